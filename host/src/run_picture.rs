@@ -52,7 +52,7 @@ struct Changes {
 }
 
 /// Largest number of marked changes: more would cover the traces.
-const MOST_CHANGES: usize = 12;
+const MAX_CHANGES: usize = 12;
 
 impl RunPicture {
     /// Creates an empty picture of a run with these devices, and the bounds to draw.
@@ -118,7 +118,7 @@ impl Observer for RunPicture {
 
 impl Changes {
     fn add(&mut self, change: &Change) {
-        if self.marked.len() < MOST_CHANGES {
+        if self.marked.len() < MAX_CHANGES {
             let text = format!("{}.{} = {}", change.plugin, change.parameter, change.value);
             self.marked.push((seconds(change.time_ns), text));
         } else {

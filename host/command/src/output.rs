@@ -3,7 +3,7 @@
 use crate::platform::results_apart;
 use crate::style::for_terminal;
 use crate::{CommandError, style};
-use flotor_servo::last_stop::{ReportedEnd, leave_process, report_end};
+use flotor_servo::last_stop::{ReportedEnd, exit_process, report_end};
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
@@ -28,8 +28,8 @@ pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
     };
     let _ = std::io::stdout().flush();
     report_end(ReportedEnd::Code(code));
-    if flotor_session::is_left_behind() {
-        leave_process(code.into());
+    if flotor_session::is_abandoned() {
+        exit_process(code.into());
     }
     ExitCode::from(code)
 }

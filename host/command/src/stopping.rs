@@ -8,7 +8,7 @@
 
 use super::{CommandError, note, print_error_line};
 use crate::platform::{INTERRUPTED, KeyTerminal, Request, Requests, is_orphaned, outlive_requests};
-use flotor_servo::last_stop::{calls, leave_process, stop_all, was_armed};
+use flotor_servo::last_stop::{calls, exit_process, stop_all, was_armed};
 use flotor_servo::{EmergencySource, StopSwitch, Stuck, THREAD_ADVICE, enter_guard_priority};
 use std::io::{self, Read, stdin};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -87,7 +87,7 @@ fn attend(requests: &Requests, first: First, stop: &StopSwitch, exit: &Exit) {
     let (mut insistence, mut hang) = (Insistence::default(), Hang::default());
     loop {
         // A thread that does not block a signal may have taken it: then only the switch shows the request.
-        let is_asked = || insistence.last.is_some() || stop.is_stop_asked();
+        let is_asked = || insistence.last.is_some() || stop.is_stop_requested();
         let patience = if is_asked() { LOOK } else { UNASKED_LOOK };
         let Some(request) = requests.next(patience) else {
             let now = Instant::now();
@@ -146,7 +146,7 @@ impl Exit {
     fn take(&self) -> ! {
         let _ = self.stop.try_send(());
         let _ = self.stopped.recv_timeout(STOP_PATIENCE);
-        leave_process(INTERRUPTED)
+        exit_process(INTERRUPTED)
     }
 }
 

@@ -32,7 +32,7 @@ pub struct CouplingConfig {
 }
 
 /// Longest delay, ticks: at least 1 s at rates up to 4 kHz.
-pub const MOST_DELAY_TICKS: u32 = 4096;
+pub const MAX_DELAY_TICKS: u32 = 4096;
 
 impl Default for CouplingConfig {
     fn default() -> Self {

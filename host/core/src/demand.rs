@@ -9,14 +9,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Returns the outputs that reach a hand at a device: force, and torque if device and scene allow any.
 #[must_use]
-pub fn felt_within(torque_nm: &Bound) -> Demand {
+pub fn hand_demand(torque_nm: &Bound) -> Demand {
     if torque_nm.longest() > 0.0 { Demand::WRENCH } else { Demand::FORCE }
 }
 
 /// Outputs that the models of a device compute in one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TickDemand {
-    felt: Demand,
+    at_hand: Demand,
     computed: Demand,
 }
 
@@ -24,15 +24,15 @@ impl TickDemand {
     /// Creates the demand from the outputs felt at a device and those that only observers request. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
-    pub const fn new(felt: Demand, observed: Demand) -> Self {
-        Self { felt, computed: felt.with(observed) }
+    pub const fn new(at_hand: Demand, observed: Demand) -> Self {
+        Self { at_hand, computed: at_hand.with(observed) }
     }
 
     /// Returns the outputs that reach the hand.
     #[inline]
     #[must_use]
-    pub const fn felt(self) -> Demand {
-        self.felt
+    pub const fn at_hand(self) -> Demand {
+        self.at_hand
     }
 
     /// Returns the outputs that reach the hand or an observer.
@@ -134,9 +134,9 @@ mod tests {
     #[test]
     fn torque_is_felt_where_device_and_scene_allow_any() {
         let device = Bound::box_of([0.0, 0.0, 0.1]);
-        assert_eq!(felt_within(&Bound::box_of([0.0; 3])), Demand::FORCE);
-        assert_eq!(felt_within(&device), Demand::WRENCH);
-        assert_eq!(felt_within(&device.and(Bound::ball(0.0))), Demand::FORCE);
-        assert_eq!(felt_within(&device.and(Bound::box_of([0.5, 0.5, 0.0]))), Demand::FORCE);
+        assert_eq!(hand_demand(&Bound::box_of([0.0; 3])), Demand::FORCE);
+        assert_eq!(hand_demand(&device), Demand::WRENCH);
+        assert_eq!(hand_demand(&device.and(Bound::ball(0.0))), Demand::FORCE);
+        assert_eq!(hand_demand(&device.and(Bound::box_of([0.5, 0.5, 0.0]))), Demand::FORCE);
     }
 }

@@ -36,4 +36,4 @@ pub use random::Random;
 /// Largest seed that commands and files accept: every program reads whole numbers up to this one exactly from JSON.
 pub const LARGEST_SEED: u64 = 1 << 53;
 /// Largest number of devices in a run.
-pub const MOST_DEVICES: u16 = 8;
+pub const MAX_DEVICES: u16 = 8;

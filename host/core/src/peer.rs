@@ -11,7 +11,7 @@ pub struct PeerState {
     /// Velocity of the handle, m/s and rad/s.
     pub twist: Twist,
     /// Running total of energy that this end has passed on to the other, J.
-    pub told_j: f64,
+    pub passed_on_j: f64,
 }
 
 /// Energy tank of an end, for reports.
@@ -24,7 +24,7 @@ pub struct TankState {
     /// Energy that the hand has put in so far less energy that has come out, J.
     pub gone_in_j: f64,
     /// Energy that was put in and then discarded, J.
-    pub given_up_j: f64,
+    pub discarded_j: f64,
 }
 
 /// Peer state with the data for its transport to another host.
@@ -101,28 +101,30 @@ impl Dispatch {
     }
 
     fn is_possible(&self) -> bool {
-        let Self { state: PeerState { pose, twist, told_j }, tank, .. } = self;
-        let TankState { level_j, lowest_j, gone_in_j, given_up_j } = tank;
+        let Self { state: PeerState { pose, twist, passed_on_j }, tank, .. } = self;
+        let TankState { level_j, lowest_j, gone_in_j, discarded_j } = tank;
         let length = pose.orientation().length();
         pose.is_finite()
             && (length - 1.0).abs() < UNIT_TOLERANCE
             && twist.is_finite()
-            && [told_j, level_j, lowest_j, gone_in_j, given_up_j].iter().all(|number| number.is_finite())
-            && *told_j >= 0.0
+            && [passed_on_j, level_j, lowest_j, gone_in_j, discarded_j]
+                .iter()
+                .all(|number| number.is_finite())
+            && *passed_on_j >= 0.0
     }
 }
 
 impl Words<DISPATCH_WORDS> for Dispatch {
     #[inline]
     fn to_words(&self) -> [u64; DISPATCH_WORDS] {
-        let Self { run, partner, since, tick, state: PeerState { pose, twist, told_j }, tank } = self;
+        let Self { run, partner, since, tick, state: PeerState { pose, twist, passed_on_j }, tank } = self;
         let Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] } = *pose;
         let Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] } = *twist;
-        let TankState { level_j, lowest_j, gone_in_j, given_up_j } = *tank;
+        let TankState { level_j, lowest_j, gone_in_j, discarded_j } = *tank;
         let [x, y, z, qx, qy, qz, qw] = [x, y, z, qx, qy, qz, qw].map(f64::to_bits);
         let [vx, vy, vz, wx, wy, wz] = [vx, vy, vz, wx, wy, wz].map(f64::to_bits);
         let [told, level, lowest, gone_in, given_up] =
-            [*told_j, level_j, lowest_j, gone_in_j, given_up_j].map(f64::to_bits);
+            [*passed_on_j, level_j, lowest_j, gone_in_j, discarded_j].map(f64::to_bits);
         #[rustfmt::skip] // a line for each part
         let words = [
             *run, *partner, *since, *tick,
@@ -150,16 +152,16 @@ impl Words<DISPATCH_WORDS> for Dispatch {
             wx,
             wy,
             wz,
-            told_j,
+            passed_on_j,
             level_j,
             lowest_j,
             gone_in_j,
-            given_up_j,
+            discarded_j,
         ] = numbers.map(f64::from_bits);
         let pose = Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] };
         let twist = Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] };
-        let tank = TankState { level_j, lowest_j, gone_in_j, given_up_j };
-        Self { run, partner, since, tick, state: PeerState { pose, twist, told_j }, tank }
+        let tank = TankState { level_j, lowest_j, gone_in_j, discarded_j };
+        Self { run, partner, since, tick, state: PeerState { pose, twist, passed_on_j }, tank }
     }
 }
 
@@ -170,13 +172,13 @@ mod tests {
     fn dispatch() -> Dispatch {
         let pose = Pose { position_m: [1.0e-3, -2.0e-3, 3.0e-3], orientation_xyzw: [0.6, 0.0, 0.0, 0.8] };
         let twist = Twist { linear_m_per_s: [0.1, 0.2, 0.3], angular_rad_per_s: [1.0, 2.0, 3.0] };
-        let tank = TankState { level_j: 4.0e-3, lowest_j: -1.0e-3, gone_in_j: -0.5, given_up_j: 0.25 };
+        let tank = TankState { level_j: 4.0e-3, lowest_j: -1.0e-3, gone_in_j: -0.5, discarded_j: 0.25 };
         Dispatch {
             run: 7,
             partner: 5,
             since: 3,
             tick: 9,
-            state: PeerState { pose, twist, told_j: 0.125 },
+            state: PeerState { pose, twist, passed_on_j: 0.125 },
             tank,
         }
     }
@@ -212,7 +214,7 @@ mod tests {
             }
         }
         let longer = Pose { orientation_xyzw: [0.6, 0.0, 0.0, 0.9], ..dispatch().state.pose };
-        let owing = PeerState { told_j: -1.0e-9, ..dispatch().state };
+        let owing = PeerState { passed_on_j: -1.0e-9, ..dispatch().state };
         for state in [PeerState { pose: longer, ..dispatch().state }, owing] {
             let wrong = Dispatch { state, ..dispatch() };
             assert_eq!(Dispatch::from_bytes(&wrong.to_bytes()), Err(InvalidDispatch::Numbers));

@@ -5,7 +5,7 @@ use flotor_hal::{Capabilities, Damper, SampledLoop};
 use std::fmt::{self, Display, Formatter};
 
 /// Force that the wall withstands inside the range of a device, N, if device and scene allow that much.
-pub const TAKEN_N: f64 = 5.0;
+pub const DESIGN_FORCE_N: f64 = 5.0;
 
 /// Ratio of the depth of a suddenly applied weight to its depth at rest.
 const SWING: f64 = 2.0;
@@ -28,9 +28,9 @@ pub struct RenderedBoundary {
     pub stiffness_nm_per_rad: f64,
     /// Rotational damping outwards, N·m·s/rad.
     pub damping_nms_per_rad: f64,
-    /// Weight that the wall holds inside the range, N; [`TAKEN_N`] or the limit of force, unless half of the range is too short.
+    /// Weight that the wall holds inside the range, N; [`DESIGN_FORCE_N`] or the limit of force, unless half of the range is too short.
     /// A weight applied at once is held too, if the limit of force is twice that.
-    pub takes_n: f64,
+    pub holds_n: f64,
     /// Force that the wall should withstand, N.
     wanted_n: f64,
     /// The scene's stiffness, N/m and N·m/rad; the second is 0 on a device without torque.
@@ -55,7 +55,8 @@ impl RenderedBoundary {
         let declared = if declared > 0.0 { declared } else { f64::INFINITY };
         let Boundary { damping_ns_per_m, damping_nms_per_rad, .. } = *boundary;
         let stiffness_n_per_m = boundary.stiffness_n_per_m.min(stable(damping_ns_per_m)).min(declared);
-        let wanted_n = most_n.and(Bound::box_of(device.max_force_n)).axes().map(|most| most.min(TAKEN_N));
+        let wanted_n =
+            most_n.and(Bound::box_of(device.max_force_n)).axes().map(|most| most.min(DESIGN_FORCE_N));
         let [x, y, z] = [0, 1, 2].map(|axis: usize| {
             Room::new(device.range_m[axis], boundary.margin_m, wanted_n[axis], stiffness_n_per_m)
         });
@@ -69,7 +70,7 @@ impl RenderedBoundary {
             damping_ns_per_m,
             stiffness_nm_per_rad: boundary.stiffness_nm_per_rad.min(stable(damping_nms_per_rad)),
             damping_nms_per_rad,
-            takes_n: wanted_n * taken_share,
+            holds_n: wanted_n * taken_share,
             wanted_n,
             requested: [boundary.stiffness_n_per_m, if turns { boundary.stiffness_nm_per_rad } else { 0.0 }],
             latency_s: device.latency_s,
@@ -92,10 +93,10 @@ impl RenderedBoundary {
             parts.push("has no damper, so only the damping of the device can keep it stable".to_owned());
         }
         // Rounding of a quotient is no shortfall.
-        if self.takes_n < self.wanted_n * (1.0 - 1.0e-9) {
+        if self.holds_n < self.wanted_n * (1.0 - 1.0e-9) {
             parts.push(format!(
                 "takes {:.1} N instead of {:.1} N, because it begins at half of the range",
-                self.takes_n, self.wanted_n
+                self.holds_n, self.wanted_n
             ));
         }
         if parts.is_empty() {
@@ -108,7 +109,7 @@ impl RenderedBoundary {
 /// Limits of the wall and the place at which it begins.
 impl Display for RenderedBoundary {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { period_s, latency_s, stiffness_n_per_m, takes_n, .. } = *self;
+        let Self { period_s, latency_s, stiffness_n_per_m, holds_n, .. } = *self;
         let begins_mm = self.begins_m.into_iter().fold(f64::INFINITY, f64::min) * 1.0e3;
         write!(
             f,
@@ -117,7 +118,7 @@ impl Display for RenderedBoundary {
             latency_s * 1.0e3
         )?;
         if begins_mm.is_finite() {
-            write!(f, ", begins {begins_mm:.1} mm from home and takes {takes_n:.1} N")?;
+            write!(f, ", begins {begins_mm:.1} mm from home and takes {holds_n:.1} N")?;
         }
         Ok(())
     }
@@ -173,7 +174,7 @@ mod tests {
         let wall = rendered(&Boundary::default(), 1.0e-3, Bound::NONE, 1_000_000);
         near(wall.stiffness_n_per_m, 2500.0);
         near(wall.begins_m[0], 0.008);
-        near(wall.takes_n, 5.0);
+        near(wall.holds_n, 5.0);
         let told = wall.notice().expect("7.5 kN/m are not stable");
         assert!(told.contains("2500 N/m instead of 7500") && told.contains("8.0 mm from home"), "{told}");
     }
@@ -188,7 +189,7 @@ mod tests {
     fn half_of_the_range_that_is_too_short_is_reported_with_the_force() {
         let wall = rendered(&Boundary::default(), 3.0e-3, Bound::NONE, 1_000_000);
         near(wall.begins_m[2], 0.006);
-        near(wall.takes_n, 7500.0 / 7.0 * 0.006 / 2.0);
+        near(wall.holds_n, 7500.0 / 7.0 * 0.006 / 2.0);
         let told = wall.notice().expect("3.2 of 5 N");
         assert!(told.contains("takes 3.2 N instead of 5.0 N"), "{told}");
     }
@@ -196,7 +197,7 @@ mod tests {
     #[test]
     fn a_limit_of_force_below_five_newtons_is_what_it_takes() {
         let wall = rendered(&Boundary::default(), 3.0e-3, Bound::ball(2.0), 1_000_000);
-        near(wall.takes_n, 2.0);
+        near(wall.holds_n, 2.0);
         let told = wall.notice().expect("stiffness");
         assert!(!told.contains("instead of 2.0 N"), "{told}");
     }

@@ -23,7 +23,7 @@ pub struct Reach {
 
 /// Rejected part of a partner's claims.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cut {
+pub struct ClaimExcess {
     /// Energy, J, in the shared frame.
     pub energy_j: f64,
     /// Distance by which the claimed position moved too fast, m, device frame.
@@ -48,7 +48,7 @@ const MORE: f64 = 2.0;
 /// so that repeated connections add no energy.
 const AT_FIRST_J: f64 = 0.02;
 /// Limits of the excess within some [`MEMORY_S`]; a partner above one of them is rejected.
-const TOO_MUCH: Cut = Cut { energy_j: 0.05, path_m: 0.25, turn_rad: 12.5 };
+const TOO_MUCH: ClaimExcess = ClaimExcess { energy_j: 0.05, path_m: 0.25, turn_rad: 12.5 };
 /// Time constant with which the recent excess decays, s.
 const MEMORY_S: f64 = 1.0;
 /// Largest distance of a partner from home, in the shared frame of devices that are not scaled, m: the range of its device
@@ -65,16 +65,16 @@ pub(super) struct Claims {
     last: Option<[DVec3; 2]>,
     /// Energy that the partner claims to have passed on, and the accepted part of it, J.
     claimed_j: f64,
-    believed_j: f64,
+    accepted_j: f64,
     /// Energy that the partner may still claim, and energy that its hand may still have put in, J.
     open_j: f64,
     hand_j: f64,
     /// Energy that this end had passed on in the last tick, J.
-    told_j: f64,
+    passed_on_j: f64,
     /// Remaining allowance of motion, m and rad.
     way: [f64; 2],
-    cut: Cut,
-    recent: Cut,
+    cut: ClaimExcess,
+    recent: ClaimExcess,
     is_cut: bool,
 }
 
@@ -88,13 +88,13 @@ impl Claims {
             period_s,
             last: None,
             claimed_j: 0.0,
-            believed_j: 0.0,
+            accepted_j: 0.0,
             open_j: 0.0,
             hand_j: HAND_W * BURST_S / mapping.energy_scale(),
-            told_j: 0.0,
+            passed_on_j: 0.0,
             way: [0.0; 2],
-            cut: Cut::default(),
-            recent: Cut::default(),
+            cut: ClaimExcess::default(),
+            recent: ClaimExcess::default(),
             is_cut: false,
         }
     }
@@ -118,10 +118,10 @@ impl Claims {
     pub(super) fn meet(&mut self, peer: &PeerState, is_another: bool) {
         self.last = None;
         if is_another {
-            self.recent = Cut::default();
+            self.recent = ClaimExcess::default();
         }
         let had_j = AT_FIRST_J.min(self.hand_j);
-        (self.claimed_j, self.open_j, self.hand_j) = (peer.told_j, had_j, self.hand_j - had_j);
+        (self.claimed_j, self.open_j, self.hand_j) = (peer.passed_on_j, had_j, self.hand_j - had_j);
     }
 
     /// Forgets the partner's pose after a silence: the next one is accepted as a start. Real-time: bounded, no allocation.
@@ -129,20 +129,20 @@ impl Claims {
         self.last = None;
     }
 
-    /// Updates the allowances for a tick; `told_j` is the total energy passed on by this end. Real-time: bounded, no allocation.
+    /// Updates the allowances for a tick; `passed_on_j` is the total energy passed on by this end. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn pass(&mut self, told_j: f64) {
+    pub(super) fn pass(&mut self, passed_on_j: f64) {
         let period_s = self.period_s;
         let shared = |hand: f64| hand / self.energy_scale;
-        self.open_j += (told_j - self.told_j).max(0.0);
+        self.open_j += (passed_on_j - self.passed_on_j).max(0.0);
         self.open_j = self.open_j.min(shared(HAND_W * BURST_S) + AT_FIRST_J);
-        self.told_j = told_j;
+        self.passed_on_j = passed_on_j;
         self.hand_j = (self.hand_j + shared(HAND_W * period_s)).min(shared(HAND_W * BURST_S));
         for (way, fastest) in self.way.iter_mut().zip([FASTEST_M_PER_S, FASTEST_RAD_PER_S]) {
             *way = (*way + fastest * period_s).min(fastest * (AT_ONCE_S + period_s));
         }
         let kept = 1.0 - (period_s / MEMORY_S).min(1.0);
-        let Cut { energy_j, path_m, turn_rad } = &mut self.recent;
+        let ClaimExcess { energy_j, path_m, turn_rad } = &mut self.recent;
         [energy_j, path_m, turn_rad].into_iter().for_each(|number| *number *= kept);
         self.is_cut = false;
     }
@@ -150,7 +150,7 @@ impl Claims {
     /// Returns the accepted part of a claim, with the handle here at `here` (device frame) and the last message `silent_s` ago; its
     /// energy is the running total of accepted energy. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn believe(
+    pub(super) fn accept(
         &mut self,
         peer: &PeerState,
         here: &DeviceState,
@@ -165,11 +165,11 @@ impl Claims {
         // A partner with more range than this device makes no false claim: the cut is reported, and not counted.
         self.is_cut = within != claimed;
         let last = self.last.unwrap_or(within);
-        let mut believed = within;
+        let mut accepted = within;
         let mut moved = [0.0; 2];
         for (index, fastest) in [FASTEST_M_PER_S, FASTEST_RAD_PER_S].into_iter().enumerate() {
             let (Some(to), Some(from), Some(way), Some(moved)) =
-                (believed.get_mut(index), last.get(index), self.way.get_mut(index), moved.get_mut(index))
+                (accepted.get_mut(index), last.get(index), self.way.get_mut(index), moved.get_mut(index))
             else {
                 continue;
             };
@@ -189,25 +189,25 @@ impl Claims {
             *moved = length.min(most);
             *way = (*way - *moved).max(0.0);
         }
-        self.last = Some(believed);
+        self.last = Some(accepted);
         // A pose that is used as claimed keeps its bits, if its orientation has length one.
-        let pose = if believed == claimed {
+        let pose = if accepted == claimed {
             normalised(&peer.pose)
         } else {
-            let pose = Pose::new(believed[0], orientation_from_rotation_vector(believed[1]));
+            let pose = Pose::new(accepted[0], orientation_from_rotation_vector(accepted[1]));
             mapping.pose_to_model(&pose)
         };
         let [path_m, turn_rad] = moved;
         let moved = [path_m / mapping.length_to_device(1.0), turn_rad];
         let here = (mapping.pose_to_model(&here.pose), mapping.twist_to_model(&here.twist));
-        let told_j = self.energy(peer.told_j, &pose, &here, moved, silent_s);
-        PeerState { pose, twist: bounded_twist(&peer.twist, mapping), told_j }
+        let passed_on_j = self.energy(peer.passed_on_j, &pose, &here, moved, silent_s);
+        PeerState { pose, twist: bounded_twist(&peer.twist, mapping), passed_on_j }
     }
 
     /// Returns the accepted energy: the total so far, J.
     fn energy(
         &mut self,
-        told_j: f64,
+        passed_on_j: f64,
         pose: &Pose,
         (here, motion): &(Pose, Twist),
         [path_m, turn_rad]: [f64; 2],
@@ -227,19 +227,19 @@ impl Claims {
         let work_j = (MORE * (force_n * path_m + torque_nm * turn_rad)).min(self.hand_j);
         self.hand_j -= work_j;
         self.open_j += work_j;
-        let claim_j = (told_j - self.claimed_j).max(0.0);
-        let believed_j = claim_j.min(self.open_j);
-        self.claimed_j = self.claimed_j.max(told_j);
-        self.open_j -= believed_j;
-        self.believed_j += believed_j;
-        let beyond_j = claim_j - believed_j;
+        let claim_j = (passed_on_j - self.claimed_j).max(0.0);
+        let accepted_j = claim_j.min(self.open_j);
+        self.claimed_j = self.claimed_j.max(passed_on_j);
+        self.open_j -= accepted_j;
+        self.accepted_j += accepted_j;
+        let beyond_j = claim_j - accepted_j;
         // Sums of some thousand terms of up to 10 mJ.
         if beyond_j > 1.0e-12 {
             self.is_cut = true;
             self.cut.energy_j += beyond_j;
             self.recent.energy_j += beyond_j;
         }
-        self.believed_j
+        self.accepted_j
     }
 
     /// Returns true if a claim was cut in this tick. Real-time: bounded, no allocation.
@@ -251,18 +251,18 @@ impl Claims {
     /// Returns true if the recent excess is above the limits for a partner. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn is_too_much(&self) -> bool {
-        let Cut { energy_j, path_m, turn_rad } = self.recent;
+        let ClaimExcess { energy_j, path_m, turn_rad } = self.recent;
         energy_j > TOO_MUCH.energy_j || path_m > TOO_MUCH.path_m || turn_rad > TOO_MUCH.turn_rad
     }
 
     /// Returns the total excess of all partners.
-    pub(super) fn cut(&self) -> Cut {
+    pub(super) fn cut(&self) -> ClaimExcess {
         self.cut
     }
 
     /// Returns the total accepted energy of all partners, J: with the energy put in by the hand here, the most that can come out.
-    pub(super) fn believed_j(&self) -> f64 {
-        self.believed_j
+    pub(super) fn accepted_j(&self) -> f64 {
+        self.accepted_j
     }
 }
 

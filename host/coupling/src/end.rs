@@ -69,37 +69,37 @@ impl End {
     /// Returns the state for the partner, with a part of the energy in the tank. Call once a tick. Real-time: bounded, no
     /// allocation.
     #[inline]
-    pub fn tell(&mut self, state: &DeviceState) -> PeerState {
-        let told_j = self.tank.pass_on(self.bounce_j());
-        self.peer_state(state, told_j)
+    pub fn send_state(&mut self, state: &DeviceState) -> PeerState {
+        let passed_on_j = self.tank.pass_on(self.bounce_j());
+        self.peer_state(state, passed_on_j)
     }
 
     /// Returns the state for a partner that may not be there, to which no energy is passed on. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn call(&self, state: &DeviceState) -> PeerState {
-        self.peer_state(state, self.tank.told_j())
+        self.peer_state(state, self.tank.passed_on_j())
     }
 
     #[inline]
-    fn peer_state(&self, state: &DeviceState, told_j: f64) -> PeerState {
+    fn peer_state(&self, state: &DeviceState, passed_on_j: f64) -> PeerState {
         PeerState {
             pose: self.mapping.pose_to_model(&state.pose),
             twist: self.mapping.twist_to_model(&state.twist),
-            told_j,
+            passed_on_j,
         }
     }
 
     /// Stores the newest peer state; those of earlier ticks may be missing. Real-time: bounded, no allocation.
     #[inline]
-    pub fn hear(&mut self, peer: &PeerState) {
-        self.tank.hear(peer.told_j);
+    pub fn receive(&mut self, peer: &PeerState) {
+        self.tank.receive(peer.passed_on_j);
         self.partner = Some(*peer);
     }
 
     /// Returns the total energy passed on to the partner, J. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn told_j(&self) -> f64 {
-        self.tank.told_j()
+    pub(super) fn passed_on_j(&self) -> f64 {
+        self.tank.passed_on_j()
     }
 
     /// Returns the mapping from the device's frame to the shared one.
@@ -127,7 +127,7 @@ impl End {
 
     /// Requests no force. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn let_go(&mut self) -> Pull {
+    pub(super) fn release(&mut self) -> Pull {
         self.bounce.asked = Wrench::ZERO;
         Pull::default()
     }

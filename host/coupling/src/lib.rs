@@ -34,13 +34,13 @@ mod tank;
 #[cfg(test)]
 mod tests;
 
-pub use claims::{Cut, Reach};
+pub use claims::{ClaimExcess, Reach};
 pub use end::End;
 pub use flotor_core::coupling::{
-    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MOST_DELAY_TICKS, PassivityMode,
+    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MAX_DELAY_TICKS, PassivityMode,
 };
 pub use flotor_core::peer::{Dispatch, PeerState, TankState};
-pub use remote::{Hearing, Line, Patience, RemoteEnd};
+pub use remote::{Line, LinkStatistics, LinkTimeouts, RemoteEnd};
 pub use tank::Tank;
 
 use delay::DelayLine;
@@ -48,7 +48,7 @@ use flotor_hal::{DeviceState, Wrench};
 
 /// State at one of the devices of a coupling in a tick.
 #[derive(Clone, Copy, Debug)]
-pub struct Grip<'a> {
+pub struct PortSample<'a> {
     /// State of the handle, device frame.
     pub state: &'a DeviceState,
     /// Wrench applied since the last tick, as far as the coupling had requested it, device frame.
@@ -85,16 +85,16 @@ impl Coupling {
 
     /// Runs one tick and returns the request of each end. Real-time: bounded, no allocation.
     #[inline]
-    pub fn step(&mut self, grips: [Grip<'_>; 2]) -> [Pull; 2] {
+    pub fn step(&mut self, samples: [PortSample<'_>; 2]) -> [Pull; 2] {
         let Self { ends: [first, second], ways: [to_first, to_second] } = self;
-        let [at_first, at_second] = grips;
+        let [at_first, at_second] = samples;
         first.observe(at_first.state, &at_first.held);
         second.observe(at_second.state, &at_second.held);
-        if let Some(peer) = to_second.pass(first.tell(at_first.state)) {
-            second.hear(&peer);
+        if let Some(peer) = to_second.pass(first.send_state(at_first.state)) {
+            second.receive(&peer);
         }
-        if let Some(peer) = to_first.pass(second.tell(at_second.state)) {
-            first.hear(&peer);
+        if let Some(peer) = to_first.pass(second.send_state(at_second.state)) {
+            first.receive(&peer);
         }
         [first.pull(at_first.state), second.pull(at_second.state)]
     }

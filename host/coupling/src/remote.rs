@@ -1,15 +1,15 @@
 //! End of a coupling whose other end is on another host.
 
 use super::brake::Brake;
-use super::claims::{Claims, Cut, Reach};
-use super::{CouplingConfig, CouplingEnd, End, Grip, Pull};
+use super::claims::{ClaimExcess, Claims, Reach};
+use super::{CouplingConfig, CouplingEnd, End, PortSample, Pull};
 use flotor_core::peer::{DISPATCH_WORDS, Dispatch, PeerState, TankState};
 use flotor_hal::{DeviceState, Tick, Wrench};
 use flotor_sync::{Observer, Publisher, latest};
 
 /// Timeout and fade of a remote end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Patience {
+pub struct LinkTimeouts {
     /// Time without a message after which the end removes its force, ns.
     pub silence_ns: u64,
     /// Time over which its force fades in, again or for the first time, ns.
@@ -20,16 +20,16 @@ pub struct Patience {
 /// newest state counts.
 pub struct Line {
     /// Last message of this end. Its `run`, `partner` and `since` are 0: the peer link sets them.
-    pub told: Observer<Dispatch, DISPATCH_WORDS>,
+    pub outgoing: Observer<Dispatch, DISPATCH_WORDS>,
     /// Messages for this end, newest last.
-    pub heard: Publisher<Dispatch, DISPATCH_WORDS>,
+    pub incoming: Publisher<Dispatch, DISPATCH_WORDS>,
     /// Time without a message after which the partner is gone, ns.
     pub silence_ns: u64,
 }
 
 /// Statistics of the messages from the partner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Hearing {
+pub struct LinkStatistics {
     /// Ticks in which a message arrived.
     pub ticks: u64,
     /// Number of timeouts of the partner.
@@ -43,14 +43,14 @@ pub struct Hearing {
     /// The partner's energy tank, as received last.
     pub partner: TankState,
     /// Accepted energy of partners, J: with the energy put in by the hand here, the most that can have come out here.
-    pub believed_j: f64,
+    pub accepted_j: f64,
     /// Rejected part of the partners' claims.
-    pub cut: Cut,
+    pub cut: ClaimExcess,
     /// Ticks in which a claim was cut.
     pub cut_ticks: u64,
     /// Runs rejected because of their claims, whose messages are ignored; 0: no run. When all places are taken, every message is
     /// ignored.
-    pub let_go: [u64; 3],
+    pub rejected_runs: [u64; 3],
 }
 
 /// End of a coupling, with the line to its partner.
@@ -59,9 +59,9 @@ pub struct Hearing {
 /// is unknown. When messages arrive (again) the force fades in.
 pub struct RemoteEnd {
     end: End,
-    patience: Patience,
-    told: Publisher<Dispatch, DISPATCH_WORDS>,
-    heard: Observer<Dispatch, DISPATCH_WORDS>,
+    timeouts: LinkTimeouts,
+    outgoing: Publisher<Dispatch, DISPATCH_WORDS>,
+    incoming: Observer<Dispatch, DISPATCH_WORDS>,
     /// Version of the message taken in last.
     version: u64,
     /// Partner's run, and the tick from which on it has this run as its partner.
@@ -69,7 +69,7 @@ pub struct RemoteEnd {
     hold: Hold,
     claims: Claims,
     brake: Brake,
-    hearing: Hearing,
+    link: LinkStatistics,
     /// True if the message of this tick was implausible.
     is_implausible: bool,
     /// True if a rejected partner may have thrown the handle: the brake acts until the handle is slow enough.
@@ -91,8 +91,8 @@ const NOBODY: Dispatch = Dispatch {
     partner: 0,
     since: 0,
     tick: 0,
-    state: PeerState { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, told_j: 0.0 },
-    tank: TankState { level_j: 0.0, lowest_j: 0.0, gone_in_j: 0.0, given_up_j: 0.0 },
+    state: PeerState { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, passed_on_j: 0.0 },
+    tank: TankState { level_j: 0.0, lowest_j: 0.0, gone_in_j: 0.0, discarded_j: 0.0 },
 };
 
 impl RemoteEnd {
@@ -102,40 +102,40 @@ impl RemoteEnd {
         config: &CouplingConfig,
         end: &CouplingEnd,
         period_s: f64,
-        patience: Patience,
+        timeouts: LinkTimeouts,
         reach: Reach,
     ) -> (Self, Line) {
-        let (told, for_partner) = latest(NOBODY);
-        let (from_partner, heard) = latest(NOBODY);
+        let (outgoing, for_partner) = latest(NOBODY);
+        let (from_partner, incoming) = latest(NOBODY);
         let end = End::new(config, &end.mapping, period_s);
         let end = Self {
             claims: Claims::new(config, end.mapping(), reach, period_s),
             brake: Brake::new(reach, period_s),
             end,
-            patience,
-            told,
-            heard,
+            timeouts,
+            outgoing,
+            incoming,
             version: 0,
             partner: None,
             hold: Hold::Released,
-            hearing: Hearing::default(),
+            link: LinkStatistics::default(),
             is_implausible: false,
             is_thrown: false,
         };
-        (end, Line { told: for_partner, heard: from_partner, silence_ns: patience.silence_ns })
+        (end, Line { outgoing: for_partner, incoming: from_partner, silence_ns: timeouts.silence_ns })
     }
 
     /// Runs one tick and returns the request of this end. Real-time: bounded, no allocation.
     #[inline]
-    pub fn step(&mut self, tick: &Tick, grip: Grip<'_>) -> Pull {
-        self.end.observe(grip.state, &grip.held);
-        self.claims.pass(self.end.told_j());
-        self.listen(tick.time_ns, grip.state);
+    pub fn step(&mut self, tick: &Tick, sample: PortSample<'_>) -> Pull {
+        self.end.observe(sample.state, &sample.held);
+        self.claims.pass(self.end.passed_on_j());
+        self.listen(tick.time_ns, sample.state);
         let state = match self.hold {
-            Hold::Released => self.end.call(grip.state),
-            Hold::On { .. } => self.end.tell(grip.state),
+            Hold::Released => self.end.call(sample.state),
+            Hold::On { .. } => self.end.send_state(sample.state),
         };
-        self.told.publish(&Dispatch {
+        self.outgoing.publish(&Dispatch {
             run: 0,
             partner: 0,
             since: 0,
@@ -145,14 +145,14 @@ impl RemoteEnd {
         });
         match self.hold {
             Hold::Released if self.is_thrown => {
-                let pull = self.end.pull_part(grip.state, 0.0, &self.brake);
+                let pull = self.end.pull_part(sample.state, 0.0, &self.brake);
                 self.is_thrown = pull.wrench != Wrench::ZERO;
                 pull
             }
-            Hold::Released => self.end.let_go(),
+            Hold::Released => self.end.release(),
             Hold::On { since_ns, .. } => {
                 let part = self.part_at(tick.time_ns - since_ns);
-                self.end.pull_part(grip.state, part, &self.brake)
+                self.end.pull_part(sample.state, part, &self.brake)
             }
         }
     }
@@ -186,8 +186,8 @@ impl RemoteEnd {
 
     /// Returns the statistics of the partner's messages. Real-time: bounded, no allocation.
     #[must_use]
-    pub fn hearing(&self) -> Hearing {
-        Hearing { believed_j: self.claims.believed_j(), cut: self.claims.cut(), ..self.hearing }
+    pub fn link(&self) -> LinkStatistics {
+        LinkStatistics { accepted_j: self.claims.accepted_j(), cut: self.claims.cut(), ..self.link }
     }
 
     /// Processes a new message, or checks the timeout.
@@ -195,34 +195,34 @@ impl RemoteEnd {
     fn listen(&mut self, now_ns: u64, here: &DeviceState) {
         // A cell that is being written now is read again in the next tick.
         self.is_implausible = false;
-        let newest = self.heard.read().filter(|(version, _)| *version != self.version);
+        let newest = self.incoming.read().filter(|(version, _)| *version != self.version);
         if let Some((version, dispatch)) = newest {
             self.version = version;
             if self.claims.can_be(&dispatch.state, self.end.mapping()) {
-                self.hear(&dispatch, now_ns, here);
+                self.receive(&dispatch, now_ns, here);
             } else {
                 self.is_implausible = true;
-                self.hearing.implausible += 1;
-                if self.hearing.run == 0 {
-                    self.hearing.run = dispatch.run;
+                self.link.implausible += 1;
+                if self.link.run == 0 {
+                    self.link.run = dispatch.run;
                 }
             }
         }
         if let Hold::On { heard_ns, .. } = self.hold {
             let wait_ns = now_ns - heard_ns;
-            if wait_ns >= self.patience.silence_ns {
+            if wait_ns >= self.timeouts.silence_ns {
                 self.hold = Hold::Released;
-                self.hearing.silences += 1;
+                self.link.silences += 1;
             } else {
-                self.hearing.longest_wait_ns = self.hearing.longest_wait_ns.max(wait_ns);
+                self.link.longest_wait_ns = self.link.longest_wait_ns.max(wait_ns);
             }
         }
     }
 
     #[inline]
-    fn hear(&mut self, dispatch: &Dispatch, now_ns: u64, here: &DeviceState) {
-        let is_let_go = self.hearing.let_go.contains(&dispatch.run);
-        if is_let_go || !self.hearing.let_go.contains(&0) {
+    fn receive(&mut self, dispatch: &Dispatch, now_ns: u64, here: &DeviceState) {
+        let is_rejected = self.link.rejected_runs.contains(&dispatch.run);
+        if is_rejected || !self.link.rejected_runs.contains(&0) {
             return;
         }
         let partner = (dispatch.run, dispatch.since);
@@ -240,20 +240,20 @@ impl RemoteEnd {
             Hold::On { heard_ns, .. } => now_ns - heard_ns,
         };
         let mapping = self.end.mapping();
-        let believed = self.claims.believe(&dispatch.state, here, mapping, silent_ns as f64 * 1.0e-9);
-        self.end.hear(&believed);
-        self.hearing.cut_ticks += u64::from(self.claims.is_cut());
+        let accepted = self.claims.accept(&dispatch.state, here, mapping, silent_ns as f64 * 1.0e-9);
+        self.end.receive(&accepted);
+        self.link.cut_ticks += u64::from(self.claims.is_cut());
         if self.claims.is_too_much() {
-            if let Some(place) = self.hearing.let_go.iter_mut().find(|run| **run == 0) {
+            if let Some(place) = self.link.rejected_runs.iter_mut().find(|run| **run == 0) {
                 *place = dispatch.run;
             }
             self.hold = Hold::Released;
             self.is_thrown = true;
             return;
         }
-        self.hearing.run = dispatch.run;
-        self.hearing.ticks += 1;
-        self.hearing.partner = dispatch.tank;
+        self.link.run = dispatch.run;
+        self.link.ticks += 1;
+        self.link.partner = dispatch.tank;
         let since_ns = match self.hold {
             Hold::Released => now_ns,
             Hold::On { since_ns, .. } => since_ns,
@@ -264,7 +264,7 @@ impl RemoteEnd {
     /// Returns the share of the pull, by the time since the first message.
     #[inline]
     fn part_at(&self, held_ns: u64) -> f64 {
-        let [held, fade] = [held_ns, self.patience.fade_ns].map(|ns| ns as f64);
-        if held_ns >= self.patience.fade_ns { 1.0 } else { held / fade }
+        let [held, fade] = [held_ns, self.timeouts.fade_ns].map(|ns| ns as f64);
+        if held_ns >= self.timeouts.fade_ns { 1.0 } else { held / fade }
     }
 }

@@ -13,10 +13,10 @@ pub struct Tank {
     level_j: f64,
     lowest_j: f64,
     gone_in_j: f64,
-    told_j: f64,
+    passed_on_j: f64,
     /// Running total of the partner, as received last.
-    heard_j: f64,
-    given_up_j: f64,
+    received_j: f64,
+    discarded_j: f64,
 }
 
 impl Tank {
@@ -34,32 +34,32 @@ impl Tank {
     pub(super) fn pass_on(&mut self, kept_j: f64) -> f64 {
         let part_j = PASSED_ON * (self.level_j - kept_j).max(0.0);
         self.level_j -= part_j;
-        self.told_j += part_j;
-        self.told_j
+        self.passed_on_j += part_j;
+        self.passed_on_j
     }
 
-    /// Adds the energy that the partner has passed on since its last message; `told_j` is its running total. An overtaken
+    /// Adds the energy that the partner has passed on since its last message; `passed_on_j` is its running total. An overtaken
     /// message adds none. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn hear(&mut self, told_j: f64) {
-        if told_j > self.heard_j {
-            self.level_j += told_j - self.heard_j;
-            self.heard_j = told_j;
+    pub(super) fn receive(&mut self, passed_on_j: f64) {
+        if passed_on_j > self.received_j {
+            self.level_j += passed_on_j - self.received_j;
+            self.received_j = passed_on_j;
         }
     }
 
     /// Returns the total energy passed on to the partner, J.
     #[inline]
-    pub(super) fn told_j(&self) -> f64 {
-        self.told_j
+    pub(super) fn passed_on_j(&self) -> f64 {
+        self.passed_on_j
     }
 
     /// Returns the tank in numbers, for reports. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn state(&self) -> TankState {
-        let Self { level_j, lowest_j, gone_in_j, given_up_j, .. } = *self;
-        TankState { level_j, lowest_j, gone_in_j, given_up_j }
+        let Self { level_j, lowest_j, gone_in_j, discarded_j, .. } = *self;
+        TankState { level_j, lowest_j, gone_in_j, discarded_j }
     }
 
     /// Discards the energy above `most_j`, so that energy dissipated in a damper does not drive anything later.
@@ -68,7 +68,7 @@ impl Tank {
     #[inline]
     pub(super) fn limit(&mut self, most_j: f64) {
         let excess_j = (self.level_j - most_j).max(0.0);
-        self.given_up_j += excess_j;
+        self.discarded_j += excess_j;
         self.level_j -= excess_j;
     }
 
@@ -93,13 +93,13 @@ impl Tank {
 
     /// Returns the energy that was put in and then discarded, J.
     #[must_use]
-    pub fn given_up_j(&self) -> f64 {
-        self.given_up_j
+    pub fn discarded_j(&self) -> f64 {
+        self.discarded_j
     }
 
     /// Returns the error of the balance: energy received less energy passed on, discarded and available, J.
     #[must_use]
     pub fn imbalance_j(&self) -> f64 {
-        self.gone_in_j + self.heard_j - self.told_j - self.given_up_j - self.level_j
+        self.gone_in_j + self.received_j - self.passed_on_j - self.discarded_j - self.level_j
     }
 }

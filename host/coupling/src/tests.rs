@@ -62,7 +62,7 @@ fn shaken(config: CouplingConfig) -> (f64, f64) {
     let (mut lowest_j, mut fastest_m_per_s) = (0.0_f64, 0.0_f64);
     for tick in 0..5000 {
         let states = sliders.each_ref().map(Slider::state);
-        let [first, second] = [0, 1].map(|end| Grip { state: &states[end], held: sliders[end].held() });
+        let [first, second] = [0, 1].map(|end| PortSample { state: &states[end], held: sliders[end].held() });
         let pulls = coupling.step([first, second]);
         let gone_in_j: f64 = coupling.tanks().iter().map(|tank| tank.gone_in_j()).sum();
         lowest_j = lowest_j.min(gone_in_j);
@@ -104,8 +104,8 @@ fn tanks_balance_and_energy_on_its_way_is_in_neither() {
     let mut sliders = [Slider::AT_REST, Slider::AT_REST];
     for tick in 0..2000 {
         let states = sliders.each_ref().map(Slider::state);
-        let grips = [0, 1].map(|end| Grip { state: &states[end], held: sliders[end].held() });
-        let pulls = coupling.step(grips);
+        let samples = [0, 1].map(|end| PortSample { state: &states[end], held: sliders[end].held() });
+        let pulls = coupling.step(samples);
         let push_n = 0.5 * (0.02 * f64::from(tick)).sin();
         sliders.iter_mut().zip([push_n, -push_n]).zip(pulls).for_each(|((slider, push_n), pull)| {
             slider.slide(push_n, &pull);
@@ -114,7 +114,7 @@ fn tanks_balance_and_energy_on_its_way_is_in_neither() {
         for tank in tanks {
             assert!(tank.imbalance_j().abs() < 1.0e-12, "tick {tick}: {tank:?}");
         }
-        let there_j: f64 = tanks.iter().map(|tank| tank.level_j() + tank.given_up_j()).sum();
+        let there_j: f64 = tanks.iter().map(|tank| tank.level_j() + tank.discarded_j()).sum();
         let gone_in_j: f64 = tanks.iter().map(|tank| tank.gone_in_j()).sum();
         assert!(there_j <= gone_in_j + 1.0e-12, "tick {tick}: {there_j} J of {gone_in_j} J");
     }
@@ -137,7 +137,7 @@ fn the_pair_generates_no_energy_whatever_becomes_of_the_messages() {
             let states = sliders.each_ref().map(Slider::state);
             for from in [0, 1] {
                 ends[from].observe(&states[from], &sliders[from].held());
-                let peer = ends[from].tell(&states[from]);
+                let peer = ends[from].send_state(&states[from]);
                 #[allow(clippy::cast_possible_truncation)] // up to 80 ticks
                 let late = (40.0 + 40.0 * random(&mut state)) as i32;
                 if random(&mut state) > -1.0 / 3.0 {
@@ -145,7 +145,7 @@ fn the_pair_generates_no_energy_whatever_becomes_of_the_messages() {
                 }
             }
             for (end, way) in ends.iter_mut().zip(&mut ways) {
-                way.iter().filter(|(arrives, _)| *arrives == tick).for_each(|(_, peer)| end.hear(peer));
+                way.iter().filter(|(arrives, _)| *arrives == tick).for_each(|(_, peer)| end.receive(peer));
                 way.retain(|(arrives, _)| *arrives > tick);
             }
             let gone_in_j: f64 = ends.iter().map(|end| end.tank().gone_in_j()).sum();
@@ -186,8 +186,8 @@ fn scales_and_frames_are_the_mappings_and_energy_balances_across_them() {
             twist: Twist::new(DVec3::Z * 0.02, DVec3::ZERO),
             ..DeviceState::HOME
         };
-        let grip = |state, pull: &Pull| Grip { state, held: pull.wrench };
-        pulls = coupling.step([grip(&up, &pulls[0]), grip(&still, &pulls[1])]);
+        let sample = |state, pull: &Pull| PortSample { state, held: pull.wrench };
+        pulls = coupling.step([sample(&up, &pulls[0]), sample(&still, &pulls[1])]);
     }
     let spring_n = config.stiffness_n_per_m * 0.00398 + config.damping_ns_per_m * 0.02;
     let [first, second] = pulls.map(|pull| pull.wrench.force());

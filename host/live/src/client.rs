@@ -3,7 +3,7 @@
 use crate::frame::{Frames, Kind, LongFrame, frame, ticks_from_payload};
 use crate::message::{Answer, Ask, ChangeMessage, End, Greeting, Request};
 use crate::platform::{Stream, connect};
-use crate::{Directory, Found, PROTOCOL};
+use crate::{Directory, FoundRun, PROTOCOL};
 use flotor_core::trace::TickRecord;
 use flotor_record::RunDescription;
 use std::io::{self, ErrorKind, Write};
@@ -46,12 +46,12 @@ pub enum LiveError {
     },
     /// A message of the host is malformed.
     #[error("malformed message from the host: {0}; use both from one build")]
-    Garbled(String),
+    Malformed(String),
 }
 
 impl From<LongFrame> for LiveError {
     fn from(error: LongFrame) -> Self {
-        Self::Garbled(error.to_string())
+        Self::Malformed(error.to_string())
     }
 }
 
@@ -78,14 +78,14 @@ pub enum Event {
 pub struct Client {
     stream: Stream,
     frames: Frames,
-    asker: Asker,
+    request_client: RequestClient,
     greeting: Greeting,
     run: RunDescription,
 }
 
 /// Client for sending requests to a run, from any thread; cheap to clone.
 #[derive(Clone, Debug)]
-pub struct Asker {
+pub struct RequestClient {
     stream: Arc<Mutex<Stream>>,
     number: Arc<AtomicU64>,
 }
@@ -107,7 +107,7 @@ impl Client {
         let (runs, others): (Vec<_>, Vec<_>) =
             directory.runs().into_iter().partition(|run| run.process == process);
         if runs.is_empty() && !others.is_empty() {
-            let other = |run: &Found| match Self::connect(&run.path) {
+            let other = |run: &FoundRun| match Self::connect(&run.path) {
                 Ok(client) => format!("{} \"{}\"", run.process, client.greeting.title),
                 Err(_) => run.process.to_string(),
             };
@@ -116,7 +116,7 @@ impl Client {
         Self::first_of(directory, runs)
     }
 
-    fn first_of(directory: &Directory, runs: Vec<Found>) -> Result<Self, LiveError> {
+    fn first_of(directory: &Directory, runs: Vec<FoundRun>) -> Result<Self, LiveError> {
         let mut first = None;
         for run in runs {
             match Self::connect(&run.path) {
@@ -145,11 +145,11 @@ impl Client {
         let run = read_frame(&mut stream, &mut frames, until, |kind, payload| {
             (kind == Kind::Run).then(|| RunDescription::from_bytes(payload))
         })?;
-        let run = run.ok_or_else(silent)?.map_err(|error| LiveError::Garbled(error.to_string()))?;
+        let run = run.ok_or_else(silent)?.map_err(|error| LiveError::Malformed(error.to_string()))?;
         let requests = stream.try_clone()?;
         requests.set_write_timeout(Some(ASK_WAIT))?;
-        let asker = Asker { stream: Arc::new(Mutex::new(requests)), number: Arc::default() };
-        Ok(Self { stream, frames, asker, greeting, run })
+        let request_client = RequestClient { stream: Arc::new(Mutex::new(requests)), number: Arc::default() };
+        Ok(Self { stream, frames, request_client, greeting, run })
     }
 
     /// Returns the greeting of the host.
@@ -166,8 +166,8 @@ impl Client {
 
     /// Returns a client for sending requests.
     #[must_use]
-    pub fn asker(&self) -> Asker {
-        self.asker.clone()
+    pub fn request_client(&self) -> RequestClient {
+        self.request_client.clone()
     }
 
     /// Waits for the next event; `None` on timeout.
@@ -190,7 +190,7 @@ impl Client {
     }
 }
 
-impl Asker {
+impl RequestClient {
     /// Sends a request; returns the number that its answer will contain.
     ///
     /// # Errors
@@ -236,7 +236,7 @@ fn read_frame<T>(
 }
 
 fn json<T: serde::de::DeserializeOwned>(payload: &[u8]) -> Result<T, LiveError> {
-    serde_json::from_slice(payload).map_err(|error| LiveError::Garbled(error.to_string()))
+    serde_json::from_slice(payload).map_err(|error| LiveError::Malformed(error.to_string()))
 }
 
 fn silent() -> LiveError {

@@ -23,7 +23,7 @@ pub struct Directory {
 
 /// Run found in the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Found {
+pub struct FoundRun {
     /// Socket of the run.
     pub path: PathBuf,
     /// Id of the process that carries out the run.
@@ -123,7 +123,7 @@ impl Directory {
 
     /// Returns the runs whose sockets are open, the newest first; none if the folder cannot be read. Removes the files of closed sockets.
     #[must_use]
-    pub fn runs(&self) -> Vec<Found> {
+    pub fn runs(&self) -> Vec<FoundRun> {
         self.try_runs().unwrap_or_default()
     }
 
@@ -131,8 +131,8 @@ impl Directory {
     ///
     /// # Errors
     /// [`DirectoryError::Unusable`] if the folder cannot be read, or another user owns it.
-    pub fn try_runs(&self) -> Result<Vec<Found>, DirectoryError> {
-        let mut runs: Vec<Found> = (self.list().map_err(unusable(&self.path))?.into_iter())
+    pub fn try_runs(&self) -> Result<Vec<FoundRun>, DirectoryError> {
+        let mut runs: Vec<FoundRun> = (self.list().map_err(unusable(&self.path))?.into_iter())
             .filter_map(|entry| {
                 let path = entry.path();
                 let process = process_of(&path)?;
@@ -140,7 +140,7 @@ impl Directory {
                     return None;
                 }
                 let since = entry.metadata().ok()?.modified().ok()?;
-                Some(Found { path, process, since })
+                Some(FoundRun { path, process, since })
             })
             .collect();
         runs.sort_by(|a, b| (b.since, &b.path).cmp(&(a.since, &a.path)));

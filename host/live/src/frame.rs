@@ -5,7 +5,7 @@ use flotor_sync::Words;
 use std::io::{self, Read};
 
 /// Longest payload, bytes: a few seconds of ticks. A longer one is malformed.
-pub const MOST_PAYLOAD: usize = 1 << 21;
+pub const MAX_PAYLOAD: usize = 1 << 21;
 /// Bytes of length and kind.
 const HEAD: usize = 5;
 /// Bytes of a record.
@@ -62,16 +62,16 @@ impl Kind {
 
 /// Error of a frame that is too long: the other side uses another protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a frame of {length} bytes exceeds {MOST_PAYLOAD}: protocol mismatch; use both sides from one build")]
+#[error("a frame of {length} bytes exceeds {MAX_PAYLOAD}: protocol mismatch; use both sides from one build")]
 pub struct LongFrame {
     /// Length in the frame's head, bytes.
     pub length: usize,
 }
 
-/// Encodes a message as a frame. `payload` is at most [`MOST_PAYLOAD`] long.
+/// Encodes a message as a frame. `payload` is at most [`MAX_PAYLOAD`] long.
 #[must_use]
 pub fn frame(kind: Kind, payload: &[u8]) -> Vec<u8> {
-    debug_assert!(payload.len() <= MOST_PAYLOAD);
+    debug_assert!(payload.len() <= MAX_PAYLOAD);
     let length = u32::try_from(payload.len()).unwrap_or(u32::MAX);
     let mut bytes = Vec::with_capacity(HEAD + payload.len());
     bytes.extend(length.to_le_bytes());
@@ -116,7 +116,7 @@ impl Frames {
         };
         let [a, b, c, d, kind] = *head;
         let length = usize::try_from(u32::from_le_bytes([a, b, c, d])).unwrap_or(usize::MAX);
-        if length > MOST_PAYLOAD {
+        if length > MAX_PAYLOAD {
             return Err(LongFrame { length });
         }
         let Some(payload) = rest.get(..length) else { return Ok(None) };

@@ -46,7 +46,7 @@ struct Kept {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pressed {
     /// Source of the press, in words for people.
-    pub who: String,
+    pub source: String,
     /// Time of the press by this machine's clock.
     pub at: SystemTime,
 }
@@ -230,7 +230,7 @@ impl LatchState {
     /// Adds a press that is not released.
     fn add(&mut self, number: u64, who: String) {
         self.presses.push(number);
-        self.pressed.get_or_insert(Pressed { who, at: UNIX_EPOCH + Duration::from_nanos(number) });
+        self.pressed.get_or_insert(Pressed { source: who, at: UNIX_EPOCH + Duration::from_nanos(number) });
     }
 }
 
@@ -292,7 +292,7 @@ impl std::fmt::Display for Pressed {
             120..=7199 => (ago_s / 60, "min"),
             _ => (ago_s / 3600, "h"),
         };
-        write!(formatter, "{}, {number} {unit} ago", self.who)
+        write!(formatter, "{}, {number} {unit} ago", self.source)
     }
 }
 

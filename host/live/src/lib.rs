@@ -64,9 +64,9 @@ mod platform;
 mod server;
 mod stop;
 
-pub use client::{Asker, Client, Event, LiveError};
-pub use directory::{Directory, DirectoryError, Found, Listener, process_number, set_process_number};
-pub use frame::{Frames, Kind, LongFrame, MOST_PAYLOAD, frame, ticks_from_payload, ticks_to_payload};
+pub use client::{Client, Event, LiveError, RequestClient};
+pub use directory::{Directory, DirectoryError, FoundRun, Listener, process_number, set_process_number};
+pub use frame::{Frames, Kind, LongFrame, MAX_PAYLOAD, frame, ticks_from_payload, ticks_to_payload};
 pub use latch::{Latch, LatchState, Pressed};
 pub use message::{
     Answer, Ask, ChangeMessage, End, EndKind, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape,

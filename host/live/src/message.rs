@@ -243,7 +243,8 @@ pub enum Ask {
         every: u32,
     },
     /// Send no more ticks.
-    LookAway,
+    #[serde(rename = "look-away")]
+    Unwatch,
     /// Set new values of live parameters, all before the same tick.
     Set {
         /// The values.

@@ -26,7 +26,7 @@ pub const CALL_PERIOD: Duration = Duration::from_millis(100);
 /// Timeout of a subscription without a call.
 const FORGET_AFTER: Duration = Duration::from_secs(1);
 /// Largest number of subscribers of a coupling.
-const MOST_JOINED: usize = 8;
+const MAX_JOINED: usize = 8;
 /// Buffer size, bytes, more than any message: a datagram that fills it is malformed.
 const BUFFER_BYTES: usize = 1024;
 
@@ -119,17 +119,17 @@ impl PeerSocket {
     }
 
     /// Sends the peer state to all receivers. Drops closed sockets; a full one misses the state.
-    pub fn tell(&mut self, dispatch: &Dispatch) {
-        self.send(&dispatch.to_bytes());
+    pub fn send(&mut self, dispatch: &Dispatch) {
+        self.send_bytes(&dispatch.to_bytes());
     }
 
     /// Subscribes, without a peer state. Returns false if the host has closed its socket.
-    pub fn call(&mut self) -> bool {
-        self.send(&[]);
+    pub fn subscribe(&mut self) -> bool {
+        self.send_bytes(&[]);
         !self.peers.is_empty()
     }
 
-    fn send(&mut self, bytes: &[u8]) {
+    fn send_bytes(&mut self, bytes: &[u8]) {
         let Self { socket, peers, .. } = self;
         peers.retain(|peer| {
             let is_here = peer.called.is_none_or(|called| called.elapsed() < FORGET_AFTER);
@@ -144,22 +144,22 @@ impl PeerSocket {
     ///
     /// # Errors
     /// If a message is malformed.
-    pub fn hear(&mut self) -> Result<Option<Dispatch>, InvalidDispatch> {
+    pub fn receive(&mut self) -> Result<Option<Dispatch>, InvalidDispatch> {
         let mut buffer = [0; BUFFER_BYTES];
         loop {
             let Ok((length, from)) = self.socket.recv_from(&mut buffer) else { return Ok(None) };
             if let Some(path) = from.as_pathname() {
-                self.called_by(path);
+                self.subscribe_peer(path);
             }
             match buffer.get(..length).unwrap_or_default() {
-                [] => {} // a call
+                [] => {} // a subscription
                 bytes => return Dispatch::from_bytes(bytes).map(Some),
             }
         }
     }
 
-    fn called_by(&mut self, path: &Path) {
-        let has_room = self.peers.len() < MOST_JOINED;
+    fn subscribe_peer(&mut self, path: &Path) {
+        let has_room = self.peers.len() < MAX_JOINED;
         match self.peers.iter_mut().find(|peer| peer.path == path) {
             Some(Peer { called: None, .. }) => {} // the host, whom this end has joined
             Some(peer) => peer.called = Some(Instant::now()),
@@ -188,7 +188,8 @@ mod tests {
     use flotor_core::peer::{PeerState, TankState};
 
     fn dispatch(tick: u64) -> Dispatch {
-        let state = PeerState { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, told_j: 0.0 };
+        let state =
+            PeerState { pose: flotor_hal::Pose::HOME, twist: flotor_hal::Twist::ZERO, passed_on_j: 0.0 };
         Dispatch { run: 1, partner: 0, since: 0, tick, state, tank: TankState::default() }
     }
 
@@ -200,28 +201,28 @@ mod tests {
         let found = directory.couplings();
         assert_eq!(found.iter().map(|found| found.name.as_str()).collect::<Vec<_>>(), ["pair"]);
         let mut bridges = [(); 2].map(|()| PeerSocket::join(&directory, &found[0]).unwrap());
-        host.tell(&dispatch(1));
-        assert_eq!(bridges[0].hear(), Ok(None), "nobody has called yet");
-        assert!(bridges[0].call());
-        bridges[1].tell(&dispatch(7));
-        assert_eq!(host.hear(), Ok(Some(dispatch(7))), "a call is no message");
-        assert_eq!(host.hear(), Ok(None));
-        host.tell(&dispatch(2));
+        host.send(&dispatch(1));
+        assert_eq!(bridges[0].receive(), Ok(None), "nobody has called yet");
+        assert!(bridges[0].subscribe());
+        bridges[1].send(&dispatch(7));
+        assert_eq!(host.receive(), Ok(Some(dispatch(7))), "a call is no message");
+        assert_eq!(host.receive(), Ok(None));
+        host.send(&dispatch(2));
         for bridge in &mut bridges {
-            assert_eq!(bridge.hear(), Ok(Some(dispatch(2))));
+            assert_eq!(bridge.receive(), Ok(Some(dispatch(2))));
         }
         let [mut first, second] = bridges;
         drop(second);
         // At the first word to it; on Windows, once its file is looked at again.
         let is_forgotten = (0..100).any(|_| {
             std::thread::sleep(Duration::from_millis(1));
-            host.tell(&dispatch(3));
+            host.send(&dispatch(3));
             host.peers.len() == 1
         });
         assert!(is_forgotten);
         drop(host);
         assert_eq!(directory.couplings(), []);
-        assert!(!first.call(), "the host is gone");
+        assert!(!first.subscribe(), "the host is gone");
     }
 
     #[test]
@@ -230,12 +231,12 @@ mod tests {
         let directory = Directory::at(scratch.path().join("runs"));
         let mut host = PeerSocket::listen(&directory, "pair").unwrap();
         let mut stalled = PeerSocket::join(&directory, &directory.couplings()[0]).unwrap();
-        assert!(stalled.call());
-        assert_eq!(host.hear(), Ok(None));
+        assert!(stalled.subscribe());
+        assert_eq!(host.receive(), Ok(None));
         // More than a socket of any system has room for, and sent well within the time after which a caller is forgotten.
-        (0..600).for_each(|tick| host.tell(&dispatch(tick)));
+        (0..600).for_each(|tick| host.send(&dispatch(tick)));
         assert_eq!(host.peers.len(), 1, "no room is no reason to forget it");
-        assert_eq!(stalled.hear(), Ok(Some(dispatch(0))));
+        assert_eq!(stalled.receive(), Ok(Some(dispatch(0))));
     }
 
     #[test]
@@ -246,7 +247,7 @@ mod tests {
         let stranger = Datagrams::bind(&scratch.path().join("stranger")).unwrap();
         for length in [1, 168, 175, 177, 5000] {
             stranger.send_to(&vec![7; length], host.path()).unwrap();
-            assert!(matches!(host.hear(), Err(InvalidDispatch::Length { .. })), "{length} bytes");
+            assert!(matches!(host.receive(), Err(InvalidDispatch::Length { .. })), "{length} bytes");
         }
     }
 }

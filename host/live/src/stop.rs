@@ -5,7 +5,7 @@
 use crate::frame::{Frames, Kind, frame};
 use crate::message::{Answer, Ask, Request};
 use crate::platform::{Stream, connect_now};
-use crate::{DirectoryError, Found, Latch};
+use crate::{DirectoryError, FoundRun, Latch};
 use std::io::{ErrorKind, Write};
 use std::time::{Duration, Instant};
 
@@ -41,7 +41,7 @@ impl Latch {
 
 /// Run that has not confirmed yet.
 struct Stopping {
-    run: Found,
+    run: FoundRun,
     connection: Option<(Stream, Frames)>,
 }
 
@@ -83,7 +83,7 @@ impl Stopping {
 }
 
 /// Connects and sends the request.
-fn ask(run: &Found) -> Result<Stream, ErrorKind> {
+fn ask(run: &FoundRun) -> Result<Stream, ErrorKind> {
     let mut stream = connect_now(&run.path).map_err(|error| error.kind())?;
     let request = Request { number: 0, ask: Ask::MachineStop };
     let request = serde_json::to_vec(&request).map_err(|_| ErrorKind::InvalidData)?;

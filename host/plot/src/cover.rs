@@ -10,7 +10,7 @@ const ONE_LINE_PX: f64 = 1.2;
 const COVERING_SHARE: f64 = 0.5;
 
 /// Number of distinct widths of covered lines; more lines over one another share the largest.
-const MOST_COVERS: usize = 3;
+const MAX_COVERS: usize = 3;
 
 /// Lowest and highest point of a line in each pixel column of its panel.
 #[derive(Debug, Default)]
@@ -69,7 +69,7 @@ pub fn covering_lines(lines: &[Vec<Vec<(f64, f64)>>], [left, right]: [f64; 2]) -
     let frame = Rect { left, top: 0.0, width: right - left, height: 0.0 };
     let courses: Vec<Course> = lines.iter().map(|runs| Course::of(runs, &frame)).collect();
     let covers = |(lower, course): (usize, &Course)| {
-        courses.iter().skip(lower + 1).filter(|upper| course.is_under(upper)).count().min(MOST_COVERS)
+        courses.iter().skip(lower + 1).filter(|upper| course.is_under(upper)).count().min(MAX_COVERS)
     };
     courses.iter().enumerate().map(covers).collect()
 }
@@ -91,7 +91,7 @@ pub(super) fn count_covers(drawings: &mut [Option<Drawing>]) {
             Drawing::Line { course: upper, .. } => course.is_under(upper),
             _ => false,
         });
-        *covers = over.count().min(MOST_COVERS);
+        *covers = over.count().min(MAX_COVERS);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::schema::{Coupling as CouplingMessage, CouplingEnd as EndMessage, Mapping, Missing, Passivity};
 use flotor_core::coupling::{
-    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MOST_DELAY_TICKS, PassivityMode,
+    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MAX_DELAY_TICKS, PassivityMode,
 };
 
 impl From<&CouplingDescription> for CouplingMessage {
@@ -44,7 +44,7 @@ impl TryFrom<CouplingMessage> for CouplingDescription {
             damping_ns_per_m: message.damping_ns_per_m(),
             stiffness_nm_per_rad: message.stiffness_nm_per_rad(),
             damping_nms_per_rad: message.damping_nms_per_rad(),
-            delay_ticks: message.delay_ticks.min(MOST_DELAY_TICKS),
+            delay_ticks: message.delay_ticks.min(MAX_DELAY_TICKS),
             reserve_j: message.reserve_j(),
             passivity,
         };

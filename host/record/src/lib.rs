@@ -51,10 +51,10 @@ pub use digest::{Coverage, TraceDigest};
 pub use file::FileError;
 pub use files::NamedFile;
 pub use flotor_mcap::Ending;
-pub use messages::{NoMessage, TickMessages, change_from_bytes, change_to_bytes, tick_from_messages};
+pub use messages::{InvalidMessage, TickMessages, change_from_bytes, change_to_bytes, tick_from_messages};
 pub use reader::{Damage, ReadError, Recording};
 pub use repair::{RepairError, Repaired, repair};
-pub use run::{NoRun, PluginDescription, Role, RunDescription};
+pub use run::{InvalidRun, PluginDescription, Role, RunDescription};
 pub use writer::{RecordError, Recorder};
 
 /// Severity of a [`Note`].

@@ -8,7 +8,7 @@ use prost::Message;
 /// Error of bytes that are not a complete message of a recording.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no {message}: {reason}")]
-pub struct NoMessage {
+pub struct InvalidMessage {
     message: &'static str,
     reason: String,
 }
@@ -36,9 +36,9 @@ impl TickMessages {
 /// Decodes the record of a tick from its two messages. Not real-time.
 ///
 /// # Errors
-/// [`NoMessage`] if they cannot be decoded, are incomplete, or belong to two different ticks.
-pub fn tick_from_messages(pose: &[u8], tick: &[u8]) -> Result<TickRecord, NoMessage> {
-    let wrong = |message: &'static str| move |reason: String| NoMessage { message, reason };
+/// [`InvalidMessage`] if they cannot be decoded, are incomplete, or belong to two different ticks.
+pub fn tick_from_messages(pose: &[u8], tick: &[u8]) -> Result<TickRecord, InvalidMessage> {
+    let wrong = |message: &'static str| move |reason: String| InvalidMessage { message, reason };
     let lacks = |Missing(part)| format!("it has no `{part}`");
     let of_pose = wrong("foxglove.FrameTransform");
     let of_tick = wrong("flotor.Tick");
@@ -61,9 +61,9 @@ pub fn change_to_bytes(change: &Change) -> Vec<u8> {
 /// Decodes a change from a protobuf message `flotor.Change`, given its time, ns. Not real-time.
 ///
 /// # Errors
-/// [`NoMessage`] if it cannot be decoded or is incomplete.
-pub fn change_from_bytes(bytes: &[u8], time_ns: u64) -> Result<Change, NoMessage> {
-    let wrong = |reason: String| NoMessage { message: "flotor.Change", reason };
+/// [`InvalidMessage`] if it cannot be decoded or is incomplete.
+pub fn change_from_bytes(bytes: &[u8], time_ns: u64) -> Result<Change, InvalidMessage> {
+    let wrong = |reason: String| InvalidMessage { message: "flotor.Change", reason };
     let message = ChangeMessage::decode(bytes).map_err(|cause| wrong(cause.to_string()))?;
     message.change(time_ns).map_err(|Missing(part)| wrong(format!("it has no `{part}`")))
 }

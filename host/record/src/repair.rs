@@ -17,7 +17,7 @@ pub enum RepairError {
     Write(#[from] RecordError),
     /// The recording is complete: there is nothing to repair.
     #[error("`{}` is whole: there is nothing to repair", path.display())]
-    Whole {
+    Complete {
         /// Path of the file.
         path: PathBuf,
     },
@@ -64,7 +64,7 @@ pub fn repair(from: &Path, to: &Path) -> Result<Repaired, RepairError> {
     }
     if !is_truncated && repaired.damage.is_none() {
         recorder.discard();
-        return Err(RepairError::Whole { path: from.into() });
+        return Err(RepairError::Complete { path: from.into() });
     }
     recorder.finish()?;
     Ok(repaired)

@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 /// Error of bytes that do not describe a run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("not a run description: {0}")]
-pub struct NoRun(String);
+pub struct InvalidRun(String);
 
 /// Description of a run before its start.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +58,7 @@ pub struct PluginDescription {
     /// Declared latency of a device, s; 0 in recordings of earlier versions.
     pub latency_s: f64,
     /// Outputs of models that reach the hand at a device; force and torque in recordings of earlier versions.
-    pub felt: Demand,
+    pub at_hand: Demand,
     /// Settings of scene and command line, as written, in order: these repeat the run.
     pub settings: Vec<(String, String)>,
     /// All parameters with the values that the run used.
@@ -85,15 +85,15 @@ impl RunDescription {
     ///
     /// # Errors
     /// If the message cannot be decoded, has a later format, or is incomplete.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, NoRun> {
-        let run = Run::decode(bytes).map_err(|cause| NoRun(cause.to_string()))?;
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, InvalidRun> {
+        let run = Run::decode(bytes).map_err(|cause| InvalidRun(cause.to_string()))?;
         if run.format > FORMAT {
-            return Err(NoRun(format!(
+            return Err(InvalidRun(format!(
                 "format {} is not supported; this version reads up to {FORMAT}",
                 run.format
             )));
         }
-        Self::from_message(run).map_err(|Missing(field)| NoRun(format!("it has no `{field}`")))
+        Self::from_message(run).map_err(|Missing(field)| InvalidRun(format!("it has no `{field}`")))
     }
 
     pub(crate) fn to_message(&self) -> Run {
@@ -196,7 +196,7 @@ impl PluginDescription {
             latency_s: matches!(self.role, Role::Device).then_some(self.latency_s),
             felt: match self.role {
                 Role::Model(_) => schema::Felt::Unspecified,
-                Role::Device if self.felt.contains(Demand::TORQUE) => schema::Felt::Wrench,
+                Role::Device if self.at_hand.contains(Demand::TORQUE) => schema::Felt::Wrench,
                 Role::Device => schema::Felt::Force,
             }
             .into(),
@@ -204,7 +204,7 @@ impl PluginDescription {
     }
 
     fn from_message(plugin: Plugin) -> Result<Self, Missing> {
-        let felt = match plugin.felt() {
+        let at_hand = match plugin.felt() {
             schema::Felt::Force => Demand::FORCE,
             schema::Felt::Wrench | schema::Felt::Unspecified => Demand::WRENCH,
         };
@@ -230,7 +230,7 @@ impl PluginDescription {
             device: u16::try_from(plugin.device).map_err(|_| Missing("plugin.device"))?,
             field,
             latency_s: plugin.latency_s.unwrap_or(0.0),
-            felt,
+            at_hand,
             name: plugin.name,
             id: plugin.id,
             version: plugin.version,

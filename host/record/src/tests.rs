@@ -55,7 +55,7 @@ fn run() -> RunDescription {
         },
         field: (role != Role::Device).then_some(FieldTiming { rate_hz: 200.0, latency_s: 0.0025 }),
         latency_s: if role == Role::Device { 0.001 } else { 0.0 },
-        felt: if role == Role::Device { Demand::FORCE } else { Demand::WRENCH },
+        at_hand: if role == Role::Device { Demand::FORCE } else { Demand::WRENCH },
         settings,
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
         device: 0,
@@ -250,7 +250,7 @@ fn a_truncated_file_is_repaired_for_every_reader() {
     let (file, cut, whole) = (TestFile::new("to-cut"), TestFile::new("is-cut"), TestFile::new("repaired"));
     write(&file.0, &ticks);
     let bytes = std::fs::read(&file.0).unwrap();
-    assert!(matches!(repair(&file.0, &whole.0), Err(RepairError::Whole { .. })));
+    assert!(matches!(repair(&file.0, &whole.0), Err(RepairError::Complete { .. })));
     assert!(!whole.0.exists(), "nothing was to be written");
     let mut counts = std::collections::BTreeSet::new();
     for length in (0..bytes.len()).step_by(7) {
@@ -276,7 +276,7 @@ fn a_truncated_file_is_repaired_for_every_reader() {
     }
     assert_eq!(counts.into_iter().collect::<Vec<_>>(), [0, 3, 6, 9]);
     // A repaired file is whole: there is nothing more to repair.
-    assert!(matches!(repair(&whole.0, &cut.0.with_extension("again")), Err(RepairError::Whole { .. })));
+    assert!(matches!(repair(&whole.0, &cut.0.with_extension("again")), Err(RepairError::Complete { .. })));
 }
 
 #[test]

@@ -30,7 +30,7 @@ fn the_index_of_a_long_recording_is_not_in_memory() {
         blend: Blend::default(),
         field: None,
         latency_s: 0.0,
-        felt: flotor_hal::Demand::WRENCH,
+        at_hand: flotor_hal::Demand::WRENCH,
         settings: Vec::new(),
         parameters: Vec::new(),
         device: 0,

@@ -157,7 +157,7 @@ impl Ellipsoid {
 }
 
 /// Most steps of Newton's method: four reach rounding within a tenth of a semi-axis, twelve a hundred semi-axes away.
-const MOST_STEPS: usize = 20;
+const MAX_STEPS: usize = 20;
 
 /// Finds the nearest point of an ellipsoid with these squared semi-axes; `scaled` is the place times the semi-axes.
 ///
@@ -165,7 +165,7 @@ const MOST_STEPS: usize = 20;
 /// length is concave in t, so Newton's method from t = 0 approaches from below, and takes one step on a sphere.
 fn beyond_unequal(squares: DVec3, scaled: DVec3, at: DVec3) -> Beyond {
     let mut t = 0.0;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let part = scaled / (squares + t);
         let length = part.length();
         let slope = (part * part / (squares + t)).element_sum();

@@ -36,7 +36,7 @@ pub struct TimeBudget {
     /// Slow ticks less ticks in time; never below zero.
     overruns: u32,
     /// Tick and time at which the model was disabled.
-    out_at: Option<(u64, u64)>,
+    disabled_at: Option<(u64, u64)>,
     longest_ns: u64,
 }
 
@@ -60,7 +60,7 @@ impl TimeBudget {
     /// Returns the permission to step the model at a time of the run. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn allowed(&self, now_ns: u64) -> Allowed {
-        let Some((_, since_ns)) = self.out_at else { return Allowed::Asked };
+        let Some((_, since_ns)) = self.disabled_at else { return Allowed::Asked };
         let elapsed_ns = now_ns.saturating_sub(since_ns);
         if elapsed_ns >= FADE_NS {
             return Allowed::Nothing;
@@ -91,14 +91,14 @@ impl TimeBudget {
         }
         self.overruns += 1;
         if self.overruns > TOLERATED_OVERRUNS {
-            self.out_at.get_or_insert((tick, now_ns));
+            self.disabled_at.get_or_insert((tick, now_ns));
         }
         true
     }
 
     /// Returns the overrun for which the model was disabled, if there was one.
     pub(super) fn overrun(&self) -> Option<Overrun> {
-        let ((tick, _), limit_ns) = (self.out_at?, self.limit_ns?);
+        let ((tick, _), limit_ns) = (self.disabled_at?, self.limit_ns?);
         Some(Overrun { tick, longest_ns: self.longest_ns, limit_ns })
     }
 }

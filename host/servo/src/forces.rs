@@ -8,8 +8,8 @@ use flotor_core::ModelOutputs;
 use flotor_core::demand::TickDemand;
 use flotor_core::trace::Events;
 use flotor_coupling::{
-    Coupling, CouplingDescription, CouplingEnds, Grip, Hearing, Line, Patience, Pull, Reach, RemoteEnd, Tank,
-    TankState,
+    Coupling, CouplingDescription, CouplingEnds, Line, LinkStatistics, LinkTimeouts, PortSample, Pull, Reach,
+    RemoteEnd, Tank, TankState,
 };
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
@@ -22,7 +22,7 @@ pub struct Port {
     /// Command, held until the next tick.
     pub commanded: Wrench,
     /// Model outputs that reach the hand at this device.
-    felt: Demand,
+    at_hand: Demand,
     /// Model outputs computed in this tick.
     computed: Demand,
     /// Request of models and couplings, as far as it reaches the hand.
@@ -38,14 +38,14 @@ pub struct Port {
 }
 
 impl Port {
-    /// Creates a port at rest; the outputs `felt` reach the hand ([`flotor_core::demand::felt_within`]).
+    /// Creates a port at rest; the outputs `at_hand` reach the hand ([`flotor_core::demand::hand_demand`]).
     #[must_use]
-    pub const fn at_rest(felt: Demand) -> Self {
+    pub const fn at_rest(at_hand: Demand) -> Self {
         Self {
             state: DeviceState::HOME,
             commanded: Wrench::ZERO,
-            felt,
-            computed: felt,
+            at_hand,
+            computed: at_hand,
             requested: Wrench::ZERO,
             by_models: Wrench::ZERO,
             unfelt_torque_nm: DVec3::ZERO,
@@ -58,8 +58,8 @@ impl Port {
     #[inline]
     #[must_use]
     pub fn outputs(&self) -> ModelOutputs {
-        let Self { felt, computed, requested, unfelt_torque_nm, energy_j, .. } = self;
-        let wrench = if felt.contains(Demand::TORQUE) {
+        let Self { at_hand, computed, requested, unfelt_torque_nm, energy_j, .. } = self;
+        let wrench = if at_hand.contains(Demand::TORQUE) {
             *requested
         } else {
             Wrench::new(requested.force(), requested.torque() + *unfelt_torque_nm)
@@ -70,7 +70,7 @@ impl Port {
     /// Stores the request of the models; an output that only observers request goes no further than their record.
     #[inline]
     fn take(&mut self, demand: TickDemand, wrench: Wrench, energy_j: f64) {
-        (self.by_models, self.unfelt_torque_nm) = if self.felt.contains(Demand::TORQUE) {
+        (self.by_models, self.unfelt_torque_nm) = if self.at_hand.contains(Demand::TORQUE) {
             (wrench, DVec3::ZERO)
         } else {
             (Wrench::from_force(wrench.force()), wrench.torque())
@@ -102,7 +102,7 @@ pub struct CouplingOutcome {
     /// Energy tanks of both ends; the tank of a remote end as last received.
     pub tanks: [TankState; 2],
     /// Link statistics of a remote end; `None` if both ends are on this host.
-    pub hearing: Option<Hearing>,
+    pub link: Option<LinkStatistics>,
 }
 
 /// Coupling with its devices in this run.
@@ -132,7 +132,7 @@ impl Coupled {
     pub fn new(
         description: &CouplingDescription,
         period_s: f64,
-        patience: Patience,
+        timeouts: LinkTimeouts,
         reach: Reach,
     ) -> (Self, Option<Line>) {
         let CouplingDescription { config, ends, .. } = description;
@@ -143,7 +143,7 @@ impl Coupled {
                 (Self::Here { coupling, devices, pulls: [Pull::default(); 2] }, None)
             }
             CouplingEnds::Remote(here) => {
-                let (end, line) = RemoteEnd::new(config, here, period_s, patience, reach);
+                let (end, line) = RemoteEnd::new(config, here, period_s, timeouts, reach);
                 let device = usize::from(here.device);
                 (Self::Remote { end: Box::new(end), device, pull: Pull::default() }, Some(line))
             }
@@ -159,11 +159,12 @@ impl Coupled {
                 let [Some(first), Some(second)] = devices.map(|device| ports.get(device).map(grip)) else {
                     return;
                 };
-                *pulls = coupling.step([&first, &second].map(|(state, held)| Grip { state, held: *held }));
+                *pulls =
+                    coupling.step([&first, &second].map(|(state, held)| PortSample { state, held: *held }));
             }
             Self::Remote { end, device, pull } => {
                 let Some((state, held)) = ports.get(*device).map(grip) else { return };
-                *pull = end.step(tick, Grip { state: &state, held });
+                *pull = end.step(tick, PortSample { state: &state, held });
             }
         }
     }
@@ -198,11 +199,11 @@ impl Coupled {
     fn outcome(&self) -> CouplingOutcome {
         match self {
             Self::Here { coupling, .. } => {
-                CouplingOutcome { tanks: coupling.tanks().map(Tank::state), hearing: None }
+                CouplingOutcome { tanks: coupling.tanks().map(Tank::state), link: None }
             }
             Self::Remote { end, .. } => {
-                let hearing = end.hearing();
-                CouplingOutcome { tanks: [end.tank(), hearing.partner], hearing: Some(hearing) }
+                let link = end.link();
+                CouplingOutcome { tanks: [end.tank(), link.partner], link: Some(link) }
             }
         }
     }
@@ -244,12 +245,12 @@ impl Forces {
 
     /// Steps all models and couplings at the states of the ports, one for each device; `observed` is the demand of observers.
     /// Real-time: bounded by the models that are near, no allocation.
-    pub fn step(&mut self, tick: &Tick, ports: &mut [Port], observed: Demand, heart: &Heartbeat) {
+    pub fn step(&mut self, tick: &Tick, ports: &mut [Port], observed: Demand, heartbeat: &Heartbeat) {
         // Couplings first: the held wrench is still the last request of couplings and models.
         self.couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
         for (stack, port) in self.stacks.iter_mut().zip(&mut *ports) {
-            let demand = TickDemand::new(port.felt, observed.limited_to(stack.observable()));
-            let (wrench, energy_j) = stack.step(tick, &port.state, demand, heart, &mut port.events);
+            let demand = TickDemand::new(port.at_hand, observed.limited_to(stack.observable()));
+            let (wrench, energy_j) = stack.step(tick, &port.state, demand, heartbeat, &mut port.events);
             port.take(demand, wrench, energy_j);
         }
         self.couplings.iter().for_each(|coupled| coupled.add_to(ports));
@@ -307,10 +308,10 @@ impl Forces {
         self.stacks.iter().any(ModelStack::is_fading)
     }
 
-    /// Returns reports on all layers in place or fading out; calls `asks` with the model number before it queries a model's last
+    /// Returns reports on all layers in place or fading out; calls `on_query` with the model number before it queries a model's last
     /// message. Not real-time.
-    pub fn reports(&mut self, asks: impl Fn(usize)) -> Vec<LayerReport> {
-        self.stacks.iter_mut().flat_map(|stack| stack.reports(&asks)).collect()
+    pub fn reports(&mut self, on_query: impl Fn(usize)) -> Vec<LayerReport> {
+        self.stacks.iter_mut().flat_map(|stack| stack.reports(&on_query)).collect()
     }
 
     /// Returns all layers, each with its model number. Not real-time.

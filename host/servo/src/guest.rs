@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 #[repr(u8)]
 pub enum Signals {
     /// All signals stay with the program: no handler is installed, none is restored.
-    Theirs = 1,
+    Program = 1,
     /// Fatal signals stop the devices first; then the program's own handler runs, if it had one.
     StopFirst = 2,
 }
@@ -35,8 +35,8 @@ pub fn is_guest() -> bool {
 }
 
 /// Returns true if all signals stay with the other program.
-pub(crate) fn leaves_signals() -> bool {
-    GUEST.load(Ordering::Acquire) == Signals::Theirs as u8
+pub(crate) fn program_handles_signals() -> bool {
+    GUEST.load(Ordering::Acquire) == Signals::Program as u8
 }
 
 /// Returns the `flotor` executable of a guest.

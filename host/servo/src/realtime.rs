@@ -2,7 +2,7 @@
 
 use crate::guest::is_guest;
 use crate::platform::scheduling::{
-    self, CORE_ADVICE, Duty, MEMORY_ADVICE, MOST_CORES, NoSuchCore, THREAD_ADVICE, priority_advice,
+    self, CORE_ADVICE, Duty, MAX_CORES, MEMORY_ADVICE, NoSuchCore, THREAD_ADVICE, priority_advice,
 };
 
 /// Core of the machine, by its number in the system.
@@ -13,7 +13,7 @@ impl Core {
     /// Returns the core of this number; `None` beyond the system's range. A core that the machine lacks is found when pinning.
     #[must_use]
     pub const fn new(number: usize) -> Option<Self> {
-        if number < MOST_CORES { Some(Self(number)) } else { None }
+        if number < MAX_CORES { Some(Self(number)) } else { None }
     }
 }
 
@@ -31,7 +31,7 @@ pub enum Privilege {
     /// Refused, with the system's reason.
     Refused(String),
     /// Not requested.
-    NotAsked,
+    NotRequested,
 }
 
 impl Privilege {
@@ -57,8 +57,12 @@ pub struct RealTimeReport {
 impl RealTimeReport {
     /// Returns a report on a loop without requests, as on the virtual clock.
     #[must_use]
-    pub fn not_asked() -> Self {
-        Self { fifo: Privilege::NotAsked, memory_lock: Privilege::NotAsked, core: Privilege::NotAsked }
+    pub fn not_requested() -> Self {
+        Self {
+            fifo: Privilege::NotRequested,
+            memory_lock: Privilege::NotRequested,
+            core: Privilege::NotRequested,
+        }
     }
 
     /// Returns one line per refusal: privilege, reason and remedy.
@@ -84,10 +88,10 @@ impl RealTimeReport {
 pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
     // The memory of a guest belongs to another program: locked, its next allocation might fail.
     let memory_lock = match is_guest() {
-        true => Privilege::NotAsked,
-        false => scheduling::lock_memory().map_or(Privilege::NotAsked, Privilege::of),
+        true => Privilege::NotRequested,
+        false => scheduling::lock_memory().map_or(Privilege::NotRequested, Privilege::of),
     };
-    let core = core.map_or(Privilege::NotAsked, |core| Privilege::of(pin(core)));
+    let core = core.map_or(Privilege::NotRequested, |core| Privilege::of(pin(core)));
     RealTimeReport { fifo: enter_priority(Duty::Loop), memory_lock, core }
 }
 
@@ -122,10 +126,10 @@ pub fn probe_real_time() -> RealTimeReport {
         report
     });
     match asked {
-        Ok(asked) => asked.join().unwrap_or_else(|_| RealTimeReport::not_asked()),
+        Ok(asked) => asked.join().unwrap_or_else(|_| RealTimeReport::not_requested()),
         Err(cause) => {
             let refused = || Privilege::Refused(format!("no thread: {cause}; {THREAD_ADVICE}"));
-            RealTimeReport { fifo: refused(), memory_lock: refused(), core: Privilege::NotAsked }
+            RealTimeReport { fifo: refused(), memory_lock: refused(), core: Privilege::NotRequested }
         }
     }
 }
@@ -136,13 +140,13 @@ mod tests {
 
     #[test]
     fn a_core_that_is_not_there_is_refused_aloud() {
-        let core = Core::new(MOST_CORES - 1).expect("the last that can be named");
+        let core = Core::new(MAX_CORES - 1).expect("the last that can be named");
         let refused = std::thread::spawn(move || Privilege::of(pin(core))).join().expect("it does not panic");
-        let report = RealTimeReport { core: refused, ..RealTimeReport::not_asked() };
+        let report = RealTimeReport { core: refused, ..RealTimeReport::not_requested() };
         let told = format!(
             "--core {core}: there is no such core, or this process may not use it; the loop is not pinned to a"
         );
         assert!(report.advice().concat().starts_with(&told), "{report:?}");
-        assert_eq!(Core::new(MOST_CORES), None);
+        assert_eq!(Core::new(MAX_CORES), None);
     }
 }

@@ -48,11 +48,11 @@ impl RunEnd {
     }
 
     /// Converts the final run state to a `RunEnd`.
-    fn of(run: RunState, heart: &Heartbeat) -> Self {
-        match (run, heart.bitten()) {
+    fn of(run: RunState, heartbeat: &Heartbeat) -> Self {
+        match (run, heartbeat.fired_at()) {
             (RunState::Faulted(Cause::Device(fault)), _) => Self::DeviceFault(fault),
             // The watchdog has not fired if the whole process was suspended.
-            (RunState::Faulted(Cause::Watchdog), stuck) => Self::Watchdog(stuck.unwrap_or(heart.now())),
+            (RunState::Faulted(Cause::Watchdog), stuck) => Self::Watchdog(stuck.unwrap_or(heartbeat.now())),
             (RunState::Faulted(Cause::Oscillation), _) => Self::Oscillation,
             (RunState::EmergencyStopped(source), _) => Self::EmergencyStop(source),
             _ => Self::Stopped,
@@ -84,9 +84,9 @@ impl Loop {
         Self { release_ns: self.duration_ns.saturating_sub(self.servo.ramp_ns()), ..self }
     }
 
-    /// Waits for and runs the next tick, or sets `end`; passes the tick's records to `leave`. Real-time: bounded, no allocation.
+    /// Waits for and runs the next tick, or sets `end`; passes the tick's records to `on_record`. Real-time: bounded, no allocation.
     #[inline]
-    pub fn advance(&mut self, stop: &StopSwitch, leave: impl FnMut(&TickRecord)) {
+    pub fn advance(&mut self, stop: &StopSwitch, on_record: impl FnMut(&TickRecord)) {
         if self.schedule.next_time_ns() >= self.duration_ns {
             self.end = Some(RunEnd::Finished);
             return;
@@ -95,7 +95,7 @@ impl Loop {
         // Only the first device can set the pace.
         let next = schedule.next_index();
         let wait_for_sample = |timeout_ns| {
-            servo.heart().enter(next, Place::DeviceWait(0));
+            servo.heartbeat().enter(next, Place::DeviceWait(0));
             servo
                 .devices()
                 .next()
@@ -111,11 +111,11 @@ impl Loop {
         if due.tick.time_ns >= *release_ns {
             servo.release(&due.tick);
         }
-        servo.tick(&due, stop, leave);
+        servo.tick(&due, stop, on_record);
         if servo.run().is_over() {
-            let end = RunEnd::of(servo.run(), servo.heart());
+            let end = RunEnd::of(servo.run(), servo.heartbeat());
             // Lost samples end a fade-out early: without a stop request the run has finished.
-            let is_time_up = end == RunEnd::Stopped && !stop.is_stop_asked();
+            let is_time_up = end == RunEnd::Stopped && !stop.is_stop_requested();
             self.end = Some(if is_time_up { RunEnd::Finished } else { end });
         }
     }

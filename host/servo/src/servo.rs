@@ -44,7 +44,7 @@ pub struct Servo {
     parameters: ParameterQueue,
     swaps: LoopSwaps,
     config: RunConfig,
-    heart: Heartbeat,
+    heartbeat: Heartbeat,
     run: RunState,
     timing: Timing,
     stage_timer: StageTimer,
@@ -61,19 +61,19 @@ impl Servo {
         parameters: ParameterQueue,
         swaps: LoopSwaps,
         config: RunConfig,
-        heart: Heartbeat,
+        heartbeat: Heartbeat,
     ) -> Self {
         Self {
             _unwound: None,
             _last_stop: None,
-            ports: stations.iter().map(|station| Port::at_rest(station.felt)).collect(),
+            ports: stations.iter().map(|station| Port::at_rest(station.at_hand)).collect(),
             stations: stations.into(),
             forces,
             observers,
             parameters,
             swaps,
             config,
-            heart,
+            heartbeat,
             run: RunState::START,
             timing: Timing::default(),
             stage_timer: StageTimer::new(),
@@ -81,8 +81,8 @@ impl Servo {
     }
 
     /// Registers the calling thread as the loop thread, in place of the one that energised the devices. Not real-time.
-    pub fn follow_here(&self) {
-        self._last_stop.iter().for_each(LastStop::follow_here);
+    pub fn register_loop_thread(&self) {
+        self._last_stop.iter().for_each(LastStop::register_loop_thread);
     }
 
     /// Attaches the last stop, which stops the devices if the process dies. Not real-time.
@@ -91,27 +91,27 @@ impl Servo {
         self
     }
 
-    /// Runs one tick and passes a record for each device to `leave`. Real-time: bounded by devices and models, no allocation.
+    /// Runs one tick and passes a record for each device to `on_record`. Real-time: bounded by devices and models, no allocation.
     #[inline]
     #[cfg_attr(rtsan, sanitize(realtime = "nonblocking"))]
-    pub fn tick(&mut self, due: &Due, stop: &StopSwitch, leave: impl FnMut(&TickRecord)) {
+    pub fn tick(&mut self, due: &Due, stop: &StopSwitch, on_record: impl FnMut(&TickRecord)) {
         let (events, compute_ns) = self.advance(due, stop);
-        self.leave_records(due, events, compute_ns, leave);
+        self.emit_records(due, events, compute_ns, on_record);
     }
 
-    /// Passes a record of the tick for each device to `leave`.
-    fn leave_records(
+    /// Passes a record of the tick for each device to `on_record`.
+    fn emit_records(
         &self,
         due: &Due,
         run_events: Events,
         compute_ns: u64,
-        mut leave: impl FnMut(&TickRecord),
+        mut on_record: impl FnMut(&TickRecord),
     ) {
         for (device, (station, port)) in (0..).zip(self.stations.iter().zip(&self.ports)) {
             let Port { state, commanded, .. } = port;
             let mut events = run_events;
             events.insert(port.events);
-            leave(&TickRecord {
+            on_record(&TickRecord {
                 tick: due.tick.index,
                 device,
                 time_ns: due.tick.time_ns,
@@ -144,7 +144,7 @@ impl Servo {
         self.follow(sample, buttons, tick, stop, &mut events);
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Read);
 
-        self.forces.step(tick, &mut self.ports, self.observers.now(), &self.heart);
+        self.forces.step(tick, &mut self.ports, self.observers.now(), &self.heartbeat);
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Models);
 
         let gate = self.run.gate(tick.time_ns, self.config.ramp_ns);
@@ -158,7 +158,7 @@ impl Servo {
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Envelope);
 
         self.write(tick);
-        self.heart.enter(tick.index, Place::Waiting);
+        self.heartbeat.enter(tick.index, Place::Waiting);
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Write);
 
         let compute_ns = self.stage_timer.between_ns(started, self.stage_timer.now());
@@ -170,7 +170,7 @@ impl Servo {
     pub fn release(&mut self, tick: &Tick) {
         // While holding there is no force: the run ends without a fade.
         if self.run != RunState::Holding {
-            self.change_state(RunEvent::StopAsked, tick);
+            self.change_state(RunEvent::StopRequested, tick);
         }
     }
 
@@ -216,7 +216,7 @@ impl Servo {
     fn read(&mut self, tick: &Tick) -> (RunEvent, u32) {
         let (mut worst, mut buttons) = (RunEvent::SamplesBack, 0);
         for (device, (station, port)) in (0..).zip(self.stations.iter_mut().zip(&mut self.ports)) {
-            self.heart.enter(tick.index, Place::DeviceRead(device));
+            self.heartbeat.enter(tick.index, Place::DeviceRead(device));
             port.events = Events::NONE;
             let sample = station.read(tick, port);
             buttons |= port.state.buttons;
@@ -229,10 +229,10 @@ impl Servo {
 
     /// Sends the commands to all devices.
     fn write(&mut self, tick: &Tick) {
-        let Self { stations, ports, heart, run, config, .. } = self;
+        let Self { stations, ports, heartbeat, run, config, .. } = self;
         for (device, (station, port)) in (0..).zip(stations.iter_mut().zip(ports)) {
-            heart.enter(tick.index, Place::DeviceWrite(device));
-            if heart.is_silenced() {
+            heartbeat.enter(tick.index, Place::DeviceWrite(device));
+            if heartbeat.is_silenced() {
                 port.commanded = Wrench::ZERO; // zeroed by the safe stop
                 continue;
             }
@@ -259,10 +259,10 @@ impl Servo {
             self.change_state(RunEvent::Time, tick);
             self.change_state(sample, tick);
         }
-        if stop.is_stop_asked() {
-            self.change_state(RunEvent::StopAsked, tick);
+        if stop.is_stop_requested() {
+            self.change_state(RunEvent::StopRequested, tick);
         }
-        if self.heart.bitten().is_some() || tick.dt_ns > self.config.longest_gap_ns {
+        if self.heartbeat.fired_at().is_some() || tick.dt_ns > self.config.longest_gap_ns {
             self.change_state(RunEvent::Failed(Cause::Watchdog), tick);
         }
         let pressed = buttons & self.config.emergency_buttons != 0;
@@ -308,8 +308,8 @@ impl Servo {
     }
 
     /// Returns the heartbeat that the watchdog reads.
-    pub fn heart(&self) -> &Heartbeat {
-        &self.heart
+    pub fn heartbeat(&self) -> &Heartbeat {
+        &self.heartbeat
     }
 
     /// Iterates over the devices in order, each with its report.

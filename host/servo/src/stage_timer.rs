@@ -32,7 +32,7 @@ impl StageTimer {
     pub(super) fn new() -> Self {
         static COUNT: OnceLock<CountLength> = OnceLock::new();
         let counter = Clock::new();
-        let count = *COUNT.get_or_init(|| CountLength::measured(|| Look::at(&counter)));
+        let count = *COUNT.get_or_init(|| CountLength::measured(|| ClockReading::at(&counter)));
         Self { counter, count }
     }
 
@@ -51,13 +51,13 @@ impl StageTimer {
 
 /// Reading of the counter between two readings of the clock.
 #[derive(Clone, Copy)]
-struct Look {
+struct ClockReading {
     before_ns: u64,
     count: u64,
     after_ns: u64,
 }
 
-impl Look {
+impl ClockReading {
     /// Longest step of a clock or a counter, ns: between two steps its time is in the past. Hyper-V's clock has 100 ns, a counter
     /// of 24 MHz 42 ns.
     const STEP_NS: u64 = 100;
@@ -90,16 +90,16 @@ impl CountLength {
     const FIRST_LOOKS: usize = 32;
 
     /// Measures the length of a count. Not real-time.
-    fn measured(mut look: impl FnMut() -> Look) -> Self {
-        let mut first = look();
+    fn measured(mut poll: impl FnMut() -> ClockReading) -> Self {
+        let mut first = poll();
         for _ in 1..Self::FIRST_LOOKS {
-            let next = look();
+            let next = poll();
             first = if next.uncertainty_ns() < first.uncertainty_ns() { next } else { first };
         }
         // Zero length, should the counter never advance.
         let (mut least_uncertainty, mut best) = (f64::INFINITY, Self { parts: 0 });
         loop {
-            let last = look();
+            let last = poll();
             // Twice the time from the middle of the one reading to the middle of the other.
             let twice_ns = (last.before_ns - first.before_ns) + (last.after_ns - first.after_ns);
             let uncertainty = (first.uncertainty_ns() + last.uncertainty_ns()) as f64 / twice_ns as f64;
@@ -156,13 +156,13 @@ mod tests {
             self.pass() / self.clock_step_ns * self.clock_step_ns
         }
 
-        fn look(&mut self) -> Look {
-            Look { before_ns: self.clock_ns(), count: self.pass() * 5 / 2, after_ns: self.clock_ns() }
+        fn poll(&mut self) -> ClockReading {
+            ClockReading { before_ns: self.clock_ns(), count: self.pass() * 5 / 2, after_ns: self.clock_ns() }
         }
 
         /// How wrong the measurement is, relative.
         fn error(mut self) -> f64 {
-            let length = CountLength::measured(|| self.look());
+            let length = CountLength::measured(|| self.poll());
             (length.times_ns(2_500_000_000_000) as f64 / 1e12 - 1.0).abs()
         }
     }
@@ -203,8 +203,11 @@ mod tests {
     #[test]
     fn a_clock_that_moves_in_steps_is_no_better_than_its_steps() {
         for start_ns in 7_000..7_100 {
-            let processor =
-                Processor { clock_step_ns: Look::STEP_NS, now_ns: start_ns, ..Processor::new(&|_| 0) };
+            let processor = Processor {
+                clock_step_ns: ClockReading::STEP_NS,
+                now_ns: start_ns,
+                ..Processor::new(&|_| 0)
+            };
             let error = processor.error();
             assert!(error <= CountLength::ENOUGH, "from {start_ns}: {error}");
         }
@@ -215,7 +218,7 @@ mod tests {
     fn where_no_look_is_worth_much_the_measurement_ends_with_the_best() {
         let first = 3 * CountLength::FIRST_LOOKS;
         let aside_ns = |reading| if reading % 3 == if reading < first { 1 } else { 2 } { 100_000 } else { 0 };
-        let uncertainty_ns = Processor::new(&aside_ns).look().uncertainty_ns();
+        let uncertainty_ns = Processor::new(&aside_ns).poll().uncertainty_ns();
         let error = Processor::new(&aside_ns).error();
         assert!(error <= uncertainty_ns as f64 / CountLength::LONGEST_NS as f64, "{error}");
     }
@@ -226,10 +229,10 @@ mod tests {
         let mut looks = 0;
         let length = CountLength::measured(|| {
             looks += 1;
-            let look = processor.look();
+            let reading = processor.poll();
             // On the other core for a while after the first looks.
             let is_behind = (CountLength::FIRST_LOOKS..200).contains(&looks);
-            Look { count: if is_behind { look.count - 12_000 } else { look.count }, ..look }
+            ClockReading { count: if is_behind { reading.count - 12_000 } else { reading.count }, ..reading }
         });
         let error = (length.times_ns(2_500_000) as f64 / 1e6 - 1.0).abs();
         assert!(error <= CountLength::ENOUGH, "{error}");

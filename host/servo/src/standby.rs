@@ -26,7 +26,7 @@ pub struct Standby {
     swaps: LoopSwaps,
     config: LoopConfig,
     run: RunConfig,
-    heart: Heartbeat,
+    heartbeat: Heartbeat,
 }
 
 impl Standby {
@@ -39,13 +39,13 @@ impl Standby {
         config: LoopConfig,
         run: RunConfig,
     ) -> Self {
-        let (observers, heart) = (ObserverDemand::default(), Heartbeat::default());
-        Self { devices, forces, observers, parameters, swaps, config, run, heart }
+        let (observers, heartbeat) = (ObserverDemand::default(), Heartbeat::default());
+        Self { devices, forces, observers, parameters, swaps, config, run, heartbeat }
     }
 
     /// Returns the heartbeat that the servo's watchdog will read.
-    pub fn heart(&self) -> Heartbeat {
-        self.heart.clone()
+    pub fn heartbeat(&self) -> Heartbeat {
+        self.heartbeat.clone()
     }
 
     /// Returns the demand of observers for model outputs.
@@ -85,8 +85,8 @@ impl Standby {
     /// Number and [`Refusal`] of the device that refused; then none stays energised.
     pub fn activate(self, names: Vec<String>, enters: impl Fn(usize)) -> Result<Servo, (usize, Refusal)> {
         let stoppers = self.stoppers();
-        let last_stop = LastStop::arm(stoppers.clone(), names, self.heart());
-        let Self { devices, forces, observers, parameters, swaps, config, run, heart } = self;
+        let last_stop = LastStop::arm(stoppers.clone(), names, self.heartbeat());
+        let Self { devices, forces, observers, parameters, swaps, config, run, heartbeat } = self;
         let station = |(number, guarded): (usize, Guarded)| {
             let Guarded { mut device, capabilities, envelope } = guarded;
             enters(number);
@@ -98,6 +98,6 @@ impl Standby {
         let stations =
             devices.into_iter().enumerate().map(station).collect::<Result<Vec<_>, (usize, Refusal)>>();
         let stations = stations.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
-        Ok(Servo::new(stations, forces, observers, parameters, swaps, run, heart).guarded_by(last_stop))
+        Ok(Servo::new(stations, forces, observers, parameters, swaps, run, heartbeat).guarded_by(last_stop))
     }
 }

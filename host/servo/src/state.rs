@@ -111,7 +111,7 @@ pub enum RunEvent {
     /// A usable sample has arrived.
     SamplesBack,
     /// An orderly end is requested.
-    StopAsked,
+    StopRequested,
     /// The run cannot continue.
     Failed(Cause),
     /// Emergency stop from this source.
@@ -158,10 +158,10 @@ impl RunState {
             }
             (Self::Ramping { .. } | Self::Active, RunEvent::SamplesLost) => Self::Holding,
             (Self::Holding, RunEvent::SamplesBack) => Self::Ramping { since_ns: now_ns },
-            (Self::Releasing { .. }, RunEvent::SamplesLost) | (Self::Holding, RunEvent::StopAsked) => {
+            (Self::Releasing { .. }, RunEvent::SamplesLost) | (Self::Holding, RunEvent::StopRequested) => {
                 Self::Stopped
             }
-            (Self::Ramping { .. } | Self::Active, RunEvent::StopAsked) => {
+            (Self::Ramping { .. } | Self::Active, RunEvent::StopRequested) => {
                 Self::Releasing { since_ns: now_ns, from: self.gate(now_ns, ramp_ns).models }
             }
             _ => self,

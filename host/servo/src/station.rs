@@ -3,7 +3,7 @@
 use super::envelope::{Envelope, EnvelopeEffects};
 use super::forces::Port;
 use super::state::{Cause, Gate, RunEvent};
-use flotor_core::demand::felt_within;
+use flotor_core::demand::hand_demand;
 use flotor_core::plausibility::{
     Implausible, ImplausibleSamples, PlausibilityCheck, Trust, normalised, stale_ticks_limit,
 };
@@ -19,7 +19,7 @@ pub struct Station {
     pub(super) device: ActiveDevice,
     pub(super) envelope: Envelope,
     /// Model outputs that reach the hand at this device.
-    pub(super) felt: Demand,
+    pub(super) at_hand: Demand,
     plausibility: PlausibilityCheck,
     /// Stale ticks tolerated; unlimited for a device that senses no axis.
     stale_ticks_limit: u32,
@@ -67,7 +67,7 @@ impl Station {
         Self {
             device,
             envelope,
-            felt: felt_within(&torque_nm),
+            at_hand: hand_demand(&torque_nm),
             plausibility: PlausibilityCheck::new(told, period_ns),
             stale_ticks_limit: if told.sensed == Axes::NONE { u32::MAX } else { stale_ticks },
             stale_ticks: 0,
@@ -95,7 +95,7 @@ impl Station {
                     if port.state.conditions.contains(Conditions::EXCESS_FORCE) {
                         port.events.insert(Events::EXCESS_FORCE);
                     }
-                    return self.believed(port);
+                    return self.trust_event(port);
                 }
                 Err(Implausible::NotFinite) => port.events.insert(Events::NOT_FINITE),
                 Err(_) => port.events.insert(Events::IMPLAUSIBLE_SAMPLE),
@@ -108,7 +108,7 @@ impl Station {
         }
         port.state = last;
         self.stale_ticks = self.stale_ticks.saturating_add(1);
-        match self.believed(port) {
+        match self.trust_event(port) {
             RunEvent::SamplesBack if self.stale_ticks > self.stale_ticks_limit => RunEvent::SamplesLost,
             RunEvent::SamplesBack => RunEvent::Time,
             withdrawn => withdrawn,
@@ -117,7 +117,7 @@ impl Station {
 
     /// Maps the trust in the device to a run event.
     #[inline]
-    fn believed(&mut self, port: &mut Port) -> RunEvent {
+    fn trust_event(&mut self, port: &mut Port) -> RunEvent {
         match self.plausibility.trust() {
             Trust::Full => RunEvent::SamplesBack,
             Trust::Withdrawn => RunEvent::SamplesLost,

@@ -46,7 +46,7 @@ impl StopSwitch {
     /// Returns true if an orderly end is requested. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
-    pub fn is_stop_asked(&self) -> bool {
+    pub fn is_stop_requested(&self) -> bool {
         self.in_order.load(Ordering::Relaxed)
     }
 

@@ -7,8 +7,8 @@ use super::clock::{monotonic_ns, sleep_until};
 use super::last_stop::{SignalGuard, TakenSignals, end_dying, is_dying, take_sent};
 use super::realtime::enter_guard_priority;
 use super::stop::StopSwitch;
-use super::watchdog_process::SignOfLife;
-use flotor_core::MOST_DEVICES;
+use super::watchdog_process::HeartbeatSender;
+use flotor_core::MAX_DEVICES;
 use flotor_hal::abi::loader::Stopper;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
@@ -34,9 +34,9 @@ pub enum Place {
 impl Place {
     /// Codes: 0 and 1, then the waits for devices, their reads, their writes, the models.
     const FIRST_WAIT: u64 = 2;
-    const FIRST_READ: u64 = Self::FIRST_WAIT + MOST_DEVICES as u64;
-    const FIRST_WRITE: u64 = Self::FIRST_READ + MOST_DEVICES as u64;
-    const FIRST_MODEL: u64 = Self::FIRST_WRITE + MOST_DEVICES as u64;
+    const FIRST_READ: u64 = Self::FIRST_WAIT + MAX_DEVICES as u64;
+    const FIRST_WRITE: u64 = Self::FIRST_READ + MAX_DEVICES as u64;
+    const FIRST_MODEL: u64 = Self::FIRST_WRITE + MAX_DEVICES as u64;
 
     /// Returns the running call as text for users.
     #[must_use]
@@ -96,7 +96,7 @@ struct Shared {
     /// True once the loop is over: no more beats are due.
     done: AtomicBool,
     /// Beat at which the watchdog stopped the device, plus one; 0: not stopped.
-    bitten: AtomicU64,
+    fired: AtomicU64,
     /// Signals of the host that a plugin took while the loop ran, one bit each.
     taken: AtomicU64,
     /// True once another thread stops the devices: the loop sends no more commands.
@@ -116,8 +116,8 @@ impl Heartbeat {
 
     /// Returns the place of the loop when the watchdog stopped the device; `None` if it has not. Real-time: bounded, no allocation.
     #[inline]
-    pub fn bitten(&self) -> Option<Stuck> {
-        match self.shared.bitten.load(Ordering::Acquire) {
+    pub fn fired_at(&self) -> Option<Stuck> {
+        match self.shared.fired.load(Ordering::Acquire) {
             0 => None,
             beat => Some(Stuck::at(beat - 1)),
         }
@@ -168,8 +168,8 @@ impl Heartbeat {
         self.shared.beat.load(Ordering::Acquire)
     }
 
-    fn bite(&self, beat: u64) {
-        self.shared.bitten.store(beat + 1, Ordering::Release);
+    fn fire(&self, beat: u64) {
+        self.shared.fired.store(beat + 1, Ordering::Release);
     }
 }
 
@@ -202,18 +202,18 @@ const SIGNS_OF_LIFE: u64 = 4;
 /// Polls between two checks of the host's signals: a tenth of a second.
 const SIGNAL_LOOKS: u64 = 100;
 
-/// Starts the watchdog's thread, which uses the `stoppers` of all devices when `heart` has not changed for `limit_ns`, or when the
+/// Starts the watchdog's thread, which uses the `stoppers` of all devices when `heartbeat` has not changed for `limit_ns`, or when the
 /// emergency stop is pressed. While running, the thread sends heartbeats (`signs`) to the watchdog process, if there is one. Not
 /// real-time; ends with [`Heartbeat::finish`].
 ///
 /// # Errors
 /// If the system cannot start a thread.
 pub fn start(
-    heart: Heartbeat,
+    heartbeat: Heartbeat,
     stoppers: Vec<Stopper>,
     stop: StopSwitch,
     limit_ns: u64,
-    signs: Option<SignOfLife>,
+    signs: Option<HeartbeatSender>,
 ) -> std::io::Result<JoinHandle<()>> {
     let thread = std::thread::Builder::new().name("flotor-watchdog".to_owned());
     thread.spawn(move || {
@@ -223,17 +223,17 @@ pub fn start(
         let look_ns = (limit_ns / LOOKS).min(LONGEST_LOOK_NS);
         let sign_ns = limit_ns / SIGNS_OF_LIFE;
         let mut next_sign_ns = 0;
-        let mut last = heart.beat();
+        let mut last = heartbeat.beat();
         let mut changed_ns = monotonic_ns();
         let mut stopped = false;
         let mut dying_looks = 0;
         let signals = SignalGuard::take();
         for look in 1_u64.. {
-            if heart.is_done() {
+            if heartbeat.is_done() {
                 return;
             }
             if look.is_multiple_of(SIGNAL_LOOKS) {
-                heart.shared.taken.fetch_or(signals.put_back().bits(), Ordering::Relaxed);
+                heartbeat.shared.taken.fetch_or(signals.put_back().bits(), Ordering::Relaxed);
             }
             sleep_until(monotonic_ns() + look_ns);
             if is_dying() {
@@ -243,7 +243,7 @@ pub fn start(
                 }
                 continue;
             }
-            let (beat, now_ns) = (heart.beat(), monotonic_ns());
+            let (beat, now_ns) = (heartbeat.beat(), monotonic_ns());
             if let Some(signs) = &signs
                 && now_ns >= next_sign_ns
             {
@@ -251,16 +251,16 @@ pub fn start(
                 next_sign_ns = now_ns + sign_ns;
             }
             if stop.emergency().is_some() && !stopped {
-                heart.silence();
+                heartbeat.silence();
                 stoppers.iter().for_each(Stopper::safe_stop);
                 stopped = true;
             }
             if beat != last {
                 (last, changed_ns) = (beat, now_ns);
-            } else if now_ns - changed_ns > limit_ns && !heart.is_done() {
-                heart.silence();
+            } else if now_ns - changed_ns > limit_ns && !heartbeat.is_done() {
+                heartbeat.silence();
                 stoppers.iter().for_each(Stopper::safe_stop);
-                heart.bite(beat);
+                heartbeat.fire(beat);
                 return;
             }
         }

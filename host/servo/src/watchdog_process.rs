@@ -7,5 +7,5 @@
 //! control groups of the host where possible, and receives no signal that requests its end: it ends with its host, right after.
 
 pub use crate::platform::watchdog_process::{
-    SignOfLife, WatchdogProcess, is_offered, probe_shared_group, serve,
+    HeartbeatSender, WatchdogProcess, is_offered, probe_shared_group, serve,
 };

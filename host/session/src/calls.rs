@@ -8,7 +8,7 @@ pub(crate) use end::{EndCalls, EndReserve};
 mod end;
 
 use crate::platform::MachineState;
-use flotor_servo::last_stop::{enter_call, leave_call, prepare_for_calls};
+use flotor_servo::last_stop::{enter_call, exit_call, prepare_for_calls};
 use flotor_servo::{StopSwitch, THREAD_ADVICE};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
@@ -26,13 +26,13 @@ pub const LIMIT_VARIABLE: &str = "FLOTOR_CALL_LIMIT_S";
 pub const STEP_LIMIT_VARIABLE: &str = "FLOTOR_STEP_LIMIT_S";
 
 /// Delay before a "still waiting" notice, at most half of the limit.
-const TELL_AFTER: Duration = Duration::from_secs(5);
+const NOTIFY_AFTER: Duration = Duration::from_secs(5);
 /// Default time limit of a call before a run, or for a replacement during one: large models compute tables.
 const DEFAULT_LIMIT: Duration = Duration::from_secs(60);
 /// Time limit of a call after a run: the device is stopped, and nothing depends on the call.
 const END_LIMIT: Duration = Duration::from_secs(5);
 /// Poll interval while waiting for a call.
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Plugin call outside the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,14 +146,14 @@ impl fmt::Display for Notice {
     }
 }
 
-static TELL: OnceLock<fn(&Notice)> = OnceLock::new();
+static ON_NOTICE: OnceLock<fn(&Notice)> = OnceLock::new();
 static STOP: OnceLock<StopSwitch> = OnceLock::new();
-static LEFT_BEHIND: AtomicBool = AtomicBool::new(false);
+static ABANDONED: AtomicBool = AtomicBool::new(false);
 
 /// Sets the callback for notices: calls that take 5 s or more, changes of the process by plugins, and the end of a watchdog
 /// process. Only the first callback counts.
-pub fn tell_notices(tell: fn(&Notice)) {
-    let _ = TELL.set(tell);
+pub fn on_notice(notify: fn(&Notice)) {
+    let _ = ON_NOTICE.set(notify);
 }
 
 /// Sets the switch that stops waiting for a call before a run, when nothing is energised. Only the first switch counts.
@@ -163,12 +163,12 @@ pub fn stop_waits_with(stop: &StopSwitch) {
 
 /// Returns true unless a stop was requested.
 pub(crate) fn is_to_begin() -> bool {
-    STOP.get().is_none_or(|stop| !stop.is_stop_asked() && stop.emergency().is_none())
+    STOP.get().is_none_or(|stop| !stop.is_stop_requested() && stop.emergency().is_none())
 }
 
-pub(crate) fn tell(notice: &Notice) {
-    if let Some(tell) = TELL.get() {
-        tell(notice);
+pub(crate) fn notify(notice: &Notice) {
+    if let Some(notify) = ON_NOTICE.get() {
+        notify(notice);
     }
 }
 
@@ -178,7 +178,7 @@ pub(crate) fn keeping_machine<T>(who: &str, make: impl FnOnce() -> T) -> T {
     let made = make();
     let (restored, variables) = (before.restore(), changed_variables(&variables, &environment()));
     if !(restored.is_empty() && variables.is_empty()) {
-        tell(&Notice::Changed { who: who.to_owned(), restored, variables });
+        notify(&Notice::Changed { who: who.to_owned(), restored, variables });
     }
     made
 }
@@ -200,13 +200,13 @@ fn changed_variables(
 
 /// Returns true if a call did not return and its thread still runs: exit handlers of the process may wait for that thread.
 #[must_use]
-pub fn is_left_behind() -> bool {
-    LEFT_BEHIND.load(Ordering::Relaxed)
+pub fn is_abandoned() -> bool {
+    ABANDONED.load(Ordering::Relaxed)
 }
 
 /// Records that a thread with plugin code is abandoned.
-pub(crate) fn leave_behind() {
-    LEFT_BEHIND.store(true, Ordering::Relaxed);
+pub(crate) fn abandon() {
+    ABANDONED.store(true, Ordering::Relaxed);
 }
 
 /// Returns the time limit of a call before a run.
@@ -236,7 +236,7 @@ struct Now {
     who: String,
     call: Call,
     since: Instant,
-    is_told: bool,
+    is_reported: bool,
 }
 
 impl Progress {
@@ -247,27 +247,27 @@ impl Progress {
     /// Marks the start of a plugin call.
     pub(crate) fn enter(&self, who: &str, call: Call) {
         enter_call(who, call);
-        *self.lock() = Some(Now { who: who.to_owned(), call, since: Instant::now(), is_told: false });
+        *self.lock() = Some(Now { who: who.to_owned(), call, since: Instant::now(), is_reported: false });
     }
 
     /// Marks the end of the plugin call.
-    pub(crate) fn leave(&self) {
+    pub(crate) fn exit(&self) {
         *self.lock() = None;
-        leave_call();
+        exit_call();
     }
 
     /// Sends a notice about a call that takes long; returns an error for a call beyond the limit.
-    pub(crate) fn look(&self, limit: Duration) -> Result<(), Unresponsive> {
+    pub(crate) fn check(&self, limit: Duration) -> Result<(), Unresponsive> {
         let mut now = self.lock();
-        let Some(Now { who, call, since, is_told }) = &mut *now else { return Ok(()) };
+        let Some(Now { who, call, since, is_reported }) = &mut *now else { return Ok(()) };
         let waited = since.elapsed();
         if waited >= limit {
-            leave_behind();
+            abandon();
             return Err(Unresponsive { who: who.clone(), call: *call, limit });
         }
-        if waited >= TELL_AFTER.min(limit / 2) && !*is_told {
-            *is_told = true;
-            tell(&Notice::Waiting { who: who.clone(), call: *call, limit });
+        if waited >= NOTIFY_AFTER.min(limit / 2) && !*is_reported {
+            *is_reported = true;
+            notify(&Notice::Waiting { who: who.clone(), call: *call, limit });
         }
         Ok(())
     }
@@ -293,13 +293,13 @@ impl<T: Send + 'static> Attended<T> {
     }
 
     /// Waits up to `time` for the result; returns the result, or the call beyond its limit.
-    pub(crate) fn look(&self, time: Duration) -> Option<Result<T, Unresponsive>> {
+    pub(crate) fn poll(&self, time: Duration) -> Option<Result<T, Unresponsive>> {
         match self.result.recv_timeout(time) {
             Ok(Ok(value)) => Some(Ok(value)),
             // Only host code panics here.
             Ok(Err(panic)) => std::panic::resume_unwind(panic),
             Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
-                self.progress.look(self.limit).err().map(Err)
+                self.progress.check(self.limit).err().map(Err)
             }
         }
     }
@@ -310,12 +310,12 @@ impl<T: Send + 'static> Attended<T> {
     /// Call that did not return; `None` if the result is not wanted any more.
     pub(crate) fn wait_while(self, is_wanted: impl Fn() -> bool) -> Result<T, Option<Unresponsive>> {
         while is_wanted() {
-            if let Some(result) = self.look(LOOK) {
+            if let Some(result) = self.poll(POLL_INTERVAL) {
                 return result.map_err(Some);
             }
         }
         if matches!(self.result.try_recv(), Err(TryRecvError::Empty)) {
-            leave_behind();
+            abandon();
         }
         Err(None)
     }
@@ -354,7 +354,7 @@ impl CallThread {
         let inside = progress.clone();
         let job = move || {
             let value = catch_unwind(AssertUnwindSafe(|| body(&inside)));
-            inside.leave();
+            inside.exit();
             // Without a receiver the value is dropped here.
             let _ = sender.send(value);
         };
@@ -425,7 +425,7 @@ mod tests {
         );
         let told = Unresponsive { who: "rubber".to_owned(), call: Call::Prepare, limit: SHORT };
         assert_eq!(made.map(|_| ()), Err(CallError::Unresponsive(told)));
-        assert!(is_left_behind());
+        assert!(is_abandoned());
         drop(release);
     }
 
@@ -436,7 +436,7 @@ mod tests {
             || true,
             |progress| {
                 progress.enter("jelly", Call::Create);
-                progress.leave();
+                progress.exit();
                 std::thread::sleep(4 * SHORT);
             },
         );

@@ -44,7 +44,7 @@ pub fn run(
     let recording = RunRecording::new(recorder);
     let mut watchers = Watchers { tally: Tally::default(), digest: TraceDigest::new(), recording, demand };
     let ran = session.run(&mut watchers, &StopSwitch::default());
-    let asked = watchers.demand();
+    let requested = watchers.demand();
     let Watchers { tally, digest, mut recording, .. } = watchers;
     // The recording of a failed run is finished, too.
     let recorded = recording.finish(&[]);
@@ -58,7 +58,7 @@ pub fn run(
         seed,
         rate_hz: scene.rate_hz,
         plugins: &plugins,
-        asked,
+        requested,
         couplings: &scene.couplings,
         carried: &[],
         trace_digest: digest.finish(),

@@ -32,8 +32,8 @@ pub mod summary;
 pub mod telemetry;
 
 pub use calls::{
-    Call, CallError, LIMIT_VARIABLE, Notice, STEP_LIMIT_VARIABLE, Unresponsive, is_left_behind,
-    stop_waits_with, tell_notices,
+    Call, CallError, LIMIT_VARIABLE, Notice, STEP_LIMIT_VARIABLE, Unresponsive, is_abandoned, on_notice,
+    stop_waits_with,
 };
 pub use estimates::estimates;
 pub use flotor_servo::THREAD_ADVICE;
@@ -42,8 +42,8 @@ pub use platform::{ThreadClock, end_with_this_thread};
 pub use plugin_process::PluginProcess;
 pub use run_recording::RunRecording;
 pub use session::{
-    ControlError, Controls, DeviceOutcome, Guardian, LatchGuard, LatchWatch, Lockstep, Misbehaved, NewValue,
-    Observer, Outcome, PluginReport, Remains, RunError, RunOptions, Session, Steps, StopReach, StopTime,
-    StopWithoutHost, Strength, StrongDevice, Tap, WatchdogStart, check_plugins, prepare_model,
-    start_watchdog_process,
+    ControlError, Controls, DeviceOutcome, FaultyPlugin, Guardian, LatchGuard, LatchWatch, Lockstep,
+    NewValue, Observer, Outcome, PluginReport, RunError, RunOptions, Session, Steps, StopReach, StopTime,
+    StopWithoutHost, Strength, StrongDevice, Tap, UnfreedPlugins, WatchdogStart, check_plugins,
+    prepare_model, start_watchdog_process,
 };

@@ -80,7 +80,7 @@ impl<P: PartialEq> LongCall<P> {
 
     /// Polls the thread of `clock`, which is at `place` now; returns the limit that the call has exceeded. Call it every few
     /// hundredths of a second. Not real-time.
-    pub fn look(
+    pub fn check(
         &mut self,
         place: P,
         clock: &ThreadClock,
@@ -100,7 +100,7 @@ impl<P: PartialEq> LongCall<P> {
             self.waited += since;
         }
         let before = *self.ran_before.get_or_insert(ran);
-        let is_to_stop = stop.is_some_and(|stop| stop.is_stop_asked() || stop.emergency().is_some());
+        let is_to_stop = stop.is_some_and(|stop| stop.is_stop_requested() || stop.emergency().is_some());
         if ran.saturating_sub(before) >= limit {
             Some(Exceeded::Processor(limit))
         } else if self.waited >= WAITS * limit {

@@ -34,7 +34,7 @@ const RAMP_MS: f64 = 200.0;
 
 /// Command from the program.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Order {
+struct Command {
     wrench: Wrench,
     /// Number of commands so far: the same wrench again is valid anew.
     commands: u64,
@@ -44,7 +44,7 @@ struct Order {
     valid_ns: u64,
 }
 
-impl Words<9> for Order {
+impl Words<9> for Command {
     #[inline]
     fn to_words(&self) -> [u64; 9] {
         let Wrench { force_n: [fx, fy, fz], torque_nm: [tx, ty, tz] } = self.wrench;
@@ -60,7 +60,7 @@ impl Words<9> for Order {
     }
 }
 
-const NOTHING: Order = Order { wrench: Wrench::ZERO, commands: 0, gate: 0, valid_ns: 0 };
+const NO_COMMAND: Command = Command { wrench: Wrench::ZERO, commands: 0, gate: 0, valid_ns: 0 };
 
 /// Counters of a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -83,7 +83,7 @@ struct Lapses {
 
 /// Model side of a port, until a model takes it.
 struct ModelEnd {
-    orders: Observer<Order, 9>,
+    command: Observer<Command, 9>,
     lapses: Arc<Lapses>,
 }
 
@@ -104,7 +104,7 @@ pub struct NotFinite;
 #[derive(Debug)]
 pub struct Port {
     number: u32,
-    orders: Mutex<(Order, Publisher<Order, 9>)>,
+    command: Mutex<(Command, Publisher<Command, 9>)>,
     refused: AtomicU64,
     lapses: Arc<Lapses>,
 }
@@ -119,10 +119,10 @@ impl Port {
     /// Creates a port, disabled at first; the next model with this [number](Self::number) takes it. Not real-time.
     #[must_use]
     pub fn new() -> Self {
-        let (publisher, orders) = latest(NOTHING);
+        let (publisher, command) = latest(NO_COMMAND);
         let (number, lapses) = (NEXT.fetch_add(1, Ordering::Relaxed), Arc::<Lapses>::default());
-        lock(&FREE).push((number, ModelEnd { orders, lapses: Arc::clone(&lapses) }));
-        Self { number, orders: Mutex::new((NOTHING, publisher)), refused: AtomicU64::new(0), lapses }
+        lock(&FREE).push((number, ModelEnd { command, lapses: Arc::clone(&lapses) }));
+        Self { number, command: Mutex::new((NO_COMMAND, publisher)), refused: AtomicU64::new(0), lapses }
     }
 
     /// Returns the value of the model's parameter `port` for this port.
@@ -141,35 +141,35 @@ impl Port {
             self.refused.fetch_add(1, Ordering::Relaxed);
             return Err(NotFinite);
         }
-        self.change(|order| {
-            order.wrench = *wrench;
-            order.commands += 1;
+        self.change(|command| {
+            command.wrench = *wrench;
+            command.commands += 1;
         });
         Ok(())
     }
 
     /// Enables the force, which fades in from the next tick on. Bounded, as [`Self::command`].
     pub fn enable(&self) {
-        self.change(|order| order.gate += 1 - order.gate % 2);
+        self.change(|command| command.gate += 1 - command.gate % 2);
     }
 
     /// Disables the force from the next tick on, without a fade. Bounded, as [`Self::command`].
     pub fn disable(&self) {
-        self.change(|order| {
-            order.gate += order.gate % 2;
-            order.wrench = Wrench::ZERO;
+        self.change(|command| {
+            command.gate += command.gate % 2;
+            command.wrench = Wrench::ZERO;
         });
     }
 
     /// Returns true if the force is enabled.
     #[must_use]
     pub fn is_enabled(&self) -> bool {
-        lock(&self.orders).0.gate % 2 == 1
+        lock(&self.command).0.gate % 2 == 1
     }
 
     /// Sets the validity of a wrench, ns, in place of the model's `valid_ms`; 0: as in `valid_ms`.
-    pub fn keep_valid_for(&self, valid_ns: u64) {
-        self.change(|order| order.valid_ns = valid_ns);
+    pub fn set_validity(&self, valid_ns: u64) {
+        self.change(|command| command.valid_ns = valid_ns);
     }
 
     /// Returns the counters so far.
@@ -177,18 +177,18 @@ impl Port {
     pub fn counts(&self) -> ProgramCounts {
         let refused = self.refused.load(Ordering::Relaxed);
         ProgramCounts {
-            commands: lock(&self.orders).0.commands + refused,
+            commands: lock(&self.command).0.commands + refused,
             refused,
             lapses: self.lapses.count.load(Ordering::Relaxed),
             lapsed_ticks: self.lapses.ticks.load(Ordering::Relaxed),
         }
     }
 
-    fn change(&self, change: impl FnOnce(&mut Order)) {
-        let mut orders = lock(&self.orders);
-        let (order, publisher) = &mut *orders;
-        change(order);
-        publisher.publish(order);
+    fn change(&self, change: impl FnOnce(&mut Command)) {
+        let mut command = lock(&self.command);
+        let (command, publisher) = &mut *command;
+        change(command);
+        publisher.publish(command);
     }
 }
 
@@ -254,7 +254,7 @@ struct ProgramModel {
     valid_ns: u64,
     fade_ns: u64,
     ramp_ns: u64,
-    order: Order,
+    command: Command,
     version: u64,
     /// Time of the first tick with the newest wrench, ns.
     commanded_ns: u64,
@@ -323,7 +323,7 @@ impl ForceModel for ProgramModel {
             valid_ns: ns("valid_ms"),
             fade_ns: ns("fade_ms"),
             ramp_ns: ns("ramp_ms"),
-            order: NOTHING,
+            command: NO_COMMAND,
             version: 0,
             commanded_ns: 0,
             since_ns: 0,
@@ -335,13 +335,13 @@ impl ForceModel for ProgramModel {
     fn step(&mut self, input: &Input) -> Output {
         let now_ns = input.time_ns;
         // A command that is being written is read in the next tick.
-        if let Some((version, order)) = self.end.orders.read()
+        if let Some((version, command)) = self.end.command.read()
             && version != self.version
         {
             self.version = version;
-            self.follow(order, now_ns);
+            self.follow(command, now_ns);
         }
-        let Order { wrench, gate, valid_ns, .. } = self.order;
+        let Command { wrench, gate, valid_ns, .. } = self.command;
         if gate.is_multiple_of(2) || wrench == Wrench::ZERO {
             self.has_lapsed = false;
             return Wrench::ZERO.into();
@@ -372,19 +372,19 @@ impl ForceModel for ProgramModel {
 
 impl ProgramModel {
     /// Updates the times after a new command.
-    fn follow(&mut self, order: Order, now_ns: u64) {
-        if order.gate != self.order.gate {
+    fn follow(&mut self, command: Command, now_ns: u64) {
+        if command.gate != self.command.gate {
             (self.since_ns, self.rise_ns, self.has_lapsed) = (now_ns, self.ramp_ns, false);
             self.commanded_ns = now_ns;
         }
-        if order.commands != self.order.commands {
+        if command.commands != self.command.commands {
             if self.has_lapsed {
                 // Fade in over the time of the fade-out.
                 (self.since_ns, self.rise_ns, self.has_lapsed) = (now_ns, self.fade_ns, false);
             }
             self.commanded_ns = now_ns;
         }
-        self.order = order;
+        self.command = command;
     }
 }
 
@@ -487,7 +487,7 @@ mod tests {
         let broken = Wrench { force_n: [f64::NAN, 0.0, 0.0], ..PUSH };
         assert_eq!(port.command(&broken), Err(NotFinite));
         assert_eq!(at(&mut model, 10_040).0, PUSH);
-        port.keep_valid_for(5_000_000);
+        port.set_validity(5_000_000);
         let (fading, _) = at(&mut model, 10_041);
         assert!(fading.force().length() < PUSH.force().length(), "a validity of its own: {fading:?}");
         assert_eq!(port.counts(), ProgramCounts { commands: 3, refused: 1, lapses: 1, lapsed_ticks: 1 });

@@ -55,7 +55,7 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         blend: Blend::default(),
         field: None,
         latency_s: report.latency_s,
-        felt: report.felt,
+        at_hand: report.at_hand,
         settings: settings.collect(),
         parameters: report.parameters.iter().cloned().chain(contents_of_files(report)).collect(),
     }

@@ -3,11 +3,11 @@
 use crate::feel::Feel;
 use crate::scene::Isolation;
 use crate::telemetry::LinkCounts;
-use crate::{Misbehaved, Observer, Outcome, PluginReport};
+use crate::{FaultyPlugin, Observer, Outcome, PluginReport};
 use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;
 use flotor_core::trace::{Events, TickRecord};
-use flotor_coupling::Hearing;
+use flotor_coupling::LinkStatistics;
 use flotor_hal::{DVec3, Demand, EnergyLedger};
 use flotor_servo::RunEnd;
 use flotor_servo::{
@@ -323,7 +323,8 @@ pub struct CouplingSummary {
     /// Total energy that the hand at each end put in less the energy that came out, J.
     pub gone_in_j: [f64; 2],
     /// Energy dissipated at each end, J.
-    pub given_up_j: [f64; 2],
+    #[serde(rename = "given_up_j")]
+    pub discarded_j: [f64; 2],
     /// Link to a remote second end, whose numbers above are as last received.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<LinkSummary>,
@@ -333,7 +334,8 @@ pub struct CouplingSummary {
 #[derive(Clone, Debug, Serialize)]
 pub struct LinkSummary {
     /// Ticks in which a message arrived.
-    pub heard_ticks: u64,
+    #[serde(rename = "heard_ticks")]
+    pub received_ticks: u64,
     /// Number of times without a message for the watchdog's timeout: the coupling removed its force.
     pub silences: u64,
     /// Longest wait for a message, ms; always less than the watchdog's timeout.
@@ -345,7 +347,8 @@ pub struct LinkSummary {
     /// Run of the partner, by its start in ns since 1970, as text; empty without a partner.
     pub partner: String,
     /// Energy accepted from the partner, J: no more than this and the input of the local hand came out here.
-    pub believed_j: f64,
+    #[serde(rename = "believed_j")]
+    pub accepted_j: f64,
     /// Claimed energy beyond the part that can be checked here, J.
     pub cut_j: f64,
     /// Claimed travel beyond the plausible limit, m.
@@ -355,7 +358,8 @@ pub struct LinkSummary {
     /// Ticks with a rejected claim, or with a place beyond the range of the local device.
     pub cut_ticks: u64,
     /// Partner runs rejected for implausible claims, as text.
-    pub let_go: Vec<String>,
+    #[serde(rename = "let_go")]
+    pub rejected_runs: Vec<String>,
 }
 
 /// Energy balance of a run.
@@ -413,7 +417,7 @@ pub struct RunFacts<'a> {
     /// Plugins of the run.
     pub plugins: &'a [PluginReport],
     /// Model outputs that the run's own observer requested, without those of clients.
-    pub asked: Demand,
+    pub requested: Demand,
     /// Couplings between devices.
     pub couplings: &'a [CouplingDescription],
     /// Counts of messages between hosts, by name of the coupling.
@@ -425,7 +429,7 @@ pub struct RunFacts<'a> {
 impl LinkSummary {
     /// Formats the link statistics for users.
     fn to_text(&self) -> String {
-        let Self { heard_ticks, silences, longest_wait_ms, implausible, carried, .. } = self;
+        let Self { received_ticks, silences, longest_wait_ms, implausible, carried, .. } = self;
         let LinkCounts { lost, overtaken, refused, others, .. } = carried;
         let silent = match silences {
             0 => format!("longest wait for a message {longest_wait_ms:.0} ms"),
@@ -452,13 +456,13 @@ impl LinkSummary {
                 self.cut_turn_rad
             ),
         };
-        let let_go = match self.let_go.as_slice() {
+        let rejected_runs = match self.rejected_runs.as_slice() {
             [] => String::new(),
             runs => format!("; not heard any more because of its claims: run {}", runs.join(", run ")),
         };
         format!(
-            "{partner}; messages in {heard_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} \
-             refused{impossible}{others}{cut}{let_go}"
+            "{partner}; messages in {received_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} \
+             refused{impossible}{others}{cut}{rejected_runs}"
         )
     }
 }
@@ -491,7 +495,7 @@ impl RunSummary {
         let ledgers = || outcome.devices.iter().filter_map(|device| device.ledger);
         let elapsed_s = outcome.elapsed_ns as f64 * 1.0e-9;
         let needed = (facts.plugins.iter().zip(&tally.devices))
-            .fold(Demand::ALL, |all, (device, _)| all.limited_to(device.felt.with(facts.asked)));
+            .fold(Demand::ALL, |all, (device, _)| all.limited_to(device.at_hand.with(facts.requested)));
         let not_computed = tally.not_computed.beyond(needed).names();
         Self {
             title: facts.title.to_owned(),
@@ -553,7 +557,7 @@ impl RunSummary {
             warnings: outcome.warnings.clone(),
             plugins: (facts.plugins.iter().enumerate())
                 .map(|(number, plugin)| plugin_summary(number, plugin, outcome))
-                .chain(outcome.misbehaved.iter().map(misbehaved_summary))
+                .chain(outcome.faulty_plugins.iter().map(faulty_plugin_summary))
                 .collect(),
             replacements: outcome.replacements.iter().map(|plugin| replacement(plugin, outcome)).collect(),
         }
@@ -561,7 +565,7 @@ impl RunSummary {
 
     /// Sets the health of the plugin that ended the run.
     #[must_use]
-    pub fn blaming(mut self, name: &str, what: &str) -> Self {
+    pub fn with_health(mut self, name: &str, what: &str) -> Self {
         let cause = self.plugins.iter_mut().filter(|plugin| plugin.name == name);
         cause.for_each(|plugin| what.clone_into(&mut plugin.health));
         self
@@ -616,16 +620,16 @@ impl RunSummary {
                 row(name, format!("{peaks}   port {end_mj:+.3} mJ, lowest {lowest_mj:+.3} mJ"));
             }
         }
-        for CouplingSummary { name, lowest_j, given_up_j, link, .. } in &self.couplings {
+        for CouplingSummary { name, lowest_j, discarded_j, link, .. } in &self.couplings {
             let [first, second] = lowest_j.map(|joule| joule * 1.0e3);
-            let heat_mj = given_up_j.iter().sum::<f64>() * 1.0e3;
+            let heat_mj = discarded_j.iter().sum::<f64>() * 1.0e3;
             let tanks = match link {
                 None => {
                     format!("tanks never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ dissipated")
                 }
                 Some(link) => format!(
                     "tank never below {first:+.3} mJ with {:.3} mJ believed of the partner, whose own says {second:+.3} mJ",
-                    link.believed_j * 1.0e3
+                    link.accepted_j * 1.0e3
                 ),
             };
             row("coupling", format!("{name}: {tanks}"));
@@ -692,27 +696,27 @@ fn coupling_summary(
 ) -> CouplingSummary {
     let each = |number: fn(&TankState) -> f64| outcome.tanks.each_ref().map(number);
     let carried = carried.iter().find(|(name, _)| *name == coupling.name).map(|(_, carried)| *carried);
-    let link = |hearing: Hearing| LinkSummary {
-        heard_ticks: hearing.ticks,
-        silences: hearing.silences,
-        longest_wait_ms: hearing.longest_wait_ns as f64 * 1.0e-6,
-        implausible: hearing.implausible,
+    let link_summary = |link: LinkStatistics| LinkSummary {
+        received_ticks: link.ticks,
+        silences: link.silences,
+        longest_wait_ms: link.longest_wait_ns as f64 * 1.0e-6,
+        implausible: link.implausible,
         carried: carried.unwrap_or_default(),
-        partner: if hearing.run == 0 { String::new() } else { hearing.run.to_string() },
-        believed_j: hearing.believed_j,
-        cut_j: hearing.cut.energy_j,
-        cut_path_m: hearing.cut.path_m,
-        cut_turn_rad: hearing.cut.turn_rad,
-        cut_ticks: hearing.cut_ticks,
-        let_go: hearing.let_go.iter().filter(|run| **run != 0).map(u64::to_string).collect(),
+        partner: if link.run == 0 { String::new() } else { link.run.to_string() },
+        accepted_j: link.accepted_j,
+        cut_j: link.cut.energy_j,
+        cut_path_m: link.cut.path_m,
+        cut_turn_rad: link.cut.turn_rad,
+        cut_ticks: link.cut_ticks,
+        rejected_runs: link.rejected_runs.iter().filter(|run| **run != 0).map(u64::to_string).collect(),
     };
     CouplingSummary {
         name: coupling.name.clone(),
         energy_gain: coupling.ends.energy_gain(),
         lowest_j: each(|tank| tank.lowest_j),
         gone_in_j: each(|tank| tank.gone_in_j),
-        given_up_j: each(|tank| tank.given_up_j),
-        link: outcome.hearing.map(link),
+        discarded_j: each(|tank| tank.discarded_j),
+        link: outcome.link.map(link_summary),
     }
 }
 
@@ -763,27 +767,27 @@ fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> Pl
 }
 
 /// Returns the summary of a replacement with faults.
-fn misbehaved_summary(Misbehaved { plugin, health, words }: &Misbehaved) -> PluginSummary {
+fn faulty_plugin_summary(FaultyPlugin { plugin, health, words }: &FaultyPlugin) -> PluginSummary {
     summary_of(plugin, health_words(health, words))
 }
 
 /// Returns the summary of a replacement in place at the end.
 fn replacement(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
-    let same = |known: &&Misbehaved| {
+    let same = |known: &&FaultyPlugin| {
         known.plugin.name == plugin.name && known.plugin.metadata.path == plugin.metadata.path
     };
     outcome
-        .misbehaved
+        .faulty_plugins
         .iter()
         .find(same)
-        .map_or_else(|| summary_of(plugin, "ok".to_owned()), misbehaved_summary)
+        .map_or_else(|| summary_of(plugin, "ok".to_owned()), faulty_plugin_summary)
 }
 
 fn summary_of(plugin: &PluginReport, health: String) -> PluginSummary {
     PluginSummary {
         name: plugin.name.clone(),
         id: plugin.metadata.id.clone(),
-        kind: plugin.metadata.kind.word(),
+        kind: plugin.metadata.kind.name(),
         version: plugin.metadata.version.clone(),
         file: plugin.metadata.path.display().to_string(),
         isolation: plugin.isolation.map(Isolation::word),

@@ -64,7 +64,7 @@ impl Diagnosis {
     }
 
     /// Creates a bad finding whose text contains the remedy.
-    pub(crate) fn told(what: &'static str, found: impl Into<String>) -> Self {
+    pub(crate) fn bad_without_remedy(what: &'static str, found: impl Into<String>) -> Self {
         Self { what, grade: Grade::Bad, found: found.into(), remedy: None }
     }
 
@@ -139,7 +139,7 @@ fn privileges(report: &RealTimeReport, root: &Path) -> [Diagnosis; 2] {
     let diagnose = |what, privilege: &Privilege, remedy: String| match privilege {
         Privilege::Granted => Diagnosis::good(what, "granted"),
         Privilege::Refused(reason) => Diagnosis::bad(what, reason.clone(), remedy),
-        Privilege::NotAsked => Diagnosis::note(what, "not requested", remedy),
+        Privilege::NotRequested => Diagnosis::note(what, "not requested", remedy),
     };
     [
         diagnose(PRIORITY_NAME, &report.fifo, priority_remedy(root)),

@@ -164,7 +164,7 @@ pub fn command_names() -> Vec<String> {
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = options::arguments::<Arguments>();
-    flotor_session::tell_notices(|notice| flotor_command::note(notice));
+    flotor_session::on_notice(|notice| flotor_command::note(notice));
     let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::default()));
     if let Command::Run(arguments) = &command
         && arguments.is_lent()

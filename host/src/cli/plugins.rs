@@ -56,7 +56,7 @@ fn list(registry: &Registry, json: &JsonOption) -> Result<(), CommandError> {
         .iter()
         .map(|plugin| Listed {
             id: &plugin.id,
-            kind: plugin.kind.word(),
+            kind: plugin.kind.name(),
             name: &plugin.name,
             doc: &plugin.doc,
             version: &plugin.version,
@@ -71,8 +71,8 @@ fn list(registry: &Registry, json: &JsonOption) -> Result<(), CommandError> {
         return Ok(());
     }
     for kind in [PluginKind::Device, PluginKind::Model] {
-        say!("{}", style::title(&format!("{}s", kind.word())));
-        for plugin in listed.iter().filter(|plugin| plugin.kind == kind.word()) {
+        say!("{}", style::title(&format!("{}s", kind.name())));
+        for plugin in listed.iter().filter(|plugin| plugin.kind == kind.name()) {
             say!("  {:<12} {:<8} {}", plugin.id, plugin.version, plugin.doc);
             say!("  {:<12} {:<8} {}", "", "", plugin.file);
         }

@@ -89,9 +89,9 @@ enum RecordingEnd {
 fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, CommandError> {
     let mut recorder = Recorder::create(out, client.run())?;
     let lost = |error: LiveError| CommandError::Failed(error.to_string());
-    client.asker().ask(Ask::Watch { every: 1 }).map_err(lost)?;
+    client.request_client().ask(Ask::Watch { every: 1 }).map_err(lost)?;
     let mut kept = Kept { ticks: 0, dropped: 0, end: RecordingEnd::Complete("stopped recording".to_owned()) };
-    while !stop.is_stop_asked() {
+    while !stop.is_stop_requested() {
         match client.next(LOOK_PERIOD) {
             // The only request is that to watch.
             Ok(Some(Event::Answer(Answer { refused: Some(reason), .. }))) => {

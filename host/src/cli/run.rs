@@ -24,7 +24,7 @@ use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::summary::{RunFacts, RunSummary, Tally};
-use flotor_session::telemetry::{LinkCounts, PeerLink, Watched, publish, start_peer_link};
+use flotor_session::telemetry::{LinkCounts, ObservedRun, PeerLink, publish, start_peer_link};
 use flotor_session::{
     LatchGuard, Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session, stop_waits_with,
 };
@@ -166,19 +166,19 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         progress: progress_bar(length_ms, "{percent:>3} %  {msg}"),
     };
     let keys = (clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
-    let mut watched = Watched { observer: watchers, publication };
+    let mut watched = ObservedRun { observer: watchers, publication };
     let latch = session.latch().cloned();
     let outcome = session.run(&mut watched, &stop);
     drop(keys);
-    let asked = watched.demand();
-    let Watched { observer: Watchers { tally, digest, mut recording, plot, progress, .. }, publication } =
+    let requested = watched.demand();
+    let ObservedRun { observer: Watchers { tally, digest, mut recording, plot, progress, .. }, publication } =
         watched;
     progress.finish_and_clear();
     let outcome = match outcome {
         Ok(outcome) => outcome,
         Err(error) => {
             let recorded = recording.finish(&[]).map_err(Into::into);
-            let told = match (&error, arguments.json.file()) {
+            let reported = match (&error, arguments.json.file()) {
                 (RunError::Hung { who, stuck, .. }, Some(json)) => {
                     let elapsed_ns = tally.last_ns();
                     let facts = RunFacts {
@@ -187,17 +187,17 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
                         seed: arguments.seed,
                         rate_hz: scene.rate_hz,
                         plugins: &plugins,
-                        asked,
+                        requested,
                         couplings: &[],
                         carried: &[],
                         trace_digest: digest.finish(),
                     };
                     let summary = RunSummary::new(facts, &Outcome::of_hung_loop(*stuck, elapsed_ns), &tally);
-                    write_json(json, &summary.blaming(who, &error.to_string()))
+                    write_json(json, &summary.with_health(who, &error.to_string()))
                 }
                 _ => Ok(()),
             };
-            return first_error([Err(error.into()), recorded, told]);
+            return first_error([Err(error.into()), recorded, reported]);
         }
     };
 
@@ -212,7 +212,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         seed: arguments.seed,
         rate_hz: scene.rate_hz,
         plugins: &plugins,
-        asked,
+        requested,
         couplings: &scene.couplings,
         carried: &carried,
         trace_digest: digest.finish(),
@@ -232,8 +232,8 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     latch.and_then(|latch| stop_note(outcome.end, &latch)).into_iter().for_each(note);
     let verdict = verdict(&outcome, &plugins, &summary);
     // Last, because the code of a plugin may hang, or end the process.
-    let Outcome { unresponsive, remains, .. } = outcome;
-    let freed = remains.free();
+    let Outcome { unresponsive, unfreed_plugins, .. } = outcome;
+    let freed = unfreed_plugins.free();
     let freed = unresponsive.map_or(freed, Err).map_err(|hung| CommandError::PluginRefused(hung.to_string()));
     // Scripts need the outcome of the run first, a missing file second.
     first_error([verdict, freed, recorded, drawn, printed])

@@ -82,7 +82,7 @@ fn for_host(plugin: &str) -> Result<String, CommandError> {
 /// Requests the swap and waits for its result: the change in the loop, or `None` if the loop does not report it in time.
 fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMessage>, CommandError> {
     let lost = |error: LiveError| CommandError::Failed(error.to_string());
-    let asked = client.asker().ask(ask).map_err(lost)?;
+    let asked = client.request_client().ask(ask).map_err(lost)?;
     let (mut change, mut is_answered) = (None, false);
     let mut until = Instant::now() + CREATION_LIMIT;
     while change.is_none() || !is_answered {
@@ -103,8 +103,10 @@ fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMe
                 until = Instant::now() + SWAP_LIMIT;
             }
             // The change may arrive before the answer.
-            Some(Event::Change(told)) if told.subject == Subject::Plugin && is_named(&told.plugin, model) => {
-                change = Some(told);
+            Some(Event::Change(reported))
+                if reported.subject == Subject::Plugin && is_named(&reported.plugin, model) =>
+            {
+                change = Some(reported);
             }
             Some(Event::End(end)) => return Err(CommandError::Failed(end.words)),
             _ => {}

@@ -4,7 +4,7 @@ mod supervision;
 
 use super::Request;
 use flotor_servo::StopSwitch;
-use flotor_servo::platform::{block_signals, leave_sent_signals_to_the_loop, wait_for_signal};
+use flotor_servo::platform::{block_sent_signals, block_signals, wait_for_signal};
 use rustix::process::{Pid, Resource, Signal, getpgrp, getrlimit, kill_process};
 use rustix::termios::{LocalModes, OptionalActions, Termios, isatty, tcgetattr, tcgetpgrp, tcsetattr};
 use signal_hook::consts::{
@@ -54,7 +54,7 @@ impl Requests {
             .collect();
         block_signals(&[&signals[..], &SUSPENDING].concat())?;
         // This thread may wait for a processor while a plugin in the loop keeps it busy.
-        leave_sent_signals_to_the_loop()?;
+        block_sent_signals()?;
         // A thread in which a library has unblocked the signals sets these flags when it takes one.
         for signal in &signals {
             let flag = if *signal == SIGUSR1 { stop.emergency_flag() } else { stop.stop_flag() };

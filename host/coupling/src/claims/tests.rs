@@ -5,7 +5,7 @@ use flotor_hal::DQuat;
 fn is_possible(motion_scale: f64, pose: Pose, twist: Twist) -> bool {
     let mapping = Mapping::new(&MappingConfig { motion_scale, ..MappingConfig::default() });
     let claims = Claims::new(&CouplingConfig::default(), &mapping, Reach::default(), 1.0e-3);
-    claims.can_be(&PeerState { pose, twist, told_j: 0.0 }, &mapping)
+    claims.can_be(&PeerState { pose, twist, passed_on_j: 0.0 }, &mapping)
 }
 
 fn can_be(motion_scale: f64, z_m: f64, z_m_per_s: f64) -> bool {
@@ -21,7 +21,7 @@ fn swing(tick: u64) -> PeerState {
     PeerState {
         pose,
         twist: Twist::new(most * rate * cos, most * 10.0 * rate * cos),
-        told_j: 1.0e-5 * tick as f64,
+        passed_on_j: 1.0e-5 * tick as f64,
     }
 }
 
@@ -39,12 +39,12 @@ fn an_honest_partner_is_believed_to_the_bit() {
             continue;
         }
         let told = swing(tick);
-        let believed = claims.believe(&told, &DeviceState::HOME, &mapping, (tick - heard) as f64 * 1.0e-3);
-        assert_eq!((believed.pose, believed.twist), (told.pose, told.twist), "tick {tick}");
-        assert!((believed.told_j - told.told_j).abs() < 1.0e-12, "tick {tick}: {believed:?}");
+        let accepted = claims.accept(&told, &DeviceState::HOME, &mapping, (tick - heard) as f64 * 1.0e-3);
+        assert_eq!((accepted.pose, accepted.twist), (told.pose, told.twist), "tick {tick}");
+        assert!((accepted.passed_on_j - told.passed_on_j).abs() < 1.0e-12, "tick {tick}: {accepted:?}");
         heard = tick;
     }
-    assert_eq!((claims.cut(), claims.is_too_much()), (Cut::default(), false));
+    assert_eq!((claims.cut(), claims.is_too_much()), (ClaimExcess::default(), false));
 }
 
 #[test]
@@ -56,9 +56,9 @@ fn an_orientation_that_is_accepted_is_normalised() {
         let told = PeerState { pose: Pose::new(claim.pose.position(), orientation), ..claim };
         let mut claims = Claims::new(&CouplingConfig::default(), &mapping, Reach::default(), 1.0e-3);
         assert!(claims.can_be(&told, &mapping), "length {length}");
-        let believed = claims.believe(&told, &DeviceState::HOME, &mapping, 1.0e-3).pose.orientation();
+        let accepted = claims.accept(&told, &DeviceState::HOME, &mapping, 1.0e-3).pose.orientation();
         // Four roundings.
-        assert!((believed - claim.pose.orientation()).length() < 1.0e-15, "length {length}: {believed}");
+        assert!((accepted - claim.pose.orientation()).length() < 1.0e-15, "length {length}: {accepted}");
     }
 }
 

@@ -16,8 +16,8 @@ fn a_press_stays_until_it_is_released_and_is_never_forgotten() {
     latch.press("first").unwrap();
     latch.press("second").unwrap();
     let state = directory.latch().state();
-    assert_eq!(state.pressed.clone().unwrap().who, "first");
-    assert_eq!(latch.release("owner").unwrap().unwrap().who, "first");
+    assert_eq!(state.pressed.clone().unwrap().source, "first");
+    assert_eq!(latch.release("owner").unwrap().unwrap().source, "first");
     let released = latch.state();
     assert_eq!(released.pressed, None);
     assert!(released.was_pressed_after(&first) && !released.was_pressed_after(&state));
@@ -34,7 +34,7 @@ fn a_release_undoes_no_press_that_it_did_not_see() {
     press(latch.kept.file.as_ref().unwrap(), "unseen").unwrap();
     let release = Entry::Release { press: seen, who: "owner".to_owned() };
     write(latch.kept.file.as_ref().unwrap(), Place::Release, &release).unwrap();
-    assert_eq!(directory.latch().state().pressed.unwrap().who, "unseen");
+    assert_eq!(directory.latch().state().pressed.unwrap().source, "unseen");
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn what_cannot_be_read_is_a_press_and_can_be_released() {
     let longest = "\u{10ffff}".repeat(10_000);
     opened.release("owner").unwrap();
     opened.press(&longest).unwrap();
-    assert_eq!(directory.latch().state().pressed.unwrap().who.chars().count(), LONGEST_NAME);
+    assert_eq!(directory.latch().state().pressed.unwrap().source.chars().count(), LONGEST_NAME);
 }
 
 /// Whoever opened it before and whoever opens it later: both learn of a press behind a file that was replaced in between.
@@ -68,10 +68,10 @@ fn a_press_reaches_those_before_and_after_the_file_was_replaced() {
     let after = directory.latch();
     before.press("first").unwrap();
     for latch in [&other, &after, &directory.latch()] {
-        assert_eq!(latch.state().pressed.unwrap().who, "first");
+        assert_eq!(latch.state().pressed.unwrap().source, "first");
     }
     before.release("owner").unwrap();
     assert_eq!([other.state().pressed, after.state().pressed], [None, None]);
     after.press("second").unwrap();
-    assert_eq!(before.state().pressed.unwrap().who, "second");
+    assert_eq!(before.state().pressed.unwrap().source, "second");
 }

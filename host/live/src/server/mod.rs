@@ -31,12 +31,12 @@ use std::time::{Duration, Instant};
 use watcher::Watcher;
 
 /// Largest number of programs that watch one run: each costs two threads and a queue.
-const MOST_WATCHERS: usize = 16;
+const MAX_WATCHERS: usize = 16;
 /// Largest number of connections. At least one of them does not watch: the one silent for longest is closed in favour of a new
 /// one, so that an emergency stop always finds a place.
-const MOST_CONNECTIONS: usize = MOST_WATCHERS + 4;
+const MAX_CONNECTIONS: usize = MAX_WATCHERS + 4;
 /// Largest number of further connections whose threads are ending.
-const MOST_CLOSING: usize = MOST_CONNECTIONS / 2;
+const MAX_CLOSING: usize = MAX_CONNECTIONS / 2;
 /// Stack size of the threads of the server, bytes: small, because locked memory makes every page of it resident.
 const STACK_BYTES: usize = 256 * 1024;
 /// Grace period for a client to read the end of a run, and for its requests to be answered.
@@ -61,7 +61,7 @@ pub enum PublishError {
 /// Handler of clients' requests: the host itself, or a proxy that forwards them.
 pub trait Serve: Send + Sync {
     /// Carries out a request, or passes it on; called in the thread of the client, who alone waits for it. [`Ask::Watch`] and
-    /// [`Ask::LookAway`] are never passed.
+    /// [`Ask::Unwatch`] are never passed.
     ///
     /// # Errors
     /// Kind of reason for a rejection, and the reason in words for people.
@@ -187,8 +187,8 @@ impl Shared {
         let mut closing = self.closing.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
             closing.extract_if(.., |watcher| watcher.has_ended()).for_each(Watcher::join);
-            if closing.len() < MOST_CLOSING || Instant::now() >= until {
-                return closing.len() < MOST_CLOSING;
+            if closing.len() < MAX_CLOSING || Instant::now() >= until {
+                return closing.len() < MAX_CLOSING;
             }
             std::thread::sleep(BREATH / 100);
         }
@@ -202,8 +202,8 @@ impl Shared {
     /// Starts sending ticks to one more client, unless too many watch.
     fn admit(&self, outbox: &Outbox, every: u32) -> Result<(), String> {
         let watchers = self.watchers();
-        if !outbox.wants_ticks() && self.watching.load(Ordering::Relaxed) >= MOST_WATCHERS {
-            return Err(format!("{MOST_WATCHERS} programs watch already; close one of them"));
+        if !outbox.wants_ticks() && self.watching.load(Ordering::Relaxed) >= MAX_WATCHERS {
+            return Err(format!("{MAX_WATCHERS} programs watch already; close one of them"));
         }
         outbox.want_ticks(every.max(1), self.demand.request(Demand::ALL));
         self.count(&watchers);
@@ -243,7 +243,7 @@ fn welcome(stream: Stream, shared: &Arc<Shared>) {
     let mut watchers = shared.watchers();
     watchers.extract_if(.., |watcher| watcher.is_gone()).for_each(|watcher| shared.close(watcher));
     shared.count(&watchers);
-    if watchers.len() >= MOST_CONNECTIONS && !evict_longest_silent(&mut watchers, shared) {
+    if watchers.len() >= MAX_CONNECTIONS && !evict_longest_silent(&mut watchers, shared) {
         return;
     }
     let outbox = Arc::new(Outbox::default());
@@ -257,7 +257,7 @@ fn welcome(stream: Stream, shared: &Arc<Shared>) {
 /// Closes the connection of the client that watches nothing and was silent for longest; false if there is none.
 fn evict_longest_silent(watchers: &mut Vec<Watcher>, shared: &Shared) -> bool {
     let idle = watchers.iter().enumerate().filter(|(_, watcher)| !watcher.outbox.wants_ticks());
-    let longest = idle.min_by_key(|(_, watcher)| watcher.heard_ms()).map(|(place, _)| place);
+    let longest = idle.min_by_key(|(_, watcher)| watcher.last_request_ms()).map(|(place, _)| place);
     let evicted = longest.map(|place| watchers.remove(place));
     evicted.inspect(Watcher::evict).map(|watcher| shared.close(watcher)).is_some()
 }

@@ -8,10 +8,10 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Largest number of pending ticks: four seconds at 1 kHz.
-const MOST_TICKS: usize = 4096;
+const MAX_TICKS: usize = 4096;
 /// Largest number of other pending frames, except the newest change of each parameter. A client that sends this many requests and reads
 /// nothing gets no more answers.
-const MOST_FRAMES: usize = 256;
+const MAX_FRAMES: usize = 256;
 
 #[derive(Default)]
 pub(super) struct Outbox {
@@ -64,7 +64,7 @@ impl Outbox {
     pub(super) fn want_ticks(&self, every: u32, request: DemandRequest) {
         let mut state = self.lock();
         (state.every, state.request) = (every, Some(request));
-        state.ticks.reserve_exact(MOST_TICKS);
+        state.ticks.reserve_exact(MAX_TICKS);
     }
 
     /// Sends no more ticks, and withdraws the request for outputs of models.
@@ -87,7 +87,7 @@ impl Outbox {
         if !record.tick.is_multiple_of(u64::from(state.every)) {
             return;
         }
-        if state.ticks.len() >= MOST_TICKS {
+        if state.ticks.len() >= MAX_TICKS {
             state.dropped += 1;
             return;
         }
@@ -104,7 +104,7 @@ impl Outbox {
         if state.is_closed {
             return;
         }
-        if state.frames.len() >= MOST_FRAMES {
+        if state.frames.len() >= MAX_FRAMES {
             let is_same = |waiting: &WaitingFrame| {
                 waiting.change.as_ref().is_some_and(|earlier| earlier.is_of_the_same(&message))
             };
@@ -120,7 +120,7 @@ impl Outbox {
     /// Appends a frame that is neither tick nor change, if there is room.
     pub(super) fn push(&self, frame: Vec<u8>) {
         let mut state = self.lock();
-        if state.frames.len() < MOST_FRAMES && !state.is_closed {
+        if state.frames.len() < MAX_FRAMES && !state.is_closed {
             state.append(None, frame);
         }
         drop(state);
@@ -190,7 +190,7 @@ struct Batch {
 
 impl Batch {
     /// Largest number of ticks in a frame.
-    const MOST_IN_A_FRAME: usize = 1024;
+    const MAX_IN_A_FRAME: usize = 1024;
 
     fn new(dropped: u64) -> Self {
         Self { bytes: Vec::new(), ticks: Vec::new(), dropped }
@@ -198,7 +198,7 @@ impl Batch {
 
     fn tick(&mut self, record: TickRecord) {
         self.ticks.push(record);
-        if self.ticks.len() >= Self::MOST_IN_A_FRAME {
+        if self.ticks.len() >= Self::MAX_IN_A_FRAME {
             self.close_frame();
         }
     }
@@ -319,7 +319,7 @@ mod tests {
         }
         assert_eq!(seen.first(), Some(&1_000_000), "the only change of its parameter");
         assert_eq!(seen[seen.len() - 3..], [9_999, 2_000_000, 3_000_000]);
-        assert!(seen.len() <= MOST_FRAMES + 2, "{} frames wait", seen.len());
+        assert!(seen.len() <= MAX_FRAMES + 2, "{} frames wait", seen.len());
     }
 
     #[test]
@@ -354,7 +354,7 @@ mod tests {
         while let Some((kind, payload)) = frames.take().expect("frames of our own") {
             seen.push(if kind == Kind::Ticks { ticks_from_payload(payload).1.len() } else { 0 });
         }
-        let newest = MOST_FRAMES;
+        let newest = MAX_FRAMES;
         assert_eq!(seen.first(), Some(&(1000 - newest)), "ticks of the changes that found no room");
         assert_eq!(seen[1..], [0, 1].repeat(newest));
     }
@@ -366,7 +366,7 @@ mod tests {
             let rounds = (0..5).map(|_| {
                 let outbox = Outbox::default();
                 outbox.want_ticks(every, nothing());
-                (0..MOST_TICKS as u64).for_each(|tick| outbox.tick(&record(tick, Events::NONE)));
+                (0..MAX_TICKS as u64).for_each(|tick| outbox.tick(&record(tick, Events::NONE)));
                 let message = changed("gamma_n", Outcome::Applied);
                 let since = Instant::now();
                 for _ in 0..1000 {

@@ -52,7 +52,7 @@ fn publication() -> (tempfile::TempDir, Directory, Publication, Sender<()>) {
 fn stop_of_a_new_client(path: &Path) -> Duration {
     let since = Instant::now();
     let mut client = Client::connect(path).unwrap();
-    let number = client.asker().ask(Ask::EmergencyStop).unwrap();
+    let number = client.request_client().ask(Ask::EmergencyStop).unwrap();
     loop {
         match client.next(Duration::from_secs(20)).unwrap() {
             Some(Event::Answer(answer)) if answer.number == number => return since.elapsed(),
@@ -68,11 +68,11 @@ fn a_stop_waits_for_no_client_that_makes_room_for_it() {
     let (_scratch, _directory, publication, over) = publication();
     let busy = || {
         let client = Client::connect(publication.path()).unwrap();
-        client.asker().ask(Ask::Stop).unwrap();
+        client.request_client().ask(Ask::Stop).unwrap();
         client
     };
-    let busy: Vec<Client> = (0..MOST_CONNECTIONS).map(|_| busy()).collect();
-    let stops = MOST_CONNECTIONS / 2;
+    let busy: Vec<Client> = (0..MAX_CONNECTIONS).map(|_| busy()).collect();
+    let stops = MAX_CONNECTIONS / 2;
     let all: Duration = (0..stops).map(|_| stop_of_a_new_client(publication.path())).sum();
     let evictions = u32::try_from(stops).unwrap();
     assert!(all < evictions * PATIENCE / 4, "{all:?} for {evictions} stops");

@@ -25,7 +25,7 @@ pub(super) struct Watcher {
     writer: JoinHandle<()>,
     reader: JoinHandle<()>,
     /// Time of the connection or the last request, ms.
-    heard_ms: Arc<AtomicU64>,
+    last_request_ms: Arc<AtomicU64>,
 }
 
 impl Watcher {
@@ -36,17 +36,17 @@ impl Watcher {
         let (to_write, to_read) = (Arc::clone(&stream), Arc::clone(&stream));
         let (for_writer, for_reader, of_run) = (Arc::clone(&outbox), Arc::clone(&outbox), Arc::clone(shared));
         let writer = thread("flotor-live-out").spawn(move || write(&to_write, &for_writer)).ok()?;
-        let heard_ms = Arc::new(AtomicU64::new(shared.now_ms()));
-        let heard = Arc::clone(&heard_ms);
+        let last_request_ms = Arc::new(AtomicU64::new(shared.now_ms()));
+        let last_request = Arc::clone(&last_request_ms);
         let reader = thread("flotor-live-in").spawn(move || {
-            read(&to_read, &for_reader, &of_run, &heard);
+            read(&to_read, &for_reader, &of_run, &last_request);
             // The client has closed the connection or sends malformed frames: the writer ends, too.
             for_reader.want_no_ticks();
             for_reader.close();
             of_run.count(&of_run.watchers());
         });
         match reader {
-            Ok(reader) => Some(Self { outbox, stream, writer, reader, heard_ms }),
+            Ok(reader) => Some(Self { outbox, stream, writer, reader, last_request_ms }),
             Err(_) => {
                 outbox.close();
                 None
@@ -60,8 +60,8 @@ impl Watcher {
     }
 
     /// Returns the time of the connection or the last request, ms since the publication began.
-    pub(super) fn heard_ms(&self) -> u64 {
-        self.heard_ms.load(Ordering::Relaxed)
+    pub(super) fn last_request_ms(&self) -> u64 {
+        self.last_request_ms.load(Ordering::Relaxed)
     }
 
     /// Reads no further request; the threads end after the requests that have arrived are answered.
@@ -121,7 +121,7 @@ fn write_whole(mut stream: &Stream, mut bytes: &[u8], outbox: &Outbox) -> bool {
 }
 
 /// Answers requests until the client closes the connection.
-fn read(mut stream: &Stream, outbox: &Outbox, shared: &Shared, heard_ms: &AtomicU64) {
+fn read(mut stream: &Stream, outbox: &Outbox, shared: &Shared, last_request_ms: &AtomicU64) {
     let mut frames = Frames::default();
     loop {
         match frames.fill(&mut stream) {
@@ -133,7 +133,7 @@ fn read(mut stream: &Stream, outbox: &Outbox, shared: &Shared, heard_ms: &Atomic
         loop {
             match frames.take() {
                 Ok(Some((Kind::Request, payload))) => {
-                    heard_ms.store(shared.now_ms(), Ordering::Relaxed);
+                    last_request_ms.store(shared.now_ms(), Ordering::Relaxed);
                     let answer = answer(payload, outbox, shared);
                     if let Ok(payload) = serde_json::to_vec(&answer) {
                         outbox.push(frame(Kind::Answer, &payload));
@@ -164,7 +164,7 @@ fn carry_out(ask: Ask, outbox: &Outbox, shared: &Shared) -> Result<(), (RefusalC
         Ask::Watch { every } => {
             shared.admit(outbox, every).map_err(|refused| (RefusalCause::Other, refused))?
         }
-        Ask::LookAway => {
+        Ask::Unwatch => {
             outbox.want_no_ticks();
             shared.count(&shared.watchers());
         }

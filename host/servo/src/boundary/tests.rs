@@ -249,11 +249,11 @@ impl Handle {
         let rendered =
             RenderedBoundary::new(&Boundary::default(), &device, &Bound::NONE, 1_000_000_000 / rate_hz);
         assert!(
-            rendered.takes_n > 0.999 * self.max_force_n.min(5.0),
+            rendered.holds_n > 0.999 * self.max_force_n.min(5.0),
             "{} at {rate_hz} Hz: {rendered:?}",
             self.name
         );
-        let weight_n = 0.9 * rendered.takes_n;
+        let weight_n = 0.9 * rendered.holds_n;
         let wall = BoundaryWall::new(&rendered);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // counts
         let [steps, late, all] = [1.0 / (STEP_S * rate_hz as f64), self.latency_s / STEP_S, 8.0 / STEP_S]

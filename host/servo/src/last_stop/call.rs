@@ -29,7 +29,7 @@ pub fn enter_call(who: &str, call: impl Display) {
 }
 
 /// Marks the end of the plugin call. Not real-time.
-pub fn leave_call() {
+pub fn exit_call() {
     CALL.set(Line::EMPTY);
 }
 
@@ -52,7 +52,7 @@ mod tests {
             Some("`jelly` ended the process in `create`".to_owned())
         );
         std::thread::spawn(|| assert!(current().is_none())).join().expect("another thread is in no call");
-        leave_call();
+        exit_call();
         assert!(current().is_none());
     }
 }

@@ -15,7 +15,7 @@ pub(crate) use crate::platform::last_stop::take_sent;
 pub use crate::platform::last_stop::{
     SignalGuard, SignalName, TakenSignals, ignore_no_signal, spawn_unblocked,
 };
-pub use call::{enter_call, leave_call, prepare_for_calls};
+pub use call::{enter_call, exit_call, prepare_for_calls};
 pub use end_report::{ReportedEnd, report_end, report_end_to};
 
 use crate::platform::last_stop as system;
@@ -29,7 +29,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 /// Exit code after the devices were stopped here: the one of a failed plugin.
 const ENDED: i32 = 3;
 /// Most runs of one process that are armed at a time; further ones, of parallel simulations, are not.
-const MOST_RUNS: usize = 256;
+const MAX_RUNS: usize = 256;
 /// Number of polls of a second dying thread for the end of the process by the first one, and the poll interval, ns.
 const LOOKS: u32 = 50;
 const LOOK_NS: u64 = 10_000_000;
@@ -39,14 +39,14 @@ struct Armed {
     stoppers: Box<[Stopper]>,
     /// Names of the devices, then of the models, in the scene's order.
     names: Box<[String]>,
-    heart: Heartbeat,
+    heartbeat: Heartbeat,
     /// Id of the loop's thread.
     thread: AtomicI32,
 }
 
 /// Runs of this process. Locked for a few instructions to begin or end a run; a dying thread only tries the lock: a locked run has
 /// no energised device yet, or none any more.
-static RUNS: [Mutex<Option<Arc<Armed>>>; MOST_RUNS] = [const { Mutex::new(None) }; MOST_RUNS];
+static RUNS: [Mutex<Option<Arc<Armed>>>; MAX_RUNS] = [const { Mutex::new(None) }; MAX_RUNS];
 /// True once a run was armed.
 static WAS_ARMED: AtomicBool = AtomicBool::new(false);
 /// Id of the thread in which this process dies; 0: none.
@@ -81,7 +81,7 @@ pub fn was_armed() -> bool {
 pub fn stop_all() {
     for run in &RUNS {
         let run = lock(run).clone();
-        run.iter().for_each(|run| run.heart.silence());
+        run.iter().for_each(|run| run.heartbeat.silence());
         run.iter().flat_map(|run| &run.stoppers).for_each(Stopper::safe_stop);
     }
 }
@@ -90,7 +90,7 @@ pub fn stop_all() {
 #[must_use]
 pub fn calls() -> Vec<(String, Stuck)> {
     let runs = RUNS.iter().filter_map(|run| lock(run).clone()).filter(|run| !run.is_over());
-    let calls = runs.map(|run| (run.name(run.heart.now().place).to_owned(), run.heart.now()));
+    let calls = runs.map(|run| (run.name(run.heartbeat.now().place).to_owned(), run.heartbeat.now()));
     calls.filter(|(_, at)| at.place.is_a_plugins()).collect()
 }
 
@@ -124,9 +124,9 @@ impl LastStop {
     /// Arms a run on the thread that will run the loop: its devices stop when the process dies. `names` are those of the devices,
     /// in the order of `stoppers`, then of the models. `None` if too many runs are armed. Not real-time.
     #[must_use]
-    pub fn arm(stoppers: Vec<Stopper>, names: Vec<String>, heart: Heartbeat) -> Option<(Unwound, Self)> {
+    pub fn arm(stoppers: Vec<Stopper>, names: Vec<String>, heartbeat: Heartbeat) -> Option<(Unwound, Self)> {
         let thread = AtomicI32::new(system::thread_number());
-        let armed = Arc::new(Armed { stoppers: stoppers.into(), names: names.into(), heart, thread });
+        let armed = Arc::new(Armed { stoppers: stoppers.into(), names: names.into(), heartbeat, thread });
         system::install();
         for (place, run) in RUNS.iter().enumerate() {
             let mut run = lock(run);
@@ -140,7 +140,7 @@ impl LastStop {
     }
 
     /// Registers the calling thread as the loop's thread of the run. Not real-time.
-    pub(crate) fn follow_here(&self) {
+    pub(crate) fn register_loop_thread(&self) {
         if let Some(run) = RUNS.get(self.place).and_then(|run| lock(run).clone()) {
             run.thread.store(system::thread_number(), Ordering::Release);
             system::install();
@@ -163,7 +163,7 @@ impl Drop for Unwound {
         }
         if std::thread::panicking() {
             run.stoppers.iter().for_each(Stopper::safe_stop);
-        } else if run.heart.now().place.is_a_plugins() {
+        } else if run.heartbeat.now().place.is_a_plugins() {
             die(Death::Thread);
         }
     }
@@ -172,7 +172,7 @@ impl Drop for Unwound {
 impl Armed {
     /// Returns true once the loop has ended or the watchdog has stopped the devices: nothing is energised.
     fn is_over(&self) -> bool {
-        self.heart.is_done() || self.heart.bitten().is_some()
+        self.heartbeat.is_done() || self.heartbeat.fired_at().is_some()
     }
 
     fn name(&self, place: Place) -> &str {
@@ -188,9 +188,9 @@ impl Armed {
 }
 
 /// Reports this exit code and ends the process at once, without exit handlers. Real-time: never returns.
-pub fn leave_process(code: i32) -> ! {
+pub fn exit_process(code: i32) -> ! {
     report_end(ReportedEnd::Code(u8::try_from(code & 0xff).unwrap_or(u8::MAX)));
-    system::leave_process(code)
+    system::exit_process(code)
 }
 
 /// Stops the devices and ends the process; returns if no run is energised. For a signal handler or `exit`: no lock, no allocation.
@@ -221,7 +221,7 @@ pub(crate) fn is_dying() -> bool {
 pub(crate) fn end_dying() -> ! {
     stop_the_rest();
     system::say(b"error: the process was ended, and a device did not come back from `safe_stop`\n");
-    leave_process(ENDED)
+    exit_process(ENDED)
 }
 
 /// Stops all devices, prints the message, and ends the process.
@@ -252,7 +252,7 @@ fn stop_the_rest() {
     for run in runs() {
         // A loop that dies itself sends no more commands.
         if run.thread.load(Ordering::Acquire) != own {
-            run.heart.silence();
+            run.heartbeat.silence();
         }
         for (index, stopper) in run.stoppers.iter().enumerate() {
             let number = first + index;
@@ -281,7 +281,7 @@ fn describe(line: &mut Line, death: Death, own: i32) {
         let _ = write!(line, "error: the process was ended; every device was told to stop");
         return;
     };
-    let Stuck { tick, place } = run.heart.now();
+    let Stuck { tick, place } = run.heartbeat.now();
     let in_loop = is_own(&run);
     let culprit = in_loop && place.is_a_plugins();
     // A line that is too long loses its end.

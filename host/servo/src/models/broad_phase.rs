@@ -13,9 +13,9 @@
 use flotor_hal::{DVec3, math};
 
 /// Most cells that an object's box may overlap; a larger object is checked in every tick instead.
-const MOST_CELLS_OF_AN_OBJECT: usize = 64;
+const MAX_CELLS_OF_AN_OBJECT: usize = 64;
 /// Most cells along an axis.
-const MOST_CELLS_OF_AN_AXIS: f64 = 128.0;
+const MAX_CELLS_OF_AN_AXIS: f64 = 128.0;
 /// Ratio of a cell's side to the median side of the boxes.
 const CELL_OVER_BOX: f64 = 2.0;
 /// Margin of a box around its region, m: larger than the rounding of the mapping from the model's frame.
@@ -77,7 +77,7 @@ impl BroadPhase {
         let mut in_cells = vec![Vec::<u32>::new(); grid.counts.iter().product()];
         for (object, bounds) in (0..).zip(&bounds) {
             match bounds {
-                Some(bounds) if grid.cells_of(bounds).count() <= MOST_CELLS_OF_AN_OBJECT => {
+                Some(bounds) if grid.cells_of(bounds).count() <= MAX_CELLS_OF_AN_OBJECT => {
                     grid.cells_of(bounds).for_each(|cell| in_cells[cell].push(object));
                 }
                 _ => always.push(object),
@@ -161,7 +161,7 @@ impl Grid {
         let hull = boxed.iter().copied().reduce(Bounds::with);
         let hull = hull.unwrap_or(Bounds { low_m: DVec3::ZERO, high_m: DVec3::ZERO });
         let extent_m = (hull.high_m - hull.low_m).to_array();
-        let most = MOST_CELLS_OF_AN_AXIS.min(math::cbrt(boxed.len() as f64).ceil() * 2.0);
+        let most = MAX_CELLS_OF_AN_AXIS.min(math::cbrt(boxed.len() as f64).ceil() * 2.0);
         let counts = [0, 1, 2].map(|axis| {
             let mut sides_m: Vec<f64> =
                 boxed.iter().map(|bounds| (bounds.high_m - bounds.low_m)[axis]).collect();

@@ -10,7 +10,7 @@ use flotor_hal::{DVec3, Damper, Pose, SampledLoop, Twist, WorkspaceBounds, Wrenc
 const DAMPING_NS_PER_M: f64 = 15.0;
 
 /// Largest stiffness of the wall, N/m, as of the [boundary](flotor_core::limits::Boundary) at 1 kHz.
-const MOST_STIFFNESS_N_PER_M: f64 = 7_500.0;
+const MAX_STIFFNESS_N_PER_M: f64 = 7_500.0;
 
 /// Returns true if a wall at these bounds would push a handle at the home of its device. Real-time: bounded, no allocation.
 #[must_use]
@@ -29,7 +29,7 @@ impl EndWall {
     pub(super) fn new(bounds: &WorkspaceBounds, mapping: &Mapping, sampled: &SampledLoop) -> Option<Self> {
         // The damping of the device is not known.
         let stable_n_per_m = sampled.largest_stiffness(0.0, Damper::OneWay(DAMPING_NS_PER_M));
-        let stiffness_n_per_m = MOST_STIFFNESS_N_PER_M.min(stable_n_per_m);
+        let stiffness_n_per_m = MAX_STIFFNESS_N_PER_M.min(stable_n_per_m);
         bounds.is_bounded().then(|| {
             let mut wall = Self { bounds: WorkspaceBounds::UNBOUNDED, stiffness_n_per_m };
             wall.move_to(bounds, mapping);

@@ -74,21 +74,21 @@ struct Object {
     /// Calls counted so far that changed the floating-point environment.
     float_changes: u64,
     /// True after a panic or process exit: the model is not called any more.
-    is_out: bool,
+    is_disabled: bool,
 }
 
 /// Wrench and energy of one layer in a tick. An output that was not computed is NaN.
 #[derive(Clone, Copy)]
-pub(super) struct Share {
+pub(super) struct Contribution {
     /// Wrench in the device frame, unweighted; the torque is NaN if it is not finite and only an observer requests it.
     pub(super) wrench: Wrench,
     /// Stored energy scaled to the device, J; NaN where it is not finite.
     pub(super) energy_j: f64,
 }
 
-impl Share {
+impl Contribution {
     /// No wrench and no energy.
-    pub(super) const NONE: Share = Share { wrench: Wrench::ZERO, energy_j: 0.0 };
+    pub(super) const NONE: Contribution = Contribution { wrench: Wrench::ZERO, energy_j: 0.0 };
 
     /// Scales the contribution. Real-time: bounded, no allocation.
     #[inline]
@@ -108,7 +108,7 @@ impl Share {
 #[inline(always)] // in the middle of a tick
 fn usable(demand: TickDemand, mut output: Output) -> Option<Output> {
     output.status()?;
-    if demand.felt().contains(Demand::TORQUE) {
+    if demand.at_hand().contains(Demand::TORQUE) {
         if !output.wrench.is_finite() {
             return None;
         }
@@ -135,7 +135,7 @@ pub struct Layer {
     memory: Memory,
     budget: TimeBudget,
     /// Last contribution, which fades out after too many overruns.
-    last: Share,
+    last: Contribution,
     blend: Blend,
     /// Health of this layer alone; a replacement starts anew.
     health: ModelHealth,
@@ -168,7 +168,7 @@ impl Layer {
         let serves = instances.first().map_or(Demand::ALL, |(model, _)| model.serves());
         let object = |(mut model, mapping): (Engine, Mapping)| {
             let end = EndWall::new(&model.workspace_bounds(), &mapping, sampled);
-            Object { model, mapping, end, last: None, stepped_at: None, float_changes: 0, is_out: false }
+            Object { model, mapping, end, last: None, stepped_at: None, float_changes: 0, is_disabled: false }
         };
         let mut objects: Box<[Object]> = instances.into_iter().map(object).collect();
         let bounds = objects.iter_mut().map(Object::bounds).collect();
@@ -179,7 +179,7 @@ impl Layer {
             serves,
             memory,
             budget,
-            last: Share::NONE,
+            last: Contribution::NONE,
             blend: *blend,
             health: ModelHealth::default(),
             generation: 0,
@@ -217,7 +217,7 @@ impl Layer {
         state: &DeviceState,
         demand: TickDemand,
         events: &mut Events,
-    ) -> Share {
+    ) -> Contribution {
         match self.budget.allowed(tick.time_ns) {
             Allowed::Asked => {
                 let (begun_ns, late_answers) = (self.budget.begin(), self.health.late_answers);
@@ -239,16 +239,22 @@ impl Layer {
             }
             Allowed::Nothing => {
                 events.insert(Events::MODEL_FAULT);
-                Share::NONE
+                Contribution::NONE
             }
         }
     }
 
     /// Steps all objects that can act at the handle; the others are not called.
     #[inline]
-    fn ask(&mut self, tick: &Tick, state: &DeviceState, demand: TickDemand, events: &mut Events) -> Share {
+    fn ask(
+        &mut self,
+        tick: &Tick,
+        state: &DeviceState,
+        demand: TickDemand,
+        events: &mut Events,
+    ) -> Contribution {
         let Self { objects, broad, serves, memory, health, .. } = self;
-        let mut share = Share::NONE;
+        let mut share = Contribution::NONE;
         broad.for_each_near(objects, state.pose.position(), |object| {
             let input = object.mapping.input(tick, state, demand.computed().limited_to(*serves));
             let Some(output) = object.answer(&input, demand, *memory, health, events) else {
@@ -275,7 +281,7 @@ impl Layer {
         for (index, object) in self.objects.iter_mut().enumerate() {
             let status = object.model.set_parameter(parameter, value);
             if status == CallStatus::Panicked {
-                object.is_out = true;
+                object.is_disabled = true;
                 self.health.panicked_at.get_or_insert(tick.index);
             }
             if status != CallStatus::Ok {
@@ -300,14 +306,14 @@ impl Layer {
         self.health
     }
 
-    /// Returns a report on the layer as model number `model`. Queries the last message of an unhealthy model only, and calls `asks`
+    /// Returns a report on the layer as model number `model`. Queries the last message of an unhealthy model only, and calls `on_query`
     /// before. Not real-time.
-    pub fn report(&mut self, model: usize, asks: impl FnOnce()) -> LayerReport {
+    pub fn report(&mut self, model: usize, on_query: impl FnOnce()) -> LayerReport {
         let Self { generation, health, .. } = *self;
         let words = if health.is_good() {
             String::new()
         } else {
-            asks();
+            on_query();
             self.last_message()
         };
         LayerReport { model, generation, health, words }
@@ -342,7 +348,7 @@ impl Object {
         health: &mut ModelHealth,
         events: &mut Events,
     ) -> Option<Output> {
-        if self.is_out {
+        if self.is_disabled {
             return None;
         }
         // A model that was not stepped in the last tick has no history and is reset.
@@ -384,7 +390,7 @@ impl Object {
             }
             Stepped::Broken => self.fail(input.tick, health),
             Stepped::Gone => {
-                self.is_out = true;
+                self.is_disabled = true;
                 health.lost_at.get_or_insert(input.tick);
                 None
             }
@@ -392,7 +398,7 @@ impl Object {
     }
 
     fn fail(&mut self, tick: u64, health: &mut ModelHealth) -> Option<Output> {
-        self.is_out = true;
+        self.is_disabled = true;
         health.panicked_at.get_or_insert(tick);
         None
     }

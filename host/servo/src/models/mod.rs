@@ -21,7 +21,7 @@ use flotor_core::demand::TickDemand;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
-use layer::Share;
+use layer::Contribution;
 use slot::Slot;
 
 /// Time in which a layer of higher priority silences the others, s: shorter than a hand's reaction, and long enough that the slew
@@ -92,29 +92,29 @@ impl ModelStack {
         tick: &Tick,
         state: &DeviceState,
         demand: TickDemand,
-        heart: &Heartbeat,
+        heartbeat: &Heartbeat,
         events: &mut Events,
     ) -> (Wrench, f64) {
         let Self { slots, broad, levels, .. } = self;
         levels.iter_mut().for_each(|level| level.pushes = false);
-        let mut sum = Share::NONE;
+        let mut sum = Contribution::NONE;
         broad.for_each_near(slots, state.pose.position(), |slot| {
             let level = levels.iter_mut().find(|level| level.priority == slot.priority);
             let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));
             if is_silenced || slot.weight.is_silent(tick.time_ns) {
                 return;
             }
-            heart.enter(tick.index, Place::Model(slot.number));
+            heartbeat.enter(tick.index, Place::Model(slot.number));
             let share = slot.step(tick, state, demand, events);
             let mut weight = slot.weight.at(tick.time_ns);
             if let Some(level) = level {
-                level.pushes |= weight > 0.0 && is_felt(&share.wrench, demand.felt());
+                level.pushes |= weight > 0.0 && reaches_hand(&share.wrench, demand.at_hand());
                 weight *= level.gain.at(tick.time_ns);
             }
             sum.wrench = sum.wrench + share.wrench * weight;
             sum.energy_j += share.energy_j * weight;
         });
-        heart.enter(tick.index, Place::Host);
+        heartbeat.enter(tick.index, Place::Host);
         let mut is_silenced = false;
         for level in levels.iter_mut().rev() {
             level.gain.set_target(if is_silenced { 0.0 } else { 1.0 }, tick.time_ns);
@@ -193,9 +193,9 @@ impl ModelStack {
         self.slots.iter_mut().map(Slot::health).collect()
     }
 
-    /// Returns reports on all layers; calls `asks` before it queries a model's last message. Not real-time.
-    pub(crate) fn reports(&mut self, asks: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
-        self.slots.iter_mut().flat_map(|slot| slot.reports(asks))
+    /// Returns reports on all layers; calls `on_query` before it queries a model's last message. Not real-time.
+    pub(crate) fn reports(&mut self, on_query: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
+        self.slots.iter_mut().flat_map(|slot| slot.reports(on_query))
     }
 
     /// Returns all layers, each with its model number. Not real-time.
@@ -206,6 +206,6 @@ impl ModelStack {
 
 /// Returns true if the wrench has a nonzero part that reaches the hand.
 #[inline]
-fn is_felt(wrench: &Wrench, felt: Demand) -> bool {
-    wrench.force() != DVec3::ZERO || felt.contains(Demand::TORQUE) && wrench.torque() != DVec3::ZERO
+fn reaches_hand(wrench: &Wrench, at_hand: Demand) -> bool {
+    wrench.force() != DVec3::ZERO || at_hand.contains(Demand::TORQUE) && wrench.torque() != DVec3::ZERO
 }

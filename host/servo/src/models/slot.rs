@@ -6,7 +6,7 @@
 
 use super::broad_phase::Bounds;
 use super::fade::Fade;
-use super::layer::{Layer, LayerReport, ModelHealth, Share};
+use super::layer::{Contribution, Layer, LayerReport, ModelHealth};
 use flotor_core::demand::TickDemand;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
@@ -21,9 +21,9 @@ pub(super) struct Slot {
     /// Old layer, while it fades out.
     leaving: Option<Box<Layer>>,
     /// Contribution of a layer removed before it had faded out; fades with `leaving`.
-    rest: Option<Share>,
+    rest: Option<Contribution>,
     /// Tick of the last step, and the difference between the old contributions and the current one then.
-    gap: Option<(u64, Share)>,
+    gap: Option<(u64, Contribution)>,
     pub(super) weight: Fade,
     pub(super) priority: u8,
     fade_s: f64,
@@ -67,7 +67,7 @@ impl Slot {
 
     /// Returns the contribution that would be missing without the leaving layer, as of the last tick; `None` if no layer is
     /// leaving, or none was stepped then.
-    fn missing_without_leaving(&self, tick: &Tick) -> Option<Share> {
+    fn missing_without_leaving(&self, tick: &Tick) -> Option<Contribution> {
         let (asked_at, gap) = self.gap?;
         let absence = 1.0 - self.presence.at(tick.time_ns);
         let is_felt = self.leaving.is_some() && absence > 0.0 && asked_at.saturating_add(1) == tick.index;
@@ -113,7 +113,7 @@ impl Slot {
         state: &DeviceState,
         demand: TickDemand,
         events: &mut Events,
-    ) -> Share {
+    ) -> Contribution {
         let share = self.current.step(tick, state, demand, events);
         let Some(leaving) = &mut self.leaving else { return share };
         // Mix of the current layer and the leaving one.
@@ -137,11 +137,11 @@ impl Slot {
     }
 
     /// Returns reports on all layers of the slot. Not real-time.
-    pub(super) fn reports(&mut self, asks: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
+    pub(super) fn reports(&mut self, on_query: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
         let Self { number, current, leaving, .. } = self;
         let number = *number;
         let layers = leaving.iter_mut().chain(std::iter::once(current));
-        layers.map(move |layer| layer.report(number, || asks(number)))
+        layers.map(move |layer| layer.report(number, || on_query(number)))
     }
 
     /// Returns all layers of the slot, each with the model's number. Not real-time.

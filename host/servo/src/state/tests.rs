@@ -17,7 +17,7 @@ const EVENTS: [RunEvent; 7] = [
     RunEvent::Time,
     RunEvent::SamplesLost,
     RunEvent::SamplesBack,
-    RunEvent::StopAsked,
+    RunEvent::StopRequested,
     RunEvent::Failed(Cause::Watchdog),
     RunEvent::Failed(Cause::Device(Fault::EmergencyStop)),
     RunEvent::Emergency(EmergencySource::Signal),
@@ -70,7 +70,7 @@ fn the_gate_opens_and_shuts_without_a_step() {
     let mut highest = 0.0_f64;
     // Stopped half-way through the ramp, where a careless fade-out would start from 1.
     for now_ns in 0..=200 {
-        let event = if now_ns == 50 { RunEvent::StopAsked } else { RunEvent::Time };
+        let event = if now_ns == 50 { RunEvent::StopRequested } else { RunEvent::Time };
         state = state.after(event, now_ns, RAMP_NS);
         let gate = state.gate(now_ns, RAMP_NS);
         // Steepest slope of 3 p^2 - 2 p^3 is 1.5 per ramp.

@@ -67,7 +67,7 @@ enum Located<'a> {
 pub enum LookupError {
     /// No plugin has the id.
     #[error("no {}plugin `{id}`{}{} (`flotor plugins` lists all; {PATH_VARIABLE} adds folders)",
-        kind.as_ref().map_or(String::new(), |kind| format!("{} ", kind.word())),
+        kind.as_ref().map_or(String::new(), |kind| format!("{} ", kind.name())),
         nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
         hint.as_ref().map_or(String::new(), |hint| format!(" ({hint})")))]
     Unknown {
@@ -353,5 +353,5 @@ pub fn load_file(path: &Path) -> Result<Plugin, LoadError> {
 fn check_kind(plugin: &Metadata, kind: Option<PluginKind>) -> Result<(), LoadError> {
     let Some(kind) = kind.filter(|kind| *kind != plugin.kind) else { return Ok(()) };
     let Metadata { path, id, kind: found, .. } = plugin.clone();
-    Err(LoadError::OtherKind { path, id, found: found.word(), wanted: kind.word() })
+    Err(LoadError::OtherKind { path, id, found: found.name(), wanted: kind.name() })
 }

@@ -4,7 +4,7 @@ use super::devices::{self, DeviceUse};
 use super::reader::{SceneError, Section};
 use super::{Limits, frame_and_scales, passivity};
 use flotor_core::coupling::{
-    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MOST_DELAY_TICKS, PassivityMode,
+    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MAX_DELAY_TICKS, PassivityMode,
 };
 use flotor_core::mapping::MappingConfig;
 
@@ -38,7 +38,7 @@ fn coupling(
         damping_nms_per_rad: gain("damping_nms_per_rad", 10.0, default.damping_nms_per_rad)?,
         reserve_j: gain("reserve_mj", 1.0e6, default.reserve_j * 1.0e3)? * 1.0e-3,
         delay_ticks: match (section.take("delay_ticks"), partner) {
-            (Some(value), Partner::Here) => value.whole(1..=MOST_DELAY_TICKS)?,
+            (Some(value), Partner::Here) => value.whole(1..=MAX_DELAY_TICKS)?,
             (Some(_), Partner::Elsewhere) => {
                 return Err(wrong("the way to another host has the delay it has; leave `delay_ticks` out"));
             }

@@ -2,7 +2,7 @@
 
 use super::reader::{Location, SceneError, Section, Value, did_you_mean};
 use super::{CalibrationUse, ModelUse, PluginUse, plugin_use};
-use flotor_core::MOST_DEVICES;
+use flotor_core::MAX_DEVICES;
 use std::collections::BTreeSet;
 
 /// Separator between the names of a model and of its device, for a model on several devices.
@@ -41,8 +41,8 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError>
                 here.problem(format!("two devices are called `{name}`; give each a different `name`"))
             );
         }
-        if devices.len() >= MOST_DEVICES.into() {
-            return Err(here.problem(format!("a scene has at most {MOST_DEVICES} devices")));
+        if devices.len() >= MAX_DEVICES.into() {
+            return Err(here.problem(format!("a scene has at most {MAX_DEVICES} devices")));
         }
         let plugin = plugin_use(&mut section)?;
         let calibration = section.take("calibration").map(|value| {
@@ -105,10 +105,10 @@ pub(super) fn name_on(model: &str, device: &DeviceUse) -> String {
     format!("{model}{ON}{}", device.name)
 }
 
-/// Returns true if `asked` names this model, alone or together with its copies on other devices.
+/// Returns true if `requested` names this model, alone or together with its copies on other devices.
 #[must_use]
-pub fn is_named(name: &str, asked: &str) -> bool {
-    name == asked || without_device(name) == asked
+pub fn is_named(name: &str, requested: &str) -> bool {
+    name == requested || without_device(name) == requested
 }
 
 /// Returns the name of a model without its device.

@@ -245,9 +245,9 @@ impl Scene {
         let devices = devices::read(&mut root)?;
         let models = root.sections("model")?.into_iter().map(|section| model(section, &devices));
         let models = models.collect::<Result<Vec<_>, _>>()?.concat();
-        if let Some(model) = models.get(MOST_MODELS) {
+        if let Some(model) = models.get(MAX_MODELS) {
             let problem = format!(
-                "there are more than {MOST_MODELS} models; `grid` of `mapping` puts one model at many places"
+                "there are more than {MAX_MODELS} models; `grid` of `mapping` puts one model at many places"
             );
             return Err(model.plugin.location.problem(problem));
         }
@@ -388,7 +388,7 @@ fn frame_and_scales(section: &mut Section<'_>) -> Result<MappingConfig, SceneErr
 const SCALE: std::ops::RangeInclusive<f64> = 1.0e-6..=1.0e6;
 
 /// Largest number of models, each on one device: their calls alone take a millisecond.
-const MOST_MODELS: usize = 4096;
+const MAX_MODELS: usize = 4096;
 
 /// Longest timeout of a watchdog, ms.
 const LONGEST_WATCHDOG_MS: f64 = 60_000.0;

@@ -3,7 +3,7 @@
 use super::reader::{SceneError, Section};
 
 /// Most places of one model: each is an instance of the model, with its own memory.
-const MOST_PLACES: usize = 1_000_000;
+const MAX_PLACES: usize = 1_000_000;
 /// Farthest place along an axis, mm: a farther one is a wrong unit.
 const FARTHEST_MM: f64 = 1.0e4;
 
@@ -14,7 +14,7 @@ pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneErro
     let grid = mapping.section("grid")?;
     let places_mm = match (list, grid) {
         (None, None) => vec![[0.0; 3]],
-        (Some(list), None) => list.points(-FARTHEST_MM..=FARTHEST_MM, 1..=MOST_PLACES)?,
+        (Some(list), None) => list.points(-FARTHEST_MM..=FARTHEST_MM, 1..=MAX_PLACES)?,
         (None, Some(grid)) => points_of(grid)?,
         (Some(list), Some(_)) => {
             return Err(list.problem("a model has `positions_mm` or a `grid`, not both"));
@@ -30,15 +30,15 @@ pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneErro
 /// Returns the points of a grid about its centre, x fastest, mm.
 fn points_of(mut grid: Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
     let count_value = grid.require("count")?;
-    let too_many = count_value.problem(format!("a grid has at most {MOST_PLACES} points"));
+    let too_many = count_value.problem(format!("a grid has at most {MAX_PLACES} points"));
     let not_whole = count_value.problem("`count` is three whole numbers from 1 on");
-    let counts = count_value.three(1.0..=MOST_PLACES as f64)?;
+    let counts = count_value.three(1.0..=MAX_PLACES as f64)?;
     let spacing_mm = grid.require("spacing_mm")?.three(0.0..=FARTHEST_MM)?;
     grid.finish()?;
     if counts.iter().any(|count| count.fract() != 0.0) {
         return Err(not_whole);
     }
-    if counts.iter().product::<f64>() > MOST_PLACES as f64 {
+    if counts.iter().product::<f64>() > MAX_PLACES as f64 {
         return Err(too_many);
     }
     let along = |axis: usize| {

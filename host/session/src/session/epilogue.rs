@@ -1,7 +1,7 @@
 //! End of a run: de-energises the devices, queries the last messages of the models, and creates the outcome.
 
 use super::controls::Settled;
-use super::{Controls, DeviceOutcome, Finished, Outcome, Remains};
+use super::{Controls, DeviceOutcome, Finished, Outcome, UnfreedPlugins};
 use crate::calls::{Call, CallError, EndCalls, EndReserve, Progress, Unresponsive, end_limit};
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
 use flotor_servo::{Dismantled, Forces, Heartbeat, Layer, LayerReport, Reported};
@@ -11,7 +11,7 @@ use std::time::Instant;
 pub(super) struct Epilogue {
     pub(super) started: Instant,
     pub(super) warnings: Vec<String>,
-    pub(super) heart: Heartbeat,
+    pub(super) heartbeat: Heartbeat,
     pub(super) names: Vec<String>,
     pub(super) controls: Controls,
     pub(super) reserve: EndReserve,
@@ -20,7 +20,7 @@ pub(super) struct Epilogue {
 impl Epilogue {
     /// De-energises the devices and returns the outcome of the run.
     pub(super) fn conclude(self, finished: Finished) -> Outcome {
-        let Self { started, mut warnings, heart, names, controls, reserve } = self;
+        let Self { started, mut warnings, heartbeat, names, controls, reserve } = self;
         let mut calls = reserve.begin();
         let Finished { servo, end, elapsed_ns, dropped_records, real_time, stop_time, warning } = finished;
         warnings.extend(warning);
@@ -39,17 +39,17 @@ impl Epilogue {
         let waiting = swaps.into_layers().into_iter();
         let (layers, reports) =
             last_words(&mut calls, model_names, (forces, controls.take_retired()), &mut unresponsive);
-        let Settled { first: health, misbehaved, replacements, hung } = controls.settle(reports);
+        let Settled { first: health, faulty_plugins, replacements, hung } = controls.settle(reports);
         unresponsive = unresponsive.or(hung);
         let models = model_names.iter().cloned().zip(health);
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
         let name = |number: usize| model_names.get(number).cloned().unwrap_or_default();
         let layers = layers.into_iter().chain(waiting).map(|(number, layer)| (name(number), layer)).collect();
-        let remains = Remains::new(closing, layers, last_stop, calls);
+        let unfreed_plugins = UnfreedPlugins::new(closing, layers, last_stop, calls);
         let wall_s = started.elapsed().as_secs_f64();
         warnings.extend(controls.warnings());
         warnings.extend(stop_time.as_ref().and_then(|time| time.warning(&names)));
-        let taken = heart.signals_taken();
+        let taken = heartbeat.signals_taken();
         if !taken.is_none() {
             warnings.push(format!(
                 "a plugin took {taken} away from the host during the run; the host has taken them back"
@@ -68,10 +68,10 @@ impl Epilogue {
             devices: told,
             couplings,
             models,
-            misbehaved,
+            faulty_plugins,
             replacements,
             unresponsive,
-            remains,
+            unfreed_plugins,
         }
     }
 }
@@ -114,11 +114,11 @@ fn last_words(
 ) -> (Layers, Vec<LayerReport>) {
     let names = names.to_vec();
     let told = calls.attended(end_limit(), move |progress: &Progress| {
-        let asks =
+        let on_query =
             |model: usize| progress.enter(names.get(model).map_or("", String::as_str), Call::LastMessage);
         let mut reports: Vec<LayerReport> =
-            retired.iter_mut().map(|(model, layer)| layer.report(*model, || asks(*model))).collect();
-        reports.extend(forces.reports(asks));
+            retired.iter_mut().map(|(model, layer)| layer.report(*model, || on_query(*model))).collect();
+        reports.extend(forces.reports(on_query));
         (forces.into_layers().chain(retired).collect(), reports)
     });
     told.unwrap_or_else(|error| {

@@ -98,10 +98,10 @@ impl LatchGuard {
         let reach = reach.get_or_insert_with(|| {
             let who = format!("emergency stop ({}) of process {}", source.word(), process_number());
             let pressed = self.latch.press(&who);
-            let asked = self.latch.stop_runs(Instant::now() + CONFIRM_WAIT);
+            let requested = self.latch.stop_runs(Instant::now() + CONFIRM_WAIT);
             StopReach {
                 unkept: pressed.err().map(|error| error.to_string()),
-                unconfirmed: asked.map_err(|error| error.to_string()),
+                unconfirmed: requested.map_err(|error| error.to_string()),
             }
         });
         reach.clone()
@@ -123,7 +123,7 @@ impl LatchGuard {
     ///
     /// # Errors
     /// [`RunError::Latched`], or no thread.
-    pub fn obey(&self, stop: &StopSwitch) -> Result<LatchWatch, RunError> {
+    pub fn check_and_watch(&self, stop: &StopSwitch) -> Result<LatchWatch, RunError> {
         let watch = self.watch(stop).map_err(|_| RunError::NoThread(WATCH))?;
         self.check().map(|()| watch)
     }
@@ -230,7 +230,7 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         let directory = Directory::at(scratch.path().join("runs"));
         let stop = StopSwitch::default();
-        let watch = LatchGuard::of(&directory).obey(&stop).unwrap();
+        let watch = LatchGuard::of(&directory).check_and_watch(&stop).unwrap();
         stop.press(EmergencySource::Key);
         drop(watch);
         assert!(directory.latch().state().pressed.is_some());

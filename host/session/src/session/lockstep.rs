@@ -17,7 +17,7 @@ pub struct Lockstep {
     controls: Controls,
     changes: ChangeLog,
     taps: TapEnds,
-    asked: DemandRequest,
+    requested: DemandRequest,
     stoppers: Stoppers,
     epilogue: Epilogue,
 }
@@ -41,9 +41,9 @@ impl Session {
         let epilogue = self.epilogue(EndReserve::default());
         let Session { standby, controls, changes, taps, period_ns, duration_ns, plugins, .. } = self;
         let stoppers = Stoppers(standby.stoppers());
-        let asked = standby.observers().request(Demand::FORCE);
+        let requested = standby.observers().request(Demand::FORCE);
         let runner = Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
-        Ok(Lockstep { runner, controls, changes, taps, asked, stoppers, epilogue })
+        Ok(Lockstep { runner, controls, changes, taps, requested, stoppers, epilogue })
     }
 }
 
@@ -51,11 +51,11 @@ impl Lockstep {
     /// Runs one tick; passes the changes before the tick, and the tick's records, to the observer. Returns the end of the run once
     /// it has ended. Not real-time: the observer is not.
     pub fn advance(&mut self, observer: &mut dyn Observer, stop: &StopSwitch) -> Option<RunEnd> {
-        let Self { runner, controls, changes, taps, asked, .. } = self;
+        let Self { runner, controls, changes, taps, requested, .. } = self;
         if runner.end().is_some() {
             return runner.end();
         }
-        asked.change_to(observer.demand());
+        requested.change_to(observer.demand());
         runner.advance(stop, |record| {
             publish_to(taps, record);
             changes.up_to(record.tick, |change| observer.change(change));
@@ -70,7 +70,7 @@ impl Lockstep {
     pub fn finish(self) -> Outcome {
         let Self { mut runner, stoppers, epilogue, .. } = self;
         drop(stoppers);
-        runner.servo().heart().finish();
-        epilogue.conclude(Finished::of(runner, 0, RealTimeReport::not_asked()))
+        runner.servo().heartbeat().finish();
+        epilogue.conclude(Finished::of(runner, 0, RealTimeReport::not_requested()))
     }
 }

@@ -7,25 +7,25 @@ mod epilogue;
 mod latch;
 mod lockstep;
 mod prepare;
-mod remains;
 mod steps;
 mod stop_time;
 mod stop_without_host;
+mod unfreed_plugins;
 mod unguarded;
 mod virtual_loop;
 
 pub use ceiling::{Strength, StrongDevice};
-pub use controls::{ControlError, Controls, Misbehaved, NewValue};
+pub use controls::{ControlError, Controls, FaultyPlugin, NewValue};
 pub use latch::{LatchGuard, LatchWatch, StopReach};
 pub use lockstep::Lockstep;
 pub use prepare::{check_plugins, prepare_model};
-pub use remains::Remains;
 pub use steps::Steps;
 pub use stop_time::StopTime;
 pub use stop_without_host::{StopWithoutHost, WatchdogStart, start_watchdog_process};
+pub use unfreed_plugins::UnfreedPlugins;
 pub use unguarded::Guardian;
 
-use crate::calls::{Call, CallError, EndReserve, Progress, Unresponsive, end_limit, leave_behind, limit};
+use crate::calls::{Call, CallError, EndReserve, Progress, Unresponsive, abandon, end_limit, limit};
 use crate::long_call::Exceeded;
 use crate::registry::{LookupError, Registry};
 use crate::scene::{Isolation, Pacing, Scene, SceneError};
@@ -34,12 +34,12 @@ use controls::{ChangeLog, PluginTable};
 use epilogue::Epilogue;
 use flotor_core::Change;
 use flotor_core::ModelOutputs;
-use flotor_core::demand::{ObserverDemand, felt_within};
+use flotor_core::demand::{ObserverDemand, hand_demand};
 use flotor_core::limits::{Bound, Limits};
 use flotor_core::plausibility::ImplausibleSamples;
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
-use flotor_coupling::{Line, Patience, Reach};
+use flotor_coupling::{Line, LinkTimeouts, Reach};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{LoadError, Metadata, Stopper};
 use flotor_hal::{
@@ -179,7 +179,7 @@ pub struct PluginReport {
     /// Latency that a device declares, s; 0 for a model.
     pub latency_s: f64,
     /// Model outputs that reach the hand at a device.
-    pub felt: Demand,
+    pub at_hand: Demand,
     /// Isolation of a model, resolved by its origin; `None` for a device.
     pub isolation: Option<Isolation>,
     /// Signals of the host that the plugin took during its creation, restored since.
@@ -296,7 +296,7 @@ pub struct Outcome {
     /// Name, health and last message of each model that the run began with.
     pub models: Vec<(String, ModelHealth, String)>,
     /// Replacements with faults.
-    pub misbehaved: Vec<Misbehaved>,
+    pub faulty_plugins: Vec<FaultyPlugin>,
     /// Replacements in place at the end, after a hot swap; not those that the seed chose among several.
     pub replacements: Vec<PluginReport>,
     /// Warnings for users, a sentence each: first those known before the run.
@@ -306,7 +306,7 @@ pub struct Outcome {
     /// The first plugin that did not return from a call right after the run.
     pub unresponsive: Option<Unresponsive>,
     /// Plugin instances left to free. Free or drop them last: plugin code may hang.
-    pub remains: Remains,
+    pub unfreed_plugins: UnfreedPlugins,
 }
 
 impl Outcome {
@@ -324,17 +324,17 @@ impl Outcome {
             elapsed_ns,
             wall_s: elapsed_ns as f64 * 1.0e-9,
             dropped_records: 0,
-            real_time: RealTimeReport::not_asked(),
+            real_time: RealTimeReport::not_requested(),
             stop_time: None,
             devices: Vec::new(),
             couplings: Vec::new(),
             models: Vec::new(),
-            misbehaved: Vec::new(),
+            faulty_plugins: Vec::new(),
             replacements: Vec::new(),
             warnings: Vec::new(),
             known_before: 0,
             unresponsive: None,
-            remains: Remains::default(),
+            unfreed_plugins: UnfreedPlugins::default(),
         }
     }
 
@@ -394,7 +394,7 @@ impl Session {
         for device in &scene.devices {
             let (device, mut report) = prepare::open_device(registry, device)?;
             let most_torque_nm = Bound::box_of(device.capabilities.max_torque_nm);
-            report.felt = felt_within(&scene.limits.torque_nm.and(most_torque_nm));
+            report.at_hand = hand_demand(&scene.limits.torque_nm.and(most_torque_nm));
             opened.push(device);
             plugins.push(report);
         }
@@ -473,13 +473,13 @@ impl Session {
         let [ramp_ns, watchdog_ns] =
             [scene.limits.ramp_s, scene.limits.watchdog_s].map(|seconds| (seconds * 1.0e9).round() as u64);
         // A partner on another host is monitored like the loop itself.
-        let patience = Patience { silence_ns: watchdog_ns, fade_ns: ramp_ns };
+        let timeouts = LinkTimeouts { silence_ns: watchdog_ns, fade_ns: ramp_ns };
         let mut lines = Vec::new();
         let couplings = scene.couplings.iter().map(|coupling| {
             let here = coupling.ends.here().first().and_then(|end| capabilities.get(usize::from(end.device)));
             let reach = here.map(|device| Reach { range_m: device.range_m, range_rad: device.range_rad });
             let reach = reach.unwrap_or_default();
-            let (coupled, line) = Coupled::new(coupling, period_s, patience, reach);
+            let (coupled, line) = Coupled::new(coupling, period_s, timeouts, reach);
             lines.extend(line.map(|line| (coupling.name.clone(), line)));
             coupled
         });
@@ -663,7 +663,7 @@ impl Session {
             reserve,
             started: Instant::now(),
             warnings: self.warnings.clone(),
-            heart: self.standby.heart(),
+            heartbeat: self.standby.heartbeat(),
             names: self.plugins.iter().map(|plugin| plugin.name.clone()).collect(),
             controls: self.controls.clone(),
         }
@@ -693,16 +693,16 @@ impl Session {
         // Watch before the final check of the latch, so that no press is missed.
         let watch = latch.as_ref().map(|latch| latch.watch(stop)).transpose();
         let _watch = watch.map_err(|_| RunError::NoThread(latch::WATCH))?;
-        let mut asked = standby.observers().request(observer.demand());
-        let mut look = |observer: &mut dyn Observer, record: TickRecord| {
+        let mut requested = standby.observers().request(observer.demand());
+        let mut deliver = |observer: &mut dyn Observer, record: TickRecord| {
             changes.up_to(record.tick, |change| observer.change(change));
             observer.observe(&record);
         };
-        let heart = standby.heart();
+        let heartbeat = standby.heartbeat();
         let loop_stop = stop.clone();
         // Not scoped: a thread that is stuck in a plugin has to be abandoned.
         let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
-        let (loop_heart, loop_plugins, loop_latch) = (heart.clone(), plugins.clone(), latch.clone());
+        let (loop_heartbeat, loop_plugins, loop_latch) = (heartbeat.clone(), plugins.clone(), latch.clone());
         let (progress, all_stoppers) = (Progress::default(), standby.stoppers());
         let loop_progress = progress.clone();
         // Number of the device that is being stopped, from 1: polled from this thread, as `safe_stop` may hang, too.
@@ -713,7 +713,7 @@ impl Session {
             // The polling thread notices the end of the process.
             let signs = watchdog_process.as_ref().and_then(|process| {
                 let _ = process.follow_this_thread();
-                process.sign_of_life().ok()
+                process.heartbeat_sender().ok()
             });
             let spin = match pacing {
                 Pacing::Host => Some(SpinWindow::measure(period_ns)),
@@ -728,7 +728,7 @@ impl Session {
                 None => Schedule::start_paced(period_ns),
             };
             let watchdog =
-                start_watchdog(loop_heart, stoppers.clone(), loop_stop.clone(), watchdog_ns, signs);
+                start_watchdog(loop_heartbeat, stoppers.clone(), loop_stop.clone(), watchdog_ns, signs);
             let mut runner = Loop::new(servo, schedule, duration_ns).releasing();
             // Without a watchdog nothing is moved.
             // A full queue drops records and counts them: observers never delay the loop.
@@ -752,7 +752,7 @@ impl Session {
                 timer.stopped();
             }
             loop_stopping.store(0, Ordering::Relaxed);
-            runner.servo().heart().finish();
+            runner.servo().heartbeat().finish();
             // From here on nothing is energised.
             drop(watchdog_process);
             if let Ok(watchdog) = &watchdog {
@@ -765,14 +765,14 @@ impl Session {
             Ok::<_, RunError>(Finished { stop_time, ..finished })
         });
         let servo_thread = servo_thread.map_err(|_| RunError::NoThread("the loop"))?;
-        let mut bitten = None;
+        let mut fired = None;
         let mut stopping_since = None;
         while !servo_thread.is_finished() {
-            asked.change_to(observer.demand());
-            drain(&mut receiver, |record| look(observer, record));
+            requested.change_to(observer.demand());
+            drain(&mut receiver, |record| deliver(observer, record));
             controls.sweep();
-            guardian.look(stop);
-            if let Err(hung) = progress.look(limit()) {
+            guardian.check(stop);
+            if let Err(hung) = progress.check(limit()) {
                 // Other devices may be energised by now.
                 all_stoppers.iter().for_each(Stopper::safe_stop);
                 return Err(CallError::from(hung).into());
@@ -784,22 +784,22 @@ impl Session {
             if let Some((number, since)) = stopping_since
                 && since.elapsed() > end_limit()
             {
-                leave_behind();
+                abandon();
                 let who = plugins.get(number - 1).map_or_else(String::new, |plugin| plugin.name.clone());
                 let hung = Unresponsive { who, call: Call::SafeStop, limit: end_limit() };
                 return Err(CallError::from(hung).into());
             }
-            bitten = bitten.or_else(|| heart.bitten().map(|stuck| (stuck, Instant::now())));
-            if let Some((stuck, since)) = bitten
+            fired = fired.or_else(|| heartbeat.fired_at().map(|stuck| (stuck, Instant::now())));
+            if let Some((stuck, since)) = fired
                 && since.elapsed() > COME_BACK
             {
-                leave_behind();
+                abandon();
                 return Err(hung(stuck, &plugins, Exceeded::Watchdog(Duration::from_nanos(watchdog_ns))));
             }
             std::thread::sleep(OBSERVER_PERIOD);
         }
         let finished = servo_thread.join().map_err(|_| RunError::Thread("panicked"))??;
-        drain(&mut receiver, |record| look(observer, record));
+        drain(&mut receiver, |record| deliver(observer, record));
         Ok(Finished { end: guardian.end(finished.end), warning: guardian.warning(), ..finished })
     }
 }

@@ -21,7 +21,7 @@ use flotor_hal::{
     SampledLoop, SoftRange,
 };
 use flotor_servo::engine::asynchronous::AsynchronousModel;
-use flotor_servo::engine::process::{Worker, WorkerOrder};
+use flotor_servo::engine::process::{Worker, WorkerConfig};
 use flotor_servo::last_stop::{SignalGuard, TakenSignals};
 use flotor_servo::{
     Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget, pushes_at_home,
@@ -64,7 +64,7 @@ pub(super) fn activate(standby: Standby, plugins: &[PluginReport]) -> Result<Ser
     let activated =
         attended_while(limit(), is_to_begin, move |progress| activate_here(standby, &plugins, progress));
     let activated = activated.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
-    activated.inspect(Servo::follow_here)
+    activated.inspect(Servo::register_loop_thread)
 }
 
 /// Energises the devices on this thread, while another thread polls the progress. Not real-time.
@@ -78,7 +78,7 @@ pub(super) fn activate_here(
     };
     let names = plugins.iter().map(|plugin| plugin.name.clone()).collect();
     let activated = standby.activate(names, enters);
-    progress.leave();
+    progress.exit();
     activated.map_err(|(device, refusal)| match plugins.get(device) {
         Some(report) => refused(&report.metadata, refusal),
         None => RunError::Thread("names a device that the scene has not"),
@@ -194,7 +194,7 @@ pub(super) fn prepare_model_while(
     let signals = SignalGuard::take();
     let plugin = load(registry, &model.plugin, PluginKind::Model)?;
     let settings = settings(&plugin, &model.name, &model.plugin.parameters)?;
-    let making = Making {
+    let builder = ModelBuilder {
         isolation: isolation(model, plugin.metadata(), clock)?,
         plugin: plugin.clone(),
         settings: settings.clone(),
@@ -202,13 +202,13 @@ pub(super) fn prepare_model_while(
         config: *config,
         clock,
     };
-    let isolation = making.isolation;
+    let isolation = builder.isolation;
     let most = match isolation {
         // A worker that is not ready in time has to be ended, not abandoned.
         Isolation::Process => limit() + END_OF_A_WORKER,
         Isolation::ByOrigin | Isolation::None => limit(),
     };
-    let make = move |progress: &Progress| making.layer(progress);
+    let make = move |progress: &Progress| builder.layer(progress);
     let (layer, values, estimates) = keeping_machine(&model.name, || attended_while(most, is_wanted, make))??;
     let mut report = report(&plugin, &model.name, &model.plugin, &settings, |index| value_at(&values, index));
     report.signals_taken = signals.put_back();
@@ -229,13 +229,13 @@ pub(super) fn settle_isolation(model: &mut ModelUse, clock: Clock, simulated: &[
 const END_OF_A_WORKER: Duration = Duration::from_secs(10);
 
 /// Most instances of a model that get a process each without the scene's explicit request.
-const MOST_PROCESSES: usize = 64;
+const MAX_PROCESSES: usize = 64;
 
 /// Resolves the isolation of a model by its origin.
 fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolation, SceneError> {
     let is_outside = clock == Clock::Real && !is_installed(&plugin.path);
     match model.isolation {
-        Isolation::ByOrigin if is_outside && model.places_m.len() > MOST_PROCESSES => {
+        Isolation::ByOrigin if is_outside && model.places_m.len() > MAX_PROCESSES => {
             let objects = model.places_m.len();
             Err(complain(
                 model,
@@ -255,7 +255,7 @@ fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolat
 type Estimates = Vec<(String, f64)>;
 
 /// Inputs for creating a model.
-struct Making {
+struct ModelBuilder {
     isolation: Isolation,
     plugin: Plugin,
     settings: Vec<Setting>,
@@ -264,7 +264,7 @@ struct Making {
     clock: Clock,
 }
 
-impl Making {
+impl ModelBuilder {
     /// Creates the model in all its places; returns it with the values of its parameters and its error estimates. Runs the plugin's code.
     fn layer(&self, progress: &Progress) -> Result<(Layer, Vec<f64>, Estimates), RunError> {
         let Self { plugin, model, config, clock, .. } = self;
@@ -311,7 +311,7 @@ impl Making {
                 let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
                 let values = settings.iter().map(|setting| setting.display());
                 let in_the_loop = model.field.is_none().then_some(budget_ns).flatten();
-                let order = WorkerOrder {
+                let worker_config = WorkerConfig {
                     plugin: &plugin.metadata().path,
                     sets: keys.zip(values).collect(),
                     config: model
@@ -319,10 +319,10 @@ impl Making {
                         .as_ref()
                         .map_or(*config, |field| AsynchronousModel::config(field, config)),
                     // The loop does not wait for a field.
-                    patience_ns: in_the_loop.unwrap_or(PATIENCE_NS),
-                    making: limit(),
+                    timeout_ns: in_the_loop.unwrap_or(PATIENCE_NS),
+                    create_timeout: limit(),
                 };
-                Engine::Process(Worker::start(&order).map_err(no)?)
+                Engine::Process(Worker::start(&worker_config).map_err(no)?)
             }
             Isolation::ByOrigin | Isolation::None => Engine::Here(plugin.create_model(settings)?),
         };
@@ -412,7 +412,7 @@ fn report(
         embodiment: plugin.device_info().map(|info| info.embodiment()),
         parameters,
         latency_s: 0.0,
-        felt: Demand::WRENCH,
+        at_hand: Demand::WRENCH,
         isolation: None,
         signals_taken: TakenSignals::default(),
         estimates: Vec::new(),

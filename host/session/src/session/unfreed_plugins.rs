@@ -9,7 +9,7 @@ use flotor_servo::{LastStop, Layer};
 
 /// Models and devices of a finished run. Freed when dropped, or by [`Self::free`], which names a plugin that hangs.
 #[derive(Default)]
-pub struct Remains {
+pub struct UnfreedPlugins {
     devices: Vec<(String, OpenedDevice)>,
     models: Vec<(String, Box<Layer>)>,
     /// Owns the devices, too, and closes one without another owner.
@@ -17,7 +17,7 @@ pub struct Remains {
     calls: EndCalls,
 }
 
-impl Remains {
+impl UnfreedPlugins {
     pub(super) fn new(
         devices: Vec<(String, OpenedDevice)>,
         models: Vec<(String, Box<Layer>)>,
@@ -48,7 +48,7 @@ impl Remains {
     }
 }
 
-impl Drop for Remains {
+impl Drop for UnfreedPlugins {
     fn drop(&mut self) {
         // `free` returns the error.
         let _ = self.free_all();

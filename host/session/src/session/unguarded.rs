@@ -1,6 +1,6 @@
 //! Monitor for the end of the watchdog process itself.
 
-use crate::calls::{Notice, tell};
+use crate::calls::{Notice, notify};
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{RunEnd, StopSwitch};
 use std::sync::{Arc, Weak};
@@ -20,7 +20,7 @@ impl Guardian {
     }
 
     /// Reports the end of the process once; a run that requires the process ends in order then. Not real-time.
-    pub fn look(&mut self, stop: &StopSwitch) {
+    pub fn check(&mut self, stop: &StopSwitch) {
         if self.is_gone || !self.process.upgrade().is_some_and(|process| process.is_gone()) {
             return;
         }
@@ -28,7 +28,7 @@ impl Guardian {
         if self.is_required {
             stop.stop();
         } else {
-            tell(&Notice::Unguarded);
+            notify(&Notice::Unguarded);
         }
     }
 

@@ -2,10 +2,10 @@
 
 use super::prepare::activate;
 use super::{ChangeLog, Finished, Observer, PluginReport, RunError, Session, TapEnds, hung, publish_to};
-use crate::calls::leave_behind;
+use crate::calls::abandon;
 use crate::long_call::{Exceeded, LongCall, step_limit};
 use crate::platform::ThreadClock;
-use flotor_core::MOST_DEVICES;
+use flotor_core::MAX_DEVICES;
 use flotor_core::demand::DemandRequest;
 use flotor_core::trace::TickRecord;
 use flotor_hal::Demand;
@@ -54,10 +54,10 @@ pub(super) struct VirtualLoop {
     batch: Option<Batch>,
     records: Consumer<TickRecord>,
     changes: ChangeLog,
-    asked: DemandRequest,
+    requested: DemandRequest,
     stop: StopSwitch,
     stoppers: Vec<Stopper>,
-    heart: Heartbeat,
+    heartbeat: Heartbeat,
     plugins: Vec<PluginReport>,
 }
 
@@ -68,10 +68,10 @@ impl VirtualLoop {
     /// [`RunError`]; nothing is energised then.
     pub(super) fn start(session: Session, stop: &StopSwitch) -> Result<Self, RunError> {
         let Session { standby, changes, taps, period_ns, duration_ns, plugins, .. } = session;
-        let (stoppers, heart) = (standby.stoppers(), standby.heart());
-        let asked = standby.observers().request(Demand::FORCE);
+        let (stoppers, heartbeat) = (standby.stoppers(), standby.heartbeat());
+        let requested = standby.observers().request(Demand::FORCE);
         // The last tick of a batch may add a record for each device.
-        let (mut sender, records) = queue(BATCH + usize::from(MOST_DEVICES));
+        let (mut sender, records) = queue(BATCH + usize::from(MAX_DEVICES));
         let loop_stop = stop.clone();
         let thread = LoopThread::start(move |Batch { runner, taps, ticks }| {
             let mut records = 0;
@@ -86,7 +86,17 @@ impl VirtualLoop {
         let servo = activate(standby, &plugins)?;
         let runner = Loop::new(servo, Schedule::start_virtual(period_ns), duration_ns);
         let batch = Some(Batch { runner, taps, ticks: 0 });
-        Ok(Self { thread, batch, records, changes, asked, stop: stop.clone(), stoppers, heart, plugins })
+        Ok(Self {
+            thread,
+            batch,
+            records,
+            changes,
+            requested,
+            stop: stop.clone(),
+            stoppers,
+            heartbeat,
+            plugins,
+        })
     }
 
     /// Returns the end of the run; `None` while the run continues.
@@ -109,11 +119,11 @@ impl VirtualLoop {
     /// Runs `ticks` ticks, or until the batch is full or the run ends; returns the remaining ticks.
     fn batch(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<u64, RunError> {
         let batch = self.batch.take().ok_or(RunError::Thread("did not come back"))?;
-        self.asked.change_to(observer.demand());
-        let ticked = self.thread.tick(Batch { ticks, ..batch }, &self.heart, &self.stop);
+        self.requested.change_to(observer.demand());
+        let ticked = self.thread.tick(Batch { ticks, ..batch }, &self.heartbeat, &self.stop);
         if !matches!(&ticked, Ok(batch) if batch.runner.end().is_none()) {
             self.stop_devices();
-            self.heart.finish();
+            self.heartbeat.finish();
         }
         let changes = &mut self.changes;
         drain(&mut self.records, |record| {
@@ -140,7 +150,7 @@ impl VirtualLoop {
     /// Ends the run. Not real-time.
     fn finish(mut self) -> Result<Finished, RunError> {
         let batch = self.batch.take().ok_or(RunError::Thread("did not come back"))?;
-        Ok(Finished::of(batch.runner, 0, RealTimeReport::not_asked()))
+        Ok(Finished::of(batch.runner, 0, RealTimeReport::not_requested()))
     }
 }
 
@@ -168,7 +178,7 @@ impl LoopThread {
             let mut is_first = true;
             for mut batch in waiting {
                 if std::mem::take(&mut is_first) {
-                    batch.runner.servo().follow_here();
+                    batch.runner.servo().register_loop_thread();
                 }
                 tick(&mut batch);
                 let _ = sender.send(batch);
@@ -181,16 +191,16 @@ impl LoopThread {
     }
 
     /// Runs a batch on the thread.
-    fn tick(&self, batch: Batch, heart: &Heartbeat, stop: &StopSwitch) -> Result<Batch, Lost> {
+    fn tick(&self, batch: Batch, heartbeat: &Heartbeat, stop: &StopSwitch) -> Result<Batch, Lost> {
         self.batches.send(batch).map_err(|_| Lost::Thread)?;
-        let (mut call, limit) = (LongCall::new(heart.now()), step_limit());
+        let (mut call, limit) = (LongCall::new(heartbeat.now()), step_limit());
         loop {
             match self.done.recv_timeout(LOOK) {
                 Ok(batch) => return Ok(batch),
                 Err(RecvTimeoutError::Disconnected) => return Err(Lost::Thread),
                 Err(RecvTimeoutError::Timeout) => {
-                    if let Some(exceeded) = call.look(heart.now(), &self.clock, limit, Some(stop)) {
-                        leave_behind();
+                    if let Some(exceeded) = call.check(heartbeat.now(), &self.clock, limit, Some(stop)) {
+                        abandon();
                         return Err(Lost::Stuck(*call.place(), exceeded));
                     }
                 }

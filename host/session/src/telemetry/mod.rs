@@ -77,14 +77,14 @@ fn panel(report: &PluginReport) -> PanelPlugin {
 }
 
 /// Observer of a run, with the clients of the telemetry server.
-pub struct Watched<O> {
+pub struct ObservedRun<O> {
     /// Observer of the run itself.
     pub observer: O,
     /// Clients, if the telemetry server has started.
     pub publication: Option<Publication>,
 }
 
-impl<O> Watched<O> {
+impl<O> ObservedRun<O> {
     /// Notifies the clients of the end of the run.
     pub fn end(self, words: &str, kind: EndKind) {
         if let Some(publication) = self.publication {
@@ -93,7 +93,7 @@ impl<O> Watched<O> {
     }
 }
 
-impl<O: Observer> Observer for Watched<O> {
+impl<O: Observer> Observer for ObservedRun<O> {
     fn observe(&mut self, record: &TickRecord) {
         self.observer.observe(record);
         if let Some(publication) = &self.publication {
@@ -183,7 +183,7 @@ impl Serve for Host {
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         let Self { controls, stop, latch, .. } = self;
         match ask {
-            Ask::Watch { .. } | Ask::LookAway => {} // handled by the publication
+            Ask::Watch { .. } | Ask::Unwatch => {} // handled by the publication
             Ask::Set { values } => {
                 let values: Vec<NewValue<'_>> = values
                     .iter()

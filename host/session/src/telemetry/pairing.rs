@@ -124,7 +124,7 @@ mod tests {
     use flotor_hal::{Pose, Twist};
 
     fn dispatch(run: u64, partner: u64, tick: u64) -> Dispatch {
-        let state = PeerState { pose: Pose::HOME, twist: Twist::ZERO, told_j: 0.0 };
+        let state = PeerState { pose: Pose::HOME, twist: Twist::ZERO, passed_on_j: 0.0 };
         Dispatch { run, partner, since: 1, tick, state, tank: TankState::default() }
     }
 

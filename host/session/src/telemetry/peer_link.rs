@@ -18,7 +18,7 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 const LOOK_PERIOD: Duration = Duration::from_micros(500);
 
 /// Most datagrams read per poll.
-const MOST_AT_ONCE: usize = 256;
+const MAX_AT_ONCE: usize = 256;
 
 /// The thread of a peer link; it ends when dropped.
 pub struct PeerLink {
@@ -59,7 +59,7 @@ impl Drop for PeerLink {
 }
 
 fn run(mut socket: PeerSocket, line: Line, stop: &AtomicBool) -> LinkCounts {
-    let Line { told, mut heard, silence_ns } = line;
+    let Line { outgoing, mut incoming, silence_ns } = line;
     let began = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
     #[allow(clippy::cast_possible_truncation)] // in the year 2554
     let run = began as u64;
@@ -67,24 +67,24 @@ fn run(mut socket: PeerSocket, line: Line, stop: &AtomicBool) -> LinkCounts {
     let mut pairing = Pairing::new(run, silence_ns);
     let since = Instant::now();
     while !stop.load(Ordering::Relaxed) {
-        if let Some((version, dispatch)) = told.read()
+        if let Some((version, dispatch)) = outgoing.read()
             && version != sent
         {
             sent = version;
-            socket.tell(&pairing.address(&dispatch));
+            socket.send(&pairing.address(&dispatch));
         }
         // Of several messages only the last counts; a flood is cut off here, and read further at the next poll.
         #[allow(clippy::cast_possible_truncation)] // in five hundred years
         let now_ns = since.elapsed().as_nanos() as u64;
         let mut newest = None;
-        for _ in 0..MOST_AT_ONCE {
-            match socket.hear() {
+        for _ in 0..MAX_AT_ONCE {
+            match socket.receive() {
                 Ok(None) => break,
                 Ok(Some(dispatch)) => newest = pairing.take(dispatch, now_ns).or(newest),
                 Err(_) => pairing.refuse(),
             }
         }
-        newest.iter().for_each(|newest| heard.publish(newest));
+        newest.iter().for_each(|newest| incoming.publish(newest));
         std::thread::sleep(LOOK_PERIOD);
     }
     pairing.counts()

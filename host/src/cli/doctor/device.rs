@@ -36,8 +36,10 @@ pub(super) fn diagnose(
     match opened {
         Ok(mut device) => diagnoses.extend(abilities(&plugin, &mut device)),
         // The reason is one sentence for people: problem, place, remedy.
-        Err(LoadError::Refused { refusal, .. }) => diagnoses.push(Diagnosis::told("opening", refusal.reason)),
-        Err(error) => diagnoses.push(Diagnosis::told("opening", error.to_string())),
+        Err(LoadError::Refused { refusal, .. }) => {
+            diagnoses.push(Diagnosis::bad_without_remedy("opening", refusal.reason))
+        }
+        Err(error) => diagnoses.push(Diagnosis::bad_without_remedy("opening", error.to_string())),
     }
     Ok(diagnoses)
 }
@@ -51,19 +53,19 @@ fn abilities(plugin: &Plugin, device: &mut OpenedDevice) -> Vec<Diagnosis> {
             diagnoses.push(Diagnosis::good("axes", axes(&capabilities)));
             diagnoses.push(Diagnosis::good("boundary wall", boundary_wall(&capabilities)));
         }
-        Err(refusal) => diagnoses.push(Diagnosis::told("axes", refusal.to_string())),
+        Err(refusal) => diagnoses.push(Diagnosis::bad_without_remedy("axes", refusal.to_string())),
     }
     diagnoses.push(without_its_host(device.independent_stop()));
     diagnoses
 }
 
 /// Returns the finding on the stop of the device without its host.
-fn without_its_host(told: Result<Option<Independence>, Refusal>) -> Diagnosis {
-    match told {
+fn without_its_host(declared: Result<Option<Independence>, Refusal>) -> Diagnosis {
+    match declared {
         Ok(Some(Independence::Itself { .. })) => Diagnosis::good(WITHOUT_ITS_HOST, "stops by itself"),
         Ok(Some(Independence::Message { .. })) => by_message(watchdog_process::is_offered()),
         Ok(None) => not_stopped("nothing is known to stop it"),
-        Err(refusal) => Diagnosis::told(WITHOUT_ITS_HOST, refusal.to_string()),
+        Err(refusal) => Diagnosis::bad_without_remedy(WITHOUT_ITS_HOST, refusal.to_string()),
     }
 }
 
@@ -91,7 +93,7 @@ fn boundary_wall(device: &Capabilities) -> String {
     RenderedBoundary::new(&Boundary::default(), device, &Bound::NONE, period_ns).to_string()
 }
 
-fn axes(told: &Capabilities) -> String {
+fn axes(declared: &Capabilities) -> String {
     const SINGLE: [Axes; 3] = [Axes::X, Axes::Y, Axes::Z];
     let count = |axes: Axes| {
         let translations = SINGLE.into_iter().filter(|axis| axes.contains(*axis)).count();
@@ -100,10 +102,10 @@ fn axes(told: &Capabilities) -> String {
     let most = |axes: [f64; 3]| axes.into_iter().fold(0.0, f64::max);
     format!(
         "{} sensed, {} driven; at most {} N and {} N·m along one",
-        count(told.sensed),
-        count(told.actuated),
-        most(told.max_force_n),
-        most(told.max_torque_nm)
+        count(declared.sensed),
+        count(declared.actuated),
+        most(declared.max_force_n),
+        most(declared.max_torque_nm)
     )
 }
 

@@ -357,7 +357,7 @@ fn serve(
     runs.tell(program, arguments.record.as_deref());
     if let Some(json) = &arguments.json {
         match served {
-            _ if service.leaves_its_summary_here() => runs.write(json)?,
+            _ if service.writes_summary() => runs.write(json)?,
             ServiceEnd::Killed => write_json(json, &json!({ "end": ServiceEnd::KILLED }))?,
             // The service has written the file.
             ServiceEnd::Exited(_) => {}
@@ -407,11 +407,11 @@ fn environment(
             command.env(variable, folder);
         }
     }
-    told(command, arguments, folder, own)
+    set_environment(command, arguments, folder, own)
 }
 
 /// Sets the environment variables of a run behind a program, in a library or a service.
-fn told(
+fn set_environment(
     command: &mut Command,
     arguments: &LendArguments,
     folder: &Path,

@@ -18,7 +18,7 @@ pub(crate) use std::net::TcpStream as Stream;
 /// Timeout for sending the whole secret.
 const SECRET_WAIT: Duration = Duration::from_secs(1);
 /// Largest number of clients without the secret; for one more, the oldest is rejected.
-const MOST_PENDING: usize = 16;
+const MAX_PENDING: usize = 16;
 /// Poll interval of the clients without the secret.
 const POLL_PERIOD: Duration = Duration::from_millis(2);
 
@@ -80,7 +80,7 @@ impl Listening {
             }
             match accepted {
                 Ok((stream, _)) => {
-                    let is_full = pending.len() >= MOST_PENDING;
+                    let is_full = pending.len() >= MAX_PENDING;
                     if is_full {
                         pending.remove(0);
                     }
@@ -227,7 +227,7 @@ mod tests {
         let mut silent = without_secret(&path);
         silent.write_all(b"0").unwrap();
         assert_eq!(listening.accept().unwrap_err().kind(), ErrorKind::Interrupted);
-        let crowd: Vec<Stream> = (0..=MOST_PENDING).map(|_| without_secret(&path)).collect();
+        let crowd: Vec<Stream> = (0..=MAX_PENDING).map(|_| without_secret(&path)).collect();
         let client = connect(&path).unwrap();
         let _ = accept_one(&listening);
         drop((crowd, client));

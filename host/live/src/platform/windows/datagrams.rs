@@ -48,7 +48,7 @@ const LONGEST: usize = 8 * 1024;
 /// Error code of a datagram that is too long (`WSAEMSGSIZE`); its rest is lost.
 const TOO_LONG: i32 = 10040;
 /// Largest number of datagrams discarded in one call, which limits the delay by a flood.
-const MOST_DISCARDED: usize = 64;
+const MAX_DISCARDED: usize = 64;
 
 impl Datagrams {
     /// Creates a non-blocking socket.
@@ -87,7 +87,7 @@ impl Datagrams {
     /// Receives the next datagram; returns its length and sender. `WouldBlock` when all have been read, or many were discarded.
     pub(crate) fn recv_from(&self, buffer: &mut [u8]) -> io::Result<(usize, Address)> {
         let mut datagram = [0; LONGEST];
-        for _ in 0..MOST_DISCARDED {
+        for _ in 0..MAX_DISCARDED {
             let length = match self.socket.recv_from(&mut datagram) {
                 Ok((length, _)) => length,
                 Err(error) if error.raw_os_error() == Some(TOO_LONG) => continue,
@@ -151,7 +151,7 @@ mod tests {
         let [host, guest] = pair(scratch.path());
         let port = host.socket.local_addr().unwrap();
         let stranger = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
-        for _ in 0..MOST_DISCARDED {
+        for _ in 0..MAX_DISCARDED {
             stranger.send_to(&[b'0'; 64], port).unwrap();
         }
         guest.send_to(b"known", &scratch.path().join("host")).unwrap();

@@ -103,8 +103,8 @@ impl AsynchronousModel {
     /// bounded, no allocation.
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
         let arrival = match &mut self.computing {
-            Computing::Inline(inline) => inline.look(input),
-            Computing::Thread(thread) => thread.look(input),
+            Computing::Inline(inline) => inline.poll(input),
+            Computing::Thread(thread) => thread.poll(input),
         };
         match arrival {
             Arrival::Field(field) if field.is_finite() => {
@@ -188,7 +188,7 @@ impl Inline {
         Self { model, period_ns, latency_ns, next_ns: 0, looked_ns: None, held_back: None }
     }
 
-    fn look(&mut self, input: &Input) -> Arrival {
+    fn poll(&mut self, input: &Input) -> Arrival {
         let due = self.held_back.take_if(|(ready_ns, _)| input.time_ns >= *ready_ns);
         if input.time_ns >= self.next_ns {
             self.next_ns = (input.time_ns / self.period_ns + 1) * self.period_ns;

@@ -13,11 +13,11 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// Capacity of the command queue between two fields.
-const ORDERS: usize = 64;
+const OPERATIONS: usize = 64;
 
 /// Handle sample sent to the model thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Look {
+struct HandleSample {
     pose: Pose,
     twist: Twist,
     time_ns: u64,
@@ -25,10 +25,10 @@ struct Look {
     buttons: u32,
 }
 
-const LOOK_WORDS: usize = 7 + 6 + 3;
+const SAMPLE_WORDS: usize = 7 + 6 + 3;
 
-impl Words<LOOK_WORDS> for Look {
-    fn to_words(&self) -> [u64; LOOK_WORDS] {
+impl Words<SAMPLE_WORDS> for HandleSample {
+    fn to_words(&self) -> [u64; SAMPLE_WORDS] {
         let [px, py, pz] = self.pose.position_m.map(f64::to_bits);
         let [qx, qy, qz, qw] = self.pose.orientation_xyzw.map(f64::to_bits);
         let [vx, vy, vz] = self.twist.linear_m_per_s.map(f64::to_bits);
@@ -36,7 +36,7 @@ impl Words<LOOK_WORDS> for Look {
         [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, self.time_ns, self.tick, self.buttons.into()]
     }
 
-    fn from_words(words: &[u64; LOOK_WORDS]) -> Self {
+    fn from_words(words: &[u64; SAMPLE_WORDS]) -> Self {
         let [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, time_ns, tick, buttons] = *words;
         let three = |numbers: [u64; 3]| numbers.map(f64::from_bits);
         Self {
@@ -89,7 +89,7 @@ impl Words<FIELD_WORDS> for Sent {
 
 /// Command that the model executes before its next field.
 #[derive(Clone, Copy, Debug)]
-enum Order {
+enum Operation {
     Set { index: usize, value: f64 },
     Reset,
 }
@@ -104,9 +104,9 @@ struct Flags {
 
 /// Loop side of the model thread.
 pub(super) struct ModelThread {
-    looks: Publisher<Look, LOOK_WORDS>,
+    samples: Publisher<HandleSample, SAMPLE_WORDS>,
     fields: Observer<Sent, FIELD_WORDS>,
-    orders: Producer<Order>,
+    operations: Producer<Operation>,
     flags: Arc<Flags>,
     /// Version of the newest field taken.
     taken: u64,
@@ -121,17 +121,17 @@ impl ModelThread {
     /// # Errors
     /// If the system cannot start a thread.
     pub(super) fn start(model: Engine, period_ns: u64) -> Result<Self, Refusal> {
-        let at_home = Look { pose: Pose::HOME, twist: Twist::ZERO, time_ns: 0, tick: 0, buttons: 0 };
-        let (looks, seen) = latest(at_home);
+        let at_home = HandleSample { pose: Pose::HOME, twist: Twist::ZERO, time_ns: 0, tick: 0, buttons: 0 };
+        let (samples, seen) = latest(at_home);
         let (sent, fields) = latest(Sent(LinearField::NONE));
-        let (orders, obeyed) = RingBuffer::new(ORDERS);
+        let (operations, pending) = RingBuffer::new(OPERATIONS);
         let flags = Arc::new(Flags::default());
         let computer = Computer {
             demand: model.serves().limited_to(Demand::WRENCH),
             model,
-            looks: seen,
+            samples: seen,
             fields: sent,
-            orders: obeyed,
+            operations: pending,
             flags: Arc::clone(&flags),
             looked_ns: None,
         };
@@ -143,14 +143,14 @@ impl ModelThread {
                 "cannot start a thread for an asynchronous model: {error}; {THREAD_ADVICE}"
             ))
         })?;
-        Ok(Self { looks, fields, orders, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
+        Ok(Self { samples, fields, operations, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
     }
 
     /// Publishes the handle sample and takes a new field, if there is one. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn look(&mut self, input: &Input) -> Arrival {
+    pub(super) fn poll(&mut self, input: &Input) -> Arrival {
         let Input { pose, twist, time_ns, tick, buttons, .. } = *input;
-        self.looks.publish(&Look { pose, twist, time_ns, tick, buttons });
+        self.samples.publish(&HandleSample { pose, twist, time_ns, tick, buttons });
         self.now_ns = time_ns;
         if self.flags.is_broken.load(Ordering::Acquire) {
             return Arrival::Broken;
@@ -166,17 +166,17 @@ impl ModelThread {
 
     /// Queues a change of a live parameter. Real-time: bounded, no allocation.
     pub(super) fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
-        self.order(Order::Set { index, value })
+        self.enqueue(Operation::Set { index, value })
     }
 
     /// Queues a reset and drops fields of older samples. Real-time: bounded, no allocation.
     pub(super) fn reset(&mut self) -> CallStatus {
         self.forgotten_ns = self.now_ns.saturating_add(1);
-        self.order(Order::Reset)
+        self.enqueue(Operation::Reset)
     }
 
-    fn order(&mut self, order: Order) -> CallStatus {
-        match self.orders.push(order) {
+    fn enqueue(&mut self, operation: Operation) -> CallStatus {
+        match self.operations.push(operation) {
             Ok(()) => CallStatus::Ok,
             Err(_) => CallStatus::Unsupported,
         }
@@ -198,9 +198,9 @@ impl Drop for ModelThread {
 struct Computer {
     model: Engine,
     demand: Demand,
-    looks: Observer<Look, LOOK_WORDS>,
+    samples: Observer<HandleSample, SAMPLE_WORDS>,
     fields: Publisher<Sent, FIELD_WORDS>,
-    orders: Consumer<Order>,
+    operations: Consumer<Operation>,
     flags: Arc<Flags>,
     looked_ns: Option<u64>,
 }
@@ -210,15 +210,15 @@ impl Computer {
         enter_worker_priority();
         let (mut deadline, mut seen) = (Instant::now(), 0);
         while !self.flags.is_over.load(Ordering::Acquire) {
-            let obeyed = self.obey();
-            let answered = match self.looks.read() {
-                Some((version, look)) if version > seen => {
+            let executed = self.execute();
+            let answered = match self.samples.read() {
+                Some((version, sample)) if version > seen => {
                     seen = version;
-                    self.answer(&look)
+                    self.answer(&sample)
                 }
                 _ => CallStatus::Ok,
             };
-            if obeyed == CallStatus::Panicked || answered != CallStatus::Ok {
+            if executed == CallStatus::Panicked || answered != CallStatus::Ok {
                 let _ = self.flags.last_words.set(self.model.last_message());
                 self.flags.is_broken.store(true, Ordering::Release);
                 return;
@@ -230,12 +230,12 @@ impl Computer {
         }
     }
 
-    fn obey(&mut self) -> CallStatus {
+    fn execute(&mut self) -> CallStatus {
         let mut worst = CallStatus::Ok;
-        while let Ok(order) = self.orders.pop() {
-            let status = match order {
-                Order::Set { index, value } => self.model.set_parameter(index, value),
-                Order::Reset => {
+        while let Ok(operation) = self.operations.pop() {
+            let status = match operation {
+                Operation::Set { index, value } => self.model.set_parameter(index, value),
+                Operation::Reset => {
                     self.looked_ns = None;
                     self.model.reset()
                 }
@@ -247,8 +247,8 @@ impl Computer {
         worst
     }
 
-    fn answer(&mut self, look: &Look) -> CallStatus {
-        let Look { pose, twist, time_ns, tick, buttons } = *look;
+    fn answer(&mut self, sample: &HandleSample) -> CallStatus {
+        let HandleSample { pose, twist, time_ns, tick, buttons } = *sample;
         let dt_ns = self.looked_ns.map_or(0, |before_ns| time_ns.saturating_sub(before_ns));
         self.looked_ns = Some(time_ns);
         let input = Input { pose, twist, time_ns, dt_ns, tick, buttons, demand: self.demand };
@@ -285,8 +285,8 @@ mod tests {
             linear_m_per_s: std::array::from_fn(|_| next()),
             angular_rad_per_s: std::array::from_fn(|_| next()),
         };
-        let look = Look { pose, twist, time_ns: u64::MAX, tick: 7, buttons: u32::MAX };
-        assert_eq!(Look::from_words(&look.to_words()), look);
+        let sample = HandleSample { pose, twist, time_ns: u64::MAX, tick: 7, buttons: u32::MAX };
+        assert_eq!(HandleSample::from_words(&sample.to_words()), sample);
         let field = LinearField {
             anchor: pose,
             wrench: Wrench {

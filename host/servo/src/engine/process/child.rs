@@ -2,7 +2,7 @@
 
 use super::Greeting;
 use super::memory::{MESSAGE_BYTES, SharedMemory};
-use super::shared_words::{self, Order, wait_for_change};
+use super::shared_words::{self, Operation, wait_for_change};
 use crate::enter_worker_priority;
 use crate::last_stop::ignore_no_signal;
 use crate::platform::processes::HostProcess;
@@ -71,7 +71,7 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
             }
             continue;
         }
-        let status = obey(&mut model, &memory);
+        let status = execute(&mut model, &memory);
         if status == CallStatus::Panicked {
             memory.put_message(&model.last_message());
         }
@@ -80,28 +80,28 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
     }
 }
 
-fn obey(model: &mut Model, memory: &SharedMemory) -> CallStatus {
-    match memory.order() {
-        Some(Order::Step) => {
+fn execute(model: &mut Model, memory: &SharedMemory) -> CallStatus {
+    match memory.operation() {
+        Some(Operation::Step) => {
             let mut output = Output::default();
             let status = model.step(&memory.input(), &mut output);
             memory.put_output(&output);
             status
         }
-        Some(Order::SetParameter) => {
+        Some(Operation::SetParameter) => {
             let value = f64::from_bits(memory.value.load(Ordering::Relaxed));
             let index = usize::try_from(memory.parameter.load(Ordering::Relaxed)).unwrap_or(usize::MAX);
             let status = model.set_parameter(index, value);
             put_extent(model, memory);
             status
         }
-        Some(Order::Field) => {
+        Some(Operation::Field) => {
             let mut field = LinearField::NONE;
             let status = model.linear_field(&memory.input(), &mut field);
             memory.put_field(&field);
             status
         }
-        Some(Order::Reset) => model.reset(),
+        Some(Operation::Reset) => model.reset(),
         None => CallStatus::Unsupported,
     }
 }
@@ -172,7 +172,7 @@ const MORE_TO_COME: CallStatus = CallStatus::WrongPhase;
 #[cfg(test)]
 mod tests {
     use super::super::memory::mapped;
-    use super::super::parent::heard;
+    use super::super::parent::receive_text;
     use super::*;
 
     #[test]
@@ -181,7 +181,7 @@ mod tests {
             let Some([here, there]) = mapped() else { return };
             let said = text.clone();
             let worker = std::thread::spawn(move || greet(&there, &said, || false));
-            let (number, told) = heard(&here, || false).expect("it says something");
+            let (number, told) = receive_text(&here, || false).expect("it says something");
             assert_eq!(told, text);
             assert_eq!(worker.join().expect("it greets"), Some(number));
         }

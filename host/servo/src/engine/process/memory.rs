@@ -26,7 +26,7 @@ pub(crate) struct SharedPage {
     /// Number of the newest request that is answered; the host sleeps on it.
     pub(super) reply: AtomicU32,
     /// Code of the requested operation.
-    pub(super) order: AtomicU32,
+    pub(super) operation: AtomicU32,
     /// Status of the reply.
     pub(super) status: AtomicU32,
     /// Index of the parameter to change, and bits of its new value.

@@ -14,7 +14,7 @@ mod shared_words;
 
 pub use child::{LoadFile, WorkerArguments, serve};
 pub(crate) use memory::SharedPage;
-pub use parent::{Worker, WorkerOrder};
+pub use parent::{Worker, WorkerConfig};
 
 use serde::{Deserialize, Serialize};
 

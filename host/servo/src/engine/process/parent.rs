@@ -2,7 +2,7 @@
 
 use super::child::WHOLE;
 use super::memory::{SharedMemory, create_file};
-use super::shared_words::{DEMANDS, NO_DEMAND, Order, wait_for_change};
+use super::shared_words::{DEMANDS, NO_DEMAND, Operation, wait_for_change};
 use super::{Greeting, Reply};
 use crate::last_stop::spawn_unblocked;
 use crate::platform::processes;
@@ -21,7 +21,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Start-up settings of a worker.
-pub struct WorkerOrder<'a> {
+pub struct WorkerConfig<'a> {
     /// Path of the plugin's shared library.
     pub plugin: &'a Path,
     /// Parameters of the model, key and value as text.
@@ -29,9 +29,9 @@ pub struct WorkerOrder<'a> {
     /// Period and seed of the loop.
     pub config: LoopConfig,
     /// Timeout of a reply, ns.
-    pub patience_ns: u64,
+    pub timeout_ns: u64,
     /// Timeout of `create` and `prepare`.
-    pub making: Duration,
+    pub create_timeout: Duration,
 }
 
 /// Model in a worker process.
@@ -41,9 +41,9 @@ pub struct Worker {
     /// Number of the newest request.
     number: u32,
     /// True after a timeout, until the newest request is answered.
-    is_behind: bool,
+    is_pending: bool,
     is_gone: bool,
-    patience_ns: u64,
+    timeout_ns: u64,
     parameters: Vec<Option<f64>>,
     serves: Demand,
     remembers: Memory,
@@ -55,16 +55,16 @@ impl Worker {
     ///
     /// # Errors
     /// The plugin's [`Refusal`], or the reason why no worker could start.
-    pub fn start(order: &WorkerOrder<'_>) -> Result<Self, Refusal> {
+    pub fn start(config: &WorkerConfig<'_>) -> Result<Self, Refusal> {
         let no_worker = |error: io::Error| Refusal::resource(format!("no worker process: {error}"));
         let file = create_file().map_err(no_worker)?;
         let memory = SharedMemory::map(&file).map_err(no_worker)?;
         let mut command = Command::new(program().map_err(no_worker)?);
-        command.arg("worker").arg(order.plugin);
+        command.arg("worker").arg(config.plugin);
         command.args(["--host", &std::process::id().to_string()]);
-        command.args(["--period-ns", &order.config.period_ns.to_string()]);
-        command.args(["--seed", &order.config.seed.to_string()]);
-        command.args(order.sets.iter().map(|(key, value)| format!("--set={key}={value}")));
+        command.args(["--period-ns", &config.config.period_ns.to_string()]);
+        command.args(["--seed", &config.config.seed.to_string()]);
+        command.args(config.sets.iter().map(|(key, value)| format!("--set={key}={value}")));
         // Output of the model goes to the host's standard error, where it does no harm.
         command.stdin(file).stdout(io::stderr());
         // Signals of the terminal go to the host alone, which needs the model while the force fades out.
@@ -74,15 +74,15 @@ impl Worker {
             child,
             memory,
             number: 0,
-            is_behind: false,
+            is_pending: false,
             is_gone: false,
-            patience_ns: order.patience_ns,
+            timeout_ns: config.timeout_ns,
             parameters: Vec::new(),
             serves: NO_DEMAND,
             remembers: Memory::PathDependent,
             has_field: false,
         };
-        let greeting = worker.greeting(order.making);
+        let greeting = worker.greeting(config.create_timeout);
         match serde_json::from_str(&greeting) {
             Ok(Greeting::Ready { parameters, serves, remembers, has_field }) => {
                 worker.has_field = has_field;
@@ -102,9 +102,9 @@ impl Worker {
                 let _ = worker.child.kill();
                 let end = worker.child.wait().map_err(no_worker)?;
                 if is_late {
-                    let making_s = order.making.as_secs_f64();
+                    let create_timeout_s = config.create_timeout.as_secs_f64();
                     return Err(Refusal::broken(format!(
-                        "`create` or `prepare` did not return within {making_s} s in its process"
+                        "`create` or `prepare` did not return within {create_timeout_s} s in its process"
                     )));
                 }
                 Err(Refusal::broken(format!("its process ended before the model was made ({end})")))
@@ -114,10 +114,11 @@ impl Worker {
 
     /// Waits for the greeting of the worker, sent once its model is ready. Empty if the process ends before or the timeout expires.
     /// Not real-time.
-    fn greeting(&mut self, making: Duration) -> String {
+    fn greeting(&mut self, create_timeout: Duration) -> String {
         let (child, started) = (&mut self.child, Instant::now());
-        let has_ended = || started.elapsed() > making || child.try_wait().is_ok_and(|end| end.is_some());
-        let Some((number, text)) = heard(&self.memory, has_ended) else { return String::new() };
+        let has_ended =
+            || started.elapsed() > create_timeout || child.try_wait().is_ok_and(|end| end.is_some());
+        let Some((number, text)) = receive_text(&self.memory, has_ended) else { return String::new() };
         self.number = number;
         text
     }
@@ -135,10 +136,10 @@ impl Worker {
     /// Steps the model. Real-time: bounded by the reply timeout, no allocation.
     #[inline]
     pub fn step(&mut self, input: &Input) -> Reply<(CallStatus, Output)> {
-        let patience_ns = self.patience_ns;
+        let timeout_ns = self.timeout_ns;
         self.request(
-            Order::Step,
-            patience_ns,
+            Operation::Step,
+            timeout_ns,
             |memory| memory.put_input(input),
             |memory| (memory.status(), memory.output()),
         )
@@ -151,10 +152,10 @@ impl Worker {
 
     /// Computes the linear field at an input. Not real-time: bounded by the reply timeout.
     pub fn linear_field(&mut self, input: &Input) -> Reply<(CallStatus, LinearField)> {
-        let patience_ns = self.patience_ns;
+        let timeout_ns = self.timeout_ns;
         self.request(
-            Order::Field,
-            patience_ns,
+            Operation::Field,
+            timeout_ns,
             |memory| memory.put_input(input),
             |memory| (memory.status(), memory.field()),
         )
@@ -162,7 +163,7 @@ impl Worker {
 
     /// Returns the active region of the model; everywhere while a pending request may change it. Real-time: bounded, no allocation.
     pub fn active_region(&self) -> ActiveRegion {
-        if self.is_behind { ActiveRegion::EVERYWHERE } else { self.memory.region() }
+        if self.is_pending { ActiveRegion::EVERYWHERE } else { self.memory.region() }
     }
 
     /// Returns the workspace bounds of the model. Real-time: bounded, no allocation.
@@ -176,14 +177,14 @@ impl Worker {
             memory.parameter.store(index as u64, Ordering::Relaxed);
             memory.value.store(value.to_bits(), Ordering::Relaxed);
         };
-        let patience_ns = self.patience_ns;
-        self.request(Order::SetParameter, patience_ns, put, |memory| memory.status())
+        let timeout_ns = self.timeout_ns;
+        self.request(Operation::SetParameter, timeout_ns, put, |memory| memory.status())
     }
 
     /// Clears the history of the model. Real-time: bounded by the reply timeout, no allocation.
     pub fn reset(&mut self) -> Reply<CallStatus> {
-        let patience_ns = self.patience_ns;
-        self.request(Order::Reset, patience_ns, |_| (), |memory| memory.status())
+        let timeout_ns = self.timeout_ns;
+        self.request(Operation::Reset, timeout_ns, |_| (), |memory| memory.status())
     }
 
     /// Returns the model's dependence on the path of the handle.
@@ -193,8 +194,8 @@ impl Worker {
 
     fn request<T>(
         &mut self,
-        order: Order,
-        patience_ns: u64,
+        operation: Operation,
+        timeout_ns: u64,
         put: impl FnOnce(&SharedMemory),
         take: impl FnOnce(&SharedMemory) -> T,
     ) -> Reply<T> {
@@ -202,18 +203,18 @@ impl Worker {
             return Reply::Gone;
         }
         // No new request while the last one is pending: its data in the memory is still in use.
-        if self.is_behind && !self.memory.is_answered(self.number) {
+        if self.is_pending && !self.memory.is_answered(self.number) {
             return self.late();
         }
-        self.is_behind = false;
+        self.is_pending = false;
         put(&self.memory);
         self.number = self.number.wrapping_add(1);
-        self.memory.ask(self.number, order);
-        let deadline_ns = monotonic_ns().saturating_add(patience_ns);
+        self.memory.ask(self.number, operation);
+        let deadline_ns = monotonic_ns().saturating_add(timeout_ns);
         while !self.memory.is_answered(self.number) {
             let left_ns = deadline_ns.saturating_sub(monotonic_ns());
             if left_ns == 0 {
-                self.is_behind = true;
+                self.is_pending = true;
                 return self.late();
             }
             wait_for_change(&self.memory.reply, self.number.wrapping_sub(1), left_ns);
@@ -252,7 +253,10 @@ const LOOK_NS: u64 = 20_000_000;
 
 /// Receives the greeting of a worker piece by piece, and confirms each piece with a request under its number. Returns the last
 /// number and the whole text; `None` if the worker ended before.
-pub(super) fn heard(memory: &SharedMemory, mut has_ended: impl FnMut() -> bool) -> Option<(u32, String)> {
+pub(super) fn receive_text(
+    memory: &SharedMemory,
+    mut has_ended: impl FnMut() -> bool,
+) -> Option<(u32, String)> {
     let (mut number, mut text) = (0_u32, String::new());
     loop {
         // Checked first: a piece may have been sent before the end.
@@ -268,7 +272,7 @@ pub(super) fn heard(memory: &SharedMemory, mut has_ended: impl FnMut() -> bool) 
         text.push_str(&memory.message());
         let is_whole = memory.status() == WHOLE;
         // The worker does not read the operation yet.
-        memory.ask(number, Order::Reset);
+        memory.ask(number, Operation::Reset);
         if is_whole {
             return Some((number, text));
         }

@@ -12,14 +12,14 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Operation that the host requests of a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Order {
+pub(super) enum Operation {
     Step,
     SetParameter,
     Reset,
     Field,
 }
 
-impl Order {
+impl Operation {
     const fn code(self) -> u32 {
         match self {
             Self::Step => 0,
@@ -42,8 +42,8 @@ impl Order {
 
 impl SharedPage {
     /// Host side: sends a request under a new number. Real-time: one system call.
-    pub(super) fn ask(&self, number: u32, order: Order) {
-        self.order.store(order.code(), Ordering::Relaxed);
+    pub(super) fn ask(&self, number: u32, operation: Operation) {
+        self.operation.store(operation.code(), Ordering::Relaxed);
         // Release: a worker that reads the number also reads the request.
         self.request.store(number, Ordering::Release);
         wake(&self.request);
@@ -55,8 +55,8 @@ impl SharedPage {
     }
 
     /// Worker side: returns the requested operation; `None` for an unknown code.
-    pub(super) fn order(&self) -> Option<Order> {
-        Order::from_code(self.order.load(Ordering::Relaxed))
+    pub(super) fn operation(&self) -> Option<Operation> {
+        Operation::from_code(self.operation.load(Ordering::Relaxed))
     }
 
     /// Worker side: sends the reply to a request.

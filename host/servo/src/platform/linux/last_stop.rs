@@ -3,7 +3,7 @@
 //! Nothing that runs in a handler allocates, locks or formats into memory of its own.
 #![allow(unsafe_code)] // handlers of deadly signals and of `exit` cannot be made without; tests/tests/system/architecture.rs
 
-use crate::guest::{is_guest, leaves_signals};
+use crate::guest::{is_guest, program_handles_signals};
 use crate::last_stop::{Death, end_if_armed, end_if_in_call, is_armed, is_in_call};
 use libc::{c_int, c_void, sigaction, siginfo_t, sigset_t};
 use std::io;
@@ -90,7 +90,7 @@ fn install_for(is_wanted: impl Fn(c_int) -> bool) {
         // SAFETY: a function without arguments that may be called at the end of the process.
         let _ = unsafe { libc::atexit(at_exit) };
     });
-    if leaves_signals() {
+    if program_handles_signals() {
         return;
     }
     STACK.with(|_| ());
@@ -117,13 +117,13 @@ fn install_for(is_wanted: impl Fn(c_int) -> bool) {
 ///
 /// # Errors
 /// If the system call fails.
-pub fn leave_sent_signals_to_the_loop() -> io::Result<()> {
+pub fn block_sent_signals() -> io::Result<()> {
     block_signals(&SENT)
 }
 
 /// Unblocks the sent signals in this thread, unless they belong to another program. Not real-time.
 pub(crate) fn take_sent() {
-    if leaves_signals() {
+    if program_handles_signals() {
         return;
     }
     let set = set_of(&SENT);
@@ -186,11 +186,11 @@ pub(crate) fn end_by(death: Death, code: i32) -> ! {
         set_action(signal, &default);
         raise(signal);
     }
-    leave_process(code)
+    exit_process(code)
 }
 
 /// Ends the process at once, without exit handlers. Real-time: never returns.
-pub(crate) fn leave_process(code: i32) -> ! {
+pub(crate) fn exit_process(code: i32) -> ! {
     // SAFETY: takes nothing and never returns.
     unsafe { libc::_exit(code) }
 }

@@ -9,4 +9,4 @@ pub(crate) mod scheduling;
 pub(crate) mod shared_memory;
 pub(crate) mod watchdog_process;
 
-pub use last_stop::{block_signals, leave_sent_signals_to_the_loop, wait_for_signal};
+pub use last_stop::{block_sent_signals, block_signals, wait_for_signal};

@@ -31,7 +31,7 @@ pub fn real_time_budget_advice(file: &Path) -> String {
 }
 
 /// Number of cores that the system can address.
-pub(crate) const MOST_CORES: usize = CpuSet::MAX_CPU;
+pub(crate) const MAX_CORES: usize = CpuSet::MAX_CPU;
 
 /// System's name for the priority of a loop.
 pub const PRIORITY_NAME: &str = "SCHED_FIFO";

@@ -8,7 +8,7 @@
 //! callback of the loader, which Wine 8 does not call for a program: it is not tested.
 #![allow(unsafe_code)] // neither filter nor callback can be made without; tests/tests/system/architecture.rs lists it
 
-use crate::guest::leaves_signals;
+use crate::guest::program_handles_signals;
 use crate::last_stop::{Death, end_if_armed, end_if_in_call, is_armed, is_in_call};
 use std::ffi::c_void;
 use std::io;
@@ -39,7 +39,7 @@ pub(crate) fn install() {
     let mut bytes = STACK_BYTES;
     // SAFETY: a number that is there for the call.
     let _ = unsafe { SetThreadStackGuarantee(&raw mut bytes) };
-    if !leaves_signals() {
+    if !program_handles_signals() {
         // SAFETY: a function that may be called in any thread at any time.
         let _ = unsafe { SetUnhandledExceptionFilter(Some(on_exception)) };
     }
@@ -79,11 +79,11 @@ unsafe extern "system" fn at_end(_: *mut c_void, reason: u32, _: *mut c_void) {
 
 /// Ends the process with a code.
 pub(crate) fn end_by(_: Death, code: i32) -> ! {
-    leave_process(code)
+    exit_process(code)
 }
 
 /// Ends the process at once, without exit handlers. Real-time: never returns.
-pub(crate) fn leave_process(code: i32) -> ! {
+pub(crate) fn exit_process(code: i32) -> ! {
     // SAFETY: the handle that means this process is always there.
     let _ = unsafe { TerminateProcess(GetCurrentProcess(), code.cast_unsigned()) };
     // Not reached, if the system lets a process end itself.

@@ -11,7 +11,7 @@ use windows_sys::Win32::System::Threading::{
 pub const THREAD_ADVICE: &str = "end other programs";
 
 /// Number of cores that the system can address in one group of processors.
-pub(crate) const MOST_CORES: usize = usize::BITS as usize;
+pub(crate) const MAX_CORES: usize = usize::BITS as usize;
 
 /// System's name for the priority of a loop.
 pub const PRIORITY_NAME: &str = "time-critical priority";

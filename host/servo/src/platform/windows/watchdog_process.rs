@@ -16,9 +16,9 @@ pub fn is_offered() -> io::Result<()> {
 pub enum WatchdogProcess {}
 
 /// Sender of heartbeats to the watchdog process: not available yet.
-pub enum SignOfLife {}
+pub enum HeartbeatSender {}
 
-impl SignOfLife {
+impl HeartbeatSender {
     /// Sends a heartbeat and announces the next one within this time, ns.
     pub(crate) fn give(&self, _: u64) {
         match *self {}
@@ -44,7 +44,7 @@ impl WatchdogProcess {
     ///
     /// # Errors
     /// None.
-    pub fn sign_of_life(&self) -> io::Result<SignOfLife> {
+    pub fn heartbeat_sender(&self) -> io::Result<HeartbeatSender> {
         match *self {}
     }
 

@@ -9,7 +9,7 @@ mod versions;
 
 pub(super) use change_log::ChangeLog;
 pub(super) use plugin_table::{PluginTable, understands};
-pub use swaps::Misbehaved;
+pub use swaps::FaultyPlugin;
 pub(super) use swaps::Settled;
 pub(super) use versions::ChosenBy;
 

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 /// Plugin of a run with faults: the first one of a model, or a replacement.
 #[derive(Clone, Debug)]
-pub struct Misbehaved {
+pub struct FaultyPlugin {
     /// Plugin, under the name of the model.
     pub plugin: PluginReport,
     /// Health counters with the faults.
@@ -23,7 +23,7 @@ pub(super) struct Swaps {
     queues: HostSwaps,
     busy: Vec<bool>,
     /// Plugins with faults, each with model number and generation: the first of each file, which bounds the list.
-    misbehaved: Vec<(usize, u16, Misbehaved)>,
+    faulty_plugins: Vec<(usize, u16, FaultyPlugin)>,
     /// Warnings about replacements, a sentence each.
     warnings: Vec<String>,
     /// Plugins being freed on helper threads: `sweep` does not wait for plugin code.
@@ -37,7 +37,7 @@ pub(in super::super) struct Settled {
     /// Health and last message of the models of the scene, in its order.
     pub(in super::super) first: Vec<(ModelHealth, String)>,
     /// Replacements with faults.
-    pub(in super::super) misbehaved: Vec<Misbehaved>,
+    pub(in super::super) faulty_plugins: Vec<FaultyPlugin>,
     /// Replacements in place at the end.
     pub(in super::super) replacements: Vec<PluginReport>,
     /// The first plugin that was not freed in time.
@@ -49,7 +49,7 @@ impl Swaps {
         Self {
             queues,
             busy: vec![false; models],
-            misbehaved: Vec::new(),
+            faulty_plugins: Vec::new(),
             warnings: Vec::new(),
             freeing: Vec::new(),
             hung: None,
@@ -103,7 +103,7 @@ impl Swaps {
     pub(super) fn collect(&mut self, plugins: &PluginTable, time: Duration) {
         let mut at = 0;
         while let Some(calls) = self.freeing.get(at) {
-            let Some(freed) = calls.look(time) else {
+            let Some(freed) = calls.poll(time) else {
                 at += 1;
                 continue;
             };
@@ -128,13 +128,13 @@ impl Swaps {
             return;
         }
         let Some(plugin) = plugins.plugin(model, generation) else { return };
-        let is_known = |(of, which, known): &(usize, u16, Misbehaved)| {
+        let is_known = |(of, which, known): &(usize, u16, FaultyPlugin)| {
             *of == model
                 && (*which == 0) == (generation == 0)
                 && known.plugin.metadata.path == plugin.metadata.path
         };
-        if !self.misbehaved.iter().any(is_known) {
-            self.misbehaved.push((model, generation, Misbehaved { plugin, health, words }));
+        if !self.faulty_plugins.iter().any(is_known) {
+            self.faulty_plugins.push((model, generation, FaultyPlugin { plugin, health, words }));
         }
     }
 
@@ -181,12 +181,12 @@ impl Swaps {
             }
         }
         let mut later = Vec::new();
-        for (model, generation, misbehaved) in &self.misbehaved {
+        for (model, generation, faulty) in &self.faulty_plugins {
             match first.get_mut(*model) {
-                Some(first) if *generation == 0 => *first = (misbehaved.health, misbehaved.words.clone()),
-                _ => later.push(misbehaved.clone()),
+                Some(first) if *generation == 0 => *first = (faulty.health, faulty.words.clone()),
+                _ => later.push(faulty.clone()),
             }
         }
-        Settled { first, misbehaved: later, replacements: plugins.replacements(), hung: self.hung.take() }
+        Settled { first, faulty_plugins: later, replacements: plugins.replacements(), hung: self.hung.take() }
     }
 }

@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
 /// Largest size of a program that is searched for names of libraries, bytes.
-const MOST_BYTES: u64 = 512 << 20;
+const MAX_BYTES: u64 = 512 << 20;
 
 /// Program to be run on a device.
 pub(super) struct Program {
@@ -104,7 +104,7 @@ impl Native {
 /// Reads the properties of a native program's file; `None` for a script.
 fn read_native(path: &Path) -> Option<Native> {
     let length = std::fs::metadata(path).ok()?.len();
-    if length > MOST_BYTES {
+    if length > MAX_BYTES {
         return None;
     }
     let bytes = std::fs::read(path).ok()?;

@@ -1,7 +1,7 @@
 //! Interfaces that a program reaches over the network: the service is a separate process beside the program.
 
 use super::stop_request::{Stage, StopRequest};
-use super::{Early, Folder, LendArguments, PaceOption, has_ended, told};
+use super::{Early, Folder, LendArguments, PaceOption, has_ended, set_environment};
 use flotor_command::separate::{Built, SeparateProgram};
 use flotor_command::{CommandError, INTERRUPTED, note, say};
 use flotor_servo::last_stop::spawn_unblocked;
@@ -39,7 +39,7 @@ impl Service {
     }
 
     /// Returns true if the service writes its summary to the folder of `flotor lend`; the other is a `flotor run` with its own file.
-    pub(super) fn leaves_its_summary_here(self) -> bool {
+    pub(super) fn writes_summary(self) -> bool {
         self == Self::Haply
     }
 
@@ -67,7 +67,7 @@ impl Service {
                     build: "cargo build --release -p flotor-haply-service",
                 };
                 let mut command = program.command()?;
-                told(&mut command, arguments, &folder.0, own)?;
+                set_environment(&mut command, arguments, &folder.0, own)?;
                 command.arg("--lent");
                 if let Some(listen) = &arguments.listen {
                     command.args(["--listen", listen, "--events", "127.0.0.1:0"]);

@@ -61,7 +61,7 @@ impl StopRequest {
 
     fn stage_at(&self, now: Instant) -> Stage {
         let is_emergency = self.switch.emergency().is_some();
-        if !is_emergency && !self.switch.is_stop_asked() {
+        if !is_emergency && !self.switch.is_stop_requested() {
             return Stage::Running;
         }
         let stage = Stage::after(now.saturating_duration_since(*self.found.get_or_init(|| now)));

@@ -20,12 +20,12 @@ const SCOPE_POLL: Duration = Duration::from_millis(2);
 const OWN_GROUP: &str = "flotor-watchdog";
 
 /// Leaves the control groups of the host; returns a group that both processes still share. Not real-time.
-pub(super) fn leave_those_of(host: i32) -> Option<String> {
+pub(super) fn join_separate_group(host: i32) -> Option<String> {
     let processes = Processes::with(host);
     processes.shared_group()?;
     if !join_scope(&processes) {
         processes.own().iter().filter(|group| !group.is_root()).for_each(|group| {
-            let _ = leave(group);
+            let _ = move_outward(group);
         });
     }
     processes.shared_group().map(|group| group.path)
@@ -63,7 +63,7 @@ fn left_groups(file: &str, mounts: &[Mount]) -> Vec<Group> {
 }
 
 /// Moves this process to the outermost enclosing group that accepts it.
-fn leave(group: &Group) -> Option<()> {
+fn move_outward(group: &Group) -> Option<()> {
     group.folders().iter().skip(1).rev().find_map(|outer| enter(outer).or_else(|| enter_inside(outer)))
 }
 

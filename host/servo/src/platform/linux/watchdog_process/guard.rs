@@ -1,6 +1,6 @@
 //! Guard side: the watchdog process itself.
 
-use super::control_group::leave_those_of;
+use super::control_group::join_separate_group;
 use super::{PACKET_BYTES, Packet, bytes_of};
 use crate::realtime::enter_guard_priority;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -65,7 +65,7 @@ pub fn serve(host: i32) -> io::Result<()> {
     }
     // A kill of the host's session, process group or control group must not reach this process.
     let _ = setsid();
-    let shared_group = leave_those_of(host).unwrap_or_default();
+    let shared_group = join_separate_group(host).unwrap_or_default();
     enter_guard_priority();
     let _ = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE);
     send(link.as_fd(), &bytes_of(Packet::Ready, shared_group.as_bytes()), SendFlags::NOSIGNAL)?;

@@ -71,8 +71,8 @@ impl WatchdogProcess {
     ///
     /// # Errors
     /// If the system has no further descriptor.
-    pub fn sign_of_life(&self) -> io::Result<SignOfLife> {
-        Ok(SignOfLife { link: self.link.try_clone()? })
+    pub fn heartbeat_sender(&self) -> io::Result<HeartbeatSender> {
+        Ok(HeartbeatSender { link: self.link.try_clone()? })
     }
 
     /// Registers the calling thread as the loop's: its end without an orderly end counts as the host's. Not real-time.
@@ -130,11 +130,11 @@ impl WatchdogProcess {
 }
 
 /// Sender of heartbeats to the watchdog process, which stops the devices without them: this process may be stopped or traced.
-pub struct SignOfLife {
+pub struct HeartbeatSender {
     link: OwnedFd,
 }
 
-impl SignOfLife {
+impl HeartbeatSender {
     /// Sends a heartbeat and announces the next one within `limit_ns`. Bounded: never waits.
     pub(crate) fn give(&self, limit_ns: u64) {
         self.send(&bytes_of(Packet::Alive, &limit_ns.to_le_bytes()));
@@ -146,7 +146,7 @@ impl SignOfLife {
     }
 }
 
-impl Drop for SignOfLife {
+impl Drop for HeartbeatSender {
     fn drop(&mut self) {
         self.send(&[Packet::Quiet as u8]);
     }

@@ -5,7 +5,7 @@ mod guard;
 mod host;
 
 pub use guard::serve;
-pub use host::{SignOfLife, WatchdogProcess, probe_shared_group};
+pub use host::{HeartbeatSender, WatchdogProcess, probe_shared_group};
 
 /// Returns `Ok`: this system has a watchdog process. Not real-time.
 ///
