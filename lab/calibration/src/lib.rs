@@ -50,7 +50,7 @@ pub enum CalibrationError {
         "the handle lost contact with the force sensor at {height_mm:.1} mm and was braked; check that the sensor is above it and \
          held firmly"
     )]
-    RanAway {
+    LostContact {
         /// Height of the handle, mm.
         height_mm: f64,
     },
@@ -94,7 +94,7 @@ pub enum CalibrationError {
     },
     /// The user stopped the calibration.
     #[error("calibration aborted; handle lowered, no file written")]
-    BrokenOff,
+    Aborted,
     /// The thread that holds the handle cannot be started.
     #[error("cannot start the holding controller thread: {0}")]
     NoThread(std::io::Error),
@@ -109,7 +109,7 @@ pub enum CalibrationError {
     Fault(Fault),
     /// The handle did not come to rest.
     #[error("at {height_mm:.1} mm the handle still moves by {moved_um:.0} µm; check the sensor's stand")]
-    Restless {
+    NotAtRest {
         /// Height of the handle, mm.
         height_mm: f64,
         /// Residual motion, µm.

@@ -4,7 +4,7 @@
 //! take it there, and held until it has converged.
 
 use crate::PERIOD_NS;
-use crate::watch::calling;
+use crate::watch::enter_call;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::{
@@ -46,7 +46,7 @@ pub fn input_of(tick: u64, pose: Pose) -> Input {
 /// The call status of the model, if not `Ok`.
 pub fn call(model: &mut Model, input: &Input) -> Result<Output, CallStatus> {
     let mut output = Output::default();
-    let _call = calling(std::slice::from_ref(input));
+    let _call = enter_call(std::slice::from_ref(input));
     match model.step(input, &mut output) {
         CallStatus::Ok => Ok(output),
         other => Err(other),
@@ -105,7 +105,7 @@ pub enum TroubleKind {
     /// The call returned this error status.
     Refused(CallStatus),
     /// The status for a non-finite input is `Ok`.
-    CallsNonsenseSound,
+    AcceptsNonFiniteInput,
 }
 
 /// Instance of the model under test.
@@ -149,7 +149,7 @@ impl<'a> Subject<'a> {
     ///
     /// # Errors
     /// The failure to answer.
-    pub fn ask(&mut self, pose: Pose) -> Result<Output, Trouble> {
+    pub fn answer_at(&mut self, pose: Pose) -> Result<Output, Trouble> {
         match self.memory() {
             Memory::Stateless => self.step(&self.at_rest(pose)),
             Memory::PathDependent => self.walk(pose, &mut || ()),
@@ -223,7 +223,7 @@ impl<'a> Subject<'a> {
             _ if !output.wrench.is_finite() || output.energy_j.is_infinite() => {
                 trouble(TroubleKind::NotFinite)
             }
-            Some(StepStatus::Ok) if !input.pose.is_finite() => trouble(TroubleKind::CallsNonsenseSound),
+            Some(StepStatus::Ok) if !input.pose.is_finite() => trouble(TroubleKind::AcceptsNonFiniteInput),
             Some(_) => Ok(output),
         }
     }

@@ -46,21 +46,21 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 /// Guard: while it exists, this thread is in a call.
-pub struct Calling(());
+pub struct CallGuard(());
 
 /// Marks this thread as being in `step` with these inputs, until the result is dropped. Takes some tens of nanoseconds.
 #[must_use]
-pub fn calling(inputs: &[Input]) -> Calling {
+pub fn enter_call(inputs: &[Input]) -> CallGuard {
     let steps = u32::try_from(inputs.len()).unwrap_or(u32::MAX);
     let at = inputs.first().map(|first| (steps, first.tick, first.pose));
     OWN.with(|own| {
         let mut doing = locked(&own.doing);
         *doing = Doing { calls: doing.calls + 1, at };
     });
-    Calling(())
+    CallGuard(())
 }
 
-impl Drop for Calling {
+impl Drop for CallGuard {
     fn drop(&mut self) {
         OWN.with(|own| locked(&own.doing).at = None);
     }
@@ -116,7 +116,7 @@ fn stuck(seen: &mut BTreeMap<usize, LongCall<u64>>, limit: Duration) -> Option<S
             continue;
         };
         let call = seen.entry(id).or_insert_with(|| LongCall::new(calls));
-        if let Some(limit) = call.look(calls, &caller.clock, limit.saturating_mul(steps), None) {
+        if let Some(limit) = call.check(calls, &caller.clock, limit.saturating_mul(steps), None) {
             return Some(StuckStep { tick, pose, limit });
         }
     }
@@ -142,9 +142,9 @@ mod tests {
         let worker = thread::spawn(move || {
             let begin = Instant::now();
             while begin.elapsed() < 20 * limit {
-                let _call = calling(&[input_of(1, Pose::HOME)]);
+                let _call = enter_call(&[input_of(1, Pose::HOME)]);
             }
-            let _call = calling(&[input_of(700, far)]);
+            let _call = enter_call(&[input_of(700, far)]);
             ended.recv().ok();
         });
         let stuck = told.recv().expect("it is found");

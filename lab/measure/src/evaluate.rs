@@ -74,10 +74,10 @@ pub enum EvaluateError {
     #[error(transparent)]
     Load(#[from] LoadError),
     /// The model panicked and cannot be called any more.
-    #[error("the model failed: {words}")]
-    Broke {
+    #[error("the model failed: {message}")]
+    Panicked {
         /// Message of the model.
-        words: String,
+        message: String,
     },
 }
 
@@ -173,7 +173,7 @@ impl Walker<'_> {
         for batch in handles.chunks(BATCH) {
             let inputs: Vec<Input> = batch.iter().map(|handle| self.subject.at_rest(handle.pose())).collect();
             if self.subject.model().step_batch(&inputs, &mut outputs) != CallStatus::Ok {
-                return Err(self.broke());
+                return Err(self.panicked());
             }
             for (handle, output) in batch.iter().zip(&outputs) {
                 answers.push(self.answer(*handle, output)?);
@@ -207,11 +207,11 @@ impl Walker<'_> {
 
     fn step(&mut self, pose: Pose) -> Result<Output, EvaluateError> {
         let input = self.subject.input(pose, Twist::ZERO, PERIOD_NS);
-        call(self.subject.model(), &input).map_err(|_| self.broke())
+        call(self.subject.model(), &input).map_err(|_| self.panicked())
     }
 
-    fn broke(&mut self) -> EvaluateError {
-        EvaluateError::Broke { words: self.subject.model().last_message() }
+    fn panicked(&mut self) -> EvaluateError {
+        EvaluateError::Panicked { message: self.subject.model().last_message() }
     }
 
     fn answer(&mut self, handle: Handle, output: &Output) -> Result<Answer, EvaluateError> {
@@ -236,7 +236,7 @@ impl Walker<'_> {
         }
         let mut values = vec![f64::NAN; count];
         if self.subject.model().read_details(&mut values) != CallStatus::Ok {
-            return Err(self.broke());
+            return Err(self.panicked());
         }
         Ok(values.into_iter().map(|value| value.is_finite().then_some(value)).collect())
     }

@@ -75,7 +75,7 @@ pub fn measure(
     progress: impl Fn(u64) + Send,
 ) -> Result<JitterReport, RunError> {
     let period_ns = session.period_ns();
-    let _watch = session.latch().map(|latch| latch.obey(stop)).transpose()?;
+    let _watch = session.latch().map(|latch| latch.check_and_watch(stop)).transpose()?;
     let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
     std::thread::scope(|scope| {
         let measured = thread.spawn_scoped(scope, move || {
@@ -85,7 +85,7 @@ pub fn measure(
             let (mut with_servo, mut bare) = (Timing::default(), Timing::default());
             let mut pairs = Pairs::default();
             let mut done = 0;
-            while done < slices && !stop.is_stop_asked() && stop.emergency().is_none() {
+            while done < slices && !stop.is_stop_requested() && stop.emergency().is_none() {
                 let missed_before = [with_servo.missed, bare.missed];
                 let mut schedule = Schedule::start_real(period_ns, window);
                 while schedule.next_time_ns() < SLICE_NS {

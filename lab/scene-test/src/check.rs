@@ -6,8 +6,8 @@ use crate::curve::POSE;
 use crate::file::{Expectation, MeasureDemand, TestFile, Validate};
 use crate::minimise::shortest;
 use crate::numbers::at;
-use crate::process::{Flotor, Ran};
-use crate::rule::Told;
+use crate::process::{Flotor, ProcessResult};
+use crate::rule::RuleFinding;
 use flotor_command::{command_line, note};
 use serde::Serialize;
 use serde_json::Value;
@@ -208,7 +208,7 @@ pub(crate) fn picture(folder: &Path, case: &Case<'_>) -> PathBuf {
 }
 
 /// Judged run.
-pub(crate) struct Judged {
+pub(crate) struct JudgedRun {
     pub(crate) failures: Vec<Failure>,
     pub(crate) json: Option<Value>,
 }
@@ -220,7 +220,7 @@ pub(crate) fn run(
     seed: u64,
     set: &[(String, String)],
     duration: Option<&str>,
-) -> Judged {
+) -> JudgedRun {
     let summary = |set: &[(String, String)]| {
         let mut arguments = run_arguments(case.file, seed, set, duration);
         arguments.extend(["--json".to_owned(), "-".to_owned()]);
@@ -232,7 +232,7 @@ pub(crate) fn run(
     };
     let (ran, json) = match summary(set) {
         Ok(answered) => answered,
-        Err(failure) => return Judged { failures: vec![failure], json: None },
+        Err(failure) => return JudgedRun { failures: vec![failure], json: None },
     };
     let mut failures = judge(case, &ran, &json);
     if let Some(reference) = &case.file.reference {
@@ -249,10 +249,10 @@ pub(crate) fn run(
             })),
         }
     }
-    Judged { failures, json: Some(json) }
+    JudgedRun { failures, json: Some(json) }
 }
 
-fn judge(case: &Case<'_>, ran: &Ran, json: &Value) -> Vec<Failure> {
+fn judge(case: &Case<'_>, ran: &ProcessResult, json: &Value) -> Vec<Failure> {
     let Case { file, label, .. } = case;
     let mut failures = Vec::new();
     if !file.expect.iter().any(|expectation| expectation.path == "end") {
@@ -298,7 +298,7 @@ fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], picture: Option<&Pa
     let tolerance = |index: usize| if index < 3 { curve.within_n } else { curve.within_nm };
     let answers = match flotor.run(&arguments, &curve.points.poses()) {
         Ok(ran) if ran.code == Some(0) => ran.stdout,
-        Ok(Ran { error, .. }) | Err(error) => {
+        Ok(ProcessResult { error, .. }) | Err(error) => {
             return outcome.failures.push(Failure::new("curve", "an evaluation", error));
         }
     };
@@ -371,12 +371,12 @@ fn validate(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Ou
             continue;
         };
         for finding in &findings {
-            match Told::of(finding) {
-                Told::Holds => {}
-                Told::NotJudged { rule, why } => {
+            match RuleFinding::of(finding) {
+                RuleFinding::Holds => {}
+                RuleFinding::NotJudged { rule, why } => {
                     note(format!("{plugin}: the rule {rule} is not judged: {why}"));
                 }
-                Told::Fails { rule, text, seen } => {
+                RuleFinding::Fails { rule, text, seen } => {
                     outcome.failures.push(Failure::new(format!("rule {rule}"), text, seen));
                     let arguments = ["validate", &plugin, "--only", rule].map(str::to_owned);
                     outcome.detail.get_or_insert_with(|| command_line(&arguments));

@@ -5,7 +5,7 @@ use crate::case::{Case, Check, Shard, combinations};
 use crate::check::{Model, check, models, picture, run_arguments};
 use crate::file::{SUFFIX, TestFile};
 use crate::numbers::misspelt;
-use crate::process::{Flotor, Ran};
+use crate::process::{Flotor, ProcessResult};
 use crate::report::{Report, deliver, is_output, remove};
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use flotor_command::options::{JsonOption, PluginPathOption, count, duration_s, new_file};
@@ -255,7 +255,7 @@ fn probe<'f>(flotor: &Flotor, jobs: usize, cases: &[Case<'f>]) -> Result<Vec<Kno
 /// Evaluates a trial run: an error if the file is wrong, the reason if the plugin is.
 fn models_of(
     file: &TestFile,
-    answer: Result<Ran, String>,
+    answer: Result<ProcessResult, String>,
 ) -> Result<Result<Vec<Model>, String>, CommandError> {
     let ran = match answer {
         Ok(ran) => ran,

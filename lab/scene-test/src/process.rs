@@ -15,7 +15,7 @@ pub(crate) struct Flotor {
 }
 
 /// Result of a process.
-pub(crate) struct Ran {
+pub(crate) struct ProcessResult {
     /// Exit code; `None` if a signal ended it.
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
@@ -23,7 +23,7 @@ pub(crate) struct Ran {
     pub(crate) error: String,
 }
 
-impl Ran {
+impl ProcessResult {
     /// Parses the JSON on standard output.
     pub(crate) fn json(&self) -> Option<Value> {
         serde_json::from_str(&self.stdout).ok()
@@ -48,7 +48,7 @@ impl Flotor {
         &self,
         arguments: impl IntoIterator<Item = I>,
         input: &str,
-    ) -> Result<Ran, String> {
+    ) -> Result<ProcessResult, String> {
         self.try_run(arguments, input).map_err(|cause| match cause {
             Trouble::Missing(error) => error.to_string(),
             Trouble::System(cause) => format!("cannot run flotor: {cause}"),
@@ -60,7 +60,7 @@ impl Flotor {
         &self,
         arguments: impl IntoIterator<Item = I>,
         input: &str,
-    ) -> Result<Ran, Trouble> {
+    ) -> Result<ProcessResult, Trouble> {
         // Files, not pipes: a grandchild process could hold a pipe open for ever.
         let [mut stdin, mut stdout, mut stderr] =
             [tempfile::tempfile()?, tempfile::tempfile()?, tempfile::tempfile()?];
@@ -76,7 +76,7 @@ impl Flotor {
         let silent = || code.map_or("a signal ended it".to_owned(), |code| format!("exit code {code}"));
         let error = last.map_or_else(silent, |line| line.trim_start_matches("error: ").to_owned());
         let error = if code.is_none() { format!("it was killed by a signal: {error}") } else { error };
-        Ok(Ran { code, stdout, error })
+        Ok(ProcessResult { code, stdout, error })
     }
 
     fn wait(&self, command: &mut Command) -> Result<Option<i32>, Trouble> {

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 /// Finding of one rule.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) enum Told<'a> {
+pub(crate) enum RuleFinding<'a> {
     /// The rule holds.
     Holds,
     /// The rule cannot be checked on this system, or does not apply to this plugin; with the reason.
@@ -13,7 +13,7 @@ pub(crate) enum Told<'a> {
     Fails { rule: &'a str, text: &'a str, seen: String },
 }
 
-impl<'a> Told<'a> {
+impl<'a> RuleFinding<'a> {
     /// Parses a finding from its JSON.
     pub(crate) fn of(finding: &'a Value) -> Self {
         let word = |key: &str| finding.get(key).and_then(Value::as_str);
@@ -39,14 +39,22 @@ mod tests {
         let finding = |obstacle: Option<&str>| json!({ "rule": "no-threads", "text": "it starts none", "violation": null, "unchecked": "why", "obstacle": obstacle });
         for obstacle in ["system", "subject"] {
             let found = finding(Some(obstacle));
-            assert_eq!(Told::of(&found), Told::NotJudged { rule: "no-threads", why: "why" });
+            assert_eq!(RuleFinding::of(&found), RuleFinding::NotJudged { rule: "no-threads", why: "why" });
         }
         for obstacle in [Some("requirement"), None] {
             let failed = finding(obstacle);
-            let Told::Fails { rule, seen, .. } = Told::of(&failed) else { panic!("{obstacle:?} passed") };
+            let RuleFinding::Fails { rule, seen, .. } = RuleFinding::of(&failed) else {
+                panic!("{obstacle:?} passed")
+            };
             assert_eq!((rule, seen.as_str()), ("no-threads", "it could not be checked: why"));
         }
-        assert_eq!(Told::of(&json!({ "rule": "loads", "violation": null, "unchecked": null })), Told::Holds);
-        assert!(matches!(Told::of(&json!({ "rule": "loads", "violation": "no" })), Told::Fails { .. }));
+        assert_eq!(
+            RuleFinding::of(&json!({ "rule": "loads", "violation": null, "unchecked": null })),
+            RuleFinding::Holds
+        );
+        assert!(matches!(
+            RuleFinding::of(&json!({ "rule": "loads", "violation": "no" })),
+            RuleFinding::Fails { .. }
+        ));
     }
 }

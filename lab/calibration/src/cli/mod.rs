@@ -37,7 +37,7 @@ pub fn command() -> clap::Command {
 #[must_use]
 pub fn main() -> ExitCode {
     let Command::Calibrate(arguments) = options::arguments::<Arguments>().command;
-    flotor_session::tell_notices(|notice| flotor_command::note(notice));
+    flotor_session::on_notice(|notice| flotor_command::note(notice));
     supervised(|| run(&arguments))
 }
 

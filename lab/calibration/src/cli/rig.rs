@@ -100,7 +100,7 @@ impl RigArguments {
         let progress = progress_bar(stops, "{pos}/{len}  {wide_bar}\n{msg}");
         let latch = LatchGuard::of_this_user();
         latch.warning().iter().for_each(note);
-        let guide = guide(&progress, &stop, latch.obey(&stop)?);
+        let guide = guide(&progress, &stop, latch.check_and_watch(&stop)?);
         let rig =
             DeviceRig::open(&plugin, &device_settings, sensor, options, stop, guide).map_err(refused)?;
         rig.warnings().iter().for_each(note);
@@ -124,6 +124,6 @@ fn guide(progress: &ProgressBar, stop: &StopSwitch, watch: LatchWatch) -> Guide 
             }
             None => progress.set_message("reading"),
         }
-        if stop.is_stop_asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        if stop.is_stop_requested() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     })
 }

@@ -137,10 +137,10 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     }
 
     fn tell(&mut self, waiting: Option<Waiting>) -> Result<(), CalibrationError> {
-        self.guardian.look(&self.stop);
+        self.guardian.check(&self.stop);
         match (self.waiting)(waiting) {
             ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(CalibrationError::BrokenOff),
+            ControlFlow::Break(()) => Err(CalibrationError::Aborted),
         }
     }
 

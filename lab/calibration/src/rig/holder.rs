@@ -41,24 +41,24 @@ const LOOK_FOR_END: Duration = Duration::from_millis(1);
 
 /// Command to the thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Order {
+enum Command {
     /// Upward force, N.
     Push(f64),
     /// Removes the force and ends the thread.
     End,
 }
 
-const ORDER_WORDS: usize = 2;
+const COMMAND_WORDS: usize = 2;
 
-impl Words<ORDER_WORDS> for Order {
-    fn to_words(&self) -> [u64; ORDER_WORDS] {
+impl Words<COMMAND_WORDS> for Command {
+    fn to_words(&self) -> [u64; COMMAND_WORDS] {
         match self {
             Self::Push(force_n) => [0, force_n.to_bits()],
             Self::End => [1, 0],
         }
     }
 
-    fn from_words(&[kind, force_bits]: &[u64; ORDER_WORDS]) -> Self {
+    fn from_words(&[kind, force_bits]: &[u64; COMMAND_WORDS]) -> Self {
         if kind == 0 { Self::Push(f64::from_bits(force_bits)) } else { Self::End }
     }
 }
@@ -88,7 +88,7 @@ impl Words<REPORT_WORDS> for Report {
         let (kind, detail) = match self.state {
             Holding::Changing => (0, 0),
             Holding::Steady(force_n) => (1, force_n.to_bits()),
-            Holding::RanAway => (2, 0),
+            Holding::LostContact => (2, 0),
             Holding::Oscillated => (4, 0),
             Holding::Faulted(fault) => (3, u64::from(fault as u32)),
         };
@@ -101,7 +101,7 @@ impl Words<REPORT_WORDS> for Report {
         let state = match kind {
             0 => Holding::Changing,
             1 => Holding::Steady(f64::from_bits(detail)),
-            2 => Holding::RanAway,
+            2 => Holding::LostContact,
             4 => Holding::Oscillated,
             _ => {
                 let code = u32::try_from(detail).unwrap_or(u32::MAX);
@@ -121,7 +121,7 @@ pub(super) enum Holding {
     /// The force has had this value for a while, N.
     Steady(f64),
     /// The handle lost contact and is braked, without vertical force.
-    RanAway,
+    LostContact,
     /// The force of an axis alternated between its limits and was removed.
     Oscillated,
     /// The device faulted.
@@ -139,9 +139,9 @@ pub(super) struct Guard {
 
 /// Owner of the holding thread.
 pub(super) struct Holder {
-    orders: Publisher<Order, ORDER_WORDS>,
+    commands: Publisher<Command, COMMAND_WORDS>,
     reports: Observer<Report, REPORT_WORDS>,
-    heart: Heartbeat,
+    heartbeat: Heartbeat,
     thread: Option<JoinHandle<ActiveDevice>>,
 }
 
@@ -151,30 +151,31 @@ impl Holder {
     /// # Errors
     /// Errors of the thread's start.
     pub(super) fn start(device: ActiveDevice, guard: Guard) -> std::io::Result<Self> {
-        let (orders, ordered) = latest(Order::Push(0.0));
+        let (commands, commanded) = latest(Command::Push(0.0));
         let (publisher, reports) = latest(Averages::default().report(Holding::Changing));
         let Guard { envelope, plausibility, stopper, stop, watchdog_process } = guard;
-        let heart = Heartbeat::default();
-        let signs = watchdog_process.as_ref().and_then(|process| process.sign_of_life().ok());
-        start_watchdog(heart.clone(), vec![stopper.clone()], stop.clone(), WATCHDOG_NS, signs)?;
-        let thread_heart = heart.clone();
+        let heartbeat = Heartbeat::default();
+        let signs = watchdog_process.as_ref().and_then(|process| process.heartbeat_sender().ok());
+        start_watchdog(heartbeat.clone(), vec![stopper.clone()], stop.clone(), WATCHDOG_NS, signs)?;
+        let thread_heartbeat = heartbeat.clone();
         let hold = move || {
             // The rig detects if the watchdog process has ended.
             let _ = watchdog_process.as_ref().map(|process| process.follow_this_thread());
             let name = "the device of the rig".to_owned();
-            let _last_stop = LastStop::arm(vec![stopper], vec![name], thread_heart.clone());
-            let device = hold(device, envelope, plausibility, &thread_heart, &stop, &ordered, publisher);
-            thread_heart.finish();
+            let _last_stop = LastStop::arm(vec![stopper], vec![name], thread_heartbeat.clone());
+            let device =
+                hold(device, envelope, plausibility, &thread_heartbeat, &stop, &commanded, publisher);
+            thread_heartbeat.finish();
             let _ = watchdog_process.as_ref().map(|process| process.follow_no_thread());
             device
         };
         let thread = std::thread::Builder::new().name("flotor-rig".to_owned()).spawn(hold)?;
-        Ok(Self { orders, reports, heart, thread: Some(thread) })
+        Ok(Self { commands, reports, heartbeat, thread: Some(thread) })
     }
 
     /// Ramps the upward force to a new value, N.
     pub(super) fn push(&mut self, force_n: f64) {
-        self.orders.publish(&Order::Push(force_n));
+        self.commands.publish(&Command::Push(force_n));
     }
 
     /// Returns the state of the handle.
@@ -188,13 +189,13 @@ impl Holder {
                 break report;
             }
         };
-        if self.heart.bitten().is_some() {
+        if self.heartbeat.fired_at().is_some() {
             return Err(CalibrationError::Fault(Fault::Timeout));
         }
         match report.state {
             Holding::Faulted(fault) => Err(CalibrationError::Fault(fault)),
             Holding::Oscillated => Err(CalibrationError::Oscillated),
-            Holding::RanAway => Err(CalibrationError::RanAway { height_mm: report.height_m * 1.0e3 }),
+            Holding::LostContact => Err(CalibrationError::LostContact { height_mm: report.height_m * 1.0e3 }),
             Holding::Changing | Holding::Steady(_) => Ok(report),
         }
     }
@@ -205,11 +206,11 @@ impl Holder {
     }
 
     fn stop(&mut self) -> Option<ActiveDevice> {
-        self.orders.publish(&Order::End);
+        self.commands.publish(&Command::End);
         let thread = self.thread.take()?;
         while !thread.is_finished() {
             // Stuck in a device call after the watchdog stopped the device: abandon the thread.
-            if self.heart.bitten().is_some() {
+            if self.heartbeat.fired_at().is_some() {
                 return None;
             }
             std::thread::sleep(LOOK_FOR_END);
@@ -229,16 +230,16 @@ fn hold(
     mut device: ActiveDevice,
     mut envelope: Envelope,
     mut plausibility: PlausibilityCheck,
-    heart: &Heartbeat,
+    heartbeat: &Heartbeat,
     stop: &StopSwitch,
-    orders: &Observer<Order, ORDER_WORDS>,
+    commands: &Observer<Command, COMMAND_WORDS>,
     mut reports: Publisher<Report, REPORT_WORDS>,
 ) -> ActiveDevice {
     // Without real-time priority the thread holds too: late ticks show in the delivered force.
     let _ = enter_real_time(None);
     let period = Duration::from_nanos(PERIOD_NS);
     let started = Instant::now();
-    let mut order = Order::Push(0.0);
+    let mut command = Command::Push(0.0);
     let (mut pushed_n, mut ran_away) = (0.0_f64, false);
     let mut state = DeviceState::HOME;
     let mut averages = Averages::default();
@@ -249,21 +250,21 @@ fn hold(
         let time_ns = started.elapsed().as_nanos() as u64;
         let tick = Tick { index, time_ns, dt_ns: time_ns - last_ns };
         last_ns = time_ns;
-        if let Some((_, newest)) = orders.read() {
-            order = newest;
+        if let Some((_, newest)) = commands.read() {
+            command = newest;
         }
-        let ordered_n = if let Order::Push(force_n) = order { force_n } else { 0.0 };
-        let left_n = ordered_n - pushed_n;
+        let commanded_n = if let Command::Push(force_n) = command { force_n } else { 0.0 };
+        let left_n = commanded_n - pushed_n;
         if left_n != 0.0 {
             // The last step is the remainder, so that the force equals its target to the bit.
             pushed_n = if left_n.abs() <= RAMP_STEP_N {
-                ordered_n
+                commanded_n
             } else {
                 pushed_n + RAMP_STEP_N * left_n.signum()
             };
             averages.begin_anew();
         }
-        heart.enter(index, Place::DeviceRead(0));
+        heartbeat.enter(index, Place::DeviceRead(0));
         let last = state;
         let mut read = device.read(&tick, &mut state);
         // As in a run: an implausible sample counts as stale, and too many as a fault.
@@ -291,9 +292,9 @@ fn hold(
             // A limited force never counts as the commanded one.
             averages.begin_anew();
         }
-        heart.enter(index, Place::DeviceWrite(0));
+        heartbeat.enter(index, Place::DeviceWrite(0));
         let written = device.write(&tick, &commanded);
-        heart.enter(index, Place::Waiting);
+        heartbeat.enter(index, Place::Waiting);
         let faulted = [read, written].into_iter().find_map(|cycle| match cycle {
             Cycle::Fault(fault) => Some(fault),
             Cycle::Fresh | Cycle::Stale => None,
@@ -306,12 +307,12 @@ fn hold(
         let doing = match fault {
             Some(fault) => Holding::Faulted(fault),
             None if envelope.is_unstable() => Holding::Oscillated,
-            None if ran_away => Holding::RanAway,
+            None if ran_away => Holding::LostContact,
             None if averages.are_full() => Holding::Steady(pushed_n),
             None => Holding::Changing,
         };
         reports.publish(&averages.report(doing));
-        let is_let_go = order == Order::End && (pushed_n == 0.0 || ran_away);
+        let is_let_go = command == Command::End && (pushed_n == 0.0 || ran_away);
         if fault.is_some() || is_let_go {
             break;
         }

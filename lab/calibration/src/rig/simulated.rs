@@ -108,7 +108,7 @@ impl SimulatedRig {
         let height_m = 0.5 * (first.value() + second.value());
         let moved_m = (first.value() - second.value()).abs();
         if moved_m > REST_M {
-            return Err(CalibrationError::Restless {
+            return Err(CalibrationError::NotAtRest {
                 height_mm: height_m * 1.0e3,
                 moved_um: moved_m * 1.0e6,
             });

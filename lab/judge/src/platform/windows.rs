@@ -50,33 +50,35 @@ pub(crate) fn used(_: u32) -> Used {
 
 /// State of this process and thread: not read on Windows.
 pub(crate) mod state {
-    use crate::validate::Seen;
+    use crate::validate::Outcome;
     use crate::validate::untouched::Part;
 
     /// Reports that the state is unknown.
-    pub(crate) fn of_the_system() -> Result<Vec<Part>, Seen> {
+    pub(crate) fn of_the_system() -> Result<Vec<Part>, Outcome> {
         let looked_at =
             "of this process only environment, folder and floating-point mode are looked at on Windows";
-        Err(Seen::NotOnThisSystem(looked_at.to_owned()))
+        Err(Outcome::UnsupportedSystem(looked_at.to_owned()))
     }
 
     /// Reports that threads are not counted.
-    pub(crate) fn threads() -> Result<usize, Seen> {
-        Err(Seen::NotOnThisSystem("threads are not counted on Windows".to_owned()))
+    pub(crate) fn threads() -> Result<usize, Outcome> {
+        Err(Outcome::UnsupportedSystem("threads are not counted on Windows".to_owned()))
     }
 
     /// Reports that there is no such library.
     ///
     /// # Errors
-    /// [`Seen::NotOnThisSystem`] always.
-    pub(crate) fn is_loaded_first(_: &str) -> Result<(), Seen> {
-        Err(Seen::NotOnThisSystem("only Linux gives a process another allocator (LD_PRELOAD)".to_owned()))
+    /// [`Outcome::UnsupportedSystem`] always.
+    pub(crate) fn is_loaded_first(_: &str) -> Result<(), Outcome> {
+        Err(Outcome::UnsupportedSystem(
+            "only Linux gives a process another allocator (LD_PRELOAD)".to_owned(),
+        ))
     }
 }
 
 /// Check that a step only computes: not possible on Windows, which has no seccomp.
 pub(crate) mod locked {
-    use crate::validate::Seen;
+    use crate::validate::Outcome;
     use flotor_hal::abi::loader::Model;
     use std::process::Command;
 
@@ -89,7 +91,7 @@ pub(crate) mod locked {
     }
 
     /// Reports that the check is not possible.
-    pub(crate) fn system_calls(_: Model) -> Result<(), Seen> {
-        Err(Seen::NotOnThisSystem("only Linux can tell (seccomp)".to_owned()))
+    pub(crate) fn system_calls(_: Model) -> Result<(), Outcome> {
+        Err(Outcome::UnsupportedSystem("only Linux can tell (seccomp)".to_owned()))
     }
 }

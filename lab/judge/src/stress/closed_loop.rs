@@ -111,7 +111,7 @@ struct Release {
 fn release(subject: &mut Subject<'_>, conditions: Loop, start: Pose, random: &mut Random) -> Option<Release> {
     subject.restart();
     if subject.memory() == Memory::PathDependent {
-        subject.ask(start).ok()?;
+        subject.answer_at(start).ok()?;
     }
     let mut plant = Flotor::at_rest(start, conditions.damping_ns_per_m, LEVER_M, PERIOD_S);
     let mut way = VecDeque::from(vec![(start, plant.twist()); conditions.delay_ticks]);

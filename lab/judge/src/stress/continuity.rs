@@ -177,7 +177,7 @@ pub(super) fn changes(
 ) -> Vec<Option<Change>> {
     let mut ask = |index: usize| {
         let pose = line.pose(start_m + piece_m * index as f64);
-        let here = subject.ask(pose).ok()?.wrench;
+        let here = subject.answer_at(pose).ok()?.wrench;
         match subject.memory() {
             Memory::Stateless => Some([here; 2]),
             // Step again at the same pose, a tick later.

@@ -14,7 +14,7 @@ use crate::call_timer::{net_ns, overhead_ns};
 use crate::sampling::{Random, Sobol};
 use crate::subject::Subject;
 use crate::tally::{Decades, Worst};
-use crate::watch::calling;
+use crate::watch::enter_call;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Memory, Output, Pose};
@@ -117,7 +117,7 @@ impl Stopwatch {
         }
         let input = subject.at_rest(pose);
         let mut output = Output::default();
-        let _call = calling(&[input]);
+        let _call = enter_call(&[input]);
         let begin = Instant::now();
         let call = subject.model().step(std::hint::black_box(&input), std::hint::black_box(&mut output));
         let call_ns = net_ns(begin);

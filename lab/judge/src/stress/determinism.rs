@@ -11,7 +11,7 @@ use crate::PERIOD_NS;
 use crate::sampling::{Random, Sobol};
 use crate::subject::{Subject, call};
 use crate::tally::{Worst, tally};
-use crate::watch::calling;
+use crate::watch::enter_call;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{LoadError, Model};
 use flotor_hal::{Input, Memory, Output, Pose, Twist};
@@ -88,7 +88,7 @@ fn singly(model: &mut Model, inputs: &[Input]) -> Vec<Bits> {
 
 fn batch(model: &mut Model, inputs: &[Input]) -> Vec<Bits> {
     let mut outputs = vec![Output::default(); inputs.len()];
-    let _calls = calling(inputs);
+    let _calls = enter_call(inputs);
     match model.step_batch(inputs, &mut outputs) {
         CallStatus::Ok => outputs.iter().map(bits).collect(),
         _ => vec![UNANSWERED; inputs.len()],

@@ -175,7 +175,7 @@ impl Lap {
 /// Samples a lap at a fraction of it, from 0 to 1.
 fn sample(subject: &mut Subject<'_>, path: &Trajectory, part: f64) -> Option<Sample> {
     let (pose, motion_m, turn_rad) = path.at(part);
-    let answer = subject.ask(pose).ok()?;
+    let answer = subject.answer_at(pose).ok()?;
     let power_j = answer.wrench.force().dot(motion_m) + answer.wrench.torque().dot(turn_rad);
     let (force_n, torque_nm) = (answer.wrench.force(), answer.wrench.torque());
     let most_j = force_n.length() * motion_m.length() + torque_nm.length() * turn_rad.length();

@@ -76,7 +76,7 @@ impl Jacobian {
     /// Computes central differences of fourth order, with the step of least uncertainty; `None` if the model gives no
     /// answer around the pose.
     pub(super) fn at(subject: &mut Subject<'_>, pose: Pose) -> Option<Self> {
-        let wrench = subject.ask(pose).ok()?.wrench;
+        let wrench = subject.answer_at(pose).ok()?.wrench;
         let (mut tried, mut apart_n) = (Vec::with_capacity(STEPS_M.len()), 0.0);
         let mut chords = Chords::default();
         for step_m in STEPS_M {
@@ -87,7 +87,7 @@ impl Jacobian {
             let entries = combine(&fine, 4.0 / 3.0, &coarse, -1.0 / 3.0);
             let error = norm(&combine(&entries, 1.0, &fine, -1.0));
             tried.push((step_m, Self { entries, error, chords, wrench }));
-            let again = subject.ask(pose).ok()?.wrench;
+            let again = subject.answer_at(pose).ok()?.wrench;
             apart_n = f64::max(apart_n, size_n(&(again - wrench)));
         }
         // A model with memory may have switched to another solution meanwhile: then there is no derivative here.
@@ -145,7 +145,8 @@ impl Jacobian {
 fn central(subject: &mut Subject<'_>, pose: Pose, step_m: f64) -> Option<Matrix> {
     let mut by_column = [[0.0; 6]; 6];
     for (column, slopes) in by_column.iter_mut().enumerate() {
-        let mut ask = |step_m: f64| subject.ask(moved(pose, column, step_m)).ok().map(|answer| answer.wrench);
+        let mut ask =
+            |step_m: f64| subject.answer_at(moved(pose, column, step_m)).ok().map(|answer| answer.wrench);
         let (up, down) = (ask(step_m)?, ask(-step_m)?);
         let slope = (up + down * -1.0) * (0.5 / step_m);
         let components = slope.force().to_array().into_iter().chain((slope.torque() / LEVER_M).to_array());

@@ -47,7 +47,7 @@ impl Motion {
     pub(super) fn lap(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
         subject.restart();
         if subject.memory() == Memory::PathDependent {
-            subject.ask(self.at(0.0).0).ok()?;
+            subject.answer_at(self.at(0.0).0).ok()?;
         }
         let even: Vec<f64> = (0..samples).map(|index| index as f64 / samples as f64).collect();
         let lap = least_of_later_laps(|| Some(Lap::from_powers(&self.powers(subject, &even)?)))?;
@@ -101,7 +101,7 @@ impl Triangle {
     fn sampled(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
         subject.restart();
         if subject.memory() == Memory::PathDependent {
-            subject.ask(self.start).ok()?;
+            subject.answer_at(self.start).ok()?;
         }
         least_of_later_laps(|| {
             let (mut corner_m, mut net_j, mut gross_j) = (self.start.position(), 0.0, 0.0);

@@ -254,7 +254,7 @@ impl Opponent<'_, '_> {
     fn size(&mut self) {
         let (best, size_n) = self.climb(None, |own, point| {
             let pose = own.pose(point);
-            match own.subject.ask(pose) {
+            match own.subject.answer_at(pose) {
                 Ok(output) => output.wrench.force().length() + output.wrench.torque().length() / LEVER_M,
                 Err(trouble) => {
                     own.tally.troubles += 1;

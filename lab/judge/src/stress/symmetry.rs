@@ -99,7 +99,7 @@ fn answer(subject: &mut Subject<'_>, pose: Pose) -> Option<Wrench> {
     if subject.memory() == Memory::PathDependent {
         subject.restart();
     }
-    subject.ask(pose).ok().map(|output| output.wrench)
+    subject.answer_at(pose).ok().map(|output| output.wrench)
 }
 
 fn size_n(wrench: Wrench) -> f64 {

@@ -45,7 +45,7 @@ impl Tally {
         self.asked += 1;
         let answer = match subject.memory() {
             Memory::Stateless => subject.step(&Input { twist, ..subject.at_rest(pose) }),
-            Memory::PathDependent if twist == Twist::ZERO => subject.ask(pose),
+            Memory::PathDependent if twist == Twist::ZERO => subject.answer_at(pose),
             Memory::PathDependent => subject.advance(pose, twist, PERIOD_NS),
         };
         match answer {
@@ -106,7 +106,7 @@ fn judge(total: &Tally) -> Measure {
             TroubleKind::NotFinite => "returned a number that is not finite".to_owned(),
             TroubleKind::UnknownStatus => "returned a status unknown to the contract".to_owned(),
             TroubleKind::Refused(status) => format!("refused the call (`{}`)", wording::status(*status)),
-            TroubleKind::CallsNonsenseSound => "returned `ok` for a pose that is not finite".to_owned(),
+            TroubleKind::AcceptsNonFiniteInput => "returned `ok` for a pose that is not finite".to_owned(),
         };
         format!("first at {place}: {what}")
     });

@@ -3,7 +3,7 @@
 use super::path::CONFIG;
 use super::rule::Check;
 use super::untouched::{Host, untouched};
-use super::{Figures, Seen, device, guarded, life, live_parameters, model, passive};
+use super::{Figures, Outcome, device, guarded, life, live_parameters, model, passive};
 use crate::platform::locked;
 use crate::subject::prepared;
 use flotor_hal::abi::PluginKind;
@@ -20,7 +20,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// The violation of the rule, or the reason why it could not be checked.
-pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option<Figures>, Seen> {
+pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option<Figures>, Outcome> {
     if wanted == Check::Contract(Rule::Metadata) {
         read_metadata(path)?;
         return Ok(None);
@@ -30,9 +30,9 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
     let plugin = load_file(path)?;
     let parse = |set: &KeyValue| {
         let (key, value) = set.pair();
-        Setting::parse(plugin.parameters(), key, value).map_err(|error| Seen::Missing(error.to_string()))
+        Setting::parse(plugin.parameters(), key, value).map_err(|error| Outcome::Missing(error.to_string()))
     };
-    let settings = settings.iter().map(parse).collect::<Result<Vec<_>, Seen>>()?;
+    let settings = settings.iter().map(parse).collect::<Result<Vec<_>, Outcome>>()?;
     let subject = Subject { plugin, settings };
     let of_model = |check: fn(&mut Model) -> Result<(), String>| check(&mut subject.prepared_model()?);
     match wanted {
@@ -68,7 +68,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
     Ok(None)
 }
 
-impl Seen {
+impl Outcome {
     /// Returns the finding for a check whose thread could not be started.
     pub(crate) fn no_thread(cause: &std::io::Error) -> Self {
         Self::Missing(format!("the check needs a thread: {cause}; {THREAD_ADVICE}"))
@@ -80,14 +80,14 @@ impl Seen {
     }
 }
 
-impl From<String> for Seen {
+impl From<String> for Outcome {
     fn from(violation: String) -> Self {
         Self::Violation(violation)
     }
 }
 
 /// Converts a load error; a missing, busy or forbidden resource is no violation.
-impl From<LoadError> for Seen {
+impl From<LoadError> for Outcome {
     fn from(error: LoadError) -> Self {
         match error {
             LoadError::Refused { refusal, .. }

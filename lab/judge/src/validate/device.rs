@@ -1,6 +1,6 @@
 //! Rules of a device: description, life cycle, stop.
 
-use super::Seen;
+use super::Outcome;
 use super::path::CONFIG;
 use crate::wording;
 use flotor_core::plausibility::{PoseBounds, is_rotation};
@@ -97,7 +97,7 @@ fn within(call: &str, took: Duration, limit: Duration) -> Result<(), String> {
     Err(format!("{call} takes {took}, above the limit of {limit}"))
 }
 
-pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), Seen> {
+pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), Outcome> {
     let push = push(&device.capabilities().map_err(|refusal| refusal.to_string())?);
     // Check only its description: its message is for a device without a host.
     let _ = device.independent_stop().map_err(|refusal| refusal.to_string())?;
@@ -111,7 +111,7 @@ pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), Seen> {
         std::thread::sleep(5 * TICK);
         stopper.safe_stop();
     });
-    let stopping = stopping.map_err(|cause| Seen::no_thread(&cause))?;
+    let stopping = stopping.map_err(|cause| Outcome::no_thread(&cause))?;
     let mut went_on = Ok(());
     while went_on.is_ok() && !stopping.is_finished() {
         went_on = running.push_on(&push);

@@ -4,7 +4,7 @@
 //! inaccessible page: a read or write past its end ends the process there, and a damaged edge is found when the block
 //! is freed. Input and output of a call are blocks too.
 
-use super::Seen;
+use super::Outcome;
 use super::checks::Subject;
 use super::life::live;
 use crate::platform::state;
@@ -28,7 +28,7 @@ fn beside(folder: &Path) -> Option<PathBuf> {
 }
 
 /// Runs the life of an instance under the allocator.
-pub(super) fn inside_memory(subject: &Subject) -> Result<(), Seen> {
+pub(super) fn inside_memory(subject: &Subject) -> Result<(), Outcome> {
     state::is_loaded_first(LIBRARY)?;
     live(subject, &mut |_, _| Ok(()))
 }

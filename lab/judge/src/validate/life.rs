@@ -1,11 +1,11 @@
 //! Complete life of an instance: all calls of a host, in a host's order, including extensions. Three rules share it;
 //! each checks something else between the calls.
 
-use super::Seen;
+use super::Outcome;
 use super::checks::Subject;
 use super::device::Running;
 use super::path::{CONFIG, finite, walk};
-use crate::watch::calling;
+use crate::watch::enter_call;
 use crate::wording;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::{Model, OpenedDevice};
@@ -22,7 +22,7 @@ const POINTS: usize = 65;
 pub(super) type After<'a> = &'a mut dyn FnMut(&str, u64) -> Result<(), String>;
 
 /// Runs the life of an instance. Fails if a call or `after` fails.
-pub(super) fn live(subject: &Subject, after: After<'_>) -> Result<(), Seen> {
+pub(super) fn live(subject: &Subject, after: After<'_>) -> Result<(), Outcome> {
     if subject.is_device() {
         return device(subject.device()?, after);
     }
@@ -52,7 +52,7 @@ fn steps(model: &mut Model) -> Result<(), String> {
     for sent in walk(STEPS) {
         let (input, mut output) = (Box::new(sent), Box::<Output>::default());
         let status = {
-            let _call = calling(std::slice::from_ref(&*input));
+            let _call = enter_call(std::slice::from_ref(&*input));
             model.step(&input, &mut output)
         };
         if status != CallStatus::Ok {
@@ -64,7 +64,7 @@ fn steps(model: &mut Model) -> Result<(), String> {
     }
     let inputs: Vec<Input> = walk(STEPS).collect();
     let mut outputs = vec![Output::default(); inputs.len()];
-    let _calls = calling(&inputs);
+    let _calls = enter_call(&inputs);
     match model.step_batch(&inputs, &mut outputs) {
         CallStatus::Ok => Ok(()),
         other => Err(format!("step_batch returned `{}`", wording::status(other))),
@@ -130,7 +130,7 @@ fn works(model: &mut Model, asked: &str) -> Result<(), String> {
     answer.map(|_| ()).map_err(|words| format!("after {asked}, {words}"))
 }
 
-fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Seen> {
+fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Outcome> {
     after("open", 0)?;
     device.capabilities().map_err(|refusal| refusal.to_string())?;
     after("capabilities", 0)?;

@@ -1,6 +1,6 @@
 //! Live parameters: range, effect and duration of changes.
 
-use super::Seen;
+use super::Outcome;
 use super::checks::Subject;
 use super::path::{CONFIG, finite, walk};
 use crate::platform::processor_time;
@@ -15,7 +15,7 @@ const TIMES: usize = 33;
 
 /// Sets each live parameter to its value, to the ends of its range and to its default. Each has its own instance,
 /// because the value of one may change the range of another.
-pub(super) fn live_parameters(subject: &Subject) -> Result<(), Seen> {
+pub(super) fn live_parameters(subject: &Subject) -> Result<(), Outcome> {
     let is_live = |(_, parameter): &(usize, &Parameter)| parameter.mutability() == Mutability::Live;
     let mut taken = Vec::new();
     for (index, parameter) in subject.plugin.parameters().iter().enumerate().filter(is_live) {
@@ -30,10 +30,10 @@ pub(super) fn live_parameters(subject: &Subject) -> Result<(), Seen> {
         }
     }
     if taken.is_empty() {
-        return Err(Seen::nothing_to_judge("the model has no live parameter"));
+        return Err(Outcome::nothing_to_judge("the model has no live parameter"));
     }
     if taken.iter().all(|took| *took == Took::Refused) {
-        return Err(Seen::Violation(
+        return Err(Outcome::Violation(
             "it refuses every live parameter, even with its present value".to_owned(),
         ));
     }

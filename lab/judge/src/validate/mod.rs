@@ -84,10 +84,10 @@ impl Finding {
         let Verdict { seen, figures } = verdict;
         let (violation, unchecked, obstacle) = match seen {
             None => (None, None, None),
-            Some(Seen::Violation(seen) | Seen::Stuck(seen)) => (Some(seen), None, None),
-            Some(Seen::Missing(what)) => (None, Some(what), Some(Obstacle::Requirement)),
-            Some(Seen::NotOnThisSystem(why)) => (None, Some(why), Some(Obstacle::System)),
-            Some(Seen::NothingToJudge(why)) => (None, Some(why), Some(Obstacle::Subject)),
+            Some(Outcome::Violation(seen) | Outcome::Stuck(seen)) => (Some(seen), None, None),
+            Some(Outcome::Missing(what)) => (None, Some(what), Some(Obstacle::Requirement)),
+            Some(Outcome::UnsupportedSystem(why)) => (None, Some(why), Some(Obstacle::System)),
+            Some(Outcome::NothingToJudge(why)) => (None, Some(why), Some(Obstacle::Subject)),
         };
         Self { rule: check.id(), text: check.text(), violation, unchecked, obstacle, figures }
     }
@@ -96,7 +96,7 @@ impl Finding {
 /// Outcome of a rule that is not known to hold.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Seen {
+pub enum Outcome {
     /// The rule is violated.
     Violation(String),
     /// A step did not return, so the outcome is unknown.
@@ -104,7 +104,8 @@ pub enum Seen {
     /// The plugin needs something that is missing (a device, a permission): no violation, no proof.
     Missing(String),
     /// This system cannot check the rule for any plugin.
-    NotOnThisSystem(String),
+    #[serde(rename = "notonthissystem")]
+    UnsupportedSystem(String),
     /// The rule does not apply to this plugin, or nothing in the sample could violate it.
     NothingToJudge(String),
 }
@@ -113,7 +114,7 @@ pub enum Seen {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// Outcome; `None` if the rule holds.
-    pub seen: Option<Seen>,
+    pub seen: Option<Outcome>,
     /// Figures measured by the check.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub figures: Option<Figures>,
@@ -121,7 +122,7 @@ pub struct Verdict {
 
 impl Verdict {
     /// Converts the result of a check.
-    pub fn of(checked: Result<Option<Figures>, Seen>) -> Self {
+    pub fn of(checked: Result<Option<Figures>, Outcome>) -> Self {
         match checked {
             Ok(figures) => Self { seen: None, figures },
             Err(seen) => Self { seen: Some(seen), figures: None },
@@ -129,7 +130,7 @@ impl Verdict {
     }
 
     fn violated(seen: String) -> Self {
-        Self { seen: Some(Seen::Violation(seen)), figures: None }
+        Self { seen: Some(Outcome::Violation(seen)), figures: None }
     }
 
     /// Writes the verdict into the file on standard input, where the parent process reads it, apart from the plugin's
@@ -148,7 +149,7 @@ impl Verdict {
 pub fn deliver(path: &Path, settings: &[KeyValue], wanted: Check, limit: Duration) -> io::Result<()> {
     watch::start(limit, |stuck| {
         // End the process even if the write fails: nothing else ends a call that does not return.
-        let _ = Verdict::of(Err(Seen::Stuck(stuck.to_string()))).deliver();
+        let _ = Verdict::of(Err(Outcome::Stuck(stuck.to_string()))).deliver();
         end_at_once();
     })?;
     Verdict::of(check(path, settings, wanted)).deliver()
@@ -166,14 +167,14 @@ pub fn validate(
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut note = |check: Check, verdict: Verdict| {
-        let is_violated = matches!(verdict.seen, Some(Seen::Violation(_) | Seen::Stuck(_)));
+        let is_violated = matches!(verdict.seen, Some(Outcome::Violation(_) | Outcome::Stuck(_)));
         findings.push(Finding::new(check, verdict));
         is_violated
     };
     // Reads the file without running its code.
     let metadata = Check::Contract(Rule::Metadata);
     let read = read_metadata(path);
-    let verdict = read.as_ref().map(|_| None).map_err(|error| Seen::Violation(error.to_string()));
+    let verdict = read.as_ref().map(|_| None).map_err(|error| Outcome::Violation(error.to_string()));
     note(metadata, Verdict::of(verdict));
     let Ok(kind) = read.map(|known| known.kind) else { return findings };
     let is_wanted = |check: &Check| only.is_empty() || only.contains(check);
@@ -194,10 +195,10 @@ pub fn validate(
         }
         let outcome = outcome.map(|ended| ended.map(|(verdict, _)| verdict));
         let is_fatal = matches!(check, Check::Contract(Rule::Loads | Rule::Defaults));
-        let is_stuck = matches!(outcome, Ok(None | Some(Verdict { seen: Some(Seen::Stuck(_)), .. })));
+        let is_stuck = matches!(outcome, Ok(None | Some(Verdict { seen: Some(Outcome::Stuck(_)), .. })));
         let stops = is_fatal || is_stuck;
         let verdict = match outcome {
-            Ok(Some(Verdict { seen: Some(Seen::Stuck(step)), .. })) => {
+            Ok(Some(Verdict { seen: Some(Outcome::Stuck(step)), .. })) => {
                 Verdict::violated(format!("{step}; the rules after it were not checked"))
             }
             Ok(Some(verdict)) => verdict,
@@ -206,7 +207,7 @@ pub fn validate(
                 let patience = wording::time(patience);
                 let late =
                     format!("a life of an instance takes more than {patience} with the guarding allocator");
-                Verdict { seen: Some(Seen::Missing(late)), figures: None }
+                Verdict { seen: Some(Outcome::Missing(late)), figures: None }
             }
             Ok(None) => Verdict::violated(format!(
                 "it did not return within {}; the rules after it were not checked (`--timeout` allows more)",
@@ -265,7 +266,7 @@ fn in_own_process(
     told.rewind()?;
     told.read_to_end(&mut text)?;
     let verdict = match serde_json::from_slice(&text) {
-        Ok(verdict @ Verdict { seen: Some(Seen::Stuck(_)), .. }) => verdict,
+        Ok(verdict @ Verdict { seen: Some(Outcome::Stuck(_)), .. }) => verdict,
         Ok(verdict) if end.success() => verdict,
         _ => Verdict::violated(died(check, end)),
     };

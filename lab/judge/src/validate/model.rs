@@ -1,6 +1,6 @@
 //! Rules of a force model: finite numbers, repeatability, time, threads, energy, active region.
 
-use super::Seen;
+use super::Outcome;
 use super::checks::Subject;
 use super::path::{CONFIG, FAST, directions, finite, grid, step, walk, walk_at};
 use super::untouched::threads;
@@ -148,7 +148,7 @@ fn walked(models: &mut [&mut Model]) -> Result<Vec<Vec<Wrench>>, String> {
     Ok(wrenches)
 }
 
-pub(super) fn independent(subject: &Subject) -> Result<(), Seen> {
+pub(super) fn independent(subject: &Subject) -> Result<(), Outcome> {
     let make = || subject.prepared_model();
     let alone = walked(&mut [&mut make()?])?;
     let alone = alone.first().cloned().unwrap_or_default();
@@ -159,12 +159,12 @@ pub(super) fn independent(subject: &Subject) -> Result<(), Seen> {
     // Created here, stepped on another thread: as in a loop.
     let start = |mut model: Model| {
         let thread = std::thread::Builder::new().spawn(move || walked(&mut [&mut model]));
-        thread.map_err(|cause| Seen::no_thread(&cause))
+        thread.map_err(|cause| Outcome::no_thread(&cause))
     };
     let elsewhere: Vec<_> = [start(make()?), start(make()?)]
         .into_iter()
         .map(|thread| Ok(thread?.join().map_err(|_| "a thread panicked".to_owned())??))
-        .collect::<Result<_, Seen>>()?;
+        .collect::<Result<_, Outcome>>()?;
     if elsewhere.iter().flatten().any(|wrenches| *wrenches != alone) {
         return Err("two instances stepped on two threads give other answers than one alone"
             .to_owned()
@@ -174,10 +174,10 @@ pub(super) fn independent(subject: &Subject) -> Result<(), Seen> {
 }
 
 /// Compares the number of threads with that before the library was loaded.
-pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), Seen> {
+pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), Outcome> {
     let more = |when: &str| match threads()?.saturating_sub(before) {
         0 => Ok(()),
-        more => Err(Seen::Violation(format!("the process has {more} more threads after {when}"))),
+        more => Err(Outcome::Violation(format!("the process has {more} more threads after {when}"))),
     };
     more("create and prepare")?;
     let _ = walked(&mut [&mut model])?;
@@ -188,16 +188,16 @@ pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), Seen> {
 
 /// Compares force and torque with the energy's slope over a micrometre and a hundredth of a milliradian, at poses of a
 /// walk. A kink of the law may lie in between, so a few places may differ, but not one in ten.
-pub(super) fn energy_gradient(model: &mut Model) -> Result<(), Seen> {
+pub(super) fn energy_gradient(model: &mut Model) -> Result<(), Outcome> {
     const STEP_M: f64 = 1.0e-6;
     const STEP_RAD: f64 = 1.0e-5;
     if model.memory() != Memory::Stateless {
-        return Err(Seen::nothing_to_judge(
+        return Err(Outcome::nothing_to_judge(
             "the model has a history, and its energy is no function of the pose",
         ));
     }
     if !model.serves().contains(Demand::ENERGY) {
-        return Err(Seen::nothing_to_judge("the model serves no energy"));
+        return Err(Outcome::nothing_to_judge("the model serves no energy"));
     }
     // Components of force and of torque, each with the energy's slope.
     let (mut forces, mut torques) = (Vec::new(), Vec::new());
@@ -207,7 +207,7 @@ pub(super) fn energy_gradient(model: &mut Model) -> Result<(), Seen> {
         for axis in DVec3::AXES {
             let moved = |along: f64| Pose::new(position + axis * along, orientation);
             let turned = |angle: f64| Pose::new(position, DQuat::from_axis_angle(axis, angle) * orientation);
-            let mut slope = |pose: &dyn Fn(f64) -> Pose, size: f64| -> Result<f64, Seen> {
+            let mut slope = |pose: &dyn Fn(f64) -> Pose, size: f64| -> Result<f64, Outcome> {
                 let ahead_j = step(model, &Input::at_rest(pose(size)))?.energy_j;
                 let behind_j = step(model, &Input::at_rest(pose(-size)))?.energy_j;
                 Ok((ahead_j - behind_j) / (2.0 * size))
@@ -219,7 +219,7 @@ pub(super) fn energy_gradient(model: &mut Model) -> Result<(), Seen> {
     let has_something =
         |(own, gradient): &(f64, f64)| gradient.is_finite() && (*own != 0.0 || *gradient != 0.0);
     if !forces.iter().chain(&torques).any(has_something) {
-        return Err(Seen::nothing_to_judge(
+        return Err(Outcome::nothing_to_judge(
             "wrench and energy are zero, or the energy is not finite, on the whole path",
         ));
     }
@@ -246,10 +246,10 @@ fn agree(seen: &[(f64, f64)], [what, unit]: [&str; 2]) -> Result<(), String> {
 }
 
 /// Steps the model around its active region, where a host does not step it and assumes zero.
-pub(super) fn activity(model: &mut Model) -> Result<(), Seen> {
+pub(super) fn activity(model: &mut Model) -> Result<(), Outcome> {
     let region = model.active_region();
     if region.shape() == RegionShape::Everywhere {
-        return Err(Seen::nothing_to_judge("the model is active everywhere"));
+        return Err(Outcome::nothing_to_judge("the model is active everywhere"));
     }
     let turned = DQuat::from_scaled_axis(DVec3::new(0.1, -0.2, 0.05));
     let mut ticks = 0..;
@@ -263,7 +263,7 @@ pub(super) fn activity(model: &mut Model) -> Result<(), Seen> {
                 let output = finite(model, &Input { twist, ..input_of(tick, pose) })?;
                 let acts = output.wrench != Wrench::ZERO || output.energy_j.abs() > 0.0;
                 if acts && !region.contains(pose.position()) {
-                    return Err(Seen::Violation(format!(
+                    return Err(Outcome::Violation(format!(
                         "at {position_m} m, outside its active region, it returned {}",
                         wording::output(&output)
                     )));

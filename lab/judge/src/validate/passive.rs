@@ -11,7 +11,7 @@
 //! next bounds.
 
 use super::path::{FAST, finite, walk_at};
-use super::{Figures, Seen};
+use super::{Figures, Outcome};
 use crate::wording;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{
@@ -28,9 +28,9 @@ const RADIUS_RAD: f64 = 1.0e-2;
 const ROUNDING: f64 = 1.0e-12;
 
 /// Checks both paths, and measures stiffness and damping.
-pub(super) fn passive(model: &mut Model) -> Result<Option<Figures>, Seen> {
+pub(super) fn passive(model: &mut Model) -> Result<Option<Figures>, Outcome> {
     if model.memory() != Memory::Stateless {
-        return Err(Seen::nothing_to_judge(
+        return Err(Outcome::nothing_to_judge(
             "the model has a history, and may store energy where no pose shows it",
         ));
     }
@@ -43,7 +43,7 @@ pub(super) fn passive(model: &mut Model) -> Result<Option<Figures>, Seen> {
     let damping_ns_per_m = there_and_back(model)?;
     let stiffness_n_per_m = steepest(model)?;
     if largest_n == 0.0 && damping_ns_per_m == 0.0 {
-        return Err(Seen::nothing_to_judge("the wrench is zero on every circle, and there is no damping"));
+        return Err(Outcome::nothing_to_judge("the wrench is zero on every circle, and there is no damping"));
     }
     let are_numbers = stiffness_n_per_m.is_finite() && damping_ns_per_m.is_finite();
     Ok(are_numbers.then_some(Figures { stiffness_n_per_m, damping_ns_per_m }))

@@ -2,7 +2,7 @@
 //!
 //! A few sums reveal a change of the floating-point mode by loading; changes by calls are counted by the loader.
 
-use super::Seen;
+use super::Outcome;
 use super::checks::Subject;
 use super::life::live;
 use crate::platform::state;
@@ -29,12 +29,12 @@ pub(crate) type Part = (&'static str, May, Vec<String>);
 pub(super) struct Host {
     parts: Vec<Part>,
     /// Reason why the rest of the state is unknown, if so.
-    unknown: Option<Seen>,
-    threads: Result<usize, Seen>,
+    unknown: Option<Outcome>,
+    threads: Result<usize, Outcome>,
 }
 
 /// Runs the life of an instance, and compares the state after each call.
-pub(super) fn untouched(subject: &Subject, before: &Host) -> Result<(), Seen> {
+pub(super) fn untouched(subject: &Subject, before: &Host) -> Result<(), Outcome> {
     before.compare("loading")?;
     live(subject, &mut |call, float_changes| match float_changes {
         0 => before.compare(call),
@@ -67,12 +67,12 @@ impl Host {
     }
 
     /// Returns the number of threads at that time, if known.
-    pub(super) fn threads(&self) -> Result<usize, Seen> {
+    pub(super) fn threads(&self) -> Result<usize, Outcome> {
         self.threads.clone()
     }
 
     /// Fails if a part of the state is unknown.
-    fn known(&self) -> Result<(), Seen> {
+    fn known(&self) -> Result<(), Outcome> {
         self.unknown.clone().map_or(Ok(()), Err)
     }
 
@@ -94,7 +94,7 @@ impl Host {
 }
 
 /// Returns the number of threads of this process, if known.
-pub(super) fn threads() -> Result<usize, Seen> {
+pub(super) fn threads() -> Result<usize, Outcome> {
     state::threads()
 }
 
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn what_the_system_does_not_tell_is_not_said_to_hold() {
-        let why = Seen::NotOnThisSystem("nobody tells".to_owned());
+        let why = Outcome::UnsupportedSystem("nobody tells".to_owned());
         let unknown = Host { unknown: Some(why.clone()), threads: Err(why.clone()), ..host("/here", &[]) };
         assert_eq!((unknown.known(), unknown.threads()), (Err(why.clone()), Err(why)));
         assert_eq!(host("/here", &[]).known(), Ok(()));

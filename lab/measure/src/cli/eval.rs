@@ -74,8 +74,8 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
     let bar = progress_bar(handles.len() as u64, "{wide_bar} {pos}/{len} poses  {elapsed}");
     let answers = evaluation.answers(&handles, &|| bar.inc(1)).map_err(|error| match error {
         EvaluateError::Load(error) => CommandError::from(error),
-        broke @ EvaluateError::Broke { .. } => {
-            CommandError::PluginRefused(format!("{}: {broke}", plugin.metadata().path.display()))
+        panicked @ EvaluateError::Panicked { .. } => {
+            CommandError::PluginRefused(format!("{}: {panicked}", plugin.metadata().path.display()))
         }
     })?;
     bar.finish_and_clear();
@@ -113,7 +113,7 @@ fn csv_text(ids: &[String], answers: &[Answer], details: &[Detail]) -> String {
         let numbers = answer.wrench.force_n.into_iter().chain(answer.wrench.torque_nm).map(shortest);
         let energy = answer.energy_j.map(shortest).unwrap_or_default();
         let known = details.iter().zip(&answer.details).map(|(detail, value)| written(detail, *value));
-        let others = [energy, answer.status.word().to_owned()].into_iter().chain(known);
+        let others = [energy, answer.status.name().to_owned()].into_iter().chain(known);
         std::iter::once(id.clone()).chain(numbers).chain(others).collect()
     };
     to_csv(head, ids.iter().zip(answers).map(row))

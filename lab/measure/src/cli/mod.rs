@@ -43,7 +43,7 @@ pub fn command() -> clap::Command {
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    flotor_session::tell_notices(|notice| flotor_command::note(notice));
+    flotor_session::on_notice(|notice| flotor_command::note(notice));
     match options::arguments::<Arguments>().command {
         Command::Replay(arguments) => supervised(|| replay::run(&arguments)),
         Command::Eval(arguments) => supervised(|| eval::run(&arguments)),

@@ -72,7 +72,8 @@ pub enum DivergenceCause {
     #[error(
         "in tick {tick} of the run a model was disabled (time budget or process failure), and in the replay it is not"
     )]
-    ModelOut {
+    #[serde(rename = "model_out")]
+    ModelDisabled {
         /// First tick of the run in which the model's absence made a difference.
         tick: u64,
     },
@@ -118,7 +119,7 @@ pub(super) struct Evidence {
     /// Last gap: tick before it, and number of missing ticks.
     gap: Option<(u64, u64)>,
     /// First tick in which a model was disabled in the run only.
-    out_at: Option<u64>,
+    disabled_at: Option<u64>,
     /// Cause of the first differing tick.
     cause: Option<DivergenceCause>,
 }
@@ -138,7 +139,7 @@ impl Evidence {
             self.gap = Some((after_tick, missing));
         }
         if happened_then(Events::MODEL_FAULT, records, ports) {
-            self.out_at.get_or_insert(tick);
+            self.disabled_at.get_or_insert(tick);
         }
     }
 
@@ -152,7 +153,7 @@ impl Evidence {
         let cause = if let Some(model) = &self.field {
             DivergenceCause::FieldOnRealClock { model: model.clone() }
         } else if happened_then(Events::MODEL_FAULT, records, ports) {
-            DivergenceCause::ModelOut { tick }
+            DivergenceCause::ModelDisabled { tick }
         } else if happened_then(Events::MODEL_OVERRUN, records, ports) {
             DivergenceCause::ModelLate { tick }
         } else if let Some((after_tick, ticks)) = self.gap {
@@ -175,7 +176,7 @@ impl Evidence {
         let field =
             self.field.as_ref().map(|model| DivergenceCause::FieldOnRealClock { model: model.clone() });
         field
-            .or_else(|| self.out_at.map(|tick| DivergenceCause::ModelOut { tick }))
+            .or_else(|| self.disabled_at.map(|tick| DivergenceCause::ModelDisabled { tick }))
             .filter(|_| self.cause.is_some())
     }
 }

@@ -16,7 +16,7 @@ use flotor_core::coupling::{CouplingDescription, CouplingEnds};
 use flotor_core::plausibility::{ImplausibleSamples, PlausibilityCheck};
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs};
-use flotor_coupling::{Patience, Reach};
+use flotor_coupling::{LinkTimeouts, Reach};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{Axes, Capabilities, Demand, DeviceState, LoopConfig, Tick};
 use flotor_record::{Ending, ReadError, Recording, Role, RunDescription};
@@ -45,7 +45,7 @@ pub enum ReplayError {
         "the coupling `{coupling}` has its other end on another host, whose messages are not in the recording: \
          only runs whose couplings have both ends on one host can be replayed"
     )]
-    Apart {
+    RemoteCoupling {
         /// Name of the coupling.
         coupling: String,
     },
@@ -64,7 +64,7 @@ pub enum ReplayError {
 }
 
 /// Timeouts of couplings with both ends on this host, which never wait.
-const NOBODY_TO_WAIT_FOR: Patience = Patience { silence_ns: 0, fade_ns: 0 };
+const NO_TIMEOUTS: LinkTimeouts = LinkTimeouts { silence_ns: 0, fade_ns: 0 };
 
 fn is_remote(coupling: &CouplingDescription) -> bool {
     matches!(coupling.ends, CouplingEnds::Remote(_))
@@ -158,11 +158,11 @@ impl<'r> Replay<'r> {
         let devices = recording.run().devices().count();
         let period_s = period_ns as f64 * 1.0e-9;
         if let Some(coupling) = recording.run().couplings.iter().find(|coupling| is_remote(coupling)) {
-            return Err(ReplayError::Apart { coupling: coupling.name.clone() });
+            return Err(ReplayError::RemoteCoupling { coupling: coupling.name.clone() });
         }
         let couplings = recording.run().couplings.iter();
-        let couplings = couplings
-            .map(|coupling| Coupled::new(coupling, period_s, NOBODY_TO_WAIT_FOR, Reach::default()).0);
+        let couplings =
+            couplings.map(|coupling| Coupled::new(coupling, period_s, NO_TIMEOUTS, Reach::default()).0);
         let forces = Forces::new(devices, layers, couplings.collect());
         Ok(Self { registry, config, recording, uses, devices, forces, plugins, held })
     }
@@ -192,9 +192,9 @@ impl<'r> Replay<'r> {
         let mut difference = Difference::default();
         let mut evidence = Evidence::of(self.recording.run());
         let mut plausibility = vec![any_device(self.config.period_ns); self.devices];
-        let heart = Heartbeat::default(); // no watchdog observes a replay
+        let heartbeat = Heartbeat::default(); // no watchdog observes a replay
         let mut ports: Vec<Port> =
-            self.recording.run().devices().map(|device| Port::at_rest(device.felt)).collect();
+            self.recording.run().devices().map(|device| Port::at_rest(device.at_hand)).collect();
         let mut records: Vec<TickRecord> = Vec::with_capacity(self.devices);
         while let Some(record) = self.recording.next() {
             let record = record?;
@@ -227,7 +227,7 @@ impl<'r> Replay<'r> {
             // Compute all recorded outputs of the tick, and no more.
             let computed = |all: Demand, record: &TickRecord| all.with(record.model.computed());
             let observed = records.iter().fold(Demand::FORCE, computed);
-            self.forces.step(&tick, &mut ports, observed, &heart);
+            self.forces.step(&tick, &mut ports, observed, &heartbeat);
             evidence.look(tick.index, &records, &ports);
             let is_other =
                 |(record, port): (&TickRecord, &Port)| bits(&replayed(port, record)) != bits(&record.model);

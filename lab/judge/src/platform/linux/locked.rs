@@ -7,7 +7,7 @@
 //! An allocation is a system call too if the C library serves each one from the system, as [`C_LIBRARY`] sets;
 //! otherwise a pair of `malloc` and `free` would leave no trace. The kernel counts reads and writes.
 
-use crate::validate::Seen;
+use crate::validate::Outcome;
 use crate::validate::path::walk;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
@@ -53,17 +53,17 @@ pub(crate) fn has_caught(signal: i32) -> bool {
 }
 
 /// Steps the model in a sandboxed thread. **Ends this process** by [`CAUGHT`] if a step made a system call.
-pub(crate) fn system_calls(model: Model) -> Result<(), Seen> {
+pub(crate) fn system_calls(model: Model) -> Result<(), Outcome> {
     let stage = Arc::new(AtomicU8::new(WAITING));
     let (ready, told) = channel();
     let of_thread = Arc::clone(&stage);
     let walking = std::thread::Builder::new().spawn(move || walk_locked_in(model, &ready, &of_thread));
-    walking.map_err(|cause| Seen::no_thread(&cause))?;
-    let ended = |_| Seen::Violation("its thread ended before the test".to_owned());
+    walking.map_err(|cause| Outcome::no_thread(&cause))?;
+    let ended = |_| Outcome::Violation("its thread ended before the test".to_owned());
     let thread = told.recv().map_err(ended)?;
     let folder = PathBuf::from(format!("/proc/self/task/{thread}"));
     if !folder.exists() {
-        return Err(Seen::Missing("the system has no /proc, which the test needs".to_owned()));
+        return Err(Outcome::Missing("the system has no /proc, which the test needs".to_owned()));
     }
     let before = transfers(&folder);
     stage.store(LOCKED, Ordering::Release);
@@ -72,9 +72,9 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Seen> {
         let is_there = folder.exists();
         match stage.load(Ordering::Acquire) {
             DONE => break,
-            FAILED => return Err(Seen::Violation("a step of the path failed".to_owned())),
+            FAILED => return Err(Outcome::Violation("a step of the path failed".to_owned())),
             NOT_ALLOWED => {
-                return Err(Seen::Missing("the system does not allow seccomp (strict mode)".to_owned()));
+                return Err(Outcome::Missing("the system does not allow seccomp (strict mode)".to_owned()));
             }
             _ if !is_there => end_here(),
             _ => std::thread::sleep(LOOK),
@@ -82,7 +82,7 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Seen> {
     }
     match (before, transfers(&folder)) {
         (Some(before), Some(after)) if after > before => {
-            Err(Seen::Violation(format!("it read or wrote {} times in {STEPS} steps", after - before)))
+            Err(Outcome::Violation(format!("it read or wrote {} times in {STEPS} steps", after - before)))
         }
         _ => Ok(()),
     }

@@ -1,6 +1,6 @@
 //! State of this process and thread, from the files under `/proc`.
 
-use crate::validate::Seen;
+use crate::validate::Outcome;
 use crate::validate::untouched::{May, Part};
 use rustix::io::Errno;
 use rustix::process::{WaitOptions, waitpid};
@@ -8,12 +8,12 @@ use std::fs;
 use std::path::Path;
 
 /// Returns the finding that `/proc` is missing.
-fn no_files() -> Seen {
-    Seen::Missing("the system has no /proc, which the test needs".to_owned())
+fn no_files() -> Outcome {
+    Outcome::Missing("the system has no /proc, which the test needs".to_owned())
 }
 
 /// Returns the parts of the state of this process and thread that only the kernel knows, or the reason of a failure.
-pub(crate) fn of_the_system() -> Result<Vec<Part>, Seen> {
+pub(crate) fn of_the_system() -> Result<Vec<Part>, Outcome> {
     let whole = |path: &str| fs::read_to_string(path).unwrap_or_default();
     let (process, thread) = (whole("/proc/self/status"), whole("/proc/thread-self/status"));
     if process.is_empty() || thread.is_empty() {
@@ -38,19 +38,19 @@ pub(crate) fn of_the_system() -> Result<Vec<Part>, Seen> {
 }
 
 /// Returns the number of threads of this process, or the reason of a failure.
-pub(crate) fn threads() -> Result<usize, Seen> {
+pub(crate) fn threads() -> Result<usize, Outcome> {
     fs::read_dir("/proc/self/task").map(Iterator::count).map_err(|_| no_files())
 }
 
 /// Checks that this process has loaded a library of that name, preloaded before all others.
 ///
 /// # Errors
-/// [`Seen::Missing`] if the library is not loaded.
-pub(crate) fn is_loaded_first(library: &str) -> Result<(), Seen> {
+/// [`Outcome::Missing`] if the library is not loaded.
+pub(crate) fn is_loaded_first(library: &str) -> Result<(), Outcome> {
     let mapped = fs::read_to_string("/proc/self/maps").unwrap_or_default();
     match mapped.contains(library) {
         true => Ok(()),
-        false => Err(Seen::Missing(format!("{library} is not beside this program"))),
+        false => Err(Outcome::Missing(format!("{library} is not beside this program"))),
     }
 }
 
