@@ -178,11 +178,11 @@ impl Applied {
     }
 
     /// Returns the warnings for rules that excluded something and depend on more than the subject.
-    pub fn cautions(&self) -> impl Iterator<Item = &'static str> {
+    pub fn warnings(&self) -> impl Iterator<Item = &'static str> {
         let mut rules: Vec<&str> = self.excluded.iter().map(|exclusion| exclusion.rule).collect();
         rules.sort_unstable();
         rules.dedup();
-        rules.into_iter().filter_map(ExclusionRules::caution)
+        rules.into_iter().filter_map(ExclusionRules::warning)
     }
 
     /// Formats the exclusions with their rules.
@@ -205,7 +205,7 @@ impl Applied {
                 None => {}
             }
         }
-        lines.extend(self.cautions().map(|caution| format!("  note                          {caution}")));
+        lines.extend(self.warnings().map(|warning| format!("  note                          {warning}")));
         lines.join("\n")
     }
 }

@@ -1,7 +1,7 @@
 //! Analysis of thresholds: Weber fractions, their difference between modalities, effects of base, modality and order.
 
 use super::kinematics::{KinematicMeasure, measures};
-use super::published::Beside;
+use super::published::ThesisComparison;
 use super::{
     AnalysisError, AnalysisOptions, CONFIDENCE, Estimator, PostHoc, ResponseRow, SubjectRecord,
     mean_responses, order_factor, post_hoc, response_rows, within_factors,
@@ -80,7 +80,7 @@ pub struct JndAnalysis {
     pub kinematics: Vec<KinematicMeasure>,
     /// Comparability with the thesis.
     #[serde(skip)]
-    pub beside: Beside,
+    pub thesis: ThesisComparison,
     /// Responses from which the effects are computed.
     #[serde(skip)]
     pub responses: Vec<ResponseRow>,
@@ -133,7 +133,7 @@ pub fn analyse_jnd(
             modalities.into_iter().chain(bases).collect()
         },
         kinematics: measures(&protocol.bases, subjects, options)?,
-        beside: Beside::jnd(protocol),
+        thesis: ThesisComparison::jnd(protocol),
         responses: response_rows(subjects, &protocol.bases, &responses),
     })
 }

@@ -1,7 +1,7 @@
 //! Analysis of ratings: normalisation, trend over the stimuli, effects of stimulus, modality and order.
 
 use super::kinematics::{KinematicMeasure, measures};
-use super::published::Beside;
+use super::published::ThesisComparison;
 use super::{
     AnalysisError, AnalysisOptions, PostHoc, ResponseRow, SubjectRecord, conditions, mean_responses,
     order_factor, post_hoc, response_rows, within_factors,
@@ -52,7 +52,7 @@ pub struct MagnitudeAnalysis {
     pub kinematics: Vec<KinematicMeasure>,
     /// Comparability with the thesis.
     #[serde(skip)]
-    pub beside: Beside,
+    pub thesis: ThesisComparison,
     /// Responses from which the effects are computed.
     #[serde(skip)]
     pub responses: Vec<ResponseRow>,
@@ -94,7 +94,7 @@ pub fn analyse_magnitude(
         repeated: subjects.iter().map(repeats).sum(),
         post_hoc: post_hoc::modalities("stimulus", stimuli, &rows),
         kinematics: measures(stimuli, subjects, options)?,
-        beside: Beside::magnitude(protocol),
+        thesis: ThesisComparison::magnitude(protocol),
         responses: response_rows(subjects, stimuli, &rows),
     })
 }

@@ -5,7 +5,7 @@ use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Stimulus};
 
 /// Comparability of a study with the thesis, whose results hold only for springs at its bases and stimuli.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Beside {
+pub enum ThesisComparison {
     /// The settings match the thesis.
     Thesis,
     /// The settings differ.
@@ -13,7 +13,7 @@ pub enum Beside {
     Nothing,
 }
 
-impl Beside {
+impl ThesisComparison {
     /// Checks a difference experiment: springs with bases of 17, 26 and 35 N, larger comparisons, a target of 75 %.
     #[must_use]
     pub fn jnd(protocol: &JndProtocol) -> Self {

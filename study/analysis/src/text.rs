@@ -1,7 +1,7 @@
 //! Text pages of results, compared with CMU-RI-TR-07-21.
 
 use super::blinded::BlindedAnalysis;
-use super::published::Beside;
+use super::published::ThesisComparison;
 use super::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PairTest, PostHoc, order_note, published};
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::MeanInterval;
@@ -11,9 +11,9 @@ use flotor_statistics::t_test::TTest;
 use flotor_study::trial::Modality;
 
 pub(super) fn jnd(analysis: &JndAnalysis) -> String {
-    let mut page = Page::beside(analysis.beside);
+    let mut page = Page::compared_with(analysis.thesis);
     let JndAnalysis { subjects, pairs_per_subject, .. } = analysis;
-    let thesis = analysis.beside.text(" (thesis: about 200)");
+    let thesis = analysis.thesis.text(" (thesis: about 200)");
     page.line(format!("{subjects} subjects, {pairs_per_subject:.1} pairs each{thesis}"));
     page.gap();
     page.row("Weber fraction", "here", "thesis");
@@ -54,9 +54,9 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
 }
 
 pub(super) fn magnitude(analysis: &MagnitudeAnalysis) -> String {
-    let mut page = Page::beside(analysis.beside);
+    let mut page = Page::compared_with(analysis.thesis);
     let MagnitudeAnalysis { subjects, trials_per_subject, repeated, .. } = analysis;
-    let thesis = analysis.beside.text(" (thesis: 72)");
+    let thesis = analysis.thesis.text(" (thesis: 72)");
     page.line(format!("{subjects} subjects, {trials_per_subject} ratings each{thesis}"));
     page.line(format!("{repeated} presentations repeated because the handle left its range"));
     page.gap();
@@ -92,12 +92,12 @@ pub(super) fn blinded(analysis: &BlindedAnalysis) -> String {
 #[derive(Default)]
 struct Page {
     lines: Vec<String>,
-    beside: Beside,
+    thesis: ThesisComparison,
 }
 
 impl Page {
-    fn beside(beside: Beside) -> Self {
-        Self { lines: Vec::new(), beside }
+    fn compared_with(thesis: ThesisComparison) -> Self {
+        Self { lines: Vec::new(), thesis }
     }
 
     fn line(&mut self, text: String) {
@@ -110,7 +110,7 @@ impl Page {
 
     /// Adds a row: name, own value, and value of the thesis.
     fn row(&mut self, name: &str, here: &str, published: &str) {
-        let published = self.beside.text(published);
+        let published = self.thesis.text(published);
         let line = format!("  {}{}{published}", column(name, 30), column(here, 46));
         self.lines.push(line.trim_end().to_owned());
     }

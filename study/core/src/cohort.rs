@@ -1,7 +1,7 @@
 //! Runs a study with many simulated subjects in parallel.
 
-use crate::conduct::{ConductError, OutsideError, Presenter, conduct};
-use crate::dataset::{Dataset, DatasetError, Earlier, Progress};
+use crate::conduct::{ApparatusOrFrontEndError, ConductError, Presenter, conduct};
+use crate::dataset::{Dataset, DatasetError, ExistingLogPolicy, Progress};
 use crate::log::{Begin, FORMAT, InputFile, LogWriter, Plan};
 use crate::observer::{Population, SimulatedSubject};
 use crate::protocol::{Protocol, SubjectNumber};
@@ -32,7 +32,7 @@ pub struct Cohort {
     /// The study file in use, for the log.
     pub plan: Option<Plan>,
     /// Policy for subjects with an existing log.
-    pub earlier: Earlier,
+    pub existing_log: ExistingLogPolicy,
 }
 
 /// Error that ended a study early.
@@ -54,7 +54,7 @@ pub enum CohortError {
 
 /// Factory of presenters, one per subject; returns `None` if a stop was requested first.
 pub type PresenterFactory<'a> =
-    dyn Fn(SubjectNumber) -> Result<Option<Box<dyn Presenter + 'a>>, OutsideError> + Sync + 'a;
+    dyn Fn(SubjectNumber) -> Result<Option<Box<dyn Presenter + 'a>>, ApparatusOrFrontEndError> + Sync + 'a;
 
 /// One subject's sitting, ready to run.
 struct Turn {
@@ -108,8 +108,9 @@ impl Cohort {
         watch: &(dyn Fn() + Sync),
         stop: &AtomicBool,
     ) -> Result<(), CohortError> {
-        let progress =
-            |subject: &SubjectNumber| Ok((*subject, dataset.progress(&self.begin(*subject), self.earlier)?));
+        let progress = |subject: &SubjectNumber| {
+            Ok((*subject, dataset.progress(&self.begin(*subject), self.existing_log)?))
+        };
         let mut waiting = self.subjects.iter().map(progress).collect::<Result<Vec<_>, CohortError>>()?;
         waiting.retain(|(_, progress)| !matches!(progress, Progress::Complete));
         waiting.reverse(); // popped from the end

@@ -7,7 +7,7 @@ use crate::trial::{Exploration, Trial};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Error of an apparatus or a front end.
-pub type OutsideError = Box<dyn std::error::Error + Send + Sync>;
+pub type ApparatusOrFrontEndError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Presents the stimuli of a trial one after the other and reports the exploration.
 pub trait Presenter {
@@ -15,15 +15,15 @@ pub trait Presenter {
     ///
     /// # Errors
     /// Errors of the apparatus; the trial counts as not presented.
-    fn present(&mut self, trial: &Trial) -> Result<Option<Exploration>, OutsideError>;
+    fn present(&mut self, trial: &Trial) -> Result<Option<Exploration>, ApparatusOrFrontEndError>;
 }
 
 /// Presenter without an apparatus, for simulated observers.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Nothing;
+pub struct NoApparatus;
 
-impl Presenter for Nothing {
-    fn present(&mut self, _trial: &Trial) -> Result<Option<Exploration>, OutsideError> {
+impl Presenter for NoApparatus {
+    fn present(&mut self, _trial: &Trial) -> Result<Option<Exploration>, ApparatusOrFrontEndError> {
         Ok(Some(Exploration::default()))
     }
 }
@@ -46,14 +46,14 @@ pub enum ConductError {
     Log(#[from] LogError),
     /// Error of the apparatus before the first trial.
     #[error("{0}")]
-    Outside(OutsideError),
+    Outside(ApparatusOrFrontEndError),
     /// Error of the apparatus during a trial.
     #[error("trial {trial}: {cause}")]
     Trial {
         /// Trial number in the sitting.
         trial: u32,
         /// Error of the apparatus.
-        cause: OutsideError,
+        cause: ApparatusOrFrontEndError,
     },
     /// The subject gave an invalid answer.
     #[error(transparent)]

@@ -115,7 +115,7 @@ impl ExclusionRules {
 
     /// Returns a warning for a rule that depends on the condition as well as on the subject.
     #[must_use]
-    pub fn caution(rule: &str) -> Option<&'static str> {
+    pub fn warning(rule: &str) -> Option<&'static str> {
         (rule == "least_movement_mm").then_some(
             "least_movement_mm depends on the stimulus: the same hand moves a stiffer one less, so trials of the stiffest go first",
         )

@@ -93,26 +93,26 @@ fn date(days: u64) -> (u64, u64, u64) {
 /// Error of parsing a time of day.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("it is no time like 2026-11-25T18:34:09.123Z")]
-pub struct NoTime;
+pub struct ParseTimeError;
 
 impl FromStr for TimeOfDay {
-    type Err = NoTime;
+    type Err = ParseTimeError;
 
-    fn from_str(text: &str) -> Result<Self, NoTime> {
-        let number = |range: std::ops::Range<usize>| -> Result<u64, NoTime> {
-            text.get(range).and_then(|digits| digits.parse().ok()).ok_or(NoTime)
+    fn from_str(text: &str) -> Result<Self, ParseTimeError> {
+        let number = |range: std::ops::Range<usize>| -> Result<u64, ParseTimeError> {
+            text.get(range).and_then(|digits| digits.parse().ok()).ok_or(ParseTimeError)
         };
         let (year, month, day) = (number(0..4)?, number(5..7)?, number(8..10)?);
         let (hour, minute, second, ms) = (number(11..13)?, number(14..16)?, number(17..19)?, number(20..23)?);
         if year < 1970 {
-            return Err(NoTime);
+            return Err(ParseTimeError);
         }
         let (march, years) = if month > 2 { (month - 3, year) } else { (month + 9, year - 1) };
         let days = 365 * years + years / 4 - years / 100 + years / 400 + (153 * march + 2) / 5 + day;
-        let days = days.checked_sub(719_469).ok_or(NoTime)?;
+        let days = days.checked_sub(719_469).ok_or(ParseTimeError)?;
         let time = Self(days * MS_PER_DAY + hour * 3_600_000 + minute * 60_000 + second * 1000 + ms);
         // Accept only text in canonical form.
-        if time.to_string() == text { Ok(time) } else { Err(NoTime) }
+        if time.to_string() == text { Ok(time) } else { Err(ParseTimeError) }
     }
 }
 
@@ -151,7 +151,7 @@ mod tests {
             "1969-01-01T00:00:00.000Z",
             "25.11.2025",
         ] {
-            assert_eq!(wrong.parse::<TimeOfDay>(), Err(NoTime), "{wrong}");
+            assert_eq!(wrong.parse::<TimeOfDay>(), Err(ParseTimeError), "{wrong}");
         }
     }
 

@@ -33,7 +33,7 @@ pub fn command() -> clap::Command {
 /// Runs the command given on the command line.
 #[must_use]
 pub fn main() -> ExitCode {
-    flotor_session::tell_notices(|notice| flotor_command::note(notice));
+    flotor_session::on_notice(|notice| flotor_command::note(notice));
     match options::arguments::<Arguments>().command {
         Command::Study(arguments) => supervised(|| study::run(&arguments)),
         Command::Analyse(arguments) => exit_code_of(analyse::run(&arguments)),

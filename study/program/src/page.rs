@@ -6,7 +6,7 @@ mod figures;
 use crate::analyse::Report;
 use crate::analyse::provenance::Provenance;
 use flotor_analysis::exclusion::Applied;
-use flotor_analysis::published::Beside;
+use flotor_analysis::published::ThesisComparison;
 use flotor_analysis::{
     Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PairTest, PostHoc, SubjectChecks,
     SubjectRecord, effect_text, exponent_text, order_note, p_text, published, size_interval_text, t_text,
@@ -88,7 +88,7 @@ fn exclusions(page: &mut Page, rules: &ExclusionRules, applied: &Applied) {
     for rule in &applied.not_applied {
         page.paragraph(&format!("Not applied: {rule}."));
     }
-    applied.cautions().for_each(|caution| page.paragraph(&format!("{caution}.")));
+    applied.warnings().for_each(|warning| page.paragraph(&format!("{warning}.")));
 }
 
 fn jnd_page(
@@ -114,12 +114,12 @@ fn jnd_page(
     ));
     page.figure(
         figures::thresholds(analysis, stimulus),
-        match analysis.beside {
-            Beside::Thesis => {
+        match analysis.thesis {
+            ThesisComparison::Thesis => {
                 "Thresholds by base and modality, as figure 18 of CMU-RI-TR-07-21. Its bars are printed without numbers; \
                  the markers are its mean Weber fraction, 14.2 and 17.2 %, times the base."
             }
-            Beside::Nothing => "Thresholds by base and modality.",
+            ThesisComparison::Nothing => "Thresholds by base and modality.",
         },
     );
     page.heading("Weber fractions");
@@ -132,7 +132,7 @@ fn jnd_page(
                 name.to_owned(),
                 percent(detail),
                 format!("{low:.1} to {high:.1} %"),
-                analysis.beside.text(&format!("{:.1} %", published * 100.0)).to_owned(),
+                analysis.thesis.text(&format!("{:.1} %", published * 100.0)).to_owned(),
             ]);
         }
         let t = &analysis.t;
@@ -141,14 +141,14 @@ fn jnd_page(
             "Difference".to_owned(),
             t.to_text(t_text),
             interval.map_or(String::new(), |[low, high]| format!("{low:.1} to {high:.1} %")),
-            analysis.beside.text(published::T).to_owned(),
+            analysis.thesis.text(published::T).to_owned(),
         ]);
     });
     page.heading("Thresholds");
     let cells = analysis.thresholds.iter().map(|cell| (cell.modality, cell.base, &cell.threshold));
     page.means("Base", cells);
     page.heading("Effects on thresholds");
-    page.effects(&analysis.anova, analysis.beside.effects(&published::JND));
+    page.effects(&analysis.anova, analysis.thesis.effects(&published::JND));
     order_note(&analysis.anova).into_iter().for_each(|note| page.paragraph(&format!("{note}.")));
     page.comparisons(&analysis.post_hoc);
     page.paragraph("Is the Weber fraction the same at every base? Within each modality, on fractions:");
@@ -162,7 +162,7 @@ fn jnd_page(
             beside.push((name, report));
         }
     }
-    page.effects(&lines, analysis.beside.effects(&beside));
+    page.effects(&lines, analysis.thesis.effects(&beside));
     page.figure(
         figures::subjects(analysis),
         "Each subject's Weber fraction without vision against that with it.",
@@ -174,7 +174,7 @@ fn jnd_page(
         );
     }
     tracks(page, subjects, stimulus);
-    movements(page, (analysis.task, analysis.beside), &analysis.kinematics, levels, stimulus);
+    movements(page, (analysis.task, analysis.thesis), &analysis.kinematics, levels, stimulus);
     if analysis.unfinished_tracks > 0 {
         let count = analysis.unfinished_tracks;
         page.paragraph(&format!("{count} tracks did not reach a threshold and are omitted."));
@@ -204,7 +204,7 @@ fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stim
             .test
             .to_text(|test| format!("F({}, {}) = {:.2}, {}", test.df, test.error_df, test.f, p_text(test.p)));
         let thesis = format!(" (thesis: {})", published::LINEAR_R2);
-        format!("R² = {:.3}{}, {test}", trend.r_squared, analysis.beside.text(&thesis))
+        format!("R² = {:.3}{}, {test}", trend.r_squared, analysis.thesis.text(&thesis))
     };
     page.paragraph(&format!(
         "{} subjects gave {} ratings each; {} presentations were repeated because the handle left its range. Linear trend \
@@ -216,23 +216,23 @@ fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stim
     ));
     page.figure(
         figures::ratings(analysis, stimulus),
-        match analysis.beside {
-            Beside::Thesis => "Mean ratings over the stimulus, as figure 17 of CMU-RI-TR-07-21.",
-            Beside::Nothing => "Mean ratings over the stimulus.",
+        match analysis.thesis {
+            ThesisComparison::Thesis => "Mean ratings over the stimulus, as figure 17 of CMU-RI-TR-07-21.",
+            ThesisComparison::Nothing => "Mean ratings over the stimulus.",
         },
     );
     page.heading("Ratings");
     page.means("Stimulus", analysis.ratings.iter().map(|cell| (cell.modality, cell.stimulus, &cell.rating)));
     page.heading("Effects on ratings");
-    page.effects(&analysis.anova, analysis.beside.effects(&published::MAGNITUDE));
+    page.effects(&analysis.anova, analysis.thesis.effects(&published::MAGNITUDE));
     order_note(&analysis.anova).into_iter().for_each(|note| page.paragraph(&format!("{note}.")));
     page.comparisons(&analysis.post_hoc);
-    movements(page, (analysis.task, analysis.beside), &analysis.kinematics, levels, stimulus);
+    movements(page, (analysis.task, analysis.thesis), &analysis.kinematics, levels, stimulus);
 }
 
 fn movements(
     page: &mut Page,
-    (task, beside): (&str, Beside),
+    (task, beside): (&str, ThesisComparison),
     measures: &[KinematicMeasure],
     levels: &[f64],
     stimulus: &Stimulus,
@@ -245,7 +245,7 @@ fn movements(
         page.effects(&measure.anova, beside.effects(published::movement(task, measure.measure)));
         if let Some(exponent) = &measure.exponent {
             let direction = published::direction(measure.measure).map(|direction| direction.beside(exponent));
-            let beside = direction.filter(|_| beside == Beside::Thesis);
+            let beside = direction.filter(|_| beside == ThesisComparison::Thesis);
             let beside = beside.map_or(String::new(), |text| format!("; thesis: {text}"));
             page.paragraph(&format!("Exponent of the stimulus: {}{beside}.", exponent_text(exponent)));
         }

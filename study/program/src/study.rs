@@ -29,8 +29,8 @@ use flotor_session::{RunError, stop_waits_with};
 use flotor_study::apparatus::rig::{Rig, RunEnded, TrialFiles};
 use flotor_study::apparatus::{Apparatus, ApparatusError, Kinematics};
 use flotor_study::cohort::{Cohort, CohortError};
-use flotor_study::conduct::{ConductError, Nothing, OutsideError, Presenter};
-use flotor_study::dataset::{Dataset, Earlier};
+use flotor_study::conduct::{ApparatusOrFrontEndError, ConductError, NoApparatus, Presenter};
+use flotor_study::dataset::{Dataset, ExistingLogPolicy};
 use flotor_study::log::{Person, Plan};
 use flotor_study::observer::Population;
 use flotor_study::procedure::{Averaging, Procedure, QuestPlusRule, StepAtReversal, WeightedUpDownRule};
@@ -370,8 +370,8 @@ impl Common {
         (person != Person::default()).then_some(person)
     }
 
-    fn earlier(&self) -> Earlier {
-        if self.resume { Earlier::Resume } else { Earlier::Refuse }
+    fn existing_log(&self) -> ExistingLogPolicy {
+        if self.resume { ExistingLogPolicy::Resume } else { ExistingLogPolicy::Refuse }
     }
 
     fn stimulus(&self, usual: &Subject) -> Result<Stimulus, CommandError> {
@@ -511,7 +511,7 @@ fn simulate(
         inputs: apparatus.map_or_else(|| Ok(Vec::new()), Apparatus::input_files).map_err(unfit)?,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         plan: common.plan.clone(),
-        earlier: common.earlier(),
+        existing_log: common.existing_log(),
         protocol,
     };
     let about = u64::from(common.subjects) * cohort.protocol.presentations_about();
@@ -522,18 +522,19 @@ fn simulate(
     let dataset = Dataset::at(&common.out);
     let kinematics = common.kinematics.unwrap_or(Kinematics::Summary);
     let task = cohort.protocol.task();
-    let presenter = |subject: SubjectNumber| -> Result<Option<Box<dyn Presenter + '_>>, OutsideError> {
-        let Some(apparatus) = apparatus else { return Ok(Some(Box::new(Nothing))) };
-        let folder = dataset.source_folder(subject).join("motion");
-        let files = (kinematics == Kinematics::Full)
-            .then(|| TrialFiles::make(folder, format!("{subject}_task-{task}")))
-            .transpose()?;
-        let person = (common.seed, subject);
-        match Rig::start(apparatus, person, kinematics, files, common.feel, &stop) {
-            Err(error) if error.is_stopped() => Ok(None),
-            started => Ok(Some(Box::new(started?))),
-        }
-    };
+    let presenter =
+        |subject: SubjectNumber| -> Result<Option<Box<dyn Presenter + '_>>, ApparatusOrFrontEndError> {
+            let Some(apparatus) = apparatus else { return Ok(Some(Box::new(NoApparatus))) };
+            let folder = dataset.source_folder(subject).join("motion");
+            let files = (kinematics == Kinematics::Full)
+                .then(|| TrialFiles::make(folder, format!("{subject}_task-{task}")))
+                .transpose()?;
+            let person = (common.seed, subject);
+            match Rig::start(apparatus, person, kinematics, files, common.feel, &stop) {
+                Err(error) if error.is_stopped() => Ok(None),
+                started => Ok(Some(Box::new(started?))),
+            }
+        };
     let first = Once::new();
     let watch = || {
         progress.inc(1);
@@ -601,7 +602,7 @@ fn refused(error: CohortError) -> CommandError {
 
 /// Converts an apparatus error to a command error with the exit code of its cause. For errors of a run, first prints `message` as a
 /// note, with subject and trial.
-fn outside(cause: OutsideError, message: String) -> CommandError {
+fn outside(cause: ApparatusOrFrontEndError, message: String) -> CommandError {
     let error = match cause.downcast_ref::<RunEnded>() {
         Some(RunEnded(RunEnd::DeviceFault(fault))) => CommandError::DeviceFault(*fault),
         Some(RunEnded(RunEnd::EmergencyStop(source))) => CommandError::EmergencyStop(*source),

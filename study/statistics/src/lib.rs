@@ -84,7 +84,7 @@ pub enum StatisticsError {
     NoError,
     /// Scaling of the responses has removed an effect and its error.
     #[error("scaling of the responses removes the effect")]
-    NothingLeft,
+    RemovedByScaling,
     /// The design of an analysis of variance is invalid.
     #[error("analysis of variance: {0}")]
     Design(String),

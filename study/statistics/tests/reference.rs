@@ -301,7 +301,7 @@ fn differences_without_variation_are_not_testable_for_a_reason() {
     let all_alike = within(&[[1.0, 2.0, 4.0]; 3]);
     assert_eq!(all_alike.not_testable, Some(StatisticsError::NoError), "{all_alike:?}");
     let flat = within(&[[1.0; 3], [2.0; 3], [0.5; 3]]);
-    assert_eq!(flat.not_testable, Some(StatisticsError::NothingLeft), "{flat:?}");
+    assert_eq!(flat.not_testable, Some(StatisticsError::RemovedByScaling), "{flat:?}");
     let levels = [1.0, 2.0, 3.0];
     let flat: Vec<Vec<f64>> = [5.0, 1.0, 0.1].iter().map(|value| vec![*value; 3]).collect();
     assert_eq!(trend::linear(&levels, &flat).unwrap_err(), StatisticsError::EqualMeans);

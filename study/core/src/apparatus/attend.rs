@@ -1,15 +1,15 @@
 //! Runs the sitting of a person: shows screens, presents stimuli and logs each answer before the next trial begins.
 
 use super::real_time_rig::RealTimeRig;
-use crate::conduct::{Ending, OutsideError};
+use crate::conduct::{ApparatusOrFrontEndError, Ending};
 use crate::log::{Event, Incident, LogWriter, TrialEvent, digest};
-use crate::screen::{Attended, Felt, Input, May, Screen, Step};
+use crate::screen::{Input, May, Screen, ScreenStateMachine, Step, StimulusExploration};
 use crate::trial::Trial;
 use std::time::Instant;
 
 /// Result of polling a front end.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Heard {
+pub enum PollResult {
     /// No input yet.
     Nothing,
     /// Input of the person.
@@ -20,22 +20,22 @@ pub enum Heard {
 
 /// Minimum exploration of a stimulus before an answer counts, against keys pressed by accident or too early.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Least {
+pub struct MinimumExploration {
     /// Least time, s.
     pub time_s: f64,
     /// Least path length of the handle, up and down together, m.
-    pub way_m: f64,
+    pub path_length_m: f64,
 }
 
-impl Least {
+impl MinimumExploration {
     /// Half a second and 2 mm. Past these limits the previous answer can no longer be withdrawn.
-    pub const USUAL: Least = Least { time_s: 0.5, way_m: 2.0e-3 };
+    pub const USUAL: MinimumExploration = MinimumExploration { time_s: 0.5, path_length_m: 2.0e-3 };
 
     /// Returns a hint if a stimulus was not felt long or far enough.
-    fn is_missed(&self, time_s: f64, way_m: Option<f64>) -> Option<&'static str> {
+    fn is_missed(&self, time_s: f64, path_length_m: Option<f64>) -> Option<&'static str> {
         if time_s < self.time_s {
             Some("feel it a little longer")
-        } else if way_m.is_some_and(|way_m| way_m < self.way_m) {
+        } else if path_length_m.is_some_and(|path_length_m| path_length_m < self.path_length_m) {
             Some("move the handle to feel it")
         } else {
             None
@@ -49,25 +49,25 @@ pub trait FrontEnd {
     ///
     /// # Errors
     /// If the front end is gone.
-    fn show(&mut self, screen: &Screen) -> Result<(), OutsideError>;
+    fn show(&mut self, screen: &Screen) -> Result<(), ApparatusOrFrontEndError>;
 
     /// Returns the input since the last call; waits only briefly, so that the handle can be watched meanwhile.
     ///
     /// # Errors
     /// If the front end is gone.
-    fn poll(&mut self, screen: &Screen) -> Result<Heard, OutsideError>;
+    fn poll(&mut self, screen: &Screen) -> Result<PollResult, ApparatusOrFrontEndError>;
 
     /// Warns at once, visibly and audibly, that the handle was pushed out of its range.
     ///
     /// # Errors
     /// If the front end is gone.
-    fn warn_out_of_range(&mut self) -> Result<(), OutsideError>;
+    fn warn_out_of_range(&mut self) -> Result<(), ApparatusOrFrontEndError>;
 
     /// Shows why an input was rejected.
     ///
     /// # Errors
     /// If the front end is gone.
-    fn refuse(&mut self, why: &str) -> Result<(), OutsideError>;
+    fn refuse(&mut self, why: &str) -> Result<(), ApparatusOrFrontEndError>;
 }
 
 /// Runs a sitting until it is complete or stopped, and logs each interruption and disturbance. `watch` is called for every trial
@@ -76,13 +76,13 @@ pub trait FrontEnd {
 /// # Errors
 /// Errors of apparatus, front end or log; the log stays valid and can be resumed.
 pub fn attend(
-    attended: &mut Attended,
+    attended: &mut ScreenStateMachine,
     log: &mut LogWriter,
     rig: &mut RealTimeRig<'_>,
     front: &mut dyn FrontEnd,
-    least: Least,
+    least: MinimumExploration,
     watch: &mut dyn FnMut(&TrialEvent),
-) -> Result<Ending, OutsideError> {
+) -> Result<Ending, ApparatusOrFrontEndError> {
     let result = sit(attended, log, rig, front, least, watch);
     if let Err(error) = &result {
         // The first error is returned; a failure to log it matters less.
@@ -92,13 +92,13 @@ pub fn attend(
 }
 
 fn sit(
-    attended: &mut Attended,
+    attended: &mut ScreenStateMachine,
     log: &mut LogWriter,
     rig: &mut RealTimeRig<'_>,
     front: &mut dyn FrontEnd,
-    least: Least,
+    least: MinimumExploration,
     watch: &mut dyn FnMut(&TrialEvent),
-) -> Result<Ending, OutsideError> {
+) -> Result<Ending, ApparatusOrFrontEndError> {
     loop {
         let screen = attended.screen();
         if screen == Screen::Over {
@@ -112,7 +112,7 @@ fn sit(
                 log.write(&Event::Incident(Incident::NotRecorded { reason }))?;
             }
             if let Some(now) = log.now() {
-                attended.felt_from(now);
+                attended.record_onset(now);
             }
         }
         let felt = stimulus.map(|(trial, _)| trial);
@@ -132,17 +132,17 @@ fn sit(
             let felt_for_s = shown.elapsed().as_secs_f64();
             if may_withdraw(&screen)
                 && input == Input::Withdraw
-                && Least::USUAL.is_missed(felt_for_s, rig.way_m()).is_none()
+                && MinimumExploration::USUAL.is_missed(felt_for_s, rig.path_length_m()).is_none()
             {
                 front.refuse("the next one has been felt; the answer before it stays")?;
                 continue;
             }
             if let Some(trial) = felt.filter(|_| input == Input::Continue) {
-                if let Some(why) = least.is_missed(felt_for_s, rig.way_m()) {
+                if let Some(why) = least.is_missed(felt_for_s, rig.path_length_m()) {
                     front.refuse(why)?;
                     continue;
                 }
-                attended.felt(end(rig, &trial, log)?);
+                attended.record_exploration(end(rig, &trial, log)?);
             }
             match attended.input(input, shown.elapsed().as_secs_f64()) {
                 Ok(Step::Note(text)) => log.write(&Event::Note { text })?,
@@ -183,7 +183,11 @@ fn may_withdraw(screen: &Screen) -> bool {
 }
 
 /// Ends a stimulus and logs its missed ticks.
-fn end(rig: &mut RealTimeRig<'_>, trial: &Trial, log: &mut LogWriter) -> Result<Felt, OutsideError> {
+fn end(
+    rig: &mut RealTimeRig<'_>,
+    trial: &Trial,
+    log: &mut LogWriter,
+) -> Result<StimulusExploration, ApparatusOrFrontEndError> {
     let felt = rig.end()?;
     if felt.missed_ticks > 0 {
         log.write(&disturbance(trial, Incident::MissedTicks { ticks: felt.missed_ticks }))?;
@@ -200,7 +204,7 @@ fn disturbance(trial: &Trial, incident: Incident) -> Event {
 }
 
 /// Closes the recording of a trial; logs a failure and continues the sitting.
-fn close_recording(rig: &mut RealTimeRig<'_>, log: &mut LogWriter) -> Result<(), OutsideError> {
+fn close_recording(rig: &mut RealTimeRig<'_>, log: &mut LogWriter) -> Result<(), ApparatusOrFrontEndError> {
     if let Err(error) = rig.close_recording() {
         log.write(&Event::Incident(Incident::NotRecorded { reason: error.to_string() }))?;
     }
@@ -214,17 +218,17 @@ fn wait_for_input(
     screen: &Screen,
     felt: Option<&Trial>,
     log: &mut LogWriter,
-) -> Result<Result<Input, Incident>, OutsideError> {
+) -> Result<Result<Input, Incident>, ApparatusOrFrontEndError> {
     let mut warned = false;
     loop {
         if let Some(incident) = rig.stopped_by() {
             return Ok(Err(incident));
         }
         match front.poll(screen)? {
-            Heard::Nothing => {}
-            Heard::Input(input) => return Ok(Ok(input)),
+            PollResult::Nothing => {}
+            PollResult::Input(input) => return Ok(Ok(input)),
             // An emergency stop closes the window, too: report the stop.
-            Heard::Closed => return Ok(Err(rig.stopped_by().unwrap_or(Incident::WindowClosed))),
+            PollResult::Closed => return Ok(Err(rig.stopped_by().unwrap_or(Incident::WindowClosed))),
         }
         let out = felt.filter(|_| rig.is_out_of_range());
         if let (Some(trial), false) = (out, warned) {

@@ -4,15 +4,15 @@
 use super::watch::Shared;
 use super::{Apparatus, Kinematics};
 use crate::apparatus::rig::{RunEnded, StimulusRefused, TrialFiles};
-use crate::conduct::{Ending, OutsideError};
+use crate::conduct::{ApparatusOrFrontEndError, Ending};
 use crate::kinematics::KinematicsMeter;
 use crate::log::Incident;
-use crate::screen::Felt;
+use crate::screen::StimulusExploration;
 use crate::trial::Trial;
 use flotor_live::{Ask, Directory, EndKind, RefusalCause, Serve};
 use flotor_record::Recorder;
 use flotor_servo::{Clock, RunEnd, StopSwitch};
-use flotor_session::telemetry::{Watched, announce, emergency_stop, machine_stop};
+use flotor_session::telemetry::{ObservedRun, announce, emergency_stop, machine_stop};
 use flotor_session::{
     ControlError, Controls, LatchGuard, Outcome, RunError, RunOptions, RunRecording, Session,
 };
@@ -31,7 +31,7 @@ pub struct RealTimeRig<'a> {
     controls: Controls,
     stop: StopSwitch,
     shared: Shared,
-    unseen: Option<String>,
+    viewer_error: Option<String>,
     /// Warnings of the run.
     warnings: Vec<String>,
     run: Option<JoinHandle<Result<Outcome, RunError>>>,
@@ -48,7 +48,7 @@ struct OnlyStop {
 impl Serve for OnlyStop {
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         match ask {
-            Ask::Watch { .. } | Ask::LookAway => {} // handled by the publication
+            Ask::Watch { .. } | Ask::Unwatch => {} // handled by the publication
             Ask::Stop => self.stop.stop(),
             Ask::EmergencyStop => return emergency_stop(&self.stop, self.latch.as_ref()),
             Ask::MachineStop => machine_stop(&self.stop, self.latch.as_ref()),
@@ -70,7 +70,7 @@ impl<'a> RealTimeRig<'a> {
         apparatus: &'a Apparatus,
         kinematics: Kinematics,
         stop: &StopSwitch,
-    ) -> Result<Self, OutsideError> {
+    ) -> Result<Self, ApparatusOrFrontEndError> {
         let options = RunOptions { clock: Clock::Real, seed: 0 };
         let session = Session::prepare(apparatus.scene(), apparatus.registry(), &options)?;
         let session = session.with_strength(apparatus.strength());
@@ -80,8 +80,8 @@ impl<'a> RealTimeRig<'a> {
         let run = apparatus.describe(apparatus.scene(), Clock::Real, 0);
         let host = Arc::new(OnlyStop { stop: stop.clone(), latch: session.latch().cloned() });
         let publication = announce(&Directory::of_this_user(), apparatus.scene(), &run, &session, host);
-        let unseen = publication.as_ref().err().map(ToString::to_string);
-        let mut observers = Watched { observer: shared.clone(), publication: publication.ok() };
+        let viewer_error = publication.as_ref().err().map(ToString::to_string);
+        let mut observers = ObservedRun { observer: shared.clone(), publication: publication.ok() };
         let switch = stop.clone();
         let thread = std::thread::Builder::new().name("flotor-study".to_owned());
         let run = thread.spawn(move || {
@@ -98,7 +98,7 @@ impl<'a> RealTimeRig<'a> {
             controls,
             stop,
             shared,
-            unseen,
+            viewer_error,
             warnings,
             run: Some(run),
             ended: None,
@@ -119,15 +119,15 @@ impl<'a> RealTimeRig<'a> {
 
     /// Returns the reason why no window can display the run, if so.
     #[must_use]
-    pub fn unseen(&self) -> Option<&str> {
-        self.unseen.as_deref()
+    pub fn viewer_error(&self) -> Option<&str> {
+        self.viewer_error.as_deref()
     }
 
     /// Sets the stimulus and fades it in; returns the reason if the movement should be recorded and cannot.
     ///
     /// # Errors
     /// If the run has ended, or the model rejected the value.
-    pub fn begin(&mut self, trial: &Trial, value: f64) -> Result<Option<String>, OutsideError> {
+    pub fn begin(&mut self, trial: &Trial, value: f64) -> Result<Option<String>, ApparatusOrFrontEndError> {
         self.check()?;
         self.set(value)?;
         {
@@ -157,7 +157,7 @@ impl<'a> RealTimeRig<'a> {
 
     /// Returns the path length of the handle since the stimulus can be felt, m; `None` before the first sample.
     #[must_use]
-    pub fn way_m(&self) -> Option<f64> {
+    pub fn path_length_m(&self) -> Option<f64> {
         let watch = self.shared.lock();
         let moved = watch.meter.as_ref()?.finish()?;
         Some(moved.mean_speed_m_per_s * moved.duration_s)
@@ -167,7 +167,7 @@ impl<'a> RealTimeRig<'a> {
     ///
     /// # Errors
     /// If the run has ended.
-    pub fn end(&mut self) -> Result<Felt, OutsideError> {
+    pub fn end(&mut self) -> Result<StimulusExploration, ApparatusOrFrontEndError> {
         let (meter, missed_ticks) = {
             let mut watch = self.shared.lock();
             (watch.meter.take().unwrap_or_default(), std::mem::take(&mut watch.missed_ticks))
@@ -176,14 +176,14 @@ impl<'a> RealTimeRig<'a> {
         self.apparatus.show(&self.controls, false)?;
         self.wait_for_fade();
         let kinematics = (self.kinematics != Kinematics::None).then(|| meter.finish()).flatten();
-        Ok(Felt { kinematics, boundary_hit: meter.out_of_range(), missed_ticks })
+        Ok(StimulusExploration { kinematics, boundary_hit: meter.out_of_range(), missed_ticks })
     }
 
     /// Closes the recording of an answered trial.
     ///
     /// # Errors
     /// Errors of the recording.
-    pub fn close_recording(&mut self) -> Result<(), OutsideError> {
+    pub fn close_recording(&mut self) -> Result<(), ApparatusOrFrontEndError> {
         Ok(self.shared.lock().recording.finish(&[])?)
     }
 
@@ -195,7 +195,7 @@ impl<'a> RealTimeRig<'a> {
 
     /// Returns true if a stop was requested or the run has ended.
     fn is_stopping(&self) -> bool {
-        self.stop.is_stop_asked() || self.run.as_ref().is_none_or(JoinHandle::is_finished)
+        self.stop.is_stop_requested() || self.run.as_ref().is_none_or(JoinHandle::is_finished)
     }
 
     /// Returns the incident that stops the sitting, if any: an emergency stop, a stop request, or the end of the run.
@@ -203,7 +203,7 @@ impl<'a> RealTimeRig<'a> {
         if let Some(source) = self.stop.emergency() {
             return Some(Incident::EmergencyStop { source: source.word().to_owned() });
         }
-        if self.stop.is_stop_asked() {
+        if self.stop.is_stop_requested() {
             return Some(Incident::Signal);
         }
         self.check().err().map(|error| self.incident_of(error.as_ref()))
@@ -225,7 +225,7 @@ impl<'a> RealTimeRig<'a> {
     ///
     /// # Errors
     /// If a fault or an emergency stop ended the run.
-    pub fn finish_after(&mut self, ending: Ending) -> Result<Ending, OutsideError> {
+    pub fn finish_after(&mut self, ending: Ending) -> Result<Ending, ApparatusOrFrontEndError> {
         if ending == Ending::Complete {
             return Ok(ending);
         }
@@ -240,7 +240,7 @@ impl<'a> RealTimeRig<'a> {
         }
     }
 
-    fn set(&self, value: f64) -> Result<(), OutsideError> {
+    fn set(&self, value: f64) -> Result<(), ApparatusOrFrontEndError> {
         // A replaced model may still be fading out.
         for _ in 0..100 {
             match self.apparatus.set(&self.controls, value) {
@@ -272,7 +272,7 @@ impl<'a> RealTimeRig<'a> {
     }
 
     /// Returns an error if the run has ended by itself.
-    fn check(&mut self) -> Result<(), OutsideError> {
+    fn check(&mut self) -> Result<(), ApparatusOrFrontEndError> {
         match (&self.run, self.ended) {
             (Some(run), _) if !run.is_finished() => return Ok(()),
             (None, Some(end)) => return Err(RunEnded(end).into()),

@@ -9,7 +9,7 @@
 
 use super::watch::Watch;
 use super::{Apparatus, Kinematics};
-use crate::conduct::{OutsideError, Presenter};
+use crate::conduct::{ApparatusOrFrontEndError, Presenter};
 use crate::kinematics::KinematicsMeter;
 use crate::protocol::SubjectNumber;
 use crate::trial::{Exploration, Trial};
@@ -122,7 +122,7 @@ impl<'a> Rig<'a> {
         &mut self,
         trial: &Trial,
         also: &mut dyn Observer,
-    ) -> Result<Exploration, OutsideError> {
+    ) -> Result<Exploration, ApparatusOrFrontEndError> {
         if let (Kinematics::Full, Some(files)) = (self.kinematics, &self.files) {
             let run = self.apparatus.describe(&self.scene, Clock::Virtual, self.seed);
             self.watch.recording = RunRecording::new(Some(Recorder::create(&files.next_of(trial), &run)?));
@@ -144,7 +144,7 @@ impl<'a> Rig<'a> {
         Ok(exploration)
     }
 
-    fn change_to(&mut self, value: f64, also: &mut dyn Observer) -> Result<(), OutsideError> {
+    fn change_to(&mut self, value: f64, also: &mut dyn Observer) -> Result<(), ApparatusOrFrontEndError> {
         let apparatus = self.apparatus;
         apparatus.show(self.steps.controls(), false)?;
         self.advance(self.fade_ticks, also)?;
@@ -160,14 +160,14 @@ impl<'a> Rig<'a> {
         self.watch.refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change).into()))
     }
 
-    fn advance(&mut self, ticks: u64, also: &mut dyn Observer) -> Result<(), OutsideError> {
+    fn advance(&mut self, ticks: u64, also: &mut dyn Observer) -> Result<(), ApparatusOrFrontEndError> {
         let end = self.steps.advance(ticks, &mut Both(&mut self.watch, also))?;
         end.map_or(Ok(()), |end| Err(RunEnded(end).into()))
     }
 }
 
 impl Presenter for Rig<'_> {
-    fn present(&mut self, trial: &Trial) -> Result<Option<Exploration>, OutsideError> {
+    fn present(&mut self, trial: &Trial) -> Result<Option<Exploration>, ApparatusOrFrontEndError> {
         match self.present_watched(trial, &mut Nobody) {
             Err(error) if matches!(error.downcast_ref(), Some(RunEnded(RunEnd::Stopped))) => Ok(None),
             presented => presented.map(Some),

@@ -90,7 +90,7 @@ pub enum ApparatusError {
         "{device}, and the host sends at most {} N and {} N·m: a stimulus above that would be felt as another. Set `[limits] force_n` and `torque_nm` to no more than that, or give `--allow-strong`",
         CEILING.force_n, CEILING.torque_nm
     )]
-    HeldBack {
+    ExceedsForceCeiling {
         /// Device stronger than the ceiling.
         device: StrongDevice,
     },
@@ -172,7 +172,7 @@ impl Apparatus {
         let session =
             Session::prepare(&scene, &registry, &options(Clock::Virtual, 0))?.with_strength(strength);
         if let Some(device) = session.held_back().first() {
-            return Err(ApparatusError::HeldBack { device: device.clone() });
+            return Err(ApparatusError::ExceedsForceCeiling { device: device.clone() });
         }
         let (plugins, notices) = (session.plugins().to_vec(), session.notices());
         drop(session);

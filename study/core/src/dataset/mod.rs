@@ -42,7 +42,7 @@ pub enum Progress {
 
 /// Policy for subjects with an existing log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Earlier {
+pub enum ExistingLogPolicy {
     /// Rejects such subjects.
     Refuse,
     /// Skips complete subjects and resumes incomplete ones.
@@ -219,8 +219,8 @@ impl Dataset {
     /// Returns the progress of a subject whose sitting may begin or resume.
     ///
     /// # Errors
-    /// If a log is invalid, `earlier` forbids to continue, or the study began with another configuration.
-    pub fn progress(&self, begin: &Begin, earlier: Earlier) -> Result<Progress, DatasetError> {
+    /// If a log is invalid, `existing_log` forbids to continue, or the study began with another configuration.
+    pub fn progress(&self, begin: &Begin, existing_log: ExistingLogPolicy) -> Result<Progress, DatasetError> {
         let (subject, root) = (begin.subject, self.root.clone());
         let path = self.log_path(subject, begin.protocol.task());
         let log = match SittingLog::read(&path) {
@@ -238,10 +238,12 @@ impl Dataset {
         if !log.complete {
             LogWriter::check_free(&path)?;
         }
-        match earlier {
-            Earlier::Refuse if log.complete => Err(DatasetError::Duplicate { subject, root }),
-            Earlier::Refuse => Err(DatasetError::Unfinished { subject, trials: log.trials.len(), root }),
-            Earlier::Resume => {
+        match existing_log {
+            ExistingLogPolicy::Refuse if log.complete => Err(DatasetError::Duplicate { subject, root }),
+            ExistingLogPolicy::Refuse => {
+                Err(DatasetError::Unfinished { subject, trials: log.trials.len(), root })
+            }
+            ExistingLogPolicy::Resume => {
                 same_study(begin, &log)?;
                 Ok(if log.complete { Progress::Complete } else { Progress::Partial(log) })
             }

@@ -1,7 +1,7 @@
 //! A log survives what can happen to it, or is refused with line and reason.
 
 use super::*;
-use crate::conduct::{Ending, Nothing, conduct};
+use crate::conduct::{Ending, NoApparatus, conduct};
 use crate::observer::{Population, SimulatedSubject};
 use crate::protocol::JndProtocol;
 use crate::sitting::Sitting;
@@ -59,7 +59,7 @@ fn sit(path: &Path) {
     let mut log = LogWriter::create(path).unwrap();
     log.write(&Event::Begin(Box::new(begin))).unwrap();
     let ending =
-        conduct(&mut sitting, &mut log, &mut Nothing, &subject, &|| (), &AtomicBool::default()).unwrap();
+        conduct(&mut sitting, &mut log, &mut NoApparatus, &subject, &|| (), &AtomicBool::default()).unwrap();
     assert_eq!(ending, Ending::Complete);
 }
 
@@ -252,7 +252,8 @@ fn cut_anywhere_it_goes_on_as_if_nothing_had_happened() {
             continue;
         }
         let (mut sitting, mut writer) = log.resume("0.0.1").unwrap();
-        conduct(&mut sitting, &mut writer, &mut Nothing, &subject, &|| (), &AtomicBool::default()).unwrap();
+        conduct(&mut sitting, &mut writer, &mut NoApparatus, &subject, &|| (), &AtomicBool::default())
+            .unwrap();
         drop(writer);
         let resumed = SittingLog::read(&path).unwrap();
         assert!(resumed.complete && resumed.resumed == 1);

@@ -30,7 +30,7 @@ pub enum Step {
 
 /// Exploration of one stimulus.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Felt {
+pub struct StimulusExploration {
     /// Movement measures; `None` if not recorded.
     pub kinematics: Option<StimulusKinematics>,
     /// True if the handle left its range.
@@ -84,7 +84,7 @@ struct Before {
 
 /// Screen state machine of a person's sitting.
 #[derive(Clone, Debug)]
-pub struct Attended {
+pub struct ScreenStateMachine {
     sitting: Sitting,
     quality: Quality,
     /// Texts to read before the first trial, next one first.
@@ -105,7 +105,7 @@ pub struct Attended {
     practice: VecDeque<Trial>,
 }
 
-impl Attended {
+impl ScreenStateMachine {
     /// Creates the state machine at the first or next trial; offers a rest after every `rest_every` trials (0: never).
     #[must_use]
     pub fn new(sitting: Sitting, protocol: &Protocol, rest_every: u32) -> Self {
@@ -181,12 +181,12 @@ impl Attended {
     }
 
     /// Records the time when a stimulus can be felt; the first of a trial counts.
-    pub fn felt_from(&mut self, time: TimeOfDay) {
+    pub fn record_onset(&mut self, time: TimeOfDay) {
         self.exploration.onset.get_or_insert(time);
     }
 
     /// Adds the exploration of the stimulus that has just ended.
-    pub fn felt(&mut self, felt: Felt) {
+    pub fn record_exploration(&mut self, felt: StimulusExploration) {
         self.exploration.kinematics.extend(felt.kinematics);
         self.exploration.boundary_hit |= felt.boundary_hit;
         self.exploration.missed_ticks += felt.missed_ticks;

@@ -7,7 +7,7 @@ use serde_json::Value;
 /// Message to the window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Told {
+pub enum WindowMessage {
     /// New screen.
     Screen(Screen),
     /// Warning to show at once, visibly and audibly; the screen does not change.
@@ -33,7 +33,7 @@ pub enum Warning {
 /// Message from the window.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-pub enum Said {
+pub enum WindowReply {
     /// Input of the person.
     Input(Input),
     /// State of the window; not sent by front ends without one.
@@ -43,7 +43,7 @@ pub enum Said {
     },
 }
 
-impl Said {
+impl WindowReply {
     /// Parses a line from the window.
     ///
     /// # Errors
@@ -80,25 +80,25 @@ mod tests {
     #[test]
     fn lines_are_what_they_say() {
         let lines = [
-            (Told::Screen(Screen::Over), r#"{"screen":"over"}"#),
-            (Told::Warning { warning: Warning::OutOfRange }, r#"{"warning":"out-of-range"}"#),
+            (WindowMessage::Screen(Screen::Over), r#"{"screen":"over"}"#),
+            (WindowMessage::Warning { warning: Warning::OutOfRange }, r#"{"warning":"out-of-range"}"#),
             (
-                Told::Refused { refused: "an answer is expected".to_owned() },
+                WindowMessage::Refused { refused: "an answer is expected".to_owned() },
                 r#"{"refused":"an answer is expected"}"#,
             ),
         ];
-        for (told, line) in lines {
-            assert_eq!(serde_json::to_string(&told).unwrap(), line);
-            assert_eq!(serde_json::from_str::<Told>(line).unwrap(), told);
+        for (message, line) in lines {
+            assert_eq!(serde_json::to_string(&message).unwrap(), line);
+            assert_eq!(serde_json::from_str::<WindowMessage>(line).unwrap(), message);
         }
         let said = [
-            (Said::Input(Input::Continue), r#"{"input":"continue"}"#),
-            (Said::Window { window: WindowState::Open }, r#"{"window":"open"}"#),
+            (WindowReply::Input(Input::Continue), r#"{"input":"continue"}"#),
+            (WindowReply::Window { window: WindowState::Open }, r#"{"window":"open"}"#),
         ];
         for (said, line) in said {
             assert_eq!(serde_json::to_string(&said).unwrap(), line);
-            assert_eq!(serde_json::from_str::<Said>(line).unwrap(), said);
-            assert_eq!(Said::read(line), Ok(said));
+            assert_eq!(serde_json::from_str::<WindowReply>(line).unwrap(), said);
+            assert_eq!(WindowReply::read(line), Ok(said));
         }
     }
 
@@ -112,7 +112,7 @@ mod tests {
             ("{\"input\":\"answer\"}", "missing field `response`"),
             ("{\"window\":\"shut\"}", "unknown variant `shut`, expected `open`"),
         ] {
-            let error = Said::read(line).expect_err(line);
+            let error = WindowReply::read(line).expect_err(line);
             assert!(error.starts_with(reason) && !error.contains("untagged"), "{line}: {error}");
         }
     }

@@ -1,8 +1,9 @@
 //! Screens and inputs of a person's sitting.
 //!
-//! A front end (terminal or window) shows [`Attended::screen`], waits for an [`Input`], and passes it to [`Attended::input`].
-//! Screens and inputs are plain data (serde) and also travel as lines of JSON ([`Told`], [`Said`]) to the viewer, a separate
-//! program. No screen identifies the stimulus, not even by a code: the answer to a code could be learnt.
+//! A front end (terminal or window) shows [`ScreenStateMachine::screen`], waits for an [`Input`], and passes it to
+//! [`ScreenStateMachine::input`]. Screens and inputs are plain data (serde) and also travel as lines of JSON ([`WindowMessage`],
+//! [`WindowReply`]) to the viewer, a separate program. No screen identifies the stimulus, not even by a code: the answer to a code could be
+//! learnt.
 //!
 //! ```text
 //! Ready -> Feel (first) -> Feel (second) -> Ask -> Ready or Feel of the next trial ... -> Over
@@ -14,8 +15,8 @@
 mod attended;
 mod line;
 
-pub use attended::{Attended, Felt, InputError, Step};
-pub use line::{Said, Told, Warning, WindowState};
+pub use attended::{InputError, ScreenStateMachine, Step, StimulusExploration};
+pub use line::{Warning, WindowMessage, WindowReply, WindowState};
 
 use crate::protocol::Quality;
 use crate::trial::{Phase, Position, Response};

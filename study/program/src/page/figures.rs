@@ -52,7 +52,7 @@ pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> Figure 
         let name = if slot == 0 { ONE_ERROR } else { "" };
         panel = panel.series(Series::errors(name, errors).slot(INK));
     }
-    if let Some(weber) = analysis.beside.weber() {
+    if let Some(weber) = analysis.thesis.weber() {
         let of = |(slot, weber): (usize, f64)| {
             bases.iter().map(move |base| (centre(slot, *base), weber * base)).collect::<Vec<_>>()
         };
@@ -83,7 +83,7 @@ pub(super) fn subjects(analysis: &JndAnalysis) -> Figure {
     let mut panel = Panel::new(Axis::linear("Weber fraction, haptics alone", "%").range(0.0, most))
         .series(Series::points("a subject", points).slot(0))
         .series(Series::line("no difference", [(0.0, 0.0), (most, most)]).slot(3));
-    if let Some([vh, h]) = analysis.beside.weber().map(|weber| weber.map(|weber| weber * 100.0)) {
+    if let Some([vh, h]) = analysis.thesis.weber().map(|weber| weber.map(|weber| weber * 100.0)) {
         panel = panel.series(Series::points("thesis, mean", [(vh, h)]).slot(2));
     }
     Figure::new("Subjects", Axis::linear("Weber fraction, vision + haptics", "%").range(0.0, most))
@@ -112,7 +112,7 @@ pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Figu
         let line =
             cells(Modality::Vh).map(|cell| (cell.stimulus, trend.intercept + trend.slope * cell.stimulus));
         let thesis = format!(" (thesis: {})", published::LINEAR_R2);
-        let label = format!("linear trend, R² {:.3}{}", analysis.linear_r2, analysis.beside.text(&thesis));
+        let label = format!("linear trend, R² {:.3}{}", analysis.linear_r2, analysis.thesis.text(&thesis));
         panel = panel.series(Series::line(label, line).slot(2));
     }
     let (name, unit) = stimulus.name_and_unit();

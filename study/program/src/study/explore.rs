@@ -15,7 +15,7 @@ use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
-use flotor_session::telemetry::{Watched, publish};
+use flotor_session::telemetry::{ObservedRun, publish};
 use flotor_session::{ControlError, Controls, NewValue, RunError, RunOptions, Session, stop_waits_with};
 use flotor_study::apparatus::watch::Shared;
 use flotor_study::kinematics::{KinematicsMeter, StimulusKinematics};
@@ -87,7 +87,8 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
         watch: watch.clone(),
         mapping,
     };
-    let (switch, mut observers) = (stop.clone(), Watched { observer: watch, publication: publication.ok() });
+    let (switch, mut observers) =
+        (stop.clone(), ObservedRun { observer: watch, publication: publication.ok() });
     let run = std::thread::Builder::new().name("flotor-study".to_owned()).spawn(move || {
         let outcome = session.run(&mut observers, &switch);
         let is_in_order = outcome.as_ref().is_ok_and(|outcome| outcome.end.is_in_order());
@@ -99,7 +100,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     say!("{}", style::title(&scene.title));
     say!("  type a parameter and its value; ? lists them, q ends{hint}");
     let lines = lines_of(BufReader::new(stdin())).map_err(|error| CommandError::Failed(error.to_string()))?;
-    while !(stop.is_stop_asked() || run.is_finished()) {
+    while !(stop.is_stop_requested() || run.is_finished()) {
         match lines.recv_timeout(Duration::from_millis(50)) {
             Ok(line) if line.trim() == "q" => break,
             Ok(line) => say!("{}", prompt.take(line.trim())),

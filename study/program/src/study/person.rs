@@ -10,15 +10,15 @@ use flotor_command::stopping::stop_run_on_signals;
 use flotor_command::{CommandError, note};
 use flotor_hal::read_text;
 use flotor_session::stop_waits_with;
-use flotor_study::apparatus::attend::{FrontEnd, Least, attend};
+use flotor_study::apparatus::attend::{FrontEnd, MinimumExploration, attend};
 use flotor_study::apparatus::real_time_rig::RealTimeRig;
 use flotor_study::apparatus::rig::TrialFiles;
 use flotor_study::apparatus::{Apparatus, Kinematics};
-use flotor_study::conduct::{Ending, OutsideError};
+use flotor_study::conduct::{ApparatusOrFrontEndError, Ending};
 use flotor_study::dataset::{Dataset, DatasetError, Progress};
 use flotor_study::log::{Begin, Event, FORMAT, digest};
 use flotor_study::protocol::{Protocol, SubjectNumber};
-use flotor_study::screen::Attended;
+use flotor_study::screen::ScreenStateMachine;
 use serde_json::json;
 use std::io::{BufReader, Stdout, stdin, stdout};
 use std::path::Path;
@@ -43,7 +43,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
             .map_err(super::unfit)?
             .concat(),
     };
-    let earlier = match dataset.progress(&begin, common.earlier()).map_err(of_dataset)? {
+    let earlier = match dataset.progress(&begin, common.existing_log()).map_err(of_dataset)? {
         Progress::New => None,
         Progress::Partial(log) => Some(log),
         Progress::Complete => {
@@ -93,11 +93,12 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         log.write(&Event::Note { text: format!("texts of the screens: SHA-256 {}", digest(&texts)) })
             .map_err(failed)?;
     }
-    let least = Least { time_s: common.least_time, way_m: common.least_movement_mm * 1.0e-3 };
+    let least =
+        MinimumExploration { time_s: common.least_time, path_length_m: common.least_movement_mm * 1.0e-3 };
     let text = format!("least time {} s, least movement {} mm", least.time_s, common.least_movement_mm);
     log.write(&Event::Note { text }).map_err(failed)?;
 
-    let mut attended = Attended::new(sitting, protocol, common.rest_every).after_reading(texts);
+    let mut attended = ScreenStateMachine::new(sitting, protocol, common.rest_every).after_reading(texts);
     if has_begun {
         attended = attended.with_practice_offered();
     }
@@ -144,13 +145,13 @@ fn text_of(path: &Path) -> Result<String, CommandError> {
 }
 
 /// Converts an apparatus error.
-fn outside(cause: OutsideError) -> CommandError {
+fn outside(cause: ApparatusOrFrontEndError) -> CommandError {
     let message = cause.to_string();
     super::outside(cause, message)
 }
 
 /// Describes the progress of an interrupted sitting and how to resume.
-fn broken_off(subject: SubjectNumber, attended: &Attended) -> String {
+fn broken_off(subject: SubjectNumber, attended: &ScreenStateMachine) -> String {
     let presented = attended.presented();
     format!(
         "{subject} stopped after {presented} presentations; continue with --subject {} --resume",
@@ -168,7 +169,7 @@ enum Front {
 impl Front {
     fn open(common: &Common, rig: &RealTimeRig<'_>) -> Result<Self, CommandError> {
         match common.screen {
-            ScreenOption::Viewer => match rig.unseen() {
+            ScreenOption::Viewer => match rig.viewer_error() {
                 None => Ok(Self::Window(Window::open(common.stop_key, common.texts.as_deref())?)),
                 Some(why) => Err(CommandError::Failed(format!("the viewer cannot show the session: {why}"))),
             },

@@ -161,7 +161,7 @@ fn test(
     let (squares, error_squares) = (hypothesis.trace(), error.trace());
     let not_testable = match (squares > rounding, error_squares > rounding) {
         (_, true) => None,
-        (false, false) => Some(StatisticsError::NothingLeft),
+        (false, false) => Some(StatisticsError::RemovedByScaling),
         (true, false) => Some(StatisticsError::NoError),
     };
     let tested = |value: f64| if not_testable.is_none() { value } else { f64::NAN };

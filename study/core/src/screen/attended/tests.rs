@@ -2,9 +2,9 @@ use super::*;
 use crate::protocol::{JndProtocol, MagnitudeProtocol, SubjectNumber};
 use crate::trial::Phase;
 
-fn attended(protocol: &Protocol, rest_every: u32) -> Attended {
+fn attended(protocol: &Protocol, rest_every: u32) -> ScreenStateMachine {
     let sitting = Sitting::new(protocol, 4, SubjectNumber::new(1).unwrap());
-    Attended::new(sitting, protocol, rest_every)
+    ScreenStateMachine::new(sitting, protocol, rest_every)
 }
 
 /// A whole sitting through the screens gives the trials of the bare state machine, in its order.
@@ -53,7 +53,7 @@ fn what_does_not_fit_the_screen_changes_nothing() {
     let mut jnd = JndProtocol::default();
     jnd.demo.shown = false;
     let mut person = attended(&Protocol::Jnd(jnd), 0);
-    let wrong = |person: &mut Attended, input: Input| {
+    let wrong = |person: &mut ScreenStateMachine, input: Input| {
         let before = person.screen();
         assert!(person.input(input, 0.0).is_err());
         assert_eq!(person.screen(), before);
@@ -86,7 +86,7 @@ fn out_of_range_is_said_and_repeated() {
     jnd.demo.shown = false;
     let mut person = attended(&Protocol::Jnd(jnd), 0);
     person.input(Input::Continue, 0.0).unwrap();
-    person.felt(Felt { kinematics: None, boundary_hit: true, missed_ticks: 2 });
+    person.record_exploration(StimulusExploration { kinematics: None, boundary_hit: true, missed_ticks: 2 });
     person.input(Input::Continue, 0.0).unwrap();
     person.input(Input::Continue, 0.0).unwrap();
     let step = person.input(Input::Answer { response: Response::First }, 0.0).unwrap();
@@ -151,11 +151,11 @@ fn a_trial_is_felt_again_no_more_often_than_the_study_allows() {
     let mut jnd = JndProtocol::default();
     jnd.demo.shown = false;
     let mut person = attended(&Protocol::Jnd(jnd.clone()), 0).with_again_at_most(2);
-    let feel = |person: &mut Attended| {
+    let feel = |person: &mut ScreenStateMachine| {
         person.input(Input::Continue, 0.0).unwrap();
         person.input(Input::Continue, 0.0).unwrap();
     };
-    let may = |person: &Attended| match person.screen() {
+    let may = |person: &ScreenStateMachine| match person.screen() {
         Screen::Ask { trial, .. } => trial.may,
         other => panic!("{other:?}"),
     };
@@ -188,12 +188,16 @@ fn an_answer_is_taken_back_once_and_before_the_next_stimulus() {
     let mut person = attended(&protocol, 0);
     let mut bare = Sitting::new(&protocol, 4, SubjectNumber::new(1).unwrap());
     let answer = |response| Input::Answer { response };
-    let feel = |person: &mut Attended| {
+    let feel = |person: &mut ScreenStateMachine| {
         person.input(Input::Continue, 0.0).unwrap();
-        person.felt(Felt { kinematics: None, boundary_hit: false, missed_ticks: 1 });
+        person.record_exploration(StimulusExploration {
+            kinematics: None,
+            boundary_hit: false,
+            missed_ticks: 1,
+        });
         person.input(Input::Continue, 0.0).unwrap();
     };
-    let refused = |person: &mut Attended| {
+    let refused = |person: &mut ScreenStateMachine| {
         let before = person.screen();
         assert!(matches!(person.input(Input::Withdraw, 1.0), Err(InputError::NotNow(_))));
         assert_eq!(person.screen(), before);
@@ -237,7 +241,7 @@ fn practice_is_offered_before_a_sitting_goes_on() {
             sitting.answer(response(&trial), &Exploration::default()).unwrap();
         }
         let next = sitting.next();
-        let mut person = Attended::new(sitting, &protocol, 0).with_practice_offered();
+        let mut person = ScreenStateMachine::new(sitting, &protocol, 0).with_practice_offered();
         let before = person.presented();
         let Screen::Ready { reason: Pause::Welcome, next: welcome } = person.screen() else {
             panic!("ready")
@@ -245,7 +249,7 @@ fn practice_is_offered_before_a_sitting_goes_on() {
         assert_eq!(welcome.may, [May::Practise]);
         person.input(Input::Practise, 0.0).unwrap();
         assert!(matches!(person.input(Input::Practise, 0.0), Err(InputError::NotNow(_))));
-        let mut told = 0;
+        let mut message = 0;
         loop {
             match person.screen() {
                 Screen::Ready { reason, next } => {
@@ -274,12 +278,12 @@ fn practice_is_offered_before_a_sitting_goes_on() {
                         matches!(&step, Ok(Step::Practised(text)) if text.contains("presented")),
                         "{step:?}"
                     );
-                    told += 1;
+                    message += 1;
                 }
                 Screen::Over | Screen::Read { .. } => unreachable!("it goes on"),
             }
         }
-        assert_eq!(told, if matches!(protocol, Protocol::Jnd(_)) { 3 } else { 5 });
+        assert_eq!(message, if matches!(protocol, Protocol::Jnd(_)) { 3 } else { 5 });
         assert_eq!((person.presented(), person.sitting.next()), (before, next));
     }
 }

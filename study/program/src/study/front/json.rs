@@ -1,9 +1,9 @@
 //! Screens and inputs as lines of JSON, for a separate window program.
 
 use super::MOMENT;
-use flotor_study::apparatus::attend::{FrontEnd, Heard};
-use flotor_study::conduct::OutsideError;
-use flotor_study::screen::{Said, Screen, Told, Warning};
+use flotor_study::apparatus::attend::{FrontEnd, PollResult};
+use flotor_study::conduct::ApparatusOrFrontEndError;
+use flotor_study::screen::{Screen, Warning, WindowMessage, WindowReply};
 use std::io::{ErrorKind, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
@@ -19,8 +19,8 @@ impl<W: Write> JsonLines<W> {
         Self { lines, out }
     }
 
-    fn report(&mut self, told: &Told) -> Result<(), OutsideError> {
-        let line = serde_json::to_string(told)?;
+    fn report(&mut self, message: &WindowMessage) -> Result<(), ApparatusOrFrontEndError> {
+        let line = serde_json::to_string(message)?;
         match writeln!(self.out, "{line}").and_then(|()| self.out.flush()) {
             // Ignored: a closed window is detected by the end of its input.
             Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
@@ -30,32 +30,32 @@ impl<W: Write> JsonLines<W> {
 }
 
 impl<W: Write> FrontEnd for JsonLines<W> {
-    fn show(&mut self, screen: &Screen) -> Result<(), OutsideError> {
-        self.report(&Told::Screen(screen.clone()))
+    fn show(&mut self, screen: &Screen) -> Result<(), ApparatusOrFrontEndError> {
+        self.report(&WindowMessage::Screen(screen.clone()))
     }
 
-    fn poll(&mut self, _screen: &Screen) -> Result<Heard, OutsideError> {
+    fn poll(&mut self, _screen: &Screen) -> Result<PollResult, ApparatusOrFrontEndError> {
         let line = match self.lines.recv_timeout(MOMENT) {
             Ok(line) => line,
-            Err(RecvTimeoutError::Timeout) => return Ok(Heard::Nothing),
+            Err(RecvTimeoutError::Timeout) => return Ok(PollResult::Nothing),
             // The input has ended: the window is closed.
-            Err(RecvTimeoutError::Disconnected) => return Ok(Heard::Closed),
+            Err(RecvTimeoutError::Disconnected) => return Ok(PollResult::Closed),
         };
-        match Said::read(&line) {
-            Ok(Said::Input(input)) => Ok(Heard::Input(input)),
-            Ok(Said::Window { .. }) => Ok(Heard::Nothing),
+        match WindowReply::read(&line) {
+            Ok(WindowReply::Input(input)) => Ok(PollResult::Input(input)),
+            Ok(WindowReply::Window { .. }) => Ok(PollResult::Nothing),
             Err(error) => {
                 self.refuse(&error)?;
-                Ok(Heard::Nothing)
+                Ok(PollResult::Nothing)
             }
         }
     }
 
-    fn warn_out_of_range(&mut self) -> Result<(), OutsideError> {
-        self.report(&Told::Warning { warning: Warning::OutOfRange })
+    fn warn_out_of_range(&mut self) -> Result<(), ApparatusOrFrontEndError> {
+        self.report(&WindowMessage::Warning { warning: Warning::OutOfRange })
     }
 
-    fn refuse(&mut self, why: &str) -> Result<(), OutsideError> {
-        self.report(&Told::Refused { refused: why.to_owned() })
+    fn refuse(&mut self, why: &str) -> Result<(), ApparatusOrFrontEndError> {
+        self.report(&WindowMessage::Refused { refused: why.to_owned() })
     }
 }

@@ -3,8 +3,8 @@
 use super::{MOMENT, lines_of};
 use flotor_command::say;
 use flotor_command::style;
-use flotor_study::apparatus::attend::{FrontEnd, Heard};
-use flotor_study::conduct::OutsideError;
+use flotor_study::apparatus::attend::{FrontEnd, PollResult};
+use flotor_study::conduct::ApparatusOrFrontEndError;
 use flotor_study::protocol::Quality;
 use flotor_study::screen::{Input, May, Pause, Question, Screen, TrialView};
 use flotor_study::trial::{Phase, Position, Response};
@@ -24,7 +24,7 @@ impl Terminal {
 }
 
 impl FrontEnd for Terminal {
-    fn show(&mut self, screen: &Screen) -> Result<(), OutsideError> {
+    fn show(&mut self, screen: &Screen) -> Result<(), ApparatusOrFrontEndError> {
         // Discard input typed before the screen was shown. Piped input is kept: a script knows the sequence.
         if std::io::stdin().is_terminal() {
             while self.lines.try_recv().is_ok() {}
@@ -33,30 +33,30 @@ impl FrontEnd for Terminal {
         Ok(())
     }
 
-    fn poll(&mut self, screen: &Screen) -> Result<Heard, OutsideError> {
+    fn poll(&mut self, screen: &Screen) -> Result<PollResult, ApparatusOrFrontEndError> {
         let line = match self.lines.recv_timeout(MOMENT) {
             Ok(line) => line,
-            Err(RecvTimeoutError::Timeout) => return Ok(Heard::Nothing),
+            Err(RecvTimeoutError::Timeout) => return Ok(PollResult::Nothing),
             // Standard input is closed.
-            Err(RecvTimeoutError::Disconnected) => return Ok(Heard::Closed),
+            Err(RecvTimeoutError::Disconnected) => return Ok(PollResult::Closed),
         };
         match typed(&line, screen) {
-            Ok(input) => Ok(Heard::Input(input)),
+            Ok(input) => Ok(PollResult::Input(input)),
             Err(why) => {
                 self.refuse(&why)?;
-                Ok(Heard::Nothing)
+                Ok(PollResult::Nothing)
             }
         }
     }
 
-    fn warn_out_of_range(&mut self) -> Result<(), OutsideError> {
+    fn warn_out_of_range(&mut self) -> Result<(), ApparatusOrFrontEndError> {
         // The bell replaces the beep of the thesis.
         ring_bell();
         say!("  {} the handle is out of its range: move it back", style::warning("!"));
         Ok(())
     }
 
-    fn refuse(&mut self, why: &str) -> Result<(), OutsideError> {
+    fn refuse(&mut self, why: &str) -> Result<(), ApparatusOrFrontEndError> {
         say!("  {why}");
         Ok(())
     }

@@ -54,7 +54,7 @@ impl Window {
 
     /// Waits until the person closes the window or a stop is requested.
     pub(in crate::study) fn wait_closed(mut self, stop: &StopSwitch) {
-        while self.viewer.0.try_wait().is_ok_and(|status| status.is_none()) && !stop.is_stop_asked() {
+        while self.viewer.0.try_wait().is_ok_and(|status| status.is_none()) && !stop.is_stop_requested() {
             std::thread::sleep(LOOK_PERIOD);
         }
     }
