@@ -1,7 +1,7 @@
 //! Republishes a remote run locally, for the viewer and all other clients of runs on this machine.
 
 use crate::link::LinkError;
-use crate::remote::{Errand, Remote, Told};
+use crate::remote::{Remote, RemoteEvent, RequestClient};
 use crate::request::Request;
 use flotor_core::demand::ObserverDemand;
 use flotor_live::{Ask, Directory, End, EndKind, Publication, PublishError, RefusalCause, Serve};
@@ -24,7 +24,7 @@ pub enum AttachError {
     Publish(#[from] PublishError),
 }
 
-impl Serve for Errand {
+impl Serve for RequestClient {
     /// Forwards the request to the remote host, and waits for the reply.
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         if matches!(ask, Ask::Swap { .. }) {
@@ -36,7 +36,7 @@ impl Serve for Errand {
     }
 }
 
-/// Republishes one remote run after the other until stopped. `tell` receives a line for people at each change.
+/// Republishes one remote run after the other until stopped. `report_line` receives a line for people at each change.
 ///
 /// # Errors
 /// [`AttachError`] of the network or of this machine.
@@ -44,7 +44,7 @@ pub fn attach(
     remote: &Remote,
     directory: &Directory,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(&str),
+    report_line: &mut dyn FnMut(&str),
 ) -> Result<(), AttachError> {
     while let Some((greeting, run)) = remote.wait_for_run(stop)? {
         let title = greeting.title.clone();
@@ -52,14 +52,14 @@ pub fn attach(
             directory,
             greeting,
             &run,
-            Arc::new(remote.errand()),
+            Arc::new(remote.requests()),
             ObserverDemand::default(),
         )?;
-        tell(&format!("`{title}` is at {}; `flotor view` shows it", publication.path().display()));
+        report_line(&format!("`{title}` is at {}; `flotor view` shows it", publication.path().display()));
         let lost_before = remote.lost();
         let End { words, kind } = show(remote, &publication, stop);
         let lost = remote.lost() - lost_before;
-        tell(&match lost {
+        report_line(&match lost {
             0 => words.clone(),
             lost => format!("{words}; {lost} ticks were lost on the way"),
         });
@@ -73,10 +73,10 @@ fn show(remote: &Remote, publication: &Publication, stop: &AtomicBool) -> End {
     while !stop.load(Ordering::Relaxed) {
         match remote.next(LOOK_PERIOD) {
             None => {}
-            Some(Told::Tick(record)) => publication.observe(&record),
-            Some(Told::Change(change)) => publication.change(&change),
-            Some(Told::End(end)) => return end,
-            Some(Told::Gone) => {
+            Some(RemoteEvent::Tick(record)) => publication.observe(&record),
+            Some(RemoteEvent::Change(change)) => publication.change(&change),
+            Some(RemoteEvent::End(end)) => return end,
+            Some(RemoteEvent::Gone) => {
                 let words = "the bridge cannot be seen any more".to_owned();
                 return End { words, kind: EndKind::Failed };
             }

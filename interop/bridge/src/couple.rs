@@ -37,7 +37,7 @@ pub enum Side {
     /// Bridge: publishes to all peers, and accepts messages.
     Serving,
     /// Bridge whose hand no peer may move: publishes, and accepts no messages.
-    ServingDeaf,
+    ServingReadOnly,
     /// Peer that connects to a bridge.
     Visiting,
 }
@@ -45,15 +45,15 @@ pub enum Side {
 impl Side {
     fn tells(self, name: &Name, coupling: &str) -> String {
         match self {
-            Side::Serving | Side::ServingDeaf => name.key(&format!("news/{coupling}")),
+            Side::Serving | Side::ServingReadOnly => name.key(&format!("news/{coupling}")),
             Side::Visiting => name.key(&format!("couple/{coupling}")),
         }
     }
 
-    fn hears(self, name: &Name, coupling: &str) -> Option<String> {
+    fn incoming_key(self, name: &Name, coupling: &str) -> Option<String> {
         match self {
             Side::Serving => Some(name.key(&format!("couple/{coupling}"))),
-            Side::ServingDeaf => None,
+            Side::ServingReadOnly => None,
             Side::Visiting => Some(name.key(&format!("news/{coupling}"))),
         }
     }
@@ -61,31 +61,34 @@ impl Side {
 
 /// Message counts of a coupling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Carried {
+pub struct MessageCounts {
     /// Messages of the host here, sent to the network.
-    pub told: u64,
+    #[serde(rename = "told")]
+    pub sent: u64,
     /// Messages from the network, passed to the host here.
-    pub heard: u64,
+    #[serde(rename = "heard")]
+    pub received: u64,
     /// Malformed messages from the network.
-    pub refused: u64,
+    #[serde(rename = "refused")]
+    pub rejected: u64,
 }
 
 /// Counters shared with the network's threads.
 #[derive(Default)]
 struct Counts {
-    told: AtomicU64,
-    heard: AtomicU64,
-    refused: AtomicU64,
+    sent: AtomicU64,
+    received: AtomicU64,
+    rejected: AtomicU64,
     /// Run id here, and run id that the other end answers; 0: none, or unknown.
     here: AtomicU64,
     answered: AtomicU64,
 }
 
 impl Counts {
-    fn now(&self) -> Carried {
-        let [told, heard, refused] =
-            [&self.told, &self.heard, &self.refused].map(|count| count.load(Ordering::Relaxed));
-        Carried { told, heard, refused }
+    fn now(&self) -> MessageCounts {
+        let [sent, received, rejected] =
+            [&self.sent, &self.received, &self.rejected].map(|count| count.load(Ordering::Relaxed));
+        MessageCounts { sent, received, rejected }
     }
 
     /// Returns whether the other end is coupled to another run.
@@ -134,11 +137,11 @@ impl Couplers {
         }
     }
 
-    /// Starts links for new couplings and drops those of ended runs, once per poll interval. `tell` receives a line for people on each.
+    /// Starts links for new couplings and drops those of ended runs, once per poll interval. `report` receives a line for people on each.
     ///
     /// # Errors
     /// [`CoupleError`] of a new link.
-    pub fn follow(&mut self, tell: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
+    pub fn follow(&mut self, report: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
         if self.looked.is_some_and(|at| at.elapsed() < FIND_PERIOD) {
             return Ok(());
         }
@@ -146,13 +149,13 @@ impl Couplers {
         self.here.retain(|coupling, coupler| {
             let is_on = !coupler.thread.as_ref().is_none_or(JoinHandle::is_finished);
             if !is_on {
-                tell(&format!("the coupling `{coupling}` is gone: its run is over"));
+                report(&format!("the coupling `{coupling}` is gone: its run is over"));
             }
             is_on
         });
         for found in self.directory.couplings() {
             if !self.here.contains_key(&found.name) {
-                tell(&format!(
+                report(&format!(
                     "carrying the peer state of the coupling `{}` (process {})",
                     found.name, found.process
                 ));
@@ -172,12 +175,12 @@ impl Couplers {
 
     /// Returns the message counts by coupling.
     #[must_use]
-    pub fn carried(&self) -> BTreeMap<String, Carried> {
+    pub fn carried(&self) -> BTreeMap<String, MessageCounts> {
         self.here.iter().map(|(name, coupler)| (name.clone(), coupler.counts.now())).collect()
     }
 }
 
-/// Links the couplings of hosts here to those of the same name behind a bridge, until stopped. `tell` receives a line for
+/// Links the couplings of hosts here to those of the same name behind a bridge, until stopped. `report` receives a line for
 /// people at each change.
 ///
 /// # Errors
@@ -187,29 +190,29 @@ pub fn couple(
     directory: &Directory,
     name: &Name,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(&str),
+    report: &mut dyn FnMut(&str),
 ) -> Result<(), CoupleError> {
     let mut couplers = Couplers::new(session, directory, name, Side::Visiting);
-    let mut before: BTreeMap<String, (Carried, bool)> = BTreeMap::new();
-    let mut told_of: Vec<String> = Vec::new();
+    let mut before: BTreeMap<String, (MessageCounts, bool)> = BTreeMap::new();
+    let mut reported: Vec<String> = Vec::new();
     while !stop.load(Ordering::Relaxed) {
-        couplers.follow(tell)?;
+        couplers.follow(report)?;
         std::thread::sleep(FIND_PERIOD);
         let held = couplers.held_by_others();
-        for coupling in held.iter().filter(|coupling| !told_of.contains(coupling)) {
-            tell(&format!(
+        for coupling in held.iter().filter(|coupling| !reported.contains(coupling)) {
+            report(&format!(
                 "the other end of `{coupling}` is the partner of another run: the one here has none"
             ));
         }
-        told_of = held;
+        reported = held;
         for (coupling, now) in couplers.carried() {
-            let (last, was_heard) = before.get(&coupling).copied().unwrap_or_default();
-            let is_heard = now.heard > last.heard;
-            if is_heard != was_heard {
-                let words = if is_heard { "is heard" } else { "cannot be heard any more" };
-                tell(&format!("the other end of `{coupling}` {words}"));
+            let (last, was_received) = before.get(&coupling).copied().unwrap_or_default();
+            let is_received = now.received > last.received;
+            if is_received != was_received {
+                let words = if is_received { "is heard" } else { "cannot be heard any more" };
+                report(&format!("the other end of `{coupling}` {words}"));
             }
-            before.insert(coupling, (now, is_heard));
+            before.insert(coupling, (now, is_received));
         }
     }
     Ok(())
@@ -220,7 +223,7 @@ struct Coupler {
     counts: Arc<Counts>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
-    _hears: Option<Subscriber<()>>,
+    _subscriber: Option<Subscriber<()>>,
 }
 
 impl Coupler {
@@ -234,7 +237,7 @@ impl Coupler {
         let counts = Arc::<Counts>::default();
         let (sender, from_network) = sync_channel(MOST_WAITING);
         let of_callback = Arc::clone(&counts);
-        let hear = move |sample: zenoh::sample::Sample| {
+        let receive = move |sample: zenoh::sample::Sample| {
             // Check the length before copying.
             let payload = sample.payload();
             let dispatch =
@@ -245,13 +248,13 @@ impl Coupler {
                     let _ = sender.try_send(dispatch);
                 }
                 _ => {
-                    of_callback.refused.fetch_add(1, Ordering::Relaxed);
+                    of_callback.rejected.fetch_add(1, Ordering::Relaxed);
                 }
             }
         };
-        let hears = side.hears(name, &found.name);
-        let hears = hears.map(|key| session.declare_subscriber(key).callback(hear).wait()).transpose();
-        let hears = hears.map_err(LinkError::from)?;
+        let key = side.incoming_key(name, &found.name);
+        let subscriber = key.map(|key| session.declare_subscriber(key).callback(receive).wait()).transpose();
+        let subscriber = subscriber.map_err(LinkError::from)?;
         // Highest priority. Not express: on a slow network messages share a batch instead of being dropped.
         let tells = session
             .declare_publisher(side.tells(name, &found.name))
@@ -264,7 +267,7 @@ impl Coupler {
         let (of_thread, until) = (Arc::clone(&counts), Arc::clone(&stop));
         let thread = std::thread::Builder::new().name("flotor-couple".to_owned());
         let thread = thread.spawn(move || carry(socket, &from_network, &tells, &of_thread, &until))?;
-        Ok(Self { counts, stop, thread: Some(thread), _hears: hears })
+        Ok(Self { counts, stop, thread: Some(thread), _subscriber: subscriber })
     }
 }
 
@@ -289,13 +292,13 @@ fn carry(
     while !stop.load(Ordering::Relaxed) {
         if called.is_none_or(|at| at.elapsed() >= CALL_PERIOD) {
             called = Some(Instant::now());
-            if !socket.call() {
+            if !socket.subscribe() {
                 return;
             }
         }
         // Only the last pending message is new. Messages of the host are local: none is rejected.
         let mut newest = None;
-        while let Ok(Some(dispatch)) = socket.hear() {
+        while let Ok(Some(dispatch)) = socket.receive() {
             newest = Some(dispatch);
         }
         if let Some(dispatch) = newest {
@@ -304,11 +307,11 @@ fn carry(
         if let Some(dispatch) = newest
             && tells.put(dispatch.to_bytes()).wait().is_ok()
         {
-            counts.told.fetch_add(1, Ordering::Relaxed);
+            counts.sent.fetch_add(1, Ordering::Relaxed);
         }
         for dispatch in from_network.try_iter() {
-            socket.tell(&dispatch);
-            counts.heard.fetch_add(1, Ordering::Relaxed);
+            socket.send(&dispatch);
+            counts.received.fetch_add(1, Ordering::Relaxed);
         }
         std::thread::sleep(LOOK_PERIOD);
     }

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! [`serve`] is one end: a client of the host ([`flotor_live`]) that publishes the host's messages on keys ([`keys`]) in the format
-//! of a recording. [`remote`] is the other end; [`attach`] republishes a remote run locally, and [`keep`] records it. [`couple`]
+//! of a recording. [`remote`] is the other end; [`attach`] republishes a remote run locally, and [`record`] records it. [`couple`]
 //! links a hand here to a remote one. Requests take the reverse path ([`request`]); Zenoh's access control decides who may send
 //! which, by keys and configurations from [`access`]. An emergency stop takes a second path beside Zenoh: [`stop_channel`].
 //!
@@ -17,9 +17,9 @@
 pub mod access;
 pub mod attach;
 pub mod couple;
-pub mod keep;
 pub mod keys;
 pub mod link;
+pub mod record;
 pub mod remote;
 pub mod request;
 pub mod serve;

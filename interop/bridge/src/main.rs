@@ -4,9 +4,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use flotor_bridge::access::{Members, write_keys};
 use flotor_bridge::attach::attach;
 use flotor_bridge::couple::couple;
-use flotor_bridge::keep::{RecordingEnd, keep};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, Link, LinkError, LinkOptions, open, stop_channel};
+use flotor_bridge::record::{RecordingEnd, record};
 use flotor_bridge::remote::{Remote, bridges};
 use flotor_bridge::request::{Request, Right};
 use flotor_bridge::serve::{Launcher, Service, serve};
@@ -190,48 +190,52 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
     let directory = Directory::of_this_user();
     let visit = |link: LinkOptions| {
         let link = open(&link.or_this_user(&directory, None), End::Visiting)?;
-        tell_of_keys(&link, &mut |line| eprintln!("{}", escaped(line)));
+        report_keys(&link, &mut |line| eprintln!("{}", escaped(line)));
         Ok::<Link, LinkError>(link)
     };
-    let mut tell = |line: &str| eprintln!("{}", escaped(line));
+    let mut report_line = |line: &str| eprintln!("{}", escaped(line));
     match command {
         Command::Serve(serving) => {
             let service = service(serving)?;
             directory.make()?;
             let link = link.or_this_user(&directory, Some(&service.name));
             let session = open(&link, End::Serving)?;
-            tell_of_keys(&session, &mut tell);
+            report_keys(&session, &mut report_line);
             if let (None, Some(endpoint)) = (&link.config, link.open_to_others()) {
-                tell(&format!(
+                report_line(&format!(
                     "without keys: whoever reaches {endpoint}, on this machine every user, has the rights of --allow"
                 ));
             }
-            tell(&format!("zenoh/{}: waiting for a run on this machine (Ctrl-C ends)", service.name));
-            serve(&session, &directory, service, &stop, &mut tell)?;
+            report_line(&format!("zenoh/{}: waiting for a run on this machine (Ctrl-C ends)", service.name));
+            serve(&session, &directory, service, &stop, &mut report_line)?;
         }
         Command::Attach { name } => {
             let remote = Remote::listen(&visit(link)?, &name)?;
-            tell(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
-            attach(&remote, &directory, &stop, &mut tell)?;
+            report_line(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
+            attach(&remote, &directory, &stop, &mut report_line)?;
         }
         Command::Couple { name } => {
             let session = visit(link)?;
-            tell(&format!("waiting for a coupling to hold with zenoh/{name} (Ctrl-C ends)"));
-            couple(&session, &directory, &name, &stop, &mut tell)?;
+            report_line(&format!("waiting for a coupling to hold with zenoh/{name} (Ctrl-C ends)"));
+            couple(&session, &directory, &name, &stop, &mut report_line)?;
         }
         Command::Record { name, file } => {
             let remote = Remote::listen(&visit(link)?, &name)?;
-            tell(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
-            let kept = keep(&remote, &file, &stop)?;
-            let words = match &kept.end {
+            report_line(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
+            let recorded = record(&remote, &file, &stop)?;
+            let words = match &recorded.end {
                 RecordingEnd::Over(words) => words,
                 RecordingEnd::Stopped => "stopped recording",
                 RecordingEnd::Cut => "the bridge cannot be seen any more",
             };
-            let shown =
-                format!("{}: {} ticks, {} lost on the way; {words}", file.display(), kept.ticks, kept.lost);
+            let shown = format!(
+                "{}: {} ticks, {} lost on the way; {words}",
+                file.display(),
+                recorded.ticks,
+                recorded.lost
+            );
             println!("{}", escaped(&shown));
-            if kept.end == RecordingEnd::Cut {
+            if recorded.end == RecordingEnd::Cut {
                 return Err(
                     "the recording ends before the run has told its end; what had come is in the file".into(),
                 );
@@ -244,13 +248,15 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         }
         Command::Ask { name, request } => {
             let remote = Remote::listen(&visit(link)?, &name)?;
-            remote.errand().run(request.into())?;
+            remote.requests().run(request.into())?;
         }
         Command::List => {
             let session = visit(link)?;
             let names = bridges(&session)?;
             if names.is_empty() {
-                tell("no bridge can be seen; `flotor bridge serve` starts one, --connect says where to look");
+                report_line(
+                    "no bridge can be seen; `flotor bridge serve` starts one, --connect says where to look",
+                );
             }
             for name in names {
                 let status = Remote::listen(&session, &name)?.status()?.unwrap_or_default();
@@ -268,7 +274,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             {
                 println!("{}", written.display());
             }
-            tell(
+            report_line(
                 "Give each member its .json5, .pem, .key and .stop, and authority.pem; keep the .key and .stop files secret.",
             );
         }
@@ -277,16 +283,16 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
 }
 
 /// Warns of keys that expire soon, and of keys without a second path for an emergency stop.
-fn tell_of_keys(link: &Link, tell: &mut dyn FnMut(&str)) {
+fn report_keys(link: &Link, report_line: &mut dyn FnMut(&str)) {
     if link.lacks_stop_keys() {
-        tell(
+        report_line(
             "the keys have no stop key: an emergency stop of a new member waits while others flood the bridge with connections; \
              `flotor bridge keys` makes new ones, for the bridge and all members",
         );
     }
     const SOON_DAYS: u64 = 30;
     if let Some(days) = link.days_left().filter(|days| *days < SOON_DAYS) {
-        tell(&format!("the keys are good for {days} more days; `flotor bridge keys` makes new ones"));
+        report_line(&format!("the keys are good for {days} more days; `flotor bridge keys` makes new ones"));
     }
 }
 

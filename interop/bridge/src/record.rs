@@ -1,7 +1,7 @@
 //! Recording of a remote run.
 
 use crate::link::LinkError;
-use crate::remote::{Remote, Told};
+use crate::remote::{Remote, RemoteEvent};
 use flotor_record::{Note, RecordError, Recorder, Severity};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,7 +13,7 @@ const LOOK_PERIOD: Duration = Duration::from_millis(100);
 /// Error of a recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum KeepError {
+pub enum RecordingError {
     /// Error of the network.
     #[error(transparent)]
     Link(#[from] LinkError),
@@ -24,7 +24,7 @@ pub enum KeepError {
 
 /// Result of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Kept {
+pub struct Recorded {
     /// Ticks in the file.
     pub ticks: u64,
     /// Ticks lost in transit. The recording contains a note at each gap.
@@ -47,18 +47,18 @@ pub enum RecordingEnd {
 /// Records one remote run, from now to its end or until stopped.
 ///
 /// # Errors
-/// [`KeepError`] of the network or of the file.
-pub fn keep(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<Kept, KeepError> {
-    let mut kept = Kept { ticks: 0, lost: 0, end: RecordingEnd::Stopped };
-    let Some((_, run)) = remote.wait_for_run(stop)? else { return Ok(kept) };
+/// [`RecordingError`] of the network or of the file.
+pub fn record(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<Recorded, RecordingError> {
+    let mut recorded = Recorded { ticks: 0, lost: 0, end: RecordingEnd::Stopped };
+    let Some((_, run)) = remote.wait_for_run(stop)? else { return Ok(recorded) };
     let mut recorder = Recorder::create(file, &run)?;
     while !stop.load(Ordering::Relaxed) {
         match remote.next(LOOK_PERIOD) {
             None => {}
-            Some(Told::Tick(record)) => {
+            Some(RemoteEvent::Tick(record)) => {
                 let lost = remote.lost();
-                if lost > kept.lost {
-                    let text = format!("{} ticks were lost on the way here", lost - kept.lost);
+                if lost > recorded.lost {
+                    let text = format!("{} ticks were lost on the way here", lost - recorded.lost);
                     let source = "flotor bridge".to_owned();
                     recorder.note(&Note {
                         time_ns: record.time_ns,
@@ -66,22 +66,22 @@ pub fn keep(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<Kept, Kee
                         source,
                         text,
                     })?;
-                    kept.lost = lost;
+                    recorded.lost = lost;
                 }
                 recorder.record(&record)?;
-                kept.ticks += 1;
+                recorded.ticks += 1;
             }
-            Some(Told::Change(change)) => recorder.change(&change)?,
-            Some(Told::End(end)) => {
-                kept.end = RecordingEnd::Over(end.words);
+            Some(RemoteEvent::Change(change)) => recorder.change(&change)?,
+            Some(RemoteEvent::End(end)) => {
+                recorded.end = RecordingEnd::Over(end.words);
                 break;
             }
-            Some(Told::Gone) => {
-                kept.end = RecordingEnd::Cut;
+            Some(RemoteEvent::Gone) => {
+                recorded.end = RecordingEnd::Cut;
                 break;
             }
         }
     }
     recorder.finish()?;
-    Ok(kept)
+    Ok(recorded)
 }

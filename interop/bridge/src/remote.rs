@@ -36,7 +36,7 @@ const LOOK_PERIOD: Duration = Duration::from_millis(300);
 
 /// Event of a remote run.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Told {
+pub enum RemoteEvent {
     /// A tick.
     Tick(TickRecord),
     /// A parameter changed.
@@ -51,16 +51,16 @@ pub enum Told {
 pub struct Remote {
     session: Session,
     name: Name,
-    told: Receiver<Told>,
+    events: Receiver<RemoteEvent>,
     queue: Queue,
-    errand: Errand,
+    requests: RequestClient,
     _all: Subscriber<()>,
     _alive: Subscriber<()>,
 }
 
 /// Client for sending requests, from any thread; clones share the state.
 #[derive(Clone)]
-pub struct Errand {
+pub struct RequestClient {
     session: Session,
     name: Name,
     /// Member name in the keys.
@@ -77,22 +77,24 @@ impl Remote {
     /// # Errors
     /// If the network refuses.
     pub fn listen(session: &Link, name: &Name) -> Result<Self, LinkError> {
-        let (sender, told) = channel();
+        let (sender, events) = channel();
         let queue = Queue { sender, waiting: Arc::default(), lost: Arc::default() };
-        let mut ear = Ear { queue: queue.clone(), pose: None, number: None };
+        let mut decoder = Decoder { queue: queue.clone(), pose: None, number: None };
         let of_liveliness = queue.clone();
-        let all =
-            session.declare_subscriber(name.key("*")).callback_mut(move |sample| ear.hear(&sample)).wait()?;
+        let all = session
+            .declare_subscriber(name.key("*"))
+            .callback_mut(move |sample| decoder.decode(&sample))
+            .wait()?;
         let alive = session
             .liveliness()
             .declare_subscriber(name.key("alive"))
             .callback(move |sample| {
                 if sample.kind() == SampleKind::Delete {
-                    of_liveliness.put(Told::Gone);
+                    of_liveliness.put(RemoteEvent::Gone);
                 }
             })
             .wait()?;
-        let errand = Errand {
+        let requests = RequestClient {
             session: Session::clone(session),
             name: name.clone(),
             member: session.member().clone(),
@@ -102,9 +104,9 @@ impl Remote {
         Ok(Self {
             session: Session::clone(session),
             name: name.clone(),
-            told,
+            events,
             queue,
-            errand,
+            requests,
             _all: all,
             _alive: alive,
         })
@@ -120,7 +122,7 @@ impl Remote {
                 self.get("greeting")?.and_then(|bytes| serde_json::from_slice::<Greeting>(&bytes).ok());
             let run = self.get("run")?.and_then(|bytes| RunDescription::from_bytes(&bytes).ok());
             if let (Some(greeting), Some(run)) = (greeting, run) {
-                self.errand.run.store(u64::from(greeting.process), Ordering::Relaxed);
+                self.requests.run.store(u64::from(greeting.process), Ordering::Relaxed);
                 return Ok(Some((greeting, run)));
             }
             std::thread::sleep(LOOK_PERIOD);
@@ -130,14 +132,14 @@ impl Remote {
 
     /// Waits for the next event; `None` on timeout.
     #[must_use]
-    pub fn next(&self, timeout: Duration) -> Option<Told> {
-        match self.told.recv_timeout(timeout) {
-            Ok(told) => {
+    pub fn next(&self, timeout: Duration) -> Option<RemoteEvent> {
+        match self.events.recv_timeout(timeout) {
+            Ok(event) => {
                 self.queue.waiting.fetch_sub(1, Ordering::Relaxed);
-                Some(told)
+                Some(event)
             }
             Err(RecvTimeoutError::Timeout) => None,
-            Err(RecvTimeoutError::Disconnected) => Some(Told::Gone),
+            Err(RecvTimeoutError::Disconnected) => Some(RemoteEvent::Gone),
         }
     }
 
@@ -152,13 +154,13 @@ impl Remote {
     /// # Errors
     /// If the network refuses.
     pub fn status(&self) -> Result<Option<Status>, LinkError> {
-        self.errand.status()
+        self.requests.status()
     }
 
     /// Returns a client for requests to the bridge.
     #[must_use]
-    pub fn errand(&self) -> Errand {
-        self.errand.clone()
+    pub fn requests(&self) -> RequestClient {
+        self.requests.clone()
     }
 
     fn get(&self, what: &str) -> Result<Option<Vec<u8>>, LinkError> {
@@ -171,7 +173,7 @@ fn get(session: &Session, name: &Name, what: &str) -> Result<Option<Vec<u8>>, Li
     Ok(first(&answers))
 }
 
-impl Errand {
+impl RequestClient {
     /// Sends a request and waits for the reply.
     ///
     /// # Errors
@@ -221,8 +223,8 @@ impl Errand {
         };
         let (session, ticket) = (self.session.zid().to_string(), status.ticket);
         let wait = if request == Request::EmergencyStop { STOP_WAIT } else { ANSWER_WAIT };
-        let letter = NumberedRequest { session, number: *number, run, ticket, request };
-        let get = self.session.get(key).timeout(wait).payload(letter.to_bytes());
+        let numbered = NumberedRequest { session, number: *number, run, ticket, request };
+        let get = self.session.get(key).timeout(wait).payload(numbered.to_bytes());
         // Bridges on two machines may have one name: all of them must have carried out the request.
         let get = get.target(QueryTarget::All).consolidation(ConsolidationMode::None);
         get.wait().map_err(|error| LinkError::from(error).to_string())
@@ -270,14 +272,14 @@ fn first(answers: &Answers) -> Option<Vec<u8>> {
 /// Queue from the network's threads to the caller, of bounded length; lost ticks are counted.
 #[derive(Clone)]
 struct Queue {
-    sender: Sender<Told>,
+    sender: Sender<RemoteEvent>,
     waiting: Arc<AtomicUsize>,
     lost: Arc<AtomicU64>,
 }
 
 impl Queue {
-    fn put(&self, told: Told) {
-        let is_tick = matches!(told, Told::Tick(_));
+    fn put(&self, event: RemoteEvent) {
+        let is_tick = matches!(event, RemoteEvent::Tick(_));
         let most = if is_tick { MOST_TICKS } else { MOST_WAITING };
         if self.waiting.load(Ordering::Relaxed) >= most {
             self.lose(u64::from(is_tick));
@@ -285,7 +287,7 @@ impl Queue {
         }
         self.waiting.fetch_add(1, Ordering::Relaxed);
         // Fails without a receiver.
-        let _ = self.sender.send(told);
+        let _ = self.sender.send(event);
     }
 
     fn lose(&self, ticks: u64) {
@@ -294,45 +296,45 @@ impl Queue {
 }
 
 /// Decoder that assembles messages into events, on the network's thread.
-struct Ear {
+struct Decoder {
     queue: Queue,
     pose: Option<Vec<u8>>,
     number: Option<u64>,
 }
 
-impl Ear {
-    fn hear(&mut self, sample: &Sample) {
+impl Decoder {
+    fn decode(&mut self, sample: &Sample) {
         let payload = sample.payload().to_bytes();
         let number = sample.attachment().and_then(|bytes| bytes.to_bytes().as_ref().try_into().ok());
         let number = number.map(u64::from_le_bytes);
-        let told = match sample.key_expr().as_str().rsplit('/').next() {
+        let event = match sample.key_expr().as_str().rsplit('/').next() {
             Some("tf") => {
                 self.pose = Some(payload.into_owned());
                 return;
             }
             Some("tick") => self.tick(&payload, number),
             Some("change") => {
-                flotor_record::change_from_bytes(&payload, number.unwrap_or(0)).ok().map(Told::Change)
+                flotor_record::change_from_bytes(&payload, number.unwrap_or(0)).ok().map(RemoteEvent::Change)
             }
             Some("end") => self.end(&payload, number),
             _ => return,
         };
-        if let Some(told) = told {
-            self.queue.put(told);
+        if let Some(event) = event {
+            self.queue.put(event);
         }
     }
 
     /// Decodes the end; missing ticks before it are counted as lost.
-    fn end(&mut self, payload: &[u8], last: Option<u64>) -> Option<Told> {
-        if let (Some(heard), Some(last)) = (self.number, last) {
-            self.queue.lose(last.saturating_sub(heard));
-            self.number = Some(last.max(heard));
+    fn end(&mut self, payload: &[u8], last: Option<u64>) -> Option<RemoteEvent> {
+        if let (Some(received), Some(last)) = (self.number, last) {
+            self.queue.lose(last.saturating_sub(received));
+            self.number = Some(last.max(received));
         }
-        serde_json::from_slice(payload).ok().map(Told::End)
+        serde_json::from_slice(payload).ok().map(RemoteEvent::End)
     }
 
     /// Decodes a tick if its pose came before it; gaps in the numbers are counted as lost.
-    fn tick(&mut self, payload: &[u8], number: Option<u64>) -> Option<Told> {
+    fn tick(&mut self, payload: &[u8], number: Option<u64>) -> Option<RemoteEvent> {
         if let Some(number) = number {
             let missing = self.number.map_or(0, |last| number.saturating_sub(last).saturating_sub(1));
             self.queue.lose(missing);
@@ -343,7 +345,7 @@ impl Ear {
         if record.is_none() {
             self.queue.lose(1);
         }
-        record.map(Told::Tick)
+        record.map(RemoteEvent::Tick)
     }
 }
 

@@ -111,7 +111,7 @@ impl Request {
     #[must_use]
     pub fn of_ask(ask: Ask) -> Option<Self> {
         match ask {
-            Ask::Watch { .. } | Ask::LookAway | Ask::Swap { .. } | Ask::MachineStop => None,
+            Ask::Watch { .. } | Ask::Unwatch | Ask::Swap { .. } | Ask::MachineStop => None,
             Ask::Set { values } => Some(Request::Set { values }),
             Ask::Weight { model, weight } => Some(Request::Weight { model, weight }),
             Ask::Stop => Some(Request::Stop),
@@ -181,7 +181,7 @@ pub enum Refusal {
 
 /// Replay protection: accepts each request once, but emergency stops always, because a repeated stop is safe.
 #[derive(Debug)]
-pub struct Gate {
+pub struct AdmissionControl {
     began: u64,
     since: Instant,
     /// Sessions by right and member, so that no member can exhaust numbers or capacity of another.
@@ -208,7 +208,7 @@ struct Last {
     at_ms: u64,
 }
 
-impl Default for Gate {
+impl Default for AdmissionControl {
     fn default() -> Self {
         let began = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
         #[allow(clippy::cast_possible_truncation)] // in the year 2554
@@ -222,7 +222,7 @@ impl Default for Gate {
     }
 }
 
-impl Gate {
+impl AdmissionControl {
     /// Returns a ticket for new requests.
     #[must_use]
     pub fn ticket(&self) -> Ticket {
@@ -254,27 +254,27 @@ impl Gate {
         if payload.len() > MAX_REQUEST_BYTES {
             return Err(Refusal::TooLong);
         }
-        let (member, letter) = letter_on(key, payload).ok_or(Refusal::Malformed)?;
+        let (member, numbered) = numbered_on(key, payload).ok_or(Refusal::Malformed)?;
         let now = self.ticket();
-        let right = letter.request.right();
+        let right = numbered.request.right();
         // An emergency stop applies to any run.
         let is_meant = match right {
-            Right::Watch => return Ok(letter.request),
-            Right::Operate => run != 0 && letter.run == run,
-            Right::Own => letter.run == run,
+            Right::Watch => return Ok(numbered.request),
+            Right::Operate => run != 0 && numbered.run == run,
+            Right::Own => numbered.run == run,
         };
-        let is_fresh = right != Right::Own || now.at_ms.saturating_sub(letter.ticket.at_ms) <= FRESH_MS;
-        if letter.ticket.began != now.began || letter.ticket.at_ms > now.at_ms || !is_fresh {
+        let is_fresh = right != Right::Own || now.at_ms.saturating_sub(numbered.ticket.at_ms) <= FRESH_MS;
+        if numbered.ticket.began != now.began || numbered.ticket.at_ms > now.at_ms || !is_fresh {
             return Err(Refusal::Expired);
         }
-        self.use_up((right, member), &letter)?;
-        if is_meant { Ok(letter.request) } else { Err(Refusal::Stale) }
+        self.use_up((right, member), &numbered)?;
+        if is_meant { Ok(numbered.request) } else { Err(Refusal::Stale) }
     }
 
     /// Rejects a replayed number, and stores the new one.
-    fn use_up(&mut self, member: (Right, Name), letter: &NumberedRequest) -> Result<(), Refusal> {
+    fn use_up(&mut self, member: (Right, Name), numbered: &NumberedRequest) -> Result<(), Refusal> {
         if !self.members.contains_key(&member) {
-            if letter.ticket.at_ms < self.forgotten_ms {
+            if numbered.ticket.at_ms < self.forgotten_ms {
                 return Err(Refusal::Expired);
             }
             if self.members.len() >= MOST_MEMBERS {
@@ -286,9 +286,9 @@ impl Gate {
             }
         }
         let Sessions { last, forgotten_ms, asked_ms } = self.members.entry(member).or_default();
-        match last.get(&letter.session) {
-            Some(before) if letter.number <= before.number => return Err(Refusal::Replayed),
-            None if letter.ticket.at_ms < *forgotten_ms => return Err(Refusal::Expired),
+        match last.get(&numbered.session) {
+            Some(before) if numbered.number <= before.number => return Err(Refusal::Replayed),
+            None if numbered.ticket.at_ms < *forgotten_ms => return Err(Refusal::Expired),
             Some(_) => {}
             None if last.len() >= MOST_SESSIONS => {
                 let oldest = last.iter().min_by_key(|(_, last)| last.at_ms);
@@ -299,8 +299,8 @@ impl Gate {
             }
             None => {}
         }
-        *asked_ms = letter.ticket.at_ms.max(*asked_ms);
-        last.insert(letter.session.clone(), Last { number: letter.number, at_ms: letter.ticket.at_ms });
+        *asked_ms = numbered.ticket.at_ms.max(*asked_ms);
+        last.insert(numbered.session.clone(), Last { number: numbered.number, at_ms: numbered.ticket.at_ms });
         Ok(())
     }
 }
@@ -308,23 +308,23 @@ impl Gate {
 /// Returns whether a payload on its key is an emergency stop; needs no state and no lock of a gate.
 #[must_use]
 pub fn is_emergency_stop(key: &str, payload: &[u8]) -> bool {
-    letter_on(key, payload).is_some_and(|(_, letter)| letter.request == Request::EmergencyStop)
+    numbered_on(key, payload).is_some_and(|(_, numbered)| numbered.request == Request::EmergencyStop)
 }
 
 /// Parses a request and its member, if it belongs on its key.
-fn letter_on(key: &str, payload: &[u8]) -> Option<(Name, NumberedRequest)> {
-    let letter = exactly(payload)?;
+fn numbered_on(key: &str, payload: &[u8]) -> Option<(Name, NumberedRequest)> {
+    let numbered = exactly(payload)?;
     let (key, member) = key.rsplit_once('/')?;
     let member = Name::new(member).ok()?;
-    let belongs = key.strip_suffix(letter.request.key())?.ends_with('/');
-    (belongs && (1..=64).contains(&letter.session.len())).then_some((member, letter))
+    let belongs = key.strip_suffix(numbered.request.key())?.ends_with('/');
+    (belongs && (1..=64).contains(&numbered.session.len())).then_some((member, numbered))
 }
 
 /// Parses strictly: rejects unknown keys at any depth.
 fn exactly(payload: &[u8]) -> Option<NumberedRequest> {
     let said: serde_json::Value = serde_json::from_slice(payload).ok()?;
-    let letter: NumberedRequest = serde_json::from_slice(payload).ok()?;
-    (serde_json::to_value(&letter).ok()? == said).then_some(letter)
+    let numbered: NumberedRequest = serde_json::from_slice(payload).ok()?;
+    (serde_json::to_value(&numbered).ok()? == said).then_some(numbered)
 }
 
 #[cfg(test)]
@@ -335,46 +335,53 @@ mod tests {
         format!("flotor/a/{}/{member}", request.key())
     }
 
-    fn letter(gate: &Gate, session: &str, number: u64, run: u32, request: &Request) -> NumberedRequest {
-        let (session, request, ticket) = (session.to_owned(), request.clone(), gate.ticket());
+    fn numbered(
+        admission: &AdmissionControl,
+        session: &str,
+        number: u64,
+        run: u32,
+        request: &Request,
+    ) -> NumberedRequest {
+        let (session, request, ticket) = (session.to_owned(), request.clone(), admission.ticket());
         NumberedRequest { session, number, run, ticket, request }
     }
 
     /// A letter of ada's on its key.
     fn ask(
-        gate: &mut Gate,
+        admission: &mut AdmissionControl,
         number: u64,
         run: u32,
         request: Request,
         current: u32,
     ) -> Result<Request, Refusal> {
-        let letter = letter(gate, "one", number, run, &request);
-        gate.admit(&key(&request, "ada"), &letter.to_bytes(), current)
+        let numbered = numbered(admission, "one", number, run, &request);
+        admission.admit(&key(&request, "ada"), &numbered.to_bytes(), current)
     }
 
     #[test]
     fn a_letter_is_valid_once_and_for_its_run() {
-        let mut gate = Gate::default();
-        assert_eq!(ask(&mut gate, 1, 7, Request::Stop, 7), Ok(Request::Stop));
-        assert_eq!(ask(&mut gate, 1, 7, Request::Stop, 7), Err(Refusal::Replayed));
-        assert_eq!(ask(&mut gate, 2, 7, Request::Stop, 8), Err(Refusal::Stale));
-        assert_eq!(ask(&mut gate, 3, 0, Request::Stop, 0), Err(Refusal::Stale));
-        assert_eq!(ask(&mut gate, 4, 7, Request::EmergencyStop, 8), Ok(Request::EmergencyStop));
+        let mut admission = AdmissionControl::default();
+        assert_eq!(ask(&mut admission, 1, 7, Request::Stop, 7), Ok(Request::Stop));
+        assert_eq!(ask(&mut admission, 1, 7, Request::Stop, 7), Err(Refusal::Replayed));
+        assert_eq!(ask(&mut admission, 2, 7, Request::Stop, 8), Err(Refusal::Stale));
+        assert_eq!(ask(&mut admission, 3, 0, Request::Stop, 0), Err(Refusal::Stale));
+        assert_eq!(ask(&mut admission, 4, 7, Request::EmergencyStop, 8), Ok(Request::EmergencyStop));
         // Starting and releasing are for the run that was seen, too.
-        assert_eq!(ask(&mut gate, 5, 0, Request::Start, 0), Ok(Request::Start));
-        assert_eq!(ask(&mut gate, 6, 7, Request::Release, 8), Err(Refusal::Stale));
-        let refused: Vec<_> = gate.refused().iter().map(|(refusal, count)| (*refusal, *count)).collect();
+        assert_eq!(ask(&mut admission, 5, 0, Request::Start, 0), Ok(Request::Start));
+        assert_eq!(ask(&mut admission, 6, 7, Request::Release, 8), Err(Refusal::Stale));
+        let refused: Vec<_> = admission.refused().iter().map(|(refusal, count)| (*refusal, *count)).collect();
         assert_eq!(refused, [(Refusal::Replayed, 1), (Refusal::Stale, 3)]);
     }
 
     #[test]
     fn a_letter_is_of_one_start_of_the_bridge_and_starting_and_releasing_of_ten_seconds() {
-        let mut gate = Gate::default();
-        gate.since -= std::time::Duration::from_secs(60);
+        let mut admission = AdmissionControl::default();
+        admission.since -= std::time::Duration::from_secs(60);
         for request in [Request::Stop, Request::Start, Request::Release] {
-            let of = |ticket| NumberedRequest { ticket, ..letter(&gate, "one", 9, 7, &request) }.to_bytes();
-            let now = gate.ticket();
-            let letters = [
+            let of =
+                |ticket| NumberedRequest { ticket, ..numbered(&admission, "one", 9, 7, &request) }.to_bytes();
+            let now = admission.ticket();
+            let numbered_requests = [
                 (Ticket { began: now.began - 1, ..now }, Err(Refusal::Expired)),
                 (Ticket { at_ms: now.at_ms + 60_000, ..now }, Err(Refusal::Expired)),
                 (
@@ -382,15 +389,15 @@ mod tests {
                     if request == Request::Stop { Ok(request.clone()) } else { Err(Refusal::Expired) },
                 ),
             ];
-            for (letter, expected) in letters.map(|(ticket, expected)| (of(ticket), expected)) {
-                assert_eq!(gate.admit(&key(&request, "ada"), &letter, 7), expected, "{request:?}");
+            for (numbered, expected) in numbered_requests.map(|(ticket, expected)| (of(ticket), expected)) {
+                assert_eq!(admission.admit(&key(&request, "ada"), &numbered, 7), expected, "{request:?}");
             }
         }
     }
 
     #[test]
     fn a_request_on_the_key_of_another_is_refused() {
-        let mut gate = Gate::default();
+        let mut admission = AdmissionControl::default();
         for request in [
             Request::EmergencyStop,
             Request::Set { values: Vec::new() },
@@ -399,13 +406,13 @@ mod tests {
             Request::Start,
             Request::Release,
         ] {
-            let payload = letter(&gate, "one", 9, 7, &request).to_bytes();
+            let payload = numbered(&admission, "one", 9, 7, &request).to_bytes();
             let others = Right::ALL.into_iter().flat_map(Right::keys).filter(|key| **key != request.key());
             let wrong = others.map(|key| format!("flotor/a/{key}/ada"));
             let nobody = ["", "*", "**", "Ada", "a/b"].map(|member| key(&request, member));
             for wrong in wrong.chain(nobody).chain([format!("flotor/a/{}", request.key())]) {
                 assert_eq!(
-                    gate.admit(&wrong, &payload, 7),
+                    admission.admit(&wrong, &payload, 7),
                     Err(Refusal::Malformed),
                     "{request:?} on {wrong}"
                 );
@@ -415,16 +422,16 @@ mod tests {
 
     #[test]
     fn what_is_no_letter_is_refused_and_counted() {
-        let mut gate = Gate::default();
+        let mut admission = AdmissionControl::default();
         let stop = Request::Stop;
-        let good = letter(&gate, "one", 1, 7, &stop).to_bytes();
+        let good = numbered(&admission, "one", 1, 7, &stop).to_bytes();
         for nonsense in [b"".as_slice(), b"{}", b"\xff\xfe", b"[[[[", &good[1..]] {
-            assert_eq!(gate.admit(&key(&stop, "ada"), nonsense, 7), Err(Refusal::Malformed));
+            assert_eq!(admission.admit(&key(&stop, "ada"), nonsense, 7), Err(Refusal::Malformed));
         }
         let long = vec![b' '; MAX_REQUEST_BYTES + 1];
-        assert_eq!(gate.admit(&key(&stop, "ada"), &long, 7), Err(Refusal::TooLong));
-        assert_eq!(gate.refused().values().sum::<u64>(), 6);
-        assert_eq!(gate.admit(&key(&stop, "ada"), &good, 7), Ok(Request::Stop));
+        assert_eq!(admission.admit(&key(&stop, "ada"), &long, 7), Err(Refusal::TooLong));
+        assert_eq!(admission.refused().values().sum::<u64>(), 6);
+        assert_eq!(admission.admit(&key(&stop, "ada"), &good, 7), Ok(Request::Stop));
     }
 
     #[test]
@@ -439,69 +446,73 @@ mod tests {
             Request::Start,
             Request::Release,
         ] {
-            let mut gate = Gate::default();
-            let good = letter(&gate, "one", 1, 7, &request).to_bytes();
+            let mut admission = AdmissionControl::default();
+            let good = numbered(&admission, "one", 1, 7, &request).to_bytes();
             let text = String::from_utf8(good.clone()).unwrap();
             // After every opening brace: in the letter, its ticket, its request, a value of that.
             for (at, _) in text.match_indices('{') {
                 let mut more = good.clone();
                 more.splice(at + 1..=at, br#""extra":1,"#.iter().copied());
                 assert_eq!(
-                    gate.admit(&key(&request, "ada"), &more, 7),
+                    admission.admit(&key(&request, "ada"), &more, 7),
                     Err(Refusal::Malformed),
                     "{request:?}"
                 );
             }
-            assert_eq!(gate.admit(&key(&request, "ada"), &good, 7), Ok(request));
+            assert_eq!(admission.admit(&key(&request, "ada"), &good, 7), Ok(request));
         }
     }
 
     #[test]
     fn no_flood_of_sessions_or_names_fills_the_memory_or_keeps_another_member_out() {
-        let mut gate = Gate::default();
+        let mut admission = AdmissionControl::default();
         let release = Request::Release;
-        let old = letter(&gate, "old", 1, 7, &release).to_bytes();
-        assert_eq!(gate.admit(&key(&release, "bob"), &old, 7), Ok(Request::Release));
+        let old = numbered(&admission, "old", 1, 7, &release).to_bytes();
+        assert_eq!(admission.admit(&key(&release, "bob"), &old, 7), Ok(Request::Release));
         std::thread::sleep(std::time::Duration::from_millis(3));
         for session in 0..4 * MOST_SESSIONS {
             if session % 32 == 0 {
                 std::thread::sleep(std::time::Duration::from_millis(1)); // no member has so many in a millisecond
             }
-            let payload = letter(&gate, &session.to_string(), 1, 7, &release).to_bytes();
-            assert_eq!(gate.admit(&key(&release, "bob"), &payload, 7), Ok(Request::Release));
+            let payload = numbered(&admission, &session.to_string(), 1, 7, &release).to_bytes();
+            assert_eq!(admission.admit(&key(&release, "bob"), &payload, 7), Ok(Request::Release));
         }
         assert_eq!(
-            gate.admit(&key(&release, "bob"), &old, 7),
+            admission.admit(&key(&release, "bob"), &old, 7),
             Err(Refusal::Expired),
             "forgotten, not valid again"
         );
-        assert!(gate.members.values().all(|sessions| sessions.last.len() <= MOST_SESSIONS));
-        let payload = letter(&gate, "one", 1, 7, &release).to_bytes();
-        assert_eq!(gate.admit(&key(&release, "ada"), &payload, 7), Ok(Request::Release));
+        assert!(admission.members.values().all(|sessions| sessions.last.len() <= MOST_SESSIONS));
+        let payload = numbered(&admission, "one", 1, 7, &release).to_bytes();
+        assert_eq!(admission.admit(&key(&release, "ada"), &payload, 7), Ok(Request::Release));
         std::thread::sleep(std::time::Duration::from_millis(3));
-        let fresh = letter(&gate, "one", 1, 7, &release).to_bytes();
+        let fresh = numbered(&admission, "one", 1, 7, &release).to_bytes();
         for name in 0..2 * MOST_MEMBERS {
-            let _ = gate.admit(&key(&release, &format!("n{name}")), &fresh, 7);
+            let _ = admission.admit(&key(&release, &format!("n{name}")), &fresh, 7);
         }
-        assert!(gate.members.len() <= MOST_MEMBERS);
-        assert_eq!(gate.admit(&key(&release, "ada"), &payload, 7), Err(Refusal::Expired), "not valid again");
+        assert!(admission.members.len() <= MOST_MEMBERS);
+        assert_eq!(
+            admission.admit(&key(&release, "ada"), &payload, 7),
+            Err(Refusal::Expired),
+            "not valid again"
+        );
         std::thread::sleep(std::time::Duration::from_millis(3));
         // Neither who was known nor who is new is kept out.
-        let payload = letter(&gate, "one", 2, 7, &release).to_bytes();
+        let payload = numbered(&admission, "one", 2, 7, &release).to_bytes();
         for member in ["ada", "grace"] {
-            assert_eq!(gate.admit(&key(&release, member), &payload, 7), Ok(Request::Release));
+            assert_eq!(admission.admit(&key(&release, member), &payload, 7), Ok(Request::Release));
         }
     }
 
     #[test]
     fn numbers_up_to_the_last_overflow_nothing() {
-        let mut gate = Gate::default();
+        let mut admission = AdmissionControl::default();
         let stop = Request::Stop;
         for (number, at_ms) in [(u64::MAX, u64::MAX), (u64::MAX, 0), (0, 0)] {
-            let ticket = Ticket { at_ms, ..gate.ticket() };
+            let ticket = Ticket { at_ms, ..admission.ticket() };
             let payload =
-                NumberedRequest { ticket, ..letter(&gate, "one", number, u32::MAX, &stop) }.to_bytes();
-            let _ = gate.admit(&key(&stop, "ada"), &payload, 7);
+                NumberedRequest { ticket, ..numbered(&admission, "one", number, u32::MAX, &stop) }.to_bytes();
+            let _ = admission.admit(&key(&stop, "ada"), &payload, 7);
         }
     }
 }

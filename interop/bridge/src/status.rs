@@ -1,6 +1,6 @@
 //! Status of a bridge, with losses and refusals.
 
-use crate::couple::Carried;
+use crate::couple::MessageCounts;
 use crate::request::{Refusal, Right, Ticket};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -28,7 +28,7 @@ pub struct Status {
     pub ticket: Ticket,
     /// Message counts by coupling with another host.
     #[serde(default)]
-    pub couplings: BTreeMap<String, Carried>,
+    pub couplings: BTreeMap<String, MessageCounts>,
 }
 
 /// State of a bridge.

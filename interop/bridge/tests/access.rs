@@ -50,12 +50,12 @@ fn rights_are_what_the_keys_say() {
         let remote = visit(folder.path(), who, &endpoint, &bridge.name);
         let (greeting, _) = remote.wait_for_run(&NEVER).unwrap().expect("every member may see");
         assert_eq!(greeting.title, "Far away", "{who}");
-        let errand = remote.errand();
+        let requests = remote.requests();
         let before = host.asked.0.lock().unwrap().len();
-        assert_eq!(errand.run(weight()).is_ok(), may_operate, "{who}");
+        assert_eq!(requests.run(weight()).is_ok(), may_operate, "{who}");
         assert_eq!(host.asked.0.lock().unwrap().len() > before, may_operate, "{who}");
-        assert_eq!(errand.run(Request::EmergencyStop), Ok(()), "{who}: anybody presses it");
-        assert_eq!(errand.run(Request::Release).is_ok(), may_own, "{who}");
+        assert_eq!(requests.run(Request::EmergencyStop), Ok(()), "{who}: anybody presses it");
+        assert_eq!(requests.run(Request::Release).is_ok(), may_own, "{who}");
     }
 }
 
@@ -77,7 +77,7 @@ fn who_is_no_member_is_refused() {
             Ok(session) => {
                 let remote = Remote::listen(&session, &bridge.name).unwrap();
                 assert_eq!(remote.status().unwrap(), None, "nothing is told");
-                assert!(remote.errand().run(Request::EmergencyStop).is_err());
+                assert!(remote.requests().run(Request::EmergencyStop).is_err());
             }
         }
     }
@@ -130,7 +130,7 @@ fn members_ask_under_their_own_names_only() {
     let status = remote.status().unwrap().expect("every member may see");
     let ask = |member: &str| {
         let request = Request::Weight { model: "spring".to_owned(), weight: 0.5 };
-        let letter = NumberedRequest {
+        let numbered = NumberedRequest {
             session: "tester".to_owned(),
             number: 1,
             run: status.run,
@@ -139,7 +139,7 @@ fn members_ask_under_their_own_names_only() {
         };
         let key = bridge.name.key(&format!("ask/weight/{member}"));
         let answers =
-            session.get(key).payload(letter.to_bytes()).timeout(Duration::from_secs(1)).wait().unwrap();
+            session.get(key).payload(numbered.to_bytes()).timeout(Duration::from_secs(1)).wait().unwrap();
         answers.iter().filter(|answer| answer.result().is_ok()).count()
     };
     assert_eq!((ask("ada"), ask("**"), ask("grace")), (0, 0, 1));

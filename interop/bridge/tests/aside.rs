@@ -8,7 +8,7 @@ use common::process::Owned;
 use common::{free_port, is_full_size, program, wait_until};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, Link, LinkOptions, open};
-use flotor_bridge::remote::{Remote, Told};
+use flotor_bridge::remote::{Remote, RemoteEvent};
 use flotor_bridge::request::{MAX_REQUEST_BYTES, NumberedRequest, Refusal, Request};
 use flotor_live::SetValue;
 use rustix::process::Signal;
@@ -149,7 +149,7 @@ fn run_with_bridge(program: &Path, clock: &str, duration_s: u64, fate: Fate) -> 
         let (heard, is_over) = (&heard, &is_over);
         let listener = scope.spawn(move || {
             while !is_over.load(Ordering::Relaxed) {
-                if let Some(Told::Tick(_)) = remote.next(Duration::from_millis(20)) {
+                if let Some(RemoteEvent::Tick(_)) = remote.next(Duration::from_millis(20)) {
                     heard.fetch_add(1, Ordering::Relaxed);
                 }
             }
@@ -185,7 +185,7 @@ fn flood(session: &Link, run: u32, is_over: &AtomicBool) {
     let request = Request::Set { values: vec![SetValue { plugin, parameter, value }] };
     let remote = Remote::listen(session, &Name::new(NAME).unwrap()).unwrap();
     let ticket = remote.status().unwrap().expect("the bridge is there").ticket;
-    let letter = |number: u64, request: &Request| {
+    let numbered = |number: u64, request: &Request| {
         NumberedRequest { session: "flood".to_owned(), number, run, ticket, request: request.clone() }
             .to_bytes()
     };
@@ -196,7 +196,7 @@ fn flood(session: &Link, run: u32, is_over: &AtomicBool) {
         }
         for _ in 0..BURST {
             // The same number again: a replay.
-            for payload in [letter(number, &request), b"{".to_vec(), vec![0xff; 300]] {
+            for payload in [numbered(number, &request), b"{".to_vec(), vec![0xff; 300]] {
                 let asked = session.get(key("ask/set/anyone")).payload(payload).timeout(FORGOTTEN);
                 asked.callback(|_| {}).wait().unwrap();
             }

@@ -4,9 +4,9 @@ mod common;
 
 use common::{Bridge, FakeHost, PATIENCE, SLOW, description, is_full_size, record, wait_until};
 use flotor_bridge::attach::attach;
-use flotor_bridge::keep::{RecordingEnd, keep};
 use flotor_bridge::link::{End, LinkOptions, open};
-use flotor_bridge::remote::{Remote, Told, bridges};
+use flotor_bridge::record::{RecordingEnd, record as record_remote};
+use flotor_bridge::remote::{Remote, RemoteEvent, bridges};
 use flotor_bridge::request::{MAX_REQUEST_BYTES, NumberedRequest, Refusal, Request, Right};
 use flotor_bridge::status::State;
 use flotor_live::{Ask, Client, Directory, Event, SetValue};
@@ -32,7 +32,7 @@ fn listening(bridge: &Bridge, host: &FakeHost) -> Remote {
     wait_until("the visitor hears", || {
         host.publication().observe(&record(probe));
         probe += 1;
-        matches!(remote.next(Duration::from_millis(50)), Some(Told::Tick(_)))
+        matches!(remote.next(Duration::from_millis(50)), Some(RemoteEvent::Tick(_)))
     });
     remote
 }
@@ -53,7 +53,7 @@ fn every_tick_arrives_to_the_bit() {
             let mut heard = Vec::new();
             let until = Instant::now() + Duration::from_millis(total) + PATIENCE;
             while heard.len() < total as usize && Instant::now() < until {
-                if let Some(Told::Tick(tick)) = remote.next(Duration::from_millis(100))
+                if let Some(RemoteEvent::Tick(tick)) = remote.next(Duration::from_millis(100))
                     && tick.tick < 1 << 40
                 {
                     heard.push(tick);
@@ -89,10 +89,10 @@ fn what_the_host_drops_and_what_a_slow_visitor_misses_are_losses_and_the_end_is_
     host.end("enough");
     let (mut heard, mut words) = (0, None);
     wait_until("the end is heard", || {
-        while let Some(told) = remote.next(Duration::from_millis(10)) {
-            match told {
-                Told::Tick(tick) if tick.tick < 1 << 40 => heard += 1,
-                Told::End(end) => words = Some(end.words),
+        while let Some(event) = remote.next(Duration::from_millis(10)) {
+            match event {
+                RemoteEvent::Tick(tick) if tick.tick < 1 << 40 => heard += 1,
+                RemoteEvent::End(end) => words = Some(end.words),
                 _ => {}
             }
         }
@@ -133,14 +133,14 @@ fn requests_reach_the_host_and_its_message_come_back() {
     let bridge = Bridge::start(&host.directory, Right::Operate);
     let remote = bridge.visit();
     remote.wait_for_run(&NEVER).unwrap();
-    let errand = remote.errand();
-    assert_eq!(errand.run(set("gamma_n")), Ok(()));
-    assert_eq!(errand.run(set("gamma")), Err("no parameter `gamma`; did you mean `gamma_n`?".to_owned()));
-    assert_eq!(errand.run(Request::EmergencyStop), Ok(()));
+    let requests = remote.requests();
+    assert_eq!(requests.run(set("gamma_n")), Ok(()));
+    assert_eq!(requests.run(set("gamma")), Err("no parameter `gamma`; did you mean `gamma_n`?".to_owned()));
+    assert_eq!(requests.run(Request::EmergencyStop), Ok(()));
     let asked = host.asked.0.lock().unwrap().clone();
     assert!(matches!(asked.as_slice(), [Ask::Set { .. }, Ask::Set { .. }, Ask::MachineStop]), "{asked:?}");
     // Starting is the owner's, and this bridge does not let anybody.
-    let refused = errand.run(Request::Start).unwrap_err();
+    let refused = requests.run(Request::Start).unwrap_err();
     assert!(refused.contains("does not take `start`"), "{refused}");
 }
 
@@ -150,12 +150,12 @@ fn an_emergency_stop_stays_until_its_owner_releases_it() {
     let bridge = Bridge::start(&host.directory, Right::Own);
     let remote = bridge.visit();
     remote.wait_for_run(&NEVER).unwrap();
-    let errand = remote.errand();
+    let requests = remote.requests();
     let state = || remote.status().unwrap().expect("the bridge is there").state;
-    assert_eq!(errand.run(Request::EmergencyStop), Ok(()));
+    assert_eq!(requests.run(Request::EmergencyStop), Ok(()));
     assert_eq!(state(), State::EmergencyStopped);
-    assert!(errand.run(Request::Start).unwrap_err().contains("its owner releases it first"));
-    assert_eq!(errand.run(Request::Release), Ok(()));
+    assert!(requests.run(Request::Start).unwrap_err().contains("its owner releases it first"));
+    assert_eq!(requests.run(Request::Release), Ok(()));
     assert_eq!(state(), State::Running);
 }
 
@@ -174,20 +174,20 @@ fn malformed_long_stale_and_replayed_requests_are_refused_and_counted() {
         answer.refused
     };
     let ticket = remote.status().unwrap().expect("the bridge is there").ticket;
-    let letter = |number, run, request| {
+    let numbered = |number, run, request| {
         NumberedRequest { session: "tester".to_owned(), number, run, ticket, request }.to_bytes()
     };
-    let good = letter(5, greeting.process, Request::Stop);
+    let good = numbered(5, greeting.process, Request::Stop);
     assert_eq!(ask("ask/stop/anyone", good.clone()), None);
     let before = host.asked.0.lock().unwrap().len();
     assert!(ask("ask/stop/anyone", good).is_some(), "replayed");
-    assert!(ask("ask/stop/anyone", letter(4, greeting.process, Request::Stop)).is_some(), "older");
+    assert!(ask("ask/stop/anyone", numbered(4, greeting.process, Request::Stop)).is_some(), "older");
     assert!(
-        ask("ask/stop/anyone", letter(6, greeting.process + 1, Request::Stop)).is_some(),
+        ask("ask/stop/anyone", numbered(6, greeting.process + 1, Request::Stop)).is_some(),
         "of another run"
     );
     assert!(
-        ask("ask/emergency-stop/anyone", letter(7, greeting.process, set("gamma_n"))).is_some(),
+        ask("ask/emergency-stop/anyone", numbered(7, greeting.process, set("gamma_n"))).is_some(),
         "through the wrong door"
     );
     assert!(ask("ask/set/anyone", b"{".to_vec()).is_some(), "no letter");
@@ -207,15 +207,15 @@ fn a_flood_of_requests_is_cut_short_and_the_emergency_stop_gets_past() {
     remote.wait_for_run(&NEVER).unwrap();
     std::thread::scope(|scope| {
         for _ in 0..64 {
-            let errand = remote.errand();
+            let requests = remote.requests();
             let request = Request::Weight { model: SLOW.to_owned(), weight: 0.5 };
-            scope.spawn(move || errand.run(request));
+            scope.spawn(move || requests.run(request));
         }
         wait_until("requests are refused", || {
             let status = remote.status().unwrap().expect("the bridge is there");
             status.refused.contains_key(&Refusal::Busy)
         });
-        assert_eq!(remote.errand().run(Request::EmergencyStop), Ok(()));
+        assert_eq!(remote.requests().run(Request::EmergencyStop), Ok(()));
     });
     let asked = host.asked.0.lock().unwrap();
     assert!(asked.contains(&Ask::MachineStop) && asked.len() < 64, "{} requests", asked.len());
@@ -234,8 +234,8 @@ fn a_remote_run_can_be_watched_as_if_it_ran_here() {
         wait_until("the run appears", || !here.runs().is_empty());
         let mut client = Client::find(&here).unwrap();
         assert_eq!(client.greeting().title, "Far away");
-        client.asker().ask(Ask::Watch { every: 1 }).unwrap();
-        client.asker().ask(Ask::Weight { model: "spring".to_owned(), weight: 0.5 }).unwrap();
+        client.request_client().ask(Ask::Watch { every: 1 }).unwrap();
+        client.request_client().ask(Ask::Weight { model: "spring".to_owned(), weight: 0.5 }).unwrap();
         let mut tick = 0;
         let mut seen = 0;
         wait_until("ticks appear", || {
@@ -272,7 +272,7 @@ fn a_remote_run_is_recorded_whole_and_the_bridge_may_die() {
     let remote = listening(&bridge, &host);
     let recording = file.clone();
     let kept = std::thread::scope(|scope| {
-        let kept = scope.spawn(move || keep(&remote, &recording, &NEVER).unwrap());
+        let kept = scope.spawn(move || record_remote(&remote, &recording, &NEVER).unwrap());
         wait_until("the recording begins", || file.exists());
         host.ticks(0..500);
         host.end("enough");
@@ -294,7 +294,7 @@ fn a_remote_run_is_recorded_whole_and_the_bridge_may_die() {
     let remote = listening(&bridge, &host);
     let recording = file.clone();
     let kept = std::thread::scope(|scope| {
-        let kept = scope.spawn(move || keep(&remote, &recording, &NEVER).unwrap());
+        let kept = scope.spawn(move || record_remote(&remote, &recording, &NEVER).unwrap());
         wait_until("the recording begins", || file.exists());
         drop(bridge);
         host.ticks(0..100); // the host does not mind
@@ -325,8 +325,8 @@ fn without_keys_only_the_bridge_tells_what_becomes_of_a_run() {
     drop(_token);
     let until = std::time::Instant::now() + Duration::from_millis(500);
     while std::time::Instant::now() < until {
-        let told = listener.next(Duration::from_millis(50));
-        assert!(told.is_none() || matches!(told, Some(Told::Tick(_))), "{told:?}");
+        let event = listener.next(Duration::from_millis(50));
+        assert!(event.is_none() || matches!(event, Some(RemoteEvent::Tick(_))), "{event:?}");
     }
     assert_eq!(listener.lost(), 0, "no forged tick was counted");
 }

@@ -8,7 +8,7 @@ use common::process::Owned;
 use common::{free_port, is_full_size, program, wait_until};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
-use flotor_bridge::remote::{Errand, Remote};
+use flotor_bridge::remote::{Remote, RequestClient};
 use flotor_bridge::request::Request;
 use flotor_live::{Directory, SetValue};
 use std::net::TcpStream;
@@ -27,7 +27,7 @@ struct Machine {
 struct Bridge {
     process: Owned,
     endpoint: String,
-    errand: Errand,
+    requests: RequestClient,
     remote: Remote,
 }
 
@@ -62,7 +62,7 @@ impl Machine {
         wait_until("the bridge listens", || TcpStream::connect(("127.0.0.1", port)).is_ok());
         let remote = visit(&endpoint, name);
         wait_until("the bridge is seen", || remote.status().unwrap().is_some());
-        Bridge { process, endpoint, errand: remote.errand(), remote }
+        Bridge { process, endpoint, requests: remote.requests(), remote }
     }
 }
 
@@ -106,17 +106,17 @@ impl Trial {
         std::thread::sleep(after);
         match way {
             Way::Through(bridge) => {
-                assert_eq!(self.bridges[bridge].errand.run(Request::EmergencyStop), Ok(()))
+                assert_eq!(self.bridges[bridge].requests.run(Request::EmergencyStop), Ok(()))
             }
             Way::Killed(later) => {
-                let errand = self.bridges[0].errand.clone();
-                let asked = std::thread::spawn(move || errand.run(Request::EmergencyStop));
+                let requests = self.bridges[0].requests.clone();
+                let asked = std::thread::spawn(move || requests.run(Request::EmergencyStop));
                 std::thread::sleep(later);
                 self.bridges[0].process.signal(rustix::process::Signal::KILL);
                 // One that has died answers nobody: that is no "done", and a second press is.
                 if asked.join().unwrap().is_err() {
                     self.unanswered += 1;
-                    assert_eq!(self.bridges[1].errand.run(Request::EmergencyStop), Ok(()));
+                    assert_eq!(self.bridges[1].requests.run(Request::EmergencyStop), Ok(()));
                 }
                 self.bridges[0] = self.machine.bridge(&format!("lab{}", self.starts + 1));
             }
@@ -125,11 +125,11 @@ impl Trial {
             assert_eq!(run.wait().unwrap().code(), STOPPED, "{count} runs, {after:?}, {way:?}");
         }
         for bridge in &self.bridges {
-            let refused = bridge.errand.run(Request::Start).unwrap_err();
+            let refused = bridge.requests.run(Request::Start).unwrap_err();
             assert!(refused.contains("its owner releases it first"), "{refused}");
         }
         assert_eq!(stopped(self.machine.run()), STOPPED, "whatever became of a bridge");
-        assert_eq!(self.bridges[self.starts as usize % 2].errand.run(Request::Release), Ok(()));
+        assert_eq!(self.bridges[self.starts as usize % 2].requests.run(Request::Release), Ok(()));
     }
 }
 
@@ -182,7 +182,7 @@ fn a_host_that_does_not_confirm_makes_no_done() {
     let [frozen, other] = [machine.run(), machine.run()];
     wait_until("both run", || machine.directory().runs().len() == 2);
     frozen.signal_host(rustix::process::Signal::STOP);
-    let refused = bridge.errand.run(Request::EmergencyStop).unwrap_err();
+    let refused = bridge.requests.run(Request::EmergencyStop).unwrap_err();
     assert!(refused.contains(&format!("not confirmed by process {}", frozen.id())), "{refused}");
     assert_eq!(stopped(other), STOPPED);
     frozen.signal_host(rustix::process::Signal::CONT);
@@ -206,16 +206,16 @@ fn a_frozen_host_and_a_flood_for_it_delay_no_stop() {
         let values =
             vec![SetValue { plugin: "x".repeat(60_000), parameter: String::new(), value: String::new() }];
         for _ in 0..8 {
-            let (errand, values, is_over) = (bridge.remote.errand(), values.clone(), &is_over);
+            let (requests, values, is_over) = (bridge.remote.requests(), values.clone(), &is_over);
             scope.spawn(move || {
                 while !is_over.load(Ordering::Relaxed) {
-                    let _ = errand.run(Request::Set { values: values.clone() });
+                    let _ = requests.run(Request::Set { values: values.clone() });
                 }
             });
         }
         // Until the socket of the frozen host is full.
         std::thread::sleep(Duration::from_millis(1000));
-        let refused = visit(&bridge.endpoint, "lab").errand().run(Request::EmergencyStop).unwrap_err();
+        let refused = visit(&bridge.endpoint, "lab").requests().run(Request::EmergencyStop).unwrap_err();
         is_over.store(true, Ordering::Relaxed);
         assert!(refused.contains(&format!("not confirmed by process {}", frozen.id())), "{refused}");
     });
@@ -238,7 +238,7 @@ fn of_two_bridges_of_one_name_both_have_to_confirm() {
     let remote = Remote::listen(&link, &Name::new("lab").unwrap()).unwrap();
     let seen = || zenoh::Wait::wait(link.info().peers_zid()).count() == 2;
     wait_until("both are seen", seen);
-    assert!(remote.errand().run(Request::EmergencyStop).is_err());
+    assert!(remote.requests().run(Request::EmergencyStop).is_err());
     assert_eq!(stopped(other), STOPPED);
     frozen.signal_host(rustix::process::Signal::CONT);
     assert_eq!(stopped(frozen), STOPPED);

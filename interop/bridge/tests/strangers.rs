@@ -212,7 +212,7 @@ fn failed_connections_do_not_delay_the_stop_of_a_member_that_is_connected() {
             };
             let stop = |_| {
                 let since = Instant::now();
-                assert_eq!(remote.errand().run(Request::EmergencyStop), Ok(()));
+                assert_eq!(remote.requests().run(Request::EmergencyStop), Ok(()));
                 since.elapsed()
             };
             under(1, connect, || (0..STOPS).map(stop).collect::<Vec<Duration>>())

@@ -267,12 +267,12 @@ const LIAR: u64 = 99;
 type Lie = fn(u64, Dispatch) -> Dispatch;
 
 /// A handle on a swing that nobody moves, and energy that nobody has put in.
-fn swing(tick: u64, most_m: f64, frequency_hz: f64, told_j: f64, mut dispatch: Dispatch) -> Dispatch {
+fn swing(tick: u64, most_m: f64, frequency_hz: f64, passed_on_j: f64, mut dispatch: Dispatch) -> Dispatch {
     let rate = std::f64::consts::TAU * frequency_hz;
     let (sin, cos) = (rate * 1.0e-3 * tick as f64).sin_cos();
     dispatch.state.pose.position_m[2] = most_m * sin;
     dispatch.state.twist.linear_m_per_s[2] = most_m * rate * cos;
-    dispatch.state.told_j = told_j;
+    dispatch.state.passed_on_j = passed_on_j;
     dispatch
 }
 
@@ -282,7 +282,7 @@ const LIES: [(&str, Lie); 6] = [
     ("no energy", |tick, d| swing(tick, 0.002, 8.0, 0.0, d)),
     ("out of this world", |tick, mut d| {
         d.state.pose.position_m = [1.7e308; 3];
-        d.state.told_j = tick as f64;
+        d.state.passed_on_j = tick as f64;
         d
     }),
     ("the last of all runs", |tick, d| swing(tick, 0.01, 4.0, tick as f64, Dispatch { run: u64::MAX, ..d })),

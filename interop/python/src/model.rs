@@ -212,7 +212,7 @@ fn columns<'py>(py: Python<'py>, answers: &[Answer]) -> Columns<'py> {
             .into_pyarray(py)
     };
     let energies: Vec<f64> = answers.iter().map(|answer| answer.energy_j.unwrap_or(f64::NAN)).collect();
-    let statuses = answers.iter().map(|answer| answer.status.word()).collect();
+    let statuses = answers.iter().map(|answer| answer.status.name()).collect();
     let (forces, torques) = (three(|a| a.wrench.force_n), three(|a| a.wrench.torque_nm));
     (forces, torques, energies.into_pyarray(py), statuses)
 }

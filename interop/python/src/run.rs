@@ -14,7 +14,7 @@ pub(crate) fn plugins(folders: Vec<PathBuf>) -> Vec<(String, &'static str, Strin
     let registry = Registry::search(&folders);
     let found = registry.found().iter();
     found
-        .map(|found| (found.id.clone(), found.kind.word(), found.version.clone(), found.path.clone()))
+        .map(|found| (found.id.clone(), found.kind.name(), found.version.clone(), found.path.clone()))
         .collect()
 }
 

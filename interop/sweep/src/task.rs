@@ -325,7 +325,7 @@ fn is_pose(key: &str) -> bool {
 fn answered(answer: &Answer) -> Vec<Cell> {
     let wrench = answer.wrench.force_n.into_iter().chain(answer.wrench.torque_nm).map(Cell::number);
     let energy = Cell::number(answer.energy_j.unwrap_or(f64::NAN));
-    let words = [Cell::Word(answer.status.word().to_owned()), Cell::Word(String::new())];
+    let words = [Cell::Word(answer.status.name().to_owned()), Cell::Word(String::new())];
     wrench.chain([energy]).chain(words).collect()
 }
 

@@ -6,12 +6,12 @@
 use super::emergency::{Emergency, who};
 use super::station::{Station, json};
 use super::{Launcher, WaitNow};
-use crate::couple::{Carried, CoupleError};
+use crate::couple::{CoupleError, MessageCounts};
 use crate::keys::Name;
 use crate::link::LinkError;
-use crate::request::{Gate, MAX_REQUEST_BYTES, Refusal, Request, Right, is_emergency_stop};
+use crate::request::{AdmissionControl, MAX_REQUEST_BYTES, Refusal, Request, Right, is_emergency_stop};
 use crate::status::{State, Status};
-use flotor_live::{Answer, Asker, ChangeMessage, Client, Directory, Greeting, Latch, RefusalCause};
+use flotor_live::{Answer, ChangeMessage, Client, Directory, Greeting, Latch, RefusalCause, RequestClient};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -53,7 +53,7 @@ enum Asked {
 }
 
 struct Inside {
-    gate: Gate,
+    admission: AdmissionControl,
     status: Status,
     run: Option<Run>,
     launcher: Option<Launcher>,
@@ -67,7 +67,7 @@ struct Inside {
 struct Run {
     greeting: Greeting,
     description: Vec<u8>,
-    asker: Asker,
+    request_client: RequestClient,
     /// Pending requests to the host, by request number.
     open: BTreeMap<u64, (Query, Instant)>,
 }
@@ -141,7 +141,7 @@ impl RequestHandler {
         let emergency = Emergency::start(directory)?;
         let latch = emergency.latch().clone();
         let inside = Inside {
-            gate: Gate::default(),
+            admission: AdmissionControl::default(),
             status: Status { allow, ..Status::default() },
             run: None,
             launcher,
@@ -171,7 +171,7 @@ impl RequestHandler {
         inside.run = Some(Run {
             greeting: client.greeting().clone(),
             description: client.run().to_bytes(),
-            asker: client.asker(),
+            request_client: client.request_client(),
             open: BTreeMap::new(),
         });
     }
@@ -201,7 +201,7 @@ impl RequestHandler {
     }
 
     /// Updates the message counts of couplings.
-    pub(super) fn carried(&self, couplings: BTreeMap<String, Carried>) {
+    pub(super) fn carried(&self, couplings: BTreeMap<String, MessageCounts>) {
         self.lock().status.couplings = couplings;
     }
 
@@ -285,15 +285,15 @@ impl RequestHandler {
             }
             return;
         }
-        let letter = payload.map(|payload| payload.to_bytes()).unwrap_or_default();
+        let numbered = payload.map(|payload| payload.to_bytes()).unwrap_or_default();
         // A key pattern names no member, and is refused.
         let asked = query.key_expr().as_str();
-        if is_emergency_stop(asked, &letter) {
+        if is_emergency_stop(asked, &numbered) {
             let who = who(member(asked), &self.name);
-            drop(letter);
+            drop(numbered);
             self.emergency.press(&who, Box::new(move |refused| reply(&query, refused)));
         } else {
-            drop(letter);
+            drop(numbered);
             if line.try_send((Asked::Letter, query)).is_err() {
                 no_room.fetch_add(1, Ordering::Relaxed);
             }
@@ -302,10 +302,10 @@ impl RequestHandler {
 
     /// Admits a queued request and carries it out.
     fn admit(&self, query: Query) {
-        let letter = query.payload().map(|payload| payload.to_bytes().into_owned()).unwrap_or_default();
+        let numbered = query.payload().map(|payload| payload.to_bytes().into_owned()).unwrap_or_default();
         let mut inside = self.lock();
         let run = inside.status.run;
-        match inside.gate.admit(query.key_expr().as_str(), &letter, run) {
+        match inside.admission.admit(query.key_expr().as_str(), &numbered, run) {
             Err(refusal) => reply(&query, Some(refusal.to_string())),
             Ok(request) => inside.follow(&request, query),
         }
@@ -318,7 +318,7 @@ impl RequestHandler {
             (false, Some(_)) => State::Running,
             (false, None) => State::Waiting,
         };
-        let (mut refused, ticket) = (inside.gate.refused().clone(), inside.gate.ticket());
+        let (mut refused, ticket) = (inside.admission.refused().clone(), inside.admission.ticket());
         for (refusal, count) in [Refusal::Busy, Refusal::TooLong].into_iter().zip(&self.turned_away) {
             let count = count.load(Ordering::Relaxed);
             if count > 0 {
@@ -333,9 +333,9 @@ impl Inside {
     fn follow(&mut self, request: &Request, query: Query) {
         match (request.ask(), &mut self.run) {
             (Some(_), Some(run)) if run.open.len() >= MOST_OPEN => {
-                reply(&query, Some(self.gate.refuse(Refusal::Busy).to_string()));
+                reply(&query, Some(self.admission.refuse(Refusal::Busy).to_string()));
             }
-            (Some(ask), Some(run)) => match run.asker.ask(ask) {
+            (Some(ask), Some(run)) => match run.request_client.ask(ask) {
                 // The lock is held, so that the reply cannot come before the request is stored.
                 Ok(number) => {
                     run.open.insert(number, (query, Instant::now()));

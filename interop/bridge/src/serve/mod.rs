@@ -45,7 +45,7 @@ pub struct Service {
     pub launcher: Option<Launcher>,
 }
 
-/// Serves until `stop` is set. `tell` receives a line for people at each change.
+/// Serves until `stop` is set. `report_line` receives a line for people at each change.
 ///
 /// # Errors
 /// [`CoupleError`] of the network or of this machine.
@@ -54,7 +54,7 @@ pub fn serve(
     directory: &Directory,
     service: Service,
     stop: &AtomicBool,
-    tell: &mut dyn FnMut(&str),
+    report_line: &mut dyn FnMut(&str),
 ) -> Result<(), CoupleError> {
     let Service { name, allow, every, launcher } = service;
     let handler =
@@ -64,39 +64,39 @@ pub fn serve(
     let _counter = handler::open(session, &handler, allow)?;
     let opened = session.stop_channel().map(|stop| stop_channel::open(stop, &name, directory)).transpose();
     let _stop_channel = opened.unwrap_or_else(|error| {
-        tell(&format!(
+        report_line(&format!(
             "a new member's emergency stop waits for the connections before it: no UDP port of the same number: {error}"
         ));
         None
     });
     // Declared last: a peer that sees the token can send requests.
     let _alive = session.liveliness().declare_token(name.key("alive")).wait_now()?;
-    let side = if allow >= Right::Operate { Side::Serving } else { Side::ServingDeaf };
+    let side = if allow >= Right::Operate { Side::Serving } else { Side::ServingReadOnly };
     let couplers = Couplers::new(session, directory, &name, side);
     let mut relay = Relay { station, handler, couplers, every, stop };
-    let mut told = String::new();
+    let mut reported = String::new();
     while !stop.load(Ordering::Relaxed) {
         match Client::find(directory) {
             Ok(client) => {
-                tell(&format!(
+                report_line(&format!(
                     "carrying `{}` (process {})",
                     client.greeting().title,
                     client.greeting().process
                 ));
-                relay.carry(client, tell)?;
-                tell("the run is over; waiting for the next");
+                relay.carry(client, report_line)?;
+                report_line("the run is over; waiting for the next");
             }
             Err(LiveError::NoRun { .. }) => {}
             Err(error) => {
                 // Report once, as this is retried many times a second.
                 let words = error.to_string();
-                if words != told {
-                    tell(&words);
-                    told = words;
+                if words != reported {
+                    report_line(&words);
+                    reported = words;
                 }
             }
         }
-        relay.report(tell)?;
+        relay.report(report_line)?;
         std::thread::sleep(LOOK_PERIOD);
     }
     Ok(())
@@ -113,9 +113,9 @@ struct Relay<'s> {
 
 impl Relay<'_> {
     /// Relays one run until it ends.
-    fn carry(&mut self, mut client: Client, tell: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
+    fn carry(&mut self, mut client: Client, report_line: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
         self.handler.begin(&client);
-        let asker = client.asker();
+        let request_client = client.request_client();
         let mut is_watching = false;
         let mut checked: Option<Instant> = None;
         while !self.stop.load(Ordering::Relaxed) {
@@ -126,9 +126,9 @@ impl Relay<'_> {
                     is_watching = is_wanted;
                     // A lost host is reported below.
                     let every = self.every;
-                    let _ = asker.ask(if is_wanted { Ask::Watch { every } } else { Ask::LookAway });
+                    let _ = request_client.ask(if is_wanted { Ask::Watch { every } } else { Ask::Unwatch });
                 }
-                self.report(tell)?;
+                self.report(report_line)?;
             }
             let Self { station, handler, .. } = self;
             match client.next(CHECK_PERIOD) {
@@ -159,12 +159,12 @@ impl Relay<'_> {
             }
         }
         self.handler.end();
-        self.report(tell)
+        self.report(report_line)
     }
 
     /// Updates the couplings and publishes the status.
-    fn report(&mut self, tell: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
-        self.couplers.follow(tell)?;
+    fn report(&mut self, report_line: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
+        self.couplers.follow(report_line)?;
         self.handler.carried(self.couplers.carried());
         Ok(self.handler.report(&self.station)?)
     }

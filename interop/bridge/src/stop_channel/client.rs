@@ -36,7 +36,7 @@ pub fn press_both_ways(
     std::thread::spawn(move || {
         let session = open(&link, End::Visiting).and_then(|link| Remote::listen(&link, &bridge));
         let pressed = session.map_err(|error| error.to_string());
-        sender.send(pressed.and_then(|remote| remote.errand().run(Request::EmergencyStop)))
+        sender.send(pressed.and_then(|remote| remote.requests().run(Request::EmergencyStop)))
     });
     let mut problems = Vec::new();
     for outcome in outcomes {

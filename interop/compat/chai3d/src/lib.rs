@@ -10,7 +10,7 @@
 #![allow(non_snake_case)] // the names are another maker's
 
 use flotor_compat::pointer::{get, put, put_all, put_text};
-use flotor_compat::{Frame, Host, MARKER, Station, guarded, host, said};
+use flotor_compat::{Frame, Host, MARKER, Station, env_value, guarded, host};
 use flotor_hal::{DVec3, Wrench};
 use std::ffi::{c_char, c_int};
 use std::sync::Mutex;
@@ -56,7 +56,7 @@ fn sampled(id: c_int) -> Option<&'static Station> {
 
 /// Returns the success value of `hdPhantomGetPosition` and `hdPhantomClose`: CHAI3D takes 0 for failure there, the original returns 0.
 fn done_for_chai3d() -> c_int {
-    c_int::from(said("FLOTOR_PHANTOM_SUCCESS").is_some_and(|value| value == "1"))
+    c_int::from(env_value("FLOTOR_PHANTOM_SUCCESS").is_some_and(|value| value == "1"))
 }
 
 /// Returns the number of devices.
@@ -276,9 +276,10 @@ pub unsafe extern "C" fn hdPhantomGetType(id: c_int, name: *mut c_char) -> c_int
     unsafe { put_all(name, &[0]) };
     guarded(FAILED, || {
         let Some((_, station, _)) = station(id) else { return FAILED };
-        let told = said("FLOTOR_PHANTOM_TYPE").unwrap_or_else(|| format!("Flotor {}", station.plugin()));
+        let configured =
+            env_value("FLOTOR_PHANTOM_TYPE").unwrap_or_else(|| format!("Flotor {}", station.plugin()));
         // SAFETY: by the contract of this function.
-        unsafe { put_text(name, &told, NAME_BYTES) };
+        unsafe { put_text(name, &configured, NAME_BYTES) };
         DONE
     })
 }

@@ -1,8 +1,8 @@
 //! The single run of a process: prepared at the first access, begun by the first open device, ended with the program.
 
 use crate::process::{at_end, guarded, is_copy, is_first, library, notice_copies, quietly};
-use crate::run::{LockstepRun, Prepared, tell};
-use crate::settings::{Pace, Settings, SharedControlGroup, said};
+use crate::run::{LockstepRun, Prepared, report_line};
+use crate::settings::{Pace, Settings, SharedControlGroup, env_value};
 use crate::station::{Station, Turn};
 use flotor_servo::{Clock, StopSwitch, guest, monotonic_ns};
 use flotor_session::registry::Registry;
@@ -46,7 +46,7 @@ pub fn host() -> Option<&'static Host> {
     let prepare = || {
         let prepare = || Host::prepare(Settings::from_environment()?, &StopSwitch::default());
         let prepared = guarded(Err("it panicked".to_owned()), || quietly(prepare));
-        prepared.map_err(|problem| tell(&problem)).ok()
+        prepared.map_err(|problem| report_line(&problem)).ok()
     };
     HOST.get_or_init(prepare).as_ref()
 }
@@ -93,9 +93,9 @@ enum Stage {
 impl Host {
     fn prepare(mut settings: Settings, stop: &StopSwitch) -> Result<Self, String> {
         if !is_first() {
-            settings.keep_apart(library().as_deref().and_then(Path::file_stem).unwrap_or_default());
+            settings.add_suffix(library().as_deref().and_then(Path::file_stem).unwrap_or_default());
         }
-        if let Some(folder) = said("FLOTOR_PROCESSES") {
+        if let Some(folder) = env_value("FLOTOR_PROCESSES") {
             settings.keep_processes_apart(Path::new(&folder));
         }
         let folder = library().and_then(|file| file.parent().map(Path::to_path_buf)).unwrap_or_default();
@@ -119,7 +119,7 @@ impl Host {
         let options = RunOptions { clock, seed: settings.seed };
         let registry = Registry::search(&scene.plugin_folders);
         let mut session = Session::prepare(&scene, &registry, &options).map_err(|error| error.to_string())?;
-        session.warnings().iter().for_each(|warning| tell(warning));
+        session.warnings().iter().for_each(|warning| report_line(warning));
         let period_ns = session.period_ns();
         let limits = session.limits();
         let capabilities = session.capabilities().to_vec();
@@ -226,7 +226,7 @@ impl Host {
                     Stage::Lockstep(Box::new(run))
                 }
                 Err(problem) => {
-                    tell(&problem);
+                    report_line(&problem);
                     Stage::Over
                 }
             };
@@ -237,7 +237,7 @@ impl Host {
             guarded((), || prepared.run(&stop, stations_so_far()));
         };
         let Ok(thread) = thread.spawn(run) else {
-            tell("there is no thread for the run");
+            report_line("there is no thread for the run");
             return Stage::Over;
         };
         let since = Instant::now();
@@ -273,7 +273,7 @@ impl Host {
         let reads = self.reads.fetch_add(1, Ordering::Relaxed) + 1;
         if self.pace == Pace::Lockstep && reads >= READS_OF_A_TICK {
             WARNING.call_once(|| {
-                tell(&format!(
+                report_line(&format!(
                     "in lockstep the commands of the program make the ticks; this program only reads, so each \
                      {READS_OF_A_TICK}th read makes a tick"
                 ));
@@ -342,8 +342,8 @@ fn executable(folder: &Path) -> Option<PathBuf> {
     // lib/flotor/compat/NAME is four folders below the installation.
     let installed = folder.ancestors().nth(4).map(|root| root.join("bin").join(&name));
     let beside = [folder.join(&name), folder.join("..").join(&name)];
-    let told = said("FLOTOR_PROGRAM").map(PathBuf::from);
-    told.into_iter().chain(beside).chain(installed).find(|file| file.is_file())
+    let configured = env_value("FLOTOR_PROGRAM").map(PathBuf::from);
+    configured.into_iter().chain(beside).chain(installed).find(|file| file.is_file())
 }
 
 /// Returns the plugin folders of the installation or build folder that contains a library.

@@ -23,7 +23,7 @@ mod station;
 pub use frame::Frame;
 pub use host::{Host, host, prepare};
 pub use process::{Language, guarded, language, library, quietly};
-pub use settings::{Pace, Settings, SharedControlGroup, said};
+pub use settings::{Pace, Settings, SharedControlGroup, env_value};
 pub use station::{Axes, State, Station, Turn};
 
 /// Version of Flotor, null-terminated, exported by a drop-in as `flotor_dropin`, so that a plugin that loads a maker's library can

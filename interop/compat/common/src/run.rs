@@ -13,7 +13,7 @@ use flotor_servo::{Place, RunEnd, StopSwitch, Stuck};
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::summary::{RunFacts, RunSummary, Tally, end_cause};
-use flotor_session::telemetry::{Watched, publish};
+use flotor_session::telemetry::{ObservedRun, publish};
 use flotor_session::{
     Lockstep, Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session,
 };
@@ -33,7 +33,7 @@ struct Watchers {
     tally: Tally,
     digest: TraceDigest,
     recording: RunRecording,
-    asked: Vec<Asked>,
+    requested: Vec<Asked>,
     draft: Option<Draft>,
 }
 
@@ -50,14 +50,17 @@ const DRAFT_LOOK: u64 = 64;
 
 impl Draft {
     /// Writes the intermediate summary atomically once per interval.
-    fn update(&mut self, record: &TickRecord, asked: &[Asked], run: Measured<'_>) {
+    fn update(&mut self, record: &TickRecord, requested: &[Asked], run: Measured<'_>) {
         let is_fresh = |written: Instant| written.elapsed() < DRAFT_PERIOD;
         if !record.tick.is_multiple_of(DRAFT_LOOK) || self.written.is_some_and(is_fresh) {
             return;
         }
         self.written = Some(Instant::now());
-        let lines: Vec<String> =
-            stations_so_far().iter().zip(asked).map(|(station, asked)| line(station, *asked)).collect();
+        let lines: Vec<String> = stations_so_far()
+            .iter()
+            .zip(requested)
+            .map(|(station, requested)| line(station, *requested))
+            .collect();
         let ran_s = record.time_ns as f64 * 1.0e-9;
         let Facts { scene, settings, .. } = &self.facts;
         if let Some(path) = settings.report.as_deref().filter(|path| path.as_os_str() != "-") {
@@ -104,18 +107,22 @@ impl Observer for Watchers {
         self.digest.update(record);
         self.recording.observe(record);
         let device = usize::from(record.device);
-        if self.asked.len() <= device {
-            self.asked.resize_with(device + 1, Asked::default);
+        if self.requested.len() <= device {
+            self.requested.resize_with(device + 1, Asked::default);
         }
-        if let Some(asked) = self.asked.get_mut(device) {
-            asked.force_n = asked.force_n.max(length(record.model.force()));
-            asked.torque_nm = asked.torque_nm.max(record.model.torque().map_or(0.0, length));
-            asked.applied_n = asked.applied_n.max(record.commanded.force().length());
-            asked.applied_nm = asked.applied_nm.max(record.commanded.torque().length());
+        if let Some(requested) = self.requested.get_mut(device) {
+            requested.force_n = requested.force_n.max(length(record.model.force()));
+            requested.torque_nm = requested.torque_nm.max(record.model.torque().map_or(0.0, length));
+            requested.applied_n = requested.applied_n.max(record.commanded.force().length());
+            requested.applied_nm = requested.applied_nm.max(record.commanded.torque().length());
         }
         if let (0, Some(draft)) = (record.device, &mut self.draft) {
             let demand = demand(&self.recording);
-            draft.update(record, &self.asked, Measured { tally: &self.tally, digest: &self.digest, demand });
+            draft.update(
+                record,
+                &self.requested,
+                Measured { tally: &self.tally, digest: &self.digest, demand },
+            );
         }
     }
 }
@@ -149,7 +156,7 @@ struct Facts {
 
 impl Prepared {
     /// Creates the observers of the run and the facts for its report.
-    fn watched(&self, stop: &StopSwitch) -> Result<(Watched<Watchers>, Facts), String> {
+    fn watched(&self, stop: &StopSwitch) -> Result<(ObservedRun<Watchers>, Facts), String> {
         let Self { session, scene, options, settings } = self;
         let plugins = session.plugins().to_vec();
         let description: RunDescription = describe(scene, options, &plugins);
@@ -163,17 +170,17 @@ impl Prepared {
             tally: Tally::default(),
             digest: TraceDigest::new(),
             recording: RunRecording::new(recorder),
-            asked: Vec::new(),
+            requested: Vec::new(),
             draft: is_reported.then(|| Draft { facts: facts.clone(), written: None }),
         };
-        Ok((Watched { observer: watchers, publication: publication.ok() }, facts))
+        Ok((ObservedRun { observer: watchers, publication: publication.ok() }, facts))
     }
 
     /// Executes the run on this thread, until it is stopped or the device faults. Not real-time.
     pub(crate) fn run(self, stop: &StopSwitch, stations: &[Station]) {
         let (mut watched, facts) = match self.watched(stop) {
             Ok(watched) => watched,
-            Err(problem) => return tell(&problem),
+            Err(problem) => return report_line(&problem),
         };
         match self.session.run(&mut watched, stop) {
             Ok(outcome) => {
@@ -184,7 +191,7 @@ impl Prepared {
             }
             Err(error) => {
                 let _ = watched.observer.recording.finish(&[]);
-                tell(&error.to_string());
+                report_line(&error.to_string());
             }
         }
     }
@@ -200,7 +207,7 @@ impl Prepared {
 /// Run that the program's calls advance.
 pub(crate) struct LockstepRun {
     lockstep: Lockstep,
-    watched: Watched<Watchers>,
+    watched: ObservedRun<Watchers>,
     facts: Facts,
     stop: StopSwitch,
 }
@@ -228,7 +235,7 @@ impl Facts {
             seed: self.seed,
             rate_hz: self.scene.rate_hz,
             plugins: &self.plugins,
-            asked: run.demand,
+            requested: run.demand,
             couplings: &self.scene.couplings,
             carried: &[],
             trace_digest: run.digest.finish(),
@@ -237,13 +244,14 @@ impl Facts {
     }
 
     /// Finishes the recording and writes the requested summaries.
-    fn report(self, watched: Watched<Watchers>, outcome: Outcome, stations: &[Station]) {
-        let Watched { observer: Watchers { tally, digest, mut recording, asked, .. }, publication } = watched;
+    fn report(self, watched: ObservedRun<Watchers>, outcome: Outcome, stations: &[Station]) {
+        let ObservedRun { observer: Watchers { tally, digest, mut recording, requested, .. }, publication } =
+            watched;
         let run = Measured { tally: &tally, digest: &digest, demand: demand(&recording) };
         let summary = self.summary(&outcome, &run);
         let settings = &self.settings;
         let mut lines: Vec<String> =
-            stations.iter().zip(&asked).map(|(station, asked)| line(station, *asked)).collect();
+            stations.iter().zip(&requested).map(|(station, requested)| line(station, *requested)).collect();
         lines.extend(end_of(&outcome));
         let notes: Vec<Note> = lines
             .iter()
@@ -255,7 +263,7 @@ impl Facts {
             })
             .collect();
         if let Err(error) = recording.finish(&notes) {
-            tell(&error.to_string());
+            report_line(&error.to_string());
         }
         if let Some(publication) = publication {
             publication.end("the program ended", flotor_live::EndKind::InOrder);
@@ -271,8 +279,8 @@ impl Facts {
             let _ = std::fs::remove_file(so_far(path));
         }
         // Last: the code of a plugin may hang, or end the process.
-        if let Err(hung) = outcome.remains.free() {
-            tell(&hung.to_string());
+        if let Err(hung) = outcome.unfreed_plugins.free() {
+            report_line(&hung.to_string());
         }
     }
 }
@@ -283,17 +291,17 @@ fn quantity(value: f64, decimals: usize, unit: &str) -> String {
 }
 
 /// Formats the line of a station: requested and applied wrench, and counts.
-fn line(station: &Station, asked: Asked) -> String {
+fn line(station: &Station, requested: Asked) -> String {
     let counts = station.counts();
     let mut line = format!(
         "program    `{}` opened {}; {} wrenches; asked for {} and {} at most, the hand got {} and {}",
         station.name(),
         if station.opened() == 1 { "once".to_owned() } else { format!("{} times", station.opened()) },
         counts.commands,
-        quantity(asked.force_n, 3, "N"),
-        quantity(asked.torque_nm, 4, "N·m"),
-        quantity(asked.applied_n, 3, "N"),
-        quantity(asked.applied_nm, 4, "N·m")
+        quantity(requested.force_n, 3, "N"),
+        quantity(requested.torque_nm, 4, "N·m"),
+        quantity(requested.applied_n, 3, "N"),
+        quantity(requested.applied_nm, 4, "N·m")
     );
     if counts.refused > 0 {
         line += &format!("; {} refused, not finite", counts.refused);
@@ -321,7 +329,7 @@ fn write(path: &Path, text: String) -> bool {
     }
     let written = std::fs::write(path, text);
     if let Err(error) = &written {
-        tell(&format!("cannot write `{}`: {error}", path.display()));
+        report_line(&format!("cannot write `{}`: {error}", path.display()));
     }
     written.is_ok()
 }
@@ -334,7 +342,7 @@ fn so_far(report: &Path) -> PathBuf {
 }
 
 /// Writes a message to the user of the program.
-pub(crate) fn tell(problem: &str) {
+pub(crate) fn report_line(problem: &str) {
     tell_plainly(&format!("flotor: {problem}"));
 }
 

@@ -53,7 +53,7 @@ pub enum SharedControlGroup {
 
 /// Returns the value of a variable; `None` if it is unset or empty. Not real-time.
 #[must_use]
-pub fn said(variable: &str) -> Option<String> {
+pub fn env_value(variable: &str) -> Option<String> {
     std::env::var(variable).ok().filter(|value| !value.is_empty())
 }
 
@@ -63,7 +63,7 @@ impl Settings {
     /// # Errors
     /// The variable, its value and the permitted values.
     pub fn from_environment() -> Result<Self, String> {
-        Self::read(said)
+        Self::read(env_value)
     }
 
     /// Adapts the settings to a program of Flotor's own: a deadly signal stops the devices first.
@@ -74,7 +74,7 @@ impl Settings {
 
     /// Adds a suffix, the name of a library or the number of a process, to the names of all files, so that drop-ins do not overwrite each
     /// other's files.
-    pub(crate) fn keep_apart(&mut self, word: &OsStr) {
+    pub(crate) fn add_suffix(&mut self, word: &OsStr) {
         for file in [&mut self.record, &mut self.report, &mut self.json].into_iter().flatten() {
             if file.as_os_str() == "-" {
                 continue;
@@ -102,30 +102,30 @@ impl Settings {
         };
         match (1..).find(is_free) {
             None | Some(1) => {}
-            Some(number) => self.keep_apart(number.to_string().as_ref()),
+            Some(number) => self.add_suffix(number.to_string().as_ref()),
         }
     }
 
-    fn read(said: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
-        let file = |variable| said(variable).map(PathBuf::from);
+    fn read(env_value: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
+        let file = |variable| env_value(variable).map(PathBuf::from);
         let wrong =
             |variable: &str, value: &str, legal: &str| Err(format!("{variable}={value}: must be {legal}"));
-        let pace = match said("FLOTOR_PACE").as_deref() {
+        let pace = match env_value("FLOTOR_PACE").as_deref() {
             None | Some("real") => Pace::Real,
             Some("lockstep") => Pace::Lockstep,
             Some(other) => return wrong("FLOTOR_PACE", other, "`real` or `lockstep`"),
         };
-        let signals = match said("FLOTOR_SIGNALS").as_deref() {
-            None | Some("leave") => Signals::Theirs,
+        let signals = match env_value("FLOTOR_SIGNALS").as_deref() {
+            None | Some("leave") => Signals::Program,
             Some("stop") => Signals::StopFirst,
             Some(other) => return wrong("FLOTOR_SIGNALS", other, "`leave` or `stop`"),
         };
-        let shared_control_group = match said(CONSENT).as_deref() {
+        let shared_control_group = match env_value(CONSENT).as_deref() {
             None => SharedControlGroup::ByScene,
             Some("accept") => SharedControlGroup::Accepted,
             Some(other) => return wrong(CONSENT, other, "`accept`"),
         };
-        let seed = match said("FLOTOR_SEED").map(|text| (text.parse(), text)) {
+        let seed = match env_value("FLOTOR_SEED").map(|text| (text.parse(), text)) {
             None => 0,
             Some((Ok(seed), _)) => seed,
             Some((Err(_), text)) => return wrong("FLOTOR_SEED", &text, "a whole number"),
@@ -155,14 +155,14 @@ mod tests {
     #[test]
     fn what_is_not_said_has_a_default_and_what_is_wrong_is_named() {
         let plain = Settings::read(|_| None).expect("nothing is wrong");
-        assert_eq!((plain.pace, plain.signals, plain.seed), (Pace::Real, Signals::Theirs, 0));
+        assert_eq!((plain.pace, plain.signals, plain.seed), (Pace::Real, Signals::Program, 0));
         assert_eq!(read("FLOTOR_PACE", "lockstep").map(|settings| settings.pace), Ok(Pace::Lockstep));
         assert_eq!(
             read("FLOTOR_PACE", "fast"),
             Err("FLOTOR_PACE=fast: must be `real` or `lockstep`".to_owned())
         );
         let mut recorded = read("FLOTOR_RECORD", "/tmp/run.mcap").expect("it is a file");
-        recorded.keep_apart("libHD".as_ref());
+        recorded.add_suffix("libHD".as_ref());
         assert_eq!(recorded.record, Some(PathBuf::from("/tmp/run-libHD.mcap")));
         assert_eq!(plain.shared_control_group, SharedControlGroup::ByScene);
         let accepted = read(CONSENT, "accept").map(|settings| settings.shared_control_group);

@@ -196,7 +196,7 @@ impl Station {
     /// Closes the device, whose force ends with the next tick; returns whether it was open.
     pub fn close(&self) -> bool {
         self.disable();
-        self.port.keep_valid_for(0);
+        self.port.set_validity(0);
         self.is_open.swap(false, Ordering::AcqRel)
     }
 
@@ -225,8 +225,8 @@ impl Station {
     }
 
     /// Sets the validity of a wrench, ns; 0: as in the scene.
-    pub fn keep_valid_for(&self, valid_ns: u64) {
-        self.port.keep_valid_for(valid_ns);
+    pub fn set_validity(&self, valid_ns: u64) {
+        self.port.set_validity(valid_ns);
     }
 
     /// Commands a wrench on the hand, Flotor's axes, from the next tick on.

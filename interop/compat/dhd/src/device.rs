@@ -2,7 +2,7 @@
 
 use crate::error::Code;
 use crate::regulation::Regulation;
-use flotor_compat::{Axes, Frame, Host, Language, Station, host, language, said};
+use flotor_compat::{Axes, Frame, Host, Language, Station, env_value, host, language};
 use flotor_hal::{DVec3, Wrench, math};
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -188,7 +188,7 @@ pub(crate) fn set_default(id: i8) -> Result<i32, Code> {
 /// Returns the type of device that a program sees, unless `FLOTOR_DHD_TYPE` sets one. Of the types with six driven axes, Python
 /// bindings accept 104 only, and an unknown type stops them; CHAI3D, in C++, shifts the position of a 104 by a centimetre.
 pub(crate) fn kind(station: &Station) -> i32 {
-    let set = said("FLOTOR_DHD_TYPE").and_then(|text| text.parse().ok());
+    let set = env_value("FLOTOR_DHD_TYPE").and_then(|text| text.parse().ok());
     set.unwrap_or_else(|| match (station.axes(), language()) {
         (Axes::Three, _) => 33,
         (Axes::ThreeAndWrist, _) => 34,

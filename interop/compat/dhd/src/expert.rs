@@ -27,7 +27,7 @@ export! {
     /// Sets the validity of a force, in 125 µs; 0: as in the scene.
     fn dhdSetWatchdog(units: c_uchar, id: i8) -> c_int [-1] {
         read_expert(id, |open| {
-            open.station.keep_valid_for(u64::from(units) * WATCHDOG_NS);
+            open.station.set_validity(u64::from(units) * WATCHDOG_NS);
             open.device().watchdog = units;
         })
     }

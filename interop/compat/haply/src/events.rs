@@ -54,10 +54,10 @@ fn event(name: &str, category: &str, level: Level, data: Value, message: &str) -
 /// # Errors
 /// If the accepting thread cannot be created.
 pub(crate) fn serve(service: &'static Service, port: Port) -> io::Result<()> {
-    accept(port, "flotor-events", move |stream| tell(service, stream))
+    accept(port, "flotor-events", move |stream| send_events(service, stream))
 }
 
-fn tell(service: &Service, mut stream: TcpStream) -> io::Result<()> {
+fn send_events(service: &Service, mut stream: TcpStream) -> io::Result<()> {
     let deadline = Instant::now() + PATIENCE;
     let Some(head) = prepared(&mut stream, &service.access, deadline)? else { return Ok(()) };
     if !upgraded(&mut stream, &head)? {

@@ -4,7 +4,7 @@ use crate::access::Forbidden;
 use crate::connection::Request;
 use crate::message::set;
 use crate::service::{Service, Session, Shared, grip_id, inverse_id, kept_at_first};
-use crate::state::{Extent, damping, force_gate, told_session, write};
+use crate::state::{Extent, damping, force_gate, session_json, write};
 use crate::view::View;
 use serde_json::{Value, json};
 use std::time::{SystemTime, UNIX_EPOCH};
@@ -51,7 +51,7 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
         ("GET", ["devices"]) => (200, devices(service)),
         ("GET", ["expert", "status"]) => {
             let shared = service.shared();
-            let sessions: Vec<Value> = shared.sessions.iter().map(told_session).collect();
+            let sessions: Vec<Value> = shared.sessions.iter().map(session_json).collect();
             (
                 200,
                 json!({ "detection": {}, "devices": service.host.stations().len(), "sessions": sessions, "global": {} }),
@@ -59,7 +59,7 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
         }
         ("GET", ["sessions"]) => {
             let shared = service.shared();
-            let sessions: Vec<Value> = shared.sessions.iter().map(told_session).collect();
+            let sessions: Vec<Value> = shared.sessions.iter().map(session_json).collect();
             done(json!({ "session_count": sessions.len(), "sessions": sessions }))
         }
         (_, ["sessions", id, rest @ ..]) => session(service, method, id, rest, body),
@@ -107,7 +107,7 @@ fn session(service: &Service, method: &str, id: &str, rest: &[&str], body: &Valu
     let own = id.parse().ok().and_then(|id| shared.session_mut(id));
     let Some(own) = own else { return failed(404, "there is no such session") };
     match (method, rest) {
-        ("GET", []) => done(told_session(own)),
+        ("GET", []) => done(session_json(own)),
         ("GET", ["profile"]) => done(json!({ "name": own.profile })),
         ("POST", ["profile"]) => match body.get("name").and_then(Value::as_str) {
             Some(name) => {
@@ -306,11 +306,11 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
     }
     match short {
         "basis" => Ok(json!({ "permutation": view.basis.name() })),
-        "mount" => Ok(json!({ "transform": view.mount.told() })),
+        "mount" => Ok(json!({ "transform": view.mount.to_json() })),
         "preset" => Ok(json!({ "preset": view.preset })),
         "damping" => Ok(damping(view)),
         "force_gate" => Ok(force_gate(view)),
-        "transform" => Ok(json!({ "transform": view.workspace.told() })),
+        "transform" => Ok(json!({ "transform": view.workspace.to_json() })),
         _ => Err(failed(404, "there is no such setting")),
     }
 }

@@ -138,10 +138,10 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
         .and_then(|()| connection::serve(service, simulation))
         .map_err(|cause| CommandError::Failed(format!("there is no thread for the service: {cause}")))?;
     say!("listening ws://{simulation_at}/ events ws://{events_at}/");
-    while !stop.is_stop_asked() && host.is_running() {
+    while !stop.is_stop_requested() && host.is_running() {
         std::thread::sleep(LOOK);
     }
-    let was_asked = stop.is_stop_asked();
+    let was_asked = stop.is_stop_requested();
     service.device_lost();
     host.end();
     if was_asked {

@@ -1,6 +1,6 @@
 //! Parser of clients' messages, which applies their settings and commands.
 
-use crate::force::{Domain, Wanted};
+use crate::force::{Domain, SessionCommand};
 use crate::service::{ARM_M, Service, Session, Shared, grip_id, inverse_id};
 use crate::view::{Basis, Transform, View, numbers, vector};
 use flotor_hal::DVec3;
@@ -177,7 +177,7 @@ fn command(service: &Service, shared: &mut Shared, session: u64, device: usize, 
         set_workspace(service, view, transform);
     }
     let damping = view.damping;
-    let mut wanted = Wanted { domain: Domain::Cartesian, force_n: None, target_m: None, damping };
+    let mut wanted = SessionCommand { domain: Domain::Cartesian, force_n: None, target_m: None, damping };
     let (mut commands_it, mut is_wanted) = (false, false);
     for (name, command) in commands.as_object().into_iter().flatten() {
         let read = |keys: [&str; 2], names| {
@@ -219,7 +219,7 @@ fn command(service: &Service, shared: &mut Shared, session: u64, device: usize, 
         }
     }
     if is_wanted {
-        service.want(shared, session, device, wanted);
+        service.set(shared, session, device, wanted);
     }
     commands_it
 }

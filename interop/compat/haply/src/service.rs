@@ -2,7 +2,7 @@
 
 use crate::access::Access;
 use crate::events::{Events, Level};
-use crate::force::{Domain, Forces, Wanted};
+use crate::force::{Domain, Forces, SessionCommand};
 use crate::view::View;
 use flotor_compat::{Host, Pace, State, Station};
 use flotor_hal::{DVec3, Wrench};
@@ -107,21 +107,21 @@ impl Service {
     }
 
     /// Ends a session and removes its commands.
-    pub(crate) fn leave(&self, session: u64) {
+    pub(crate) fn remove(&self, session: u64) {
         let mut shared = self.shared();
         shared.sessions.retain(|there| there.id != session);
         for (forces, station) in shared.forces.iter_mut().zip(self.host.stations()) {
-            forces.leave(session);
+            forces.remove(session);
             self.command(forces, station, &station.state());
         }
     }
 
     /// Sets the command of a session to a device, in Flotor's axes. The first command enables force, which fades in.
-    pub(crate) fn want(&self, shared: &mut Shared, session: u64, device: usize, wanted: Wanted) {
+    pub(crate) fn set(&self, shared: &mut Shared, session: u64, device: usize, wanted: SessionCommand) {
         let (Some(forces), Some(station)) = (shared.forces.get_mut(device), self.host.station(device)) else {
             return;
         };
-        forces.want(session, self.host.now_ns(), wanted);
+        forces.set(session, self.host.now_ns(), wanted);
         self.command(forces, station, &station.state());
         if self.host.pace() == Pace::Real && forces.follow_the_handle() {
             self.following.notify_one();
@@ -131,7 +131,7 @@ impl Service {
     /// Sends the sum of all commands to a device.
     fn command(&self, forces: &mut Forces, station: &Station, state: &State) {
         let now_ns = self.host.now_ns();
-        if forces.forget(now_ns) {
+        if forces.remove_expired(now_ns) {
             station.disable();
             return;
         }

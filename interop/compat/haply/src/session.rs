@@ -64,7 +64,7 @@ pub(crate) fn serve(service: &Service, mut socket: WebSocket<Link>) {
         let _ = socket.get_ref().stream.set_read_timeout(Some(LONGEST_SILENCE));
     }
     let ended = answer(service, session, &mut socket);
-    service.leave(session);
+    service.remove(session);
     if let Err(Error::Capacity(_) | Error::Utf8(_) | Error::Protocol(_)) = &ended {
         let _ = socket.close(None);
     }

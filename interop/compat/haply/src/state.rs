@@ -28,7 +28,7 @@ pub(crate) fn write(text: &mut String, service: &Service, session: u64, extent: 
     let own = shared.session(session).unwrap_or(&plain);
     let _ = write!(text, "{{\"session_id\":{session}");
     if extent == Extent::All {
-        let _ = write!(text, ",\"session\":{}", told_session(own));
+        let _ = write!(text, ",\"session\":{}", session_json(own));
     }
     text.push_str(",\"inverse3\":[");
     devices(text, service, &shared, own, extent, arm);
@@ -38,7 +38,7 @@ pub(crate) fn write(text: &mut String, service: &Service, session: u64, extent: 
 }
 
 /// Encodes a session.
-pub(crate) fn told_session(session: &Session) -> Value {
+pub(crate) fn session_json(session: &Session) -> Value {
     json!({
         "session_id": session.id,
         "config": { "profile": { "name": session.profile }, "started_time": session.started },
@@ -116,7 +116,7 @@ fn grip(text: &mut String, seen: &Seen<'_>, [_, view]: &[View; 2], extent: Exten
         let config = json!({
             "type": "wireless_verse_grip", "port": "flotor", "major_version": 2, "minor_version": 2, "hardware_version": 1,
             "streaming_mode": "USB", "preset": view.preset, "basis": { "permutation": view.basis.name() },
-            "mount": view.mount.told(),
+            "mount": view.mount.to_json(),
         });
         let _ = write!(text, ",\"config\":{config}");
     }
@@ -152,7 +152,7 @@ fn arm_config(shared: &Shared, number: usize, view: &View) -> Value {
         "streaming_mode": "USB",
         "preset": view.preset,
         "basis": { "permutation": view.basis.name() },
-        "mount": view.mount.told(),
+        "mount": view.mount.to_json(),
         "filters": { "force_gate": force_gate(view), "damping": damping(view) },
     });
     if let (Value::Object(config), Some(kept)) = (&mut config, shared.kept.get(number)) {
@@ -199,7 +199,7 @@ fn transform(text: &mut String, transform: &Transform) {
     if *transform == Transform::NONE {
         text.push_str("{}");
     } else {
-        let _ = write!(text, "{}", transform.told());
+        let _ = write!(text, "{}", transform.to_json());
     }
 }
 

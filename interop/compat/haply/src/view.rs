@@ -107,9 +107,9 @@ impl Transform {
     }
 
     /// Encodes the transform like the service, without parts at their defaults.
-    pub(crate) fn told(&self) -> Value {
-        let mut told = json!({});
-        if let Value::Object(parts) = &mut told {
+    pub(crate) fn to_json(&self) -> Value {
+        let mut encoded = json!({});
+        if let Value::Object(parts) = &mut encoded {
             if self.position_m != DVec3::ZERO {
                 parts.insert("position".to_owned(), of_vector(self.position_m));
             }
@@ -121,7 +121,7 @@ impl Transform {
                 parts.insert("scale".to_owned(), of_vector(self.scale));
             }
         }
-        told
+        encoded
     }
 
     fn point(&self, place: DVec3) -> DVec3 {
@@ -288,7 +288,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_undone_is_no_transform_and_what_is_plain_is_not_told() {
-        assert_eq!(Transform::NONE.told(), json!({}));
+        assert_eq!(Transform::NONE.to_json(), json!({}));
         for wrong in [
             json!({ "scale": { "x": 0.0, "y": 1.0, "z": 1.0 } }),
             json!({ "rotation": { "w": 0.0, "x": 0.0, "y": 0.0, "z": 0.0 } }),

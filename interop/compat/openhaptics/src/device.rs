@@ -12,7 +12,7 @@ use crate::parameter::{
     VENDOR, VERSION, Values, WORKSPACES,
 };
 use crate::scheduler::Scheduler;
-use flotor_compat::{Axes, Frame, Host, Station, host, said};
+use flotor_compat::{Axes, Frame, Host, Station, env_value, host};
 use flotor_hal::{DVec3, Wrench, math};
 use std::collections::BTreeMap;
 use std::ffi::{CStr, CString, c_uint};
@@ -169,7 +169,7 @@ pub(crate) fn disable(handle: c_uint) -> bool {
     drop(device);
     let _ = CURRENT.0.compare_exchange(handle, NO_DEVICE, Ordering::AcqRel, Ordering::Acquire);
     if Devices::any().is_none() {
-        Scheduler::forget();
+        Scheduler::clear();
     }
     true
 }
@@ -245,7 +245,7 @@ pub(crate) fn text(parameter: c_uint) -> Result<&'static CStr, Code> {
                 (device.number, plugin.unwrap_or_default())
             })?;
             let text = match parameter {
-                MODEL_TYPE => said("FLOTOR_HD_MODEL").unwrap_or_else(|| format!("Flotor {plugin}")),
+                MODEL_TYPE => env_value("FLOTOR_HD_MODEL").unwrap_or_else(|| format!("Flotor {plugin}")),
                 _ => format!("flotor-{number}"),
             };
             Ok(kept(text))

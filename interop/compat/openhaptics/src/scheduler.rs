@@ -107,7 +107,7 @@ extern "C-unwind" fn run(_data: *mut c_void) -> *mut c_void {
                 continue;
             }
             let goes_on = entry.call();
-            guarded((), || Scheduler::leave(entry, goes_on));
+            guarded((), || Scheduler::finish(entry, goes_on));
         }
     }
     std::ptr::null_mut()
@@ -199,7 +199,7 @@ impl Scheduler {
     }
 
     /// Clears the mark of a running callback, and unschedules one that has ended.
-    fn leave(entry: &Entry, goes_on: bool) {
+    fn finish(entry: &Entry, goes_on: bool) {
         UNDER_WAY.store(0, Ordering::Release);
         if !goes_on {
             Self::take_out(entry.handle);
@@ -308,7 +308,7 @@ impl Scheduler {
     }
 
     /// Removes all callbacks unless the scheduler runs: the last device is closed, and the program may have freed their data.
-    pub(crate) fn forget() {
+    pub(crate) fn clear() {
         if !Self::is_running() {
             list().entries.clear();
             CHANGED.notify_all();
