@@ -12,7 +12,7 @@ use flotor_drawing::camera::Camera;
 use flotor_drawing::gpu::GpuScene;
 use flotor_hal::{Demand, Pose};
 use flotor_history::quantity::Quantity;
-use flotor_history::{History, Keep, unknown_run};
+use flotor_history::{History, Retention, unknown_run};
 use flotor_record::{PluginDescription, Role, RunDescription};
 use flotor_sync::Words;
 use flotor_viewer::app::{Recorded, Start, Viewer};
@@ -78,7 +78,7 @@ fn run(model: &str) -> RunDescription {
             blend: Blend::default(),
             field: None,
             latency_s: 0.0,
-            felt: Demand::WRENCH,
+            at_hand: Demand::WRENCH,
             settings: Vec::new(),
             parameters: Vec::new(),
             device: 0,
@@ -88,7 +88,7 @@ fn run(model: &str) -> RunDescription {
 }
 
 fn history() -> History {
-    let mut history = History::new(run("spring"), Keep::All);
+    let mut history = History::new(run("spring"), Retention::All);
     (0..TICKS).for_each(|tick| history.push(&record(tick)));
     history
 }
@@ -155,7 +155,7 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
         });
     });
     // As while ticks come: each picture has 16 new ones.
-    let mut coming = History::new(run("spring"), Keep::Newest(20_000));
+    let mut coming = History::new(run("spring"), Retention::Newest(20_000));
     let mut ticks = (0..).map(record);
     ticks.by_ref().take(10_000).for_each(|record| coming.push(&record));
     let mut traces = [Trace::of(Quantity::Force), Trace::of(Quantity::Position)];
@@ -246,7 +246,7 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     criterion.bench_function("whole picture at 1280x800", |bench| {
         bench.iter(|| black_box(picture(&mut viewer, Vec::new())));
     });
-    let mut histories = History::of_each_device(&two_devices(), Keep::All);
+    let mut histories = History::of_each_device(&two_devices(), Retention::All);
     for record in (0..TICKS).map(record) {
         for (device, history) in (0..).zip(&mut histories) {
             history.push(&TickRecord { device, ..record });

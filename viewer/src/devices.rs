@@ -1,7 +1,7 @@
 //! Devices of a run: history of each device, and the device chosen for numbers and traces.
 
+use crate::event_counts::EventCounts;
 use crate::scene::ArrowScale;
-use crate::tally::Tally;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_history::{History, Sample};
 
@@ -16,7 +16,7 @@ pub struct Devices {
 struct Seen {
     name: String,
     history: History,
-    tally: Tally,
+    event_counts: EventCounts,
 }
 
 impl Devices {
@@ -25,12 +25,12 @@ impl Devices {
     pub fn new(histories: Vec<History>) -> Self {
         let seen = |history: History| {
             let name = history.device_name().to_owned();
-            Seen { name, tally: Tally::of(history.samples()), history }
+            Seen { name, event_counts: EventCounts::of(history.samples()), history }
         };
         let mut seen: Vec<Seen> = histories.into_iter().map(seen).collect();
         if seen.is_empty() {
             let history = History::default();
-            seen.push(Seen { name: String::new(), tally: Tally::default(), history });
+            seen.push(Seen { name: String::new(), event_counts: EventCounts::default(), history });
         }
         Self { seen, chosen: 0 }
     }
@@ -75,8 +75,8 @@ impl Devices {
 
     /// Returns the tally of the chosen device.
     #[must_use]
-    pub fn tally(&self) -> &Tally {
-        &self.seen[self.chosen.min(self.seen.len() - 1)].tally
+    pub fn event_counts(&self) -> &EventCounts {
+        &self.seen[self.chosen.min(self.seen.len() - 1)].event_counts
     }
 
     /// Returns name and history of each device.
@@ -93,7 +93,7 @@ impl Devices {
     /// Returns a scale of arrows that fits all samples of all devices.
     #[must_use]
     pub fn scale(&self) -> ArrowScale {
-        let scales = self.seen.iter().map(|seen| seen.tally.scale());
+        let scales = self.seen.iter().map(|seen| seen.event_counts.scale());
         scales.reduce(ArrowScale::larger).unwrap_or_else(|| ArrowScale::fitting(std::iter::empty()))
     }
 
@@ -111,7 +111,7 @@ impl Devices {
     pub fn push(&mut self, record: &TickRecord) {
         if let Some(seen) = self.seen.get_mut(usize::from(record.device)) {
             seen.history.push(record);
-            seen.tally.add(&Sample::from(record));
+            seen.event_counts.add(&Sample::from(record));
         }
     }
 
@@ -122,6 +122,6 @@ impl Devices {
 
     /// Sets the number of dropped ticks.
     pub fn set_dropped(&mut self, dropped: u64) {
-        self.seen.iter_mut().for_each(|seen| seen.tally.dropped = dropped);
+        self.seen.iter_mut().for_each(|seen| seen.event_counts.dropped = dropped);
     }
 }

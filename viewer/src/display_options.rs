@@ -4,7 +4,7 @@ use flotor_history::quantity::Quantity;
 
 /// Display options; each has a default.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Chosen {
+pub struct DisplayOptions {
     /// Number of the device for numbers and traces, from 0.
     pub device: usize,
     /// Traces in the order of menus; empty: the default.
@@ -15,7 +15,7 @@ pub struct Chosen {
     pub arrow_force_n: Option<f64>,
 }
 
-impl Chosen {
+impl DisplayOptions {
     /// Creates options for a device, traces, and force over position along an axis, with automatic scaling of arrows.
     #[must_use]
     pub fn new(device: usize, mut traces: Vec<Quantity>, force_position: Option<usize>) -> Self {

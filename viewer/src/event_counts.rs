@@ -6,7 +6,7 @@ use flotor_history::Sample;
 
 /// Counts of events since the first sample, and a scale of arrows for the largest wrench.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tally {
+pub struct EventCounts {
     counts: [u64; Events::NAMES.len()],
     scale: ArrowScale,
     since_s: Option<f64>,
@@ -14,20 +14,20 @@ pub struct Tally {
     pub dropped: u64,
 }
 
-impl Default for Tally {
+impl Default for EventCounts {
     fn default() -> Self {
         let scale = ArrowScale::fitting(std::iter::empty());
         Self { counts: [0; Events::NAMES.len()], scale, since_s: None, dropped: 0 }
     }
 }
 
-impl Tally {
+impl EventCounts {
     /// Counts all samples of a recording.
     #[must_use]
     pub fn of<'a>(samples: impl Iterator<Item = &'a Sample>) -> Self {
-        let mut tally = Self::default();
-        samples.for_each(|sample| tally.add(sample));
-        tally
+        let mut event_counts = Self::default();
+        samples.for_each(|sample| event_counts.add(sample));
+        event_counts
     }
 
     /// Adds a sample.

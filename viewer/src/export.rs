@@ -3,7 +3,7 @@
 use crate::palette::{Look, Palette};
 use crate::picture::{PictureError, draw_without_window, write_png};
 use crate::ui::force_position::said;
-use crate::ui::plot_stack::{ExportFormat, PlotStack, Seen, TooLow};
+use crate::ui::plot_stack::{ExportFormat, PlotStack, TooLow, TraceSource};
 use crate::ui::readout::{subtitle_of, title_of};
 use crate::ui::view3d::pixels;
 use egui::{UiBuilder, vec2};
@@ -248,7 +248,7 @@ fn png(history: &History, device: Option<&str>, plots: &PlotStack) -> egui::Colo
         let mut ui = ui.new_child(UiBuilder::new().max_rect(inside));
         ui.heading(&title);
         ui.weak(subtitle_of(history.run()));
-        plots.still(&mut ui, Seen { history, device: None, compared: None }, f64::NAN, &palette);
+        plots.still(&mut ui, TraceSource { history, device: None, compared: None }, f64::NAN, &palette);
     })
 }
 

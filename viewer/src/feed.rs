@@ -1,7 +1,9 @@
 //! Data feed of a running host: a reading thread, and the data since the last picture.
 
 use flotor_core::trace::TickRecord;
-use flotor_live::{Answer, Ask, Asker, ChangeMessage, Client, End, EndKind, Event, Greeting, LiveError};
+use flotor_live::{
+    Answer, Ask, ChangeMessage, Client, End, EndKind, Event, Greeting, LiveError, RequestClient,
+};
 use flotor_record::RunDescription;
 use std::collections::VecDeque;
 use std::io::ErrorKind;
@@ -58,7 +60,7 @@ struct Waiting {
 pub struct Feed {
     waiting: Arc<Mutex<Waiting>>,
     is_over: Arc<AtomicBool>,
-    asker: Asker,
+    request_client: RequestClient,
     greeting: Greeting,
     run: RunDescription,
 }
@@ -77,14 +79,15 @@ impl Feed {
             state: FeedState::Running,
         }));
         let is_over = Arc::new(AtomicBool::new(false));
-        let (asker, greeting, run) = (client.asker(), client.greeting().clone(), client.run().clone());
-        asker.ask(Ask::Watch { every: every(run.rate_hz) })?;
+        let (request_client, greeting, run) =
+            (client.request_client(), client.greeting().clone(), client.run().clone());
+        request_client.ask(Ask::Watch { every: every(run.rate_hz) })?;
         let (for_thread, over) = (Arc::clone(&waiting), Arc::clone(&is_over));
         std::thread::Builder::new().name("flotor-feed".to_owned()).spawn(move || {
             while !over.load(Ordering::Relaxed) {
                 let next = client.next(READ_WAIT);
                 let quiet = matches!(next, Ok(None));
-                let goes_on = lock(&for_thread).take_in(next);
+                let goes_on = lock(&for_thread).apply(next);
                 if !quiet {
                     wake();
                 }
@@ -93,7 +96,7 @@ impl Feed {
                 }
             }
         })?;
-        Ok(Self { waiting, is_over, asker, greeting, run })
+        Ok(Self { waiting, is_over, request_client, greeting, run })
     }
 
     /// Returns the greeting of the host at the start of the connection.
@@ -139,7 +142,7 @@ impl Feed {
     /// # Errors
     /// [`LiveError::Connection`] if the host is gone.
     pub fn ask(&self, ask: Ask) -> Result<u64, LiveError> {
-        self.asker.ask(ask)
+        self.request_client.ask(ask)
     }
 }
 
@@ -151,7 +154,7 @@ impl Drop for Feed {
 
 impl Waiting {
     /// Stores an event; returns true while more events may come.
-    fn take_in(&mut self, next: Result<Option<Event>, LiveError>) -> bool {
+    fn apply(&mut self, next: Result<Option<Event>, LiveError>) -> bool {
         let Arrivals { records: ticks, changes, answers } = &mut self.arrivals;
         match next {
             Ok(None) => {}

@@ -91,7 +91,7 @@ impl Guide {
     }
 
     /// Processes a change; if the device refused this client because another client guides the hand, releases the hand and returns true.
-    pub fn take_in(&mut self, change: &ChangeMessage) -> bool {
+    pub fn apply(&mut self, change: &ChangeMessage) -> bool {
         let is_ours = change.parameter == GUIDE && change.number == f64::from(self.number);
         let is_refused = is_ours && change.outcome != Outcome::Applied && self.held.is_some();
         if is_refused {
@@ -199,8 +199,8 @@ mod tests {
             outcome: Outcome::Refused,
             settings: Vec::new(),
         };
-        assert!(!guide.take_in(&refused(f64::from(guide.number) + 1.0)), "another client was refused");
-        assert!(guide.take_in(&refused(f64::from(guide.number))));
+        assert!(!guide.apply(&refused(f64::from(guide.number) + 1.0)), "another client was refused");
+        assert!(guide.apply(&refused(f64::from(guide.number))));
         assert_eq!(guide.held(), None);
     }
 }

@@ -8,12 +8,12 @@ use flotor_history::History;
 use flotor_history::compared::Compared;
 use flotor_history::quantity::Quantity;
 use flotor_live::Directory;
-use flotor_study::screen::{Screen, Told};
-use flotor_viewer::app::{Recorded, Start, Viewer, Wanted};
-use flotor_viewer::chosen::Chosen;
+use flotor_study::screen::{Screen, WindowMessage};
+use flotor_viewer::app::{Recorded, RunSelection, Start, Viewer};
 use flotor_viewer::devices::Devices;
+use flotor_viewer::display_options::DisplayOptions;
 use flotor_viewer::experiment::texts::Texts;
-use flotor_viewer::experiment::wire::at_standard_streams;
+use flotor_viewer::experiment::wire::connect_stdio;
 use flotor_viewer::experiment::{Prompt, StopKey};
 use flotor_viewer::export::{self, ExportError};
 use flotor_viewer::palette::Look;
@@ -219,12 +219,12 @@ fn fits_file(arguments: &Arguments) -> Result<(), String> {
 }
 
 /// Returns the display options of the command line, checked against the recording.
-fn chosen(arguments: &Arguments, histories: &[History]) -> Result<Chosen, PictureError> {
+fn chosen(arguments: &Arguments, histories: &[History]) -> Result<DisplayOptions, PictureError> {
     if let Some(at_s) = arguments.at {
         has_moment(histories, at_s)?;
     }
     let device = arguments.device.as_ref().map(|name| number_of(histories, name)).transpose()?;
-    let chosen = Chosen::new(device.unwrap_or(0), arguments.traces.clone(), arguments.force_position);
+    let chosen = DisplayOptions::new(device.unwrap_or(0), arguments.traces.clone(), arguments.force_position);
     Ok(chosen.with_arrow_force(arguments.arrow_force))
 }
 
@@ -239,11 +239,11 @@ fn recorded(arguments: &Arguments, histories: Vec<History>) -> Result<Recorded, 
 /// Selects a running host, for an experimenter or for a person in a sitting.
 fn live(arguments: &Arguments) -> Result<Start, Failure> {
     let (directory, process) = (Directory::of_this_user(), arguments.run);
-    let wanted = Wanted { directory, process, plugins: arguments.plugins.clone() };
+    let wanted = RunSelection { directory, process, plugins: arguments.plugins.clone() };
     if !arguments.sitting {
         return Ok(Start::Live(wanted));
     }
-    let mut prompt = at_standard_streams().map_err(Failure::file)?;
+    let mut prompt = connect_stdio().map_err(Failure::file)?;
     prompt.stop_key = arguments.stop_key;
     prompt.texts = arguments.texts.clone().unwrap_or_else(Texts::english);
     Ok(Start::Sitting(wanted, Box::new(prompt)))
@@ -253,7 +253,7 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
 fn whole_window(
     arguments: &Arguments,
     history: Vec<History>,
-    chosen: &Chosen,
+    chosen: &DisplayOptions,
     out: &Path,
 ) -> Result<(), Failure> {
     let (look, size, scale) = of_picture(arguments.request);
@@ -266,14 +266,14 @@ fn whole_window(
         let mut prompt = Prompt::new(told, said);
         prompt.texts = arguments.texts.clone().unwrap_or_else(Texts::english);
         viewer.rehearse(prompt);
-        let _ = teller.send(Told::Screen(screen.clone())); // the receiver is above
+        let _ = teller.send(WindowMessage::Screen(screen.clone())); // the receiver is above
     }
     let image = draw_without_window(size, scale, look, |ui| viewer.show(ui));
     write_png(out, &image).map_err(Failure::file)
 }
 
 /// Writes a file of the traces.
-fn traces(arguments: &Arguments, histories: Vec<History>, chosen: &Chosen) -> Result<(), Failure> {
+fn traces(arguments: &Arguments, histories: Vec<History>, chosen: &DisplayOptions) -> Result<(), Failure> {
     let Some(out) = &arguments.export else { return Ok(()) };
     let mut devices = Devices::new(histories);
     devices.choose(chosen.device);
@@ -301,7 +301,7 @@ fn of_picture(request: WindowOptions) -> (Look, [usize; 2], f32) {
 fn screenshot(
     arguments: &Arguments,
     history: Vec<History>,
-    chosen: Chosen,
+    chosen: DisplayOptions,
     out: &Path,
 ) -> Result<(), Failure> {
     let (look, mut size_px, scale) = of_picture(arguments.request);

@@ -21,7 +21,7 @@ pub enum Value {
 
 /// Editability of a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Standing {
+pub enum Editability {
     /// Editable.
     Free,
     /// Not editable: follows from other parameters, or has no effect with them; with the plugin's message.
@@ -32,7 +32,7 @@ pub enum Standing {
 
 /// Parameter in a panel.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Knob {
+pub struct PanelEntry {
     /// Entry in the schema.
     pub parameter: PanelParameter,
     /// Display name: the id without its unit, in words; with the unit if another parameter of the panel has the same name.
@@ -40,7 +40,7 @@ pub struct Knob {
     /// Displayed value.
     pub value: Value,
     /// Editability.
-    pub standing: Standing,
+    pub editability: Editability,
     /// Current value in the loop.
     in_force: Value,
     /// Requested value that is not in force yet: the loop moves a number gradually.
@@ -49,7 +49,7 @@ pub struct Knob {
 
 /// Use of a panel: for changing values, or only for reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Use {
+pub enum PanelPurpose {
     /// Changing values of a running host.
     Change,
     /// Reading values of a recording, or of a run that is over.
@@ -64,7 +64,7 @@ pub struct Panel {
     /// Id of the plugin.
     pub id: String,
     /// Parameters in the order of the schema.
-    pub knobs: Vec<Knob>,
+    pub entries: Vec<PanelEntry>,
     /// Reason for the rejection of the last change.
     pub refusal: Option<String>,
     /// Undo history: index of the parameter and its value before each change of the user.
@@ -74,11 +74,12 @@ pub struct Panel {
 impl Panel {
     /// Creates a panel from the description of a plugin, by a running host or for a recording.
     #[must_use]
-    pub fn new(plugin: &PanelPlugin, purpose: Use) -> Self {
+    pub fn new(plugin: &PanelPlugin, purpose: PanelPurpose) -> Self {
         // Guidance parameters are left out: a hand is guided in the 3D view.
         let shown = || plugin.parameters.iter().filter(|parameter| !is_for_guides(plugin, &parameter.id));
         let plain: Vec<String> = shown().map(plain_name).collect();
-        let knob = |(parameter, name): (&PanelParameter, &String)| Knob {
+        let may_change = purpose == PanelPurpose::Change;
+        let entry = |(parameter, name): (&PanelParameter, &String)| PanelEntry {
             name: if plain.iter().filter(|other| *other == name).count() > 1 {
                 format!("{name} ({})", parameter.unit)
             } else {
@@ -86,56 +87,56 @@ impl Panel {
             },
             value: Value::read(parameter, &parameter.value),
             in_force: Value::read(parameter, &parameter.value),
-            standing: if parameter.live && purpose == Use::Change { Standing::Free } else { Standing::Fixed },
+            editability: if parameter.live && may_change { Editability::Free } else { Editability::Fixed },
             parameter: parameter.clone(),
             wanted: None,
         };
         Self {
             name: plugin.name.clone(),
             id: plugin.id.clone(),
-            knobs: shown().zip(&plain).map(knob).collect(),
+            entries: shown().zip(&plain).map(entry).collect(),
             refusal: None,
             earlier: Vec::new(),
         }
     }
 
     /// Applies the outcome of a change.
-    pub fn take_in(&mut self, change: &ChangeMessage) {
+    pub fn apply(&mut self, change: &ChangeMessage) {
         if change.plugin != self.name || change.subject != Subject::Parameter {
             return;
         }
-        let Some(knob) = self.knobs.iter_mut().find(|knob| knob.parameter.id == change.parameter) else {
+        let Some(entry) = self.entries.iter_mut().find(|entry| entry.parameter.id == change.parameter) else {
             return;
         };
         match change.outcome {
             Outcome::Applied => {
-                knob.settle(Value::read(&knob.parameter, &change.value));
+                entry.settle(Value::read(&entry.parameter, &change.value));
                 self.refusal = None;
             }
             Outcome::Refused => {
-                knob.give_up();
-                let name = &knob.name;
+                entry.give_up();
+                let name = &entry.name;
                 self.refusal =
                     Some(format!("{name} = {} does not fit the other values; it stays", change.value));
             }
-            Outcome::Broke => self.refusal = Some(format!("{} broke the plugin; stop the run", knob.name)),
+            Outcome::Broke => self.refusal = Some(format!("{} broke the plugin; stop the run", entry.name)),
         }
     }
 
     /// Updates editability and dependent numbers from an instance with the same settings.
     pub fn follow(&mut self, shape: &mut Shape) {
-        for (index, knob) in self.knobs.iter_mut().enumerate() {
-            if knob.standing == Standing::Fixed
-                || !matches!(knob.parameter.shape, ParameterShape::Real { .. })
+        for (index, entry) in self.entries.iter_mut().enumerate() {
+            if entry.editability == Editability::Fixed
+                || !matches!(entry.parameter.shape, ParameterShape::Real { .. })
             {
                 continue;
             }
             match shape.accepts_its_own(index) {
-                Ok(()) => knob.standing = Standing::Free,
+                Ok(()) => entry.editability = Editability::Free,
                 Err(reason) => {
-                    knob.standing = Standing::Follows(reason);
+                    entry.editability = Editability::Follows(reason);
                     if let Some(number) = shape.parameter(index) {
-                        knob.value = Value::Number(number);
+                        entry.value = Value::Number(number);
                     }
                 }
             }
@@ -144,12 +145,12 @@ impl Panel {
 
     /// Makes all parameters read-only, at the end of the run.
     pub fn freeze(&mut self) {
-        self.knobs.iter_mut().for_each(|knob| knob.standing = Standing::Fixed);
+        self.entries.iter_mut().for_each(|entry| entry.editability = Editability::Fixed);
     }
 
     /// Discards changes that the host has not passed on, and displays the values in force.
     pub fn take_back(&mut self) {
-        self.knobs.iter_mut().filter(|knob| knob.wanted.is_some()).for_each(Knob::give_up);
+        self.entries.iter_mut().filter(|entry| entry.wanted.is_some()).for_each(PanelEntry::give_up);
     }
 
     /// Stores the value of a parameter before a change of the user, for undo.
@@ -170,33 +171,33 @@ impl Panel {
     /// Restores the displayed value before the last change; returns the index of its parameter, to be sent.
     pub fn undo(&mut self) -> Option<usize> {
         let (index, before) = self.earlier.pop()?;
-        let knob = self.knobs.get_mut(index).filter(|knob| knob.standing == Standing::Free)?;
-        knob.value = before;
+        let entry = self.entries.get_mut(index).filter(|entry| entry.editability == Editability::Free)?;
+        entry.value = before;
         Some(index)
     }
 
     /// Displays the initial value of a parameter; returns true if that is a change, to be sent.
     pub fn reset(&mut self, index: usize) -> bool {
-        let Some(knob) = self.knobs.get(index).filter(|knob| knob.is_moved()) else { return false };
-        let (before, first) = (knob.value.clone(), Value::read(&knob.parameter, &knob.parameter.first));
+        let Some(entry) = self.entries.get(index).filter(|entry| entry.is_moved()) else { return false };
+        let (before, first) = (entry.value.clone(), Value::read(&entry.parameter, &entry.parameter.first));
         self.begin(index, before);
-        self.knobs[index].value = first;
+        self.entries[index].value = first;
         true
     }
 
     /// Returns the change to send, with the displayed value.
     pub fn change(&mut self, index: usize) -> Option<SetValue> {
-        let knob = self.knobs.get_mut(index)?;
-        knob.wanted = Some(knob.value.clone());
+        let entry = self.entries.get_mut(index)?;
+        entry.wanted = Some(entry.value.clone());
         Some(SetValue {
             plugin: self.name.clone(),
-            parameter: knob.parameter.id.clone(),
-            value: knob.typed(),
+            parameter: entry.parameter.id.clone(),
+            value: entry.typed(),
         })
     }
 }
 
-impl Knob {
+impl PanelEntry {
     /// Sets the value in force. A requested value stays displayed while the loop approaches it, and not if the loop moves away.
     fn settle(&mut self, now: Value) {
         if let Some(wanted) = &self.wanted
@@ -218,7 +219,7 @@ impl Knob {
     #[must_use]
     pub fn is_moved(&self) -> bool {
         let first = &self.parameter.first;
-        self.standing == Standing::Free
+        self.editability == Editability::Free
             && !first.is_empty()
             && !Value::read(&self.parameter, first).is_about(&self.value)
     }
@@ -328,15 +329,16 @@ mod tests {
     #[test]
     fn two_of_one_name_are_distinguished_by_their_units() {
         let twins = [("damping_ns_per_m", "N s/m"), ("hand", ""), ("damping_nms_per_rad", "N m s/rad")];
-        let panel = Panel::new(&plugin(twins.map(|(id, unit)| parameter(id, unit)).into()), Use::Change);
-        let names: Vec<&str> = panel.knobs.iter().map(|knob| knob.name.as_str()).collect();
+        let panel =
+            Panel::new(&plugin(twins.map(|(id, unit)| parameter(id, unit)).into()), PanelPurpose::Change);
+        let names: Vec<&str> = panel.entries.iter().map(|entry| entry.name.as_str()).collect();
         assert_eq!(names, ["damping (N s/m)", "hand", "damping (N m s/rad)"]);
     }
 
     #[test]
     fn a_change_is_taken_in_and_a_refused_one_is_said() {
         let plugin = plugin(vec![parameter("gamma_n", "N")]);
-        let mut panel = Panel::new(&plugin, Use::Change);
+        let mut panel = Panel::new(&plugin, PanelPurpose::Change);
         let change = |value: &str, outcome| ChangeMessage {
             tick: 1,
             time_ns: 1,
@@ -348,15 +350,15 @@ mod tests {
             outcome,
             settings: Vec::new(),
         };
-        panel.take_in(&change("4", Outcome::Applied));
-        assert_eq!(panel.knobs[0].value, Value::Number(4.0));
-        panel.knobs[0].value = Value::Number(9.0);
+        panel.apply(&change("4", Outcome::Applied));
+        assert_eq!(panel.entries[0].value, Value::Number(4.0));
+        panel.entries[0].value = Value::Number(9.0);
         assert_eq!(panel.change(0).map(|set| set.value), Some("9".to_owned()));
-        panel.take_in(&change("5", Outcome::Applied));
-        assert_eq!(panel.knobs[0].value, Value::Number(9.0), "the loop is on its way");
-        panel.take_in(&change("9", Outcome::Refused));
-        assert_eq!(panel.knobs[0].value, Value::Number(5.0), "as far as it came");
+        panel.apply(&change("5", Outcome::Applied));
+        assert_eq!(panel.entries[0].value, Value::Number(9.0), "the loop is on its way");
+        panel.apply(&change("9", Outcome::Refused));
+        assert_eq!(panel.entries[0].value, Value::Number(5.0), "as far as it came");
         assert!(panel.refusal.is_some_and(|reason| reason.contains("gamma = 9")));
-        assert_eq!(Panel::new(&plugin, Use::Read).knobs[0].standing, Standing::Fixed);
+        assert_eq!(Panel::new(&plugin, PanelPurpose::Read).entries[0].editability, Editability::Fixed);
     }
 }

@@ -1,14 +1,14 @@
 //! Picture of a run at one time, without a window, a display or a GPU.
 
 use crate::canvas::Canvas;
-use crate::chosen::Chosen;
 use crate::devices::Devices;
+use crate::display_options::DisplayOptions;
 use crate::flat::FlatRasterizer;
 use crate::palette::{Look, Palette};
 use crate::scene::{Moment, SceneBuilder, SceneFacts};
 use crate::shape::Shape;
 use crate::ui::overlay::Overlay;
-use crate::ui::plot_stack::{PlotStack, Seen, TooLow, Window};
+use crate::ui::plot_stack::{PlotStack, TooLow, TraceSource, Window};
 use crate::ui::view3d::{Subject, View3d};
 use crate::ui::{legend, readout, style};
 use egui::{ColorImage, Context, RawInput, Rect, Ui, pos2, vec2};
@@ -29,7 +29,7 @@ pub struct PictureOptions {
     /// Direction and zoom; `None`: the default view.
     pub view: Option<View>,
     /// Display options.
-    pub chosen: Chosen,
+    pub chosen: DisplayOptions,
     /// Time, s; `None`: the time of the largest force.
     pub at_s: Option<f64>,
 }
@@ -106,7 +106,7 @@ pub fn has_moment(histories: &[History], at_s: f64) -> Result<(), PictureError> 
 
 /// Returns the smallest height of a picture with readable traces at a scale, pixels.
 #[must_use]
-pub fn least_height_px(chosen: &Chosen, scale: f32) -> usize {
+pub fn least_height_px(chosen: &DisplayOptions, scale: f32) -> usize {
     let mut plots = PlotStack::new(Window::Whole);
     plots.choose(chosen);
     least_height_of_px(&plots, scale)
@@ -184,7 +184,7 @@ pub fn interface(
         legend::names(&mut overlay, body, &facts, &camera, names, &palette);
         let below = Rect::from_min_max(view.left_bottom() + vec2(14.0, 8.0), area.max - vec2(4.0, 4.0));
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(below));
-        let seen = Seen { history: devices.history(), device: devices.name(), compared: None };
+        let seen = TraceSource { history: devices.history(), device: devices.name(), compared: None };
         plots.still(&mut ui, seen, sample.time_s(), &palette);
     })
 }

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Settings of the window that a user can change.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Remembered {
+pub struct SavedSettings {
     /// Colour scheme.
     pub look: Look,
     /// Units of all numbers.
@@ -35,7 +35,7 @@ pub struct Remembered {
     pub latest: Vec<PathBuf>,
 }
 
-impl Default for Remembered {
+impl Default for SavedSettings {
     fn default() -> Self {
         Self {
             look: Look::default(),
@@ -51,7 +51,7 @@ impl Default for Remembered {
     }
 }
 
-impl Remembered {
+impl SavedSettings {
     /// Returns the path of the settings file; `None` without a settings folder.
     #[must_use]
     pub fn file() -> Option<PathBuf> {
@@ -93,8 +93,8 @@ mod tests {
     fn what_was_chosen_comes_back_and_a_damaged_file_costs_nothing_else() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("made/for/it/viewer.toml");
-        assert_eq!(Remembered::load(&file), Remembered::default());
-        let chosen = Remembered {
+        assert_eq!(SavedSettings::load(&file), SavedSettings::default());
+        let chosen = SavedSettings {
             look: Look::Light,
             units: Units::Si,
             traces: vec![Quantity::Energy, Quantity::AngularVelocity],
@@ -106,12 +106,15 @@ mod tests {
             latest: vec![PathBuf::from("/data/run.mcap")],
         };
         chosen.save(&file).unwrap();
-        assert_eq!(Remembered::load(&file), chosen);
+        assert_eq!(SavedSettings::load(&file), chosen);
         std::fs::write(&file, "look = \"light\"\nfrom_the_future = 3\n").unwrap();
-        assert_eq!(Remembered::load(&file), Remembered { look: Look::Light, ..Remembered::default() });
+        assert_eq!(
+            SavedSettings::load(&file),
+            SavedSettings { look: Look::Light, ..SavedSettings::default() }
+        );
         for damaged in ["look = ", "look = 7\n", "zoom = 1e9\nsize_pt = [1.0, nan]\n"] {
             std::fs::write(&file, damaged).unwrap();
-            let found = Remembered::load(&file);
+            let found = SavedSettings::load(&file);
             assert!((0.5..=3.0).contains(&found.zoom) && found.size_pt.iter().all(|length| *length >= 480.0));
         }
     }

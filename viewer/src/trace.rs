@@ -101,7 +101,7 @@ impl Trace {
 mod tests {
     use super::*;
     use flotor_core::trace::{RECORD_WORDS, TickRecord};
-    use flotor_history::{Keep, unknown_run};
+    use flotor_history::{Retention, unknown_run};
     use flotor_sync::Words;
 
     const BUCKETS: usize = 100;
@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn a_trace_that_scrolls_is_the_one_made_afresh_and_looks_at_each_sample_once() {
         let (mut history, mut trace) =
-            (History::new(unknown_run(), Keep::Newest(5000)), Trace::of(Quantity::Force));
+            (History::new(unknown_run(), Retention::Newest(5000)), Trace::of(Quantity::Force));
         let mut ticks = 0;
         for new in [3000, 16, 1, 0, 17, 900, 4000, 333] {
             push(&mut history, ticks..ticks + new);
@@ -165,7 +165,7 @@ mod tests {
     /// Nothing was there: no line may say that something was.
     #[test]
     fn a_gap_is_a_gap() {
-        let mut history = History::new(unknown_run(), Keep::All);
+        let mut history = History::new(unknown_run(), Retention::All);
         push(&mut history, 0..1000);
         push(&mut history, 7000..8000);
         let mut trace = Trace::of(Quantity::Force);
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn another_place_or_length_of_time_begins_again() {
-        let mut history = History::new(unknown_run(), Keep::All);
+        let mut history = History::new(unknown_run(), Retention::All);
         push(&mut history, 0..10_000);
         let mut trace = Trace::of(Quantity::Force);
         for span_s in [[5.0, 8.0], [0.5, 3.5], [0.0, 9.999], [9.0, 9.5], [2.0, 5.0]] {

@@ -1,11 +1,11 @@
 //! Window on a display, and errors without a display or adapter.
 
 use crate::app::{Start, Viewer};
-use crate::chosen::Chosen;
 use crate::cost::{self, Cost};
+use crate::display_options::DisplayOptions;
 use crate::palette::{Look, Palette};
 use crate::pointer_order::PointerOrder;
-use crate::remembered::Remembered;
+use crate::saved_settings::SavedSettings;
 use egui::{Ui, ViewportBuilder};
 use std::any::Any;
 use std::panic::{self, AssertUnwindSafe};
@@ -84,11 +84,11 @@ fn scale(text: &str) -> Result<f32, String> {
 
 /// Returns the settings to save: the current settings, except options of the command line that the user has not changed since.
 fn for_the_next_time(
-    mut now: Remembered,
-    before: &Remembered,
+    mut now: SavedSettings,
+    before: &SavedSettings,
     request: WindowOptions,
-    chosen: &Chosen,
-) -> Remembered {
+    chosen: &DisplayOptions,
+) -> SavedSettings {
     if chosen.traces() == Some(&now.traces[..]) {
         now.traces.clone_from(&before.traces);
     }
@@ -111,14 +111,18 @@ fn for_the_next_time(
 ///
 /// # Errors
 /// [`WindowError`].
-pub fn open(start: Start, chosen: Chosen, request: WindowOptions) -> Result<Option<Cost>, WindowError> {
+pub fn open(
+    start: Start,
+    chosen: DisplayOptions,
+    request: WindowOptions,
+) -> Result<Option<Cost>, WindowError> {
     // A sitting looks the same for all users.
-    let file = if matches!(start, Start::Sitting(..)) { None } else { Remembered::file() };
-    let mut remembered = file.as_deref().map(Remembered::load).unwrap_or_default();
-    let before = remembered.clone();
-    remembered.look = request.look.unwrap_or(remembered.look);
-    remembered.zoom = request.scale.unwrap_or(remembered.zoom);
-    let size = request.size.map_or(remembered.size_pt, |size| size.map(|length| length as f32));
+    let file = if matches!(start, Start::Sitting(..)) { None } else { SavedSettings::file() };
+    let mut saved_settings = file.as_deref().map(SavedSettings::load).unwrap_or_default();
+    let before = saved_settings.clone();
+    saved_settings.look = request.look.unwrap_or(saved_settings.look);
+    saved_settings.zoom = request.scale.unwrap_or(saved_settings.zoom);
+    let size = request.size.map_or(saved_settings.size_pt, |size| size.map(|length| length as f32));
     let viewport = ViewportBuilder::default()
         .with_title("Flotor")
         .with_app_id("flotor-viewer")
@@ -135,15 +139,15 @@ pub fn open(start: Start, chosen: Chosen, request: WindowOptions) -> Result<Opti
             options,
             Box::new(move |creation| {
                 opened.store(true, Ordering::Relaxed);
-                creation.egui_ctx.set_zoom_factor(remembered.zoom);
+                creation.egui_ctx.set_zoom_factor(saved_settings.zoom);
                 let device = creation.wgpu_render_state.as_ref();
-                let mut viewer = Viewer::new(&creation.egui_ctx, device, start, remembered.look);
-                viewer.recall(&creation.egui_ctx, &remembered);
+                let mut viewer = Viewer::new(&creation.egui_ctx, device, start, saved_settings.look);
+                viewer.restore(&creation.egui_ctx, &saved_settings);
                 viewer.choose(&chosen);
                 Ok(Box::new(Kept {
                     viewer,
                     file,
-                    kept: remembered,
+                    kept: saved_settings,
                     before,
                     request,
                     chosen,
@@ -194,11 +198,11 @@ fn words_of(panic: &(dyn Any + Send), otherwise: &str) -> String {
 struct Kept {
     viewer: Viewer,
     file: Option<PathBuf>,
-    kept: Remembered,
+    kept: SavedSettings,
     /// Settings before this start, and the options of the command line, for this time only.
-    before: Remembered,
+    before: SavedSettings,
     request: WindowOptions,
-    chosen: Chosen,
+    chosen: DisplayOptions,
     pointer: PointerOrder,
     /// Pending measurement: its duration, and the channel for the result.
     measure: Option<(Duration, Sender<Cost>)>,
@@ -215,7 +219,7 @@ impl eframe::App for Kept {
         // In points without the zoom, because the next window opens before its zoom is set.
         let size_pt = ui.input(|input| input.viewport().inner_rect.map(|rect| (rect.size() * zoom).into()));
         let now =
-            Remembered { size_pt: size_pt.unwrap_or(self.kept.size_pt), zoom, ..self.viewer.remembered() };
+            SavedSettings { size_pt: size_pt.unwrap_or(self.kept.size_pt), zoom, ..self.viewer.settings() };
         let now = for_the_next_time(now, &self.before, self.request, &self.chosen);
         // Not with every picture during a drag.
         if now != self.kept && !ui.input(|input| input.pointer.any_down()) {
@@ -255,25 +259,29 @@ mod tests {
 
     #[test]
     fn what_a_command_line_says_is_for_this_time_only() {
-        let before = Remembered::default();
+        let before = SavedSettings::default();
         let request = WindowOptions {
             look: Some(Look::Light),
             size: Some([640, 400]),
             scale: Some(2.0),
             measure: None,
         };
-        let as_requested =
-            Remembered { look: Look::Light, zoom: 2.0, size_pt: [640.0, 400.0], ..Remembered::default() };
-        let nothing = Chosen::default();
+        let as_requested = SavedSettings {
+            look: Look::Light,
+            zoom: 2.0,
+            size_pt: [640.0, 400.0],
+            ..SavedSettings::default()
+        };
+        let nothing = DisplayOptions::default();
         let as_it_is = for_the_next_time(as_requested.clone(), &before, WindowOptions::default(), &nothing);
         assert_eq!(as_it_is, as_requested);
-        let pulled = Remembered { zoom: 1.5, size_pt: [900.0, 700.0], ..as_requested.clone() };
+        let pulled = SavedSettings { zoom: 1.5, size_pt: [900.0, 700.0], ..as_requested.clone() };
         let kept = for_the_next_time(pulled.clone(), &before, request, &nothing);
-        assert_eq!(kept, Remembered { look: before.look, ..pulled }, "what was changed since is kept");
+        assert_eq!(kept, SavedSettings { look: before.look, ..pulled }, "what was changed since is kept");
         let kept = for_the_next_time(as_requested.clone(), &before, request, &nothing);
         assert_eq!(kept, before);
-        let chosen = Chosen::new(0, vec![Quantity::Energy], None);
-        let energy = Remembered { traces: vec![Quantity::Energy], ..as_requested };
+        let chosen = DisplayOptions::new(0, vec![Quantity::Energy], None);
+        let energy = SavedSettings { traces: vec![Quantity::Energy], ..as_requested };
         assert_eq!(for_the_next_time(energy, &before, request, &chosen), before);
     }
 

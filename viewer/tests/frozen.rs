@@ -60,7 +60,7 @@ impl Bench {
         let run = Owned::start(run.stderr(Stdio::null()).stdout(Stdio::null()));
         let directory = Directory::at(folder.path().join("flotor"));
         let mut client = patiently("the run is found", || Client::find(&directory).ok());
-        client.asker().ask(Ask::Watch { every: 100 }).expect("the host listens");
+        client.request_client().ask(Ask::Watch { every: 100 }).expect("the host listens");
         let greeting = client.greeting().clone();
         let (sender, events) = channel();
         std::thread::spawn(move || {

@@ -11,7 +11,7 @@ use flotor_drawing::camera::Camera;
 use flotor_drawing::gpu::GpuScene;
 use flotor_drawing::raster::{Image, Rasterizer};
 use flotor_hal::Pose;
-use flotor_history::{History, Keep, Sample};
+use flotor_history::{History, Retention, Sample};
 use flotor_viewer::app::{Recorded, Start, Viewer};
 use flotor_viewer::palette::{Look, Palette};
 use flotor_viewer::picture::{draw_without_window, write_png};
@@ -106,7 +106,7 @@ fn an_adapter_and_the_processor_draw_the_same_scene() {
 
 /// The window at a moment of a recording.
 fn start(at_s: f64) -> Start {
-    let mut history = History::new(spring_run(&[]).0, Keep::All);
+    let mut history = History::new(spring_run(&[]).0, Retention::All);
     (0..3000).for_each(|number| history.push(&tick(number, Events::NONE)));
     Start::Recording(Recorded {
         at_s: Some(at_s),

@@ -174,8 +174,8 @@ fn flood(client: Client, path: PathBuf) -> [JoinHandle<u32>; 2] {
         let [plugin, parameter, value] = ["spring", "no_such_parameter", "1"].map(str::to_owned);
         let unknown = Ask::Set { values: vec![SetValue { plugin, parameter, value }] };
         let asks = (0_u32..).map(|number| if number % 2 == 0 { nothing() } else { unknown.clone() });
-        let asker = client.asker();
-        let sent = asks.take_while(|ask| asker.ask(ask.clone()).is_ok()).count();
+        let request_client = client.request_client();
+        let sent = asks.take_while(|ask| request_client.ask(ask.clone()).is_ok()).count();
         u32::try_from(sent).expect("of a few seconds")
     };
     let malformed_data = move || {

@@ -6,7 +6,7 @@ mod support;
 mod window;
 
 use flotor_core::trace::Events;
-use flotor_history::{History, Keep};
+use flotor_history::{History, Retention};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use support::{spring_run, tick};
 use window::{live, until};
@@ -51,7 +51,7 @@ fn streaming_is_bounded() {
     let _turn = alone();
     let minutes = if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") { 60 } else { 2 };
     let (run, _) = spring_run(&[]);
-    let mut history = History::new(run, Keep::Newest(60_000));
+    let mut history = History::new(run, Retention::Newest(60_000));
     let feed = |history: &mut History, from: u64, count: u64| {
         (from..from + count).for_each(|number| history.push(&tick(number, Events::NONE)));
     };

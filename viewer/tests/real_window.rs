@@ -77,7 +77,7 @@ fn a_slider_pulled_in_a_real_window_changes_the_servos_parameter() {
         xdotool(&["search", "--onlyvisible", "--name", "Flotor"])
     });
 
-    client.asker().ask(Ask::Watch { every: 100 }).expect("the host listens");
+    client.request_client().ask(Ask::Watch { every: 100 }).expect("the host listens");
     let (y, from, to) =
         (slider.center().y, slider.left() + 0.3 * slider.width(), slider.left() + 0.7 * slider.width());
     let changes = patiently("further right is stiffer", || {
@@ -257,7 +257,8 @@ struct Twin<'a>(egui_kittest::Harness<'a, flotor_viewer::app::Viewer>);
 impl Twin<'_> {
     fn on(directory: &Directory) -> Self {
         let size = egui::vec2(f32::from(SIZE[0]), f32::from(SIZE[1]));
-        let start = flotor_viewer::app::Start::Live(flotor_viewer::app::Wanted::newest(directory.clone()));
+        let start =
+            flotor_viewer::app::Start::Live(flotor_viewer::app::RunSelection::newest(directory.clone()));
         let look = flotor_viewer::palette::Look::Dark;
         Self(
             egui_kittest::Harness::builder().with_size(size).build_eframe(|creation| {
@@ -351,7 +352,7 @@ fn a_handle_dragged_a_millimetre_into_a_wall_reads_two_newtons_and_is_released_s
     assert!((force_n - 2.0 * depth_mm).abs() <= 0.02, "{force_n} N at {depth_mm} mm");
     xdotool(&["mouseup", "1"]);
     patiently("the hand is back where it rests", || (twin.row("Position")?[2] > 1.9).then_some(()));
-    client.asker().ask(Ask::Stop).expect("the host listens");
+    client.request_client().ask(Ask::Stop).expect("the host listens");
     patiently("the run ends", || run.try_wait().expect("it is ours"));
 
     let replay = alone("flotor", folder.path(), None).args(["replay", "--json", "-"]).arg(&file).output();

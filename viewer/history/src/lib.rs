@@ -111,7 +111,7 @@ pub fn unknown_run() -> RunDescription {
 
 /// Retention of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Keep {
+pub enum Retention {
     /// All samples, for a recording.
     All,
     /// Number of newest samples, for a running host.
@@ -124,7 +124,7 @@ pub struct History {
     run: RunDescription,
     samples: VecDeque<Sample>,
     forgotten: u64,
-    keep: Keep,
+    retention: Retention,
     notes: Vec<Note>,
     /// Times of the changes of parameters, s, in order.
     changes_s: VecDeque<f64>,
@@ -134,24 +134,32 @@ pub struct History {
 impl Default for History {
     /// Returns the history of an unknown run, without samples.
     fn default() -> Self {
-        Self::new(unknown_run(), Keep::Newest(1))
+        Self::new(unknown_run(), Retention::Newest(1))
     }
 }
 
 impl History {
     /// Creates an empty history for the first device of a run.
     #[must_use]
-    pub fn new(run: RunDescription, keep: Keep) -> Self {
-        let capacity = if let Keep::Newest(count) = keep { count } else { 0 };
+    pub fn new(run: RunDescription, retention: Retention) -> Self {
+        let capacity = if let Retention::Newest(count) = retention { count } else { 0 };
         let samples = VecDeque::with_capacity(capacity);
-        Self { run, samples, forgotten: 0, keep, notes: Vec::new(), changes_s: VecDeque::new(), device: 0 }
+        Self {
+            run,
+            samples,
+            forgotten: 0,
+            retention,
+            notes: Vec::new(),
+            changes_s: VecDeque::new(),
+            device: 0,
+        }
     }
 
     /// Creates an empty history for each device of a run.
     #[must_use]
-    pub fn of_each_device(run: &RunDescription, keep: Keep) -> Vec<Self> {
+    pub fn of_each_device(run: &RunDescription, retention: Retention) -> Vec<Self> {
         let count = u16::try_from(run.devices().count()).unwrap_or(u16::MAX).max(1);
-        (0..count).map(|device| Self { device, ..Self::new(run.clone(), keep) }).collect()
+        (0..count).map(|device| Self { device, ..Self::new(run.clone(), retention) }).collect()
     }
 
     /// Reads the history of each device from a recording. Damage after the first tick loses only the ticks after it and becomes a note.
@@ -160,7 +168,7 @@ impl History {
     /// [`ReadError`] if no part of the file is usable.
     pub fn read(path: &Path) -> Result<Vec<Self>, ReadError> {
         let mut recording = Recording::open(path)?;
-        let mut histories = Self::of_each_device(recording.run(), Keep::All);
+        let mut histories = Self::of_each_device(recording.run(), Retention::All);
         let (mut damage, mut last_ns) = (None, None);
         while let Some(tick) = recording.next() {
             match tick {
@@ -206,7 +214,7 @@ impl History {
         if record.device != self.device {
             return;
         }
-        if let Keep::Newest(count) = self.keep {
+        if let Retention::Newest(count) = self.retention {
             while self.samples.len() >= count.max(1) {
                 self.samples.pop_front();
                 self.forgotten += 1;
@@ -226,7 +234,9 @@ impl History {
     /// one.
     pub fn push_change(&mut self, time_ns: u64, parameter: &str) {
         let [first_s, _] = self.span_s();
-        while self.keep != Keep::All && self.changes_s.front().is_some_and(|time_s| *time_s < first_s) {
+        while self.retention != Retention::All
+            && self.changes_s.front().is_some_and(|time_s| *time_s < first_s)
+        {
             self.changes_s.pop_front();
         }
         if !is_guidance(parameter) {
@@ -360,7 +370,7 @@ mod tests {
     #[test]
     fn the_rate_counts_ticks_without_a_sample_and_leaves_out_missed_ones() {
         // Of a loop of 2 kHz every second tick has a sample, and after each eight ticks two are missed.
-        let mut history = History::new(unknown_run(), Keep::All);
+        let mut history = History::new(unknown_run(), Retention::All);
         for tick in (0..8000).step_by(2) {
             let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
             (record.tick, record.time_ns) = (tick, (tick + tick / 8 * 2) * 500_000);
@@ -374,7 +384,7 @@ mod tests {
 
     #[test]
     fn changes_that_guide_a_hand_are_left_out_and_those_of_forgotten_ticks_go() {
-        let mut history = History::new(unknown_run(), Keep::Newest(1000));
+        let mut history = History::new(unknown_run(), Retention::Newest(1000));
         for tick in 0..3000 {
             let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
             (record.tick, record.time_ns) = (tick, tick * 1_000_000);

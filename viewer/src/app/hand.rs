@@ -64,7 +64,7 @@ impl Viewer {
 
     /// Processes a change of the hand, and warns if another client guides it.
     pub(super) fn take_in_guide(&mut self, change: &ChangeMessage) {
-        if self.guide.take_in(change) {
+        if self.guide.apply(change) {
             self.say("Another window guides this hand; wait until it has released the handle");
         }
     }

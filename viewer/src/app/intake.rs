@@ -1,7 +1,7 @@
 //! Intake of new data from a running host, and the search for a run.
 
 use super::source::{Parts, connect};
-use super::{Audience, Heading, Source, Viewer, Wanted};
+use super::{Audience, Heading, RunSelection, Source, Viewer};
 use crate::devices::Devices;
 use crate::feed::{Arrivals, FeedState, STALE_AFTER};
 use crate::guide::Guide;
@@ -10,7 +10,7 @@ use crate::scene::SceneBuilder;
 use egui::Context;
 use flotor_core::trace::Events;
 use flotor_history::player::Player;
-use flotor_history::{History, Keep};
+use flotor_history::{History, Retention};
 use flotor_live::{ChangeMessage, Outcome, Subject};
 use std::time::{Duration, Instant};
 
@@ -26,7 +26,7 @@ const EXCESS: Events = Events::from_bits(
 
 impl Viewer {
     /// Processes all data received since the last picture, and searches for a run while there is none.
-    pub(super) fn take_in(&mut self, context: &Context) {
+    pub(super) fn poll(&mut self, context: &Context) {
         let due = self.last_look.is_none_or(|last| last.elapsed() >= LOOK_PERIOD);
         let wanted = match &self.source {
             Source::Waiting(wanted) => Some(wanted),
@@ -59,12 +59,12 @@ impl Viewer {
         }
     }
 
-    fn look_for(&mut self, wanted: &Wanted, context: &Context) {
+    fn look_for(&mut self, wanted: &RunSelection, context: &Context) {
         let Ok(feed) = connect(wanted, context, &self.pace) else { return };
         let parts = Parts::of_host(&feed);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a minute of ticks
         let kept = ((feed.run().rate_hz * KEPT_S) as usize).clamp(1, MOST_KEPT);
-        self.devices = Devices::new(History::of_each_device(feed.run(), Keep::Newest(kept)));
+        self.devices = Devices::new(History::of_each_device(feed.run(), Retention::Newest(kept)));
         self.heading = Heading::of(feed.run());
         self.limits = feed.greeting().limits;
         (self.guide, self.drag) = (Guide::new(&feed.greeting().plugins), None);
@@ -85,7 +85,7 @@ impl Viewer {
             }
         }
         for change in &arrivals.changes {
-            self.panels.iter_mut().for_each(|panel| panel.take_in(change));
+            self.panels.iter_mut().for_each(|panel| panel.apply(change));
             self.take_in_guide(change);
             if change.outcome == Outcome::Applied {
                 self.devices.push_change(change.time_ns, &change.parameter);

@@ -15,7 +15,7 @@ use crate::scene::{Moment, SceneBuilder};
 use crate::ui::handle::HINT;
 use crate::ui::messages::{Extent, Messages};
 use crate::ui::overlay::{Corner, Overlay};
-use crate::ui::plot_stack::{PlotRequest, PlotStack, Seen};
+use crate::ui::plot_stack::{PlotRequest, PlotStack, TraceSource};
 use crate::ui::style::SMALL_PT;
 use crate::ui::top_bar::{PanelSwitch, STOP, Stop, TopBar, TopBarRequest};
 use crate::ui::view3d::Subject;
@@ -135,7 +135,7 @@ impl Viewer {
                 values.extend(changed.into_iter().filter_map(|index| panel.change(index)));
                 ui.add_space(8.0);
             }
-            standing::events(ui, self.devices.tally(), palette);
+            standing::events(ui, self.devices.event_counts(), palette);
         });
         if !values.is_empty() {
             self.ask(Ask::Set { values });
@@ -214,7 +214,7 @@ impl Viewer {
         let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(area).id_salt("plots"));
         let motion = self.player.motion;
         let compared = self.compared.as_ref().and_then(|compared| compared.history(self.devices.chosen()));
-        let seen = Seen { history: self.devices.history(), device: self.devices.name(), compared };
+        let seen = TraceSource { history: self.devices.history(), device: self.devices.name(), compared };
         let requests = self.plots.show(&mut ui, seen, self.player.now_s, motion, palette);
         for request in requests {
             match request {

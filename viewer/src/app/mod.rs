@@ -12,17 +12,17 @@ mod sitting;
 mod source;
 mod words;
 
-pub use source::{Pace, Source, Wanted, connect};
+pub use source::{Pace, RunSelection, Source, connect};
 
 use crate::canvas::Canvas;
-use crate::chosen::Chosen;
 use crate::devices::Devices;
+use crate::display_options::DisplayOptions;
 use crate::experiment::Prompt;
 use crate::frame_rate::FrameRate;
 use crate::guide::Guide;
 use crate::palette::{Look, Palette};
 use crate::panel::Panel;
-use crate::remembered::Remembered;
+use crate::saved_settings::SavedSettings;
 use crate::scene::{SceneBuilder, SceneFacts};
 use crate::shape::Shape;
 use crate::sound::Bell;
@@ -59,9 +59,9 @@ const LOW_PT: f32 = 480.0;
 /// Initial content of the window.
 pub enum Start {
     /// A running host, or the next run.
-    Live(Wanted),
+    Live(RunSelection),
     /// A run with the screens of a sitting, for a subject.
-    Sitting(Wanted, Box<Prompt>),
+    Sitting(RunSelection, Box<Prompt>),
     /// A recording.
     Recording(Recorded),
 }
@@ -215,7 +215,7 @@ impl Viewer {
     }
 
     /// Applies the display options of the command line.
-    pub fn choose(&mut self, chosen: &Chosen) {
+    pub fn choose(&mut self, chosen: &DisplayOptions) {
         self.look_at(chosen.device);
         self.arrow_force_n = chosen.arrow_force_n;
         self.plots.choose(chosen);
@@ -269,8 +269,8 @@ impl Viewer {
 
     /// Returns the user's settings of the window, to be saved.
     #[must_use]
-    pub fn remembered(&self) -> Remembered {
-        Remembered {
+    pub fn settings(&self) -> SavedSettings {
+        SavedSettings {
             look: self.look,
             units: self.plots.units,
             traces: self.plots.shown.clone(),
@@ -278,14 +278,14 @@ impl Viewer {
             side_pt: self.side_pt.round(),
             view_part: self.view_part,
             latest: self.opening.latest().to_vec(),
-            ..Remembered::default()
+            ..SavedSettings::default()
         }
     }
 
     /// Restores the saved settings of the window.
-    pub fn recall(&mut self, context: &Context, remembered: &Remembered) {
-        let Remembered { look, units, traces, shows_panel, side_pt, view_part, latest, .. } = remembered;
-        self.opening.recall(latest);
+    pub fn restore(&mut self, context: &Context, saved: &SavedSettings) {
+        let SavedSettings { look, units, traces, shows_panel, side_pt, view_part, latest, .. } = saved;
+        self.opening.restore(latest);
         self.look = *look;
         style::apply(context, *look);
         self.plots.units = *units;
@@ -304,7 +304,7 @@ impl Viewer {
         if ui.ctx().current_pass_index() == 0 {
             self.frame_rate.count(Instant::now());
         }
-        self.take_in(ui.ctx());
+        self.poll(ui.ctx());
         self.pace.set(if self.is_moving() { self.frame } else { FRAME_OF_WORDS });
         if self.sitting.is_some() {
             self.player.advance(0.0, self.devices.history().span_s());

@@ -49,7 +49,7 @@ impl Opening {
     }
 
     /// Appends the latest recordings of earlier windows.
-    pub(super) fn recall(&mut self, earlier: &[PathBuf]) {
+    pub(super) fn restore(&mut self, earlier: &[PathBuf]) {
         let others: Vec<PathBuf> =
             earlier.iter().filter(|file| !self.latest.contains(file)).cloned().collect();
         self.latest.extend(others);

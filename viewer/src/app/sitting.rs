@@ -27,7 +27,7 @@ impl Viewer {
             self.ask(Ask::EmergencyStop);
         }
         let Some(mut prompt) = self.sitting.take() else { return };
-        if prompt.take_in() {
+        if prompt.poll() {
             self.bell.ring();
         }
         if let Some(rest) = prompt.warned_for() {

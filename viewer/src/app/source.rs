@@ -1,7 +1,7 @@
 //! Source of the window's data: no run yet, a running host, or a recording.
 
 use crate::feed::{Feed, FeedState};
-use crate::panel::{Panel, Use};
+use crate::panel::{Panel, PanelPurpose};
 use crate::shape::{Shape, file_of, load_file, shapes_of};
 use egui::Context;
 use flotor_live::{Client, Directory, LiveError, PanelPlugin};
@@ -42,7 +42,7 @@ impl Pace {
 
 /// Selection of the run to watch.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Wanted {
+pub struct RunSelection {
     /// Directory of the runs.
     pub directory: Directory,
     /// Process of the run; `None`: the newest run.
@@ -51,7 +51,7 @@ pub struct Wanted {
     pub plugins: Vec<PathBuf>,
 }
 
-impl Wanted {
+impl RunSelection {
     /// Selects the newest run of a directory.
     #[must_use]
     pub fn newest(directory: Directory) -> Self {
@@ -62,13 +62,13 @@ impl Wanted {
 /// Source of ticks.
 pub enum Source {
     /// No run yet.
-    Waiting(Wanted),
+    Waiting(RunSelection),
     /// A running host.
     Live {
         /// Connection to the host.
         feed: Box<Feed>,
         /// Selection of the next run, once this run is over.
-        wanted: Wanted,
+        wanted: RunSelection,
     },
     /// A recording.
     Recording,
@@ -86,7 +86,7 @@ impl Source {
 ///
 /// # Errors
 /// [`LiveError`] if there is no such run or the connection fails.
-pub fn connect(wanted: &Wanted, context: &Context, pace: &Pace) -> Result<Feed, LiveError> {
+pub fn connect(wanted: &RunSelection, context: &Context, pace: &Pace) -> Result<Feed, LiveError> {
     let (context, pace) = (context.clone(), pace.clone());
     let client = match wanted.process {
         Some(process) => Client::of_process(&wanted.directory, process)?,
@@ -126,7 +126,10 @@ impl Parts {
         let panels = run.plugins.iter().map(|plugin| {
             let file = PathBuf::from(&plugin.file);
             let (name, id) = (plugin.name.as_str(), plugin.id.as_str());
-            Panel::new(&PanelPlugin::new(name, id, file, schema(id), &plugin.parameters, &[]), Use::Read)
+            Panel::new(
+                &PanelPlugin::new(name, id, file, schema(id), &plugin.parameters, &[]),
+                PanelPurpose::Read,
+            )
         });
         let panels = panels.collect();
         Self { shapes, panels, missing: missing.iter().map(ToString::to_string).collect() }
@@ -135,7 +138,7 @@ impl Parts {
 
 /// Creates an editable panel, and sets the drawn instance to the values in force.
 fn panel(plugin: &PanelPlugin, shapes: &mut [Shape]) -> Panel {
-    let mut panel = Panel::new(plugin, Use::Change);
+    let mut panel = Panel::new(plugin, PanelPurpose::Change);
     if let Some(shape) = shapes.iter_mut().find(|shape| shape.name() == plugin.name) {
         for parameter in plugin.parameters.iter().filter(|parameter| parameter.live) {
             if let Ok(number) = parameter.value.parse() {

@@ -10,7 +10,7 @@ pub mod texts;
 pub mod wire;
 
 use egui::Context;
-use flotor_study::screen::{Input, May, Question, Said, Screen, Told, WindowState};
+use flotor_study::screen::{Input, May, Question, Screen, WindowMessage, WindowReply, WindowState};
 use flotor_study::trial::Response;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::sync::{Arc, OnceLock};
@@ -68,8 +68,8 @@ impl StopKey {
 /// Current screen, and the channels from and to the experiment.
 #[derive(Debug)]
 pub struct Prompt {
-    told: Receiver<Told>,
-    said: Sender<Said>,
+    told: Receiver<WindowMessage>,
+    said: Sender<WindowReply>,
     screen: Option<Screen>,
     /// True while keys are accepted; false while the experiment prepares the next screen.
     is_persons_turn: bool,
@@ -101,7 +101,7 @@ impl Waker {
 impl Prompt {
     /// Creates a prompt with the channels from and to the experiment.
     #[must_use]
-    pub fn new(told: Receiver<Told>, said: Sender<Said>) -> Self {
+    pub fn new(told: Receiver<WindowMessage>, said: Sender<WindowReply>) -> Self {
         Self {
             told,
             said,
@@ -126,25 +126,25 @@ impl Prompt {
     /// Reports to the experiment that the window is open.
     pub fn open(&mut self, window: &Context) {
         let _ = self.waker.0.set(window.clone()); // a window opens once
-        self.say(Said::Window { window: WindowState::Open });
+        self.say(WindowReply::Window { window: WindowState::Open });
     }
 
     /// Processes new messages of the experiment; returns true if a warning sound is due.
-    pub fn take_in(&mut self) -> bool {
+    pub fn poll(&mut self) -> bool {
         let mut warn = false;
         loop {
             match self.told.try_recv() {
-                Ok(Told::Screen(screen)) => {
+                Ok(WindowMessage::Screen(screen)) => {
                     self.screen = Some(screen);
                     self.is_persons_turn = true;
                     self.typed.clear();
                     self.refused = None;
                 }
-                Ok(Told::Warning { .. }) => {
+                Ok(WindowMessage::Warning { .. }) => {
                     self.warned = Some(Instant::now());
                     warn = true;
                 }
-                Ok(Told::Refused { refused }) => {
+                Ok(WindowMessage::Refused { refused }) => {
                     self.refused = Some(refused);
                     self.is_persons_turn = true;
                 }
@@ -235,7 +235,7 @@ impl Prompt {
         if let Some(input) = input {
             self.is_persons_turn = false;
             self.refused = None;
-            self.say(Said::Input(input));
+            self.say(WindowReply::Input(input));
         }
     }
 
@@ -252,7 +252,7 @@ impl Prompt {
         }
     }
 
-    fn say(&mut self, said: Said) {
+    fn say(&mut self, said: WindowReply) {
         self.is_lost |= self.said.send(said).is_err();
     }
 }

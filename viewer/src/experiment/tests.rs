@@ -2,7 +2,7 @@
 
 use super::{Prompt, StudyKey};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, SubjectNumber};
-use flotor_study::screen::{Attended, Input, Said, Screen, Step, Told, Warning};
+use flotor_study::screen::{Input, Screen, ScreenStateMachine, Step, Warning, WindowMessage, WindowReply};
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::{Position, Response};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -10,9 +10,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 /// A window and an experiment, without programs between them.
 struct Both {
     prompt: Prompt,
-    experiment: Attended,
-    teller: Sender<Told>,
-    hears: Receiver<Said>,
+    experiment: ScreenStateMachine,
+    teller: Sender<WindowMessage>,
+    hears: Receiver<WindowReply>,
     answers: Vec<Response>,
 }
 
@@ -21,21 +21,21 @@ impl Both {
         let sitting = Sitting::new(protocol, 1, SubjectNumber::new(subject).unwrap());
         let ((teller, told), (said, hears)) = (channel(), channel());
         let prompt = Prompt::new(told, said);
-        let experiment = Attended::new(sitting, protocol, 30);
+        let experiment = ScreenStateMachine::new(sitting, protocol, 30);
         let mut both = Self { prompt, experiment, teller, hears, answers: Vec::new() };
         both.tell();
         both
     }
 
     fn tell(&mut self) {
-        self.teller.send(Told::Screen(self.experiment.screen())).unwrap();
-        self.prompt.take_in();
+        self.teller.send(WindowMessage::Screen(self.experiment.screen())).unwrap();
+        self.prompt.poll();
     }
 
     /// Presses a key; whether the experiment went on.
     fn press(&mut self, key: StudyKey) -> bool {
         self.prompt.key(key);
-        let Ok(Said::Input(input)) = self.hears.try_recv() else { return false };
+        let Ok(WindowReply::Input(input)) = self.hears.try_recv() else { return false };
         assert!(!self.prompt.is_persons_turn(), "one answer for one screen");
         self.prompt.key(StudyKey::Enter);
         assert!(self.hears.try_recv().is_err(), "nothing more is said before the next screen");
@@ -120,15 +120,15 @@ fn an_answer_is_taken_back_by_a_key() {
 fn warnings_and_refusals_leave_the_screen_and_a_lost_experiment_is_noticed() {
     let mut both = Both::new(&Protocol::Jnd(JndProtocol::default()), 1);
     let before = both.prompt.screen().cloned();
-    both.teller.send(Told::Warning { warning: Warning::OutOfRange }).unwrap();
-    assert!(both.prompt.take_in() && both.prompt.is_warned());
+    both.teller.send(WindowMessage::Warning { warning: Warning::OutOfRange }).unwrap();
+    assert!(both.prompt.poll() && both.prompt.is_warned());
     both.prompt.key(StudyKey::Enter);
-    assert_eq!(both.hears.try_recv(), Ok(Said::Input(Input::Continue)));
-    both.teller.send(Told::Refused { refused: "not now".to_owned() }).unwrap();
-    both.prompt.take_in();
+    assert_eq!(both.hears.try_recv(), Ok(WindowReply::Input(Input::Continue)));
+    both.teller.send(WindowMessage::Refused { refused: "not now".to_owned() }).unwrap();
+    both.prompt.poll();
     assert_eq!((both.prompt.refused(), both.prompt.is_persons_turn()), (Some("not now"), true));
     assert_eq!(both.prompt.screen().cloned(), before);
     drop(both.teller);
-    both.prompt.take_in();
+    both.prompt.poll();
     assert!(both.prompt.is_lost());
 }

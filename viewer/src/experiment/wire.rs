@@ -2,7 +2,7 @@
 //! and output. Separate threads read and write, so that neither program waits for the other.
 
 use super::Prompt;
-use flotor_study::screen::{Said, Told};
+use flotor_study::screen::{WindowMessage, WindowReply};
 use std::io::{BufRead, Write, stdin, stdout};
 use std::sync::mpsc::channel;
 use std::thread::Builder;
@@ -11,16 +11,16 @@ use std::thread::Builder;
 ///
 /// # Errors
 /// If a thread cannot be started.
-pub fn at_standard_streams() -> std::io::Result<Prompt> {
+pub fn connect_stdio() -> std::io::Result<Prompt> {
     let (teller, told) = channel();
-    let (said, sayer) = channel::<Said>();
+    let (said, sayer) = channel::<WindowReply>();
     let prompt = Prompt::new(told, said);
     let waker = prompt.waker();
     // Both threads end with the process, or with the experiment.
     Builder::new().name("flotor-told".to_owned()).spawn(move || {
         for line in stdin().lock().lines().map_while(Result::ok) {
             // Skip an unknown message of a newer experiment.
-            let Ok(word) = serde_json::from_str::<Told>(&line) else { continue };
+            let Ok(word) = serde_json::from_str::<WindowMessage>(&line) else { continue };
             if teller.send(word).is_err() {
                 return;
             }

@@ -154,12 +154,12 @@ fn names(events: Events) -> Vec<String> {
 mod tests {
     use super::*;
     use flotor_core::trace::{RECORD_WORDS, TickRecord};
-    use flotor_history::{Keep, unknown_run};
+    use flotor_history::{Retention, unknown_run};
     use flotor_sync::Words;
 
     #[test]
     fn an_event_of_one_tick_is_marked_and_each_sample_is_looked_at_once() {
-        let mut history = History::new(unknown_run(), Keep::All);
+        let mut history = History::new(unknown_run(), Retention::All);
         for tick in 0..10_000 {
             let mut record = TickRecord::from_words(&[0; RECORD_WORDS]);
             (record.tick, record.time_ns) = (tick, tick * 1_000_000);

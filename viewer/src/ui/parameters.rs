@@ -1,7 +1,7 @@
 //! Panel of a plugin: a row for each parameter, in three groups.
 
 use crate::palette::Palette;
-use crate::panel::{Knob, Panel, Standing, Value};
+use crate::panel::{Editability, Panel, PanelEntry, Value};
 use crate::ui::style;
 use crate::ui::style::SMALL_PT;
 use egui::{
@@ -30,13 +30,13 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
     CollapsingHeader::new(RichText::new(title).strong()).id_salt(&panel.name).default_open(true).show(
         ui,
         |ui| {
-            let of = |panel: &Panel, wanted: fn(&Standing) -> bool| -> Vec<usize> {
-                let standing = |(_, knob): &(usize, &Knob)| wanted(&knob.standing);
-                panel.knobs.iter().enumerate().filter(standing).map(|(index, _)| index).collect()
+            let of = |panel: &Panel, wanted: fn(&Editability) -> bool| -> Vec<usize> {
+                let editability = |(_, entry): &(usize, &PanelEntry)| wanted(&entry.editability);
+                panel.entries.iter().enumerate().filter(editability).map(|(index, _)| index).collect()
             };
-            for index in of(panel, |standing| *standing == Standing::Free) {
-                let before = panel.knobs[index].value.clone();
-                match row(ui, &mut panel.knobs[index], palette) {
+            for index in of(panel, |editability| *editability == Editability::Free) {
+                let before = panel.entries[index].value.clone();
+                match row(ui, &mut panel.entries[index], palette) {
                     Some(Edit::Begun(value)) => panel.begin(index, value),
                     Some(Edit::Reset) => {
                         changed.extend(panel.reset(index).then_some(index));
@@ -44,7 +44,7 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
                     }
                     Some(Edit::Goes) | None => {}
                 }
-                changed.extend((panel.knobs[index].value != before).then_some(index));
+                changed.extend((panel.entries[index].value != before).then_some(index));
             }
             if panel.can_undo() {
                 let undo = ui.add(Button::new(RichText::new("Undo").size(SMALL_PT)).frame(false));
@@ -55,20 +55,20 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
             if let Some(refusal) = &panel.refusal {
                 ui.colored_label(palette.warning, format!("⚠ {refusal}"));
             }
-            let follow = of(panel, |standing| matches!(standing, Standing::Follows(_)));
+            let follow = of(panel, |editability| matches!(editability, Editability::Follows(_)));
             if !follow.is_empty() {
                 heading(ui, "Follow from these, or have no effect", palette);
                 for index in follow {
-                    let _ = row(ui, &mut panel.knobs[index], palette);
+                    let _ = row(ui, &mut panel.entries[index], palette);
                 }
             }
-            let fixed = of(panel, |standing| *standing == Standing::Fixed);
+            let fixed = of(panel, |editability| *editability == Editability::Fixed);
             if !fixed.is_empty() {
                 CollapsingHeader::new(RichText::new("Fixed").size(SMALL_PT).color(palette.faint))
                     .id_salt((&panel.name, "fixed"))
                     .default_open(false)
                     .show(ui, |ui| {
-                        fixed.into_iter().for_each(|index| fact(ui, &panel.knobs[index], palette))
+                        fixed.into_iter().for_each(|index| fact(ui, &panel.entries[index], palette))
                     });
             }
         },
@@ -103,11 +103,11 @@ fn heading(ui: &mut Ui, text: &str, palette: &Palette) {
 
 /// Shows a free or dependent parameter and returns the edit. The slider covers the soft range; a number outside is typed, and
 /// applied with Enter.
-fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> Option<Edit> {
-    let (name, unit, help) = (knob.name.clone(), knob.unit().to_owned(), help(knob));
-    let is_free = knob.standing == Standing::Free;
-    let (shape, soft, is_moved) = (knob.parameter.shape.clone(), knob.parameter.soft, knob.is_moved());
-    match (&mut knob.value, shape) {
+fn row(ui: &mut Ui, entry: &mut PanelEntry, palette: &Palette) -> Option<Edit> {
+    let (name, unit, help) = (entry.name.clone(), entry.unit().to_owned(), help(entry));
+    let is_free = entry.editability == Editability::Free;
+    let (shape, soft, is_moved) = (entry.parameter.shape.clone(), entry.parameter.soft, entry.is_moved());
+    match (&mut entry.value, shape) {
         (Value::Number(number), ParameterShape::Real { min, max, .. }) => {
             let before = *number;
             let (mut label, mut wants_reset) = (None, false);
@@ -172,21 +172,21 @@ fn row(ui: &mut Ui, knob: &mut Knob, palette: &Palette) -> Option<Edit> {
             (*index != before).then_some(Edit::Begun(Value::Choice(before)))
         }
         _ => {
-            fact(ui, knob, palette);
+            fact(ui, entry, palette);
             None
         }
     }
 }
 
 /// Shows a read-only parameter.
-fn fact(ui: &mut Ui, knob: &Knob, palette: &Palette) {
-    let typed = match &knob.value {
-        Value::Number(number) => format!("{} {}", short(*number), knob.unit()),
-        _ => knob.typed(),
+fn fact(ui: &mut Ui, entry: &PanelEntry, palette: &Palette) {
+    let typed = match &entry.value {
+        Value::Number(number) => format!("{} {}", short(*number), entry.unit()),
+        _ => entry.typed(),
     };
     ui.horizontal(|ui| {
-        ui.label(RichText::new(&knob.name).color(palette.faint)).on_hover_text(help(knob));
-        show_symbol(ui, &knob.name, palette);
+        ui.label(RichText::new(&entry.name).color(palette.faint)).on_hover_text(help(entry));
+        show_symbol(ui, &entry.name, palette);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.add(egui::Label::new(if typed.is_empty() { "–" } else { &typed }).truncate());
         });
@@ -194,21 +194,21 @@ fn fact(ui: &mut Ui, knob: &Knob, palette: &Palette) {
 }
 
 /// Returns the hover text of a parameter: description, id, range, default, and the reason if it is not editable.
-fn help(knob: &Knob) -> String {
-    let mut help = format!("{}\n{}", knob.parameter.doc, knob.parameter.id);
-    if let ParameterShape::Real { min, max, default } = knob.parameter.shape {
-        help += &format!("  ·  {min} to {max} {unit}, default {default}", unit = knob.unit());
-        if knob.parameter.soft.is_some_and(|soft| soft.min > min || soft.max < max) {
+fn help(entry: &PanelEntry) -> String {
+    let mut help = format!("{}\n{}", entry.parameter.doc, entry.parameter.id);
+    if let ParameterShape::Real { min, max, default } = entry.parameter.shape {
+        help += &format!("  ·  {min} to {max} {unit}, default {default}", unit = entry.unit());
+        if entry.parameter.soft.is_some_and(|soft| soft.min > min || soft.max < max) {
             help += "; beyond the slider by typing and Enter";
         }
     }
-    match &knob.standing {
-        Standing::Free => {}
-        Standing::Follows(reason) if reason.is_empty() => {
+    match &entry.editability {
+        Editability::Free => {}
+        Editability::Follows(reason) if reason.is_empty() => {
             help += "\nFollows from other values, or has no effect with them"
         }
-        Standing::Follows(reason) => help += &format!("\n{reason}"),
-        Standing::Fixed => help += "\nCannot change while the loop runs",
+        Editability::Follows(reason) => help += &format!("\n{reason}"),
+        Editability::Fixed => help += "\nCannot change while the loop runs",
     }
     help
 }

@@ -2,7 +2,7 @@
 
 mod choices;
 
-use crate::chosen::Chosen;
+use crate::display_options::DisplayOptions;
 use crate::export::ExportOptions;
 use crate::palette::Palette;
 use crate::trace::Trace;
@@ -104,7 +104,7 @@ pub struct TooLow {
 
 /// Data source of the traces.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen<'a> {
+pub struct TraceSource<'a> {
     /// Samples of a device.
     pub history: &'a History,
     /// Name of the device, if there are several.
@@ -187,7 +187,7 @@ impl PlotStack {
     }
 
     /// Applies the traces and the axis of force over position of a command line.
-    pub fn choose(&mut self, chosen: &Chosen) {
+    pub fn choose(&mut self, chosen: &DisplayOptions) {
         if let Some(traces) = chosen.traces() {
             self.shown = traces.to_vec();
         }
@@ -210,8 +210,8 @@ impl PlotStack {
     }
 
     /// Draws the traces, and force over position, into the available area, as a picture without controls.
-    pub fn still(&mut self, ui: &mut Ui, seen: Seen<'_>, cursor_s: f64, palette: &Palette) {
-        let Seen { history, device, .. } = seen;
+    pub fn still(&mut self, ui: &mut Ui, seen: TraceSource<'_>, cursor_s: f64, palette: &Palette) {
+        let TraceSource { history, device, .. } = seen;
         let span_s = self.span_of_both_s(seen);
         let mut left = ui.available_rect_before_wrap();
         if self.force_position.axis.is_some() {
@@ -350,7 +350,7 @@ impl PlotStack {
     }
 
     /// Returns the first and last displayed time, s; the window `Whole` covers both recordings.
-    fn span_of_both_s(&self, seen: Seen<'_>) -> [f64; 2] {
+    fn span_of_both_s(&self, seen: TraceSource<'_>) -> [f64; 2] {
         let span_s = self.span_s(seen.history);
         match (self.window, seen.compared.map(History::span_s)) {
             (Window::Whole, Some([first_s, last_s])) => [span_s[0].min(first_s), span_s[1].max(last_s)],
@@ -362,7 +362,7 @@ impl PlotStack {
     pub fn show(
         &mut self,
         ui: &mut Ui,
-        seen: Seen<'_>,
+        seen: TraceSource<'_>,
         now_s: f64,
         motion: Motion,
         palette: &Palette,
@@ -389,7 +389,7 @@ impl PlotStack {
     fn over_time(
         &mut self,
         ui: &mut Ui,
-        seen: Seen<'_>,
+        seen: TraceSource<'_>,
         now_s: f64,
         palette: &Palette,
         requests: &mut Vec<PlotRequest>,
@@ -431,12 +431,12 @@ impl PlotStack {
     fn stack(
         &mut self,
         ui: &mut Ui,
-        seen: Seen<'_>,
+        seen: TraceSource<'_>,
         now_s: f64,
         (shown, height_pt, wheel): (&[Quantity], f32, Wheel),
         palette: &Palette,
     ) -> Vec<PlotRequest> {
-        let Seen { history, device, .. } = seen;
+        let TraceSource { history, device, .. } = seen;
         let span_s = self.span_of_both_s(seen);
         let cursor_s = self.hover_s.unwrap_or(now_s);
         let maximise = match (self.alone, self.shown.len()) {

@@ -1,7 +1,7 @@
 //! Use of the limits, and counts of events so far.
 
+use crate::event_counts::EventCounts;
 use crate::palette::Palette;
-use crate::tally::Tally;
 use crate::ui::overlay::width_pt;
 use crate::ui::plots::short;
 use crate::ui::style::SMALL_PT;
@@ -36,12 +36,12 @@ pub fn limits(ui: &mut Ui, sample: &Sample, limits: &WrenchLimits, units: Units,
 }
 
 /// Shows a line for each event, counted since the first tick received. New lines move no control under the pointer: none is beneath.
-pub fn events(ui: &mut Ui, tally: &Tally, palette: &Palette) {
-    let title = RichText::new(format!("Events since {:.1} s", tally.since_s())).strong();
+pub fn events(ui: &mut Ui, counted: &EventCounts, palette: &Palette) {
+    let title = RichText::new(format!("Events since {:.1} s", counted.since_s())).strong();
     CollapsingHeader::new(title).id_salt("events").default_open(true).show(ui, |ui| {
         let events =
-            Events::NAMES.iter().map(|name| name.replace('_', " ")).zip(tally.counts().iter().copied());
-        let counts = events.chain([("not shown".to_owned(), tally.dropped)]);
+            Events::NAMES.iter().map(|name| name.replace('_', " ")).zip(counted.counts().iter().copied());
+        let counts = events.chain([("not shown".to_owned(), counted.dropped)]);
         let happened: Vec<_> = counts.filter(|(_, count)| *count > 0).collect();
         if happened.is_empty() {
             ui.label(RichText::new("Nothing has happened").color(palette.faint));

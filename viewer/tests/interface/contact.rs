@@ -4,13 +4,13 @@ use super::texts::texts;
 use super::window::{Window, window};
 use crate::support::{model_run, plugin_file, tick};
 use flotor_core::trace::Events;
-use flotor_history::{History, Keep};
+use flotor_history::{History, Retention};
 use flotor_viewer::app::{Recorded, Start};
 
 /// A window on a moment, s, of a handle that dips 4 mm into a wall within half a second.
 fn at_a_wall<'a>(at_s: f64) -> Window<'a> {
     let (run, _) = model_run("wall", &[]);
-    let mut history = History::new(run, Keep::All);
+    let mut history = History::new(run, Retention::All);
     (0..1000).for_each(|number| history.push(&tick(number, Events::NONE)));
     let recorded = Recorded { at_s: Some(at_s), ..Recorded::new(vec![history], vec![plugin_file("wall")]) };
     let mut window = window(Start::Recording(recorded));

@@ -6,7 +6,7 @@ use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
-use flotor_history::{History, Keep};
+use flotor_history::{History, Retention};
 use flotor_record::{Role as PluginRole, RunDescription};
 use flotor_viewer::app::{Recorded, Start};
 
@@ -21,7 +21,7 @@ fn two_hands() -> Vec<History> {
 }
 
 fn histories(run: &RunDescription) -> Vec<History> {
-    let mut histories = History::of_each_device(run, Keep::All);
+    let mut histories = History::of_each_device(run, Retention::All);
     for number in 0..1000 {
         let mut record = tick(number, Events::NONE);
         histories.iter_mut().for_each(|history| history.push(&record));

@@ -5,7 +5,7 @@ use crate::support::{plugin_file, spring_run, tick};
 use egui::{Key, vec2};
 use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
-use flotor_history::{History, Keep};
+use flotor_history::{History, Retention};
 use flotor_viewer::app::{Recorded, Start};
 use std::time::Duration;
 
@@ -42,7 +42,7 @@ fn a_picture_makes_what_is_new_and_nothing_else() {
     }
 
     let (run, _) = spring_run(&[]);
-    let mut history = History::new(run, Keep::All);
+    let mut history = History::new(run, Retention::All);
     for number in 0..3000 {
         let mut resting = tick(number, Events::NONE);
         resting.pose = tick(250, Events::NONE).pose;

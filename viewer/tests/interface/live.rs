@@ -9,13 +9,13 @@ use egui::accesskit::Role;
 use egui_kittest::kittest::{NodeT, Queryable};
 use flotor_core::trace::Events;
 use flotor_live::{Ask, Outcome};
-use flotor_viewer::app::{Start, Wanted};
-use flotor_viewer::panel::{Standing, Value};
+use flotor_viewer::app::{RunSelection, Start};
+use flotor_viewer::panel::{Editability, Value};
 
 #[test]
 fn without_a_run_the_window_says_what_to_do() {
     let folder = tempfile::tempdir().expect("a scratch folder");
-    let mut window = window(Start::Live(Wanted::newest(flotor_live::Directory::at(folder.path()))));
+    let mut window = window(Start::Live(RunSelection::newest(flotor_live::Directory::at(folder.path()))));
     window.run_steps(2);
     window.get_by_label("Waiting for a run");
     assert!(window.query_by_label("EMERGENCY STOP").is_none(), "there is nothing to stop");
@@ -38,7 +38,7 @@ fn the_emergency_stop_is_always_in_sight_and_on_the_largest_key() {
     host.end("emergency stop (the viewer's window or another client); the device is stopped");
     until(&mut window, |window| window.query_by_label_contains("emergency stop (").is_some());
     assert!(window.query_by_label("EMERGENCY STOP").is_none());
-    assert!(window.state().panels()[1].knobs.iter().all(|knob| knob.standing == Standing::Fixed));
+    assert!(window.state().panels()[1].entries.iter().all(|entry| entry.editability == Editability::Fixed));
 }
 
 #[test]
@@ -229,15 +229,15 @@ fn a_refused_change_goes_back_and_says_why() {
 #[test]
 fn physical_parameters_drive_the_rigidities_and_not_the_other_way_round() {
     let (mut window, mut host, _folder) = live(&[("mode", "physical")]);
-    let standing = |window: &Window<'_>, id: &str| {
-        let knobs = &window.state().panels()[1].knobs;
-        knobs.iter().find(|knob| knob.parameter.id == id).expect("the spring has it").standing.clone()
+    let editability = |window: &Window<'_>, id: &str| {
+        let entries = &window.state().panels()[1].entries;
+        entries.iter().find(|entry| entry.parameter.id == id).expect("the spring has it").editability.clone()
     };
-    assert_eq!(standing(&window, "wire_diameter_mm"), Standing::Free);
-    assert!(matches!(standing(&window, "gamma_n"), Standing::Follows(_)));
+    assert_eq!(editability(&window, "wire_diameter_mm"), Editability::Free);
+    assert!(matches!(editability(&window, "gamma_n"), Editability::Follows(_)));
     window.get_by_label("Follow from these, or have no effect");
     // Under a seat that is held, friction has no effect.
-    assert!(matches!(standing(&window, "seat_friction"), Standing::Follows(_)));
+    assert!(matches!(editability(&window, "seat_friction"), Editability::Follows(_)));
     assert!(window.get_by_role_and_label(Role::Slider, "gamma").accesskit_node().is_disabled());
     let before = number_of(&window, "gamma_n");
     window.get_by_role_and_label(Role::Slider, "wire diameter").set_value_accesskit(0.8);
@@ -247,16 +247,17 @@ fn physical_parameters_drive_the_rigidities_and_not_the_other_way_round() {
     until(&mut window, |window| number_of(window, "gamma_n") > 1.5 * before);
 
     let (window, _host, _folder) = live(&[("mode", "gamma")]);
-    assert!(matches!(standing(&window, "wire_diameter_mm"), Standing::Follows(_)));
-    assert_eq!(standing(&window, "gamma_n"), Standing::Free);
+    assert!(matches!(editability(&window, "wire_diameter_mm"), Editability::Follows(_)));
+    assert_eq!(editability(&window, "gamma_n"), Editability::Free);
     let (window, _host, _folder) = live(&[("seat", "free")]);
-    assert_eq!(standing(&window, "seat_friction"), Standing::Free);
+    assert_eq!(editability(&window, "seat_friction"), Editability::Free);
 }
 
 fn number_of(window: &Window<'_>, parameter: &str) -> f64 {
     let panel = &window.state().panels()[1];
-    let knob = panel.knobs.iter().find(|knob| knob.parameter.id == parameter).expect("the spring has it");
-    match knob.value {
+    let entry =
+        panel.entries.iter().find(|entry| entry.parameter.id == parameter).expect("the spring has it");
+    match entry.value {
         Value::Number(number) => number,
         ref other => panic!("{other:?}"),
     }
@@ -302,12 +303,12 @@ fn no_pointer_brings_a_parameter_out_of_its_soft_range() {
             window.event(egui::Event::MouseWheel { unit, delta, phase, modifiers, source });
         }
         window.run_steps(1);
-        for knob in window.state().panels().iter().flat_map(|panel| &panel.knobs) {
-            let (Value::Number(number), Some(soft)) = (&knob.value, knob.parameter.soft) else { continue };
-            if knob.standing == Standing::Free {
-                let first: f64 = knob.parameter.first.parse().expect("a number");
+        for entry in window.state().panels().iter().flat_map(|panel| &panel.entries) {
+            let (Value::Number(number), Some(soft)) = (&entry.value, entry.parameter.soft) else { continue };
+            if entry.editability == Editability::Free {
+                let first: f64 = entry.parameter.first.parse().expect("a number");
                 let legal = soft.min.min(first)..=soft.max.max(first);
-                assert!(legal.contains(number), "{} = {number} beyond {legal:?}", knob.name);
+                assert!(legal.contains(number), "{} = {number} beyond {legal:?}", entry.name);
             }
         }
     }

@@ -131,13 +131,13 @@ fn a_window_is_as_it_was_left() {
     left.get_by_label("Energy").click();
     left.key_press(Key::P);
     left.run_steps(3);
-    let remembered = left.state().remembered();
+    let saved_settings = left.state().settings();
     let mut next = recording();
-    assert_ne!(next.state().remembered(), remembered);
+    assert_ne!(next.state().settings(), saved_settings);
     let context = next.ctx.clone();
-    next.state_mut().recall(&context, &remembered);
+    next.state_mut().restore(&context, &saved_settings);
     next.run_steps(3);
-    assert_eq!(next.state().remembered(), remembered);
+    assert_eq!(next.state().settings(), saved_settings);
     next.get_by_label("Dark (L)");
     next.get_by_label("Energy over time, J");
     assert!(next.query_by_label("preset").is_none(), "the panel was put away");

@@ -7,7 +7,7 @@ use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
 use flotor_history::History;
-use flotor_viewer::app::{Start, Wanted};
+use flotor_viewer::app::{RunSelection, Start};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -42,8 +42,8 @@ pub(super) fn drop_on(window: &mut Window<'_>, file: &Path) {
 
 /// A window without a run.
 fn empty<'a>(folder: &Path) -> Window<'a> {
-    let wanted = Wanted::newest(flotor_live::Directory::at(folder));
-    let mut window = window(Start::Live(Wanted { plugins: vec![plugin_file("spring")], ..wanted }));
+    let wanted = RunSelection::newest(flotor_live::Directory::at(folder));
+    let mut window = window(Start::Live(RunSelection { plugins: vec![plugin_file("spring")], ..wanted }));
     window.run_steps(2);
     window
 }
@@ -66,11 +66,11 @@ fn a_recording_dropped_on_an_empty_window_is_opened_and_offered_by_the_next_wind
     window.key_press(Key::Escape);
     window.run_steps(2);
     assert!(window.state().compared().is_none());
-    let remembered = window.state().remembered();
-    assert_eq!(remembered.latest, [file]);
+    let saved_settings = window.state().settings();
+    assert_eq!(saved_settings.latest, [file]);
     let mut next = empty(folder.path());
     let context = next.ctx.clone();
-    next.state_mut().recall(&context, &remembered);
+    next.state_mut().restore(&context, &saved_settings);
     next.run_steps(2);
     next.get_by_label("run.mcap").click();
     next.run_steps(3);

@@ -7,7 +7,7 @@ use egui_kittest::kittest::Queryable;
 use flotor_history::player::Motion;
 use flotor_history::quantity::Quantity;
 use flotor_viewer::app::{Recorded, Start};
-use flotor_viewer::chosen::Chosen;
+use flotor_viewer::display_options::DisplayOptions;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureError, PictureOptions, has_moment, least_height_px, picture};
 use flotor_viewer::ui::plot_stack::ExportFormat;
@@ -164,7 +164,7 @@ fn the_stiffness_felt_is_a_trace() {
 /// The traces of a command line are those of the window, of the picture of a moment and of a file.
 #[test]
 fn what_a_command_line_chooses_holds_in_a_window_and_in_a_picture() {
-    let chosen = Chosen::new(0, vec![Quantity::Energy, Quantity::Force, Quantity::Energy], Some(2));
+    let chosen = DisplayOptions::new(0, vec![Quantity::Energy, Quantity::Force, Quantity::Energy], Some(2));
     let mut window = recording();
     window.state_mut().choose(&chosen);
     window.run_steps(3);
@@ -179,16 +179,16 @@ fn what_a_command_line_chooses_holds_in_a_window_and_in_a_picture() {
         let (scale, look) = (1.0, Look::Dark);
         picture(histories, &mut [], &PictureOptions { size_px, scale, look, view: None, chosen, at_s: None })
     };
-    let usual = drawn(Chosen::default(), [640, 600]).expect("a picture");
+    let usual = drawn(DisplayOptions::default(), [640, 600]).expect("a picture");
     assert_ne!(drawn(chosen, [640, 600]).expect("a picture"), usual);
-    let explicit = Chosen::new(0, vec![Quantity::Force, Quantity::Position], None);
+    let explicit = DisplayOptions::new(0, vec![Quantity::Force, Quantity::Position], None);
     assert_eq!(drawn(explicit, [640, 600]).expect("a picture"), usual);
-    let all = Chosen::new(0, Quantity::ALL.to_vec(), None);
+    let all = DisplayOptions::new(0, Quantity::ALL.to_vec(), None);
     assert!(matches!(drawn(all, [640, 600]), Err(PictureError::TooLow(_))));
     // Whether the traces were chosen or not.
-    let least_px = least_height_px(&Chosen::default(), 1.0);
-    drawn(Chosen::default(), [640, least_px]).expect("they fit");
-    assert!(matches!(drawn(Chosen::default(), [640, least_px - 1]), Err(PictureError::TooLow(_))));
+    let least_px = least_height_px(&DisplayOptions::default(), 1.0);
+    drawn(DisplayOptions::default(), [640, least_px]).expect("they fit");
+    assert!(matches!(drawn(DisplayOptions::default(), [640, least_px - 1]), Err(PictureError::TooLow(_))));
 }
 
 #[test]
@@ -207,7 +207,7 @@ fn a_moment_outside_the_recording_is_refused_with_its_ends() {
 #[test]
 fn a_file_too_low_for_its_traces_is_refused_and_the_least_height_is_enough() {
     let mut window = recording();
-    window.state_mut().choose(&Chosen::new(0, Quantity::ALL.to_vec(), None));
+    window.state_mut().choose(&DisplayOptions::new(0, Quantity::ALL.to_vec(), None));
     let folder = tempfile::tempdir().expect("a scratch folder");
     let mut plots = window.state().plots().clone();
     let written = |plots: &_, format| {
@@ -247,7 +247,7 @@ fn arrows_of_a_chosen_force_are_equally_long_in_every_run() {
         let Start::Recording(Recorded { histories, .. }) = recorded(ticks, None) else {
             panic!("it is a recording")
         };
-        let chosen = Chosen::default().with_arrow_force(arrow_force_n);
+        let chosen = DisplayOptions::default().with_arrow_force(arrow_force_n);
         let (size_px, scale, look, at_s) = ([320, 540], 1.0, Look::Dark, Some(0.1));
         let image =
             picture(histories, &mut [], &PictureOptions { size_px, scale, look, view: None, chosen, at_s });

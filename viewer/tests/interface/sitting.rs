@@ -10,11 +10,12 @@ use flotor_core::trace::Events;
 use flotor_live::Ask;
 use flotor_study::protocol::{MagnitudeProtocol, Protocol, Quality, SubjectNumber};
 use flotor_study::screen::{
-    Attended, May, Pause, Question, Said, Screen, Told, TrialView, Warning, WindowState,
+    May, Pause, Question, Screen, ScreenStateMachine, TrialView, Warning, WindowMessage, WindowReply,
+    WindowState,
 };
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::{Phase, Position};
-use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::app::{RunSelection, Start, Viewer};
 use flotor_viewer::experiment::Prompt;
 use flotor_viewer::experiment::texts::Texts;
 use flotor_viewer::palette::Look;
@@ -35,15 +36,15 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
     };
     let protocol = Protocol::Magnitude(magnitude);
     let sitting = Sitting::new(&protocol, 1, SubjectNumber::new(2).expect("a legal number"));
-    let mut experiment = Attended::new(sitting, &protocol, 0);
+    let mut experiment = ScreenStateMachine::new(sitting, &protocol, 0);
     let ((teller, told), (said, hears)) = (channel(), channel());
     let prompt = Box::new(Prompt::new(told, said));
     let folder = tempfile::tempdir().expect("a scratch folder");
     let mut host = FakeHost::new(&folder, &[]);
     let start =
-        |directory: &flotor_live::Directory| Start::Sitting(Wanted::newest(directory.clone()), prompt);
+        |directory: &flotor_live::Directory| Start::Sitting(RunSelection::newest(directory.clone()), prompt);
     let mut window = host.welcome(|directory| window(start(directory)));
-    assert_eq!(hears.recv_timeout(PATIENCE), Ok(Said::Window { window: WindowState::Open }));
+    assert_eq!(hears.recv_timeout(PATIENCE), Ok(WindowReply::Window { window: WindowState::Open }));
     assert_eq!(host.request(None), Ask::Watch { every: 1 });
     host.run_ticks(100, Events::NONE);
     until(&mut window, |window| !window.state().history().is_empty());
@@ -51,7 +52,7 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
     let (mut headlines, mut seen) = (Vec::new(), 0);
     while !experiment.is_over() {
         let screen = experiment.screen();
-        teller.send(Told::Screen(screen.clone())).expect("the window listens");
+        teller.send(WindowMessage::Screen(screen.clone())).expect("the window listens");
         until(&mut window, |window| window.state().prompt().is_some_and(Prompt::is_persons_turn));
         window.run_steps(1);
         let is_seen = matches!(&screen, Screen::Feel { trial, .. } if trial.object_is_shown);
@@ -85,17 +86,17 @@ fn a_person_is_led_through_trials_by_keyboard_and_sees_nothing_in_the_haptics_al
         }
         window.key_press(Key::Enter);
         window.run_steps(1);
-        let Ok(Said::Input(input)) = hears.recv_timeout(PATIENCE) else { panic!("nothing is said") };
+        let Ok(WindowReply::Input(input)) = hears.recv_timeout(PATIENCE) else { panic!("nothing is said") };
         assert!(experiment.input(input, 1.0).is_ok());
     }
     let times = |what: &str| headlines.iter().filter(|headline| **headline == what).count();
     assert_eq!((times("Feel the spring"), times("How stiff was it?"), seen), (8, 8, 4));
 
-    teller.send(Told::Warning { warning: Warning::OutOfRange }).expect("the window listens");
+    teller.send(WindowMessage::Warning { warning: Warning::OutOfRange }).expect("the window listens");
     until(&mut window, |window| window.query_by_label_contains("out of its range").is_some());
     host.end("the device has stopped");
     until(&mut window, |window| window.query_by_label("The device has stopped").is_some());
-    teller.send(Told::Screen(Screen::Over)).expect("the window listens");
+    teller.send(WindowMessage::Screen(Screen::Over)).expect("the window listens");
     until(&mut window, |window| window.query_by_label("Thank you").is_some());
 }
 
@@ -113,7 +114,7 @@ fn the_text_of_a_screen_grows_with_its_height_and_has_its_keys_beside_it() {
         Texts::read(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/texts/german.toml"))).expect("texts");
     let question = Question::WhichIsMore;
     let screen = Screen::Ask { trial: trial(Quality::Stiffness, 2, false), question };
-    teller.send(Told::Screen(screen)).expect("the window listens");
+    teller.send(WindowMessage::Screen(screen)).expect("the window listens");
     let mut window = window(recorded(100, None));
     window.state_mut().rehearse(prompt);
     for size in [[800.0, 600.0], [1280.0, 800.0], [1920.0, 1080.0], [3840.0, 2160.0], [1920.0, 1080.0]] {
@@ -140,7 +141,7 @@ fn a_text_to_be_read_is_shown_to_its_end() {
     let ((teller, told), (said, _hears)) = (channel(), channel());
     let text =
         "Consent\n\nYou take part.\n\nYou may stop at any time.\n\nNobody else sees your answers.".to_owned();
-    teller.send(Told::Screen(Screen::Read { text })).expect("the window listens");
+    teller.send(WindowMessage::Screen(Screen::Read { text })).expect("the window listens");
     let mut window = window(recorded(100, None));
     window.state_mut().rehearse(Prompt::new(told, said));
     window.run_steps(3);
@@ -206,14 +207,14 @@ fn every_screen_of_a_sitting_says_what_to_do_and_which_keys_do_it() {
     let mut host = FakeHost::new(&folder, &[]);
     let size = vec2(800.0, 600.0);
     let mut window = host.welcome(|directory| {
-        let start = Start::Sitting(Wanted::newest(directory.clone()), prompt);
+        let start = Start::Sitting(RunSelection::newest(directory.clone()), prompt);
         let harness = Harness::builder().with_size(size).with_step_dt(1.0 / 60.0);
         harness.build_eframe(|creation| Viewer::new(&creation.egui_ctx, None, start, Look::Light))
     });
     assert_eq!(host.request(None), Ask::Watch { every: 1 });
     host.run_ticks(100, Events::NONE);
     for (screen, headline, keys) in screens {
-        teller.send(Told::Screen(screen.clone())).expect("the window listens");
+        teller.send(WindowMessage::Screen(screen.clone())).expect("the window listens");
         until_fresh(&mut window, &mut host, |window| {
             window.query_by_label(headline).is_some() && window.query_by_label_contains(keys).is_some()
         });

@@ -8,13 +8,13 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use flotor_core::trace::Events;
 use flotor_history::quantity::Quantity;
-use flotor_history::{History, Keep};
+use flotor_history::{History, Retention};
 use flotor_live::{Ask, EndKind};
-use flotor_viewer::app::{Start, Viewer, Wanted};
-use flotor_viewer::chosen::Chosen;
+use flotor_viewer::app::{RunSelection, Start, Viewer};
+use flotor_viewer::display_options::DisplayOptions;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureOptions, interface, least_height_px};
-use flotor_viewer::remembered::Remembered;
+use flotor_viewer::saved_settings::SavedSettings;
 
 /// Widths and heights of windows, pixels.
 const SIZES: [[f32; 2]; 6] =
@@ -180,7 +180,7 @@ fn devices(names: &[&str], title: &str, look: Look) {
 /// A window on a run of so many devices: quiet, with warnings, and after a fault.
 fn live(mut host: FakeHost, count: u16, look: Look, case: &str) {
     let mut window = host.welcome(|directory| {
-        let start = Start::Live(Wanted::newest(directory.clone()));
+        let start = Start::Live(RunSelection::newest(directory.clone()));
         let harness = Harness::builder().with_size(vec2(640.0, 400.0));
         harness.build_eframe(|creation| Viewer::new(&creation.egui_ctx, None, start, look))
     });
@@ -190,7 +190,7 @@ fn live(mut host: FakeHost, count: u16, look: Look, case: &str) {
     in_all_sizes(&mut window, (Shown::Quiet, case), |_| host.run_ticks_of(count, 1, Events::NONE));
     in_all_sizes(&mut window, (Shown::Warned, case), |_| host.run_ticks_of(count, 1, WARNINGS));
     let four = vec![Quantity::Force, Quantity::Torque, Quantity::Velocity, Quantity::Lateness];
-    window.state_mut().choose(&Chosen::new(0, four, Some(2)));
+    window.state_mut().choose(&DisplayOptions::new(0, four, Some(2)));
     in_all_sizes(&mut window, (Shown::FourTraces, case), |_| host.run_ticks_of(count, 1, WARNINGS));
     let reason = "tick 1234 exceeded the time limit, and the watchdog stopped the device; check the machine with `flotor doctor`, which \
                   says what keeps a loop from its time, and how to mend that on this kind of machine";
@@ -234,14 +234,14 @@ fn no_texts_overlap_with_a_contact_and_a_hand() {
 #[test]
 fn no_texts_of_an_empty_window_overlap() {
     let folder = tempfile::tempdir().expect("a scratch folder");
-    let start = Start::Live(Wanted::newest(flotor_live::Directory::at(folder.path())));
+    let start = Start::Live(RunSelection::newest(flotor_live::Directory::at(folder.path())));
     let harness = Harness::builder().with_size(vec2(640.0, 400.0));
     let mut window: Window<'_> =
         harness.build_eframe(|creation| Viewer::new(&creation.egui_ctx, None, start, Look::Dark));
     let context = window.ctx.clone();
     let latest = LONG.iter().chain(&SHORT[..1]).map(|name| format!("/recordings/{name}.mcap").into());
-    let remembered = Remembered { latest: latest.collect(), ..Remembered::default() };
-    window.state_mut().recall(&context, &remembered);
+    let saved_settings = SavedSettings { latest: latest.collect(), ..SavedSettings::default() };
+    window.state_mut().restore(&context, &saved_settings);
     for size in SIZES {
         for scale in SCALES {
             let points = resize(&mut window, size, scale);
@@ -258,7 +258,7 @@ fn no_texts_of_a_picture_overlap() {
     for (names, title) in [(SHORT, TITLES[1]), (LONG, TITLES[0])] {
         for count in 1..=4 {
             let run = run_of_devices(title, &names[..count]);
-            let mut histories = History::of_each_device(&run, Keep::All);
+            let mut histories = History::of_each_device(&run, Retention::All);
             for (number, device) in
                 (0..500).flat_map(|number| (0..).zip(0..count).map(move |(device, _)| (number, device)))
             {

@@ -95,10 +95,10 @@ fn the_border_between_view_and_traces_is_pulled_and_stays() {
     drag(&mut window, PointerButton::Primary, border, border - vec2(0.0, 150.0));
     let after = area(&window, FORCE).height();
     assert!((after - before - 75.0).abs() < 4.0, "half of what was pulled each: {before} to {after}");
-    let kept = window.state().remembered();
+    let kept = window.state().settings();
     let mut next = recording();
     let context = next.ctx.clone();
-    next.state_mut().recall(&context, &kept);
+    next.state_mut().restore(&context, &kept);
     next.run_steps(3);
     assert!((area(&next, FORCE).height() - after).abs() < 1.0, "the next time, too");
 }

@@ -5,9 +5,9 @@ use egui::vec2;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use flotor_core::trace::Events;
-use flotor_history::{History, Keep};
+use flotor_history::{History, Retention};
 use flotor_live::Ask;
-use flotor_viewer::app::{Recorded, Start, Viewer, Wanted};
+use flotor_viewer::app::{Recorded, RunSelection, Start, Viewer};
 use flotor_viewer::palette::Look;
 use std::time::{Duration, Instant};
 
@@ -26,7 +26,7 @@ pub(crate) fn window<'a>(start: Start) -> Window<'a> {
 /// A recording of so many ticks, beginning at a moment.
 pub(crate) fn recorded(ticks: u64, at_s: Option<f64>) -> Start {
     let (run, _) = spring_run(&[]);
-    let mut history = History::new(run, Keep::All);
+    let mut history = History::new(run, Retention::All);
     (0..ticks).for_each(|number| history.push(&tick(number, Events::NONE)));
     Start::Recording(Recorded { at_s, ..Recorded::new(vec![history], vec![plugin_file("spring")]) })
 }
@@ -42,7 +42,7 @@ pub(crate) fn recording<'a>() -> Window<'a> {
 pub(crate) fn live<'a>(settings: &[(&str, &str)]) -> (Window<'a>, FakeHost, tempfile::TempDir) {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let mut host = FakeHost::new(&folder, settings);
-    let mut window = host.welcome(|directory| window(Start::Live(Wanted::newest(directory.clone()))));
+    let mut window = host.welcome(|directory| window(Start::Live(RunSelection::newest(directory.clone()))));
     assert_eq!(host.request(None), Ask::Watch { every: 1 });
     host.run_ticks(1500, Events::NONE);
     until(&mut window, |window| window.state().history().len() >= 1500);

@@ -7,7 +7,7 @@ use egui::{Rect, vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use flotor_live::Directory;
-use flotor_viewer::app::{Start, Viewer, Wanted};
+use flotor_viewer::app::{RunSelection, Start, Viewer};
 use flotor_viewer::palette::Look;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -104,7 +104,7 @@ pub(crate) fn place_of_slider(directory: &Directory, name: &str) -> Rect {
     let size = vec2(f32::from(SIZE[0]), f32::from(SIZE[1]));
     let directory = directory.clone();
     let mut harness = Harness::builder().with_size(size).build_eframe(|creation| {
-        Viewer::new(&creation.egui_ctx, None, Start::Live(Wanted::newest(directory)), Look::Dark)
+        Viewer::new(&creation.egui_ctx, None, Start::Live(RunSelection::newest(directory)), Look::Dark)
     });
     let until = Instant::now() + PATIENCE;
     while harness.state().history().is_empty() {
