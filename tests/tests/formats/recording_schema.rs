@@ -124,7 +124,7 @@ fn run() -> RunDescription {
         },
         field: (role != Role::Device).then_some(FieldTiming { rate_hz: 200.0, latency_s: 0.0025 }),
         latency_s: if role == Role::Device { 0.001 } else { 0.0 },
-        felt: Demand::WRENCH,
+        at_hand: Demand::WRENCH,
         settings: vec![pair("preset", "plain")],
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
         device: 0,

@@ -51,7 +51,7 @@ impl Board {
                 if length == 0 {
                     continue;
                 }
-                let answer = board.hear(&chunk[..length]);
+                let answer = board.receive(&chunk[..length]);
                 entries.push(board.force_n().map_or(0.0, DVec2::length));
                 let _ = port.write_all(&answer);
             }

@@ -131,7 +131,7 @@ fn a_device_is_energised_and_stopped_by_the_loops_own_thread_whatever_an_observe
     let outcome = session.run(&mut dawdler, &StopSwitch::default()).expect("it runs");
     assert_eq!(outcome.end, RunEnd::EmergencyStop(EmergencySource::Button));
     let pressed = directory.latch().state().pressed.expect("it stays");
-    assert!(pressed.who.starts_with("emergency stop (button of the device)"), "{pressed}");
+    assert!(pressed.source.starts_with("emergency stop (button of the device)"), "{pressed}");
     assert!(dawdler.saw_it_stopped, "the device was stopped after the observer had looked");
     assert_eq!(energised_by().as_deref(), Some("flotor-servo"));
 }

@@ -197,7 +197,7 @@ fn stop_time(stop: Stop, selected: usize) -> Duration {
     let run = run.through_shell(&keyboard.script()).start();
     let path = socket(&directory(&scratch));
     let watching = Client::connect(&path).expect("the run answers");
-    let connected = watching.asker();
+    let connected = watching.request_client();
     let _ = connected.ask(Ask::Watch { every: 1 }).expect("likewise");
     board.wait_for_force(PAST);
     let place = Place::Socket(path.clone());
@@ -211,7 +211,7 @@ fn stop_time(stop: Stop, selected: usize) -> Duration {
             Stop::Connected => drop(connected.ask(Ask::EmergencyStop).expect("the connection is there")),
             Stop::Socket => {
                 let client = Client::connect(&path).expect("the run answers");
-                let _ = client.asker().ask(Ask::EmergencyStop).expect("likewise");
+                let _ = client.request_client().ask(Ask::EmergencyStop).expect("likewise");
             }
         }
         wait_until("there is no force", || board.force_n() == 0.0);
@@ -263,7 +263,7 @@ fn windows(
     count: usize,
 ) -> Vec<Vec<u64>> {
     let mut client = Client::connect(&socket(directory)).expect("the run answers");
-    let _ = client.asker().ask(Ask::Watch { every: 1 }).expect("likewise");
+    let _ = client.request_client().ask(Ask::Watch { every: 1 }).expect("likewise");
     let places = [place.clone(), stand_in(place, scratch)];
     let selected = AtomicUsize::new(0);
     under_attack(&places, request, &selected, || {

@@ -49,7 +49,7 @@ fn a_weight_laid_on_the_boundary_comes_to_rest() {
     for rate_hz in [250, 500, 1000, 2000, 4000] {
         for (preset, latency_ticks) in [("plain", 0), ("full", 0), ("full", 1), ("full", 2), ("full", 3)] {
             let wall = wall(latency_ticks, rate_hz);
-            let load_n = wall.takes_n;
+            let load_n = wall.holds_n;
             let what = format!("{preset}, {latency_ticks} ticks, {rate_hz} Hz, {load_n:.2} N");
             let text = scene(preset, latency_ticks, rate_hz, -wall.begins_m[2] * 1.0e3, load_n);
             let notices = prepared(Clock::Virtual, &text).notices();
@@ -102,7 +102,7 @@ fn the_book_prints_the_walls_of_the_flotor() {
         let [limit, stiffness] = [limit, wall.stiffness_n_per_m]
             .map(|stiffness| format!("{:.1}", stiffness * 1.0e-3).trim_end_matches(".0").to_owned());
         let takes =
-            if wall.takes_n < 4.999 { format!(", takes {:.1} N", wall.takes_n) } else { String::new() };
+            if wall.holds_n < 4.999 { format!(", takes {:.1} N", wall.holds_n) } else { String::new() };
         let begins_mm = wall.begins_m[2] * 1.0e3;
         assert_chapter_prints(
             "safety-envelope.md",

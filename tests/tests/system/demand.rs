@@ -12,7 +12,7 @@ use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::summary::{RunFacts, RunSummary, Tally};
-use flotor_session::telemetry::{Watched, publish};
+use flotor_session::telemetry::{ObservedRun, publish};
 use flotor_session::{Observer, RunOptions, Session, headless};
 use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, exit_code};
@@ -192,7 +192,7 @@ fn until_asked(observers: &ObserverDemand, demand: Demand) {
 /// Connects a client that watches every tick.
 fn client(directory: &Directory) -> Client {
     let mut client = Client::find(directory).expect("the run is published");
-    let number = client.asker().ask(Ask::Watch { every: 1 }).expect("the host listens");
+    let number = client.request_client().ask(Ask::Watch { every: 1 }).expect("the host listens");
     loop {
         match client.next(Duration::from_secs(20)).expect("the host answers") {
             Some(Event::Answer(answer)) if answer.number == number => return client,
@@ -211,7 +211,7 @@ fn digest_with_a_client(scene: &Scene) -> (String, Vec<Demand>) {
     let publication = publish(&directory, scene, &description, &session, &stop).expect("it is published");
     let observers = session.observers();
     let mut watched =
-        Watched { observer: Asking::for_outputs(Demand::FORCE), publication: Some(publication) };
+        ObservedRun { observer: Asking::for_outputs(Demand::FORCE), publication: Some(publication) };
     let mut lockstep = session.into_lockstep().expect("it starts");
     let mut watching = None;
     for tick in 0_u64.. {
@@ -274,7 +274,7 @@ fn summary_with_clients(axes: &str, clients: usize) -> Value {
     let description = describe(&scene, &OPTIONS, &plugins);
     let publication = publish(&directory, &scene, &description, &session, &stop).expect("it is published");
     let observer = Asking::for_outputs(Demand::FORCE);
-    let mut watched = Watched { observer, publication: Some(publication) };
+    let mut watched = ObservedRun { observer, publication: Some(publication) };
     let watching: Vec<Client> = (0..clients).map(|_| client(&directory)).collect();
     until_asked(&observers, if clients > 0 { Demand::ALL } else { Demand::FORCE });
     let mut lockstep = session.into_lockstep().expect("it starts");
@@ -288,7 +288,7 @@ fn summary_with_clients(axes: &str, clients: usize) -> Value {
         seed: OPTIONS.seed,
         rate_hz: scene.rate_hz,
         plugins: &plugins,
-        asked: watched.observer.demand,
+        requested: watched.observer.demand,
         couplings: &[],
         carried: &[],
         trace_digest: String::new(),

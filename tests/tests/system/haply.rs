@@ -42,7 +42,7 @@ impl Board {
             let mut chunk = [0; 256];
             while !ended.load(Ordering::Acquire) {
                 let length = port.read(&mut chunk).unwrap_or(0);
-                if port.write_all(&board.hear(&chunk[..length])).is_err() {
+                if port.write_all(&board.receive(&chunk[..length])).is_err() {
                     break;
                 }
             }

@@ -49,7 +49,7 @@ impl Machine {
 /// A run can be watched before it looks at the latch, and ticks only after.
 fn has_ticked(directory: &Directory, process: u32) -> bool {
     let Ok(mut client) = Client::of_process(directory, process) else { return false };
-    let asked = client.asker().ask(Ask::Watch { every: 1 });
+    let asked = client.request_client().ask(Ask::Watch { every: 1 });
     asked.is_ok() && (0..4).any(|_| matches!(client.next(PATIENCE), Ok(Some(Event::Ticks { .. }))))
 }
 
@@ -109,7 +109,7 @@ fn a_stop_from_a_client_is_answered_when_the_latch_is_pressed() {
     let machine = Machine::new();
     let runs = machine.running(2);
     let mut client = Client::of_process(&machine.directory(), runs[0].id()).expect("it is on");
-    client.asker().ask(Ask::EmergencyStop).expect("it takes it");
+    client.request_client().ask(Ask::EmergencyStop).expect("it takes it");
     let answer = loop {
         match client.next(PATIENCE).expect("it answers") {
             Some(Event::Answer(answer)) => break answer,

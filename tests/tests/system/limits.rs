@@ -152,7 +152,7 @@ fn an_experiment_that_could_exceed_the_ceiling_is_refused_before_the_first_trial
         Apparatus::check_with(scene, &protocol, strength)
     };
     let refused = check("", Strength::UnderCeiling).err().expect("55 N along each axis");
-    assert!(matches!(refused, ApparatusError::HeldBack { .. }), "{refused}");
+    assert!(matches!(refused, ApparatusError::ExceedsForceCeiling { .. }), "{refused}");
     let said = refused.to_string();
     assert!(said.contains("95.3 N") && said.contains("20 N and 1 N·m"), "{said}");
     assert!(said.contains("`[limits] force_n`") && said.contains("--allow-strong"), "{said}");

@@ -89,7 +89,7 @@ fn connect(directory: &Directory) -> Client {
 
 /// The answer to a request; ticks and the rest on the way are let go.
 fn answer(client: &mut Client, ask: Ask) -> Answer {
-    let number = client.asker().ask(ask).expect("the host listens");
+    let number = client.request_client().ask(ask).expect("the host listens");
     let until = Instant::now() + PATIENCE;
     while Instant::now() < until {
         match client.next(Duration::from_millis(100)).expect("the host speaks") {
@@ -183,12 +183,12 @@ fn a_frozen_a_killed_and_a_talkative_watcher_change_no_bit() {
             let path = directory.runs().remove(0).path;
             let nonsense = UnixStream::connect(&path).expect("the socket is there");
             nonsense.set_write_timeout(Some(Duration::from_millis(10))).expect("a time-out is legal");
-            (nonsense, watch_all(directory).asker())
+            (nonsense, watch_all(directory).request_client())
         },
-        |(nonsense, asker), record| {
+        |(nonsense, request_client), record| {
             if record.tick % 10 == 0 {
                 let _ = nonsense.write_all(&[0xff; 4096]); // a frame of 4 GiB: the host hangs up
-                let _ = asker.ask(set("spring", "no_such_parameter", "1"));
+                let _ = request_client.ask(set("spring", "no_such_parameter", "1"));
             }
         },
     );

@@ -6,7 +6,7 @@ use flotor_core::trace::TickRecord;
 use flotor_hal::abi::loader::{ActiveDevice, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
 use flotor_maglev::ml_api::{
-    EventKind, FaultBits, Function, GainSet, Pid, Reply, Request, Results, Six, Status,
+    AxisValues, EventKind, FaultBits, Function, GainSet, Pid, Reply, Request, Results, Status,
 };
 use flotor_session::registry::load_file;
 use flotor_tests::TestSize;
@@ -223,8 +223,8 @@ fn a_program_for_the_maglev_200_commands_any_device_through_the_host() {
     // The simulated flotor carries its own weight: 0.2 N move 0.58 kg, and the hand is open.
     let mut forces = [0.0; 6];
     forces[2] = 0.2;
-    assert_eq!(client.call(&Request::Six(Function::SetForces, forces)).status, Status::OK);
-    assert_eq!(client.plain(Function::GetForces).results, Results::Six(forces));
+    assert_eq!(client.call(&Request::AxisValues(Function::SetForces, forces)).status, Status::OK);
+    assert_eq!(client.plain(Function::GetForces).results, Results::AxisValues(forces));
     std::thread::sleep(Duration::from_millis(100));
     let Results::Pose(pose) = client.plain(Function::GetActualPosition).results else { panic!("a pose") };
     assert!(pose.at[2] > 1.0e-4 && pose.at[0].abs() < 1.0e-4, "{pose:?}");
@@ -248,10 +248,10 @@ fn found_gravity_n(address: &str) -> [f64; 4] {
     let found = [(); 4].map(|()| {
         let reply = client.plain(Function::FindGravity);
         assert_eq!(reply.status, Status::OK, "{reply:?}");
-        let Results::Six(wrench) = reply.results else { panic!("six numbers") };
+        let Results::AxisValues(wrench) = reply.results else { panic!("six numbers") };
         wrench
     });
-    assert_eq!(client.call(&Request::Six(Function::SetGravity, found[3])).status, Status::OK);
+    assert_eq!(client.call(&Request::AxisValues(Function::SetGravity, found[3])).status, Status::OK);
     assert_eq!(client.plain(Function::DefyGravity).status, Status::OK);
     assert_eq!(client.plain(Function::Land).status, Status::OK);
     found.map(|wrench| f64::from(wrench[2]))
@@ -301,14 +301,16 @@ fn a_device_of_two_axes_is_served_with_those_it_drives() {
     let off_m = DVec3::new(pose.at[0].into(), pose.at[1].into(), pose.at[2].into()) - HELD_M;
     assert!(off_m.length() < 2.0e-4, "{pose:?}");
     let forces = [0.5, -0.25, 1.0, 0.0, 0.0, 0.0];
-    assert_eq!(client.call(&Request::Six(Function::SetForces, forces)).status, Status::OK);
+    assert_eq!(client.call(&Request::AxisValues(Function::SetForces, forces)).status, Status::OK);
 }
 
 /// A flotor in the air, carried by a force; the gravity that was found.
-fn carried_by_a_force(client: &mut Client) -> Six {
+fn carried_by_a_force(client: &mut Client) -> AxisValues {
     assert_eq!(client.plain(Function::Takeoff).status, Status::OK);
-    let Results::Six(gravity) = client.plain(Function::FindGravity).results else { panic!("six numbers") };
-    assert_eq!(client.call(&Request::Six(Function::SetForces, gravity)).status, Status::OK);
+    let Results::AxisValues(gravity) = client.plain(Function::FindGravity).results else {
+        panic!("six numbers")
+    };
+    assert_eq!(client.call(&Request::AxisValues(Function::SetForces, gravity)).status, Status::OK);
     gravity
 }
 

@@ -43,6 +43,7 @@ mod limits;
 mod live;
 mod maglev;
 mod maglev_api;
+mod names;
 mod oracle;
 mod parsers;
 mod passivity;

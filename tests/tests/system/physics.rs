@@ -162,7 +162,7 @@ fn the_hold_puts_out_exactly_the_energy_a_held_spring_must() {
         seed: 1,
         rate_hz: 1.0 / PERIOD_S,
         plugins: &[],
-        asked: Demand::ALL,
+        requested: Demand::ALL,
         couplings: &[],
         carried: &[],
         trace_digest: String::new(),

@@ -201,7 +201,7 @@ fn parameters() {
     for folder in plugin_folders() {
         let plugin = load_file(&plugin_file(&crate_name_of(&folder))).expect("it is built and loads");
         let metadata = plugin.metadata();
-        let _ = write!(text, "## `{}`\n\n{}: {}.\n\n", metadata.id, metadata.kind.word(), metadata.doc);
+        let _ = write!(text, "## `{}`\n\n{}: {}.\n\n", metadata.id, metadata.kind.name(), metadata.doc);
         text.push_str("| Parameter | Unit | Legal | Default | | |\n|---|---|---|---|---|---|\n");
         for parameter in plugin.parameters() {
             let live = if parameter.mutability() == Mutability::Live { "live" } else { "" };

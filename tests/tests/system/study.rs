@@ -13,7 +13,7 @@ use flotor_study::apparatus::rig::{Rig, TrialFiles};
 use flotor_study::apparatus::{Apparatus, Kinematics};
 use flotor_study::log::{Incident, SittingLog};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, Stimulus, SubjectNumber};
-use flotor_study::screen::{Attended, Input, May, Screen};
+use flotor_study::screen::{Input, May, Screen, ScreenStateMachine};
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::{Exploration, Modality, Phase, Presented, Response, Trial};
 use flotor_tests::TestSize;
@@ -515,7 +515,7 @@ fn typed_until(log: &SittingLog, trials: u32) -> String {
     for record in &log.trials {
         sitting.answer(record.event.response, &record.event.exploration).unwrap();
     }
-    let mut person = Attended::new(sitting, &begin.protocol, 40);
+    let mut person = ScreenStateMachine::new(sitting, &begin.protocol, 40);
     if !log.trials.is_empty() {
         person = person.with_practice_offered();
     }

@@ -7,7 +7,7 @@ mod liars;
 
 use flotor_core::peer::Dispatch;
 use flotor_core::trace::{Events, TickRecord};
-use flotor_coupling::{Cut, Line};
+use flotor_coupling::{ClaimExcess, Line};
 use flotor_hal::{DVec3, Fault};
 use flotor_servo::{CouplingOutcome, RunEnd, StopSwitch};
 use flotor_session::registry::Registry;
@@ -75,7 +75,7 @@ impl Host {
 
     /// What it has told in this tick.
     fn told(&mut self) -> Option<Dispatch> {
-        let (version, dispatch) = self.line.told.read().expect("nobody writes now");
+        let (version, dispatch) = self.line.outgoing.read().expect("nobody writes now");
         let is_new = std::mem::replace(&mut self.version, version) != version;
         is_new.then(|| self.pairing.address(&dispatch))
     }
@@ -83,7 +83,7 @@ impl Host {
     /// As a peer link does: only what is newer, of the partner.
     fn hear(&mut self, dispatch: Dispatch, tick: u64) {
         if let Some(dispatch) = self.pairing.take(dispatch, tick * 1_000_000) {
-            self.line.heard.publish(&dispatch);
+            self.line.incoming.publish(&dispatch);
         }
     }
 
@@ -236,17 +236,21 @@ fn every_pair_of_hands_is_stable_over_20_ms_with_jitter_and_loss_and_no_tank_fal
             let mut lowest_tank_j = 0.0_f64;
             let mut fastest_m_per_s = 0.0_f64;
             for host in &mut pair.hosts {
-                let CouplingOutcome { tanks, hearing } = host.coupling();
-                let hearing = hearing.expect("its other end is elsewhere");
+                let CouplingOutcome { tanks, link } = host.coupling();
+                let link = link.expect("its other end is elsewhere");
                 lowest_tank_j = lowest_tank_j.min(tanks[0].lowest_j);
                 let throws = throws_a_free_handle(left) || throws_a_free_handle(right);
                 let thrown = host.end == Some(RunEnd::DeviceFault(Fault::SensorOutOfRange));
                 assert!(host.end.is_none() || throws && thrown, "{left} and {right}: {:?}", host.end);
                 // A thrown handle ends one run; then the other one removes its force, once.
-                assert!(hearing.silences <= u64::from(throws), "{left} and {right}: {hearing:?}");
-                assert!(hearing.ticks > 100, "{left} and {right}: {hearing:?}");
+                assert!(link.silences <= u64::from(throws), "{left} and {right}: {link:?}");
+                assert!(link.ticks > 100, "{left} and {right}: {link:?}");
                 // Who tells the truth is believed.
-                assert_eq!((hearing.cut, hearing.let_go), (Cut::default(), [0; 3]), "{left} and {right}");
+                assert_eq!(
+                    (link.cut, link.rejected_runs),
+                    (ClaimExcess::default(), [0; 3]),
+                    "{left} and {right}"
+                );
                 let speeds = host.records.0.iter().map(|record| record.twist.linear().length());
                 fastest_m_per_s = speeds.fold(fastest_m_per_s, f64::max);
             }
@@ -352,9 +356,9 @@ fn a_cut_cable_leaves_both_devices_without_force_within_the_watchdog_and_two_mil
         assert!(noticed as u64 <= WATCHDOG_TICKS + 2, "noticed {noticed} ms after the cut");
         assert!(noticed as u64 + 1 >= after_cut, "force for {after_cut} ms, noticed after {noticed} ms");
         assert!(after[noticed..].iter().all(is_silent));
-        let hearing = host.coupling().hearing.expect("its other end is elsewhere");
-        assert_eq!(hearing.silences, 1);
-        assert!(hearing.longest_wait_ns < WATCHDOG_TICKS * 1_000_000, "{hearing:?}");
+        let link = host.coupling().link.expect("its other end is elsewhere");
+        assert_eq!(link.silences, 1);
+        assert!(link.longest_wait_ns < WATCHDOG_TICKS * 1_000_000, "{link:?}");
     }
 }
 
@@ -365,7 +369,7 @@ fn a_partner_that_tells_what_cannot_be_is_not_believed_and_soon_not_felt() {
         pair.hosts[0].records.0.iter().map(|record| record.commanded.force().length()).fold(0.0, f64::max);
     pair.cut();
     let from = pair.hosts[0].records.0.len();
-    let (_, told) = pair.hosts[1].line.told.read().expect("nobody writes now");
+    let (_, told) = pair.hosts[1].line.outgoing.read().expect("nobody writes now");
     let last = pair.hosts[1].pairing.address(&told);
     for tick in 1..=300 {
         let mut dispatch = Dispatch { tick: last.tick + tick, ..last };
@@ -382,8 +386,8 @@ fn a_partner_that_tells_what_cannot_be_is_not_believed_and_soon_not_felt() {
         let most_n = if tick < WATCHDOG_TICKS + 2 { 2.0 * before_n } else { 0.0 };
         assert!(force_n <= most_n, "{force_n} N in tick {tick}, {before_n} N before");
     }
-    let hearing = pair.hosts[0].coupling().hearing.expect("its other end is elsewhere");
-    assert_eq!((hearing.implausible, hearing.silences), (300, 1));
+    let link = pair.hosts[0].coupling().link.expect("its other end is elsewhere");
+    assert_eq!((link.implausible, link.silences), (300, 1));
 }
 
 #[test]

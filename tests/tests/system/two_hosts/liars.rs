@@ -3,7 +3,7 @@
 use super::{Host, Random, Registry, WATCHDOG_TICKS, Way, scene};
 use flotor_core::peer::{Dispatch, PeerState, TankState};
 use flotor_core::trace::Events;
-use flotor_coupling::Cut;
+use flotor_coupling::ClaimExcess;
 use flotor_hal::{DQuat, DVec3, Pose, Twist};
 use flotor_tests::TestSize;
 use rayon::prelude::*;
@@ -17,15 +17,15 @@ const AT_ONCE_J: f64 = 0.25;
 /// A lie: the message that the partner sends in a tick, made of an honest one with the pose of the run's own handle.
 type Lie = fn(u64, &mut Random, Dispatch) -> Dispatch;
 
-fn up(z_m: f64, speed_m_per_s: f64, told_j: f64) -> PeerState {
+fn up(z_m: f64, speed_m_per_s: f64, passed_on_j: f64) -> PeerState {
     let pose = Pose::new(DVec3::Z * z_m, DQuat::IDENTITY);
-    PeerState { pose, twist: Twist::new(DVec3::Z * speed_m_per_s, DVec3::ZERO), told_j }
+    PeerState { pose, twist: Twist::new(DVec3::Z * speed_m_per_s, DVec3::ZERO), passed_on_j }
 }
 
-fn swing(tick: u64, most_m: f64, frequency_hz: f64, told_j: f64) -> PeerState {
+fn swing(tick: u64, most_m: f64, frequency_hz: f64, passed_on_j: f64) -> PeerState {
     let rate = std::f64::consts::TAU * frequency_hz;
     let phase = rate * 1.0e-3 * tick as f64;
-    up(most_m * phase.sin(), most_m * rate * phase.cos(), told_j)
+    up(most_m * phase.sin(), most_m * rate * phase.cos(), passed_on_j)
 }
 
 /// From one end of the range to the other and back, almost as fast as is believed, with almost all the energy that is.
@@ -49,7 +49,7 @@ fn drive(tick: u64, ahead_s: f64, dispatch: Dispatch) -> Dispatch {
     let orientation =
         DQuat::from_scaled_axis(twist.angular() * ahead_s + DVec3::X * begin_m) * pose.orientation();
     let pose = Pose::new(position, orientation.normalize());
-    Dispatch { state: PeerState { pose, twist, told_j: 0.95e-3 * tick as f64 }, ..dispatch }
+    Dispatch { state: PeerState { pose, twist, passed_on_j: 0.95e-3 * tick as f64 }, ..dispatch }
 }
 
 /// Any number there is, of any size.
@@ -63,7 +63,7 @@ fn wild_state(random: &mut Random) -> PeerState {
     let (position, linear, angular) = (vector(), vector(), vector());
     let turn = DQuat::from_scaled_axis(vector().clamp_length_max(3.0));
     let pose = Pose::new(position, turn.normalize());
-    PeerState { pose, twist: Twist::new(linear, angular), told_j: wild(random).abs() }
+    PeerState { pose, twist: Twist::new(linear, angular), passed_on_j: wild(random).abs() }
 }
 
 const LIES: [(&str, Lie); 24] = [
@@ -80,8 +80,8 @@ const LIES: [(&str, Lie); 24] = [
     ("a drive that is let go at its fastest", |tick, _, d| {
         let told = drive(tick, 0.2, d);
         let is_fast = d.state.twist.linear().length() > 0.2;
-        let told_j = if is_fast { f64::MAX } else { told.state.told_j };
-        Dispatch { state: PeerState { told_j, ..told.state }, ..told }
+        let passed_on_j = if is_fast { f64::MAX } else { told.state.passed_on_j };
+        Dispatch { state: PeerState { passed_on_j, ..told.state }, ..told }
     }),
     ("1 J a tick on a swing at its resonance", |tick, _, d| Dispatch {
         state: swing(tick, 0.01, 4.0, tick as f64),
@@ -151,7 +151,7 @@ fn no_lie_brings_out_more_than_was_checked_here_or_throws_the_handle() {
             assert_eq!(host.end, None, "{name}: in tick {tick}");
         }
         let coupling = host.coupling();
-        let hearing = coupling.hearing.expect("its other end is elsewhere");
+        let link = coupling.link.expect("its other end is elsewhere");
         let port = host.records.0.iter().map(|record| record.port_energy_j);
         let out_j = -port.fold(0.0, f64::min);
         let cut_ticks =
@@ -159,20 +159,20 @@ fn no_lie_brings_out_more_than_was_checked_here_or_throws_the_handle() {
         println!(
             "{name}: {:.3} mJ out of {:.3} mJ believed; cut {:?} in {cut_ticks} ticks, let go {:?}",
             out_j * 1.0e3,
-            hearing.believed_j * 1.0e3,
-            hearing.cut,
-            hearing.let_go
+            link.accepted_j * 1.0e3,
+            link.cut,
+            link.rejected_runs
         );
         // What is not foreseen of a hand is paid for afterwards.
-        assert!(out_j <= hearing.believed_j + 1.0e-4, "{name}: {out_j} J, {hearing:?}");
+        assert!(out_j <= link.accepted_j + 1.0e-4, "{name}: {out_j} J, {link:?}");
         // What this end has passed on may come back any number of times; the rest is at most the work of a hand.
-        let TankState { level_j, gone_in_j, given_up_j, .. } = coupling.tanks[0];
-        let kept_j = level_j + given_up_j - gone_in_j;
+        let TankState { level_j, gone_in_j, discarded_j, .. } = coupling.tanks[0];
+        let kept_j = level_j + discarded_j - gone_in_j;
         assert!(kept_j <= HAND_W * duration_s + AT_ONCE_J, "{name}: {coupling:?}");
-        assert!(hearing.cut.energy_j.is_finite() && coupling.tanks[0].lowest_j >= -1.0e-4, "{name}");
-        assert!(hearing.cut == Cut::default() || cut_ticks > 0, "{name}: what is cut is an event");
+        assert!(link.cut.energy_j.is_finite() && coupling.tanks[0].lowest_j >= -1.0e-4, "{name}");
+        assert!(link.cut == ClaimExcess::default() || cut_ticks > 0, "{name}: what is cut is an event");
         // Another host, which tells the truth, is heard again soon.
-        let is_deaf = !hearing.let_go.contains(&0);
+        let is_deaf = !link.rejected_runs.contains(&0);
         for tick in ticks..ticks + 500 {
             let honest = Dispatch {
                 run: 7,
@@ -185,7 +185,7 @@ fn no_lie_brings_out_more_than_was_checked_here_or_throws_the_handle() {
             host.hear(honest, tick);
             host.advance();
         }
-        let hears = host.coupling().hearing.expect("its other end is elsewhere").run == 7;
+        let hears = host.coupling().link.expect("its other end is elsewhere").run == 7;
         assert!(hears || is_deaf, "{name}");
     }
 }
@@ -220,18 +220,17 @@ fn three(registry: &Registry, seed: u64, late: u64) {
     let case = format!("seed {seed}, the third {late} ticks later");
     // Sums of some thousand terms of up to 10 mJ.
     assert!(lowest_j >= -1.0e-12, "{case}: more came out of the three ports than went in: {lowest_j} J");
-    let hearings: Vec<_> =
-        hosts.iter_mut().map(|host| host.coupling().hearing.expect("it is elsewhere")).collect();
-    let (partner, third) = if hearings[0].run == 12 { (1, 2) } else { (2, 1) };
+    let links: Vec<_> = hosts.iter_mut().map(|host| host.coupling().link.expect("it is elsewhere")).collect();
+    let (partner, third) = if links[0].run == 12 { (1, 2) } else { (2, 1) };
     let most = 5000 - if third == 1 { late } else { 0 };
     // Of messages that overtake one another only the newer ones count.
-    assert!([0, partner].iter().all(|host| hearings[*host].ticks > most / 5), "{case}: {hearings:?}");
+    assert!([0, partner].iter().all(|host| links[*host].ticks > most / 5), "{case}: {links:?}");
     for host in [0, third] {
         let others = hosts[host].pairing.counts().others;
         assert!(others > (4500 - late) / 2, "{case}: {others} are told, and counted");
     }
     // Who is asked first may hear a word until another has answered sooner; nobody pulls by then.
-    assert!(hearings[third].ticks < WATCHDOG_TICKS, "{case}: {hearings:?}");
+    assert!(links[third].ticks < WATCHDOG_TICKS, "{case}: {links:?}");
     let later = hosts[third].records.0.iter().skip(500);
     assert!(
         later.clone().count() > 0 && later.into_iter().all(|record| record.commanded.force() == DVec3::ZERO),
