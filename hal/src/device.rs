@@ -5,7 +5,7 @@
 
 use crate::abi::Str;
 use crate::abi::layout::layout;
-use crate::{LoopConfig, OutOfRange, Parameter, Pose, Refusal, Settings, Twist, Wrench};
+use crate::{LoopConfig, Parameter, Pose, Refusal, SetParameterError, Settings, Twist, Wrench};
 
 layout! {
     Tick { index, time_ns, dt_ns }
@@ -208,9 +208,9 @@ impl Axes {
     /// All six axes.
     pub const ALL: Axes = Axes { bits: 0b11_1111 };
 
-    /// Joins two sets: `Axes::X.with(Axes::Z)` in constants, `Axes::X | Axes::Z` elsewhere.
+    /// Joins two sets: `Axes::X.union(Axes::Z)` in constants, `Axes::X | Axes::Z` elsewhere.
     #[must_use]
-    pub const fn with(self, other: Axes) -> Axes {
+    pub const fn union(self, other: Axes) -> Axes {
         Axes { bits: self.bits | other.bits }
     }
 
@@ -241,7 +241,7 @@ impl std::ops::BitOr for Axes {
     type Output = Axes;
 
     fn bitor(self, other: Axes) -> Axes {
-        self.with(other)
+        self.union(other)
     }
 }
 
@@ -496,10 +496,10 @@ pub trait ActiveDevice: Send + 'static {
     /// Changes a live parameter at a tick boundary; the range is already checked. Real-time.
     ///
     /// # Errors
-    /// [`OutOfRange`] if the value is inconsistent with other parameters; the old value stays.
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
-        let _ = index;
-        Err(OutOfRange { min: f64::NAN, max: f64::NAN, value })
+    /// [`SetParameterError`]; the old value stays.
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
+        let _ = (index, value);
+        Err(SetParameterError::Fixed)
     }
 
     /// Commands zero wrench and returns to the opened phase. Not real-time; cannot fail.

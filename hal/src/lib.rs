@@ -74,7 +74,9 @@ pub use frame::{Pose, Twist, Wrench, orientation_from_rotation_vector, rotation_
 pub use glam;
 pub use glam::{DMat3, DQuat, DVec3};
 pub use model::{Demand, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output, StepStatus};
-pub use parameter::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Settings};
+pub use parameter::{
+    Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, SetParameterError, Settings,
+};
 pub use refusal::{Refusal, RefusalKind};
 pub use sampled_loop::{Damper, SampledLoop};
 pub use simple_device::{ActiveSimple, Opened, Simple, SimpleDevice, SimpleStop, StopFlag};

@@ -2,7 +2,7 @@
 
 use crate::abi::Str;
 use crate::abi::layout::layout;
-use crate::{OutOfRange, Parameter, Pose, Refusal, Settings, Twist, Wrench};
+use crate::{Parameter, Pose, Refusal, SetParameterError, Settings, Twist, Wrench};
 
 layout! {
     Demand { bits }
@@ -329,10 +329,10 @@ pub trait ForceModel: Sized + Send + 'static {
     /// Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// [`OutOfRange`] if the value is inconsistent with other parameters; the old value stays.
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
-        let _ = index;
-        Err(OutOfRange { min: f64::NAN, max: f64::NAN, value })
+    /// [`SetParameterError`]; the old value stays.
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
+        let _ = (index, value);
+        Err(SetParameterError::Fixed)
     }
 
     /// Returns the current value of a parameter, presets resolved (by index into [`Self::PARAMETERS`]). Real-time: bounded, no allocation.

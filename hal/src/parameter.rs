@@ -224,6 +224,32 @@ impl fmt::Display for OutOfRange {
 
 impl std::error::Error for OutOfRange {}
 
+/// Error of a change of a live parameter. `Copy`: nothing to allocate in a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SetParameterError {
+    /// Parameter fixed in this instance: not live, or without effect beside the other values.
+    Fixed,
+    /// Number inconsistent with the other values.
+    OutOfRange(OutOfRange),
+}
+
+impl fmt::Display for SetParameterError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Fixed => f.write_str("the parameter is fixed beside the present values of the others"),
+            Self::OutOfRange(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for SetParameterError {}
+
+impl From<OutOfRange> for SetParameterError {
+    fn from(error: OutOfRange) -> Self {
+        Self::OutOfRange(error)
+    }
+}
+
 /// Value at the plugin boundary: index into the schema, number, text (of texts and files).
 #[repr(C)]
 #[derive(Clone, Copy)]

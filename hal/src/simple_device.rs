@@ -4,8 +4,8 @@
 //! [`Simple`] makes a [`Device`] of it: `export_device!(Simple<Crank>);`. The contract beneath is the same.
 
 use crate::{
-    ActiveDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, LoopConfig, OutOfRange, Parameter,
-    Refusal, SafeStop, Settings, Tick, Wrench,
+    ActiveDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, LoopConfig, Parameter, Refusal,
+    SafeStop, SetParameterError, Settings, Tick, Wrench,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -44,10 +44,10 @@ pub trait SimpleDevice: Sized + Send + 'static {
     /// Changes a live parameter at a tick boundary; range already checked. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// [`OutOfRange`] if the value does not fit the others; the old value stays.
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
-        let _ = index;
-        Err(OutOfRange { min: f64::NAN, max: f64::NAN, value })
+    /// [`SetParameterError`]; the old value stays.
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
+        let _ = (index, value);
+        Err(SetParameterError::Fixed)
     }
 }
 
@@ -183,7 +183,7 @@ impl<D: SimpleDevice> ActiveDevice for ActiveSimple<D> {
         self.simple.device.write(tick, if is_stopped { &Wrench::ZERO } else { wrench })
     }
 
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         self.simple.device.set_parameter(index, value)?;
         if let Some(place) = self.simple.values.get_mut(index) {
             *place = value;

@@ -8,8 +8,8 @@ use crate::protocol::Rejections;
 use crate::shaping::Shaping;
 use flotor_hal::{
     ActiveDevice, CalibrationDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, IndependentStop,
-    IndependentStopDevice, LoopConfig, OutOfRange, PacingDevice, Parameter, Refusal, SafeStop, SampleWait,
-    SampledLoop, Settings, Tick, VerticalCalibration, Wrench, export_device,
+    IndependentStopDevice, LoopConfig, PacingDevice, Parameter, Refusal, SafeStop, SampleWait, SampledLoop,
+    SetParameterError, Settings, Tick, VerticalCalibration, Wrench, export_device,
 };
 use std::sync::Arc;
 
@@ -161,7 +161,7 @@ impl ActiveDevice for LevitatingDevice {
         }
     }
 
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         self.values.set(index, value);
         self.build_walls();
         Ok(())

@@ -13,7 +13,7 @@ use crate::workspace::{
 use flotor_hal::{
     ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, Damper, Device, DeviceInfo,
     DeviceState, EnergyLedger, EnergyLedgerDevice, Fault, IndependentStop, IndependentStopDevice, LoopConfig,
-    OutOfRange, PacingDevice, Parameter, Pose, Refusal, SafeStop, SampleWait, SampledLoop, Settings,
+    PacingDevice, Parameter, Pose, Refusal, SafeStop, SampleWait, SampledLoop, SetParameterError, Settings,
     StoppedState, Tick, Twist, VerticalCalibration, export_device,
 };
 use std::sync::Arc;
@@ -233,7 +233,7 @@ impl ActiveDevice for RunningFlotor {
         Cycle::Fresh
     }
 
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         live::change(&mut self.simulation, index, value)
     }
 

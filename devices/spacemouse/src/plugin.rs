@@ -5,8 +5,8 @@ use crate::platform::PATH_HELP;
 use crate::report::Report;
 use crate::source::{Gone, HidPuck, REPORT_BYTES, Reports};
 use flotor_hal::{
-    Axes, Capabilities, Cycle, DeviceInfo, DeviceState, Fault, LoopConfig, NothingToStop, Opened, OutOfRange,
-    Parameter, Refusal, Settings, Simple, SimpleDevice, Tick, Wrench, export_device,
+    Axes, Capabilities, Cycle, DeviceInfo, DeviceState, Fault, LoopConfig, NothingToStop, Opened, Parameter,
+    Refusal, SetParameterError, Settings, Simple, SimpleDevice, Tick, Wrench, export_device,
 };
 
 /// Limit on reports read in a tick: a puck sends one or two every 8 ms or slower. Further reports wait for the next tick.
@@ -130,10 +130,10 @@ impl<S: Reports> SimpleDevice for SpaceMouse<S> {
         Cycle::Fresh
     }
 
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         match self.values.0.get_mut(index) {
             Some(place) if [SPEED, SPIN, DEAD_ZONE, HOME_BUTTON].contains(&index) => *place = value,
-            _ => return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value }),
+            _ => return Err(SetParameterError::Fixed),
         }
         Ok(())
     }

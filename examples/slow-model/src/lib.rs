@@ -1,8 +1,8 @@
 //! Bar of gel. Its forces come from a solver in another language and another process, too slow for the loop.
 
 use flotor_hal::{
-    DVec3, ForceModel, Input, LinearField, LinearFieldModel, ModelInfo, OutOfRange, Output, Parameter,
-    Refusal, Settings, StepStatus, Wrench,
+    DVec3, ForceModel, Input, LinearField, LinearFieldModel, ModelInfo, Output, Parameter, Refusal,
+    SetParameterError, Settings, StepStatus, Wrench,
 };
 use std::io::{self, BufRead, BufReader, Write};
 use std::os::fd::OwnedFd;
@@ -51,7 +51,7 @@ impl ForceModel for Gel {
         Output::new(Wrench::ZERO, f64::NAN, status)
     }
 
-    fn set_parameter(&mut self, _index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, _index: usize, value: f64) -> Result<(), SetParameterError> {
         self.shear_modulus_pa = value;
         Ok(())
     }

@@ -12,9 +12,9 @@
 //! cosh(d / d0)`, so a closed path generates none.
 
 use flotor_hal::{
-    Choices, DQuat, DVec3, Demand, ForceModel, Form, Input, ModelInfo, OutOfRange, Output, Parameter, Part,
-    Pose, Primitive, Refusal, Settings, Shape, ShapeModel, SoftRange, SoftRangeModel, StepStatus, Wrench,
-    choices, math,
+    Choices, DQuat, DVec3, Demand, ForceModel, Form, Input, ModelInfo, Output, Parameter, Part, Pose,
+    Primitive, Refusal, SetParameterError, Settings, Shape, ShapeModel, SoftRange, SoftRangeModel,
+    StepStatus, Wrench, choices, math,
 };
 
 /// Workspace limit along each axis, m; beyond it the answer is that at the edge, with status `Clamped`.
@@ -117,11 +117,11 @@ impl ForceModel for Load {
         Output::new(Wrench::from_force(DVec3::Z * force_n), energy_j, status)
     }
 
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         match index {
             1 => self.force_n = value,
             2 => self.onset_m = value * 1.0e-3,
-            _ => return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value }),
+            _ => return Err(SetParameterError::Fixed),
         }
         Ok(())
     }

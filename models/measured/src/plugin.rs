@@ -3,8 +3,8 @@
 use crate::curve::Curve;
 use crate::table;
 use flotor_hal::{
-    CenterlineInfo, CenterlineModel, DQuat, DVec3, Demand, ForceModel, Input, ModelInfo, OutOfRange, Output,
-    Parameter, Pose, Refusal, Settings, StepStatus, Wrench, choices, read_text,
+    CenterlineInfo, CenterlineModel, DQuat, DVec3, Demand, ForceModel, Input, ModelInfo, Output, Parameter,
+    Pose, Refusal, SetParameterError, Settings, StepStatus, Wrench, choices, read_text,
 };
 use std::path::Path;
 
@@ -96,9 +96,9 @@ impl ForceModel for Measured {
         Output::new(Wrench::from_force(DVec3::Z * force_n), energy_j, status)
     }
 
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         if index != 1 {
-            return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value });
+            return Err(SetParameterError::Fixed);
         }
         self.stiffness_scale = value;
         Ok(())

@@ -4,9 +4,9 @@ use crate::mesh::{Mesh, Sheet};
 use crate::network::{Network, State, Surroundings};
 use crate::touch::Touch;
 use flotor_hal::{
-    DQuat, DVec3, ForceModel, Input, LinearField, LinearFieldModel, Memory, ModelInfo, OutOfRange, Output,
-    Parameter, Part, Pose, Primitive, Refusal, ScalarField, Settings, Shape, ShapeModel, Sides, SoftRange,
-    SoftRangeModel, StepStatus, Surface, SurfaceVertex, Wrench, choices, read_text,
+    DQuat, DVec3, ForceModel, Input, LinearField, LinearFieldModel, Memory, ModelInfo, Output, Parameter,
+    Part, Pose, Primitive, Refusal, ScalarField, SetParameterError, Settings, Shape, ShapeModel, Sides,
+    SoftRange, SoftRangeModel, StepStatus, Surface, SurfaceVertex, Wrench, choices, read_text,
 };
 use std::path::Path;
 
@@ -183,9 +183,9 @@ impl ForceModel for Membrane {
         Output::new(Wrench::from_force(force_n), f64::NAN, status)
     }
 
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         if index != DAMPING {
-            return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value });
+            return Err(SetParameterError::Fixed);
         }
         self.parameters[DAMPING] = value;
         self.touch.network_mut().set_damping_per_s(value);

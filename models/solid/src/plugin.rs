@@ -7,9 +7,9 @@ use crate::mesh::Mesh;
 use crate::several::{self, MAX_SPHERES};
 use crate::{cache, gmsh};
 use flotor_hal::{
-    Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, OutOfRange, Output,
-    Parameter, Pose, Refusal, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel, Wrench,
-    choices, read_file, text_from_bytes,
+    Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, Output, Parameter,
+    Pose, Refusal, SetParameterError, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel,
+    Wrench, choices, read_file, text_from_bytes,
 };
 use std::path::Path;
 
@@ -281,9 +281,9 @@ impl ForceModel for Solid {
         Output::new(wrench, energy_j, status)
     }
 
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         if index != YOUNGS_MODULUS {
-            return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value });
+            return Err(SetParameterError::Fixed);
         }
         self.parameters[index] = value;
         self.youngs_modulus_pa = value;

@@ -15,7 +15,7 @@ use crate::rigidity::{Geometry, LEAST_POISSON_RATIO, Material, Spring, Stiffness
 use crate::rod::Accuracy;
 use crate::rod_blend::TOLERANCE_N;
 use crate::seat::Friction;
-use flotor_hal::{Choices, OutOfRange, Parameter, Refusal, Settings, choices};
+use flotor_hal::{Choices, OutOfRange, Parameter, Refusal, SetParameterError, Settings, choices};
 
 /// Law of the spring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -273,8 +273,8 @@ impl Choice {
     /// Returns a copy with one live number changed, in the unit of its parameter. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// The range consistent with the other values; NaN to NaN for a number that follows from others in this mode, or has no effect.
-    pub(crate) fn with(&self, index: usize, value: f64) -> Result<Self, OutOfRange> {
+    /// The range consistent with the other values; `Fixed` for a number that follows from others in this mode, or has no effect.
+    pub(crate) fn with(&self, index: usize, value: f64) -> Result<Self, SetParameterError> {
         let is_friction = SCHEMA.get(index).map(Parameter::id) == Some("seat_friction");
         if SCHEMA.get(index).map(Parameter::id) == Some("tolerance_n") && self.rod_blend == Switch::On {
             return Ok(Self { tolerance_n: value, ..*self });
@@ -295,7 +295,7 @@ impl Choice {
             ("gamma_n", Stiffness::Gamma(gamma_n)) => (gamma_n, 1.0),
             ("alpha_n_mm2", Stiffness::Alpha(alpha_n_m2)) => (alpha_n_m2, N_MM2),
             ("beta_n", Stiffness::Beta(beta_n)) => (beta_n, 1.0),
-            _ => return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value }),
+            _ => return Err(SetParameterError::Fixed),
         };
         *own = value * unit;
         let spring =
@@ -304,10 +304,10 @@ impl Choice {
     }
 
     /// Returns the range of a number that is consistent with the other current values, for an error.
-    fn fitting_range(&self, index: usize, value: f64) -> OutOfRange {
+    fn fitting_range(&self, index: usize, value: f64) -> SetParameterError {
         let (geometry, material) = (self.spring.geometry(), self.spring.material());
         let Some(parameter) = SCHEMA.get(index) else {
-            return OutOfRange { min: f64::NAN, max: f64::NAN, value };
+            return SetParameterError::Fixed;
         };
         // Coils must not touch at rest, the coil be wider than the wire, Poisson's ratio E/(2 G) - 1 be possible.
         let (min, max) = match parameter.id() {
@@ -328,7 +328,7 @@ impl Choice {
             }
             _ => (0.0, f64::INFINITY),
         };
-        OutOfRange { min: min.max(parameter.min()), max: max.min(parameter.max()), value }
+        OutOfRange { min: min.max(parameter.min()), max: max.min(parameter.max()), value }.into()
     }
 
     /// Returns the current value of the parameter at `index` of the schema, in its unit.

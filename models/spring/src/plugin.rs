@@ -10,8 +10,8 @@ use crate::rod::Branch;
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{
     CenterlineInfo, CenterlineModel, Choices, Demand, Detail, DetailsModel, ForceModel, Input, Memory,
-    ModelInfo, OutOfRange, Output, Parameter, Refusal, Settings, VariantInfo, VariantModel, WorkspaceBounds,
-    WorkspaceBoundsModel, choices, export_model,
+    ModelInfo, Output, Parameter, Refusal, SetParameterError, Settings, VariantInfo, VariantModel,
+    WorkspaceBounds, WorkspaceBoundsModel, choices, export_model,
 };
 
 /// Force model of the spring: parameters, prepared law and timing.
@@ -53,7 +53,7 @@ impl ForceModel for SpringModel {
         }
     }
 
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         let choice = self.choice.with(index, value)?;
         self.law.retune(&self.choice, &choice);
         self.choice = choice;

@@ -5,8 +5,8 @@ use crate::shape::Shape;
 use crate::surface::Surface;
 use flotor_hal::{
     self as hal, ActiveRegion, ActiveRegionModel, Choices, DQuat, DVec3, Demand, ForceModel, Form, Input,
-    Memory, ModelInfo, OutOfRange, Output, Parameter, Part, Pose, Primitive, Refusal, Settings, ShapeModel,
-    SoftRange, SoftRangeModel, StepStatus, Wrench, choices,
+    Memory, ModelInfo, Output, Parameter, Part, Pose, Primitive, Refusal, SetParameterError, Settings,
+    ShapeModel, SoftRange, SoftRangeModel, StepStatus, Wrench, choices,
 };
 
 /// Workspace limit along each axis, m; beyond it the answer is that at the edge, with status `Clamped`.
@@ -88,12 +88,12 @@ impl ForceModel for Wall {
         Output::new(Wrench::from_force(pull.force_n), pull.energy_j, status)
     }
 
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         match index {
             0 => self.surface.stiffness_n_per_m = value,
             1 => self.surface.damping_ns_per_m = value,
             2 => self.surface.friction = value,
-            _ => return Err(OutOfRange { min: f64::NAN, max: f64::NAN, value }),
+            _ => return Err(SetParameterError::Fixed),
         }
         Ok(())
     }

@@ -3,7 +3,7 @@
 use super::{MM, SCHEMA};
 use crate::hand::guidance::NotGuiding;
 use crate::simulation::Simulation;
-use flotor_hal::OutOfRange;
+use flotor_hal::{OutOfRange, SetParameterError};
 
 /// Indices of the coordinates of the target in the schema: x, y, z.
 const TARGET: [usize; 3] =
@@ -32,15 +32,16 @@ const fn is_same(one: &[u8], other: &[u8]) -> bool {
 /// Changes the live parameter at `index` of the schema. Real-time: bounded, no allocation.
 ///
 /// # Errors
-/// [`OutOfRange`]: with the number of the guiding client if the value is from another; for a parameter that is not live.
-pub(crate) fn change(simulation: &mut Simulation, index: usize, value: f64) -> Result<(), OutOfRange> {
-    let refused = |NotGuiding { guide }| OutOfRange { min: guide, max: guide, value };
+/// [`OutOfRange`] with the number of the guiding client if the value is from another; `Fixed` for a parameter that is not live.
+pub(crate) fn change(simulation: &mut Simulation, index: usize, value: f64) -> Result<(), SetParameterError> {
+    let refused =
+        |NotGuiding { guide }| SetParameterError::OutOfRange(OutOfRange { min: guide, max: guide, value });
     if index == GUIDE {
         return simulation.guide(value).map_err(refused);
     }
     match TARGET.iter().position(|target| *target == index) {
         Some(axis) => simulation.guide_to(axis, value * MM).map_err(refused),
-        None => Err(OutOfRange { min: f64::NAN, max: f64::NAN, value }),
+        None => Err(SetParameterError::Fixed),
     }
 }
 

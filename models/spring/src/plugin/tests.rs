@@ -51,7 +51,8 @@ fn a_refused_change_changes_nothing() {
     let index = SCHEMA.iter().position(|parameter| parameter.id() == "free_length_mm").unwrap();
     let refused = model.set_parameter(index, 7.0).unwrap_err();
     // 11.8 coils of 0.63 mm touch at 7.434 mm.
-    assert!((refused.min - 7.434).abs() < 1e-12 && refused.max == 1000.0, "{refused}");
+    let SetParameterError::OutOfRange(range) = refused else { panic!("{refused}") };
+    assert!((range.min - 7.434).abs() < 1e-12 && range.max == 1000.0, "{refused}");
     assert_eq!(model.step(&input()), before);
     assert_eq!(model.parameter(index), 25.0);
 }

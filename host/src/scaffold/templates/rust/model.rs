@@ -44,7 +44,7 @@ impl ForceModel for YourName {
     }
 
     // Between two steps: the new value of a live parameter, inside its range.
-    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), OutOfRange> {
+    fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
         self.values[index] = value;
         Ok(())
     }
