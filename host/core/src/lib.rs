@@ -23,6 +23,7 @@ pub mod oscillation;
 mod outputs;
 pub mod peer;
 pub mod plausibility;
+mod quantile;
 mod random;
 pub mod region;
 pub mod rendered_boundary;
@@ -31,6 +32,7 @@ pub mod trace;
 pub use change::{Change, ChangeOutcome, ChangeSubject};
 pub use clock::Clock;
 pub use outputs::ModelOutputs;
+pub use quantile::quantile;
 pub use random::Random;
 
 /// Largest seed that commands and files accept: every program reads whole numbers up to this one exactly from JSON.

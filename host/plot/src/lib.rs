@@ -60,6 +60,7 @@ pub use mark::Mark;
 pub use quantity::Quantity;
 pub use series::{Bin, ErrorBar, Series};
 pub use spans::Spans;
+pub use text::escape;
 pub use theme::{AXIS_COLORS, FAULT_COLORS, LIMIT_COLORS};
 pub use trace::Trace;
 pub use vector::VectorTrace;

@@ -1,8 +1,9 @@
 //! Text for pictures: escaping, numbers, and estimates of its width without a font.
 
-/// Escapes characters that XML reserves and replaces those that XML 1.0 forbids (control characters, section 2.2), so that
-/// any string is safe as content and as attribute value.
-pub(super) fn escape(text: &str) -> String {
+/// Escapes characters that XML and HTML reserve and replaces those that XML 1.0 forbids (control characters, section 2.2), so
+/// that any string is safe as content and as attribute value. Not real-time.
+#[must_use]
+pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
@@ -11,7 +12,8 @@ pub(super) fn escape(text: &str) -> String {
             '>' => escaped.push_str("&gt;"),
             '"' => escaped.push_str("&quot;"),
             '\'' => escaped.push_str("&#39;"),
-            '\t' | '\n' | '\r' => escaped.push(' '),
+            '\n' => escaped.push_str("&#10;"),
+            '\t' | '\r' => escaped.push(' '),
             '\u{0}'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => escaped.push('\u{fffd}'),
             _ => escaped.push(character),
         }

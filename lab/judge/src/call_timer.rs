@@ -1,5 +1,6 @@
 //! Timing of single calls.
 
+use flotor_core::quantile;
 use std::time::Instant;
 
 /// Returns the time since a moment less the overhead of the clock, ns.
@@ -13,12 +14,4 @@ pub fn net_ns(overhead_ns: f64, begin: Instant) -> f64 {
 pub fn overhead_ns() -> f64 {
     let mut samples: Vec<f64> = (0..1001).map(|_| net_ns(0.0, Instant::now())).collect();
     quantile(&mut samples, 0.5)
-}
-
-/// Returns the quantile of the samples at a fraction, 0 to 1; NaN without samples.
-pub fn quantile(samples: &mut [f64], part: f64) -> f64 {
-    samples.sort_by(f64::total_cmp);
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let index = (samples.len() as f64 * part) as usize;
-    samples.get(index.min(samples.len().saturating_sub(1))).copied().unwrap_or(f64::NAN)
 }

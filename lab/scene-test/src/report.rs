@@ -5,6 +5,7 @@
 use crate::check::Outcome;
 use crate::platform::readable_by_all;
 use flotor_command::{CommandError, report_line, style, write_json};
+use flotor_plot::escape;
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -59,9 +60,9 @@ impl Report {
             let _ = write!(
                 text,
                 "    <testcase classname=\"{}\" name=\"{}\" file=\"{}\" time=\"{}\"",
-                escaped(suite),
-                escaped(label),
-                escaped(&case.file.display().to_string()),
+                escape(suite),
+                escape(label),
+                escape(&case.file.display().to_string()),
                 seconds(case.took)
             );
             let Some(first) = case.failures.first() else {
@@ -73,7 +74,7 @@ impl Report {
             let picture = case.picture.iter().map(|file| format!("see {}", file.display()));
             let output = commands.chain(picture).collect::<Vec<_>>().join("\n");
             let [message, details, output] =
-                [&first.line(), &details.join("\n"), &output].map(|text| escaped(text));
+                [&first.line(), &details.join("\n"), &output].map(|text| escape(text));
             let _ = writeln!(
                 text,
                 ">\n      <failure message=\"{message}\">{details}</failure>\n      \
@@ -82,20 +83,6 @@ impl Report {
         }
         text + "  </testsuite>\n</testsuites>\n"
     }
-}
-
-/// Escapes the text of an attribute or an element; a character that XML does not allow becomes a question mark.
-fn escaped(text: &str) -> String {
-    let one = |c: char| match c {
-        '&' => "&amp;".to_owned(),
-        '<' => "&lt;".to_owned(),
-        '>' => "&gt;".to_owned(),
-        '"' => "&quot;".to_owned(),
-        '\n' => "&#10;".to_owned(),
-        c if c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c) => "?".to_owned(),
-        c => c.to_string(),
-    };
-    text.chars().map(one).collect()
 }
 
 /// Removes the results of an earlier call, so that a killed call leaves none.

@@ -3,7 +3,7 @@
 
 use crate::large::wrong_at_large;
 use crate::{SubjectChecks, SubjectRecord, p_text};
-use flotor_statistics::describe::quantile;
+use flotor_core::quantile;
 use flotor_study::estimate::{Observation, Prior, Psychometric, psychometric};
 use flotor_study::log::Incident;
 use flotor_study::protocol::Protocol;
@@ -75,8 +75,9 @@ impl SubjectQuality {
     #[must_use]
     pub fn of(protocol: &Protocol, record: &SubjectRecord, incidents: &[Incident]) -> Self {
         let counted: Vec<_> = record.counted().collect();
-        let times: Vec<f64> = counted.iter().filter_map(|event| event.exploration.response_time_s).collect();
-        let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&times, share));
+        let mut times: Vec<f64> =
+            counted.iter().filter_map(|event| event.exploration.response_time_s).collect();
+        let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&mut times, share));
         let named =
             |response: Response| counted.iter().filter(|event| event.response == response).count() as f64;
         let [first, second, unsure] = [Response::First, Response::Second, Response::DontKnow].map(named);

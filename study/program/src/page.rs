@@ -11,7 +11,7 @@ use flotor_analysis::{
     Analysis, Estimator, JndAnalysis, KinematicMeasure, MagnitudeAnalysis, PairTest, PostHoc, SubjectChecks,
     SubjectRecord, effect_text, exponent_text, order_note, p_text, published, size_interval_text, t_text,
 };
-use flotor_plot::Figure;
+use flotor_plot::{Figure, escape};
 use flotor_statistics::anova::Effect;
 use flotor_statistics::describe::MeanInterval;
 use flotor_statistics::not_testable_text;
@@ -52,7 +52,7 @@ pub(crate) fn html(begin: &Begin, report: &Report<'_>, applied: &Applied) -> Str
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<style>{STYLE}</style>\n</head>\n<body>\n\
          <h1>{title}</h1>\n{body}</body>\n</html>\n",
-        title = escaped(&title),
+        title = escape(&title),
         body = page.text,
     )
 }
@@ -279,10 +279,6 @@ const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:58rem;mar
     th,td{padding:.2rem .9rem .2rem 0;text-align:left;vertical-align:baseline}pre{overflow-x:auto;line-height:1.4}\
     @media print{details{display:none}body{margin:0}}";
 
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
-}
-
 fn percent(value: &MeanInterval) -> String {
     format!("{:.1} %", value.mean * 100.0)
 }
@@ -307,26 +303,26 @@ struct Page {
 
 impl Page {
     fn heading(&mut self, text: &str) {
-        let _ = writeln!(self.text, "<h2>{}</h2>", escaped(text));
+        let _ = writeln!(self.text, "<h2>{}</h2>", escape(text));
     }
 
     fn paragraph(&mut self, text: &str) {
-        let _ = writeln!(self.text, "<p>{}</p>", escaped(text));
+        let _ = writeln!(self.text, "<p>{}</p>", escape(text));
     }
 
     fn details(&mut self, name: &str, text: &str) {
-        let [name, text] = [name, text].map(escaped);
+        let [name, text] = [name, text].map(escape);
         let _ = writeln!(self.text, "<details><summary>{name}</summary><pre>{text}</pre></details>");
     }
 
     fn figure(&mut self, figure: Figure, caption: &str) {
         let svg = figure.watermark(self.watermark).to_svg();
-        let _ = writeln!(self.text, "<figure>{svg}<figcaption>{}</figcaption></figure>", escaped(caption));
+        let _ = writeln!(self.text, "<figure>{svg}<figcaption>{}</figcaption></figure>", escape(caption));
     }
 
     /// Adds a section, initially collapsed, with the content of `fill`.
     fn folded(&mut self, summary: &str, fill: impl FnOnce(&mut Self)) {
-        let _ = writeln!(self.text, "<details><summary>{}</summary>", escaped(summary));
+        let _ = writeln!(self.text, "<details><summary>{}</summary>", escape(summary));
         fill(self);
         self.text.push_str("</details>\n");
     }
@@ -334,7 +330,7 @@ impl Page {
     fn table(&mut self, head: &[&str], fill: impl FnOnce(&mut Rows<'_>)) {
         self.text.push_str("<table><thead><tr>");
         head.iter().for_each(|cell| {
-            let _ = write!(self.text, "<th>{}</th>", escaped(cell));
+            let _ = write!(self.text, "<th>{}</th>", escape(cell));
         });
         self.text.push_str("</tr></thead><tbody>\n");
         fill(&mut Rows(&mut self.text));
@@ -416,7 +412,7 @@ impl Rows<'_> {
     fn row(&mut self, cells: &[String]) {
         self.0.push_str("<tr>");
         for cell in cells {
-            let _ = write!(self.0, "<td>{}</td>", escaped(cell));
+            let _ = write!(self.0, "<td>{}</td>", escape(cell));
         }
         self.0.push_str("</tr>\n");
     }

@@ -52,18 +52,3 @@ pub fn mean_interval(values: &[f64], confidence: f64) -> Result<MeanInterval, St
     let half = se * student_two_sided_quantile(1.0 - confidence, count(values.len() - 1));
     Ok(MeanInterval { mean, sd, se, interval: [mean - half, mean + half], n: values.len() })
 }
-
-/// Returns the quantile for a share of the list, by linear interpolation (type 7 of Hyndman and Fan, as in R and NumPy). NaN for an
-/// empty list.
-#[must_use]
-pub fn quantile(values: &[f64], share: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
-    let place = share.clamp(0.0, 1.0) * count(last);
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 0 and the last index
-    let below = place.floor() as usize;
-    let low = sorted.get(below).copied().unwrap_or(f64::NAN);
-    let high = sorted.get(below + 1).copied().unwrap_or(low);
-    low + (place - place.floor()) * (high - low)
-}

@@ -151,7 +151,10 @@ fn a_growing_series_keeps_its_finished_buckets() {
 
 #[test]
 fn text_is_escaped_shortened_and_wrapped() {
-    assert_eq!(text::escape("<a href=\"x\">&'\u{0}\n"), "&lt;a href=&quot;x&quot;&gt;&amp;&#39;\u{fffd} ");
+    assert_eq!(
+        text::escape("<a href=\"x\">&'\u{0}\n"),
+        "&lt;a href=&quot;x&quot;&gt;&amp;&#39;\u{fffd}&#10;"
+    );
     assert_eq!([-0.04, -0.0, -0.06].map(|value| text::decimal(value, 1)), ["0.0", "0.0", "−0.1"]);
     assert_eq!(text::significant(-1234.56), "−1235");
     assert_eq!(text::significant(0.012_345_6), "0.0123");

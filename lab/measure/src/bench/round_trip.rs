@@ -3,7 +3,8 @@
 
 use super::TickCost;
 use crate::platform::{wait, wake};
-use flotor_judge::call_timer::{net_ns, quantile};
+use flotor_core::quantile;
+use flotor_judge::call_timer::net_ns;
 use std::io;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -2,9 +2,10 @@
 //! others has two speeds, and a mean of both describes neither.
 
 use super::times::{call_ns, inputs};
+use flotor_core::quantile;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Pose};
-use flotor_judge::call_timer::{overhead_ns, quantile};
+use flotor_judge::call_timer::overhead_ns;
 use serde::Serialize;
 
 /// Times of calls with a detail above zero, and of the others.

@@ -4,9 +4,10 @@
 //! and so on to its end, round after round. A disturbance of one slice affects its neighbours too, and quotients of
 //! neighbouring slices are those of a quiet machine.
 
+use flotor_core::quantile;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Memory, Output, Pose};
-use flotor_judge::call_timer::{net_ns, overhead_ns, quantile};
+use flotor_judge::call_timer::{net_ns, overhead_ns};
 use flotor_judge::subject::input_of;
 use serde::Serialize;
 use std::hint::black_box;

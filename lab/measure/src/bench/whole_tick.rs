@@ -5,10 +5,11 @@
 //! of many batches counts, because other load on the machine delays some.
 
 use super::scripted::{SCRIPTED, SCRIPTED_ENTRY};
+use flotor_core::quantile;
 use flotor_core::trace::TickRecord;
 use flotor_hal::SampleWait;
 use flotor_hal::abi::loader::Stopper;
-use flotor_judge::call_timer::{net_ns, quantile};
+use flotor_judge::call_timer::net_ns;
 use flotor_servo::{Clock, Schedule, Servo, StopSwitch, drain, queue};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
