@@ -54,7 +54,7 @@ pub fn assert_runs_with_force(scratch: &Scratch, arguments: &[&str], environment
 /// # Panics
 /// If that is not so.
 pub fn assert_missing_torque_is_told(stderr_with: impl Fn(&str) -> String) {
-    let words = "`device` gives no torque, and the hand cannot feel that of a model";
+    let words = "`device` exerts no torque, so the hand cannot feel the torque of a model";
     let said = stderr_with("");
     assert!(said.contains(words), "{said}");
     let said = stderr_with("[limits]\ntorque_nm = [0, 0, 0]");

@@ -73,7 +73,7 @@ struct Arguments {
     /// unless another is named
     #[arg(long, value_name = "OUT", requires = "recording", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
-    /// Traces shown (default: force,position; a window: as the last time)
+    /// Traces shown (default: force,position; in a window: those shown last)
     #[arg(
         long,
         value_name = "LIST",
@@ -82,10 +82,10 @@ struct Arguments {
         conflicts_with = "sitting"
     )]
     traces: Vec<Quantity>,
-    /// Force over position along this axis, beside the traces
+    /// Plot force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z", value_parser = axis, conflicts_with = "sitting")]
     force_position: Option<usize>,
-    /// Force that an arrow of full length stands for, N, so that pictures can be compared (default: the largest of the run)
+    /// Force of an arrow of full length, N; the same for pictures to compare (default: the largest of the run)
     #[arg(long, value_name = "NEWTONS", value_parser = arrow_force, conflicts_with_all = ["sitting", "export"])]
     arrow_force: Option<f64>,
     /// Title of the file of traces (default: the title of the run)

@@ -22,7 +22,7 @@ impl SimpleDevice for Crank {
         "A handle that goes up and down by itself",
     );
     const PARAMETERS: &'static [Parameter] =
-        &[Parameter::real("amplitude_mm", "mm", 0.0, 10.0, 5.0, "Half the way from lowest to highest point")];
+        &[Parameter::real("amplitude_mm", "mm", 0.0, 10.0, 5.0, "Half the distance from lowest to highest")];
     type Stop = StopFlag;
 
     // Find the hardware here; where it is missing, busy or forbidden, return a `Refusal::resource` with the remedy. The

@@ -45,13 +45,14 @@ pub enum CommandError {
     Watchdog(Stuck),
     /// The force of a device swung between its limits.
     #[error(
-        "the force swung between its limits, and went on when it was damped: the loop is unstable; lower the stiffness or the \
-         gain of the scene (`flotor stability` says what the device can render)"
+        "the force oscillated between its limits, and continued to oscillate when the host attenuated it: the loop is \
+         unstable; lower the stiffness or the gain of the scene (`flotor stability` computes the largest stable stiffness)"
     )]
     Oscillation,
     /// The required watchdog process exited, and the run was ended.
     #[error(
-        "the watchdog process is gone; nothing stops the devices if this program is killed, so the run was ended, as `[limits] require_independent_stop` asks"
+        "the watchdog process has ended, so no process stops the devices if this program is killed; the run ended \
+         because the scene has `[limits] require_independent_stop`"
     )]
     Unguarded,
     /// The device sets the pace, at a rate above the scene's.

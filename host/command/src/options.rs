@@ -78,7 +78,7 @@ impl StrengthOption {
 /// `--accept-shared-control-group`, of each command that drives a device.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct ControlGroupOption {
-    /// Run although a kill of this program's control group ends the watchdog process with it, which alone stops a device then
+    /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device
     #[arg(long)]
     accept_shared_control_group: bool,
 }
@@ -293,7 +293,7 @@ pub fn real(text: &str) -> Result<f64, String> {
 pub fn seed(text: &str) -> Result<u64, String> {
     let number = text.trim().parse().ok().filter(|seed| *seed <= LARGEST_SEED);
     number.ok_or_else(|| {
-        format!("write a whole number from 0 to {LARGEST_SEED} (2^53, which every program reads alike)")
+        format!("write a whole number from 0 to {LARGEST_SEED} (2^53, the largest whole number that every JSON reader keeps exact)")
     })
 }
 

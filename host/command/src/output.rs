@@ -47,7 +47,7 @@ pub fn keep_results_apart() -> Result<(), CommandError> {
         Ok(())
     };
     moved().map_err(|cause: std::io::Error| {
-        CommandError::file(Path::new("standard output"), "cannot be kept for the result", cause)
+        CommandError::file(Path::new("standard output"), "cannot be reserved for the result", cause)
     })
 }
 

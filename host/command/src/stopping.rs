@@ -66,7 +66,9 @@ pub fn outlive_signals() {
 fn take_signals(first: First) -> Result<StopSwitch, CommandError> {
     let stop = StopSwitch::default();
     register(first, &stop).map_err(|cause| {
-        CommandError::Failed(format!("cannot take signals, which end a run: {cause}; {THREAD_ADVICE}"))
+        CommandError::Failed(format!(
+            "cannot install the signal handlers that stop a run: {cause}; {THREAD_ADVICE}"
+        ))
     })?;
     Ok(stop)
 }

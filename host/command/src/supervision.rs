@@ -97,7 +97,7 @@ impl std::fmt::Display for Silent {
         match self {
             Self::Plugin(how) => write!(
                 f,
-                "a plugin ended the process before the command was complete ({how}); `flotor validate` finds out which"
+                "a plugin ended the process before the command was complete ({how}); `flotor validate FILE` identifies the plugin"
             ),
             Self::Killed(signal) => write!(f, "{signal} ended the process before the command was complete"),
         }

@@ -57,7 +57,7 @@ const UNIT_TOLERANCE: f64 = 1.0e-6;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidDispatch {
     /// Wrong length.
-    #[error("peer message of {length} bytes, expected {DISPATCH_BYTES}")]
+    #[error("peer message of {length} bytes, expected {DISPATCH_BYTES}; run the same release on both hosts")]
     Length {
         /// Bytes received.
         length: usize,
@@ -66,7 +66,10 @@ pub enum InvalidDispatch {
     #[error("unsupported message version; run the same release on both hosts")]
     Mark,
     /// A number is not finite, the orientation has no unit length, or the energy passed on is negative.
-    #[error("invalid peer state: a pose, twist or energy is not possible")]
+    #[error(
+        "invalid peer state: a number is not finite, the orientation has no unit length, or the energy is negative; \
+         run the same release on both hosts"
+    )]
     Numbers,
 }
 

@@ -95,7 +95,7 @@ impl RenderedBoundary {
         // Rounding of a quotient is no shortfall.
         if self.holds_n < self.wanted_n * (1.0 - 1.0e-9) {
             parts.push(format!(
-                "takes {:.1} N instead of {:.1} N, because it begins at half of the range",
+                "withstands {:.1} N instead of {:.1} N, because it begins at half of the range",
                 self.holds_n, self.wanted_n
             ));
         }
@@ -118,7 +118,7 @@ impl Display for RenderedBoundary {
             latency_s * 1.0e3
         )?;
         if begins_mm.is_finite() {
-            write!(f, ", begins {begins_mm:.1} mm from home and takes {holds_n:.1} N")?;
+            write!(f, ", begins {begins_mm:.1} mm from home and withstands {holds_n:.1} N")?;
         }
         Ok(())
     }

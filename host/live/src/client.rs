@@ -36,10 +36,12 @@ pub enum LiveError {
         running: Vec<String>,
     },
     /// The connection broke.
-    #[error("the host does not answer: {0}; is the run over?")]
+    #[error("the host does not reply: {0}; check whether the run has ended")]
     Connection(#[from] io::Error),
     /// The host uses another protocol version.
-    #[error("the host speaks protocol {host}, this program {PROTOCOL}; use both from one build")]
+    #[error(
+        "the host uses protocol version {host}, this program version {PROTOCOL}; use both from one build"
+    )]
     Protocol {
         /// Protocol version of the host.
         host: u32,

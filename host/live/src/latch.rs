@@ -206,8 +206,9 @@ impl Latch {
     /// Adds the entries of a file to a state.
     fn add(&self, file: &File, state: &mut LatchState) {
         let Some((number, who)) = last_press(file) else { return };
-        let who = who
-            .unwrap_or_else(|problem| format!("an unreadable press in {}: {problem}", self.path.display()));
+        let who = who.unwrap_or_else(|problem| {
+            format!("unreadable emergency stop entry in {}: {problem}", self.path.display())
+        });
         let released = match read(file, Place::Release).map(|text| serde_json::from_str(&text)) {
             Ok(Ok(Entry::Release { press, .. })) => Some(press),
             _ => None,
@@ -250,7 +251,7 @@ fn last_press(file: &File) -> Option<(u64, Result<String, String>)> {
     };
     match serde_json::from_str(&text) {
         Ok(Entry::Press { number, who }) => Some((number, Ok(who))),
-        _ => Some((fingerprint(&text), Err("not an entry".to_owned()))),
+        _ => Some((fingerprint(&text), Err("malformed entry".to_owned()))),
     }
 }
 

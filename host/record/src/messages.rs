@@ -47,7 +47,7 @@ pub fn tick_from_messages(pose: &[u8], tick: &[u8]) -> Result<TickRecord, Invali
     let record = tick.record(transform.pose().map_err(|part| of_pose(lacks(part)))?);
     let record = record.map_err(|part| of_tick(lacks(part)))?;
     if !transform.is_of(&record) {
-        return Err(of_pose("it is of another time than the tick".to_owned()));
+        return Err(of_pose("its time differs from the time of the tick".to_owned()));
     }
     Ok(record)
 }

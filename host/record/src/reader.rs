@@ -71,7 +71,7 @@ pub enum ReadError {
     },
     /// The file is MCAP, but no recording of a run.
     #[error(
-        "`{}` is an MCAP file, but no recording of a run: `/flotor/run` does not come first; \
+        "`{}` is an MCAP file, but not a recording of a run: its first message is not on `/flotor/run`; \
          `flotor run --record FILE.mcap` makes recordings",
         path.display()
     )]
@@ -110,7 +110,7 @@ pub enum ReadError {
         compression: String,
     },
     /// The file is damaged, and cannot be read any further.
-    #[error("`{}` is damaged {}: {cause}; ticks before that are good: `flotor repair` copies them to a new file",
+    #[error("`{}` is damaged {}: {cause}; the ticks before the damage are intact: `flotor repair` copies them to a new file",
         path.display(),
         after_tick.map_or_else(|| "before its first tick".to_owned(), |tick| format!("after tick {tick}")))]
     Damaged {

@@ -16,7 +16,7 @@ pub enum RepairError {
     #[error(transparent)]
     Write(#[from] RecordError),
     /// The recording is complete: there is nothing to repair.
-    #[error("`{}` is whole: there is nothing to repair", path.display())]
+    #[error("`{}` is complete: there is nothing to repair", path.display())]
     Complete {
         /// Path of the file.
         path: PathBuf,

@@ -457,7 +457,7 @@ fn other_files_are_refused_with_name_reason_and_remedy() {
         mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
     writer.write_to_known_channel(&header, b"{}").unwrap();
     writer.finish().unwrap();
-    holds(&refusal(&foreign.0), &["no recording of a run", "--record"]);
+    holds(&refusal(&foreign.0), &["not a recording of a run", "--record"]);
 
     let newer = TestFile::new("newer");
     let mut writer = mcap::Writer::new(File::create(&newer.0).unwrap()).unwrap();

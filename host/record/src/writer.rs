@@ -48,8 +48,8 @@ pub enum RecordError {
     },
     /// The file could not be written to.
     #[error(
-        "cannot go on writing the recording `{}`: {cause}; what was written before can be read, but make room or \
-         name another file and record again",
+        "cannot continue writing the recording `{}`: {cause}; the part written before is readable; make room or \
+         name another file, and record again",
         path.display()
     )]
     Write {

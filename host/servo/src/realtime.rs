@@ -77,7 +77,7 @@ impl RealTimeReport {
         }
         if let Privilege::Refused(reason) = &self.core {
             lines.push(format!(
-                "{reason}; the loop is not pinned to a core. Name one that this process may use: {CORE_ADVICE}"
+                "{reason}; the loop is not pinned to a core. Name a core that this process may use: {CORE_ADVICE}"
             ));
         }
         lines
@@ -98,7 +98,7 @@ pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
 /// Pins the calling thread to one core; other threads of the process are not affected.
 fn pin(Core(number): Core) -> Result<(), String> {
     scheduling::pin(number).map_err(|NoSuchCore| {
-        format!("--core {number}: there is no such core, or this process may not use it")
+        format!("--core {number}: the machine lacks this core, or this process may not use it")
     })
 }
 
@@ -144,7 +144,7 @@ mod tests {
         let refused = std::thread::spawn(move || Privilege::of(pin(core))).join().expect("it does not panic");
         let report = RealTimeReport { core: refused, ..RealTimeReport::not_requested() };
         let told = format!(
-            "--core {core}: there is no such core, or this process may not use it; the loop is not pinned to a"
+            "--core {core}: the machine lacks this core, or this process may not use it; the loop is not pinned to a"
         );
         assert!(report.advice().concat().starts_with(&told), "{report:?}");
         assert_eq!(Core::new(MAX_CORES), None);

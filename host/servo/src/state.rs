@@ -58,7 +58,7 @@ impl EmergencySource {
             Self::Latch => "pressed at another run or on the network",
             Self::Watcher => "the viewer's window or another client",
             Self::Button => "button of the device",
-            Self::Device => "the device's own",
+            Self::Device => "raised by the device",
         }
     }
 }

@@ -193,7 +193,7 @@ impl CalibrationFile {
             let message = error.message().lines().next().unwrap_or_default();
             let cause =
                 message.split(", expected one of").next().unwrap_or_default().replace(" field ", " key ");
-            let problem = format!("is no calibration file ({cause})");
+            let problem = format!("is not a calibration file ({cause})");
             CalibrationFileError::new(file, before.matches('\n').count() + 1, problem)
         })?;
         let wrong =
@@ -235,8 +235,9 @@ impl CalibrationFile {
         if wanted == plugin && (wanted_serial.is_empty() || wanted_serial == serial) {
             return Ok(());
         }
-        let problem =
-            format!("for `{wanted}` {wanted_serial}, the device is `{plugin}` {serial}; calibrate this one");
+        let problem = format!(
+            "the file is for `{wanted}` {wanted_serial}, the device is `{plugin}` {serial}; calibrate this device"
+        );
         Err(CalibrationFileError::new(file, 0, problem))
     }
 }
@@ -299,9 +300,12 @@ mod tests {
             CalibrationFile::parse("c.toml", &text).unwrap_err().to_string()
         };
         let unknown =
-            "c.toml:4: is no calibration file (unknown key `seriel`, expected `plugin` or `serial`)";
+            "c.toml:4: is not a calibration file (unknown key `seriel`, expected `plugin` or `serial`)";
         assert_eq!(said("serial", "seriel"), unknown);
-        assert_eq!(said("format = 1", "model = 1"), "c.toml:1: is no calibration file (unknown key `model`)");
+        assert_eq!(
+            said("format = 1", "model = 1"),
+            "c.toml:1: is not a calibration file (unknown key `model`)"
+        );
         assert!(said("[-7.0, 7.0]", "[-7.0, true]").starts_with("c.toml:6: "));
         assert!(said("format = 1", "format = 2").contains("format 2, this program reads 1"));
         assert!(said("1.05", "nan").contains("[vertical]"));

@@ -80,7 +80,7 @@ impl fmt::Display for Call {
 /// Call that did not return in time: its thread is abandoned, and the process should end soon.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{who}` did not return from {call} within {} s; the host waits no longer (`{LIMIT_VARIABLE}` sets the limit)",
+    "`{who}` did not return from {call} within {} s, the time limit; check the plugin, or raise the limit with `{LIMIT_VARIABLE}`",
     limit.as_secs_f64()
 )]
 pub struct Unresponsive {
@@ -133,14 +133,14 @@ impl fmt::Display for Notice {
                     let joined = if restored.is_empty() { "" } else { "; it also changed " };
                     write!(
                         f,
-                        "{joined}environment variables of the host ({}), which stay",
+                        "{joined}environment variables of the host ({}), which the host does not restore",
                         variables.join(", ")
                     )?;
                 }
                 Ok(())
             }
             Self::Unguarded => f.write_str(
-                "the watchdog process is gone; nothing stops the devices if this program is killed",
+                "the watchdog process has ended, so no process stops the devices if this program is killed",
             ),
         }
     }

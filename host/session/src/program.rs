@@ -280,7 +280,7 @@ impl ForceModel for ProgramModel {
             0.0,
             4.0e9,
             0.0,
-            "Which program: set by `flotor lend` and the drop-in libraries",
+            "Number of the program that commands the model: set by `flotor lend` and the drop-in libraries",
         ),
         Parameter::real(
             "valid_ms",
@@ -288,7 +288,7 @@ impl ForceModel for ProgramModel {
             1.0,
             60_000.0,
             50.0,
-            "How long a wrench is valid without another one",
+            "Time for which a wrench is valid without a newer one",
         ),
         Parameter::real(
             "fade_ms",
@@ -314,7 +314,8 @@ impl ForceModel for ProgramModel {
         let place = free.iter().position(|(free, _)| f64::from(*free) == number);
         let Some((_, end)) = place.map(|place| free.swap_remove(place)) else {
             return Err(Refusal::parameter(
-                "no program commands this model; `flotor lend SCENE -- PROGRAM` starts one, and it has one place only",
+                "no program commands this model; start a program with `flotor lend SCENE -- PROGRAM`, and give the \
+                 model one place only",
             ));
         };
         let ns = |id| nanoseconds(settings.number_or_default(id));

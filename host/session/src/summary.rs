@@ -433,7 +433,7 @@ impl LinkSummary {
         let LinkCounts { lost, overtaken, refused, others, .. } = carried;
         let silent = match silences {
             0 => format!("longest wait for a message {longest_wait_ms:.0} ms"),
-            silences => format!("force removed {silences} times for want of messages"),
+            silences => format!("force removed {silences} times for lack of messages"),
         };
         let impossible = match implausible {
             0 => String::new(),
@@ -450,7 +450,7 @@ impl LinkSummary {
         let cut = match self.cut_ticks {
             0 => String::new(),
             ticks => format!(
-                "; not believed in {ticks} ticks: {:.3} mJ, {:.1} mm, {:.3} rad",
+                "; claims rejected in {ticks} ticks: {:.3} mJ, {:.1} mm, {:.3} rad",
                 self.cut_j * 1.0e3,
                 self.cut_path_m * 1.0e3,
                 self.cut_turn_rad
@@ -458,7 +458,7 @@ impl LinkSummary {
         };
         let rejected_runs = match self.rejected_runs.as_slice() {
             [] => String::new(),
-            runs => format!("; not heard any more because of its claims: run {}", runs.join(", run ")),
+            runs => format!("; disconnected because of its claims: run {}", runs.join(", run ")),
         };
         format!(
             "{partner}; messages in {received_ticks} ticks, {silent}; {lost} lost, {overtaken} overtaken, {refused} \
@@ -477,9 +477,9 @@ pub fn end_cause(end: &RunEnd) -> String {
             format!("the device sends {samples_per_s} samples a second, too many")
         }
         RunEnd::NotPaced => "the device does not set the pace".to_owned(),
-        RunEnd::Oscillation => "the force swung between its limits".to_owned(),
+        RunEnd::Oscillation => "the force oscillated between its limits".to_owned(),
         RunEnd::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
-        RunEnd::Unguarded => "the watchdog process was gone".to_owned(),
+        RunEnd::Unguarded => "the watchdog process had ended".to_owned(),
         RunEnd::Finished | RunEnd::Stopped => "it was stopped".to_owned(),
     }
 }
@@ -628,7 +628,8 @@ impl RunSummary {
                     format!("tanks never below {first:+.3} and {second:+.3} mJ, {heat_mj:.3} mJ dissipated")
                 }
                 Some(link) => format!(
-                    "tank never below {first:+.3} mJ with {:.3} mJ believed of the partner, whose own says {second:+.3} mJ",
+                    "tank never below {first:+.3} mJ with {:.3} mJ accepted from the partner, whose tank was never \
+                     below {second:+.3} mJ",
                     link.accepted_j * 1.0e3
                 ),
             };
@@ -741,14 +742,17 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
     if let Some(tick) = health.first_rejected {
         let count = health.rejected_ticks;
         return format!(
-            "{count} answers were not finite, the first at tick {tick}; each counted as no force"
+            "{count} results were not finite, the first at tick {tick}; the host replaced each by zero force"
         );
     }
     health.first_float_change.map_or_else(
         || "ok".to_owned(),
         |tick| {
             let ticks = health.float_changes;
-            format!("changed the floating-point environment in {ticks} ticks, the first at tick {tick}; it was put back each time")
+            format!(
+                "changed the floating-point environment in {ticks} ticks, the first at tick {tick}; the host \
+            restored it each time"
+            )
         },
     )
 }
@@ -758,7 +762,9 @@ fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> Pl
     let device = outcome.devices.get(number);
     let float_changes = device.map_or(0, |device| device.float_changes);
     let float_changes = (float_changes > 0).then(|| {
-        format!("changed the floating-point environment in {float_changes} calls; it was put back each time")
+        format!(
+            "changed the floating-point environment in {float_changes} calls; the host restored it each time"
+        )
     });
     let problem = device.and_then(|device| device.problem.clone());
     let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name);

@@ -41,7 +41,8 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
         && device.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
     if !is_id {
         return Err(CommandError::Usage(format!(
-            "`{device}` is no id of a device's plugin: an id starts with a letter; `flotor emulate NAME --help` lists the options"
+            "`{device}` is not the id of a device plugin: an id starts with a letter; `flotor emulate NAME --help` \
+             lists the options"
         )));
     }
     let program = format!("flotor-{device}-emulator");

@@ -38,7 +38,7 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 #[command(name = "flotor", version = VERSION.as_str(), propagate_version = true, max_term_width = 110)]
 #[command(after_help = "Examples:\n  \
     flotor                                            the built-in demo: simulate a spring for 10 s\n  \
-    flotor run --clock virtual --seed 1 --plot run.svg    the same, repeatable, as a picture\n  \
+    flotor run --clock virtual --seed 1 --plot run.svg    the same, repeatable, with a plot\n  \
     flotor run wall                                   another of Flotor's own scenes (`flotor scenes`)\n  \
     flotor run scene.toml --set spring.variant=closed-form --record run.mcap\n  \
     flotor eval --model spring --set preset=thesis-2 --poses poses.csv --out -\n\n\
@@ -108,7 +108,7 @@ enum Command {
     Stress(Separate),
     /// Attach to a running session and record it until it ends
     Record(record::RecordArguments),
-    /// Copy a truncated recording to a file that every reader of MCAP takes
+    /// Copy a truncated recording to a file that every MCAP reader accepts
     Repair(repair::RepairArguments),
     /// Hot-swap a model of a running session, without a jump in the force
     Swap(swap::SwapArguments),

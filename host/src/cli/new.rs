@@ -25,16 +25,16 @@ pub(crate) struct NewArguments {
     /// Folder of the contract's sources (default: those of this installation)
     #[arg(long, value_name = "PATH")]
     hal: Option<PathBuf>,
-    /// Copy the contract's sources into the new folder: it then builds wherever it is checked out
+    /// Copy the contract's sources into the new folder: it then builds in every checkout
     #[arg(long)]
     vendor: bool,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Kind {
-    /// Gives the wrench for a pose
+    /// Computes the wrench at a pose
     Model,
-    /// Gives the pose and takes a wrench
+    /// Measures the pose and exerts a wrench
     Device,
 }
 

@@ -15,8 +15,8 @@ use std::time::Instant;
 /// List the installed plugins, without running any of them.
 #[derive(Args)]
 #[command(
-    after_help = "Examples:\n  flotor plugins\n  flotor plugins spring        its parameters, with units and ranges\n  \
-    flotor plugins solid --set tool_radius_mm=5      also its own estimate of its error, and its time\n  \
+    after_help = "Examples:\n  flotor plugins\n  flotor plugins spring        parameters, with units and ranges\n  \
+    flotor plugins solid --set tool_radius_mm=5      also its error estimate, and its time per tick\n  \
     flotor plugins --json | python3 -m json.tool"
 )]
 pub(crate) struct PluginsArguments {
@@ -132,7 +132,7 @@ fn describe(registry: &Registry, id: &str, sets: &[KeyValue], json: &JsonOption)
         print_certificate(&plugin, sets)?;
     } else if !sets.is_empty() {
         return Err(CommandError::Usage(format!(
-            "--set: `{id}` is a device; only models tell their own error"
+            "--set: `{id}` is a device; only models have an error estimate"
         )));
     }
     Ok(())

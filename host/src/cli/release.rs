@@ -8,8 +8,9 @@ use flotor_live::Directory;
 /// Release the emergency stop of this machine: runs may start again.
 #[derive(Args)]
 #[command(
-    after_help = "An emergency stop of any run of yours (key, signal, viewer, network, button) stops all of them and stays:\n\
-    nothing is energised, also after a restart of any program, until it is released. Look first why it was pressed.\n\n\
+    after_help = "An emergency stop of any run of yours (key, signal, viewer, network, button) stops all of them \
+    and stays pressed:\n\
+    nothing is energised, also after a restart of any program, until `flotor release`. First find out why it was pressed.\n\n\
     Example:\n  flotor release"
 )]
 pub(crate) struct ReleaseArguments {}

@@ -6,12 +6,12 @@ use flotor_command::{CommandError, report_line};
 use flotor_record::{RepairError, Repaired, repair};
 use std::path::PathBuf;
 
-/// Copy a truncated recording to a file that every reader of MCAP takes.
+/// Copy a truncated recording to a file that every MCAP reader accepts.
 #[derive(Args)]
 #[command(
-    after_help = "The recording of a process that was killed has no index and no end: Flotor reads it up to its last whole chunk, most other \
-    readers refuse it. This command copies all whole chunks, message by message, writes index and end, and says what is lost. The \
-    old file is not touched.\n\n\
+    after_help = "The recording of a process that was killed has no index and no end record: Flotor reads such a \
+    file up to its last complete chunk, most other readers reject it. This command copies all complete chunks, \
+    message by message, writes index and end record, and reports the loss. It does not change the old file.\n\n\
     Example:\n  flotor repair cut.mcap --out whole.mcap"
 )]
 pub(crate) struct RepairArguments {
@@ -33,8 +33,9 @@ fn to_text(repaired: &Repaired) -> String {
     let end_s = *end_ns as f64 * 1.0e-9;
     let kept = format!("{ticks} ticks up to {end_s:.3} s of a run planned for {planned_s} s");
     let lost = match damage {
-        None => "what the process had not written yet, at most a quarter of a second, is lost".to_owned(),
-        Some(damage) => format!("what follows is lost, because the file is damaged there: {damage}"),
+        None => "the ticks that the process had not written yet, at most a quarter of a second, are lost"
+            .to_owned(),
+        Some(damage) => format!("the later ticks are lost, because the file is damaged there: {damage}"),
     };
     format!("{kept}; {lost}")
 }

@@ -74,7 +74,7 @@ pub(crate) struct RunArguments {
     /// Set a parameter of a plugin of the scene (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
-    /// The controller of the Maglev 200 as one more model of the first device, for programs of the ML API that connect there
+    /// Add the controller of the Maglev 200 as a model of the first device, and accept programs of the ML API at this address
     #[arg(long, hide = true, value_name = "HOST:PORT")]
     ml_api: Option<String>,
     #[command(flatten)]
@@ -130,9 +130,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         ClockOption::Virtual => Clock::Virtual,
     };
     if clock == Clock::Virtual && arguments.core.is_some() {
-        return Err(CommandError::Usage(
-            "--core needs the real clock: leave `--clock virtual` out".to_owned(),
-        ));
+        return Err(CommandError::Usage("--core needs the real clock: omit `--clock virtual`".to_owned()));
     }
     let options = RunOptions { clock, seed: arguments.seed };
     let registry = Registry::search(&scene.plugin_folders);
@@ -332,7 +330,7 @@ fn peer_links(session: &mut Session, clock: Clock) -> Result<Vec<(String, PeerLi
     let lines = session.take_lines();
     if let (Some((name, _)), Clock::Virtual) = (lines.first(), clock) {
         return Err(CommandError::Usage(format!(
-            "the remote end of the coupling `{name}` runs in real time: leave `--clock virtual` out"
+            "the remote end of the coupling `{name}` runs in real time: omit `--clock virtual`"
         )));
     }
     let directory = Directory::of_this_user();

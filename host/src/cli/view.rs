@@ -21,12 +21,12 @@ use std::process::Stdio;
     flotor view --screenshot run.png run.mcap     a picture, without display or GPU\n  \
     flotor view --screenshot run.png --at 2.5 --look light --size 1920x1200 --scale 1.5 run.mcap\n  \
     flotor view --screenshot run.png --view 80,5,1.5 run.mcap\n  \
-    flotor view --measure 10 run.mcap             pictures drawn and processor time in 10 s")]
+    flotor view --measure 10 run.mcap             number of pictures and processor time in 10 s")]
 pub(crate) struct ViewArguments {
     /// Recording, or zenoh/NAME for a remote session (default: the running host)
     #[arg(value_name = "FILE.mcap | zenoh/NAME")]
     file: Option<PathBuf>,
-    /// Second recording, over the first: dashed traces, and the handle as a ball, seen through
+    /// Second recording, drawn over the first: with dashed traces, and the handle as a transparent ball
     #[arg(value_name = "FILE.mcap", conflicts_with_all = ["export", "screen"])]
     second: Option<PathBuf>,
     /// Write a picture of one moment; needs no display and no GPU
@@ -38,16 +38,16 @@ pub(crate) struct ViewArguments {
     /// Show the session of this process (default: the newest session)
     #[arg(long, value_name = "PID", conflicts_with = "file")]
     run: Option<u32>,
-    /// Write the traces of the recording as numbers (.csv), lines (.svg) or pixels (.png), light unless --look says dark
+    /// Write the traces of the recording as a table (.csv) or a plot (.svg, .png), which is light without --look dark
     #[arg(long, value_name = "OUT", requires = "file", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
-    /// Traces shown, by name, such as force,stiffness (default: force,position; a window: as the last time)
+    /// Traces shown, by name, such as force,stiffness (default: force,position; in a window: those shown last)
     #[arg(long, value_name = "LIST")]
     traces: Option<String>,
-    /// Force over position along this axis, beside the traces
+    /// Plot force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z")]
     force_position: Option<String>,
-    /// Force that an arrow of full length stands for, N, so that pictures can be compared (default: the largest of the run)
+    /// Force of an arrow of full length, N; the same for pictures to compare (default: the largest of the run)
     #[arg(long, value_name = "NEWTONS", conflicts_with = "export")]
     arrow_force: Option<String>,
     /// With --export: title (default: that of the scene)
@@ -74,7 +74,7 @@ pub(crate) struct ViewArguments {
     /// Size of text and lines, 1 to 3 (default: 1)
     #[arg(long, value_name = "FACTOR", conflicts_with = "export")]
     scale: Option<String>,
-    /// With --screenshot: seen from so many degrees to the right, above the horizon, and nearer by ZOOM (default: 31.5,13.8)
+    /// With --screenshot: degrees of the camera to the right and above the horizon, and magnification (default: 31.5,13.8)
     #[arg(
         long,
         value_name = "AZIMUTH,INCLINATION[,ZOOM]",
@@ -83,7 +83,7 @@ pub(crate) struct ViewArguments {
         allow_hyphen_values = true
     )]
     view: Option<String>,
-    /// Measure the processor time of the window for this time, then close it
+    /// Measure the processor time of the window for this duration, then close the window
     #[arg(long, value_name = "SECONDS", conflicts_with_all = ["screenshot", "export"])]
     measure: Option<String>,
     #[command(flatten)]
@@ -109,8 +109,10 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         // Opened here as well, so that an error in the file is reported before another program starts.
         let recording = Recording::open(file)?;
         plugin_files(&recording, &registry).into_iter().for_each(|plugin| add("--plugin", plugin.into()));
-        let written =
-            [(&arguments.screenshot, "the picture shows"), (&arguments.export, "the traces are of")];
+        let written = [
+            (&arguments.screenshot, "the picture shows only"),
+            (&arguments.export, "the file of traces has only"),
+        ];
         if let Some((_, what)) = written.iter().find(|(out, _)| out.is_some()) {
             tell_damage(file, recording, what);
         }
@@ -193,7 +195,7 @@ fn tell_damage(file: &Path, mut recording: Recording, what: &str) {
         (None, Ending::CutOff) => format!("{}: its end is missing", file.display()),
         (None, _) => return,
     };
-    note(format_args!("{damage}; {what} what can be read"));
+    note(format_args!("{damage}; {what} the readable part"));
 }
 
 /// Returns the files of the recording's plugins that were found; the viewer reports the missing ones.

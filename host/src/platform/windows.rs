@@ -48,14 +48,14 @@ pub(crate) mod doctor {
 
     /// Remedy for missing locked memory.
     pub(crate) const MEMORY_REMEDY: &str =
-        "Windows locks the memory of no whole program; keep some memory free";
+        "Windows cannot lock the whole memory of a program; keep some memory free";
 
     /// Returns the findings other than cores and privileges.
     pub(crate) fn of_the_system(_: &Path) -> Vec<Diagnosis> {
         vec![Diagnosis::note(
             "system",
             "Windows",
-            "it promises no time: sufficient for a first test; for bounded lateness use Linux with PREEMPT_RT",
+            "Windows has no bounded lateness: sufficient for a first test; for bounded lateness use Linux with PREEMPT_RT",
         )]
     }
 }
@@ -84,7 +84,7 @@ pub(crate) mod usb {
         }
         vec![Diagnosis::note(
             "USB",
-            "not looked at on Windows yet",
+            "not checked on Windows yet",
             "the Device Manager lists what is connected",
         )]
     }
@@ -107,7 +107,9 @@ pub(crate) mod lend {
 
     #[allow(clippy::needless_pass_by_value)] // as elsewhere
     pub(crate) fn run(_: LendArguments) -> Result<(), CommandError> {
-        Err(CommandError::Usage("`flotor lend` is not on Windows yet: its libraries are Linux's".to_owned()))
+        Err(CommandError::Usage(
+            "`flotor lend` is not supported on Windows yet: its libraries are for Linux".to_owned(),
+        ))
     }
 
     pub(crate) mod guard {

@@ -124,7 +124,7 @@ fn a_death_that_cannot_be_caught_leaves_it_to_the_watchdog_process() {
         assert_eq!(ran.code, Some(*code), "{death}: {ran:?}");
         let is_named = |line: &str| line.starts_with("error: ") && line.contains(words);
         assert!(ran.stderr.lines().any(is_named), "{death}: {ran:?}");
-        let told = "flotor watchdog: the host is gone; stopped `device`";
+        let told = "flotor watchdog: the host has ended; stopped `device`";
         assert!(ran.stderr.lines().any(|line| line == told), "{death}: {ran:?}");
         assert!(recorded_ticks(&scratch) > 0, "{death}");
     });
@@ -161,7 +161,7 @@ fn a_calibration_that_is_killed_leaves_no_force() {
     running.signal_host(Signal::KILL);
     let ran = running.wait();
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:?}");
-    assert!(ran.stderr.contains("flotor watchdog: the host is gone; stopped `fixture-c-post`"), "{ran:?}");
+    assert!(ran.stderr.contains("flotor watchdog: the host has ended; stopped `fixture-c-post`"), "{ran:?}");
     let _ = post.assert_stopped("the calibration is killed");
 }
 
@@ -223,7 +223,7 @@ fn a_model_in_a_process_of_its_own_dies_alone() {
 #[test]
 fn a_host_notices_that_its_watchdog_process_is_gone() {
     let _turn = crate::alone();
-    let gone = "the watchdog process is gone; nothing stops the devices if this program is killed";
+    let gone = "the watchdog process has ended, so no process stops the devices if this program is killed";
     show_each(&["require_independent_stop = true", ""], |limits| {
         let (board, scratch) = (Board::start(), Scratch::default());
         let lines = format!("{PATIENT}\n{limits}");

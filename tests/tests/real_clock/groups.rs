@@ -95,7 +95,7 @@ fn a_run_names_the_control_group_that_refuses_real_time_priority() {
     let enter = format!("echo $$ > {}; exec \"$@\"", group.list().display());
     let run = || Flotor::with(["run", "--duration", "0.1"]).through_shell(&enter).run();
     let named = format!(
-        "its control group has no budget for real-time threads, and no other permission helps: as root `echo 950000 > {}`",
+        "its control group has no budget for real-time threads, which every other permission requires: as root `echo 950000 > {}`",
         file.display()
     );
     let refused = run();
@@ -313,7 +313,10 @@ fn a_suspended_host_loses_its_force_and_ends_when_it_goes_on() {
     running.signal_host(Signal::CONT);
     let ran = running.wait();
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
-    assert!(ran.stderr.contains("flotor watchdog: the host does not run; stopped `device`"), "{ran:?}");
+    assert!(
+        ran.stderr.contains("flotor watchdog: the host is suspended or hangs; stopped `device`"),
+        "{ran:?}"
+    );
     assert!(ran.stderr.contains("the watchdog stopped the device"), "{ran:?}");
     let _ = board.assert_stopped("the end");
     // A command that the host was about to send when it was suspended goes out.

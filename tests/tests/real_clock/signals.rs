@@ -32,8 +32,8 @@ fn signals_stay_the_hosts_whatever_a_plugin_does() {
         let _ = board.assert_stopped(taking);
         // What `create` blocks is blocked in its own thread only, which has ended.
         let who = match *taking {
-            "handlers-in-create" => "`culprit` took ",
-            "handlers-in-step" => "a plugin took ",
+            "handlers-in-create" => "`culprit` replaced ",
+            "handlers-in-step" => "a plugin replaced ",
             _ => return,
         };
         let notes: Vec<&str> = ran.stderr.lines().filter(|line| line.starts_with("note: ")).collect();

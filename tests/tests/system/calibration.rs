@@ -101,7 +101,7 @@ fn a_scene_names_the_file_and_the_device_corrects_the_total_force() {
     let ran = Flotor::with(["calibrate", "import", "--serial", "7", "--out", text(&other)]).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
     for (name, words) in
-        [("other.toml", "calibrate this one"), ("missing.toml", "cannot read the calibration")]
+        [("other.toml", "calibrate this device"), ("missing.toml", "cannot read the calibration")]
     {
         let ran = run(&format!("calibration = \"{name}\""));
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");

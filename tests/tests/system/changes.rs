@@ -189,7 +189,7 @@ fn a_run_whose_force_swings_between_its_limits_is_damped_and_ended() {
     let arguments = ["run", &scene, "--clock", "virtual", "--duration", "20s", "--json", "-"];
     let ran = Flotor::with(arguments.into_iter().chain(sets)).run();
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
-    assert!(ran.stderr.contains("swung between its limits"), "{ran:?}");
+    assert!(ran.stderr.contains("oscillated between its limits"), "{ran:?}");
     let summary: Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
     assert_eq!(summary["end"], Value::from("oscillation"), "{summary}");
     assert!(summary["events"]["oscillation_damped"].as_u64() > Some(0), "{summary}");
@@ -213,7 +213,9 @@ fn what_is_wrong_with_a_change_is_said_before_it_reaches_the_loop() {
         assert!(complaint("first", "gamma_n", "1e9").contains("must be 0.01 to 10000 N"));
         let fixed = complaint("first", "variant", "thesis");
         assert!(
-            fixed.starts_with("[first] `variant` cannot change while the loop runs; parameters that can: "),
+            fixed.starts_with(
+                "[first] `variant` cannot change while the loop runs; parameters that can change then: "
+            ),
             "{fixed}"
         );
         // One that is wrong holds back the others of its group.

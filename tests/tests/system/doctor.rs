@@ -67,7 +67,7 @@ fn bad(told: &str, count: usize) {
 #[test]
 fn a_falcon_that_is_not_there_is_told_by_its_numbers() {
     let told = Computer::default().doctor("falcon", &["address=tcp:127.0.0.1:1"]);
-    finds(&told, "bad", "on USB", "no device 0403:cb48", "connect it and switch it on");
+    finds(&told, "bad", "on USB", "no device 0403:cb48", "connect the device and switch it on");
     finds(&told, "bad", "opening", "no emulated Falcon at 127.0.0.1:1", "`flotor emulate falcon` starts one");
     bad(&told, 2);
 }
@@ -77,10 +77,10 @@ fn who_has_a_falcon_is_named() {
     let drivers = [
         (
             "ftdi_sio",
-            "the kernel's driver `ftdi_sio` has it",
+            "the kernel's driver `ftdi_sio` uses the device",
             "`echo 1-4:1.0 > /sys/bus/usb/drivers/ftdi_sio/unbind`",
         ),
-        ("usbfs", "another program has it open", "end that program"),
+        ("usbfs", "another program has the device open", "end that program"),
     ];
     for (driver, words, remedy) in drivers {
         let computer = Computer::connected(["0403", "cb48"], Some(driver));
@@ -165,7 +165,13 @@ fn what_keeps_an_inverse3_from_starting_is_told() {
         let sets =
             [format!("address={}", service.address), format!("device={arm}"), "timeout_ms=9000".to_owned()];
         let told = computer.doctor("inverse3", &sets.each_ref().map(String::as_str));
-        finds(&told, "bad", "on USB", "no device 16c0:0483 or 2fe3:0100", "connect it and switch it on");
+        finds(
+            &told,
+            "bad",
+            "on USB",
+            "no device 16c0:0483 or 2fe3:0100",
+            "connect the device and switch it on",
+        );
         finds(&told, "bad", "opening", words, remedy);
         bad(&told, 2);
     }
@@ -179,7 +185,7 @@ fn an_inverse3_that_is_well_is_ready_with_what_was_found() {
     let sets =
         [format!("address={}", service.address), format!("device={ARM}"), "timeout_ms=9000".to_owned()];
     let told = Computer::default().doctor("inverse3", &sets.each_ref().map(String::as_str));
-    finds(&told, "note", "on USB", "no device 16c0:0483 or 2fe3:0100", "it is open all the same");
+    finds(&told, "note", "on USB", "no device 16c0:0483 or 2fe3:0100", "the device is open nevertheless");
     finds(&told, "good", "opening", "Haply Inverse3 is open, without force", "");
     finds(&told, "good", "axes", "6 sensed, 3 driven; at most 5 N", "");
     finds(&told, "good", "without its host", "stops by itself", "");

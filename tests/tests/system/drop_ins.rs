@@ -170,7 +170,10 @@ fn a_program_that_lost_the_library_path_and_a_duration_that_does_not_apply_are_t
         Flotor::with(["lend", &scene.display().to_string(), "--", "env", "-i", "/bin/sh", "-c", "exit 7"])
             .run();
     assert_eq!(ran.code, Some(7), "{ran:?}");
-    assert!(ran.stderr.contains("opened no device") && ran.stderr.contains("`env -i` removes it"), "{ran:?}");
+    assert!(
+        ran.stderr.contains("opened no device") && ran.stderr.contains("`env -i` removes the variable"),
+        "{ran:?}"
+    );
     assert!(ran.stderr.contains("`duration_s` does not apply"), "{ran:?}");
 }
 
@@ -190,7 +193,7 @@ fn the_summary_of_a_program_has_numbers_and_causes_that_a_person_reads() {
     let fast = "[device]\nplugin = \"simulated\"\n[limits]\nforce_n = 8\ntorque_nm = 0.15\n";
     let fast = scratch.file("fast.toml", fast).display().to_string();
     let square = lent(&program, &["--api", "dhd", "--pace", "lockstep", &fast], "square", 0);
-    let cause = "the run ended before the program: the force swung between its limits";
+    let cause = "the run ended before the program: the force oscillated between its limits";
     assert!(square.stdout.contains(cause), "{square:?}");
 }
 
@@ -442,7 +445,7 @@ fn nothing_a_program_does_gets_past_the_limits_or_takes_report_and_recording_wit
         };
         assert_eq!(ran.code, Some(expected), "{way}: {ran:?}");
         if (*way, *pace) == ("steps", "lockstep") {
-            assert!(ran.stdout.contains("the force swung between its limits"), "{ran:?}");
+            assert!(ran.stdout.contains("the force oscillated between its limits"), "{ran:?}");
         }
         match *way {
             "steps" | "huge" => assert!(largest_n > 0.9 * MOST_N, "{way}: only {largest_n} N"),

@@ -52,7 +52,7 @@ fn a_folder_anybody_may_write_to_is_not_searched_and_the_reason_is_told() {
     std::fs::copy(plugin_file("flotor-spring"), open.join("libspring.so")).expect("a library can be copied");
     std::fs::set_permissions(&open, std::fs::Permissions::from_mode(0o777)).expect("our own folder");
     let ran = Flotor::with(["plugins"]).searching(&[&open]).run();
-    assert!(ran.stdout.contains("not searched: anybody may write into it"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("not searched: every user may write into the folder"), "{}", ran.stdout);
     assert!(!ran.stdout.contains("open/libspring.so"), "{}", ran.stdout);
 }
 

@@ -67,7 +67,7 @@ fn patiently(what: &str, mut is_so: impl FnMut() -> bool) {
 /// Stopped by the latch while it ran, or refused before it began: in both cases the exit code of a stop for safety, and how to go on.
 fn assert_stopped(ran: &Ran) {
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:?}");
-    let is_told = ran.stderr.contains("flotor release") || ran.stderr.contains("start it again");
+    let is_told = ran.stderr.contains("flotor release") || ran.stderr.contains("start the run again");
     assert!(is_told, "{ran:?}");
 }
 

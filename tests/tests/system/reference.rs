@@ -107,8 +107,8 @@ fn an_option_of_many_commands_is_the_same_in_each() {
         ),
         (
             "--accept-shared-control-group",
-            "| `--accept-shared-control-group` |  | Run although a kill of this program's control group ends the watchdog process \
-             with it, which alone stops a device then |",
+            "| `--accept-shared-control-group` |  | Accept that a kill of this program's control group also ends \
+             the watchdog process, so that no process stops the device |",
             &[
                 "run",
                 "study jnd",

@@ -462,8 +462,8 @@ fn nan_from_a_model_is_counted_and_told_in_one_line() {
         let ran = run_scene_with(&model_scene(&file), &[&format!("model.fault={fault}"), "model.at_tick=7"]);
         assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:#?}");
         let told = format!(
-            "{}: `model` {count} answers were not finite, the first at tick 7; each counted as no force; \
-             run `flotor validate` for details",
+            "{}: `model` {count} results were not finite, the first at tick 7; the host replaced each by zero \
+             force; run `flotor validate` for details",
             file.display()
         );
         assert_eq!(ran.error(), told);
@@ -639,7 +639,7 @@ fn a_device_that_takes_no_command_is_stopped_and_named() {
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:#?}");
     assert_eq!(commanded.last(), Some(&(49, 0.1)), "the control: it took those before");
     let told =
-        format!("{}: device fault: it has not taken the last 101 commands; ", plugin_file(DEVICE).display());
+        format!("{}: device fault: it has not read the last 101 commands; ", plugin_file(DEVICE).display());
     assert!(ran.error().starts_with(&told), "{ran:#?}");
 }
 
@@ -798,7 +798,7 @@ fn emulate_helps_with_itself_until_a_name_is_given() {
     assert!(ran.error().contains("no emulator `flotor-nothing-emulator`"), "{ran:#?}");
     let ran = Flotor::with(["emulate", "--port", "9999"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
-    assert!(ran.error().starts_with("`--port` is no id of a device's plugin"), "{ran:#?}");
+    assert!(ran.error().starts_with("`--port` is not the id of a device plugin"), "{ran:#?}");
     let ran = Flotor::with(["emulate", "maglev", "--set", "preset=xx"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
     assert!(ran.error().starts_with("--set preset=xx: `preset` = `xx`: must be "), "{ran:#?}");

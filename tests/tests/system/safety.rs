@@ -335,7 +335,7 @@ fn an_emergency_stop_has_its_exit_code_also_where_nobody_reads_the_summary() {
         let to_nobody = "{ sleep 1; \"$@\" --clock virtual; echo \"code $?\" >&2; } | true";
         let ran = flotor.through_shell(to_nobody).run();
         assert_eq!(last_line(&ran), format!("code {}", exit_code::DEVICE_FAULT), "{ran:?}");
-        assert!(ran.stderr.contains("error: emergency stop (the device's own)"), "{ran:?}");
+        assert!(ran.stderr.contains("error: emergency stop (raised by the device)"), "{ran:?}");
         assert_eq!(recorded(&scratch).len(), 51);
         std::fs::remove_file(recording_in(&scratch)).expect("it was recorded");
     }

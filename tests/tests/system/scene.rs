@@ -136,9 +136,13 @@ fn wrong_types_and_ranges_say_what_would_be_right() {
         (
             "rate_hz = 1000",
             "rate_hz = 1000,5",
-            "scene.toml:2: not valid TOML: `rate_hz = 1000,5`: the decimal",
+            "scene.toml:2: not valid TOML: `rate_hz = 1000,5`: use a point",
         ),
-        ("\"spring\"", "\"C:\\path.dll\"", "a backslash stands in single quotes: `plugin = 'C:\\path.dll'`"),
+        (
+            "\"spring\"",
+            "\"C:\\path.dll\"",
+            "put text with a backslash in single quotes: `plugin = 'C:\\path.dll'`",
+        ),
         (
             "[device]\nplugin",
             "device",

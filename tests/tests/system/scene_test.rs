@@ -116,7 +116,7 @@ fn a_defect_of_the_model_is_found_with_its_cause_and_a_picture() {
             FORCE,
             "output->wrench.force_n[2] = depth_m > 0.001 && depth_m < 0.0015 ? NAN : values[STIFFNESS] * depth_m;",
             "seed 1",
-            "answers were not finite",
+            "results were not finite",
         ),
     ] {
         let scratch = Scratch::default();

@@ -10,7 +10,7 @@ use std::process::Command;
 /// What every run of this machine says once all are stopped.
 const ALL: &str = "all runs of this machine are stopped, and none starts until `flotor release`";
 /// What a run says that knows of no other.
-const ONE: &str = "the emergency stop is certain for this run only";
+const ONE: &str = "the emergency stop is confirmed for this run only";
 /// What a run says before it energises a device.
 const UNKEPT: &str = "an emergency stop does not outlast this run and may reach no other run";
 

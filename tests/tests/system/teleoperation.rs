@@ -344,7 +344,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
     for (wrong, expected) in [
         ("[[device]]\nplugin = \"a\"\n[[device]]\nplugin = \"b\"\n".to_owned(), "`device.name` is missing"),
         (two.replace("right", "left"), "two devices are called `left`; give each a different `name`"),
-        (format!("{two}[[model]]\nplugin = \"spring\"\n"), "the scene has several devices: say which"),
+        (format!("{two}[[model]]\nplugin = \"spring\"\n"), "the scene has several devices: name the device"),
         (
             format!("{two}[[model]]\nplugin = \"spring\"\ndevice = \"rigth\"\n"),
             "there is no device `rigth`; did you mean `right`? (devices: left, right)",
@@ -368,7 +368,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
             format!(
                 "{two}[[coupling]]\nname = \"Pair\"\npartner = \"elsewhere\"\nend = [{{ device = \"left\" }}]\n"
             ),
-            "both hosts know the coupling by its `name`: lower-case letters",
+            "invalid `name`, which identifies the coupling on both hosts",
         ),
         (
             format!("{two}[[coupling]]\npartner = \"far\"\nend = [{{ device = \"left\" }}]\n"),
@@ -378,7 +378,7 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
             format!(
                 "{two}[[coupling]]\nname = \"pair\"\npartner = \"elsewhere\"\ndelay_ticks = 3\nend = [{{ device = \"left\" }}]\n"
             ),
-            "leave `delay_ticks` out",
+            "remove `delay_ticks`",
         ),
         (
             format!("{two}{COUPLING}[limits]\npassivity = \"control\"\n"),

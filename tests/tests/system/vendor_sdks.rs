@@ -328,7 +328,7 @@ fn doctor_tells_what_keeps_a_device_from_starting() {
         ("permission", "this user may use /dev/ttyACM0"),
         ("opening", "is open, without force"),
         ("axes", "6 sensed, 3 driven; at most 3.3 N"),
-        ("without its host", "nothing is known to stop it"),
+        ("without its host", "its plugin declares no stop without the host"),
     ] {
         assert!(touch.lines().any(|line| line.contains(what) && line.contains(words)), "{what}: {touch}");
     }

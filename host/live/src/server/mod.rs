@@ -203,7 +203,9 @@ impl Shared {
     fn admit(&self, outbox: &Outbox, every: u32) -> Result<(), String> {
         let watchers = self.watchers();
         if !outbox.wants_ticks() && self.watching.load(Ordering::Relaxed) >= MAX_WATCHERS {
-            return Err(format!("{MAX_WATCHERS} programs watch already; close one of them"));
+            return Err(format!(
+                "{MAX_WATCHERS} clients are connected already, the maximum; close one of them"
+            ));
         }
         outbox.want_ticks(every.max(1), self.demand.request(Demand::ALL));
         self.count(&watchers);

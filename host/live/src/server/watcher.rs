@@ -152,7 +152,7 @@ fn answer(payload: &[u8], outbox: &Outbox, shared: &Shared) -> Answer {
     let (number, done) = match Request::read(payload) {
         Ok(Request { number, ask }) => (number, carry_out(ask, outbox, shared)),
         Err((number, error)) => {
-            (number, Err((RefusalCause::Request, format!("no request this host knows: {error}"))))
+            (number, Err((RefusalCause::Request, format!("unknown or malformed request: {error}"))))
         }
     };
     let (cause, refused) = done.err().map(|(cause, words)| (cause, Some(words))).unwrap_or_default();

@@ -220,7 +220,7 @@ pub(crate) fn is_dying() -> bool {
 /// Ends a process that dies for too long because a device's stop does not return; stops the other devices.
 pub(crate) fn end_dying() -> ! {
     stop_the_rest();
-    system::say(b"error: the process was ended, and a device did not come back from `safe_stop`\n");
+    system::say(b"error: the process was ended, and a device did not return from `safe_stop`\n");
     exit_process(ENDED)
 }
 

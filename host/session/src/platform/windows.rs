@@ -7,8 +7,8 @@ use std::time::UNIX_EPOCH;
 
 /// Warning about ends of this process that stop no device, on this system only, for users.
 pub(crate) const NOT_CAUGHT: Option<&str> = Some(
-    "on Windows nothing stops a device if a plugin ends this program by `abort` or damages its memory (heap corruption), or if it is \
-     ended from outside (Task Manager); keep a hand at the power switch",
+    "on Windows nothing stops a device if a plugin ends this program by `abort` or corrupts its heap, or if another \
+     program (Task Manager) ends this program; keep a hand at the power switch",
 );
 
 /// State of the process that plugins share with the host: the working folder. Limits of a process are set from outside, and a

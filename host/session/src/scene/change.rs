@@ -74,7 +74,9 @@ pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneEr
         let either = section.sections("either")?;
         section.finish()?;
         if set.is_none() && weight.is_none() && swap.is_none() {
-            return wrong("`change.set`, `change.weight` or `change.swap` is missing: what is to change?");
+            return wrong(
+                "`change.set`, `change.weight` or `change.swap` is missing; a `[[change]]` needs one of these keys",
+            );
         }
         if swap.is_none() && (alone != Alternative::default() || !either.is_empty()) {
             return wrong(

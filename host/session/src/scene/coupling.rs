@@ -40,7 +40,7 @@ fn coupling(
         delay_ticks: match (section.take("delay_ticks"), partner) {
             (Some(value), Partner::Here) => value.whole(1..=MAX_DELAY_TICKS)?,
             (Some(_), Partner::Elsewhere) => {
-                return Err(wrong("the way to another host has the delay it has; leave `delay_ticks` out"));
+                return Err(wrong("the network determines the delay to another host; remove `delay_ticks`"));
             }
             (None, _) => default.delay_ticks,
         },
@@ -72,9 +72,9 @@ fn coupling(
     let gain = ends.energy_gain();
     if gain > 1.0 && !may_amplify {
         return Err(wrong(&format!(
-            "the coupling amplifies: one hand may get {gain:.4} times the energy that the other puts in, because `force_scale` / \
-             `motion_scale` differ between its ends; make these quotients equal, or write `allow_amplification = true` if nobody \
-             can be hurt"
+            "the coupling amplifies: one hand may get {gain:.4} times the energy that the other puts in, because \
+             `force_scale` / `motion_scale` differ between its ends; make these quotients equal, or write \
+             `allow_amplification = true` if the amplified force is safe for the hand"
         )));
     }
     if gain <= 1.0 && may_amplify {
@@ -95,7 +95,8 @@ fn coupling(
         (Some(name), CouplingEnds::Remote(_)) if is_key(&name) => name,
         (_, CouplingEnds::Remote(_)) => {
             return Err(wrong(
-                "both hosts know the coupling by its `name`: lower-case letters, digits and hyphens, at most 40",
+                "invalid `name`, which identifies the coupling on both hosts: use lower-case letters, digits and \
+                 hyphens, at most 40",
             ));
         }
     };

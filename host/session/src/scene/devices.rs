@@ -84,7 +84,7 @@ pub(super) fn of_model(
     location: &Location,
 ) -> Result<Vec<u16>, SceneError> {
     let Some(value) = named else {
-        let problem = "the scene has several devices: say which the model is on, `device = \"NAME\"` or a list of names";
+        let problem = "the scene has several devices: name the device of the model, `device = \"NAME\"` or a list of names";
         return match devices {
             [_] => Ok(vec![0]),
             _ => Err(location.problem(problem)),

@@ -370,7 +370,7 @@ fn frame_and_scales(section: &mut Section<'_>) -> Result<MappingConfig, SceneErr
             let rotation = DQuat::from_array(numbers);
             if !is_rotation(rotation) {
                 return Err(value.problem(format!(
-                    "a rotation is a unit quaternion [x, y, z, w]; this one has length {}",
+                    "a rotation is a unit quaternion [x, y, z, w]; this quaternion has length {}",
                     rotation.length()
                 )));
             }

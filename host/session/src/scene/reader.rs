@@ -118,9 +118,9 @@ impl<'t> Source<'t> {
             let is_number =
                 |(a, b): (&str, &str)| a.ends_with(char::is_numeric) && b.starts_with(char::is_numeric);
             let problem = if line.split_once(',').is_some_and(is_number) && !line.contains('[') {
-                format!("the decimal sign is a point: `{}`", line.replace(',', "."))
+                format!("use a point as the decimal separator: `{}`", line.replace(',', "."))
             } else if line.contains('\\') {
-                format!("text with a backslash stands in single quotes: `{}`", line.replace('"', "'"))
+                format!("put text with a backslash in single quotes: `{}`", line.replace('"', "'"))
             } else {
                 error.message().lines().next().unwrap_or_default().to_owned()
             };

@@ -52,7 +52,7 @@ impl Epilogue {
         let taken = heartbeat.signals_taken();
         if !taken.is_none() {
             warnings.push(format!(
-                "a plugin took {taken} away from the host during the run; the host has taken them back"
+                "a plugin replaced {taken} of the host during the run; the host has restored them"
             ));
         }
         Outcome {

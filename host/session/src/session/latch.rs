@@ -161,10 +161,13 @@ impl StopReach {
                 Some(format!("not confirmed by process {}: switch its device off", processes.join(", ")))
             }
             Err(cause) => {
-                Some(format!("the other runs cannot be asked: {cause}; check that each has stopped"))
+                Some(format!("the state of the other runs is unknown: {cause}; check that each has stopped"))
             }
         };
-        let unkept = self.unkept.as_ref().map(|cause| format!("a later run is not refused: {cause}"));
+        let unkept = self
+            .unkept
+            .as_ref()
+            .map(|cause| format!("the emergency stop does not prevent a later run: {cause}"));
         let problems: Vec<String> = unconfirmed.into_iter().chain(unkept).collect();
         (!problems.is_empty()).then(|| problems.join("; "))
     }
@@ -175,7 +178,9 @@ impl Display for StopReach {
         match self.problem() {
             None => formatter
                 .write_str("all runs of this machine are stopped, and none starts until `flotor release`"),
-            Some(problem) => write!(formatter, "the emergency stop is certain for this run only: {problem}"),
+            Some(problem) => {
+                write!(formatter, "the emergency stop is confirmed for this run only: {problem}")
+            }
         }
     }
 }
@@ -202,9 +207,8 @@ pub(super) fn latched_words(pressed: Option<&Pressed>) -> String {
         Some(pressed) => format!(
             "the emergency stop of this machine is pressed ({pressed}): nothing is energised; `flotor release` releases it"
         ),
-        None => {
-            "the emergency stop of this machine was pressed while the run started: start it again".to_owned()
-        }
+        None => "the emergency stop of this machine was pressed while the run started: start the run again"
+            .to_owned(),
     }
 }
 
@@ -266,7 +270,7 @@ mod tests {
         std::fs::write(&file, "").unwrap();
         let apart = LatchGuard::of(&Directory::at(file.join("runs")));
         assert!(apart.warning().unwrap().contains("does not outlast this run"));
-        assert!(apart.press(EmergencySource::Key).to_string().contains("a later run is not refused"));
+        assert!(apart.press(EmergencySource::Key).to_string().contains("does not prevent a later run"));
         let usual = LatchGuard::of(&Directory::at(scratch.path().join("runs")));
         assert_eq!(usual.warning(), None);
         assert_eq!(usual.reach(), None);

@@ -102,14 +102,16 @@ pub enum RunError {
     NoThread(&'static str),
     /// The scene requires a stop that does not depend on this process, and there is none.
     #[error(
-        "no watchdog process: {0}; `[limits] require_independent_stop = true` requires one; correct the cause, or remove that line"
+        "cannot start the watchdog process: {0}; `[limits] require_independent_stop = true` requires this process; \
+         correct the cause, or remove that line"
     )]
     WatchdogProcess(std::io::Error),
     /// Only the watchdog process stops a device when this process is gone, and a kill of one control group ends both.
     #[error(
         "a kill of the control group `{group}`, as at the end of a service or a container or when memory runs out, leaves the force of \
-         `{device}` on: the watchdog process cannot leave that group, and the device has no watchdog of its own; `flotor doctor` says how \
-         to start the program; `[limits] accept_shared_control_group = true` in a scene or `--accept-shared-control-group` accepts it"
+         `{device}` on: the watchdog process cannot leave that group, and the device has no watchdog of its own; \
+         `flotor doctor` describes how to start the program; `[limits] accept_shared_control_group = true` in a \
+         scene or `--accept-shared-control-group` accepts it"
     )]
     SharedControlGroup {
         /// Name of the device in the scene.
@@ -193,7 +195,7 @@ impl PluginReport {
     pub(crate) fn warning(&self) -> Option<String> {
         let Self { name, signals_taken, .. } = self;
         (!signals_taken.is_none()).then(|| {
-            format!("`{name}` took {signals_taken} away from the host during its creation; the host has taken them back")
+            format!("`{name}` replaced {signals_taken} of the host during its creation; the host has restored them")
         })
     }
 }

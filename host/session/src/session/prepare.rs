@@ -81,7 +81,7 @@ pub(super) fn activate_here(
     progress.exit();
     activated.map_err(|(device, refusal)| match plugins.get(device) {
         Some(report) => refused(&report.metadata, refusal),
-        None => RunError::Thread("names a device that the scene has not"),
+        None => RunError::Thread("names a device that the scene does not have"),
     })
 }
 
@@ -117,8 +117,8 @@ pub(super) fn without_torque(scene: &Scene, number: u16, device: &Capabilities) 
     (is_driven && is_felt && is_wanted).then(|| {
         let name = scene.devices.get(usize::from(number)).map_or("", |device| device.name.as_str());
         format!(
-            "`{name}` gives no torque, and the hand cannot feel that of a model; `[limits] torque_nm = [0, 0, 0]` says that \
-             none is wanted"
+            "`{name}` exerts no torque, so the hand cannot feel the torque of a model; `[limits] torque_nm = [0, 0, \
+             0]` accepts this"
         )
     })
 }
@@ -240,8 +240,8 @@ fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolat
             Err(complain(
                 model,
                 &format!(
-                    "it comes from outside the installation, and each of its {objects} objects would have a process of its own; \
-                     say `isolation = \"process\"` or `isolation = \"none\"`"
+                    "it comes from outside the installation, and each of its {objects} objects would have a process \
+                     of its own; set `isolation = \"process\"` or `isolation = \"none\"`"
                 ),
             ))
         }
@@ -459,14 +459,15 @@ pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: 
     let [slowest, fastest] = device.rate_hz;
     if scene.rate_hz < slowest || scene.rate_hz > fastest {
         mismatches.push(format!(
-            "rate {} Hz, the device runs at {slowest} to {fastest} Hz; change `rate_hz`",
+            "rate {} Hz, but the device runs at {slowest} to {fastest} Hz; change `rate_hz`",
             scene.rate_hz
         ));
     }
     // Only the first device can set the pace.
     if scene.pacing == Pacing::Device && number == 0 && !can_pace {
         mismatches.push(
-            "it cannot set the pace of the loop; remove `pacing`, or say `pacing = \"host\"`".to_owned(),
+            "the device cannot set the pace of the loop; remove `pacing`, or set `pacing = \"host\"`"
+                .to_owned(),
         );
     }
     mismatches.extend(boundless(&scene.boundary, device));
@@ -487,7 +488,7 @@ fn boundless(boundary: &Boundary, device: &Capabilities) -> Option<String> {
     let (range_m, range_rad) = (narrowest(device.range_m), narrowest(device.range_rad));
     let says = |key, margin: f64, range: f64, unit| {
         format!(
-            "`{key} = {margin:.3}` leaves nothing of the {range:.3} {unit} the device moves around home; make it smaller"
+            "`{key} = {margin:.3}` leaves no free workspace, because the device moves {range:.3} {unit} around home; reduce `{key}`"
         )
     };
     if boundary.margin_m >= range_m {
@@ -516,13 +517,14 @@ fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
     let accepted = accepted.join(", ");
     Some(if is_driven == [false; 3] {
         format!(
-            "the device gives no force, so no model can be felt; set `[limits] force_n = [{accepted}]` to accept that: the \
-             host then computes, shows and records the models. A scene without a `[[model]]` records poses"
+            "the device exerts no force, so the hand cannot feel a model; set `[limits] force_n = [{accepted}]` to \
+             accept this: the host then computes, shows and records the models. A scene without a `[[model]]` \
+             records poses"
         )
     } else {
         format!(
-            "the device gives no force along {}, and the hand cannot feel that part of a model; set `[limits] force_n = \
-             [{accepted}]` to accept that",
+            "the device exerts no force along {}, so the hand cannot feel this component of a model's force; set \
+             `[limits] force_n = [{accepted}]` to accept this",
             unfelt.join(" and ")
         )
     })

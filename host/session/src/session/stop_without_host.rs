@@ -90,7 +90,7 @@ pub fn start_watchdog_process(
         Err(error) if limits.require_independent_stop => return Err(RunError::WatchdogProcess(error)),
         Err(error) => {
             warnings.push(format!(
-                "no watchdog process ({error}): nothing stops the devices if this program is killed"
+                "cannot start the watchdog process ({error}), so no process stops the devices if this program is killed"
             ));
             None
         }
@@ -115,6 +115,6 @@ pub fn start_watchdog_process(
 fn shared_group_warning(group: &str) -> String {
     format!(
         "the watchdog process is in the control group `{group}` of this program: nothing stops the devices if all processes of \
-         the group are killed, as at the end of a service or a container, or when memory runs out; `flotor doctor` says what to do"
+         the group are killed, as at the end of a service or a container, or when memory runs out; `flotor doctor` gives the remedy"
     )
 }

@@ -147,7 +147,7 @@ impl Host {
             let making = thread.spawn_scoped(scope, make);
             let making = making
                 .map_err(|error| refused(format!("cannot start a thread to create the model: {error}")))?;
-            making.join().unwrap_or_else(|_| Err(refused("making it panicked".to_owned())))
+            making.join().unwrap_or_else(|_| Err(refused("the creation of the model panicked".to_owned())))
         })
     }
 }

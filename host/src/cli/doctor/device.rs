@@ -64,7 +64,7 @@ fn without_its_host(declared: Result<Option<Independence>, Refusal>) -> Diagnosi
     match declared {
         Ok(Some(Independence::Itself { .. })) => Diagnosis::good(WITHOUT_ITS_HOST, "stops by itself"),
         Ok(Some(Independence::Message { .. })) => by_message(watchdog_process::is_offered()),
-        Ok(None) => not_stopped("nothing is known to stop it"),
+        Ok(None) => not_stopped("its plugin declares no stop without the host"),
         Err(refusal) => Diagnosis::bad_without_remedy(WITHOUT_ITS_HOST, refusal.to_string()),
     }
 }
@@ -72,8 +72,10 @@ fn without_its_host(declared: Result<Option<Independence>, Refusal>) -> Diagnosi
 /// Returns the finding on a device that is stopped by a message, which the watchdog process has to send.
 fn by_message(watchdog_process: io::Result<()>) -> Diagnosis {
     match watchdog_process {
-        Ok(()) => Diagnosis::good(WITHOUT_ITS_HOST, "the watchdog process stops it, by a message"),
-        Err(why) => not_stopped(format!("a message would stop it, and nothing sends it: {why}")),
+        Ok(()) => Diagnosis::good(WITHOUT_ITS_HOST, "the watchdog process stops the device by a message"),
+        Err(why) => {
+            not_stopped(format!("a message stops the device, but the watchdog process cannot send it: {why}"))
+        }
     }
 }
 
@@ -120,7 +122,7 @@ mod tests {
         assert_eq!((sent.grade, sent.remedy), (Grade::Good, None));
         let not_sent = by_message(Err(io::Error::other("it is not on this system")));
         assert_eq!(not_sent.grade, Grade::Note);
-        assert!(not_sent.found.ends_with("nothing sends it: it is not on this system"), "{}", not_sent.found);
+        assert!(not_sent.found.ends_with("cannot send it: it is not on this system"), "{}", not_sent.found);
         assert!(not_sent.remedy.is_some_and(|remedy| remedy.contains("a hand at its power switch")));
     }
 }

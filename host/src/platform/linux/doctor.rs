@@ -71,7 +71,7 @@ fn of_limit(limit: &GroupLimit) -> Option<Diagnosis> {
         LimitValue::RealTimeShare(share) if share < SOUND_SHARE => Diagnosis::note(
             "RT budget",
             format!("{:.0} % of a core in the control group (`{file}`)", share * 100.0),
-            "the kernel suspends a loop that needs more processor time: raise it",
+            "the kernel suspends a loop that needs more processor time: raise the budget",
         ),
         LimitValue::RealTimeShare(share) => {
             Diagnosis::good("RT budget", format!("{:.0} % of a core in the control group", share * 100.0))
@@ -133,7 +133,7 @@ fn killed_together() -> Diagnosis {
             format!("in the control group `{group}` of the run: a kill of the group leaves the force on"),
             SHARED_GROUP_REMEDY,
         ),
-        Err(error) => Diagnosis::bad("watchdog process", error.to_string(), "run the `flotor` of one build"),
+        Err(error) => Diagnosis::bad("watchdog process", error.to_string(), "use the programs of one build"),
     }
 }
 

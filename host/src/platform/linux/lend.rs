@@ -41,10 +41,10 @@ pub(crate) struct LendArguments {
     /// The interface that the program calls (default: the program finds the three libraries)
     #[arg(long, value_name = "dhd|openhaptics|chai3d|haply|ml-api")]
     api: Option<String>,
-    /// Haply, ml-api: where the service listens (default: where programs look for it, port 10001 or 5678)
+    /// Haply, ml-api: where the service listens (default: the address that programs expect, port 10001 or 5678)
     #[arg(long, value_name = "HOST:PORT")]
     listen: Option<String>,
-    /// What advances the time of the run
+    /// Source of the time of the run
     #[arg(long, value_enum, default_value_t = PaceOption::Real)]
     pace: PaceOption,
     /// Seed of all random numbers
@@ -67,7 +67,7 @@ pub(crate) struct LendArguments {
     program: Vec<OsString>,
 }
 
-/// What advances the time of the run.
+/// Source of the time of the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum PaceOption {
     /// The machine's clock: the program runs at its own rate
@@ -105,7 +105,8 @@ impl Api {
         let service = || Service::ALL.into_iter().find(|api| api.word() == word).map(Interface::Service);
         library.or_else(service).ok_or_else(|| {
             CommandError::Usage(format!(
-                "no interface `--api {word}`; give one of the libraries {}, or of the services {}. Without `--api` the program finds \
+                "unknown interface `--api {word}`; use one of the libraries {} or of the services {}. Without \
+                 `--api` the program finds \
                  all libraries",
                 Self::ALL.map(Self::word).join(", "),
                 Service::ALL.map(Service::word).join(" and ")
@@ -249,7 +250,7 @@ pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
 fn lend(arguments: &LendArguments) -> Result<i32, Early> {
     let stop = StopRequest::by_signals()?;
     let [name, rest @ ..] = arguments.program.as_slice() else {
-        let usage = "which program? `flotor lend [SCENE] -- PROGRAM ARGUMENTS`".to_owned();
+        let usage = "the program is missing; write `flotor lend [SCENE] -- PROGRAM ARGUMENTS`".to_owned();
         return Err(CommandError::Usage(usage).into());
     };
     let api = arguments.api.as_deref().map(Api::of_word).transpose()?;
@@ -277,8 +278,9 @@ fn lend(arguments: &LendArguments) -> Result<i32, Early> {
             |api| format!("nothing of `--api {}`", api.word()),
         );
         note(format_args!(
-            "`{}` opened no device: it called {which}, has its maker's library linked in (link it anew with the library of \
-             `flotor lend`), or lost `LD_LIBRARY_PATH` (a script that sets it keeps the old value behind its own; `env -i` removes it)",
+            "`{}` opened no device: it called {which}, was linked statically with its maker's library (link it with \
+             the library of `flotor lend`), or lost `LD_LIBRARY_PATH` (a script that sets the variable has to \
+             append the old value; `env -i` removes the variable)",
             program.path.display()
         ));
     }
@@ -374,7 +376,7 @@ fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
     let Some(file) = &arguments.scene else { return Ok(()) };
     if file.is_dir() || !file.exists() {
         return Err(CommandError::Usage(format!(
-            "`{}` is no scene: there is no such file; the program stands after `--`",
+            "`{}` is not a scene: the file does not exist; write the program after `--`",
             file.display()
         )));
     }

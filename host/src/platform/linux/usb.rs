@@ -132,7 +132,7 @@ impl Seen {
     fn remedy_by_rule(&self) -> String {
         format!(
             "as root, put the line `{}` into /etc/udev/rules.d/70-flotor.rules; then `udevadm control --reload`, and \
-             connect the device anew",
+             reconnect the device",
             self.rule()
         )
     }
@@ -146,14 +146,14 @@ impl Seen {
             diagnoses.push(Diagnosis::note(
                 "hub",
                 format!("behind a hub ({})", self.place),
-                "connect it to a port of the computer: a hub delays the exchange, and resets what is behind it",
+                "connect the device to a port of the computer: a hub delays the messages, and may reset its devices",
             ));
         }
         diagnoses.extend(self.driver(is_open));
         diagnoses.extend(self.permission(machine, is_open));
         if self.access == UsbAccess::Serial && machine.runs("ModemManager") {
             diagnoses.push(match machine.keeps_modem_manager_away(self.vendor) {
-                true => Diagnosis::good("ModemManager", "leaves its port alone"),
+                true => Diagnosis::good("ModemManager", "does not open its port"),
                 false => Diagnosis::bad(
                     "ModemManager",
                     "writes to its port whenever it is connected, to find a modem",
@@ -176,13 +176,13 @@ impl Seen {
                 "usbfs" if is_open => None,
                 "usbfs" => Some(Diagnosis::bad(
                     "driver",
-                    "another program has it open",
-                    "end that program; one at a time has it",
+                    "another program has the device open",
+                    "end that program; only one program at a time can open the device",
                 )),
                 _ => Some(hindrance(
                     is_open,
                     "driver",
-                    format!("the kernel's driver `{driver}` has it"),
+                    format!("the kernel's driver `{driver}` uses the device"),
                     format!("as root: `echo {interface} > /sys/bus/usb/drivers/{driver}/unbind`"),
                 )),
             }
@@ -198,8 +198,8 @@ impl Seen {
             };
             return Some(Diagnosis::bad(
                 "driver",
-                format!("the kernel gives it no {what}"),
-                format!("as root: `modprobe {module}`, and connect the device anew"),
+                format!("the kernel has no {what} for the device"),
+                format!("as root: `modprobe {module}`, and reconnect the device"),
             ));
         };
         let shown = Path::new("/").join(node.strip_prefix(&machine.root).unwrap_or(&node));
@@ -234,13 +234,15 @@ pub(crate) fn connection(machine: &Machine, kinds: &[UsbKind], is_open: bool) ->
         let wanted: Vec<String> = kinds.iter().map(wanted).collect();
         let found = format!("no device {}", wanted.join(" or "));
         return vec![match is_open {
-            true => {
-                Diagnosis::note("on USB", found, "it is open all the same: simulated, or connected otherwise")
-            }
+            true => Diagnosis::note(
+                "on USB",
+                found,
+                "the device is open nevertheless: it is simulated, or has another connection",
+            ),
             false => Diagnosis::bad(
                 "on USB",
                 found,
-                "connect it and switch it on; `lsusb` lists what the system sees",
+                "connect the device and switch it on; `lsusb` lists the devices that the system detects",
             ),
         }];
     }
@@ -340,7 +342,10 @@ mod tests {
         let told = fixture.told(|_| true);
         let (what, grade, words) = one(&told);
         assert_eq!((what, grade), ("hub", Grade::Note));
-        assert!(words.starts_with("behind a hub (1-4.2) -> connect it to a port of the computer"), "{words}");
+        assert!(
+            words.starts_with("behind a hub (1-4.2) -> connect the device to a port of the computer"),
+            "{words}"
+        );
     }
 
     #[test]
@@ -348,9 +353,12 @@ mod tests {
         for (driver, expected) in [
             (
                 "ftdi_sio",
-                "the kernel's driver `ftdi_sio` has it -> as root: `echo 1-4:1.0 > /sys/bus/usb/drivers/ftdi_sio/unbind`",
+                "the kernel's driver `ftdi_sio` uses the device -> as root: `echo 1-4:1.0 > /sys/bus/usb/drivers/ftdi_sio/unbind`",
             ),
-            ("usbfs", "another program has it open -> end that program; one at a time has it"),
+            (
+                "usbfs",
+                "another program has the device open -> end that program; only one program at a time can open the device",
+            ),
         ] {
             let fixture = Fixture::new("1-4", ["1451", "0402"]);
             fixture.driven_by("1-4", driver);

@@ -121,7 +121,7 @@ fn prepare(arguments: &WorkerArguments, load: LoadFile) -> Result<Prepared, Refu
     };
     let plugin = load(&arguments.plugin).map_err(said_no)?;
     if plugin.metadata().kind != PluginKind::Model {
-        return Err(Refusal::unsupported("only a model can be a worker"));
+        return Err(Refusal::unsupported("a worker process runs models only"));
     }
     let schema = plugin.parameters();
     let parse = |set: &String| {

@@ -56,7 +56,8 @@ impl Worker {
     /// # Errors
     /// The plugin's [`Refusal`], or the reason why no worker could start.
     pub fn start(config: &WorkerConfig<'_>) -> Result<Self, Refusal> {
-        let no_worker = |error: io::Error| Refusal::resource(format!("no worker process: {error}"));
+        let no_worker =
+            |error: io::Error| Refusal::resource(format!("cannot start a worker process: {error}"));
         let file = create_file().map_err(no_worker)?;
         let memory = SharedMemory::map(&file).map_err(no_worker)?;
         let mut command = Command::new(program().map_err(no_worker)?);
@@ -107,7 +108,7 @@ impl Worker {
                         "`create` or `prepare` did not return within {create_timeout_s} s in its process"
                     )));
                 }
-                Err(Refusal::broken(format!("its process ended before the model was made ({end})")))
+                Err(Refusal::broken(format!("its process ended before the model was created ({end})")))
             }
         }
     }
@@ -295,7 +296,7 @@ fn spawn(command: Command) -> io::Result<Child> {
         };
         let _ = starter.send((command, reply)); // the thread ends after this sender
     }
-    child.recv().map_err(|_| io::Error::other("the thread that starts processes is gone"))?
+    child.recv().map_err(|_| io::Error::other("the thread that starts worker processes has ended"))?
 }
 
 /// Starts the thread that starts worker processes.
@@ -331,6 +332,6 @@ pub(crate) fn program() -> io::Result<PathBuf> {
     }
     let folders = own.ancestors().skip(1).take(2).map(|folder| folder.join(&name));
     folders.into_iter().find(|file| file.is_file()).ok_or_else(|| {
-        io::Error::other(format!("`{name}` is neither this program nor beside `{}`", own.display()))
+        io::Error::other(format!("`{name}` is neither this program nor in the folder of `{}`", own.display()))
     })
 }

@@ -264,7 +264,7 @@ fn signal_words(signal: c_int) -> &'static str {
         libc::SIGALRM => "SIGALRM: a timer",
         libc::SIGVTALRM => "SIGVTALRM: a timer",
         libc::SIGPROF => "SIGPROF: a timer",
-        _ => name_of(signal).unwrap_or("a signal nobody takes"),
+        _ => name_of(signal).unwrap_or("an unhandled signal"),
     }
 }
 

@@ -140,7 +140,7 @@ impl std::fmt::Display for SignalName {
             EXCEPTION_INT_DIVIDE_BY_ZERO | EXCEPTION_FLT_DIVIDE_BY_ZERO => "arithmetic error",
             EXCEPTION_ILLEGAL_INSTRUCTION | EXCEPTION_PRIV_INSTRUCTION => "illegal instruction",
             EXCEPTION_BREAKPOINT => "breakpoint",
-            _ => "one that nobody handles",
+            _ => "an unhandled exception",
         };
         f.write_str("exception ")?;
         write!(f, "{:#010x} ({words})", code.cast_unsigned())

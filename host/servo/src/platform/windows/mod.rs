@@ -10,5 +10,5 @@ pub(crate) mod watchdog_process;
 
 /// Returns the error for a part that is not on this system yet.
 fn not_yet(what: &str) -> std::io::Error {
-    std::io::Error::new(std::io::ErrorKind::Unsupported, format!("{what} is not on Windows yet"))
+    std::io::Error::new(std::io::ErrorKind::Unsupported, format!("{what} is not supported on Windows yet"))
 }

@@ -17,11 +17,11 @@ pub(crate) const MAX_CORES: usize = usize::BITS as usize;
 pub const PRIORITY_NAME: &str = "time-critical priority";
 /// Returns advice for users to allow the priority of a loop.
 pub(crate) fn priority_advice() -> String {
-    "Windows refuses it to programs in the background mode of their priority only".to_owned()
+    "Windows refuses this priority only to programs in background mode".to_owned()
 }
 
 /// Advice for users to allow locked memory.
-pub(crate) const MEMORY_ADVICE: &str = "Windows locks the memory of no whole program";
+pub(crate) const MEMORY_ADVICE: &str = "Windows cannot lock the whole memory of a program";
 /// Advice for users to find the cores that a process may use.
 pub(crate) const CORE_ADVICE: &str = "the Task Manager lists them under \"Set affinity\"";
 

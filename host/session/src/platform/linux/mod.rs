@@ -54,13 +54,14 @@ pub(crate) fn distrust(folder: &Path, attributes: &Metadata) -> Option<String> {
     let folder = folder.display();
     if attributes.permissions().mode() & 0o002 != 0 {
         return Some(format!(
-            "anybody may write into it, and loading a plugin runs its code; `chmod o-w {folder}`"
+            "every user may write into the folder, and loading a plugin runs its code; `chmod o-w {folder}`"
         ));
     }
     let owner = attributes.uid();
     let owns_program =
         || std::env::current_exe().and_then(std::fs::metadata).is_ok_and(|own| own.uid() == owner);
     (owner != 0 && owner != geteuid().as_raw() && !owns_program()).then(|| {
-        format!("user {owner} owns it, and loading a plugin runs its code; `chown` it, or copy its plugins to a folder of yours")
+        format!("user {owner} owns the folder, and loading a plugin runs its code; `chown` the folder, or copy its \
+        plugins to a folder of yours")
     })
 }

@@ -84,9 +84,9 @@ pub enum ControlError {
 
 fn live_words(live: &[String]) -> String {
     if live.is_empty() {
-        "none of its parameters can".to_owned()
+        "no parameter of this plugin can change then".to_owned()
     } else {
-        format!("parameters that can: {}", live.join(", "))
+        format!("parameters that can change then: {}", live.join(", "))
     }
 }
 

@@ -73,7 +73,7 @@ impl ProgramEnd {
     /// Prints a note on each process that goes on.
     pub(super) fn tell(&self) {
         for process in &self.left_running {
-            note(format_args!("{process} has left the process group of the program, and goes on"));
+            note(format_args!("{process} has left the process group of the program, and still runs"));
         }
     }
 }

@@ -48,9 +48,11 @@ impl Program {
         let Some(path) = found else {
             let here = given.is_file();
             let help = match (here, given.components().count()) {
-                (true, 1) => "; a program of this folder is written `./NAME`",
-                (true, _) => "; it may not be executed: `chmod +x` it, or name the interpreter before it",
-                (false, _) => "; give it after `--`, as a path or as a name that a folder of PATH contains",
+                (true, 1) => "; for a program in this folder write `./NAME`",
+                (true, _) => {
+                    "; the file is not executable: `chmod +x` the file, or write its interpreter before it"
+                }
+                (false, _) => "; write the program after `--`, as a path or as a name in a folder of PATH",
             };
             return Err(CommandError::Usage(format!("there is no program `{}`{help}", given.display())));
         };
@@ -69,13 +71,14 @@ impl Program {
         let name = self.path.display();
         if native.bits == Bits::ThirtyTwo {
             return Err(CommandError::Usage(format!(
-                "`{name}` is a 32-bit program, and the drop-in libraries have 64 bits: build it for 64 bits, or use a service \
-                 (`--api haply`, `--api ml-api`), which any program reaches"
+                "`{name}` is a 32-bit program, and the drop-in libraries have 64 bits: build the program for 64 \
+                 bits, or use a service (`--api haply`, `--api ml-api`), which accepts every program"
             )));
         }
         if !native.is_dynamic {
             return Err(CommandError::Usage(format!(
-                "`{name}` is statically linked: no library can be put in its way; link it with the shared library (`flotor lend` \
+                "`{name}` is statically linked, so no drop-in library can replace its functions; link the program \
+                 with the shared library (`flotor lend` \
                  brings libdhd, libdrd, libHD and libhdPhantom)"
             )));
         }
@@ -84,7 +87,7 @@ impl Program {
         let others = [Api::Chai3d].into_iter().chain(Api::ALL);
         match others.into_iter().find(|other| native.calls(*other)) {
             Some(other) => Err(CommandError::Usage(format!(
-                "`{name}` calls {}, not `--api {}`: say `--api {}`, or leave it out",
+                "`{name}` calls {}, not `--api {}`: write `--api {}`, or omit the option",
                 other.marks().join(" and "),
                 api.word(),
                 other.word()

@@ -89,7 +89,7 @@ impl Service {
     fn run(self, arguments: &LendArguments, folder: &Folder, own: &Path) -> Result<Command, CommandError> {
         if arguments.pace == PaceOption::Lockstep {
             return Err(CommandError::Usage(
-                "`--pace lockstep` is not for `--api ml-api`; `flotor emulate maglev --protocol ml-api --pace lockstep` has it"
+                "`--pace lockstep` does not work with `--api ml-api`; use `flotor emulate maglev --protocol ml-api --pace lockstep`"
                     .to_owned(),
             ));
         }
@@ -161,7 +161,7 @@ impl<'a> Served<'a> {
         };
         let thread = std::thread::Builder::new().name("flotor-service".to_owned()).spawn(read);
         thread.map_err(|cause| {
-            CommandError::Failed(format!("no thread for the output of the service: {cause}"))
+            CommandError::Failed(format!("cannot start a thread for the output of the service: {cause}"))
         })?;
         let address = stop.poll(|stage| match served.output.try_recv() {
             Ok(address) => Some(Ok(address)),

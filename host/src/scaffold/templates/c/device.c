@@ -31,7 +31,7 @@ typedef struct {
 
 static const FlotorParameter parameters[] = {
     {.id = FLOTOR_STR("amplitude_mm"), .unit = FLOTOR_STR("mm"),
-     .doc = FLOTOR_STR("Half the way from lowest to highest point"), .kind = FlotorParameterKind_Real, .min = 0.0,
+     .doc = FLOTOR_STR("Half the distance from lowest to highest"), .kind = FlotorParameterKind_Real, .min = 0.0,
      .max = 10.0, .default_ = 5.0},
 };
 

@@ -34,7 +34,7 @@ static const FlotorParameter parameters[] = {
                 .kind = FlotorParameterKind_Real, .mutability = FlotorMutability_Live, .min = -10.0, .max = 10.0,
                 .default_ = 0.0},
     [THICKNESS] = {.id = FLOTOR_STR("thickness_mm"), .unit = FLOTOR_STR("mm"),
-                   .doc = FLOTOR_STR("Depth of the largest force"), .kind = FlotorParameterKind_Real,
+                   .doc = FLOTOR_STR("Depth at the largest force"), .kind = FlotorParameterKind_Real,
                    .mutability = FlotorMutability_Live, .min = 1.0, .max = 100.0, .default_ = 50.0},
 };
 

@@ -24,7 +24,7 @@ impl ForceModel for YourName {
     const PARAMETERS: &'static [Parameter] = &[
         Parameter::real("stiffness_n_per_m", "N/m", 0.0, 5000.0, 500.0, "Stiffness of the floor").live(),
         Parameter::real("height_mm", "mm", -10.0, 10.0, 0.0, "Height of the floor").live(),
-        Parameter::real("thickness_mm", "mm", 1.0, 100.0, 50.0, "Depth of the largest force").live(),
+        Parameter::real("thickness_mm", "mm", 1.0, 100.0, 50.0, "Depth at the largest force").live(),
     ];
 
     // Before the loop: the place to allocate, to read files, and to refuse with a reason.

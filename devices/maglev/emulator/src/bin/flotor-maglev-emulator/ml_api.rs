@@ -33,7 +33,7 @@ pub(crate) struct MlApiArguments {
     /// Longest time of a tick of the host that serves a device, in ms (default: that of every run)
     #[arg(long, requires = "device", value_name = "MS", value_parser = watchdog_ms)]
     pub(crate) host_watchdog_ms: Option<f64>,
-    /// Run although a kill of this program's control group ends the watchdog process with it, which alone stops a device then
+    /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device
     #[arg(long, requires = "device")]
     pub(crate) accept_shared_control_group: bool,
     /// Hand on the flotor at the start

@@ -54,11 +54,11 @@ pub fn serve(host: i32) -> io::Result<()> {
             }
             (Some(Packet::Begin), _) => break,
             // The host has ended before anything was energised, or is none.
-            _ => return Err(io::Error::other("nobody passes any devices")),
+            _ => return Err(io::Error::other("the host passed no devices")),
         }
     }
     let Some(process) = host_number.and_then(|host| pidfd_open(host, PidfdFlags::empty()).ok()) else {
-        return Err(io::Error::other("there is no process of the host's number"));
+        return Err(io::Error::other("no process has the number of the host"));
     };
     if getppid() != host_number {
         return Ok(()); // ended, and its id is in use again
@@ -75,14 +75,14 @@ pub fn serve(host: i32) -> io::Result<()> {
             // The host may go on, or be killed later: this process stays.
             Event::HostSilent => {
                 stop(&devices);
-                report("the host does not run", &devices);
+                report("the host is suspended or hangs", &devices);
             }
             event => break event,
         }
     };
     if event == Event::HostGone {
         stop(&devices);
-        report("the host is gone", &devices);
+        report("the host has ended", &devices);
     }
     Ok(())
 }
