@@ -30,7 +30,7 @@ pub enum Rule {
     NoThreads,
     /// The force of a model without a history is minus the gradient of its energy: units and frame agree.
     EnergyGradient,
-    /// A device's declared limits, ranges and rates are numbers a host can enforce.
+    /// A device's declared limits, ranges and rates are numbers that a host can enforce.
     Capabilities,
     /// Activate, read, write, deactivate and activate again all work.
     Lifecycle,
@@ -103,8 +103,8 @@ impl Rule {
             Rule::Metadata => "the metadata section names kind, id, version, contract and entry",
             Rule::Loads => "the library links, and its structs equal the host's",
             Rule::Schema => "every parameter has an id of its own, a doc and a default inside its range",
-            Rule::Defaults => "an instance can be created from defaults alone",
-            Rule::FiniteNearHome => "at home and near it the wrench is finite",
+            Rule::Defaults => "an instance can be created with all parameters at their defaults",
+            Rule::FiniteNearHome => "at home and near home the wrench is finite",
             Rule::SurvivesNotFinite => "NaN and infinity in the pose give a status, not NaN, and no panic",
             Rule::SurvivesFarPoses => "poses far outside any workspace give finite numbers and no panic",
             Rule::ResetRepeats => "after reset the same poses give the same bits",
@@ -114,19 +114,21 @@ impl Rule {
             Rule::EnergyGradient => {
                 "the force of a model without a history is minus the gradient of its energy"
             }
-            Rule::Capabilities => "declared limits, ranges and rates are numbers a host can enforce",
+            Rule::Capabilities => "declared limits, ranges and rates are numbers that a host can enforce",
             Rule::Lifecycle => "activate, read, write, deactivate and activate again all work",
             Rule::SafeStop => {
-                "after safe_stop from another thread the device gives no wrench and still answers"
+                "after safe_stop from another thread the device exerts no wrench and still returns samples"
             }
             Rule::DeviceTime => {
                 "reads and writes take less than half a period, a stop 100 ms, the rest of the life cycle 2 s"
             }
-            Rule::Extensions => "every extension that is offered answers, and the instance works afterwards",
+            Rule::Extensions => {
+                "every offered extension returns valid data, and the instance works afterwards"
+            }
             Rule::HostUntouched => {
                 "no call changes the host's signals, floating-point mode, environment, folder, limits or files"
             }
-            Rule::InsideMemory => "no call reads or writes memory that is not its own or was not given to it",
+            Rule::InsideMemory => "no call reads or writes memory other than its own and its arguments",
         }
     }
 

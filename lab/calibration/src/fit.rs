@@ -70,18 +70,20 @@ pub fn fit(readings: &[Reading]) -> Result<Fit, CalibrationError> {
         needed,
     };
     if forces.len() < 2 {
-        return Err(too_few("two different forces tell the weight from the field"));
+        return Err(too_few(
+            "at least two different forces are needed, to separate the weight from the field",
+        ));
     }
     if stops.len() < MAX_DEGREE + 2 {
-        return Err(too_few("more heights than coefficients are needed"));
+        return Err(too_few("measure at more heights than the polynomial has coefficients"));
     }
     let scale = Scale::of(readings);
     let candidates: Option<Vec<Candidate>> =
         (0..=MAX_DEGREE).map(|degree| cross_validate(readings, &stops, &scale, degree)).collect();
-    let candidates = candidates.ok_or_else(|| too_few("the heights must differ"))?;
+    let candidates = candidates.ok_or_else(|| too_few("measure at different heights"))?;
     let degree = choose(&candidates);
     let solution =
-        solution(readings.iter(), &scale, degree).ok_or_else(|| too_few("the heights must differ"))?;
+        solution(readings.iter(), &scale, degree).ok_or_else(|| too_few("measure at different heights"))?;
 
     let shares: Vec<f64> = solution.x.iter().take(degree + 1).copied().collect();
     let calibration = VerticalCalibration::new(scale.range_m(), &scale.powers_of_height(&shares))?;

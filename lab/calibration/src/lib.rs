@@ -47,8 +47,8 @@ pub enum CalibrationError {
     Setting(#[from] SettingError),
     /// The handle lost contact with the sensor.
     #[error(
-        "the handle lost contact with the force sensor at {height_mm:.1} mm and was braked; check that the sensor is above it and \
-         held firmly"
+        "the handle lost contact with the force sensor at {height_mm:.1} mm and was braked; check that the sensor \
+         is above the handle and firmly mounted"
     )]
     LostContact {
         /// Height of the handle, mm.
@@ -56,7 +56,8 @@ pub enum CalibrationError {
     },
     /// The force of a locked axis alternated between its limits, and the envelope removed it.
     #[error(
-        "the force of a locked axis alternated between its limits, so it was taken away; check that the handle moves freely and that \
+        "the force of a locked axis alternated between its limits, so the host removed the force; check that the \
+         handle moves freely and that \
          the device is the one of the calibration"
     )]
     Oscillated,

@@ -50,7 +50,7 @@ fn shares(readings: &[Reading], fit: &Fit, thesis: &VerticalCalibration) -> Pane
             (height_m * MM_PER_M, calibration.share(height_m) * 100.0)
         })
     };
-    let mut panel = Panel::new(Axis::of("Share that arrives", Quantity::Percent));
+    let mut panel = Panel::new(Axis::of("Delivered share", Quantity::Percent));
     for (shift_mm, (force_n, readings)) in side_by_side(by_force(readings)) {
         let share = readings.iter().map(|(_, reading)| {
             (

@@ -49,15 +49,15 @@ pub(crate) fn bless(
             let middle = f64::midpoint(least, most);
             if most - middle > within {
                 note(format!(
-                    "{place}: {}: its cases give {least} to {most}, further apart than within = {within}; \
-                    write min and max",
+                    "{place}: {}: the values of its cases are {least} to {most}, a wider range than within = \
+                     {within}; write min and max",
                     expected.path
                 ));
                 continue;
             }
             let Some(number) = number_of_value(&text, expected) else {
                 note(format!(
-                    "{place}: {}: write it as one line, {{ value = …, within = … }}",
+                    "{place}: {}: write the bound in one line, {{ value = …, within = … }}",
                     expected.path
                 ));
                 continue;
@@ -75,7 +75,8 @@ pub(crate) fn bless(
             outcome.settle();
             for failure in &outcome.failures {
                 note(format!(
-                    "{}: {}: not blessed, which changes the value of {{ value, within }} alone; edit the file, or correct the model",
+                    "{}: {}: not blessed, because --bless changes only the value of {{ value, within }}; edit the \
+                     file, or correct the model",
                     outcome.case,
                     failure.line()
                 ));

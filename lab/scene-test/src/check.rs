@@ -172,7 +172,7 @@ pub(crate) fn check(
             }
             (outcome.failures, plotted) = (judged.failures, Some(arguments));
         }
-        (_, Err(why)) => outcome.failures.push(Failure::new("the scene", "one that runs", why)),
+        (_, Err(why)) => outcome.failures.push(Failure::new("the scene", "a scene that runs", why)),
         (Check::Curve, Ok(models)) => {
             let picture = plots.map(|folder| picture(folder, case));
             curve(flotor, case.file, models, picture.as_deref(), &mut outcome);
@@ -304,7 +304,7 @@ fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], picture: Option<&Pa
     };
     match curve.points.worst(&answers, tolerance) {
         Ok(None) => {}
-        Err(error) => outcome.failures.push(Failure::new("curve", "an answer for each pose", error)),
+        Err(error) => outcome.failures.push(Failure::new("curve", "a result for each pose", error)),
         Ok(Some(worst)) => {
             let pose: Vec<String> = worst.pose.iter().map(ToString::to_string).collect();
             let place = POSE.iter().zip(worst.pose).filter(|(_, number)| *number != 0.0);

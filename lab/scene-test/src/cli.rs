@@ -32,7 +32,7 @@ enum Command {
 
 /// Run scenes with expectations: pass or fail, for CI.
 #[derive(Args)]
-#[command(after_help = "A file NAME.test.toml has a scene and what is expected of it:\n\n  \
+#[command(after_help = "A file NAME.test.toml contains a scene and the expected results:\n\n  \
     scene = \"scene.toml\"\n  seeds = [1, 2]\n  validate = true\n  stress = \"short\"\n\n  \
     [set]                                   # every combination is a case\n  \
     jelly.stiffness_n_per_m = [400, 800]\n\n  \
@@ -43,10 +43,10 @@ enum Command {
     flotor test models --shard 2/4 --json -\n  flotor test jelly.test.toml --bless\n\n\
     Exit codes: 0 all passed, 1 a case failed, 2 usage or configuration: nothing was judged.")]
 struct TestArguments {
-    /// Files NAME.test.toml, or folders with some (default: this folder); folders named `target` are left out
+    /// Files NAME.test.toml, or folders with such files (default: this folder); folders named `target` are skipped
     #[arg(value_name = "FOLDER|FILE")]
     paths: Vec<PathBuf>,
-    /// Only the case of this name, or those whose name contains this
+    /// Run only the case of this name, or the cases whose name contains this text
     #[arg(long, value_name = "TEXT")]
     filter: Option<String>,
     /// List the cases, and run none
@@ -55,7 +55,7 @@ struct TestArguments {
     /// Cases that run at the same time (default: the number of processors)
     #[arg(long, value_parser = count(1..=1024_usize), value_name = "N")]
     jobs: Option<usize>,
-    /// Only part K of N: the parts are disjoint, and together they are the whole
+    /// Run only part K of N disjoint parts of the cases
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
     /// Longest time of one run, evaluation, validation or stress test
@@ -110,7 +110,7 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
     };
     let cases: Vec<Case<'_>> = all.into_iter().filter(is_chosen).collect();
     if cases.is_empty() && arguments.shard.is_none() {
-        return Err(CommandError::Usage("no case to run; `flotor test --list` names them".to_owned()));
+        return Err(CommandError::Usage("no case matches; `flotor test --list` lists all cases".to_owned()));
     }
     if arguments.list {
         return cases.iter().try_for_each(|case| report_line(format_args!("{}", case.name())));
@@ -126,7 +126,7 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
     let plots = arguments.plots.as_deref();
     let mut outcomes = in_parallel(jobs, &cases, |case| {
         let models = known.iter().find(|(file, _)| std::ptr::eq(*file, case.file)).map(|(_, models)| models);
-        check(&flotor, case, models.unwrap_or(&Err("it was not tried".to_owned())), plots)
+        check(&flotor, case, models.unwrap_or(&Err("the scene was not tried".to_owned())), plots)
     });
     if arguments.bless {
         let blessed = if arguments.digest { Blessed::NumbersAndDigests } else { Blessed::Numbers };
@@ -275,7 +275,10 @@ fn models_of(
         if let Some(value) =
             crate::numbers::at(&json, &expected.path).filter(|value| !expected.bound.fits(value))
         {
-            let told = format!("`{}` is {value} in a run; nothing like it is expected", expected.path);
+            let told = format!(
+                "`{}` is {value} in a run, which this bound cannot match; correct the bound",
+                expected.path
+            );
             return wrong(file.place(expected.at), told);
         }
     }

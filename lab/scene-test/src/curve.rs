@@ -32,8 +32,11 @@ impl Points {
         let columns = table.columns();
         let is_known = |name: &String| POSE.contains(&name.as_str()) || WRENCH.contains(&name.as_str());
         if let Some(unknown) = columns.iter().find(|name| !is_known(name)) {
-            let problem =
-                format!("unknown column `{unknown}`; they are {}, {}", POSE.join(", "), WRENCH.join(", "));
+            let problem = format!(
+                "unknown column `{unknown}`; the columns are {}, {}",
+                POSE.join(", "),
+                WRENCH.join(", ")
+            );
             return Err(table.header_problem(problem));
         }
         let of_pose = POSE.map(|name| table.column(name));
@@ -55,7 +58,7 @@ impl Points {
             rows.push((pose, wrench));
         }
         if rows.is_empty() {
-            Err(table.header_problem("no point follows"))
+            Err(table.header_problem("the table has no row; write at least one"))
         } else {
             Ok(Self { compared, rows })
         }
@@ -77,7 +80,7 @@ impl Points {
         let head: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
         let place = |name: &str| head.iter().position(|known| *known == name);
         let answer = |_: &([f64; 6], [f64; 6])| {
-            let cells: Vec<&str> = lines.next().ok_or("eval gave too few answers")?.split(',').collect();
+            let cells: Vec<&str> = lines.next().ok_or("`eval` returned too few rows")?.split(',').collect();
             let cell = |name: &str| place(name).and_then(|place| cells.get(place).copied());
             let number = |name: &str| cell(name).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN);
             Ok(Answer { wrench: WRENCH.map(number), status: cell("status").unwrap_or_default().to_owned() })

@@ -197,14 +197,17 @@ impl TestFile {
         let folder = path.parent().unwrap_or(Path::new(""));
         let existing = |file: &Spanned<PathBuf>| {
             let found = folder.join(file.get_ref());
-            let missing = || (file.span().start, format!("there is no file {}", found.display()));
+            let missing = || (file.span().start, format!("the file {} does not exist", found.display()));
             if found.is_file() { Ok(found.clone()) } else { Err(missing()) }
         };
         let scene = existing(&written.scene)?;
         let seeds = match &written.seeds {
             None => vec![1],
             Some(none) if none.get_ref().is_empty() => {
-                return Err((none.span().start, "no seed, no case; write at least one".to_owned()));
+                return Err((
+                    none.span().start,
+                    "without a seed there is no case; write at least one seed".to_owned(),
+                ));
             }
             Some(seeds) => seeds.get_ref().clone(),
         };
@@ -283,7 +286,11 @@ impl TestFile {
         let Self { expect, reference, curve, golden, validate, stress, digests, .. } = &self;
         let checks_a_plugin = curve.is_some() || golden.is_some() || validate.is_some() || stress.is_some();
         let nothing = expect.is_empty() && reference.is_none() && digests.is_empty() && !checks_a_plugin;
-        if nothing { Err((0, "nothing is expected; write at least [expect]".to_owned())) } else { Ok(self) }
+        if nothing {
+            Err((0, "the file has no expectation; write at least [expect]".to_owned()))
+        } else {
+            Ok(self)
+        }
     }
 
     /// Formats a position in the text as `FILE:LINE`.
@@ -327,7 +334,7 @@ fn scalar(value: &Value) -> Result<String, String> {
     match value {
         Value::String(text) => Ok(text.clone()),
         Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => Ok(value.to_string()),
-        other => Err(format!("write a number or a word, not a {}", other.type_str())),
+        other => Err(format!("write a number or a text, not a {}", other.type_str())),
     }
 }
 
@@ -357,7 +364,9 @@ fn settings_with_values(
                 one => vec![scalar(one)?],
             };
             if values.is_empty() {
-                return Err(format!("no value for `{key}`, no case; write at least one"));
+                return Err(format!(
+                    "without a value for `{key}` there is no case; write at least one value"
+                ));
             }
             found.push((key.to_owned(), values));
             Ok(())
@@ -402,7 +411,7 @@ fn stress_of(written: WrittenStress) -> Result<Stress, String> {
         None => (all(), MeasureDemand::NotFailed),
     };
     if let Some(unknown) = measures.iter().find(|measure| !MEASURES.contains(&measure.as_str())) {
-        return Err(format!("unknown measure `{unknown}`; they are {}", MEASURES.join(", ")));
+        return Err(format!("unknown measure `{unknown}`; the measures are {}", MEASURES.join(", ")));
     }
     Ok(Stress { size, measures, demand, set: settings(&set)? })
 }
@@ -428,15 +437,15 @@ mod tests {
         for (rest, says) in [
             ("seedz = [1]", "F:2: unknown key `seedz`; did you mean `seeds`?"),
             ("\n[curve]\nfle = \"a\"\nwithin_n = 1", "did you mean `file`?"),
-            ("seeds = []", "F:2: no seed"),
+            ("seeds = []", "F:2: without a seed"),
             ("seeds = [1, 9007199254740993]", "F:2: the seed 9007199254740993 is larger than"),
             ("duration = \"5 parsec\"", "F:2: unknown unit of time `parsec`"),
             ("[set]\nspring = 3", "F:3: `spring` is not PLUGIN.PARAMETER"),
             ("[expect]\nlate_ticks = 0\npeak_force_n = { min = 2, max = 1 }", "F:4: `peak_force_n`: min = 2"),
             ("stress = \"shrt\"\n", "F:2: unknown size `shrt`"),
             ("[stress]\nsize = \"short\"\npass = [\"M11\"]", "unknown measure `M11`"),
-            ("[golden]\nrecording = \"no.mcap\"\nwithin_n = 1", "F:3: there is no file"),
-            ("", "nothing is expected"),
+            ("[golden]\nrecording = \"no.mcap\"\nwithin_n = 1", "F:3: the file"),
+            ("", "the file has no expectation"),
             ("validate = 3", "F:2: write true, or the path"),
             ("[expect]\nend = \"finished\"", "nothing"),
         ] {

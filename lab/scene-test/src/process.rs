@@ -16,7 +16,7 @@ pub(crate) struct Flotor {
 
 /// Result of a process.
 pub(crate) struct ProcessResult {
-    /// Exit code; `None` if a signal ended it.
+    /// Exit code; `None` if a signal ended the process.
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
     /// Last line of standard error, or the process's end if it is empty.
@@ -52,7 +52,9 @@ impl Flotor {
         self.try_run(arguments, input).map_err(|cause| match cause {
             Trouble::Missing(error) => error.to_string(),
             Trouble::System(cause) => format!("cannot run flotor: {cause}"),
-            Trouble::Late => format!("it had not ended after {} s, and was killed", self.limit.as_secs_f64()),
+            Trouble::Late => {
+                format!("the process had not ended after {} s, and was killed", self.limit.as_secs_f64())
+            }
         })
     }
 
@@ -73,9 +75,10 @@ impl Flotor {
         let stdout = text(&mut stdout)?;
         let said = text(&mut stderr)?;
         let last = said.lines().rev().find(|line| line.starts_with("error: ")).or(said.lines().last());
-        let silent = || code.map_or("a signal ended it".to_owned(), |code| format!("exit code {code}"));
+        let silent =
+            || code.map_or("a signal ended the process".to_owned(), |code| format!("exit code {code}"));
         let error = last.map_or_else(silent, |line| line.trim_start_matches("error: ").to_owned());
-        let error = if code.is_none() { format!("it was killed by a signal: {error}") } else { error };
+        let error = if code.is_none() { format!("a signal killed the process: {error}") } else { error };
         Ok(ProcessResult { code, stdout, error })
     }
 

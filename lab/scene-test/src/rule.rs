@@ -23,7 +23,9 @@ impl<'a> RuleFinding<'a> {
             (None, Some(why)) if matches!(word("obstacle"), Some("system" | "subject")) => {
                 Self::NotJudged { rule, why }
             }
-            (None, Some(why)) => Self::Fails { rule, text, seen: format!("it could not be checked: {why}") },
+            (None, Some(why)) => {
+                Self::Fails { rule, text, seen: format!("the rule could not be checked: {why}") }
+            }
             (None, None) => Self::Holds,
         }
     }
@@ -46,7 +48,7 @@ mod tests {
             let RuleFinding::Fails { rule, seen, .. } = RuleFinding::of(&failed) else {
                 panic!("{obstacle:?} passed")
             };
-            assert_eq!((rule, seen.as_str()), ("no-threads", "it could not be checked: why"));
+            assert_eq!((rule, seen.as_str()), ("no-threads", "the rule could not be checked: why"));
         }
         assert_eq!(
             RuleFinding::of(&json!({ "rule": "loads", "violation": null, "unchecked": null })),

@@ -302,7 +302,7 @@ fn a_test_of_a_model_that_hangs_leaves_nothing_when_it_ends() {
     let test = ["test", "hangs.test.toml", "--timeout", "1s"];
     let ran = hanging.flotor(&test).env("FLOTOR_STEP_LIMIT_S", "600").run();
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
-    assert!(ran.stdout.contains("it had not ended after 1 s, and was killed"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("the process had not ended after 1 s, and was killed"), "{}", ran.stdout);
     no_process_is_left_in(hanging.path(), "flotor test");
 }
 

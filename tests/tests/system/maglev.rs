@@ -253,7 +253,7 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     assert!(ran.error().contains("no force sensor at /dev/null: it is no serial port"), "{}", ran.error());
     for (set, words) in [
         ("timout_ms=50", "--sensor-set timout_ms: no parameter"),
-        ("port=/dev/null", "--sensor-set port: leave it out; `--sensor PORT` sets it"),
+        ("port=/dev/null", "--sensor-set port: omit this option; `--sensor PORT` sets the port"),
     ] {
         let ran = calibrate(&emulator, &sensor, &["vertical", "--sensor-set", set]);
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");

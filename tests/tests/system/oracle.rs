@@ -258,13 +258,16 @@ fn poses_are_not_overwritten() {
     let same = ["eval", "--model", "spring", "--poses", &file, "--out", &file];
     let ran = Flotor::with(same).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
-    assert!(ran.error().contains("holds the poses; choose another file"), "{ran:#?}");
+    assert!(ran.error().contains("this is the file of the poses; choose another file"), "{ran:#?}");
 }
 
 #[test]
 fn bench_lists_the_details_of_the_model() {
     let ran = Flotor::with(["bench", "--case", "variant=energy", "--apart", "nosuch"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
-    assert!(ran.error().starts_with("--apart nosuch: no detail of the model; its details are ["), "{ran:#?}");
+    assert!(
+        ran.error().starts_with("--apart nosuch: the model has no such detail; its details are ["),
+        "{ran:#?}"
+    );
     assert!(ran.error().contains("rod_share"), "{ran:#?}");
 }

@@ -740,7 +740,11 @@ fn each_rule_of_a_loop_sees_the_model_that_breaks_it() {
     assert!(judged.contains("nothingtojudge"), "it gives no force and no energy: {judged}");
     let broken = [
         ("time-budget", "overruns", "above the limit of"),
-        ("independent", "shares", "two instances stepped alternately give other answers than one alone"),
+        (
+            "independent",
+            "shares",
+            "two instances stepped alternately return other results than one instance alone",
+        ),
         ("no-threads", "starts-threads", "more threads after 500 steps"),
         ("energy-gradient", "wrong-energy", "force and energy disagree in"),
     ];

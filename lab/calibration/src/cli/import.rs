@@ -11,7 +11,7 @@ use flotor_session::calibration_file::{
 };
 use std::path::PathBuf;
 
-/// Write a calibration file from the thesis's polynomial, or from any other.
+/// Write a calibration file from the polynomial of the thesis, or from given coefficients.
 #[derive(Args)]
 #[command(
     after_help = "The excess p(z) = c0 + c1 z + c2 z² ... in N (z in mm) was measured at a commanded force F; \

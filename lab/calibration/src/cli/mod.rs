@@ -54,7 +54,7 @@ enum CalibrateCommand {
     Vertical(vertical::VerticalArguments),
     /// Measure the error without and with a calibration file
     Verify(verify::VerifyArguments),
-    /// Write a calibration file from the thesis's polynomial, or from any other
+    /// Write a calibration file from the polynomial of the thesis, or from given coefficients
     Import(import::ImportArguments),
 }
 

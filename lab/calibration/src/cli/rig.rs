@@ -84,7 +84,7 @@ impl RigArguments {
         let device_settings = settings(&plugin, "--set", &self.sets)?;
         if self.sensor_sets.iter().any(|set| set.parameter().key == "port") {
             return Err(CommandError::Usage(
-                "--sensor-set port: leave it out; `--sensor PORT` sets it".to_owned(),
+                "--sensor-set port: omit this option; `--sensor PORT` sets the port".to_owned(),
             ));
         }
         let sensor_settings = settings(&sensor_plugin, "--sensor-set", &self.sensor_sets)?;

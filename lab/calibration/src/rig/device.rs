@@ -176,7 +176,7 @@ fn without_wall() -> Boundary {
 }
 
 fn lost() -> CalibrationError {
-    CalibrationError::Refused(Refusal::resource("device disconnected; plug it in and start again"))
+    CalibrationError::Refused(Refusal::resource("device disconnected; connect the device and start again"))
 }
 
 impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {

@@ -56,7 +56,7 @@ pub(crate) mod state {
     /// Reports that the state is unknown.
     pub(crate) fn of_the_system() -> Result<Vec<Part>, Outcome> {
         let looked_at =
-            "of this process only environment, folder and floating-point mode are looked at on Windows";
+            "on Windows only environment, folder and floating-point mode of the process are checked";
         Err(Outcome::UnsupportedSystem(looked_at.to_owned()))
     }
 
@@ -71,7 +71,7 @@ pub(crate) mod state {
     /// [`Outcome::UnsupportedSystem`] always.
     pub(crate) fn is_loaded_first(_: &str) -> Result<(), Outcome> {
         Err(Outcome::UnsupportedSystem(
-            "only Linux gives a process another allocator (LD_PRELOAD)".to_owned(),
+            "only Linux can replace the allocator of a process (LD_PRELOAD)".to_owned(),
         ))
     }
 }
@@ -92,6 +92,6 @@ pub(crate) mod locked {
 
     /// Reports that the check is not possible.
     pub(crate) fn system_calls(_: Model) -> Result<(), Outcome> {
-        Err(Outcome::UnsupportedSystem("only Linux can tell (seccomp)".to_owned()))
+        Err(Outcome::UnsupportedSystem("only Linux can detect system calls (seccomp)".to_owned()))
     }
 }

@@ -354,17 +354,24 @@ fn judge(rows: &[Row]) -> Measure {
         (1.., _) if uphill > 0 => {
             (Verdict::Fail, format!("{uphill} releases came to rest with more energy than they started with"))
         }
-        (1.., _) => (Verdict::Fail, "diverges although nowhere stiffer than the stability limit".to_owned()),
+        (1.., _) => (
+            Verdict::Fail,
+            "a release diverges although its stiffness stays below the stability limit".to_owned(),
+        ),
         (0, 0) if carried_off > 0 => {
             (Verdict::NothingToJudge, "no release has an equilibrium to settle at".to_owned())
         }
-        (0, 0) => (Verdict::NothingToJudge, "no release is below the stability limit all the way".to_owned()),
+        (0, 0) => (
+            Verdict::NothingToJudge,
+            "no release stays below the stability limit on its whole path".to_owned(),
+        ),
         _ if elsewhere > 0 => {
-            let text =
-                format!("{foretold} releases had to settle and settled, {elsewhere} of them away from home");
+            let text = format!(
+                "{foretold} releases below the stability limit, all settled, {elsewhere} of them away from home"
+            );
             (Verdict::Pass, text)
         }
-        _ => (Verdict::Pass, format!("{foretold} releases had to settle and settled")),
+        _ => (Verdict::Pass, format!("{foretold} releases below the stability limit, all settled")),
     };
     let pose = rows.iter().find(|row| is_surprise(row)).map(|row| row.start);
     let worst = Worst { value: surprises as f64, pose };

@@ -284,8 +284,8 @@ pub(super) fn measure_loops(setup: &Setup<'_>) -> Result<(Measure, Decades), Loa
 fn judge_loops(total: &LoopTally) -> Measure {
     let verdict = Verdict::of(total.worst.value, CONSERVATIVE, CONSERVATIVE);
     let known = match total.comparable - total.resolved {
-        0 => format!("{} laps, all known to the bound", total.laps),
-        unknown => format!("{unknown} of {} laps are not known to the bound", total.laps),
+        0 => format!("{} laps, all computed more accurately than the bound", total.laps),
+        unknown => format!("{unknown} of {} laps are less accurate than the bound", total.laps),
     };
     let comment = match verdict {
         Verdict::Fail => format!(
@@ -295,7 +295,7 @@ fn judge_loops(total: &LoopTally) -> Measure {
             total.most_j * 1.0e3
         ),
         _ if total.mismatch.value > SAME_ENERGY => format!(
-            "`energy_j` differs from the work on a lap by {:.1e} of what is stored; it starts at this pose",
+            "`energy_j` differs from the work on a lap by {:.1e} of the stored energy; the lap starts at this pose",
             total.mismatch.value
         ),
         _ => known.clone(),

@@ -187,4 +187,4 @@ impl Measure {
 }
 
 /// Reason of an empty sample after every call failed.
-pub(super) const NO_ANSWER: &str = "the model gave no answer to judge";
+pub(super) const NO_ANSWER: &str = "the model returned no result to judge";

@@ -233,6 +233,6 @@ fn in_own_process(mut command: Command) -> io::Result<Result<Delivery, String>> 
     told.read_to_end(&mut text)?;
     Ok(serde_json::from_slice(&text).map_err(|_| match ending_signal(end) {
         Some(signal) => format!("the process died by signal {signal}"),
-        None => format!("the process ended without an answer ({end})"),
+        None => format!("the process ended without a result ({end})"),
     }))
 }

@@ -323,11 +323,11 @@ fn judge(total: &Tally) -> Measure {
         .max_by(|(a, of_a, ..), (b, of_b, ..)| (a.value / of_a).total_cmp(&(b.value / of_b)))
         .unwrap_or(graded[0]);
     let mut verdict = graded.iter().map(|(.., verdict, _)| *verdict).max().unwrap_or(Verdict::Pass);
-    let mut comment = format!("{what}, in its bound, after {} tries", total.tries);
+    let mut comment = format!("{what}, relative to its bound, after {} tries", total.tries);
     let mut pose = worst.pose;
     if total.troubles > 0 {
         verdict = Verdict::Fail;
-        comment = format!("{} of {} tries got no answer", total.troubles, total.tries);
+        comment = format!("{} of {} tries returned no result", total.troubles, total.tries);
         pose = total.trouble_at;
     }
     let value = Worst { value: worst.value / bound, pose };
@@ -341,8 +341,9 @@ fn judge(total: &Tally) -> Measure {
         .count("laps known to the bound", total.laps_resolved)
         .with("largest wrench", total.size.value, "N");
     let possible = if total.laps_resolved > 0 { value.value } else { f64::INFINITY };
-    Measure { verdict, pose: pose.map(PoseRecord::from), ..measure }
-        .unless_uncertain(possible, || "no lap of the search is known to the bound".to_owned())
+    Measure { verdict, pose: pose.map(PoseRecord::from), ..measure }.unless_uncertain(possible, || {
+        "no lap of the search was computed more accurately than the bound".to_owned()
+    })
 }
 
 #[cfg(test)]

@@ -95,7 +95,7 @@ impl Gain {
         };
         let possible = self.possible * unit_of_gain;
         Measure { verdict, ..measure }.unless_uncertain(possible, || {
-            format!("differences along the coordinates bound it by {possible:.4} only")
+            format!("differences along the coordinates give only the upper bound {possible:.4}")
         })
     }
 }
@@ -191,13 +191,15 @@ fn lipschitz(total: &Tally) -> Measure {
 fn reciprocity(total: &Tally) -> Measure {
     let share = total.resolved as f64 / total.comparable.max(1) as f64;
     let uncertain = total.uncertain;
-    let comment =
-        format!("known to the bound at {share:.4} of the poses; differences leave {uncertain:.0e} open");
+    let comment = format!(
+        "computed more accurately than the bound at {share:.4} of the poses; uncertainty of the differences \
+         {uncertain:.0e}"
+    );
     let possible = if share >= MOSTLY { total.asymmetry.value } else { f64::INFINITY };
     let why = match (total.answered(), total.comparable) {
         (0, _) => NO_ANSWER,
         (_, 0) => "the wrench does not depend on the pose",
-        _ => "no derivative where the wrench depends on the pose: the answer depends on the way there",
+        _ => "no derivative where the wrench depends on the pose: the result depends on the path to the pose",
     };
     Measure::of(["M3", "reciprocity", ""], &total.asymmetry, [RECIPROCAL, RECIPROCAL], comment.clone())
         .unless_uncertain(possible, || comment)

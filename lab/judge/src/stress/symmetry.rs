@@ -129,7 +129,7 @@ pub(super) fn measure(setup: &Setup<'_>, symmetry: Symmetry) -> Result<Measure, 
     let why = if total.unanswered == total.poses { NO_ANSWER } else { "the wrench is zero at every pose" };
     let comment = match Verdict::of(total.difference.value, SYMMETRIC, SYMMETRIC) {
         Verdict::Pass => format!("{} poses and their images", total.poses),
-        _ => "the answer at the image of this pose is not the image of the answer".to_owned(),
+        _ => "the result at the image of this pose differs from the image of the result".to_owned(),
     };
     Ok(Measure::of(["M10", NAME, ""], &total.difference, [SYMMETRIC; 2], comment)
         .count("poses", total.poses)

@@ -105,7 +105,7 @@ fn judge(total: &Tally) -> Measure {
             TroubleKind::Panicked(words) => words.clone(),
             TroubleKind::NotFinite => "returned a number that is not finite".to_owned(),
             TroubleKind::UnknownStatus => "returned a status unknown to the contract".to_owned(),
-            TroubleKind::Refused(status) => format!("refused the call (`{}`)", wording::status(*status)),
+            TroubleKind::Refused(status) => format!("rejected the call (`{}`)", wording::status(*status)),
             TroubleKind::AcceptsNonFiniteInput => "returned `ok` for a pose that is not finite".to_owned(),
         };
         format!("first at {place}: {what}")

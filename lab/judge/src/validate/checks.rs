@@ -71,7 +71,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
 impl Outcome {
     /// Returns the finding for a check whose thread could not be started.
     pub(crate) fn no_thread(cause: &std::io::Error) -> Self {
-        Self::Missing(format!("the check needs a thread: {cause}; {THREAD_ADVICE}"))
+        Self::Missing(format!("cannot start a thread for the check: {cause}; {THREAD_ADVICE}"))
     }
 
     /// Returns the finding that the rule does not apply, for this reason.

@@ -42,7 +42,7 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
                     return Err(match samples {
                         0 => format!("no fresh sample within {}", wording::time(PATIENCE)),
                         1 => format!("no second sample within {}", wording::time(PATIENCE)),
-                        _ => format!("no write took a command within {}", wording::time(PATIENCE)),
+                        _ => format!("no write accepted a command within {}", wording::time(PATIENCE)),
                     });
                 }
                 std::thread::sleep(TICK);
@@ -51,7 +51,7 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
         if let Sampled { count: 2.., first, last } = running.sampled
             && first == last
         {
-            return Err(format!("every sample says that it was taken at {first} ns"));
+            return Err(format!("every sample has the time {first} ns"));
         }
         device = running.device.deactivate().ok_or("deactivate failed")?;
     }
@@ -211,8 +211,10 @@ impl Running {
         if let Cycle::Fault(fault) = sampled {
             return Err(fault_of("read", fault));
         }
-        self.plausible(sampled, &tick)
-            .map_err(|words| Trouble { fault: None, words: format!("read at tick {index} gave {words}") })?;
+        self.plausible(sampled, &tick).map_err(|words| Trouble {
+            fault: None,
+            words: format!("read at tick {index} returned {words}"),
+        })?;
         let started = Instant::now();
         let taken = self.device.write(&tick, wrench);
         for (took, time) in self.took.iter_mut().zip([read, started.elapsed()]) {
@@ -278,7 +280,7 @@ impl Running {
         while !self.delivers() {
             if started.elapsed() > PATIENCE {
                 return Err(format!(
-                    "commanded {} N, it reports no force for {}, so its stop cannot be checked",
+                    "commanded {} N, the device reports no force for {}, so its stop cannot be checked",
                     push.force(),
                     wording::time(PATIENCE)
                 ));
@@ -307,9 +309,9 @@ impl Running {
         while at_rest < SAMPLES {
             if started.elapsed() > PATIENCE {
                 return Err(match self.delivers() {
-                    true => format!("it still delivers {}", wording::wrench(&self.state.delivered)),
+                    true => format!("the device still delivers {}", wording::wrench(&self.state.delivered)),
                     false => format!(
-                        "it has given {at_rest} samples in {} since it was stopped",
+                        "the device has delivered only {at_rest} samples in {} since the stop",
                         wording::time(PATIENCE)
                     ),
                 });

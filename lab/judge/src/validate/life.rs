@@ -36,7 +36,7 @@ pub(super) fn live(subject: &Subject, after: After<'_>) -> Result<(), Outcome> {
     after("set_parameter", model.float_changes())?;
     extensions(&mut model, after)?;
     if let Some(problem) = model.message_problem() {
-        return Err(format!("last_message gave {problem}").into());
+        return Err(format!("last_message returned {problem}").into());
     }
     after("last_message", model.float_changes())?;
     if model.reset() != CallStatus::Ok {
@@ -56,7 +56,7 @@ fn steps(model: &mut Model) -> Result<(), String> {
             model.step(&input, &mut output)
         };
         if status != CallStatus::Ok {
-            return Err(format!("step {} failed: it {}", sent.tick, model.last_message()));
+            return Err(format!("step {} failed: {}", sent.tick, model.last_message()));
         }
         if *input != sent {
             return Err(format!("step {} changed its input", sent.tick));
@@ -95,7 +95,7 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
             works(model, "linear-field")?;
             if answer != CallStatus::Ok || !field.is_finite() {
                 return Err(format!(
-                    "linear-field answered `{}`: {}",
+                    "linear-field returned `{}`: {}",
                     wording::status(answer),
                     wording::linear_field(&field)
                 ));
@@ -106,13 +106,13 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
         if let Some((info, points)) = drawn {
             let is_drawn = points.is_some_and(|points| points.iter().all(Pose::is_finite));
             if info.is_none() || !is_drawn {
-                return Err("centerline gave no finite points".to_owned());
+                return Err("centerline returned no finite points".to_owned());
             }
         }
         if model.has_shape() {
             let shape = model.shape(&input);
             works(model, "shape")?;
-            shape.map_err(|invalid| format!("shape gave nothing that can be drawn: {invalid}"))?;
+            shape.map_err(|invalid| format!("shape returned an invalid drawing: {invalid}"))?;
         }
         let mut values = vec![f64::NAN; model.details().len()];
         let answer = model.read_details(&mut values);

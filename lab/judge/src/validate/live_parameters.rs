@@ -34,7 +34,7 @@ pub(super) fn live_parameters(subject: &Subject) -> Result<(), Outcome> {
     }
     if taken.iter().all(|took| *took == Took::Refused) {
         return Err(Outcome::Violation(
-            "it refuses every live parameter, even with its present value".to_owned(),
+            "the model rejects every live parameter, even with its present value".to_owned(),
         ));
     }
     Ok(())
@@ -83,7 +83,7 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
     let is_told = read_back.is_finite() && expected.is_finite();
     if is_told && (read_back - expected).abs() > 1.0e-9 * read_back.abs().max(expected.abs()) {
         return Err(format!(
-            "`{id}` was set to {value} (answer `{}`), but reads back {read_back}",
+            "`{id}` was set to {value} (status `{}`), but reads back {read_back}",
             wording::status(last)
         ));
     }

@@ -199,18 +199,19 @@ pub fn validate(
         let stops = is_fatal || is_stuck;
         let verdict = match outcome {
             Ok(Some(Verdict { seen: Some(Outcome::Stuck(step)), .. })) => {
-                Verdict::violated(format!("{step}; the rules after it were not checked"))
+                Verdict::violated(format!("{step}; the later rules were not checked"))
             }
             Ok(Some(verdict)) => verdict,
             // Not a violation: the guarding allocator is slow, and other rules check that calls end.
             Ok(None) if check == Check::Contract(Rule::InsideMemory) => {
                 let patience = wording::time(patience);
-                let late =
-                    format!("a life of an instance takes more than {patience} with the guarding allocator");
+                let late = format!(
+                    "the life cycle of an instance takes more than {patience} with the guarding allocator"
+                );
                 Verdict { seen: Some(Outcome::Missing(late)), figures: None }
             }
             Ok(None) => Verdict::violated(format!(
-                "it did not return within {}; the rules after it were not checked (`--timeout` allows more)",
+                "the step did not return within {}; the later rules were not checked (raise the limit with `--timeout`)",
                 wording::time(own_patience)
             )),
             Err(error) => Verdict::violated(format!("cannot be checked: {error}")),
@@ -232,8 +233,10 @@ fn died(check: Check, end: ExitStatus) -> String {
     }
     let hint = match check {
         // A sandboxed thread may not read the processor's clock either.
-        Check::SystemCalls => "; here a step that reads the time causes this",
-        Check::Contract(Rule::InsideMemory) => ": a call left its memory, or damaged a block",
+        Check::SystemCalls => "; on this machine a step that reads the clock causes this too",
+        Check::Contract(Rule::InsideMemory) => {
+            ": a call accessed memory outside its blocks, or damaged a block"
+        }
         _ => "",
     };
     format!("the process died by signal {signal}{hint}")

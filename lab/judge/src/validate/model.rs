@@ -44,7 +44,7 @@ pub(super) fn demand(model: &mut Model) -> Result<(), String> {
         ("force alone", |_| Demand::FORCE),
         ("force and torque", |_| Demand::WRENCH),
         ("force and energy", |_| Demand::FORCE.with(Demand::ENERGY)),
-        ("everything in every other step", |tick| if tick % 2 == 0 { Demand::ALL } else { Demand::FORCE }),
+        ("all outputs in every other step", |tick| if tick % 2 == 0 { Demand::ALL } else { Demand::FORCE }),
     ];
     for (what, of) in fewer {
         let less = demanded(model, of)?;
@@ -58,7 +58,7 @@ pub(super) fn demand(model: &mut Model) -> Result<(), String> {
         if let Some((tick, (all, less))) = other {
             let [with, without] = [all, less].map(|output| wording::vector(output.wrench.force()));
             return Err(format!(
-                "step {tick} of a path gave the force {with} N with everything demanded, and {without} N with {what}"
+                "step {tick} of a path returned the force {with} N with all outputs requested, and {without} N with {what}"
             ));
         }
     }
@@ -114,8 +114,9 @@ pub(super) fn reset_repeats(model: &mut Model) -> Result<(), String> {
     }
     let second = run(model)?;
     let differs = first.iter().zip(&second).position(|(a, b)| a.wrench != b.wrench);
-    differs
-        .map_or(Ok(()), |index| Err(format!("pose {index} of the same path gave another answer after reset")))
+    differs.map_or(Ok(()), |index| {
+        Err(format!("pose {index} of the same path returned another result after reset"))
+    })
 }
 
 pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
@@ -134,7 +135,7 @@ pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
         return Ok(());
     }
     let [usual, limit] = [usual, limit].map(wording::time);
-    Err(format!("the 99th percentile of a step is {usual} of a processor, above the limit of {limit}"))
+    Err(format!("the 99th percentile of a step is {usual} of processor time, above the limit of {limit}"))
 }
 
 /// Returns the wrenches of a walk of each model, stepped alternately.
@@ -154,7 +155,9 @@ pub(super) fn independent(subject: &Subject) -> Result<(), Outcome> {
     let alone = alone.first().cloned().unwrap_or_default();
     let in_turns = walked(&mut [&mut make()?, &mut make()?])?;
     if in_turns.iter().any(|wrenches| *wrenches != alone) {
-        return Err("two instances stepped alternately give other answers than one alone".to_owned().into());
+        return Err("two instances stepped alternately return other results than one instance alone"
+            .to_owned()
+            .into());
     }
     // Created here, stepped on another thread: as in a loop.
     let start = |mut model: Model| {
@@ -166,7 +169,7 @@ pub(super) fn independent(subject: &Subject) -> Result<(), Outcome> {
         .map(|thread| Ok(thread?.join().map_err(|_| "a thread panicked".to_owned())??))
         .collect::<Result<_, Outcome>>()?;
     if elsewhere.iter().flatten().any(|wrenches| *wrenches != alone) {
-        return Err("two instances stepped on two threads give other answers than one alone"
+        return Err("two instances stepped on two threads return other results than one instance alone"
             .to_owned()
             .into());
     }
@@ -193,11 +196,11 @@ pub(super) fn energy_gradient(model: &mut Model) -> Result<(), Outcome> {
     const STEP_RAD: f64 = 1.0e-5;
     if model.memory() != Memory::Stateless {
         return Err(Outcome::nothing_to_judge(
-            "the model has a history, and its energy is no function of the pose",
+            "the model has a history, so its energy is not a function of the pose",
         ));
     }
     if !model.serves().contains(Demand::ENERGY) {
-        return Err(Outcome::nothing_to_judge("the model serves no energy"));
+        return Err(Outcome::nothing_to_judge("the model has no output `energy`"));
     }
     // Components of force and of torque, each with the energy's slope.
     let (mut forces, mut torques) = (Vec::new(), Vec::new());

@@ -31,7 +31,7 @@ const ROUNDING: f64 = 1.0e-12;
 pub(super) fn passive(model: &mut Model) -> Result<Option<Figures>, Outcome> {
     if model.memory() != Memory::Stateless {
         return Err(Outcome::nothing_to_judge(
-            "the model has a history, and may store energy where no pose shows it",
+            "the model has a history, and may store energy that is not a function of the pose",
         ));
     }
     let mut largest_n: f64 = 0.0;
@@ -87,8 +87,8 @@ fn circle(model: &mut Model, plane: [usize; 2]) -> Result<f64, String> {
     }
     let [first, second] = plane.map(|axis| COORDINATES.get(axis).copied().unwrap_or_default());
     Err(format!(
-        "once round a circle in {first} and {second} ({} mm, {} rad) it generates {:.3e} J; a law without memory must \
-         generate none",
+        "once round a circle in {first} and {second} ({} mm, {} rad) the model generates {:.3e} J; a model without \
+         a history must not generate energy",
         RADIUS_M * 1.0e3,
         RADIUS_RAD,
         given_j.abs()
@@ -114,7 +114,7 @@ fn there_and_back(model: &mut Model) -> Result<f64, String> {
             let largest_nm = ahead.torque().length() + behind.torque().length();
             if given_w > ROUNDING * (largest_n * linear.length() + largest_nm * angular.length()) {
                 return Err(format!(
-                    "forward and back at {:.3} m/s through {} it generates {given_w:.3e} W; damping must dissipate",
+                    "forward and back at {:.3} m/s through {} the model generates {given_w:.3e} W; damping must dissipate energy",
                     linear.length(),
                     wording::pose(&there.pose)
                 ));

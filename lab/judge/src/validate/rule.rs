@@ -59,12 +59,12 @@ impl Check {
             Self::Contract(rule) => rule.text(),
             Self::FiniteInMotion => "the wrench is finite while the handle moves, slowly and fast",
             Self::Demand => {
-                "force and status do not depend on the other outputs that are demanded, nor torque on energy"
+                "force and status do not depend on which other outputs are requested, nor torque on the request for energy"
             }
             Self::LiveParameters => "live parameters can be set in time and report their value",
             Self::Activity => "outside the active region, wrench and energy are zero",
             Self::Passive => {
-                "a model without a history generates no energy on a closed path or forward and back along one"
+                "a model without a history generates no energy on a closed path, or forward and back along a path"
             }
             Self::SystemCalls => "a step allocates no memory, starts no thread and makes no system call",
         }

@@ -41,7 +41,7 @@ pub(super) fn untouched(subject: &Subject, before: &Host) -> Result<(), Outcome>
         _ => Err(format!("{call} changed the floating-point mode: rounding, flush-to-zero or traps")),
     })?;
     std::thread::sleep(REST);
-    before.compare("what it left behind")?;
+    before.compare("the plugin, after its last call,")?;
     before.known()
 }
 

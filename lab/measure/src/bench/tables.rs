@@ -113,7 +113,7 @@ impl BenchReport {
         let head = ["case", "force max N", "rms N", "torque max N m", "rms N m"];
         let left_out = self.rows.iter().filter_map(|CaseRow { name, distance, .. }| {
             let unanswered = (*distance)?.unanswered;
-            (unanswered > 0).then(|| format!("  {name}: {unanswered} poses without an answer, not compared"))
+            (unanswered > 0).then(|| format!("  {name}: {unanswered} poses without a result, not compared"))
         });
         let title = format!("  Errors against {reference}");
         [vec![title], table(head, rows), left_out.collect()].concat()
@@ -157,7 +157,7 @@ impl BenchReport {
         let head = ["case", "mean ns", "p99.9", "force max N", "rms N", "torque max N m", "Pareto front"];
         let unanswered = rows.iter().filter(|row| row.distance.unanswered > 0);
         let left_out = unanswered.map(|FrontRow { name, distance, .. }| {
-            format!("  {name}: {} poses without an answer, not compared", distance.unanswered)
+            format!("  {name}: {} poses without a result, not compared", distance.unanswered)
         });
         let left_out: Vec<String> = left_out.collect();
         [vec![title], table(head, cells), left_out].concat()
@@ -175,7 +175,7 @@ impl BenchReport {
             [name.clone(), radius, share, mean, p99, others, others_p99]
         });
         let title =
-            format!("  Calls with {detail} above zero, and the others: of each tick the fastest call, ns");
+            format!("  Calls with {detail} above zero, and other calls: fastest call of each tick, ns");
         let head = ["case", "radius mm", "share %", "mean", "p99", "others: mean", "p99"];
         [vec![title], table(head, rows)].concat()
     }

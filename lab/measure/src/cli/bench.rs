@@ -20,10 +20,10 @@ use std::path::PathBuf;
 /// Measure cost and error of an evaluation, for many settings of a force model.
 #[derive(Args)]
 #[command(
-    after_help = "Without --case, the command compares the variants and settings of the spring with its exact variant, `rod`, and the \
-    resolutions of the solid with the membrane, or under a plate with linear tetrahedra. It measures any other model with default settings. \
-    With --tick, it measures the whole tick around the model instead: device, mapping, envelope, trace. \
-    Times are wall clock: compare them within one run only.\n\n\
+    after_help = "Without --case, the command compares the variants and settings of the spring with its exact \
+    variant, `rod`, and the resolutions of the solid with the membrane, or under a plate with linear tetrahedra. It \
+    measures any other model with default settings. With --tick, it measures the whole tick around the model \
+    instead: device, mapping, envelope, trace. Times are wall-clock times: compare times of one run only.\n\n\
     Examples:\n  \
     flotor bench --csv bench.csv --plot bench.svg\n  \
     flotor bench --case variant=energy --case variant=rod,accuracy=servo --size full\n  \
@@ -36,7 +36,7 @@ pub(crate) struct BenchArguments {
     /// Id of the model, or path to its plugin file
     #[arg(long, value_name = "ID", default_value = "spring")]
     model: String,
-    /// Settings of a case; `model=ID` among them measures another model beside (repeatable)
+    /// Settings of a case; the setting `model=ID` selects another model (repeatable)
     #[arg(long = "case", value_name = "KEY=VALUE,...")]
     cases: Vec<String>,
     /// Settings common to all cases (repeatable)
@@ -51,7 +51,7 @@ pub(crate) struct BenchArguments {
     /// Depth of the middle of the motion below home
     #[arg(long, value_name = "MM", default_value_t = 4.0, value_parser = number("mm", "depth", 0.0..=100.0))]
     depth_mm: f64,
-    /// Radius of the workspace about home [default: 12, the device's; of a spring, times its free length over 15 mm]
+    /// Radius of the workspace about home [default: 12, as the device; for a spring scaled by its free length over 15 mm]
     #[arg(long, value_name = "MM", value_parser = number("mm", "radius", 0.001..=1000.0))]
     workspace_mm: Option<f64>,
     /// Largest rotation in the workspace
@@ -174,7 +174,7 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
         let rows = report.ticks.iter().map(|TickRow { device, cost }| cells(device.name(), cost));
         let rows = rows.chain([cells("futex round trip", &report.round_trip)]);
         let ratio = format!(
-            "a process of its own adds {:.1} futex round trips to a tick",
+            "process isolation adds {:.1} futex round trips to a tick",
             report.isolation_in_round_trips
         );
         [vec![style::title(&title)], table(["", "median", "p99", "fastest"], rows), vec![ratio]]
@@ -209,7 +209,7 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
         let known: Vec<&str> = model.details().iter().map(Detail::id).collect();
         if !known.contains(&detail.as_str()) {
             let known = known.join(", ");
-            let why = format!("--apart {detail}: no detail of the model; its details are [{known}]");
+            let why = format!("--apart {detail}: the model has no such detail; its details are [{known}]");
             return Err(CommandError::Usage(why));
         }
     }

@@ -53,7 +53,9 @@ pub(crate) struct EvalArguments {
 pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
     if is_same_file(&arguments.out, &arguments.poses) {
         let out = arguments.out.display();
-        return Err(CommandError::Usage(format!("--out {out}: holds the poses; choose another file")));
+        return Err(CommandError::Usage(format!(
+            "--out {out}: this is the file of the poses; choose another file"
+        )));
     }
     let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
     let settings = settings(&plugin, "--set", &arguments.sets)?;

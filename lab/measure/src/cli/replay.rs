@@ -13,8 +13,9 @@ use std::time::Instant;
 /// Re-evaluate the models on a recorded trajectory: bit-exact, or with changed parameters.
 #[derive(Args)]
 #[command(
-    after_help = "Without a change force, torque and energy must equal the recorded ones bit for bit, as far as the recording holds them: the exit code is 1 if it does not. With --set \
-    or --model a difference is the expected result. If the scene of the run named a plugin by its file, give the folder of \
+    after_help = "Without a change force, torque and energy must equal the recorded ones bit for bit, as far as the \
+    recording contains them; otherwise the exit code is 1. With --set or --model, a difference is expected. If the \
+    scene of the run named a plugin by its file, give the folder of \
     that file with --plugin-path.\n\n\
     Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.preset=thesis-3 --plot difference.svg\n  \
     flotor replay run.mcap --model spring=./libmy_spring.so --json -\n  \

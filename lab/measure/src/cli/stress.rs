@@ -41,10 +41,10 @@ pub(crate) struct StressArguments {
     /// Compute only this measure (repeatable)
     #[arg(long, value_parser = measure, value_name = "M0")]
     only: Vec<Part>,
-    /// Limit of the processor time of one step, ten times as long for one that waits: 5s, 500ms (default: 1s)
+    /// Limit of the processor time of one step, ten times as long for a step that waits: 5s, 500ms (default: 1s)
     #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]
     timeout: Option<f64>,
-    /// Make one measure in this process, and write the result into the file that is standard input
+    /// Compute one measure in this process, and write the result into the file of standard input
     #[arg(long, hide = true, value_parser = part)]
     deliver: Option<Part>,
     #[command(flatten)]
@@ -57,7 +57,7 @@ pub(crate) struct StressArguments {
 }
 
 fn measure(id: &str) -> Result<Part, String> {
-    Part::of_measure(id).ok_or_else(|| format!("unknown measure `{id}`; there are M0 to M10"))
+    Part::of_measure(id).ok_or_else(|| format!("unknown measure `{id}`; use M0 to M10"))
 }
 
 fn part(word: &str) -> Result<Part, String> {

@@ -34,7 +34,7 @@ pub(crate) struct ValidateArguments {
     /// Check one rule in this process, and print the verdict as JSON
     #[arg(long, hide = true, value_parser = rule)]
     rule: Option<Check>,
-    /// Write the verdict into the file that is standard input instead
+    /// Write the verdict into the file of standard input instead
     #[arg(long, hide = true, requires = "rule")]
     deliver: bool,
 }

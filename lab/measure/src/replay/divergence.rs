@@ -70,7 +70,7 @@ pub enum DivergenceCause {
     },
     /// A model was disabled in the run, because of its time budget or its process.
     #[error(
-        "in tick {tick} of the run a model was disabled (time budget or process failure), and in the replay it is not"
+        "in tick {tick} of the run a model was disabled (time budget or process failure), but not in the replay"
     )]
     #[serde(rename = "model_out")]
     ModelDisabled {
@@ -79,8 +79,8 @@ pub enum DivergenceCause {
     },
     /// A model was late, and the loop used its previous answer.
     #[error(
-        "in tick {tick} of the run the answer of a model was late and the loop used the one before; in the replay no answer is \
-         late"
+        "in tick {tick} of the run the result of a model was late, and the loop used the previous result; in the \
+         replay no result is late"
     )]
     ModelLate {
         /// First tick of the run in which the delay made a difference.

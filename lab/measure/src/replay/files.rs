@@ -24,7 +24,7 @@ pub(super) fn as_recorded(
     }
     let what = match found.first() {
         Some(other) => format!(
-            "`{}` is not the file of the run: its content is {}, that of the run was {}",
+            "`{}` is not the file of the run: its hash is {}, the hash of the run's file was {}",
             other.path.display(),
             other.hash_text(),
             then.hash_text()
@@ -32,8 +32,8 @@ pub(super) fn as_recorded(
         None => format!("`{}` no longer exists ({})", then.path.display(), then.hash_text()),
     };
     let problem = format!(
-        "[{model}] `{key}`: {what}; put the file of the run beside the recording as `{written}`, or name another with \
-         `--set {model}.{key}=FILE`",
+        "[{model}] `{key}`: {what}; put the file of the run beside the recording as `{written}`, or name another \
+         file with `--set {model}.{key}=FILE`",
         key = set.key,
         written = set.value
     );

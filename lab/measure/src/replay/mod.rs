@@ -51,8 +51,8 @@ pub enum ReplayError {
     },
     /// The forces of a model came from a program, which is not in the recording.
     #[error(
-        "a program commanded `{model}`, and the program is not in the recording; to compare the forces of a model on the same motion, \
-         put the model in its place: `--model {model}=spring`"
+        "a program commanded `{model}`, and the program is not in the recording; to compare the forces of a model \
+         on the same motion, replace `{model}` by that model: `--model {model}=spring`"
     )]
     Program {
         /// Name of the model in the scene.

@@ -21,12 +21,12 @@ use std::f64::consts::TAU;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Grip {
-    /// Not at all: the worst case for stability
+    /// No grip: the worst case for stability
     #[default]
     Open,
-    /// By a relaxed hand that keeps its place
+    /// Relaxed hand at a constant position
     Relaxed,
-    /// By a firm hand that keeps its place
+    /// Firm hand at a constant position
     Firm,
 }
 
@@ -38,7 +38,7 @@ pub enum LoopError {
     #[error(transparent)]
     Plugin(#[from] LoadError),
     /// The plugin lacks a parameter of the simulated flotor.
-    #[error("the plugin is no simulated flotor: {0}")]
+    #[error("the plugin is not the simulated flotor: {0}")]
     Setting(#[from] SettingError),
     /// The device rejects activation.
     #[error("the device cannot be activated: {0}")]
