@@ -91,7 +91,7 @@ impl SubjectChecks {
         });
         let agreement = self.agreement.map(|share| {
             let trials = self.repeat_checks;
-            format!("{:.0} % of {trials} repeated pairs had the same answer", share * 100.0)
+            format!("{:.0} % of {trials} repeated pairs with the same answer", share * 100.0)
         });
         let deviation = self.retest_deviation.map(|share| {
             let trials = self.repeat_checks;

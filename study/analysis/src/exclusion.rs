@@ -111,7 +111,7 @@ fn outside_rule(
                 return Some(("response_time_s", format!("{time_s:.2} s")));
             }
             Some(_) => {}
-            None => applied.cannot("response_time_s", "not known of simulated observers", subject),
+            None => applied.cannot("response_time_s", "not measured for simulated observers", subject),
         }
     }
     let least_mm = rules.least_movement_mm?;

@@ -91,7 +91,7 @@ pub enum Estimator {
     /// Estimate of the procedure: mean of the last differences, or posterior of QUEST+
     #[default]
     Procedure,
-    /// Most likely observer, from all trials at a base
+    /// Threshold of the most likely observer, given all trials at a base
     Map,
 }
 
@@ -111,7 +111,7 @@ pub struct AnalysisOptions {
 #[non_exhaustive]
 pub enum AnalysisError {
     /// Too few complete sittings.
-    #[error("complete sittings that are left to analyse: {complete}; an analysis needs 2 or more")]
+    #[error("complete sittings after exclusions: {complete}; an analysis needs at least 2")]
     TooFewSubjects {
         /// Number of complete sittings that no rule excluded.
         complete: usize,
@@ -211,7 +211,7 @@ pub fn effect_text(effect: &Effect) -> String {
 #[must_use]
 pub fn order_note(effects: &[Effect]) -> Option<&'static str> {
     effects.iter().all(|effect| effect.effect != "order").then_some(
-        "order is not in the model: it needs three subjects or more, and some who start with each modality",
+        "order is not in the model: it needs three subjects or more, and subjects who start with each modality",
     )
 }
 

@@ -118,7 +118,9 @@ fn scaled(
         RatingScale::DividedByMean => {
             let unit = mean(&all);
             if unit.is_nan() || unit <= 0.0 {
-                return refuse("the mean of the ratings is not above 0, so nothing can be divided by it");
+                return refuse(
+                    "the mean of the ratings is not above 0, so the ratings cannot be divided by the mean",
+                );
             }
             unit
         }

@@ -121,7 +121,7 @@ impl SubjectQuality {
         say(wrong_at_large(record).wrong, "wrong answers to differences of 40 % and more");
         say(
             without_difference(record),
-            "answers to equal stimuli, judged by where the larger one would have been (--floor)",
+            "answers to equal stimuli, judged by the place of the larger stimulus (--floor)",
         );
         let stuck = self.tracks.iter().filter(|track| track.threshold.is_none()).count();
         say(stuck, "tracks that did not reach a threshold");

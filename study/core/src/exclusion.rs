@@ -117,7 +117,8 @@ impl ExclusionRules {
     #[must_use]
     pub fn warning(rule: &str) -> Option<&'static str> {
         (rule == "least_movement_mm").then_some(
-            "least_movement_mm depends on the stimulus: the same hand moves a stiffer one less, so trials of the stiffest go first",
+            "least_movement_mm depends on the stimulus: the hand moves a stiffer stimulus less, so the rule \
+             excludes trials of the stiffest stimuli first",
         )
     }
 

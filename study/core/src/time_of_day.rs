@@ -92,7 +92,7 @@ fn date(days: u64) -> (u64, u64, u64) {
 
 /// Error of parsing a time of day.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("it is no time like 2026-11-25T18:34:09.123Z")]
+#[error("the text is not a time like 2026-11-25T18:34:09.123Z")]
 pub struct ParseTimeError;
 
 impl FromStr for TimeOfDay {

@@ -38,7 +38,7 @@ pub(crate) struct AnalyseArguments {
     /// Write an HTML page with figures and all numbers
     #[arg(long, value_name = "FILE.html")]
     html: Option<PathBuf>,
-    /// Write every subject's response under every condition, for R or Python
+    /// Write the response of every subject in every condition, for R or Python
     #[arg(long, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
     /// Write one row for each trial of the complete sittings, and beside it scripts in R and Python that reproduce the tables with
@@ -64,8 +64,8 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         let needs_all = [&arguments.html, &arguments.csv, &arguments.trials].into_iter().any(Option::is_some);
         if arguments.blind || needs_all {
             return Err(CommandError::Usage(
-                "the tables of each subject are not blind and go into no file but --json; with --blind, --html, --csv or \
-                 --trials, at least two complete sittings are needed, without --each"
+                "the tables of single subjects (--each, or fewer than two complete sittings) are unblinded, and only --json \
+                 stores them; omit --blind, --html, --csv and --trials"
                     .to_owned(),
             ));
         }
@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         let (data, each): (_, Vec<String>) =
             (arguments.data.display(), logs.iter().map(incomplete).collect());
         return Err(CommandError::Usage(format!(
-            "{data}: no sitting is complete ({}); --each shows what there is of each",
+            "{data}: no sitting is complete ({}); `--each` shows the incomplete sittings",
             each.join(", ")
         )));
     }
@@ -91,7 +91,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let observer = first.begin.observer_kind();
     if let Some(restriction) = observer.restriction() {
         note(format_args!(
-            "{restriction}: seed {} is one of many draws; another --seed gives another",
+            "{restriction}: the result is one random draw; another --seed than {} gives another result",
             first.begin.seed
         ));
     }
@@ -108,12 +108,12 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let subjects = &applied.kept;
     if !applied.excluded.is_empty() {
         let (kept, excluded) = (subjects.len(), applied.excluded.len());
-        note(format_args!("{kept} sittings are left to analyse ({excluded} exclusions)"));
+        note(format_args!("{kept} sittings after exclusions ({excluded} exclusions)"));
     }
     let analysis = Analysis::of(protocol, subjects, &options).map_err(|error| {
         // Exclusions may be the cause; in a blinded analysis they are not shown.
         if !applied.excluded.is_empty() && !arguments.blind {
-            note(format_args!("what was excluded:\n{}", applied.to_text(&rules)));
+            note(format_args!("exclusions:\n{}", applied.to_text(&rules)));
         }
         CommandError::Usage(format!("{}: {error}", arguments.data.display()))
     })?;
@@ -153,7 +153,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     }
     if !arguments.choices.deviations(Choices::default(), protocol).is_empty() {
         note(format_args!(
-            "the scripts beside {} know the defaults of --estimator, --type and --ratings: their tables differ from these",
+            "the scripts beside {} use the defaults of --estimator, --type and --ratings: their tables differ from these tables",
             path.display()
         ));
     }
@@ -220,16 +220,14 @@ impl Each {
         let incidents: Vec<Incident> = log.incidents.iter().map(|(.., incident)| incident.clone()).collect();
         let mut quality = SubjectQuality::of(protocol, &record, &incidents);
         let withdrawn = log.withdrawn.len();
-        quality
-            .flags
-            .extend((withdrawn > 0).then(|| format!("{withdrawn} answers taken back and given anew")));
+        quality.flags.extend((withdrawn > 0).then(|| format!("{withdrawn} answers withdrawn and replaced")));
         if log.complete {
             let rules = log.begin.exclusion();
             let applied = apply(&rules, protocol, vec![record], choices.estimator, log.begin.rate_hz());
             quality.flags.extend(applied.excluded.iter().map(|one| one.to_text(&rules)));
         } else {
             let trials = log.trials.len();
-            quality.flags.insert(0, format!("incomplete after {trials} trials: no data of the study"));
+            quality.flags.insert(0, format!("incomplete after {trials} trials: not part of the data"));
         }
         Self { observer: log.begin.observer_kind(), complete: log.complete, quality }
     }

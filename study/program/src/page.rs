@@ -32,7 +32,7 @@ pub(crate) fn html(begin: &Begin, report: &Report<'_>, applied: &Applied) -> Str
     let restriction = report.observer.restriction();
     let mut page = Page { text: String::new(), watermark: restriction.unwrap_or_default() };
     if let Some(restriction) = restriction {
-        page.paragraph(&format!("{}: no number of this page is about people.", capitalised(restriction)));
+        page.paragraph(&format!("{}: no number of this page is from people.", capitalised(restriction)));
     }
     let title = match report.analysis {
         Analysis::Jnd(jnd) => {

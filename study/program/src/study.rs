@@ -70,7 +70,7 @@ enum Task {
     Force(ForceArguments),
     /// Run a study file: begin, or resume an interrupted study
     Run(plan::RunArguments),
-    /// Feel a spring while its dimensions and material change, without trials
+    /// Explore a spring by hand while its dimensions and material change, without trials
     Explore(explore::ExploreArguments),
     /// Fit a spring to the measured curve of a real one
     Spring(spring::SpringArguments),
@@ -128,8 +128,8 @@ struct Common {
     /// Time for which a simulated observer feels each stimulus
     #[arg(long, default_value = "1s", value_parser = feel_s, allow_hyphen_values = true, value_name = "TIME")]
     feel: f64,
-    /// Thresholds of simulated observers at 75 %, with vision and without, as shares of the base (default: 14.2 and 17.2 % as the
-    /// procedure of the thesis finds them, of a force 5.9 % felt and 7 % exerted)
+    /// Thresholds of simulated observers at 75 %, with vision and without, as shares of the base (default: 14.2 and 17.2 %, as the
+    /// procedure of the thesis estimates; for a force 5.9 % felt and 7 % exerted)
     #[arg(long, value_parser = thresholds, value_name = "VH,H")]
     weber: Option<[f64; 2]>,
     /// Stored movement (default: full for people, summary for simulated observers)
@@ -183,7 +183,7 @@ struct Common {
     /// Modality that comes first: vision and haptics (vh), haptics alone (h), or by the number of the subject
     #[arg(long, value_enum, default_value_t, value_name = "MODALITY")]
     first: FirstChoice,
-    /// If the handle leaves its range: repeat the trial (at most three times) or keep its answer
+    /// Action when the handle leaves its range: repeat the trial (at most three times) or keep its answer
     #[arg(long, value_enum, default_value_t)]
     boundary: BoundaryChoice,
     /// Study file in use.
@@ -245,14 +245,14 @@ struct JndArguments {
     /// First reversal whose difference counts for the threshold
     #[arg(long, default_value_t = 4, value_parser = count(1..=1000_u32), value_name = "N")]
     average_from: u32,
-    /// The threshold is the mean difference of the trials from the first counted reversal to the last: with the trials of
-    /// both reversals, without that of the first, or without that of the last
+    /// Mean for the threshold, from the first counted reversal to the last: with the trials of
+    /// both reversals, without the trial of the first, or without the trial of the last
     #[arg(long, value_enum, default_value_t)]
     averaging: Averaging,
     /// Step size used at a reversal that halves the step size
     #[arg(long, value_enum, default_value_t)]
     step_at_reversal: StepAtReversal,
-    /// Smallest difference, as a share of the base; above 0, because no answer to equal stimuli is right
+    /// Smallest difference, as a share of the base; above 0, because equal stimuli have no correct answer
     #[arg(long, default_value_t = 0.01, value_parser = real, value_name = "SHARE")]
     floor: f64,
     /// Largest difference, as a share of the base
@@ -304,8 +304,7 @@ struct MagnitudeArguments {
 
 #[derive(Args)]
 #[command(
-    after_help = "Felt: a weight that pulls down all the time. Exerted: a resistance that is felt only while the hand \
-    pushes.\n\n\
+    after_help = "Felt: a weight that always pulls down. Exerted: a resistance that acts only while the hand pushes.\n\n\
     Examples:\n  \
     flotor study force --way felt --out felt\n  \
     flotor study force --way exerted --out exerted\n  \
@@ -354,7 +353,7 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
 /// Parses one word for a table.
 fn word(text: &str) -> Result<String, String> {
     let is_word = !text.is_empty() && text.len() <= 20 && text.chars().all(char::is_alphanumeric);
-    if is_word { Ok(text.to_owned()) } else { Err("it is one word of at most 20 letters".to_owned()) }
+    if is_word { Ok(text.to_owned()) } else { Err("write one word of at most 20 letters".to_owned()) }
 }
 
 /// Parses a duration above 0, s.

@@ -80,7 +80,7 @@ pub enum StatisticsError {
     #[error("equal means at all levels")]
     EqualMeans,
     /// The effect does not vary between subjects.
-    #[error("no variation between subjects to test it against")]
+    #[error("no variation between subjects, which the test requires")]
     NoError,
     /// Scaling of the responses has removed an effect and its error.
     #[error("scaling of the responses removes the effect")]

@@ -460,7 +460,7 @@ fn screens_travel_as_json_lines() {
     let names: Vec<&str> = screens.iter().filter_map(|screen| screen["screen"].as_str()).collect();
     assert_eq!(names, ["ready", "feel", "feel", "ask", "feel"]);
     let refused = screens.iter().find_map(|line| line["refused"].as_str()).expect("nonsense is answered");
-    assert!(refused.starts_with("the line is no JSON: "), "{refused}");
+    assert!(refused.starts_with("the line is not JSON: "), "{refused}");
     assert_eq!(SittingLog::read(&log_of(&out, 1)).unwrap().trials.len(), 1);
 }
 
@@ -493,7 +493,7 @@ fn an_answer_is_taken_back_in_a_sitting() {
     let [trial] = log.trials.as_slice() else { panic!("{:?}", log.trials) };
     assert_eq!((trial.event.response, log.withdrawn[0].response), (Response::Second, Response::First));
     let ran = Flotor::with(["analyse", out.to_str().unwrap(), "--each"]).run();
-    assert!(ran.stdout.contains("1 answers taken back and given anew"), "{ran:?}");
+    assert!(ran.stdout.contains("1 answers withdrawn and replaced"), "{ran:?}");
     // Taken back, and a break before the answer: it is not taken back a second time.
     let again: Vec<&str> = arguments.into_iter().chain(["--resume"]).collect();
     let stop = r#"{"input":"stop"}"#;
@@ -503,7 +503,7 @@ fn an_answer_is_taken_back_in_a_sitting() {
     assert_eq!((log.is_answered_anew(), log.trials.len(), log.withdrawn.len()), (true, 1, 2));
     let ran = person("json", &([go, go, go, &first, back, stop].join("\n") + "\n"), &again, &out);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    assert!(ran.stdout.contains("no answer to be taken back"), "{ran:?}");
+    assert!(ran.stdout.contains("no answer that can be taken back"), "{ran:?}");
     let log = SittingLog::read(&log_of(&out, 1)).unwrap();
     assert_eq!((log.trials.len(), log.withdrawn.len()), (2, 2));
 }
@@ -630,7 +630,7 @@ fn a_sitting_that_broke_off_without_a_reason_has_an_incident() {
         assert_eq!(found, killed, "a sitting that was stopped has its reason");
     }
     let each = Flotor::with(["analyse", out.to_str().unwrap(), "--each"]).run();
-    assert!(each.stdout.contains("broke off without a line: the process was killed"), "{each:?}");
+    assert!(each.stdout.contains("ended without a line in the log: the process was killed"), "{each:?}");
 }
 
 /// A log that was copied into the folder of another subject would count twice.
@@ -706,7 +706,7 @@ fn a_sitting_does_not_go_on_with_another_build_of_a_plugin() {
     std::fs::write(&copy, bytes).unwrap();
     let refused = person("terminal", "\n\n\n1\nq\n", &resumed, &out);
     assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{refused:?}");
-    assert!(refused.error().contains("(spring) is not the file that the sitting began with"), "{refused:?}");
+    assert!(refused.error().contains("(spring) is not the file of the start of the sitting"), "{refused:?}");
     std::fs::copy(&built, &copy).unwrap();
     let resumed = person("terminal", "\n\n\n1\nq\n", &resumed, &out);
     assert_eq!(resumed.code, Some(exit_code::OK), "{resumed:?}");
@@ -808,7 +808,7 @@ fn what_was_not_felt_is_not_answered() {
     let more = ["terminal", "--scene", &scene, "--no-demo", "--least-time=30s"];
     let ran = study(&usual.chain(more).collect::<Vec<_>>(), &out).reading("\n\n\n1\nq\n").run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    assert!(ran.stdout.contains("feel it a little longer"), "{ran:?}");
+    assert!(ran.stdout.contains("feel the stimulus a little longer"), "{ran:?}");
     let log = SittingLog::read(&log_of(&out, 1)).unwrap();
     assert_eq!(log.trials.len(), 0, "three keys in a row were a trial");
 }
@@ -838,7 +838,7 @@ fn a_measured_curve_is_a_stimulus_as_it_was_measured() {
     let ran =
         Flotor::with(spring.into_iter().chain(["--curve-scene", "real.toml"])).inside(scratch.path()).run();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    assert!(std::fs::read_to_string(path("bench.svg")).unwrap().contains("served as measured"));
+    assert!(std::fs::read_to_string(path("bench.svg")).unwrap().contains("rendered measured curve"));
     let fit: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(path("fit.json")).unwrap()).unwrap();
     // Play and block lie outside the fitted middle; friction of 0.05 N on either side is averaged out.

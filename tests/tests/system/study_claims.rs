@@ -11,7 +11,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// Words that every result of simulated observers carries.
-const RESTRICTION: &str = "simulated observers, nobody was tested";
+const RESTRICTION: &str = "simulated observers, no person was tested";
 
 const FILE: &str = "task = \"jnd\"\nanalysis = \"paired t-test\"\n[options]\nout = \"data\"\nsubjects = 5\n\
                     apparatus = \"none\"\nbases = [18, 26]\nreplications = 2\ncatch_trials = 1\nrepeat_checks = 1\n\
@@ -246,7 +246,7 @@ fn an_unfinished_sitting_is_named_and_is_no_data() {
     assert_eq!(result.as_array().unwrap().len(), 1, "{result}");
     // Requested by name, it is shown with its state.
     let ran = succeeds(folder, &["analyse", "data", "--each", "--json", "each.json"]);
-    assert!(ran.stdout.contains("! incomplete after 11 trials: no data of the study"), "{ran:?}");
+    assert!(ran.stdout.contains("! incomplete after 11 trials: not part of the data"), "{ran:?}");
     let each = json(folder, "each.json");
     assert_eq!((&each[0]["complete"], &each[1]["complete"]), (&true.into(), &false.into()));
     cut(folder, "sub-01", 8);

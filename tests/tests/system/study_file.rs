@@ -44,7 +44,7 @@ fn checks_and_exclusion_rules_of_a_study_file_reach_the_analysis() {
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     assert!(ran.stdout.contains("catch trials named one of two equal stimuli"), "{ran:?}");
     assert!(ran.stdout.contains("most_false_alarms = 0.25"), "{ran:?}");
-    assert!(ran.stdout.contains("response_time_s: not known of simulated observers"), "{ran:?}");
+    assert!(ran.stdout.contains("response_time_s: not measured for simulated observers"), "{ran:?}");
     let result: Value =
         serde_json::from_str(&std::fs::read_to_string(folder.join("result.json")).unwrap()).unwrap();
     let alarms = result["checks"].as_array().unwrap();
@@ -65,7 +65,7 @@ fn checks_and_exclusion_rules_of_a_study_file_reach_the_analysis() {
     );
 
     let page = std::fs::read_to_string(folder.join("page.html")).unwrap();
-    assert!(page.contains("<p>Not applied: response_time_s: not known of simulated observers (sub-01, "));
+    assert!(page.contains("<p>Not applied: response_time_s: not measured for simulated observers (sub-01, "));
     assert!(page.contains("<h2>Exclusions</h2>") && page.contains("<td>most_false_alarms = 0.25</td>"));
 
     let table = std::fs::read_to_string(folder.join("trials.csv")).unwrap();
@@ -88,10 +88,7 @@ fn rules_that_leave_nothing_say_what_they_took() {
     let ran = flotor(scratch.path(), &["analyse", "data"]);
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
     let last = ran.stderr.lines().last().unwrap_or_default();
-    assert!(
-        last.starts_with("error: ") && last.contains("sittings that are left to analyse: 0; "),
-        "{ran:?}"
-    );
+    assert!(last.starts_with("error: ") && last.contains("sittings after exclusions: 0; "), "{ran:?}");
     let lines =
         ran.stderr.lines().filter(|line| line.starts_with("  sub-0") && line.contains("most_dont_know = 0"));
     assert_eq!(lines.count(), 6, "{ran:?}");
@@ -187,7 +184,7 @@ fn what_people_add_to_the_files_of_a_study_stays() {
     let ran = flotor(folder, &["study", "run", "a.study.toml", "--resume"]);
     assert_ne!(ran.code, Some(exit_code::OK));
     assert!(
-        ran.stderr.contains("participants.tsv: its first line has no column `participant_id`"),
+        ran.stderr.contains("participants.tsv: the first line has no column `participant_id`"),
         "{ran:?}"
     );
     assert_eq!(read("participants.tsv"), damaged);
@@ -229,7 +226,7 @@ fn a_study_does_not_go_on_with_a_changed_file() {
     let changed = study("2");
     assert_eq!(changed.code, Some(exit_code::CONFIGURATION), "{changed:?}");
     assert!(
-        changed.error().contains("`curve.csv` (measured.curve) is not the file that the sitting began with"),
+        changed.error().contains("`curve.csv` (measured.curve) is not the file of the start of the sitting"),
         "{changed:?}"
     );
     let _ = scratch.file("curve.csv", curve(3.0));

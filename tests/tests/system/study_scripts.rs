@@ -100,7 +100,7 @@ fn other_options_are_said_not_to_be_those_of_the_scripts() {
             let words = ["analyse", study[0], "--trials", "t.csv", option, value];
             let ran = Flotor::with(words).inside(scratch.path()).run();
             assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-            assert!(ran.stderr.contains("note: the scripts beside t.csv know the defaults of "), "{ran:?}");
+            assert!(ran.stderr.contains("note: the scripts beside t.csv use the defaults of "), "{ran:?}");
         }
     }
 }

@@ -176,7 +176,7 @@ fn a_rule_that_is_not_applied_names_the_subjects() {
     let rules = ExclusionRules { response_time_s: Some([0.2, 20.0]), ..ExclusionRules::default() };
     let applied = apply(&rules, &protocol, records, Estimator::Procedure, None);
     let [one] = applied.not_applied.as_slice() else { panic!("{:?}", applied.not_applied) };
-    assert_eq!(one.to_string(), "response_time_s: not known of simulated observers (sub-01, sub-02)");
+    assert_eq!(one.to_string(), "response_time_s: not measured for simulated observers (sub-01, sub-02)");
     assert!(applied.to_text(&rules).contains(&one.to_string()) && applied.excluded.len() == 1);
 }
 

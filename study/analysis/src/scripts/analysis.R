@@ -123,7 +123,7 @@ anova_of <- function(values, factors, counts, groups) {
       limit <- rounding * sum(values^2)
       if (error <= limit) {
         is_gone <- squares <= limit
-        effect <- untestable(if (is_gone) "scaling of the responses removes the effect" else "no variation between subjects to test it against")
+        effect <- untestable(if (is_gone) "scaling of the responses removes the effect" else "no variation between subjects, which the test requires")
       } else {
         products <- t(left) %*% left
         gg <- sum(diag(products))^2 / (df * sum(products^2))

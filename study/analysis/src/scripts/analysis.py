@@ -109,7 +109,7 @@ def anova(values, factors, groups):
             rounding = ROUNDING * np.sum(values**2)
             if error <= rounding:
                 is_gone = squares <= rounding
-                reason = "scaling of the responses removes the effect" if is_gone else "no variation between subjects to test it against"
+                reason = "scaling of the responses removes the effect" if is_gone else "no variation between subjects, which the test requires"
                 yield ":".join(parts), reason
                 continue
             epsilon = None

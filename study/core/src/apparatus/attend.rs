@@ -34,9 +34,9 @@ impl MinimumExploration {
     /// Returns a hint if a stimulus was not felt long or far enough.
     fn is_missed(&self, time_s: f64, path_length_m: Option<f64>) -> Option<&'static str> {
         if time_s < self.time_s {
-            Some("feel it a little longer")
+            Some("feel the stimulus a little longer")
         } else if path_length_m.is_some_and(|path_length_m| path_length_m < self.path_length_m) {
-            Some("move the handle to feel it")
+            Some("move the handle to feel the stimulus")
         } else {
             None
         }
@@ -134,7 +134,7 @@ fn sit(
                 && input == Input::Withdraw
                 && MinimumExploration::USUAL.is_missed(felt_for_s, rig.path_length_m()).is_none()
             {
-                front.refuse("the next one has been felt; the answer before it stays")?;
+                front.refuse("the next stimulus has been felt, so the previous answer is final")?;
                 continue;
             }
             if let Some(trial) = felt.filter(|_| input == Input::Continue) {

@@ -53,7 +53,7 @@ impl Serve for OnlyStop {
             Ask::EmergencyStop => return emergency_stop(&self.stop, self.latch.as_ref()),
             Ask::MachineStop => machine_stop(&self.stop, self.latch.as_ref()),
             Ask::Set { .. } | Ask::Weight { .. } | Ask::Swap { .. } => {
-                let words = "an experiment is under way: what is felt is its own to change";
+                let words = "an experiment controls the stimulus; change the models after the experiment";
                 return Err((RefusalCause::Other, words.to_owned()));
             }
         }

@@ -30,7 +30,7 @@ pub struct RunEnded(pub RunEnd);
 
 /// Stimulus that the model rejected although the check had accepted it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("the model refused {}.{} = {}", .0.plugin, .0.parameter, .0.value)]
+#[error("the model rejected {}.{} = {}", .0.plugin, .0.parameter, .0.value)]
 pub struct StimulusRefused(pub Change);
 
 /// Paths of the trial recordings, one file per trial.

@@ -37,7 +37,7 @@ pub enum ApparatusError {
     Run(#[from] RunError),
     /// The scene has no model of this name.
     #[error(
-        "stimulus {stimulus}: the scene has no model `{}`{} (it has {})",
+        "stimulus {stimulus}: the scene has no model `{}`{} (its models: {})",
         stimulus.model, nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")),
         models.join(", ")
     )]
@@ -51,7 +51,7 @@ pub enum ApparatusError {
     },
     /// The model has no real parameter of this id.
     #[error(
-        "stimulus {stimulus}: `{}` has no number `{}`{} (it has {})",
+        "stimulus {stimulus}: `{}` has no numeric parameter `{}`{} (numeric parameters: {})",
         stimulus.model, stimulus.parameter,
         nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")), numbers.join(", ")
     )]
@@ -64,7 +64,7 @@ pub enum ApparatusError {
         numbers: Vec<String>,
     },
     /// A file of the scene has become unreadable.
-    #[error("{}: {cause}; the file was there a moment ago: start again", path.display())]
+    #[error("{}: {cause}; the file was readable before: restore the file and start again", path.display())]
     Unreadable {
         /// Path of the file.
         path: PathBuf,
@@ -87,7 +87,8 @@ pub enum ApparatusError {
     },
     /// The force ceiling of the host could clip a stimulus, unnoticed in the answers.
     #[error(
-        "{device}, and the host sends at most {} N and {} N·m: a stimulus above that would be felt as another. Set `[limits] force_n` and `torque_nm` to no more than that, or give `--allow-strong`",
+        "{device}, and the host sends at most {} N and {} N·m: the host would limit a stronger stimulus. Set \
+         `[limits] force_n` and `torque_nm` to at most these values, or add `--allow-strong`",
         CEILING.force_n, CEILING.torque_nm
     )]
     ExceedsForceCeiling {

@@ -9,10 +9,10 @@ use serde_json::{Map, Value};
 #[non_exhaustive]
 pub enum Unmergeable {
     /// The table lacks its key column.
-    #[error("its first line has no column `{0}`, with tabs between the columns")]
+    #[error("the first line has no column `{0}`; separate the columns with tabs")]
     NoKey(&'static str),
     /// A line whose number of cells differs from the number of columns.
-    #[error("line {line} has {cells} cells, and there are {columns} columns")]
+    #[error("line {line} has {cells} cells instead of {columns}")]
     Ragged {
         /// Line, from 1.
         line: usize,
@@ -22,7 +22,7 @@ pub enum Unmergeable {
         columns: usize,
     },
     /// The text is not a JSON object.
-    #[error("it is no JSON object ({0})")]
+    #[error("the text is not a JSON object ({0})")]
     NotAnObject(String),
 }
 

@@ -67,7 +67,7 @@ pub enum DatasetError {
         cause: std::io::Error,
     },
     /// A file edited by people cannot be merged.
-    #[error("{}: {problem}; mend the file, or remove it to have it written anew", path.display())]
+    #[error("{}: {problem}; correct the file, or remove it: the program then writes a new file", path.display())]
     Unmergeable {
         /// Path of the file.
         path: PathBuf,
@@ -75,7 +75,7 @@ pub enum DatasetError {
         problem: Unmergeable,
     },
     /// The folder has no study.
-    #[error("{}: no study (no logs under sourcedata/); give the folder of `study --out`", .0.display())]
+    #[error("{}: not the folder of a study (no logs under sourcedata/); give the folder of `study --out`", .0.display())]
     NoStudy(PathBuf),
     /// Logs of different studies in one folder.
     #[error("{}: {what}, unlike {}; delete the file that does not belong to the study, or use another folder", path.display(), other.display())]
@@ -88,7 +88,8 @@ pub enum DatasetError {
         what: String,
     },
     /// A log in another subject's or task's place: its subject would count twice or under another number.
-    #[error("{}: is a log of {subject}, task {task}, and does not belong there; remove it, or move it to {}", path.display(), place.display())]
+    #[error("{}: the log is of {subject}, task {task}, and is in the wrong folder; remove the log, or move it to \
+    {}", path.display(), place.display())]
     Misplaced {
         /// Path of the log.
         path: PathBuf,
@@ -100,7 +101,7 @@ pub enum DatasetError {
         place: PathBuf,
     },
     /// The configuration differs from the one that the study began with.
-    #[error("{}: {what}; use what it was begun with, or another folder", path.display())]
+    #[error("{}: {what}; restore the settings of the start, or use another folder", path.display())]
     Changed {
         /// Path of one of the study's logs.
         path: PathBuf,
@@ -108,7 +109,7 @@ pub enum DatasetError {
         what: String,
     },
     /// An input file has changed since the sitting began.
-    #[error("{}: `{}` ({}) is not the file that the sitting began with: its content is {}, and was {}; put the earlier file back, or use another folder",
+    #[error("{}: `{}` ({}) is not the file of the start of the sitting: its hash is {}, and was {}; restore the earlier file, or use another folder",
         path.display(), now.name, now.used_as, now.hash, then)]
     OtherInput {
         /// Path of one of the logs.

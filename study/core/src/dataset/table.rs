@@ -20,15 +20,15 @@ const COLUMNS: [(&str, &str); 30] = [
         "practice, main, catch (a pair of equal stimuli), obvious (a pair with an obvious difference) or repeat_check (presented once before): only main counts",
     ),
     ("replication", "Replication, from 1; 0 for practice"),
-    ("track", "Track of the adaptive procedure, from 1; 0 where there is none"),
-    ("repeat", "How often this presentation was repeated before because the handle left its range"),
+    ("track", "Track of the adaptive procedure, from 1; 0 without a track"),
+    ("repeat", "Number of earlier repetitions of this presentation, because the handle left its range"),
     ("condition", "Code of modality and level, for a blinded analysis"),
     ("modality", "vh: vision and haptics, h: haptics alone"),
     ("base", "Base of a pair, in the unit of the stimulus"),
     ("comparison", "Comparison of a pair, in the unit of the stimulus"),
     ("stimulus", "The stimulus rated, in its unit"),
     ("delta", "Difference of comparison and base as a share of the base"),
-    ("comparison_at", "first or second: when the comparison was presented"),
+    ("comparison_at", "first or second: position of the comparison in the pair"),
     ("response", "first, second, dont_know, rating or seen"),
     ("rating", "The number given, in the subject's own scale"),
     ("judgement", "correct, wrong or unsure"),
@@ -43,13 +43,13 @@ const COLUMNS: [(&str, &str); 30] = [
     ("mean_acceleration", "Mean magnitude of the acceleration along the vertical, m/s2"),
     ("mean_force", "Mean magnitude of the vertical force on the hand, N"),
     ("peak_force", "Largest force on the hand, N"),
-    ("felt_stiffness", "Stiffness of each stimulus as the hand felt it, N/m, in order"),
-    ("missed_ticks", "Ticks the servo missed"),
+    ("felt_stiffness", "Stiffness of each stimulus at the hand, N/m, in order"),
+    ("missed_ticks", "Ticks missed by the servo"),
     (
         "onset",
         "When the first stimulus could be felt, s after the begin of the sitting (acq_time in the list of scans)",
     ),
-    ("observer", "human, or simulated: nobody was tested"),
+    ("observer", "human, or simulated: no person was tested"),
 ];
 
 /// Returns the table of one sitting.
@@ -223,11 +223,11 @@ pub(super) fn participant(log: &SittingLog) -> String {
 /// Returns the descriptions of the participant columns; the program owns none of them.
 pub(super) fn participant_columns() -> (Map<String, Value>, &'static [&'static str]) {
     let columns = json!({
-        "observer": { "Description": "human, or simulated: nobody was tested" },
+        "observer": { "Description": "human, or simulated: no person was tested" },
         "first_modality": { "Description": "Modality the subject started with: vh (vision and haptics) or h (haptics alone)" },
-        "complete": { "Description": "1 if the sitting came to its end" },
+        "complete": { "Description": "1 if the sitting is complete" },
         "presentations": { "Description": "Presentations, practice and repeats included" },
-        "resumed": { "Description": "How often the sitting was taken up again" },
+        "resumed": { "Description": "Number of times the sitting was resumed" },
         "age": { "Description": "Age, if it was given", "Units": "year" },
         "sex": { "Description": "Sex, if it was given" },
         "handedness": { "Description": "Preferred hand, if it was given" },

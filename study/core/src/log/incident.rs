@@ -69,15 +69,18 @@ impl fmt::Display for Incident {
             Self::RunEnded { reason } => write!(f, "the run ended: {reason}"),
             Self::WindowClosed => f.write_str("the window was closed"),
             Self::Stopped => f.write_str("stopped at the keyboard"),
-            Self::Signal => f.write_str("asked to end, by a signal or a client"),
+            Self::Signal => f.write_str("ended by a signal or a client"),
             Self::OutOfRange => f.write_str("the handle left its range"),
             Self::MissedTicks { ticks } => write!(f, "{ticks} ticks were missed"),
             Self::TimeOfDaySet { by_ms } => {
                 let (way, s) = (if *by_ms < 0 { "back" } else { "forward" }, by_ms.unsigned_abs() / 1000);
-                write!(f, "the time of day was set {way} by {s} s; times of the sitting go on without a jump")
+                write!(
+                    f,
+                    "the time of day was set {way} by {s} s; the times of the sitting continue without a jump"
+                )
             }
             Self::Killed => {
-                f.write_str("broke off without a line: the process was killed, or the power failed")
+                f.write_str("ended without a line in the log: the process was killed, or the power failed")
             }
             Self::NotRecorded { reason } => write!(f, "the movement was not recorded: {reason}"),
         }

@@ -118,7 +118,7 @@ impl ObserverKind {
     pub fn restriction(self) -> Option<&'static str> {
         match self {
             Self::Human => None,
-            Self::Simulated => Some("simulated observers, nobody was tested"),
+            Self::Simulated => Some("simulated observers, no person was tested"),
         }
     }
 }
@@ -224,8 +224,10 @@ impl Plan {
     fn differs(now: Option<&Self>, earlier: Option<&Self>) -> Option<String> {
         match (earlier, now) {
             (None, None) => None,
-            (Some(earlier), None) => Some(format!("the study file {}, and there is none now", earlier.file)),
-            (None, Some(now)) => Some(format!("no study file, and there is {} now", now.file)),
+            (Some(earlier), None) => {
+                Some(format!("the study file {}; now there is no study file", earlier.file))
+            }
+            (None, Some(now)) => Some(format!("no study file; now there is {}", now.file)),
             (Some(earlier), Some(now)) if earlier.sha256 == now.sha256 => None,
             (Some(earlier), Some(now)) => {
                 let [before, after] = [earlier, now].map(|plan| without_size_and_folder(&plan.text));

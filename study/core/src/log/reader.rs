@@ -40,10 +40,10 @@ pub enum LogProblem {
         cause: std::io::Error,
     },
     /// Another process has the log open, or has written to it since it was read.
-    #[error("another process is running this sitting; end it there before it is continued here")]
+    #[error("another process is running this sitting; end that process before you continue the sitting here")]
     InUse,
     /// The log has no complete line.
-    #[error("has no complete line, so nothing was recorded; remove the file")]
+    #[error("has no complete line, so it contains no data; remove the file")]
     Empty,
     /// A line with invalid syntax.
     #[error("is not a line of an event log: {0}")]
@@ -56,7 +56,7 @@ pub enum LogProblem {
     Chain,
     /// Unknown format revision.
     #[error(
-        "format {found} is not supported, this version reads up to {FORMAT}; use the version that wrote it"
+        "format {found} is not supported, this version reads up to {FORMAT}; use the version that wrote the log"
     )]
     Format {
         /// Revision found in the log.
@@ -67,8 +67,8 @@ pub enum LogProblem {
     Order(&'static str),
     /// The replayed experiment would have presented another trial.
     #[error(
-        "trial {number} does not follow from protocol, seed and answers; another version of the program wrote \
-         it"
+        "trial {number} does not follow from protocol, seed and answers; another version of the program wrote the \
+         log: use that version"
     )]
     Diverges {
         /// Trial, from 1.
@@ -211,7 +211,7 @@ impl SittingLog {
             Event::Trial(event) => self.replay(*event),
             Event::Withdrawn { trial } => self.withdraw(trial),
             Event::Resume { trials, .. } if trials != self.sitting.presented() => {
-                Err(LogProblem::Order("`resume` after another number of trials than there are"))
+                Err(LogProblem::Order("`resume` gives another number of trials than the log has"))
             }
             Event::Resume { .. } => {
                 self.resumed += 1;

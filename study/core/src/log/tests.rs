@@ -340,7 +340,7 @@ fn a_sitting_of_another_study_says_where_it_differs() {
     assert_eq!((one.differs(&early), early.differs(&one)), (None, None));
     assert_eq!(other.differs(&early), Some("begun with another version of a.study.toml".to_owned()));
     let said = begin().differs(&other).expect("none now");
-    assert_eq!(said, "begun with the study file a.study.toml, and there is none now");
+    assert_eq!(said, "begun with the study file a.study.toml; now there is no study file");
     assert!(!serde_json::to_string(&begin()).unwrap().contains("plan"), "logs without one are as before");
 }
 

@@ -17,10 +17,10 @@ const ALTERNATIVES: f64 = 2.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum StepAtReversal {
-    /// Halved step, at once
+    /// Halved step, from this trial on
     #[default]
     New,
-    /// Old step; the halved one from the next trial on
+    /// Old step; the halved step from the next trial on
     Old,
 }
 
@@ -119,10 +119,10 @@ impl WeightedUpDownRule {
             self.ceiling,
             0.0,
             1.0,
-            "must be above 0 and below 1 (a base minus all of it is nothing)",
+            "must be above 0 and below 1 (the comparison must stay above 0)",
         )?;
         if !(self.floor > 0.0 && self.floor < self.ceiling) {
-            let legal = "must be above 0 (no answer to equal stimuli is right) and below --ceiling";
+            let legal = "must be above 0 (equal stimuli have no correct answer) and below --ceiling";
             return Err(InvalidRule::new("--floor", self.floor, legal));
         }
         if !(self.initial_delta > self.floor && self.initial_delta <= self.ceiling) {

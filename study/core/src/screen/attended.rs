@@ -232,7 +232,7 @@ impl ScreenStateMachine {
                 self.go_to(if last { Stage::Ask } else { Stage::Feel(index + 1) })
             }
             (Stage::Ask, Input::Again) if self.again_left() == Some(0) => {
-                Err(InputError::NotNow("it has been felt again as often as it may be; answer"))
+                Err(InputError::NotNow("the largest number of repetitions is reached; answer now"))
             }
             (Stage::Ask, Input::Again) => {
                 self.again += 1;
@@ -245,7 +245,7 @@ impl ScreenStateMachine {
             (Stage::Ask, Input::Answer { response }) => self.answer(&trial, response, time_s),
             (Stage::Ask, Input::Continue) => Err(InputError::NotNow("an answer is expected")),
             (_, Input::Answer { .. }) => Err(InputError::NotNow("no question is open yet")),
-            (_, Input::Again) => Err(InputError::NotNow("it can be repeated after its end")),
+            (_, Input::Again) => Err(InputError::NotNow("the stimulus can be repeated after its end")),
         }
     }
 
@@ -314,7 +314,7 @@ impl ScreenStateMachine {
             }
             (_, undo) => {
                 self.undo = undo;
-                Err(InputError::NotNow("there is no answer to be taken back now"))
+                Err(InputError::NotNow("there is no answer that can be taken back now"))
             }
         }
     }

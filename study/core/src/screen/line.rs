@@ -50,7 +50,7 @@ impl WindowReply {
     /// The syntax error, as text.
     pub fn read(line: &str) -> Result<Self, String> {
         let value: Value =
-            serde_json::from_str(line).map_err(|error| format!("the line is no JSON: {error}"))?;
+            serde_json::from_str(line).map_err(|error| format!("the line is not JSON: {error}"))?;
         let wrong = |error: serde_json::Error| error.to_string();
         match (value.get("input"), value.get("window")) {
             (Some(_), _) => serde_json::from_value(value).map(Self::Input).map_err(wrong),
@@ -105,7 +105,7 @@ mod tests {
     #[test]
     fn a_wrong_line_is_named_in_words() {
         for (line, reason) in [
-            ("continue", "the line is no JSON: "),
+            ("continue", "the line is not JSON: "),
             ("{\"key\":\"1\"}", "the line has neither `input` nor `window`"),
             ("[1]", "the line has neither `input` nor `window`"),
             ("{\"input\":\"contine\"}", "unknown variant `contine`, expected one of `continue`"),

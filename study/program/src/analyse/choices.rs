@@ -23,7 +23,7 @@ pub(crate) struct Choices {
 /// Values of `--type`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ValueEnum)]
 enum Sums {
-    /// Each effect adjusted for those that do not contain it
+    /// Each effect adjusted for the effects that do not contain it
     #[value(name = "II")]
     Two,
     /// Each effect adjusted for all others
@@ -88,7 +88,7 @@ fn planned<T: ValueEnum + Default>(name: &str, text: Option<&str>) -> Result<T, 
     let Some(text) = text else { return Ok(T::default()) };
     T::from_str(text, false).map_err(|_| {
         let values: Vec<String> = T::value_variants().iter().map(word).collect();
-        format!("analyse.{name}: `{text}` is none of {}", values.join(", "))
+        format!("analyse.{name}: `{text}` is not valid; use one of {}", values.join(", "))
     })
 }
 

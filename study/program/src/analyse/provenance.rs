@@ -158,7 +158,7 @@ impl Agreement {
             Self::NoPlan => "without a plan".to_owned(),
             Self::AsPlanned => "as planned".to_owned(),
             Self::NotAsPlanned(deviations) => format!("not as planned: {}", deviations.join("; ")),
-            Self::Unknown => "the log lacks a plan that this version reads".to_owned(),
+            Self::Unknown => "the log has no plan that this version can read".to_owned(),
         }
     }
 }

@@ -9,7 +9,7 @@ use flotor_study::trial::Modality;
 /// Values of `--first`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum FirstChoice {
-    /// Odd subject numbers vision and haptics, even ones haptics alone
+    /// Odd subject numbers: vision and haptics; even subject numbers: haptics alone
     #[default]
     ByNumber,
     /// Vision and haptics
@@ -60,10 +60,10 @@ pub(super) enum ProcedureChoice {
 /// Values of `--apparatus`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum PresentationOption {
-    /// A scene, felt by a simulated hand
+    /// A scene, explored by a simulated hand
     #[default]
     Scene,
-    /// None: answers follow from the numbers alone, for studies of the method
+    /// No apparatus: answers are computed from the stimulus values, for studies of the method
     None,
 }
 
@@ -120,8 +120,8 @@ pub(super) fn population(stimulus: &Stimulus, way: Option<ForceWay>) -> Result<P
         (Quality::Stiffness, _) if stimulus.is_stiffness() => Percept::Stiffness,
         (Quality::Stiffness, _) => {
             return Err(format!(
-                "stimulus {stimulus}: simulated observers know Weber fractions of stiffness and of force alone; give their \
-                 thresholds, with vision and without, like --weber 0.14,0.17"
+                "stimulus {stimulus}: simulated observers have Weber fractions only for stiffness and force; give \
+                 their thresholds, with vision and without, like --weber 0.14,0.17"
             ));
         }
     };
@@ -133,7 +133,7 @@ pub(super) fn thresholds(text: &str) -> Result<[f64; 2], String> {
     let (vh, h) = text.split_once(',').ok_or("write VH,H, like 0.14,0.17")?;
     let both = [real(vh)?, real(h)?];
     let are_shares = both.iter().all(|share| (0.0..1.0).contains(share) && *share > 0.0);
-    if are_shares { Ok(both) } else { Err("both are shares above 0 and below 1".to_owned()) }
+    if are_shares { Ok(both) } else { Err("both must be shares above 0 and below 1".to_owned()) }
 }
 
 /// Parses `LEAST-MOST`, with the first value smaller.

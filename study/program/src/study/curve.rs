@@ -80,10 +80,12 @@ pub(super) enum CurveError {
     #[error("the middle of the deflection (30 to 70 %) has too few points: {0}")]
     Statistics(#[from] StatisticsError),
     /// The force decreases with compression.
-    #[error("the force falls as the spring is compressed ({0:.1} N/m); are length and compression mixed up?")]
+    #[error(
+        "the force falls as the spring is compressed ({0:.1} N/m); check whether length and compression are interchanged"
+    )]
     Falling(f64),
     /// Too few different compressions for a curve.
-    #[error("the curve needs points at three lengths at least; there are {0}")]
+    #[error("the curve needs points at three lengths or more, and has {0}; measure at more lengths")]
     Sparse(usize),
 }
 

@@ -34,10 +34,10 @@ const MATERIALS: [(&str, [&str; 2]); 4] = [
 ];
 
 #[derive(Args)]
-#[command(after_help = "While it runs, type:\n  \
+#[command(after_help = "During the session, type:\n  \
     wire_diameter_mm 0.8      a new value; the host creates a new model if the parameter cannot change during a run\n  \
     material phosphor-bronze  music-wire, stainless, phosphor-bronze, inconel\n  \
-    (Enter)                   stiffness and largest force that the hand felt since the previous command\n  \
+    (Enter)                   stiffness and largest force at the hand since the previous command\n  \
     ?                         all parameters\n  \
     q                         end of the session\n\n\
     Examples:\n  \
@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     watch.lock().meter = Some(KinematicsMeter::default());
     let description = describe(&scene, &options, session.plugins());
     let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
-    let hint = if publication.is_ok() { "; `flotor view` shows it and has sliders" } else { "" };
+    let hint = if publication.is_ok() { "; `flotor view` shows the session and has sliders" } else { "" };
     let mut prompt = Prompt {
         controls: session.controls(),
         registry,
@@ -98,7 +98,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     });
     let run = run.map_err(|_| RunError::NoThread("the exploration"))?;
     say!("{}", style::title(&scene.title));
-    say!("  type a parameter and its value; ? lists them, q ends{hint}");
+    say!("  type a parameter and its value; ? lists the parameters, q ends{hint}");
     let lines = lines_of(BufReader::new(stdin())).map_err(|error| CommandError::Failed(error.to_string()))?;
     while !(stop.is_stop_requested() || run.is_finished()) {
         match lines.recv_timeout(Duration::from_millis(50)) {
@@ -197,7 +197,7 @@ impl Prompt {
         let refused = self.watch.lock().refused.take();
         if let Some(Change { parameter, value, .. }) = refused {
             self.settings.truncate(self.settings.len() - changes.len());
-            return format!("  the model refused {parameter} = {value}: it contradicts its other values");
+            return format!("  the model rejected {parameter} = {value}, which contradicts its other values");
         }
         self.watch.lock().meter = Some(KinematicsMeter::default());
         std::thread::sleep(Duration::from_millis(700));
@@ -234,9 +234,9 @@ impl Prompt {
             let stiffness = felt.felt_stiffness_n_per_m;
             let at_hand = stiffness.map_or("no".to_owned(), |k| format!("{:.3} N/mm", k * 1.0e-3));
             let model = stiffness.map(|k| model_text(k, self.mapping)).unwrap_or_default();
-            format!("  felt at the hand: {at_hand} stiffness{model}, up to {:.2} N", felt.peak_force_n)
+            format!("  at the hand: {at_hand} stiffness{model}, up to {:.2} N", felt.peak_force_n)
         };
-        felt.and_then(|meter| meter.finish()).map_or("  nothing felt yet".to_owned(), words)
+        felt.and_then(|meter| meter.finish()).map_or("  no force at the hand yet".to_owned(), words)
     }
 }
 

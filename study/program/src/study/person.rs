@@ -59,7 +59,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         consent.chain(&common.instructions).map(|path| text_of(path)).collect::<Result<Vec<_>, _>>()?;
     let screen_texts = common.texts.as_deref().map(text_of).transpose()?;
     if screen_texts.is_some() && common.screen != ScreenOption::Viewer {
-        let why = "--texts is for the viewer's window; leave it out, or --screen";
+        let why = "--texts is for the viewer's window; omit --texts or --screen";
         return Err(CommandError::Usage(why.to_owned()));
     }
     let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
@@ -106,7 +106,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         attended = attended.with_answer_taken_back();
     }
     if let Some(times) = common.feel_again {
-        log.write(&Event::Note { text: format!("felt again {times} times a trial at most") })
+        log.write(&Event::Note { text: format!("at most {times} repetitions of a trial") })
             .map_err(failed)?;
         attended = attended.with_again_at_most(times);
     }

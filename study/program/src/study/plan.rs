@@ -25,7 +25,7 @@ const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
 
 #[derive(Args)]
 #[command(
-    after_help = "A study file has the task, what was decided beforehand, and options of that task by name:\n  \
+    after_help = "A study file has the task, the planned analysis, and options of the task by name:\n  \
     task = \"jnd\"\n  \
     analysis = \"mixed ANOVA of the Weber fractions, Holm's correction\"\n  \
     [options]\n  \
@@ -37,17 +37,19 @@ const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
     [exclusion]\n  \
     most_false_alarms = 0.5\n  \
     response_time_s = [0.2, 20]\n\n\
-    Exclusion rules, which `flotor analyse` applies. About a sitting, the largest or least share: most_false_alarms (of \
+    `flotor analyse` applies the exclusion rules. Rules for a sitting, each the largest or smallest valid share: \
+    most_false_alarms (of \
     catch trials), most_missed_obvious (of obvious pairs), most_wrong_at_large (of answers to 40 % and more), \
     least_agreement (of repeated pairs), most_retest_deviation (of repeated ratings), most_dont_know, \
-    most_missed_ticks, most_excluded_trials. About a trial: response_time_s = [shortest, longest], least_movement_mm; a \
-    trial of an adaptive track takes the track with it, unless the estimator is map.\n\n\
-    Planned options of `flotor analyse`, which says whether a result is as planned: estimator, type, ratings.\n\n\
+    most_missed_ticks, most_excluded_trials. Rules for a trial: response_time_s = [shortest, longest], \
+    least_movement_mm; an excluded trial of an adaptive track excludes the whole track, unless the estimator is \
+    map.\n\n\
+    Planned options of `flotor analyse`, which reports each deviation from the plan: estimator, type, ratings.\n\n\
     Examples:\n  \
     flotor study run weber.study.toml\n  \
     flotor study run weber.study.toml --observer human --subject 3\n  \
     flotor study run --observer human weber.study.toml\n  \
-    flotor study run                              the one study file here: begins, or goes on"
+    flotor study run                              the only study file of this folder: begins or resumes"
 )]
 pub(super) struct RunArguments {
     /// Study file (default: the one NAME.study.toml in this folder)
@@ -183,7 +185,10 @@ fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
         [] => Err(CommandError::Usage(format!("there is no NAME{ENDING} in this folder; name a study file"))),
         several => {
             let names: Vec<String> = several.iter().map(|file| file.display().to_string()).collect();
-            Err(CommandError::Usage(format!("several study files, name one: {}", names.join(", "))))
+            Err(CommandError::Usage(format!(
+                "there are several study files; name one of them: {}",
+                names.join(", ")
+            )))
         }
     }
 }
@@ -214,7 +219,9 @@ fn words(
         let name = key.replace('_', "-");
         let refuse = |why: String| CommandError::Usage(format!("{}: options.{key}: {why}", file.display()));
         if OF_THE_COMMAND_LINE.contains(&name.as_str()) {
-            return Err(refuse("belongs on the command line, after the name of the file".to_owned()));
+            return Err(refuse(
+                "is valid only on the command line, after the name of the study file".to_owned(),
+            ));
         }
         let option = known.iter().find(|option| option.get_long() == Some(&name)).ok_or_else(|| {
             let names = known.iter().filter_map(|option| option.get_long());
@@ -225,7 +232,7 @@ fn words(
         let value_of = |value: &toml::Value| match plain(value) {
             Some(text) if PATHS.contains(&name.as_str()) => Ok(folder.join(text).into_os_string()),
             Some(text) => Ok(OsString::from(text)),
-            None => Err(refuse(format!("a {} is no value of it", kind(value)))),
+            None => Err(refuse(format!("the option accepts no value of type {}", kind(value)))),
         };
         let values = match (value, option.get_action()) {
             (toml::Value::Boolean(is_set), clap::ArgAction::SetTrue) => {
@@ -379,10 +386,10 @@ mod tests {
             ("help = true", "options.help: `flotor study jnd` has no such option"),
             ("subjets = 3", "did you mean `subjects`?"),
             ("range = \"1-2\"", "options.range: `flotor study jnd` has no such option"),
-            ("subjects = true", "options.subjects: a boolean is no value of it"),
-            ("subjects = [3, 4]", "options.subjects: a list is no value of it"),
+            ("subjects = true", "options.subjects: the option accepts no value of type boolean"),
+            ("subjects = [3, 4]", "options.subjects: the option accepts no value of type list"),
             ("no_demo = 1", "options.no_demo: true or false"),
-            ("resume = true", "options.resume: belongs on the command line"),
+            ("resume = true", "options.resume: is valid only on the command line"),
         ] {
             let text = format!("task = \"jnd\"\n[options]\n{options}\n");
             let error = words(Path::new("a.study.toml"), &text, Vec::new()).expect_err(options).to_string();

@@ -9,8 +9,8 @@ use rayon::prelude::*;
 
 #[derive(Args)]
 #[command(
-    after_help = "Each study is one of simulated observers, as `flotor study jnd --apparatus none`, with the paired t-test of \
-    `flotor analyse` at a level of 5 %. --ratio 1 gives the rate of false alarms.\n\n\
+    after_help = "Each study has simulated observers, as `flotor study jnd --apparatus none`, and is tested with \
+    the paired t-test of `flotor analyse` at a level of 5 %. --ratio 1 gives the rate of false positives.\n\n\
     Examples:\n  \
     flotor study power --subjects 8..32\n  \
     flotor study power --subjects 16..16 --ratio 1.1 --replications 6 --runs 400"
@@ -22,7 +22,7 @@ pub(super) struct PowerArguments {
     /// Simulated studies of each size
     #[arg(long, default_value_t = 200, value_parser = count(10..=100_000_u32), value_name = "N")]
     runs: u32,
-    /// Threshold without vision in units of that with vision
+    /// Ratio of the threshold without vision to the threshold with vision
     #[arg(long, default_value_t = 1.21, value_parser = real, value_name = "RATIO")]
     ratio: f64,
     /// Share of trials answered without attention
@@ -43,8 +43,12 @@ pub(super) struct PowerArguments {
 
 /// Parses a range like `8..32`.
 fn sizes(text: &str) -> Result<(u16, u16), String> {
-    let wrong =
-        || format!("`{text}` is no range of subjects; write 8..32, from 3 to {}", SubjectNumber::MOST);
+    let wrong = || {
+        format!(
+            "`{text}` is not a range of subjects; write FEWEST..MOST such as 8..32, from 3 to {}",
+            SubjectNumber::MOST
+        )
+    };
     let (low, high) = text.split_once("..").ok_or_else(wrong)?;
     let number = |text: &str| text.trim().parse::<u16>().map_err(|_| wrong());
     let (low, high) = (number(low)?, number(high)?);
@@ -57,10 +61,10 @@ fn sizes(text: &str) -> Result<(u16, u16), String> {
 
 pub(super) fn run(arguments: &PowerArguments) -> Result<(), CommandError> {
     if !(0.1..=10.0).contains(&arguments.ratio) {
-        return Err(CommandError::Usage(format!("--ratio {}: it must be 0.1 to 10", arguments.ratio)));
+        return Err(CommandError::Usage(format!("--ratio {}: the ratio must be 0.1 to 10", arguments.ratio)));
     }
     if !(0.0..=0.5).contains(&arguments.lapse) {
-        return Err(CommandError::Usage(format!("--lapse {}: it must be 0 to 0.5", arguments.lapse)));
+        return Err(CommandError::Usage(format!("--lapse {}: the share must be 0 to 0.5", arguments.lapse)));
     }
     let protocol = JndProtocol {
         bases: arguments.bases.clone(),

@@ -55,7 +55,7 @@ pub(super) fn check(folder: &Path, need: Need) -> Result<(), CommandError> {
     };
     let words = |bytes: f64, what: &str| {
         let advice = if need.bytes_per_s > 0.0 {
-            "free some, or record less with --kinematics summary"
+            "free disk space, or record less with --kinematics summary"
         } else {
             "free some"
         };

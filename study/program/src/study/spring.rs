@@ -21,7 +21,7 @@ pub(super) struct SpringArguments {
     /// Measured force over length or compression (CSV)
     #[arg(value_name = "FILE.csv")]
     curve: PathBuf,
-    /// Length without load (default: the longest in the table; required for --scene if the table has compressions)
+    /// Length without load (default: the longest length in the table; required for --scene if the table has compressions)
     #[arg(long, value_parser = number("mm", "length", 0.01..=1000.0), value_name = "MM")]
     free_length_mm: Option<f64>,
     /// Diameter of the coil between wire centres, for the scene (default: spring 1 of the thesis)
@@ -33,7 +33,7 @@ pub(super) struct SpringArguments {
     /// Write a scene with the fitted spring, for `study jnd --scene` and `run`
     #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     scene: Option<PathBuf>,
-    /// Write a scene with the measured curve itself, and the table that it reads
+    /// Write a scene with the measured curve, and the table of the curve
     #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     curve_scene: Option<PathBuf>,
     #[command(flatten)]
@@ -118,7 +118,8 @@ fn picture(curve: &MeasuredCurve, fit: &SpringFit, served: &ServedCurve) -> Stri
         .series(Series::line("fitted spring", [0.0, 1.0].map(line)).slot(1))
         .series(Series::line("fitted here", FITTED.map(line)).slot(2))
         .series(
-            Series::line("served as measured", served.knots.iter().map(|(x_m, n)| (x_m * 1.0e3, *n))).slot(3),
+            Series::line("rendered measured curve", served.knots.iter().map(|(x_m, n)| (x_m * 1.0e3, *n)))
+                .slot(3),
         );
     Figure::new("A real spring", Axis::of("Compression", Quantity::Length))
         .subtitle(format!(
@@ -155,7 +156,7 @@ fn curve_scene(table: &Path, fit: &SpringFit, served: &ServedCurve, coil_diamete
     let deepest_m = served.knots.last().map_or(0.0, |(x_m, _)| *x_m);
     let (note, length_m) = match fit.free_length_m {
         Some(length_m) => ("", length_m),
-        None => ("# Not known, and for the drawing alone.\n", (DRAWN * deepest_m).max(1.0e-3)),
+        None => ("# Unknown; used only for the drawing.\n", (DRAWN * deepest_m).max(1.0e-3)),
     };
     let parameters = format!(
         "curve = {table:?}\n{note}free_length_mm = {:.6}\n{}",

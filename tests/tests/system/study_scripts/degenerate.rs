@@ -43,7 +43,7 @@ pub(super) const STUDIES: [Degenerate; 9] = [
         name: "all-wrong",
         task: Task::Pairs,
         subjects: 2,
-        line: "base not testable: no variation between subjects to test it against",
+        line: "base not testable: no variation between subjects, which the test requires",
         answer: WRONG,
     },
     Degenerate {
@@ -74,7 +74,7 @@ pub(super) const STUDIES: [Degenerate; 9] = [
         name: "two-alike",
         task: Task::Ratings,
         subjects: 2,
-        line: "stimulus not testable: no variation between subjects to test it against",
+        line: "stimulus not testable: no variation between subjects, which the test requires",
         answer: |_, stimulus, _| Response::Rating(stimulus.sqrt()),
     },
     Degenerate {
@@ -101,7 +101,7 @@ pub(super) const STUDIES: [Degenerate; 9] = [
         name: "one-higher-without-vision",
         task: Task::Ratings,
         subjects: 4,
-        line: "modality not testable: no variation between subjects to test it against",
+        line: "modality not testable: no variation between subjects, which the test requires",
         answer: |_, stimulus, modality| Response::Rating(stimulus + f64::from(modality as u8)),
     },
 ];

@@ -96,7 +96,7 @@ fn impossible_settings_are_refused() {
     );
     for floor in [0.0, -0.1] {
         let said = refused(|rule| rule.floor = floor);
-        let legal = "must be above 0 (no answer to equal stimuli is right) and below --ceiling";
+        let legal = "must be above 0 (equal stimuli have no correct answer) and below --ceiling";
         assert_eq!(said, format!("--floor {floor}: {legal}"));
     }
     assert_eq!(refused(|rule| rule.average_from = 9), "--average-from 9: must be 1 to --stop-after (8)");

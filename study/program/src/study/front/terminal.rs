@@ -114,7 +114,7 @@ fn others(trial: &TrialView) -> String {
         May::Practise => "; p practises first".to_owned(),
         May::Withdraw => "; u takes the last answer back".to_owned(),
         May::Again { left: None } => "; a repeats it".to_owned(),
-        May::Again { left: Some(left) } => format!("; a repeats it, {left} more times at most"),
+        May::Again { left: Some(left) } => format!("; a repeats it, at most {left} more times"),
     };
     trial.may.iter().map(key).collect()
 }

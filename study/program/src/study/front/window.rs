@@ -46,7 +46,7 @@ impl Window {
         let heard = lines_of(BufReader::new(output)).map_err(failed)?;
         // The first message reports the open window; without a window, the stream ends.
         if heard.recv().is_err() {
-            let why = "the viewer opened no window (its message is above); --screen terminal needs none";
+            let why = "the viewer opened no window (its message is above); use --screen terminal";
             return Err(CommandError::Usage(why.to_owned()));
         }
         Ok(Self { lines: JsonLines::new(heard, input), viewer })
