@@ -39,7 +39,7 @@ pub const STOP_KEYS: &str = "stop_keys";
 #[non_exhaustive]
 pub enum AccessError {
     /// A file could not be created.
-    #[error("{}: {cause}; keys are written once, into a folder you may write to", path.display())]
+    #[error("{}: {cause}; choose a new folder in a place where you may write: the command overwrites no keys", path.display())]
     File {
         /// Path of the file.
         path: PathBuf,
@@ -48,7 +48,10 @@ pub enum AccessError {
         cause: io::Error,
     },
     /// A member's name appears twice, or is reserved.
-    #[error("`{0}` is there twice: a peer has one right, and `bridge`, `authority` and `anyone` are taken")]
+    #[error(
+        "the name `{0}` is given twice or reserved (`bridge`, `authority`, `anyone`): give each peer another \
+    name and one right"
+    )]
     Twice(Name),
     /// A certificate could not be created.
     #[error("no certificate: {0}")]

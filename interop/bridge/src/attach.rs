@@ -28,7 +28,7 @@ impl Serve for RequestClient {
     /// Forwards the request to the remote host, and waits for the reply.
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         if matches!(ask, Ask::Swap { .. }) {
-            let words = "a model is swapped on the host's own machine, where its plugin's file is";
+            let words = "a remote model cannot be swapped; swap the model on the machine of the host, which has the plugin file";
             return Err((RefusalCause::Request, words.to_owned()));
         }
         let done = Request::of_ask(ask).map_or(Ok(()), |request| self.run(request));
@@ -61,7 +61,7 @@ pub fn attach(
         let lost = remote.lost() - lost_before;
         report_line(&match lost {
             0 => words.clone(),
-            lost => format!("{words}; {lost} ticks were lost on the way"),
+            lost => format!("{words}; the network lost {lost} ticks"),
         });
         publication.end(&words, kind);
     }
@@ -77,7 +77,7 @@ fn show(remote: &Remote, publication: &Publication, stop: &AtomicBool) -> End {
             Some(RemoteEvent::Change(change)) => publication.change(&change),
             Some(RemoteEvent::End(end)) => return end,
             Some(RemoteEvent::Gone) => {
-                let words = "the bridge cannot be seen any more".to_owned();
+                let words = "the bridge is no longer reachable".to_owned();
                 return End { words, kind: EndKind::Failed };
             }
         }

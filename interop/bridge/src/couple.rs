@@ -149,14 +149,14 @@ impl Couplers {
         self.here.retain(|coupling, coupler| {
             let is_on = !coupler.thread.as_ref().is_none_or(JoinHandle::is_finished);
             if !is_on {
-                report(&format!("the coupling `{coupling}` is gone: its run is over"));
+                report(&format!("the coupling `{coupling}` has ended with its run"));
             }
             is_on
         });
         for found in self.directory.couplings() {
             if !self.here.contains_key(&found.name) {
                 report(&format!(
-                    "carrying the peer state of the coupling `{}` (process {})",
+                    "forwarding the peer state of the coupling `{}` (process {})",
                     found.name, found.process
                 ));
                 let coupler = Coupler::start(&self.session, &self.directory, &self.name, self.side, &found)?;
@@ -201,7 +201,7 @@ pub fn couple(
         let held = couplers.held_by_others();
         for coupling in held.iter().filter(|coupling| !reported.contains(coupling)) {
             report(&format!(
-                "the other end of `{coupling}` is the partner of another run: the one here has none"
+                "the other end of `{coupling}` is coupled to another run, so the run here has no partner"
             ));
         }
         reported = held;
@@ -209,7 +209,7 @@ pub fn couple(
             let (last, was_received) = before.get(&coupling).copied().unwrap_or_default();
             let is_received = now.received > last.received;
             if is_received != was_received {
-                let words = if is_received { "is heard" } else { "cannot be heard any more" };
+                let words = if is_received { "sends messages" } else { "sends no messages any more" };
                 report(&format!("the other end of `{coupling}` {words}"));
             }
             before.insert(coupling, (now, is_received));

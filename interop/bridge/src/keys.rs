@@ -28,7 +28,7 @@ pub struct Name(String);
 
 /// The text is no valid name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("`{0}` is no name: letters a to z, digits and hyphens, at most 40")]
+#[error("invalid name `{0}`: use letters a to z, digits and hyphens, at most 40")]
 pub struct NoName(String);
 
 impl Name {

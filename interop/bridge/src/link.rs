@@ -21,7 +21,7 @@ pub const MEMBER: &str = "member";
 /// Command line options of a session.
 #[derive(Args, Clone, Debug, Default)]
 pub struct LinkOptions {
-    /// Zenoh configuration (JSON5): endpoints, keys, access control; `flotor bridge keys` writes some
+    /// Zenoh configuration (JSON5): endpoints, keys, access control; `flotor bridge keys` writes configurations
     #[arg(long, value_name = "FILE", global = true)]
     pub config: Option<PathBuf>,
     /// Endpoint to listen on, such as tls/0.0.0.0:7447 (repeatable)
@@ -30,7 +30,7 @@ pub struct LinkOptions {
     /// Endpoint to connect to, such as tls/lab.example.org:7447 (repeatable)
     #[arg(long, value_name = "ENDPOINT", global = true)]
     pub connect: Vec<String>,
-    /// Listen or connect beyond this machine without keys: every peer there has the rights of --allow
+    /// Listen or connect beyond this machine without keys: every reachable peer has the rights of --allow
     #[arg(long, global = true)]
     pub without_keys: bool,
 }
@@ -48,25 +48,26 @@ pub enum LinkError {
         reason: String,
     },
     /// A private key is readable by other users: a reader of the key is a member for as long as the certificate is valid.
-    #[error("other users may read the key in {}; `chmod 600 {}`, and if another user may have read the file, make new keys", file.display(), file.display())]
+    #[error("other users may read the key in {}; `chmod 600 {}`, and make new keys if another user may have read \
+    the file", file.display(), file.display())]
     ExposedKey {
         /// Path of the file with the key.
         file: PathBuf,
     },
     /// An endpoint is open to other users, and without keys they would have all rights of `--allow`.
     #[error(
-        "`{endpoint}` is open to others, and only keys distinguish members: `flotor bridge keys` makes some for --config, or say \
-         --without-keys as well"
+        "`{endpoint}` is open to other users, and only keys distinguish members: make keys for --config with \
+         `flotor bridge keys`, or add --without-keys"
     )]
     WithoutKeys {
         /// Offending endpoint.
         endpoint: String,
     },
     /// The session cannot be opened.
-    #[error("cannot open the session: {0}; is the endpoint free, and the peer there?")]
+    #[error("cannot open the session: {0}; check that the endpoint is free and the peer is running")]
     Open(String),
     /// The network refuses an operation.
-    #[error("the network refuses: {0}")]
+    #[error("network error: {0}")]
     Network(String),
 }
 

@@ -20,20 +20,21 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// Put a running host on a network (Zenoh), or bring one from there to this machine
+/// Publish a running host on a network (Zenoh), or show a remote host on this machine
 #[derive(Parser)]
 #[command(
     name = "flotor bridge",
     version,
     subcommand_required = true,
     after_help = "Without --config, --listen and --connect only programs of this user are reached: a bridge listens on a socket in\n\
-    the folder of the user's runs, and visitors go there. For others, `flotor bridge keys` writes keys and configurations.\n\n\
+    the folder of the user's runs, and visitors connect there. For other users, `flotor bridge keys` writes keys \
+    and configurations.\n\n\
     Examples:\n  \
-    flotor bridge serve --name lab                        whatever runs here, for others to see\n  \
-    flotor bridge list                                    who is there\n  \
-    flotor bridge attach lab                              then `flotor view` shows it here\n  \
+    flotor bridge serve --name lab                        publish every run of this machine\n  \
+    flotor bridge list                                    bridges on the network\n  \
+    flotor bridge attach lab                              then `flotor view` shows the run here\n  \
     flotor bridge record lab run.mcap\n  \
-    flotor bridge couple lab                              two hands, two hosts: see the book, Several devices\n  \
+    flotor bridge couple lab                              couple two hands on two hosts (book: Several devices)\n  \
     flotor bridge ask lab emergency-stop\n  \
     flotor bridge keys keys --host lab.example.org --own ada --operate grace --watch alan\n  \
     flotor bridge serve --name lab --config keys/bridge.json5 --allow own --scene scene.toml"
@@ -47,19 +48,19 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Put whatever runs on this machine on the network, run after run
+    /// Publish each run of this machine on the network
     Serve(ServeArguments),
-    /// Show a remote run on this machine, where `flotor view` finds it
+    /// Republish a remote run on this machine, for `flotor view`
     Attach {
         /// The bridge
         name: Name,
     },
-    /// Couple a hand here to a remote one: carry the peer state of couplings with `partner = "elsewhere"`
+    /// Couple a hand here to a remote hand: forward the peer state of couplings with `partner = "elsewhere"`
     Couple {
         /// The bridge
         name: Name,
     },
-    /// Record a remote run, from now to its end
+    /// Record a remote run until it ends
     Record {
         /// The bridge
         name: Name,
@@ -85,7 +86,7 @@ struct ServeArguments {
     /// Name of this bridge on the network (default: the machine's name)
     #[arg(long)]
     name: Option<Name>,
-    /// Highest right whose requests are accepted; the network's access control decides per member
+    /// Highest right whose requests are accepted; the access control of the network sets the right of each member
     #[arg(long, value_enum, default_value = "watch")]
     allow: Allow,
     /// A scene that may be started from the network, with `--allow own`
@@ -98,9 +99,9 @@ struct ServeArguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Allow {
-    /// See everything, press the emergency stop
+    /// Observe a run and press the emergency stop
     Watch,
-    /// Also change parameters, end a run in order
+    /// Also change parameters and stop a run in the normal way
     Operate,
     /// Also start the scene, release an emergency stop
     Own,
@@ -108,11 +109,11 @@ enum Allow {
 
 #[derive(Subcommand)]
 enum RequestArgument {
-    /// No force at once; the run is over
+    /// Emergency stop: the force is zero at once, and the run ends
     EmergencyStop,
-    /// An orderly end: force fades out
+    /// Normal stop: the force fades out
     Stop,
-    /// Change live parameters, all before the same tick
+    /// Change live parameters, all in the same tick
     Set {
         /// PLUGIN.KEY=VALUE
         #[arg(required = true, value_name = "PLUGIN.KEY=VALUE", value_parser = set_value)]
@@ -203,7 +204,8 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             report_keys(&session, &mut report_line);
             if let (None, Some(endpoint)) = (&link.config, link.open_to_others()) {
                 report_line(&format!(
-                    "without keys: whoever reaches {endpoint}, on this machine every user, has the rights of --allow"
+                    "without keys: every user who can reach {endpoint}, including all users of this machine, has \
+                     the rights of --allow"
                 ));
             }
             report_line(&format!("zenoh/{}: waiting for a run on this machine (Ctrl-C ends)", service.name));
@@ -216,7 +218,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         }
         Command::Couple { name } => {
             let session = visit(link)?;
-            report_line(&format!("waiting for a coupling to hold with zenoh/{name} (Ctrl-C ends)"));
+            report_line(&format!("waiting for a coupling with zenoh/{name} (Ctrl-C ends)"));
             couple(&session, &directory, &name, &stop, &mut report_line)?;
         }
         Command::Record { name, file } => {
@@ -226,10 +228,10 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             let words = match &recorded.end {
                 RecordingEnd::Over(words) => words,
                 RecordingEnd::Stopped => "stopped recording",
-                RecordingEnd::Cut => "the bridge cannot be seen any more",
+                RecordingEnd::Cut => "the bridge is no longer reachable",
             };
             let shown = format!(
-                "{}: {} ticks, {} lost on the way; {words}",
+                "{}: {} ticks, {} lost by the network; {words}",
                 file.display(),
                 recorded.ticks,
                 recorded.lost
@@ -237,7 +239,8 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             println!("{}", escaped(&shown));
             if recorded.end == RecordingEnd::Cut {
                 return Err(
-                    "the recording ends before the run has told its end; what had come is in the file".into(),
+                    "the recording ends before the run; the file contains the ticks received until then"
+                        .into(),
                 );
             }
         }
@@ -255,7 +258,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             let names = bridges(&session)?;
             if names.is_empty() {
                 report_line(
-                    "no bridge can be seen; `flotor bridge serve` starts one, --connect says where to look",
+                    "no bridge found; start a bridge with `flotor bridge serve`, or give its endpoint with --connect",
                 );
             }
             for name in names {
@@ -286,13 +289,13 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
 fn report_keys(link: &Link, report_line: &mut dyn FnMut(&str)) {
     if link.lacks_stop_keys() {
         report_line(
-            "the keys have no stop key: an emergency stop of a new member waits while others flood the bridge with connections; \
-             `flotor bridge keys` makes new ones, for the bridge and all members",
+            "the keys have no stop key, so a flood of connections can delay the emergency stop of a new member; \
+             make new keys for the bridge and all members with `flotor bridge keys`",
         );
     }
     const SOON_DAYS: u64 = 30;
     if let Some(days) = link.days_left().filter(|days| *days < SOON_DAYS) {
-        report_line(&format!("the keys are good for {days} more days; `flotor bridge keys` makes new ones"));
+        report_line(&format!("the keys expire in {days} days; make new keys with `flotor bridge keys`"));
     }
 }
 

@@ -58,7 +58,7 @@ pub fn record(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<Recorde
             Some(RemoteEvent::Tick(record)) => {
                 let lost = remote.lost();
                 if lost > recorded.lost {
-                    let text = format!("{} ticks were lost on the way here", lost - recorded.lost);
+                    let text = format!("the network lost {} ticks", lost - recorded.lost);
                     let source = "flotor bridge".to_owned();
                     recorder.note(&Note {
                         time_ns: record.time_ns,

@@ -191,7 +191,7 @@ impl RequestClient {
             if status.allow < right {
                 let word = request.key().trim_start_matches("ask/");
                 return Err(format!(
-                    "the bridge `{}` does not take `{word}`; `flotor bridge serve --allow` says what it takes",
+                    "the bridge `{}` rejects `{word}`; `flotor bridge serve --allow` sets the requests that a bridge accepts",
                     self.name
                 ));
             }
@@ -232,8 +232,8 @@ impl RequestClient {
 }
 
 /// Error text for a missing reply, with the possible causes.
-const NOBODY_ANSWERS: &str = "nobody answers: the bridge is gone, or does not take this request, or not from this peer; \
-                              `flotor bridge serve --allow` and the network's access control say who may";
+const NOBODY_ANSWERS: &str = "no reply: the bridge has ended, or rejects this request or this peer; check `flotor \
+bridge serve --allow` and the access control of the network";
 
 /// Replies to a query.
 type Answers = FifoChannelHandler<Reply>;

@@ -160,22 +160,24 @@ impl NumberedRequest {
 #[serde(rename_all = "kebab-case")]
 pub enum Refusal {
     /// Not a request, or on the wrong key.
-    #[error("this is no request that belongs on this key")]
+    #[error("malformed request, or request on the wrong key; use both programs from one build")]
     Malformed,
     /// Longer than [`MAX_REQUEST_BYTES`].
-    #[error("longer than {MAX_REQUEST_BYTES} bytes, which no request is")]
+    #[error("the request is longer than {MAX_REQUEST_BYTES} bytes; use both programs from one build")]
     TooLong,
     /// Number not higher than that of the session's last request.
-    #[error("a request with this number, or a higher one, came before: requests are valid once")]
+    #[error(
+        "the number of the request is not above the previous number, and each request is valid once; send a new request"
+    )]
     Replayed,
     /// Meant for a run that has ended, or there is no run.
-    #[error("no run is on, or not the one that was meant")]
+    #[error("no run is active, or the request was for another run; try again")]
     Stale,
     /// Based on a ticket of an earlier start of the bridge, or too old.
-    #[error("asked too long ago, or before the bridge started; ask again")]
+    #[error("the request is too old, or from before the start of the bridge; send a new request")]
     Expired,
     /// Too many requests are pending.
-    #[error("too many requests wait for the host's answer; ask again")]
+    #[error("too many requests are pending; try again")]
     Busy,
 }
 

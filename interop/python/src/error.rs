@@ -7,7 +7,7 @@ pyo3::create_exception!(
     flotor,
     FlotorError,
     PyException,
-    "Something Flotor refuses or cannot do; the text says what, where and what to do."
+    "Error of Flotor; the text has place, cause and remedy."
 );
 
 /// Remedies for the command line, and their replacements in Python: the wheel has no command.

@@ -125,9 +125,7 @@ impl Model {
     ) -> PyResult<()> {
         // NumPy accepts any address for a record, with a flag for misaligned data; a slice requires alignment.
         if !(inputs.data().is_aligned() && outputs.data().is_aligned()) {
-            return Err(refuse(
-                "inputs or outputs do not lie on a multiple of 8 bytes; pass a copy of the array",
-            ));
+            return Err(refuse("inputs or outputs are not aligned to 8 bytes; pass a copy of the array"));
         }
         let inputs = InputRow::peel(inputs.as_slice()?);
         // NumPy distinguishes views of one array, but not two arrays on one buffer.
@@ -140,13 +138,15 @@ impl Model {
         let outputs = OutputRow::peel_mut(outputs.as_slice_mut()?);
         if inputs.len() != outputs.len() {
             let (rows, room) = (inputs.len(), outputs.len());
-            return Err(refuse(format!("{rows} inputs and room for {room} outputs; give as many")));
+            return Err(refuse(format!(
+                "{rows} inputs, but {room} rows for outputs; pass arrays with the same number of rows"
+            )));
         }
         py.detach(|| {
             let mut instance = self.lock()?;
             match instance.step_batch(inputs, outputs) {
                 CallStatus::Ok => Ok(()),
-                _ => Err(refuse(format!("the model stopped answering: {}", instance.last_message()))),
+                _ => Err(refuse(format!("the model failed: {}", instance.last_message()))),
             }
         })
     }
@@ -161,7 +161,7 @@ impl Model {
         let poses = poses.as_array();
         if poses.ncols() != 6 {
             return Err(refuse(format!(
-                "poses have {} columns; they are x_m, y_m, z_m, rx_rad, ry_rad, rz_rad",
+                "poses have {} columns; pass six columns x_m, y_m, z_m, rx_rad, ry_rad, rz_rad",
                 poses.ncols()
             )));
         }
@@ -197,7 +197,7 @@ impl Model {
             Ok(instance) => Ok(instance),
             Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
             Err(TryLockError::WouldBlock) => Err(refuse(
-                "a thread stepped this model when the process was forked; make a new one here, or start processes by \"spawn\"",
+                "a thread stepped this model when the process was forked; create a new model here, or start processes by \"spawn\"",
             )),
         }
     }

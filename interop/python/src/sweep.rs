@@ -40,8 +40,9 @@ impl Sweep {
     /// Executes a task unless it is finished, and stores its rows; without the GIL.
     fn do_task(&self, py: Python<'_>, number: usize) -> PyResult<()> {
         let task = self.tasks.get(number);
-        let task =
-            task.ok_or_else(|| refuse(format!("there is no task {number}, only {}", self.tasks.len())))?;
+        let task = task.ok_or_else(|| {
+            refuse(format!("task {number} does not exist; the sweep has {} tasks", self.tasks.len()))
+        })?;
         py.detach(|| {
             if self.store.holds(task) {
                 return Ok(());

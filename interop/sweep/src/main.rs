@@ -18,7 +18,7 @@ use std::sync::atomic::AtomicBool;
 #[derive(Parser)]
 #[command(name = "flotor sweep", version, max_term_width = 110)]
 #[command(
-    after_help = "A sweep that was stopped or killed goes on where it was: finished tasks are kept in OUT/tasks.\n\n\
+    after_help = "A sweep that was stopped or killed resumes with the next start: finished tasks are stored in OUT/tasks.\n\n\
     Examples:\n  \
     flotor sweep plan.toml\n  \
     flotor sweep plan.toml --out results --jobs 4 --plot force.svg --draw peak_force_n"
@@ -29,7 +29,7 @@ struct Arguments {
     /// Folder of finished tasks and results.parquet (default: the plan's name without .toml)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Tasks at a time (default: one a core)
+    /// Number of parallel tasks (default: one per core)
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
     /// Draw the results as SVG

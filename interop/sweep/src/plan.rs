@@ -212,7 +212,9 @@ impl Plan {
         let layout = match (file.layout, file.points) {
             (LayoutText::Grid, None) => Layout::Grid,
             (LayoutText::Grid, Some(_)) => {
-                return Err(unfit("`points` belongs to layout = \"sobol\"; a grid has steps".into()));
+                return Err(unfit(
+                    "`points` is only for layout = \"sobol\"; in a grid, set `steps` of each axis".into(),
+                ));
             }
             (LayoutText::Sobol, Some(points)) => Layout::Sobol { points, seed: file.layout_seed },
             (LayoutText::Sobol, None) => {
@@ -233,31 +235,34 @@ impl Plan {
 
     fn check(&self) -> Result<(), String> {
         if self.axes.is_empty() {
-            return Err("nothing varies: add [[axis]] with key and values".into());
+            return Err("the plan has no axis; add [[axis]] with key and values".into());
         }
         if let Some(repeated) =
             self.axes.iter().enumerate().find(|(at, axis)| self.axes[..*at].iter().any(|a| a.key == axis.key))
         {
-            return Err(format!("`{}` is an axis twice", repeated.1.key));
+            return Err(format!("`{}` is the key of two axes; remove one", repeated.1.key));
         }
         if let Some(large) = self.seeds.iter().find(|seed| **seed > LARGEST_SEED) {
             return Err(format!("the seed {large} is larger than {LARGEST_SEED} (2^53)"));
         }
         if self.seeds.is_empty() || self.block == 0 {
-            return Err("`seeds` needs one at least, and `block` is at least 1".into());
+            return Err("`seeds` needs at least one seed, and `block` must be 1 or more".into());
         }
         if let Question::Run { .. } = self.question
             && let Some(axis) = self.axes.iter().find(|axis| !axis.key.contains('.'))
         {
             return Err(format!(
-                "`{}` is no setting of a scene; write PLUGIN.KEY, like spring.gamma_n",
+                "`{}` is not a setting of a scene; write PLUGIN.KEY, like spring.gamma_n",
                 axis.key
             ));
         }
         if let Layout::Sobol { .. } = self.layout {
             let most = flotor_lab::sampling::DIMENSIONS;
             if self.axes.len() > most {
-                return Err(format!("{} axes; Sobol's sequence here has {most} dimensions", self.axes.len()));
+                return Err(format!(
+                    "{} axes are too many; the Sobol sequence has at most {most} dimensions",
+                    self.axes.len()
+                ));
             }
             if let Some(axis) = self.axes.iter().find(|axis| !matches!(axis.values, Values::Range { .. })) {
                 return Err(format!("`{}` lists values; layout = \"sobol\" needs from and to", axis.key));
@@ -265,7 +270,7 @@ impl Plan {
         }
         match self.row_count() {
             Some(1..=MOST_ROWS) => Ok(()),
-            Some(0) => Err("the plan has no points".into()),
+            Some(0) => Err("the plan has no points; give each axis at least one value".into()),
             _ => Err(format!("the plan has more than {MOST_ROWS} rows; split it")),
         }
     }
@@ -312,10 +317,14 @@ impl AxisText {
             (None, Some(words), None, None) => Values::Words(words),
             (None, None, Some(from), Some(to)) => {
                 if !(from.is_finite() && to.is_finite() && from < to) {
-                    return Err(format!("axis `{key}`: from {from} to {to} is no interval"));
+                    return Err(format!(
+                        "axis `{key}`: `from` = {from} must be finite and below `to` = {to}"
+                    ));
                 }
                 if scale == Scale::Log && from <= 0.0 {
-                    return Err(format!("axis `{key}`: a logarithmic range starts above 0, not at {from}"));
+                    return Err(format!(
+                        "axis `{key}`: a logarithmic range must start above 0, not at {from}"
+                    ));
                 }
                 Values::Range { from, to, steps: steps.unwrap_or(2).max(2), scale }
             }

@@ -18,7 +18,7 @@ use std::sync::Arc;
 #[non_exhaustive]
 pub enum TableError {
     /// Some tasks are not finished.
-    #[error("{open} of {all} tasks are not finished; run the sweep again to go on")]
+    #[error("{open} of {all} tasks are not finished; run the sweep again to resume")]
     Unfinished {
         /// Number of unfinished tasks.
         open: usize,

@@ -450,7 +450,7 @@ fn nothing_a_program_does_gets_past_the_limits_or_takes_report_and_recording_wit
         match *way {
             "steps" | "huge" => assert!(largest_n > 0.9 * MOST_N, "{way}: only {largest_n} N"),
             "nan" => assert!(ran.stdout.contains("refused, not finite"), "{ran:?}"),
-            "stall" => assert!(ran.stdout.contains("expired for want of another"), "{ran:?}"),
+            "stall" => assert!(ran.stdout.contains("expired without a newer wrench"), "{ran:?}"),
             "fork" => assert!(ran.stdout.contains("child 0\n"), "{ran:?}"),
             "kill" | "crash" => assert!(ran.stdout.contains("s so far"), "{ran:?}"),
             _ => {}

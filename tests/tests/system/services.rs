@@ -405,7 +405,7 @@ fn the_force_of_a_client_that_stalls_or_dies_fades() {
     std::thread::sleep(Duration::from_millis(400));
     assert_eq!(vector(&state(&watcher.ask("{}"))["current_cursor_force"]), DVec3::ZERO);
     let summary = service.end();
-    assert!(summary.contains("expired for want of another"), "{summary}");
+    assert!(summary.contains("expired without a newer wrench"), "{summary}");
 }
 
 #[test]

@@ -40,10 +40,9 @@ impl Emergency {
 
     /// Presses the latch first: a run that is not visible yet checks the latch before it energises a device.
     pub(super) fn press(&self, who: &str, answer: SendAnswer) {
-        let problem =
-            self.latch.press(who).err().map(|error| {
-                format!("the emergency stop does not stay: a later run is not refused: {error}")
-            });
+        let problem = self.latch.press(who).err().map(|error| {
+            format!("the emergency stop was not stored, so it does not prevent a later run: {error}")
+        });
         let _ = self.pressed.try_send((answer, problem));
     }
 }
@@ -56,11 +55,13 @@ fn attend(latch: &Latch, waiting: &Receiver<(SendAnswer, Option<String>)>) {
             Ok(unconfirmed) => {
                 let processes: Vec<String> = unconfirmed.iter().map(u32::to_string).collect();
                 Some(format!(
-                    "not confirmed by process {}: it may go on; switch its device off",
+                    "not confirmed by process {}, which may still run: switch its device off",
                     processes.join(", ")
                 ))
             }
-            Err(error) => Some(format!("the runs cannot be asked: {error}; check that each has stopped")),
+            Err(error) => {
+                Some(format!("the state of the runs is unknown: {error}; check that each has stopped"))
+            }
         };
         for (answer, problem) in together {
             answer(missing.clone().or(problem));

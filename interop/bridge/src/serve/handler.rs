@@ -182,7 +182,7 @@ impl RequestHandler {
         inside.status.run = 0;
         inside.status.title.clear();
         for (query, _) in inside.run.take().into_iter().flat_map(|run| run.open.into_values()) {
-            reply(&query, Some("the run ended before the host answered".to_owned()));
+            reply(&query, Some("the run ended before the host replied".to_owned()));
         }
     }
 
@@ -233,7 +233,7 @@ impl RequestHandler {
             run.open.retain(|_, (query, since)| {
                 let is_late = since.elapsed() > ANSWER_WAIT;
                 if is_late {
-                    reply(query, Some("the host does not answer".to_owned()));
+                    reply(query, Some("the host does not reply".to_owned()));
                 }
                 !is_late
             });
@@ -342,7 +342,7 @@ impl Inside {
                 }
                 Err(error) => reply(&query, Some(error.to_string())),
             },
-            (Some(_), None) => reply(&query, Some("no host runs".to_owned())),
+            (Some(_), None) => reply(&query, Some("no host is running; start a run first".to_owned())),
             (None, _) => {
                 let done = match request {
                     Request::Release => self
@@ -359,13 +359,15 @@ impl Inside {
 
     fn start(&mut self) -> Result<(), String> {
         if let Some(pressed) = self.latch.state().pressed {
-            return Err(format!("the emergency stop is pressed ({pressed}); its owner releases it first"));
+            return Err(format!(
+                "the emergency stop is pressed ({pressed}); its owner has to release the emergency stop first"
+            ));
         }
         if self.run.is_some() {
-            return Err("a run is on; stop it first".to_owned());
+            return Err("a run is active; stop the run first".to_owned());
         }
         let launcher = self.launcher.as_mut();
-        launcher.ok_or("the bridge has no scene to start; `--scene FILE` names one")?.start()
+        launcher.ok_or("the bridge has no scene to start; start the bridge with `--scene FILE`")?.start()
     }
 }
 

@@ -22,10 +22,10 @@ impl Launcher {
     /// Starts the scene.
     ///
     /// # Errors
-    /// The cause as text: the scene runs already, or the system refuses.
+    /// The cause as text: the scene is running already, or the system refuses.
     pub fn start(&mut self) -> Result<(), String> {
         if self.runs() {
-            return Err("the scene runs already".to_owned());
+            return Err("the scene is running already".to_owned());
         }
         let mut command = Command::new(&self.program);
         command.arg("run").arg(&self.scene).stdin(Stdio::null()).stdout(Stdio::null());

@@ -37,7 +37,7 @@ const CHECK_PERIOD: Duration = Duration::from_millis(100);
 pub struct Service {
     /// Name of the bridge on the network.
     pub name: Name,
-    /// Highest right whose requests are accepted; the network's access control decides per member.
+    /// Highest right whose requests are accepted; the access control of the network sets the right of each member.
     pub allow: Right,
     /// Decimation of the ticks: one in `every` is published.
     pub every: u32,
@@ -65,7 +65,8 @@ pub fn serve(
     let opened = session.stop_channel().map(|stop| stop_channel::open(stop, &name, directory)).transpose();
     let _stop_channel = opened.unwrap_or_else(|error| {
         report_line(&format!(
-            "a new member's emergency stop waits for the connections before it: no UDP port of the same number: {error}"
+            "no UDP port with the number of the TCP port, so earlier connections can delay the emergency stop of a \
+             new member: {error}"
         ));
         None
     });
@@ -84,7 +85,7 @@ pub fn serve(
                     client.greeting().process
                 ));
                 relay.carry(client, report_line)?;
-                report_line("the run is over; waiting for the next");
+                report_line("the run is over; waiting for the next run");
             }
             Err(LiveError::NoRun { .. }) => {}
             Err(error) => {

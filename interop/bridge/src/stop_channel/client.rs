@@ -70,7 +70,7 @@ fn press(stop: &StopChannel, bridge: &Name) -> Result<(), String> {
 fn outcome(answers: &Receiver<Result<Option<String>, String>>) -> Result<(), String> {
     let mut until = Instant::now() + 2 * ANSWER_WAIT;
     let mut is_done = false;
-    let mut problem = "no endpoint has a stop channel".to_owned();
+    let mut problem = "no endpoint offers a stop channel".to_owned();
     loop {
         match answers.recv_timeout(until.saturating_duration_since(Instant::now())) {
             Ok(Ok(Some(refused))) => return Err(refused),
@@ -108,7 +108,8 @@ fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Optio
     // Any press may be answered; the reply to the last one comes after the hosts have confirmed.
     let mut presses: Vec<Nonce> = Vec::new();
     while Instant::now() < until {
-        let datagram = pending.sealed(&stop.keys).ok_or_else(|| io::Error::other("there is no stop key"))?;
+        let datagram =
+            pending.sealed(&stop.keys).ok_or_else(|| io::Error::other("the keys have no stop key"))?;
         for (socket, places) in &sockets {
             for place in places {
                 // Without a listener the next system call reports the error.

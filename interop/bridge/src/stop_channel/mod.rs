@@ -64,8 +64,9 @@ impl StopKeys {
     /// # Errors
     /// Errors of the file; `InvalidData` for a malformed or empty file.
     pub(crate) fn read(path: &Path) -> io::Result<Self> {
-        let malformed =
-            || io::Error::new(ErrorKind::InvalidData, "not a stop key; `flotor bridge keys` makes new ones");
+        let malformed = || {
+            io::Error::new(ErrorKind::InvalidData, "not a stop key; make new keys with `flotor bridge keys`")
+        };
         let text = std::fs::read_to_string(path)?;
         let keys = text.lines().map(|line| {
             let (name, digits) = line.split_once(' ')?;
@@ -85,7 +86,7 @@ fn bytes_of(digits: &str) -> Option<Vec<u8>> {
 /// Returns a line of a stop key file: a new key for a member.
 ///
 /// # Errors
-/// If the system has no random numbers.
+/// If the system provides no random numbers.
 pub(crate) fn new_key_line(member: &str) -> io::Result<String> {
     let mut line = format!("{member} ");
     for byte in random::<KEY_BYTES>()? {
@@ -98,7 +99,9 @@ pub(crate) fn new_key_line(member: &str) -> io::Result<String> {
 
 fn random<const COUNT: usize>() -> io::Result<[u8; COUNT]> {
     let mut bytes = [0; COUNT];
-    SystemRandom::new().fill(&mut bytes).map_err(|_| io::Error::other("the system has no random numbers"))?;
+    SystemRandom::new()
+        .fill(&mut bytes)
+        .map_err(|_| io::Error::other("the system provides no random numbers"))?;
     Ok(bytes)
 }
 

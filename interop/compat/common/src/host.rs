@@ -58,7 +58,9 @@ pub fn host() -> Option<&'static Host> {
 /// The reason why the scene cannot be run, one line.
 pub fn prepare(settings: Settings, stop: &StopSwitch) -> Result<&'static Host, String> {
     let prepared = Host::prepare(settings, stop)?;
-    HOST.get_or_init(|| Some(prepared)).as_ref().ok_or_else(|| "there is a run already".to_owned())
+    HOST.get_or_init(|| Some(prepared))
+        .as_ref()
+        .ok_or_else(|| "this process already has a run; use another process".to_owned())
 }
 
 /// Returns the run of this process, if prepared already. Not real-time.
@@ -237,7 +239,7 @@ impl Host {
             guarded((), || prepared.run(&stop, stations_so_far()));
         };
         let Ok(thread) = thread.spawn(run) else {
-            report_line("there is no thread for the run");
+            report_line("cannot start a thread for the run");
             return Stage::Over;
         };
         let since = Instant::now();
@@ -274,8 +276,8 @@ impl Host {
         if self.pace == Pace::Lockstep && reads >= READS_OF_A_TICK {
             WARNING.call_once(|| {
                 report_line(&format!(
-                    "in lockstep the commands of the program make the ticks; this program only reads, so each \
-                     {READS_OF_A_TICK}th read makes a tick"
+                    "in lockstep each command of the program starts a tick; this program only reads, so each \
+                     {READS_OF_A_TICK}th read starts a tick"
                 ));
             });
             before_tick();

@@ -308,7 +308,7 @@ fn line(station: &Station, requested: Asked) -> String {
     }
     if counts.lapses > 0 {
         line += &format!(
-            "; {} expired for want of another, faded for {} ticks",
+            "; {} expired without a newer wrench, faded for {} ticks",
             counts.lapses, counts.lapsed_ticks
         );
     }

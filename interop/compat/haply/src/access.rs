@@ -25,9 +25,9 @@ enum Hosts {
 /// Reason of a refused connection.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Forbidden {
-    #[error("pages of `{0}` may not connect; `--allow-origin {0}` permits it")]
+    #[error("pages of `{0}` may not connect; allow the connection with `--allow-origin {0}`")]
     Origin(String),
-    #[error("`{0}` is no name of this machine; connect to 127.0.0.1 or localhost")]
+    #[error("`{0}` is not a name of this machine; connect to 127.0.0.1 or localhost")]
     Host(String),
 }
 

@@ -70,7 +70,7 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
                 let all = settings.iter().all(|(key, value)| shared.keep_setting(key, value));
                 if all { (200, json!({ "ok": true })) } else { no_room() }
             }
-            _ => failed(400, "settings are an object"),
+            _ => failed(400, "the settings must be a JSON object"),
         },
         (_, ["settings", key]) => setting(service, method, key, body),
         ("POST", ["save_configuration"] | ["ports", _, "reset"]) => (200, json!({ "ok": true })),
@@ -80,12 +80,12 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
         (_, [kind, device, "state", "transform"]) => {
             configured(service, method, [kind, device], "transform", query, body)
         }
-        _ => failed(404, "there is no such route"),
+        _ => failed(404, "unknown route"),
     }
 }
 
 fn no_room() -> Answer {
-    failed(507, "there is no room for more settings; delete some")
+    failed(507, "too many settings; delete some settings")
 }
 
 fn version() -> Value {
@@ -105,7 +105,7 @@ fn devices(service: &Service) -> Value {
 fn session(service: &Service, method: &str, id: &str, rest: &[&str], body: &Value) -> Answer {
     let mut shared = service.shared();
     let own = id.parse().ok().and_then(|id| shared.session_mut(id));
-    let Some(own) = own else { return failed(404, "there is no such session") };
+    let Some(own) = own else { return failed(404, "unknown session") };
     match (method, rest) {
         ("GET", []) => done(session_json(own)),
         ("GET", ["profile"]) => done(json!({ "name": own.profile })),
@@ -114,13 +114,13 @@ fn session(service: &Service, method: &str, id: &str, rest: &[&str], body: &Valu
                 name.clone_into(&mut own.profile);
                 done(json!({ "name": name }))
             }
-            None => failed(400, "a profile has a name"),
+            None => failed(400, "the profile needs a name"),
         },
         ("DELETE", ["profile"]) => {
             "default".clone_into(&mut own.profile);
             (200, json!({ "ok": true }))
         }
-        _ => failed(404, "there is no such route"),
+        _ => failed(404, "unknown route"),
     }
 }
 
@@ -129,7 +129,7 @@ fn setting(service: &Service, method: &str, key: &str, body: &Value) -> Answer {
     match method {
         "GET" => match shared.settings.get(key) {
             Some(value) => (200, value.clone()),
-            None => failed(404, "there is no such setting"),
+            None => failed(404, "unknown setting"),
         },
         "POST" => {
             if shared.keep_setting(key, body) {
@@ -142,7 +142,7 @@ fn setting(service: &Service, method: &str, key: &str, body: &Value) -> Answer {
             shared.settings.remove(key);
             (200, json!({ "ok": true }))
         }
-        _ => failed(405, "GET, POST or DELETE"),
+        _ => failed(405, "use GET, POST or DELETE"),
     }
 }
 
@@ -237,10 +237,10 @@ fn configured(
     body: &Value,
 ) -> Answer {
     let Some((numbers, part)) = selected(service, device) else {
-        return failed(404, "there is no such device");
+        return failed(404, "unknown device");
     };
     if method == "GET" && (numbers.len() > 1 || device[1] == "*") {
-        return failed(400, "a wildcard reads nothing");
+        return failed(400, "a wildcard cannot be read; give one device");
     }
     let mut shared = service.shared();
     let at_first = kept_at_first();
@@ -255,12 +255,12 @@ fn configured(
                 }
                 done(value.clone())
             }
-            _ => failed(405, "GET, POST or DELETE"),
+            _ => failed(405, "use GET, POST or DELETE"),
         };
     }
     let sessions = of_query(&shared, query);
     if sessions.is_empty() {
-        return failed(404, "there is no such session");
+        return failed(404, "unknown session");
     }
     let mut last = Value::Null;
     for id in sessions {
@@ -287,12 +287,13 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         ("POST" | "PATCH", "transform") => {
             let patch = body.get("transform").unwrap_or(body);
             view.workspace =
-                view.workspace.patched(patch).ok_or_else(|| failed(400, "it is no transform"))?;
+                view.workspace.patched(patch).ok_or_else(|| failed(400, "the value is not a transform"))?;
         }
         ("POST", _) => set(view, short, body).map_err(|why| failed(400, &why))?,
         ("PATCH", "mount") => {
             let patch = body.get("transform").unwrap_or(body);
-            let mount = view.mount.patched(patch).ok_or_else(|| failed(400, "it is no transform"))?;
+            let mount =
+                view.mount.patched(patch).ok_or_else(|| failed(400, "the value is not a transform"))?;
             view.set_mount(mount);
         }
         ("DELETE", "basis") => view.basis = plain.basis,
@@ -302,7 +303,7 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         ("DELETE", "damping") => view.damping = plain.damping,
         ("DELETE", "force_gate") => view.force_gate = plain.force_gate,
         ("DELETE", "transform") => view.workspace = plain.workspace,
-        _ => return Err(failed(405, "not for this setting")),
+        _ => return Err(failed(405, "the setting does not support this method")),
     }
     match short {
         "basis" => Ok(json!({ "permutation": view.basis.name() })),
@@ -311,7 +312,7 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         "damping" => Ok(damping(view)),
         "force_gate" => Ok(force_gate(view)),
         "transform" => Ok(json!({ "transform": view.workspace.to_json() })),
-        _ => Err(failed(404, "there is no such setting")),
+        _ => Err(failed(404, "unknown setting")),
     }
 }
 

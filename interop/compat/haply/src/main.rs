@@ -41,25 +41,25 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Duration;
 
-/// Haply's Inverse Service for any Flotor device.
+/// Serve Haply's Inverse Service with any Flotor device.
 #[derive(Parser)]
 #[command(name = "flotor emulate haply-service", version, max_term_width = 110)]
-#[command(after_help = "The first line on standard output says where to connect.\n\nExamples:\n  \
+#[command(after_help = "The first line on standard output has the addresses.\n\nExamples:\n  \
     flotor emulate haply-service                            a simulated flotor, held by a hand\n  \
-    flotor emulate haply-service proxy.toml --record run.mcap   the device of a scene, inside its limits\n  \
-    flotor lend --api haply -- python3 my_program.py        the same around one program")]
+    flotor emulate haply-service proxy.toml --record run.mcap   the device of a scene, within the scene's limits\n  \
+    flotor lend --api haply -- python3 my_program.py        the same for one program")]
 struct Arguments {
     /// Scene file (TOML); without it, a simulated flotor held by a hand
     scene: Option<PathBuf>,
-    /// Where to listen for the simulation channel and HTTP (port 0: any free one)
+    /// Address of the simulation channel and HTTP (port 0: any free port)
     #[arg(long, default_value = "127.0.0.1:10001", value_name = "HOST:PORT")]
     listen: String,
-    /// Where to listen for the events channel (port 0: any free one)
+    /// Address of the events channel (port 0: any free port)
     #[arg(long, default_value = "127.0.0.1:10020", value_name = "HOST:PORT")]
     events: String,
     #[command(flatten)]
     reach: ReachArguments,
-    /// Let web pages of this origin connect, for example http://localhost:3000 (repeatable; default: no page)
+    /// Allow connections of web pages with this origin, for example http://localhost:3000 (repeatable; default: none)
     #[arg(long, value_name = "ORIGIN")]
     allow_origin: Vec<String>,
     /// Clock of the run
@@ -88,7 +88,7 @@ struct Arguments {
 enum PaceOption {
     /// The machine's clock
     Real,
-    /// The clients: each message that commands a device is a tick
+    /// The clients: each message that commands a device starts a tick
     Lockstep,
 }
 
@@ -130,13 +130,13 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
     let access = Access::new(arguments.allow_origin, simulation_at);
     let host = prepare(settings, &stop).map_err(CommandError::Usage)?;
     if (0..host.stations().len()).any(|number| !host.open(number)) {
-        return Err(CommandError::Failed("the run did not begin".to_owned()));
+        return Err(CommandError::Failed("the run did not start".to_owned()));
     }
     let service = Service::leak(host, access);
     let started = service.follow().and_then(|()| events::serve(service, events));
     started
         .and_then(|()| connection::serve(service, simulation))
-        .map_err(|cause| CommandError::Failed(format!("there is no thread for the service: {cause}")))?;
+        .map_err(|cause| CommandError::Failed(format!("cannot start a thread for the service: {cause}")))?;
     say!("listening ws://{simulation_at}/ events ws://{events_at}/");
     while !stop.is_stop_requested() && host.is_running() {
         std::thread::sleep(LOOK);
@@ -147,7 +147,7 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
     if was_asked {
         Ok(())
     } else {
-        Err(CommandError::Failed("the run ended before the service; its summary says why".to_owned()))
+        Err(CommandError::Failed("the run ended before the service; its summary has the cause".to_owned()))
     }
 }
 

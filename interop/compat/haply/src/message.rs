@@ -20,11 +20,11 @@ pub(crate) fn carry_out(service: &Service, session: u64, text: &str) -> Carried 
     let message: Value = match serde_json::from_str(text) {
         Ok(message @ Value::Object(_)) => message,
         Ok(_) => {
-            service.refuse("", "a message is an object", text);
+            service.refuse("", "the message must be a JSON object", text);
             return Carried::default();
         }
         Err(error) => {
-            service.refuse("", &format!("it is no JSON: {error}"), text);
+            service.refuse("", &format!("the message is not JSON: {error}"), text);
             return Carried::default();
         }
     };
@@ -73,7 +73,7 @@ fn number(service: &Service, entry: &Value, name: fn(usize) -> String) -> Option
     let id = entry.get("device_id").and_then(Value::as_str).unwrap_or_default();
     let number = (0..service.host.stations().len()).find(|number| name(*number).eq_ignore_ascii_case(id));
     if number.is_none() {
-        service.refuse("device_id", "there is no such device", &entry.to_string());
+        service.refuse("device_id", "unknown device", &entry.to_string());
     }
     number
 }
@@ -86,7 +86,11 @@ fn configure_session(service: &Service, session: &mut Session, configure: &Value
     if let Some(name) = configure.get("profile").and_then(|profile| profile.get("name")) {
         match name.as_str() {
             Some(name) => name.clone_into(&mut session.profile),
-            None => service.refuse("session.configure.profile.name", "it is no text", &name.to_string()),
+            None => service.refuse(
+                "session.configure.profile.name",
+                "the value must be a text",
+                &name.to_string(),
+            ),
         }
     }
     if let Some(basis) = configure.get("basis") {
@@ -97,8 +101,9 @@ fn configure_session(service: &Service, session: &mut Session, configure: &Value
     }
 }
 
-const NO_BASIS: &str = "a permutation of X, Y and Z with signs, such as XZY or X-YZ";
-const NO_TRANSFORM: &str = "position and scale have x, y, z, the rotation w, x, y, z; no scale is 0";
+const NO_BASIS: &str = "the basis must be a permutation of X, Y and Z with signs, such as XZY or X-YZ";
+const NO_TRANSFORM: &str =
+    "position and scale need x, y, z, the rotation needs w, x, y, z, and no scale may be 0";
 
 pub(crate) fn read_basis(basis: &Value) -> Option<Basis> {
     basis.get("permutation").and_then(Value::as_str).and_then(Basis::parse)
@@ -107,7 +112,7 @@ pub(crate) fn read_basis(basis: &Value) -> Option<Basis> {
 /// Applies the settings of a session for a device, by their names in a message and, below `filters`, in a path.
 fn configure_device(service: &Service, view: &mut View, configure: &Value) {
     if configure.get("mount").is_some() && configure.get("preset").is_some() {
-        return service.refuse("configure", "either a preset or a mount", &configure.to_string());
+        return service.refuse("configure", "give either a preset or a mount", &configure.to_string());
     }
     for (name, value) in configure.as_object().into_iter().flatten() {
         if let Err(reason) = set(view, name, value) {
@@ -126,7 +131,7 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
         "preset" => {
             let preset = value.get("preset").or(Some(value)).and_then(Value::as_str).unwrap_or_default();
             if !view.set_preset(preset) {
-                return Err("there is no such preset".to_owned());
+                return Err("unknown preset".to_owned());
             }
         }
         "mount" => {
@@ -138,11 +143,11 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
             let along =
                 value.get("vector").filter(|vector| !vector.is_null()).map_or(Some(DVec3::ZERO), vector);
             let damping = along.map(|along| along + scalar).filter(|damping| damping.min_element() >= 0.0);
-            view.damping = damping.ok_or("a damping is not negative, N·s/m")?;
+            view.damping = damping.ok_or("the damping must be 0 or more, N·s/m")?;
         }
         "force_gate" => {
             let gain = value.get("gain").and_then(Value::as_f64).filter(|gain| (0.0..=1.0).contains(gain));
-            view.force_gate = gain.ok_or("a gain is from 0 to 1")?;
+            view.force_gate = gain.ok_or("the gain must be 0 to 1")?;
         }
         "filters" => {
             for (name, value) in value.as_object().into_iter().flatten() {
@@ -199,7 +204,7 @@ fn command(service: &Service, shared: &mut Shared, session: u64, device: usize, 
         };
         commands_it = true;
         let Some(value) = value else {
-            service.refuse(name, "three finite numbers are missing", &command.to_string());
+            service.refuse(name, "the command needs three finite numbers", &command.to_string());
             continue;
         };
         if !is_executed(command) {

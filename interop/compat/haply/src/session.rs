@@ -88,7 +88,7 @@ fn answer(service: &Service, session: u64, socket: &mut WebSocket<Link>) -> Resu
             Message::Binary(message) => match std::str::from_utf8(message) {
                 Ok(message) => carry_out(service, session, message),
                 Err(_) => {
-                    service.refuse("", "a message is text", "binary");
+                    service.refuse("", "a message must be text", "binary");
                     Default::default()
                 }
             },

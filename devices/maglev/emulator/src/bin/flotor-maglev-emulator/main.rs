@@ -32,7 +32,7 @@ use std::sync::atomic::AtomicBool;
 /// Emulate the controller of the magnetic-levitation device.
 #[derive(Parser)]
 #[command(name = "flotor emulate maglev", version, max_term_width = 110)]
-#[command(after_help = "The first line on standard output says where to connect.\n\nExamples:\n  \
+#[command(after_help = "The first line on standard output has the addresses.\n\nExamples:\n  \
     flotor emulate maglev\n  \
     flotor emulate maglev --protocol ml-api\n  \
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
