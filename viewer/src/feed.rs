@@ -21,8 +21,8 @@ const READ_WAIT: Duration = Duration::from_millis(200);
 pub const STALE_AFTER: Duration = Duration::from_millis(500);
 
 /// Error text for a connection that ends without a message.
-const GONE: &str = "The program that ran the loop has ended without a message: it was killed, or it crashed; its watchdog takes the \
-                    force from the device. Look at its terminal, and start the run again";
+const GONE: &str = "The program that ran the loop has ended without a message: the program was killed or crashed, \
+and its watchdog stops the device. Check the terminal, and start the run again";
 
 /// State of the connection.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -29,11 +29,11 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::mpsc::channel;
 
-/// Shows a run as felt by the hand: the model in 3D, and plots over time.
+/// Show a running session or a recording: the model in 3D, and plots over time
 #[derive(Parser)]
 #[command(name = "flotor-viewer", version, about, max_term_width = 110)]
 struct Arguments {
-    /// Recording to show, and a second one over it, dashed; without one, the newest running host
+    /// Recording to show, and a second recording over the first, dashed (default: the newest running host)
     #[arg(value_name = "FILE.mcap", num_args = 0..=2)]
     recording: Vec<PathBuf>,
     /// File of a plugin whose shape may be drawn (repeatable)
@@ -69,8 +69,8 @@ struct Arguments {
     /// Time to show, s (default: of the largest force)
     #[arg(long, value_name = "SECONDS", requires = "recording", conflicts_with = "export")]
     at: Option<f64>,
-    /// Write the traces of the recording instead of opening a window: numbers (.csv), lines (.svg) or pixels (.png); --look light
-    /// unless another is named
+    /// Write the traces of the recording instead of opening a window: as a table (.csv) or a plot (.svg, .png); --look light
+    /// is the default
     #[arg(long, value_name = "OUT", requires = "recording", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
     /// Traces shown (default: force,position; in a window: those shown last)
@@ -104,13 +104,13 @@ struct Arguments {
 /// Parses a force of an arrow in N, such as `20`.
 fn arrow_force(text: &str) -> Result<f64, String> {
     let force_n = text.parse().ok().filter(|force_n| (0.001..=10_000.0).contains(force_n));
-    force_n.ok_or_else(|| format!("`{text}` is no force of an arrow; it must be 0.001 to 10000 N"))
+    force_n.ok_or_else(|| format!("`{text}` is not a force of an arrow; write 0.001 to 10000 N"))
 }
 
 /// Parses an axis, such as `z`.
 fn axis(text: &str) -> Result<usize, String> {
     let known = ["x", "y", "z"].into_iter().position(|name| name == text);
-    known.ok_or_else(|| format!("`{text}` is no axis; write x, y or z"))
+    known.ok_or_else(|| format!("`{text}` is not an axis; write x, y or z"))
 }
 
 /// Parses a screen from a line of JSON.
@@ -162,21 +162,20 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         arguments.screenshot.as_ref().filter(|out| out.extension().is_none_or(|is| is != "png"))
     {
         return Err(Failure::usage(format!(
-            "`{}` does not end with .png, and the picture is one",
+            "`{}` must end with .png, because the picture is a PNG file",
             out.display()
         )));
     }
     if arguments.texts.is_some() && !arguments.sitting && arguments.screen.is_none() {
-        return Err(Failure::usage(
-            "--texts is for the screens of a sitting: name --sitting or --screen, too",
-        ));
+        return Err(Failure::usage("--texts is for the screens of a sitting: add --sitting or --screen"));
     }
     fits_file(arguments).map_err(Failure::usage)?;
     let read = |path: &PathBuf| History::read(path).map_err(Failure::usage);
     let is_file = arguments.export.is_some() || arguments.screenshot.is_some() && !arguments.window;
     if arguments.recording.len() > 1 && is_file {
         return Err(Failure::usage(
-            "a second recording is shown in the window and in a picture of it: name one, or `--screenshot` with `--window`",
+            "a second recording is shown only in the window and in a picture of the window: give one recording, or \
+             `--screenshot` with `--window`",
         ));
     }
     let history = arguments.recording.first().map(read).transpose()?;
@@ -211,7 +210,7 @@ fn fits_file(arguments: &Arguments) -> Result<(), String> {
     let idle = of_picture.into_iter().find_map(|(is_there, name)| is_there.then_some(name));
     match (ExportFormat::of_file(out)?, idle) {
         (ExportFormat::Csv, Some(name)) => Err(format!(
-            "`{}` holds numbers, and `{name}` is for a picture of traces: leave it out, or write .svg or .png",
+            "`{}` is a table, and `{name}` is for a plot of traces: omit the option, or write .svg or .png",
             out.display()
         )),
         _ => Ok(()),

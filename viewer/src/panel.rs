@@ -116,10 +116,14 @@ impl Panel {
             Outcome::Refused => {
                 entry.give_up();
                 let name = &entry.name;
-                self.refusal =
-                    Some(format!("{name} = {} does not fit the other values; it stays", change.value));
+                self.refusal = Some(format!(
+                    "{name} = {} does not fit the other values, so the model keeps its value",
+                    change.value
+                ));
             }
-            Outcome::Broke => self.refusal = Some(format!("{} broke the plugin; stop the run", entry.name)),
+            Outcome::Broke => {
+                self.refusal = Some(format!("{} caused an error of the plugin; stop the run", entry.name))
+            }
         }
     }
 

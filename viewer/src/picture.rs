@@ -39,10 +39,10 @@ pub struct PictureOptions {
 #[non_exhaustive]
 pub enum PictureError {
     /// The recording has no ticks.
-    #[error("the recording holds no ticks, there is nothing to show; record a longer run")]
+    #[error("the recording has no ticks to show; record a longer run")]
     Empty,
     /// The run has no device of this name.
-    #[error("no device is called `{name}`; this run has {}", known.join(", "))]
+    #[error("the run has no device `{name}`; its devices: {}", known.join(", "))]
     Device {
         /// Requested name.
         name: String,
@@ -50,7 +50,7 @@ pub enum PictureError {
         known: Vec<String>,
     },
     /// The time is outside the recording.
-    #[error("{at_s} s is outside the recording, which is from {:.3} to {:.3} s", span_s[0], span_s[1])]
+    #[error("{at_s} s is outside the recording; choose a time from {:.3} to {:.3} s", span_s[0], span_s[1])]
     Moment {
         /// Requested time, s.
         at_s: f64,

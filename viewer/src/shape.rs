@@ -79,7 +79,7 @@ pub enum Posed {
 #[non_exhaustive]
 pub enum ShapeError {
     /// The plugin file of the model is unknown.
-    #[error("the plugin `{id}` of model `{name}` is not here; FLOTOR_PLUGIN_PATH adds folders")]
+    #[error("the plugin `{id}` of model `{name}` was not found; add its folder to FLOTOR_PLUGIN_PATH")]
     NoPlugin {
         /// Name of the model in the scene.
         name: String,
@@ -218,7 +218,7 @@ impl Shape {
     /// # Errors
     /// The plugin's message, if the parameter cannot be set.
     pub fn accepts_its_own(&mut self, index: usize) -> Result<(), String> {
-        let Some(number) = self.parameter(index) else { return Err("it is no number".to_owned()) };
+        let Some(number) = self.parameter(index) else { return Err("the value is not a number".to_owned()) };
         match self.model.set_parameter(index, number) {
             CallStatus::Ok => Ok(()),
             _ => Err(self.model.last_message()),

@@ -34,23 +34,23 @@ pub enum WindowError {
     )]
     NoAdapter(String),
     /// The display or the adapter of an open window was lost.
-    #[error("the window was lost: {0}; are the display and its driver still there?")]
+    #[error("the window was lost: {0}; check the display and its driver")]
     Lost(String),
     /// The program panicked in an open window; the panic hook has printed the place in the source.
-    #[error("the window broke: {0}; that should not happen: please report it, with what was done last")]
+    #[error("internal error of the window: {0}; please report this error with your last action")]
     Broken(String),
 }
 
 /// Options of a window; an option that is not given keeps its saved setting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, clap::Args)]
 pub struct WindowOptions {
-    /// Light or dark (default: dark; a window: as the last time)
+    /// Light or dark (default: dark; in a window: the look of the last window)
     #[arg(long, value_enum)]
     pub look: Option<Look>,
-    /// Width and height of picture or window (default: 1280x800; a window: as the last time)
+    /// Width and height of picture or window (default: 1280x800; in a window: the size of the last window)
     #[arg(long, value_parser = size, value_name = "WxH")]
     pub size: Option<[usize; 2]>,
-    /// Size of text and lines, 1 to 3 (default: 1; a window: as the last time)
+    /// Size of text and lines, 1 to 3 (default: 1; in a window: the scale of the last window)
     #[arg(long, value_parser = scale, value_name = "FACTOR", conflicts_with = "export")]
     pub scale: Option<f32>,
     /// Measure processor time and memory of the opened window over 1 to 3600 seconds, then close it; opening may take up to half
@@ -61,7 +61,7 @@ pub struct WindowOptions {
 
 /// Parses a size in pixels, such as `1280x800`.
 fn size(text: &str) -> Result<[usize; 2], String> {
-    let wrong = || format!("`{text}` is no size; write 1280x800, each side 64 to 8192 pixels");
+    let wrong = || format!("`{text}` is not a size; write 1280x800, each side 64 to 8192 pixels");
     let (width, height) = text.split_once('x').ok_or_else(wrong)?;
     let length =
         |text: &str| text.parse().ok().filter(|length| (64..=8192).contains(length)).ok_or_else(wrong);
@@ -70,7 +70,7 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 
 /// Parses a duration in seconds, such as `10`.
 fn seconds(text: &str) -> Result<Duration, String> {
-    let wrong = || format!("`{text}` is no time to watch a window; it must be 1 to 3600 seconds");
+    let wrong = || format!("`{text}` is not a valid duration; write 1 to 3600 seconds");
     let seconds: f64 =
         text.parse().ok().filter(|seconds| (1.0..=3600.0).contains(seconds)).ok_or_else(wrong)?;
     Ok(Duration::from_secs_f64(seconds))
@@ -78,7 +78,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
 
 /// Parses a scale of text, such as `1.5`.
 fn scale(text: &str) -> Result<f32, String> {
-    let wrong = || format!("`{text}` is no size of text; it must be 1 to 3");
+    let wrong = || format!("`{text}` is not a valid scale of text; write 1 to 3");
     text.parse().ok().filter(|scale| (1.0..=3.0).contains(scale)).ok_or_else(wrong)
 }
 
@@ -242,7 +242,8 @@ impl eframe::App for Kept {
 /// Returns the first line of a library's message, without the full stop and without the place in the source, which is no help to users
 /// without a display.
 fn one_line(text: &str) -> String {
-    let line = text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("nothing can be opened");
+    let line =
+        text.lines().map(str::trim).find(|line| !line.is_empty()).unwrap_or("no display can be opened");
     let words = match line.split_once(".rs:") {
         Some((before, after)) if before.contains(" at ") => {
             after.trim_start_matches(|c: char| c.is_ascii_digit() || c == ':').trim_start()
@@ -302,7 +303,8 @@ mod tests {
         });
         let said = broken.expect_err("it broke").to_string();
         assert!(
-            said.starts_with("the window broke: index out of bounds;") && !said.contains("no window"),
+            said.starts_with("internal error of the window: index out of bounds;")
+                && !said.contains("no window"),
             "{said}"
         );
 

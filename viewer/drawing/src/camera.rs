@@ -49,7 +49,8 @@ impl std::str::FromStr for View {
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong = || {
             format!(
-                "`{text}` is no view; write AZIMUTH,INCLINATION or AZIMUTH,INCLINATION,ZOOM, such as 30,15 or 30,15,2: degrees to \
+                "`{text}` is not a view; write AZIMUTH,INCLINATION or AZIMUTH,INCLINATION,ZOOM, such as 30,15 or \
+                 30,15,2: degrees to \
                  the right and, from -2 to 88, above the horizon, and a zoom of 0.2 to 3"
             )
         };

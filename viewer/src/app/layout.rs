@@ -282,8 +282,8 @@ impl Viewer {
     /// Shows a hint in place of missing data; while there is no run, offers recordings.
     fn nothing(&mut self, ui: &mut Ui, area: Rect, palette: &Palette) {
         let (first, second) = match &self.source {
-            Source::Waiting(_) => ("Waiting for a run", "Start one in a terminal:  flotor run"),
-            _ => ("No ticks yet", "They appear as soon as the loop runs"),
+            Source::Waiting(_) => ("Waiting for a run", "Start a run in a terminal:  flotor run"),
+            _ => ("No ticks yet", "Ticks appear when the loop runs"),
         };
         let inside = area.shrink2(vec2(16.0, 0.0));
         let layout = Layout::top_down(Align::Center);

@@ -60,7 +60,7 @@ impl Viewer {
         let mut known = Events::NONE;
         if let Source::Live { feed, .. } = &self.source {
             if feed.is_stale() {
-                said.push("Stale data: no ticks come; look at the terminal of `flotor run`".to_owned());
+                said.push("Stale data: no new ticks; check the terminal of `flotor run`".to_owned());
             }
             match feed.state() {
                 // The reason is more specific than the event of the last tick.

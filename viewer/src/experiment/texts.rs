@@ -104,7 +104,7 @@ impl Texts {
             ("again_left", &texts.again_left, "{left}"),
         ] {
             if !text.contains(place) {
-                return Err(format!("`{key}` has no `{place}`, the place of its number"));
+                return Err(format!("`{key}` lacks `{place}`, the placeholder of its number"));
             }
         }
         Ok(texts)

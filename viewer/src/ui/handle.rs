@@ -10,7 +10,7 @@ use flotor_drawing::drag::{DragPlane, Ray};
 use flotor_hal::DVec3;
 
 /// Accessible name of the handle, with the ways to move it.
-pub const DRAG: &str = "Drag the handle; the wheel, Q and E move it nearer and away, Shift ten times finer";
+pub const DRAG: &str = "Drag the handle; the wheel, Q and E change its depth, Shift is ten times finer";
 /// Hint over the view while no handle is dragged.
 pub const HINT: &str = "Drag the handle; wheel, Q, E for its depth, Shift for fine motion";
 /// Radius around the handle in which a drag can start, points.

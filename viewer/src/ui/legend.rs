@@ -75,7 +75,7 @@ fn force_scale(key: ArrowKey, camera: &Camera, area: Rect) -> (f32, String) {
     let force_n = round_below(key.full_force_n.min(MOST_OF_WIDTH * f64::from(area.width()) / per_n));
     #[allow(clippy::cast_possible_truncation)] // points
     let length_pt = (force_n * per_n) as f32;
-    (length_pt, format!("force on the hand, as long as {} N", significant_short(force_n)))
+    (length_pt, format!("force on the hand, this length is {} N", significant_short(force_n)))
 }
 
 /// Formats a round number without trailing zeros.

@@ -48,7 +48,7 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
             }
             if panel.can_undo() {
                 let undo = ui.add(Button::new(RichText::new("Undo").size(SMALL_PT)).frame(false));
-                if undo.on_hover_text("The value before the last change (Ctrl+Z)").clicked() {
+                if undo.on_hover_text("Undo the last change (Ctrl+Z)").clicked() {
                     changed.extend(panel.undo());
                 }
             }
@@ -57,7 +57,7 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
             }
             let follow = of(panel, |editability| matches!(editability, Editability::Follows(_)));
             if !follow.is_empty() {
-                heading(ui, "Follow from these, or have no effect", palette);
+                heading(ui, "Determined by these parameters, or without effect", palette);
                 for index in follow {
                     let _ = row(ui, &mut panel.entries[index], palette);
                 }
@@ -199,13 +199,13 @@ fn help(entry: &PanelEntry) -> String {
     if let ParameterShape::Real { min, max, default } = entry.parameter.shape {
         help += &format!("  ·  {min} to {max} {unit}, default {default}", unit = entry.unit());
         if entry.parameter.soft.is_some_and(|soft| soft.min > min || soft.max < max) {
-            help += "; beyond the slider by typing and Enter";
+            help += "; type a number and Enter for values beyond the slider";
         }
     }
     match &entry.editability {
         Editability::Free => {}
         Editability::Follows(reason) if reason.is_empty() => {
-            help += "\nFollows from other values, or has no effect with them"
+            help += "\nDetermined by other parameters, or without effect"
         }
         Editability::Follows(reason) => help += &format!("\n{reason}"),
         Editability::Fixed => help += "\nCannot change while the loop runs",

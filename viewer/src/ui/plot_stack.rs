@@ -83,7 +83,7 @@ impl ExportFormat {
             Some("csv") => Ok(Self::Csv),
             Some("svg") => Ok(Self::Svg),
             Some("png") => Ok(Self::Png),
-            _ => Err(format!("`{}` ends neither with .csv, nor .svg, nor .png", file.display())),
+            _ => Err(format!("`{}` must end with .csv, .svg or .png", file.display())),
         }
     }
 }
@@ -91,7 +91,8 @@ impl ExportFormat {
 /// Error of a picture too low for its traces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the picture is {height_px} pixels high, and for {count} traces that can be read it has to be {least_px}; make it higher, or choose fewer traces"
+    "the picture is {height_px} pixels high, but {count} readable traces need {least_px}; make the picture higher, \
+     or choose fewer traces"
 )]
 pub struct TooLow {
     /// Number of traces.

@@ -167,16 +167,16 @@ pub fn warnings(devices: &[(&str, Events)], facts: &SceneFacts) -> Vec<String> {
 #[must_use]
 pub fn happened(devices: &[(&str, Events)]) -> Vec<String> {
     const WORDS: [(Events, &str); 10] = [
-        (Events::DEVICE_FAULT, "Device fault: force is off; see the log for what to do"),
-        (Events::MODEL_FAULT, "A model failed: it gives no force any more; stop and look at the log"),
-        (Events::FORCE_LIMITED, "Excess force: limited by the envelope; ease off"),
-        (Events::TORQUE_LIMITED, "Excess torque: limited by the envelope; ease off"),
+        (Events::DEVICE_FAULT, "Device fault: force is off; the log has the remedy"),
+        (Events::MODEL_FAULT, "A model failed and has no force any more; stop and check the log"),
+        (Events::FORCE_LIMITED, "Excess force: limited by the envelope; push less"),
+        (Events::TORQUE_LIMITED, "Excess torque: limited by the envelope; push less"),
         (Events::BOUNDARY, "Outside the boundary: move back towards the middle"),
         (Events::STALE_SAMPLE, "Stale data: the device had no new sample; check its cable"),
         (Events::IMPLAUSIBLE_SAMPLE, "Impossible sample: not used; check the device and its cable"),
-        (Events::NOT_FINITE, "A number was not finite: counted as no force"),
-        (Events::MISSED, "Late: ticks were missed; `flotor doctor` says how to keep time"),
-        (Events::MODEL_DEGRADED, "The model left its domain: its answer is a safe continuation"),
+        (Events::NOT_FINITE, "A result was not finite: replaced by zero force"),
+        (Events::MISSED, "Late: ticks were missed; check with `flotor doctor`"),
+        (Events::MODEL_DEGRADED, "The model left its domain: its result is extrapolated safely"),
     ];
     let warning = |(event, words): &(Events, &str)| {
         let concerned = devices.iter().filter(|(_, events)| events.intersects(*event));
@@ -203,9 +203,9 @@ fn short_name(name: &str) -> String {
 /// Returns the warnings about the drawn bodies.
 pub fn of_shapes(facts: &SceneFacts) -> impl Iterator<Item = &'static str> {
     let shape = [
-        (facts.lifted, "Off its seat: the lower plate hangs in the air, without load"),
+        (facts.lifted, "Off its seat: the lower plate is in the air, without load"),
         (facts.touching, "Coils touch: from here the spring is far stiffer than the model"),
-        (facts.no_shape, "No shape at this pose: the model gives none"),
+        (facts.no_shape, "The model has no shape at this pose"),
     ];
     shape.into_iter().filter(|(is, _)| *is).map(|(_, words)| words)
 }

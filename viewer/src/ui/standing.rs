@@ -44,7 +44,7 @@ pub fn events(ui: &mut Ui, counted: &EventCounts, palette: &Palette) {
         let counts = events.chain([("not shown".to_owned(), counted.dropped)]);
         let happened: Vec<_> = counts.filter(|(_, count)| *count > 0).collect();
         if happened.is_empty() {
-            ui.label(RichText::new("Nothing has happened").color(palette.faint));
+            ui.label(RichText::new("No events").color(palette.faint));
         }
         for (name, count) in happened {
             line(ui, &name, &format!("{count} ticks"), palette);

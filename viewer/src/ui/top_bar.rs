@@ -166,7 +166,8 @@ fn emergency_stop(ui: &mut Ui, Stop { name, key }: &Stop, scale: f32) -> egui::R
         .stroke(Stroke::new(1.5, YELLOW))
         .corner_radius(CornerRadius::same(6))
         .min_size(vec2(150.0, 32.0_f32.min(ui.available_height())) * scale);
-    let response = ui.add(button).on_hover_text(format!("No force at once; the run is over (key: {key})"));
+    let response =
+        ui.add(button).on_hover_text(format!("Zero force at once, and the end of the run (key: {key})"));
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));
     response
 }

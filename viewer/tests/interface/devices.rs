@@ -47,7 +47,7 @@ fn each_of_two_devices_has_its_name_and_can_be_looked_at() {
     assert_eq!(window.state().devices().names().collect::<Vec<_>>(), ["left", "right"]);
     assert_eq!(window.state().history().len(), 1000, "ticks of one device are not those of the other");
     window.get_by_label("left: Force over time, N");
-    window.get_by_label_contains("Excess force: limited by the envelope; ease off (right)");
+    window.get_by_label_contains("Excess force: limited by the envelope; push less (right)");
     let left_n = force_n(&window);
     window.get_by_role_and_label(Role::Button, "right").click();
     window.run_steps(2);

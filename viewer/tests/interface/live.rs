@@ -235,7 +235,7 @@ fn physical_parameters_drive_the_rigidities_and_not_the_other_way_round() {
     };
     assert_eq!(editability(&window, "wire_diameter_mm"), Editability::Free);
     assert!(matches!(editability(&window, "gamma_n"), Editability::Follows(_)));
-    window.get_by_label("Follow from these, or have no effect");
+    window.get_by_label("Determined by these parameters, or without effect");
     // Under a seat that is held, friction has no effect.
     assert!(matches!(editability(&window, "seat_friction"), Editability::Follows(_)));
     assert!(window.get_by_role_and_label(Role::Slider, "gamma").accesskit_node().is_disabled());
@@ -324,13 +324,13 @@ fn no_pointer_brings_a_parameter_out_of_its_soft_range() {
 fn f1_lists_the_keys() {
     let (mut window, mut host, _folder) = live(&[]);
     until_fresh(&mut window, &mut host, |window| window.query_by_label("running").is_some());
-    assert!(window.query_by_label("emergency stop; of a recording: play").is_none());
+    assert!(window.query_by_label("emergency stop; in a recording: play").is_none());
     window.key_press(Key::F1);
     window.run_steps(2);
-    window.get_by_label("emergency stop; of a recording: play");
+    window.get_by_label("emergency stop; in a recording: play");
     window.key_press(Key::Escape);
     window.run_steps(2);
-    assert!(window.query_by_label("emergency stop; of a recording: play").is_none());
+    assert!(window.query_by_label("emergency stop; in a recording: play").is_none());
 }
 
 /// Requests up to the emergency stop. Pictures are not made meanwhile: what is not under way already never comes.
