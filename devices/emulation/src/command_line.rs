@@ -20,7 +20,7 @@ pub fn arguments<T: Parser>() -> T {
 /// # Errors
 /// A message: the text is no number, or the number is outside the limits.
 pub fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
-    let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is no number"))?;
+    let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
     if (least..=most).contains(&number) {
         Ok(number)
     } else {

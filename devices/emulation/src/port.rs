@@ -56,13 +56,14 @@ impl Port {
     /// Errors of the system, or `InvalidInput` for an address beyond this machine without consent; both with the remedy.
     pub fn bind(at: &str, reach: Reach) -> io::Result<Self> {
         let unusable = |error: io::Error| {
-            let problem = format!("cannot listen at {at}: {error}; 127.0.0.1:0 takes any free port");
+            let problem = format!("cannot listen at {at}: {error}; 127.0.0.1:0 selects any free port");
             io::Error::new(error.kind(), problem)
         };
         let addresses: Vec<SocketAddr> = at.to_socket_addrs().map_err(unusable)?.collect();
         if reach != Reach::AnyMachine && addresses.iter().any(|address| !address.ip().is_loopback()) {
             let problem = format!(
-                "{at} can be reached from other machines, and whoever reaches it commands the device; listen at 127.0.0.1, or \
+                "{at} can be reached from other machines, and every program that reaches the address commands the \
+                 device; listen at 127.0.0.1, or \
                  add --allow-remote"
             );
             return Err(io::Error::new(ErrorKind::InvalidInput, problem));
@@ -92,13 +93,16 @@ impl Port {
             }
             let cause = match peer::user(&stream) {
                 Ok(user) if user.is_root() || user == geteuid() => return Ok(stream),
-                Ok(user) => format!("its program is of user {}", user.as_raw()),
+                Ok(user) => format!("its program belongs to user {}", user.as_raw()),
                 // The client closed the connection at once.
                 Err(error) if error.kind() == ErrorKind::NotFound => continue,
-                Err(error) => format!("the system does not tell the user of its program: {error}"),
+                Err(error) => format!("the user of its program is unknown: {error}"),
             };
-            REFUSAL
-                .call_once(|| warn(&format!("a connection was refused: {cause}; --allow-users permits it")));
+            REFUSAL.call_once(|| {
+                warn(&format!(
+                    "a connection was refused: {cause}; --allow-users permits connections of every user"
+                ))
+            });
         }
     }
 

@@ -25,8 +25,8 @@ const LINE_BYTES: usize = 80;
 /// Command line options of the rig.
 #[derive(Args, Clone, Debug)]
 pub struct RigArguments {
-    /// Hold the handle in a calibration rig instead of a hand: a stand that comes down step by step, and a force sensor
-    /// as a serial port by this name
+    /// Hold the handle in a calibration rig instead of a hand: a stand that moves down step by step, and a force sensor
+    /// at a serial port of this name
     #[arg(long, value_name = "PATH")]
     calibration_rig: Option<PathBuf>,
     /// Calibration rig: step of the stand, in mm
@@ -133,7 +133,7 @@ pub fn serve(
                 Ok(1) if byte == *b"\n" => {
                     let answer = match asked.trim_ascii() {
                         b"R" => format!("F {:.4}\n", force_n()),
-                        _ => "E only R is understood\n".to_owned(),
+                        _ => "E only R is supported\n".to_owned(),
                     };
                     asked.clear();
                     let _ = ours.write_all(answer.as_bytes());
@@ -207,7 +207,7 @@ mod tests {
             text
         };
         assert_eq!(answers(b"R\nR\n", 2), "F 1.0000\nF 2.0000\n");
-        assert_eq!(answers(b"force?\nR\n", 2), "E only R is understood\nF 3.0000\n");
+        assert_eq!(answers(b"force?\nR\n", 2), "E only R is supported\nF 3.0000\n");
         // Somebody's file is left alone.
         let file = folder.path().join("file");
         std::fs::write(&file, "mine").expect("the folder is there");

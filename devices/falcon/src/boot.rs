@@ -89,41 +89,43 @@ impl From<ChipLost> for BootFailure {
 impl fmt::Display for BootFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Lost => f.write_str("it was unplugged, or its hub was reset; connect it without a hub, and try again"),
+            Self::Lost => f.write_str("the Falcon was unplugged, or its hub was reset; connect the Falcon without a \
+            hub, and try again"),
             Self::ShortPacket => f.write_str(
-                "its chip sends packets without the two bytes of its status; connect it without a hub, and try again",
+                "the USB chip sends packets without the two bytes of its status; connect the Falcon without a hub, and try again",
             ),
             Self::NoFirmware => f.write_str(
-                "it has no firmware since its power was off; name your own file with `firmware`: libnifalcon's folder \
-                 `firmware` has `nvent`, and so has the driver for Windows",
+                "the Falcon has no firmware after power-off; give your own firmware file with `firmware`: the file \
+                 `nvent` is in libnifalcon's folder `firmware` and in the driver for Windows",
             ),
             Self::NoPrompt => write!(
                 f,
-                "its boot loader did not answer {PROMPTS} times; switch its power off and on, and try again"
+                "the boot loader did not answer {PROMPTS} times; switch the Falcon off and on, and try again"
             ),
             Self::NotAgreed(None) => f.write_str(
-                "its boot loader did not agree to take a firmware; switch its power off and on, and try again",
+                "the boot loader did not accept the upload of a firmware; switch the Falcon off and on, and try again",
             ),
             Self::NotAgreed(Some(byte)) => write!(
                 f,
-                "its boot loader said {byte:#04x} instead of {AGREED:#04x}; switch its power off and on, and try again"
+                "the boot loader replied {byte:#04x} instead of {AGREED:#04x}; switch the Falcon off and on, and try again"
             ),
             Self::Echo { at, sent, came } => write!(
                 f,
-                "byte {at} of the firmware, {sent:#04x}, came back as {came:#04x}; switch its power off and on, connect it \
-                 without a hub, and try again"
+                "byte {at} of the firmware, {sent:#04x}, came back as {came:#04x}; switch the Falcon off and on, \
+                 connect the Falcon without a hub, and try again"
             ),
             Self::NoEcho { at } => write!(
                 f,
-                "byte {at} of the firmware did not come back; switch its power off and on, connect it without a hub, and try \
-                 again"
+                "byte {at} of the firmware did not come back; switch the Falcon off and on, connect the Falcon \
+                 without a hub, and try again"
             ),
             Self::NoReport => f.write_str(
-                "it has the firmware and does not report; switch its power off and on, and check the file `firmware`",
+                "the Falcon received the firmware but sends no reports; switch the Falcon off and on, and check the \
+                 file `firmware`",
             ),
             Self::StaleReports => f.write_str(
-                "it sends reports that no command was sent for, so that each would be late; unplug it, plug it in again, and \
-                 try again",
+                "the Falcon sends reports without a command, so every report would be late; unplug the Falcon, plug \
+                 it in again, and try again",
             ),
         }
     }

@@ -22,7 +22,9 @@ const LEAST_DIGITS: usize = 16;
 pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
     let bytes = read_file(Path::new(path), MOST_BYTES).map_err(|error| match error.kind() {
         ErrorKind::FileTooLarge => {
-            format!("firmware {path} has more than {MOST_BYTES} bytes, and no firmware of a Falcon has")
+            format!(
+                "firmware {path} has more than {MOST_BYTES} bytes, the most of a Falcon; choose another file"
+            )
         }
         _ => format!("firmware {path}: {error}"),
     })?;
@@ -40,15 +42,15 @@ pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
     }
     Err(match expected {
         Some(expected) => format!(
-            "firmware {path} has the SHA-256 {digest}, and `firmware_sha256` = {expected} is not its beginning of {LEAST_DIGITS} \
-             digits or more"
+            "firmware {path} has the SHA-256 {digest}, but `firmware_sha256` is {expected}; give the first \
+             {LEAST_DIGITS} or more digits of the SHA-256"
         ),
         None => {
             let known =
                 KNOWN.map(|(name, size, begins)| format!("{name} ({size} bytes, SHA-256 {begins}...)"));
             format!(
-                "firmware {path} has {} bytes and the SHA-256 {digest}; known are {}. If it is the right one, say so with \
-                 `firmware_sha256`",
+                "firmware {path} has {} bytes and the SHA-256 {digest}; known are {}. If the file is right, confirm \
+                 its SHA-256 with `firmware_sha256`",
                 bytes.len(),
                 known.join(" and ")
             )
@@ -80,8 +82,8 @@ mod tests {
         assert_eq!(read(&name, Some(known)), Ok(b"abc".to_vec()));
         for (expected, words) in [
             (None, "known are nvent (8492 bytes"),
-            (Some("ba78"), "16 digits"),
-            (Some(&known[1..]), "not its beginning"),
+            (Some("ba78"), "16 or more digits"),
+            (Some(&known[1..]), "give the first"),
         ] {
             let refused = read(&name, expected).expect_err("it is another");
             assert!(refused.contains(words) && refused.contains(known), "{refused}");

@@ -27,22 +27,22 @@ const SLEW_N_PER_S: f64 = 8000.0;
 /// Latency, s: a command and its report over full-speed USB, a frame of 1 ms each.
 const LATENCY_S: f64 = 2.0e-3;
 /// Error without homing, with the remedy.
-const NOT_HOMED: &str = "the Falcon does not know where its handle is: start it with `homing_s` of 10 or more, and while its \
-                         lamp is red, push the handle in as far as it goes, pull it out as far as it goes";
+const NOT_HOMED: &str = "the Falcon has not found its home position: start with `homing_s` of 10 or more, and while \
+its lamp is red, push the handle in as far as possible and pull the handle out as far as possible";
 /// Interval between two commands during homing.
 const HOMING_NAP: Duration = Duration::from_millis(2);
 
 const SCHEMA: &[Parameter] = &[
-    Parameter::text(
-        "address",
-        "Where it is: usb, which it is if not said, usb:SERIAL, or tcp:HOST:PORT of an emulator",
-    ),
+    Parameter::text("address", "Address: usb (the default), usb:SERIAL, or tcp:HOST:PORT of an emulator"),
     Parameter::file(
         "firmware",
         choices![],
-        "The firmware: your own file; not needed while the device keeps it",
+        "Firmware file of your own; not needed while the device has its firmware",
     ),
-    Parameter::text("firmware_sha256", "How the SHA-256 of a firmware begins that is none of those known"),
+    Parameter::text(
+        "firmware_sha256",
+        "First digits of the SHA-256 of a firmware that is not in the built-in list",
+    ),
     Parameter::real("max_force_n", "N", 0.0, 20.0, 8.0, "Largest force on the hand"),
     Parameter::real(
         "words_per_nm",
@@ -50,7 +50,7 @@ const SCHEMA: &[Parameter] = &[
         100.0,
         100_000.0,
         10_000.0,
-        "Motor word for a torque of an arm; a calibration with a force sensor says which",
+        "Motor command per torque of an arm; measure this value with a force sensor",
     ),
     Parameter::real(
         "homing_s",
@@ -58,7 +58,7 @@ const SCHEMA: &[Parameter] = &[
         0.0,
         600.0,
         30.0,
-        "How long it waits for the handle to be pushed in and pulled out; 0: it must have been before",
+        "Time limit for pushing the handle in and pulling it out; 0: the device must be homed already",
     ),
     Parameter::real(
         "velocity_cutoff_hz",
@@ -66,9 +66,9 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         500.0,
         30.0,
-        "Velocity is the difference of positions, smoothed below this frequency",
+        "Cutoff frequency of the low-pass filter of the velocity, which is the difference of positions",
     ),
-    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Silence of the device that is a fault"),
+    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Timeout for messages of the device"),
 ];
 
 /// Transforms a vector from the maker's frame (x right, y up, z towards the user) to the host's (x right, y away, z up).
@@ -146,7 +146,7 @@ impl Options {
             let connected = RemoteChip::connect(address);
             return connected.map(|chip| Arc::new(chip) as Arc<dyn Chip>).map_err(|error| {
                 Refusal::resource(format!(
-                    "no emulated Falcon at {address} ({error}); `flotor emulate falcon` starts one and says where"
+                    "no emulated Falcon at {address} ({error}); start one with `flotor emulate falcon`, which prints its address"
                 ))
             });
         }
@@ -155,7 +155,7 @@ impl Options {
             Some(rest) if rest.starts_with(':') && rest.len() > 1 => rest.get(1..),
             _ => {
                 return Err(Refusal::parameter(format!(
-                    "`address` = `{}` is none of usb, usb:SERIAL and tcp:HOST:PORT",
+                    "`address` = `{}` is not valid; write usb, usb:SERIAL or tcp:HOST:PORT",
                     self.address
                 )));
             }
@@ -263,7 +263,7 @@ impl FalconDevice {
         self.chip = Some(chip);
         let posture = posture(angles_rad(report.encoders), CENTRE_M).ok_or_else(|| {
             Refusal::resource(format!(
-                "the Falcon counts {}, which its arms cannot have: switch its power off and on, and start again",
+                "the Falcon reports the counts {}, which its arms cannot have: switch the Falcon off and on, and start again",
                 report.encoders.map(|count| count.to_string()).join(", ")
             ))
         })?;

@@ -116,16 +116,15 @@ impl Drop for UsbChip {
 
 fn refused(error: Error) -> String {
     match error {
-        Error::NotFound => "no Falcon is plugged in (USB 0403:cb48); check cable and power. Without one, `flotor emulate falcon` \
-                            starts one in software, for `address = \"tcp:127.0.0.1:4108\"`"
+        Error::NotFound => "no Falcon is plugged in (USB 0403:cb48); check cable and power. Without a Falcon, start \
+        the emulator with `flotor emulate falcon`, for `address = \"tcp:127.0.0.1:4108\"`"
             .to_owned(),
         Error::Access => format!("this user may not use the Falcon; {}", access_remedy(VENDOR, PRODUCT)),
-        Error::Busy => "the Falcon is in use by another program; close that one first".to_owned(),
-        Error::NoDevice => "no Falcon has that serial number, or it was unplugged; `address` is usb, or usb: and a serial \
-                            number"
+        Error::Busy => "the Falcon is in use by another program; close that program first".to_owned(),
+        Error::NoDevice => "no Falcon has this serial number, or the Falcon was unplugged; set `address` to usb, or to usb: and a serial number"
             .to_owned(),
         Error::Other if !has_bus() => "no USB bus can be reached here, as in most containers; start the container with `--device \
-                                       /dev/bus/usb`. Without a Falcon, `flotor emulate falcon` starts one in software"
+                                       /dev/bus/usb`. Without a Falcon, start the emulator with `flotor emulate falcon`"
             .to_owned(),
         other => format!("the Falcon cannot be used ({other}); {OTHER_REMEDY}"),
     }
@@ -140,7 +139,7 @@ mod tests {
         for (error, words) in [
             (Error::NotFound, "check cable and power"),
             (Error::Access, &access_remedy(VENDOR, PRODUCT)),
-            (Error::Busy, "close that one first"),
+            (Error::Busy, "close that program first"),
             (Error::NoDevice, "serial number"),
             (Error::Io, OTHER_REMEDY),
             (Error::Other, if has_bus() { OTHER_REMEDY } else { "--device /dev/bus/usb" }),

@@ -50,12 +50,12 @@ impl Failed {
     pub(crate) fn refusal(&self) -> Refusal {
         let remedy = match self.code {
             NO_DRIVER => {
-                "this user may not open the USB device: `flotor doctor --device force-dimension` has the line for udev"
+                "this user may not open the USB device: `flotor doctor --device force-dimension` prints the rule for udev"
             }
-            NO_DEVICE => "connect it and switch it on; `lsusb -d 1451:` lists what the system sees",
-            IN_USE => "end the other program that uses it",
-            COM | TIMEOUT => "check cable, hub and power, switch it off and on",
-            _ => "try it with the maker's own programs first",
+            NO_DEVICE => "connect the device and switch it on; `lsusb -d 1451:` lists the detected devices",
+            IN_USE => "end the other program that uses the device",
+            COM | TIMEOUT => "check cable, hub and power, and switch the device off and on",
+            _ => "test the device with the maker's own programs first",
         };
         Refusal::resource(format!(
             "{} failed (error {} of the SDK: {}); {remedy}",

@@ -27,52 +27,47 @@ const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "library",
         choices![],
-        "The SDK's library, libdrd.so.3; without it, looked for in $FDSDK and where the system has libraries",
+        "Library of the SDK, libdrd.so.3 (default: searched in $FDSDK and in the library folders of the system)",
     ),
-    Parameter::choice(
-        "stand_in",
-        NO_YES,
-        0,
-        "Whether Flotor's own drop-in library may stand in for a device",
-    ),
+    Parameter::choice("stand_in", NO_YES, 0, "Accept Flotor's own drop-in library, which simulates a device"),
     Parameter::real("serial", "1", 0.0, 65_535.0, 0.0, "Serial number of the device; 0: the first one"),
     Parameter::choice(
         "initialise",
         INITIALISE,
         0,
-        "automatic: a device that does not know where it is moves its arm to find out, when it is energised",
+        "automatic: when energised, a device without a reference position moves its arm to find the reference",
     ),
-    Parameter::real("max_force_n", "N", 0.0, 100.0, 0.0, "Largest force on the hand; 0: that of the device"),
+    Parameter::real(
+        "max_force_n",
+        "N",
+        0.0,
+        100.0,
+        0.0,
+        "Largest force on the hand; 0: the limit of the device",
+    ),
     Parameter::real(
         "max_torque_nm",
         "N·m",
         0.0,
         10.0,
         0.0,
-        "Largest torque on the hand; 0: that of the device",
+        "Largest torque on the hand; 0: the limit of the device",
     ),
-    Parameter::real(
-        "velocity_window_ms",
-        "ms",
-        1.0,
-        100.0,
-        20.0,
-        "Window from which the SDK takes the velocity",
-    ),
+    Parameter::real("velocity_window_ms", "ms", 1.0, 100.0, 20.0, "Window of the SDK's velocity estimate"),
     Parameter::real(
         "watchdog_ms",
         "ms",
         1.0,
         31.875,
         20.0,
-        "Time without a command after which the device itself takes its force away",
+        "Time without a command after which the watchdog of the device removes the force",
     ),
-    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Time without a sample that is a fault"),
+    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Timeout for samples of the device"),
     Parameter::choice(
         "pace",
         PACES,
         0,
-        "real: samples are taken as they come; lockstep: each tick waits for its own (virtual clock, simulated device)",
+        "real: each tick uses the newest sample; lockstep: each tick waits for its sample (virtual clock, simulated device)",
     ),
 ];
 
@@ -100,7 +95,7 @@ impl Device for ForceDimensionDevice {
     const INFO: DeviceInfo = DeviceInfo::new(
         "force-dimension",
         "Force Dimension omega, delta, sigma, lambda",
-        "A parallel arm with three to six driven axes, over the SDK that its user has installed",
+        "A parallel arm with three to six driven axes, over the SDK that the user has installed",
     );
     const PARAMETERS: &'static [Parameter] = SCHEMA;
     type Active = EnergizedDevice;
@@ -114,8 +109,8 @@ impl Device for ForceDimensionDevice {
         let initialises = settings.choice_or_default("initialise") == 1;
         if !initialises && !dhd.is_initialized() {
             return Err(Refusal::resource(format!(
-                "the {} does not know where its arm is: let the maker's program initialise it, or keep your hands off \
-                 and set `initialise = \"automatic\"`, which moves the arm",
+                "the {} has no reference position: initialise the device with the maker's program, or keep your \
+                 hands off and set `initialise = \"automatic\"`, which moves the arm",
                 dhd.name()
             )));
         }
@@ -132,7 +127,7 @@ impl Device for ForceDimensionDevice {
         };
         if wrist == Wrist::Driven && kind.torque_nm == 0.0 {
             return Err(Refusal::parameter(format!(
-                "the {} drives its wrist, and its largest torque is not known here: set `max_torque_nm`",
+                "the {} has a driven wrist of unknown largest torque: set `max_torque_nm`",
                 dhd.name()
             )));
         }
@@ -195,7 +190,9 @@ impl Device for ForceDimensionDevice {
         let Some(dhd) = self.dhd.take() else {
             return Err((
                 self,
-                Refusal::resource("the device was closed when its thread was lost; open it again"),
+                Refusal::resource(
+                    "the thread of the device has ended and closed the device; open the device again",
+                ),
             ));
         };
         if self.initialises
@@ -215,7 +212,7 @@ impl Device for ForceDimensionDevice {
                 let refusal = match why {
                     Why::Failed(failed) => failed.refusal(),
                     Why::NoThread(error) => {
-                        Refusal::resource(format!("the system starts no thread for the device: {error}"))
+                        Refusal::resource(format!("cannot start a thread for the device: {error}"))
                     }
                 };
                 Err((self, refusal))

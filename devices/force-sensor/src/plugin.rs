@@ -16,7 +16,7 @@ const SCHEMA: &[Parameter] = &[
         10.0,
         60_000.0,
         2000.0,
-        "Silence of the sensor that is a fault; a slow one averages for a tenth of a second",
+        "Timeout for readings of the sensor; a slow sensor averages for a tenth of a second",
     ),
 ];
 
@@ -34,8 +34,9 @@ pub struct ForceSensor {
 impl ForceSensor {
     /// Waits for the first reading, so that a faulty sensor is reported at open.
     fn prove(&mut self, port: &str) -> Result<(), String> {
-        let gone =
-            |LineLost| format!("the force sensor at {port} is disconnected; plug it in and measure again");
+        let gone = |LineLost| {
+            format!("the force sensor at {port} is disconnected; connect the sensor and measure again")
+        };
         loop {
             self.line.request().map_err(gone)?;
             match self.line.poll().map_err(gone)? {
@@ -48,8 +49,7 @@ impl ForceSensor {
                 }
                 PollResult::Nothing if self.line.silence() > self.timeout => {
                     return Err(format!(
-                        "the force sensor at {port} does not answer within {} ms; is it one that answers `R`, at \
-                         115200 baud?",
+                        "the force sensor at {port} does not answer within {} ms; use a sensor that answers `R` at 115200 baud",
                         self.timeout.as_millis()
                     ));
                 }
@@ -70,7 +70,7 @@ impl SimpleDevice for ForceSensor {
 
     fn open(settings: &Settings<'_>) -> Result<Opened<Self>, Refusal> {
         let port = settings.text("port").ok_or_else(|| {
-            Refusal::resource(format!("no `port` for the force sensor; set it, as in {PORT_EXAMPLE}"))
+            Refusal::resource(format!("no `port` for the force sensor; set the port, as in {PORT_EXAMPLE}"))
         })?;
         let timeout = Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3);
         let line = SensorLine::open(port).map_err(Refusal::resource)?;

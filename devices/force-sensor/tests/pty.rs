@@ -138,6 +138,6 @@ fn what_is_no_sensor_is_refused_in_one_sentence() {
     let sensor = emulated(Box::new(|| Some("F 1\n".to_owned())));
     let held = sensor.open().expect("it answers");
     let busy = sensor.open().err().unwrap_or_default();
-    assert!(busy.contains("another program uses it"), "{busy}");
+    assert!(busy.contains("another program uses the port"), "{busy}");
     drop(held);
 }

@@ -37,7 +37,7 @@ const VERSIONS: Choices = choices!["v2", "v3"];
 
 const SCHEMA: &[Parameter] = &[
     Parameter::text("port", PORT_HELP),
-    Parameter::choice("hardware", VERSIONS, 1, "Version of the device: v2 of metal, v3 of plastic (3.1)"),
+    Parameter::choice("hardware", VERSIONS, 1, "Version of the device: v2 (metal) or v3 (plastic, 3.1)"),
     Parameter::real("max_force_n", "N", 0.0, 10.0, 3.0, "Largest force on the hand"),
     Parameter::real(
         "velocity_cutoff_hz",
@@ -45,9 +45,9 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         500.0,
         30.0,
-        "Velocity is the difference of positions, smoothed below this frequency",
+        "Cutoff frequency of the low-pass filter of the velocity, which is the difference of positions",
     ),
-    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Silence of the board that is a fault"),
+    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Timeout for messages of the board"),
 ];
 
 /// Hardware version, as described by the maker's examples.
@@ -151,8 +151,8 @@ impl Device for HaplyDevice {
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let path = settings.text("port").ok_or_else(|| {
             Refusal::resource(format!(
-                "no `port` for the board; set it, as in {PORT_EXAMPLE}; \
-                 `cargo run -p flotor-haply --example emulated_board` starts one without hardware and says where"
+                "no `port` for the board; set the port, as in {PORT_EXAMPLE}; without hardware start the emulator \
+                 with `cargo run -p flotor-haply --example emulated_board`, which prints its port"
             ))
         })?;
         let board = Board::open(path).map_err(Refusal::resource)?;
@@ -226,16 +226,16 @@ impl HaplyDevice {
     fn start(&mut self) -> Result<Posture, Refusal> {
         let angles_deg = self.board.start(&self.hardware.arms, PATIENCE).map_err(|no_answer| {
             Refusal::resource(match no_answer {
-                NoAnswer::Lost => "the port of the board was closed: is it plugged in?",
+                NoAnswer::Lost => "the port of the board was closed; check that the board is plugged in",
                 NoAnswer::Silent => {
-                    "nothing at this port answers as a board of this device; is it switched on?"
+                    "no board of this device replies at this port; check that the board is switched on"
                 }
             })
         })?;
         self.posture(angles_deg).ok_or_else(|| {
             Refusal::resource(format!(
-                "angles of {:.1}° and {:.1}° are none the arms can have: put the handle where it rests, switch the \
-                 board off and on, and start again",
+                "the arms cannot have the angles {:.1}° and {:.1}°: put the handle into its rest position, switch \
+                 the board off and on, and start again",
                 angles_deg[0], angles_deg[1]
             ))
         })

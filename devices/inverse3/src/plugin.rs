@@ -30,14 +30,18 @@ const LOOK: Duration = Duration::from_millis(5);
 const STOP_NS: u64 = 100_000_000;
 
 const SCHEMA: &[Parameter] = &[
-    Parameter::text(
-        "address",
-        "Where the Inverse Service listens, as 127.0.0.1:10001, which it is if not said",
-    ),
-    Parameter::text("device", "Which Inverse3, by the id on its label; the only one if not said"),
-    Parameter::text("grip", "Which VerseGrip, by its id, or none; the only one if not said"),
+    Parameter::text("address", "Address of the Inverse Service (default: 127.0.0.1:10001)"),
+    Parameter::text("device", "Id of the Inverse3, from its label (default: the only one)"),
+    Parameter::text("grip", "Id of the VerseGrip, or none (default: the only one)"),
     Parameter::real("max_force_n", "N", 0.0, 20.0, 5.0, "Largest force on the hand"),
-    Parameter::real("range_mm", "mm", 1.0, 200.0, 60.0, "Farthest from the centre of the arm's range"),
+    Parameter::real(
+        "range_mm",
+        "mm",
+        1.0,
+        200.0,
+        60.0,
+        "Largest distance from the centre of the arm's range",
+    ),
     Parameter::real("force_gate", "1", 0.0, 1.0, 0.0, "Gain of the service's force gate; 0: none"),
     Parameter::real(
         "foreign_force_n",
@@ -45,7 +49,7 @@ const SCHEMA: &[Parameter] = &[
         0.0,
         100.0,
         0.5,
-        "Force beyond the commanded one that is another program's, and a fault",
+        "Largest difference from the commanded force; above it another program commands the device, which is a fault",
     ),
     Parameter::real(
         "spin_cutoff_hz",
@@ -53,9 +57,9 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         500.0,
         30.0,
-        "Angular velocity is the difference of orientations, smoothed below this frequency",
+        "Cutoff frequency of the low-pass filter of the angular velocity, which is the difference of orientations",
     ),
-    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Silence of the service that is a fault"),
+    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Timeout for messages of the service"),
 ];
 
 /// Parsed parameters.
@@ -115,7 +119,7 @@ impl Options {
             }
             if started.elapsed() >= COMMANDS_FADE {
                 return Err(Refusal::resource(
-                    "another program commands this Inverse3, and the forces of both would add up; end that one first",
+                    "another program commands this Inverse3, and the forces of both would add up; end that program first",
                 ));
             }
             std::thread::sleep(LOOK);

@@ -59,7 +59,7 @@ impl Session {
         let of_service = |cause: String| format!("the Inverse Service at {address}: {cause}");
         let mut socket = Socket::connect(address, PATIENCE).map_err(|cause| {
             of_service(format!(
-                "{cause}; start Haply's service, or `flotor emulate haply-service` for one without hardware"
+                "{cause}; start Haply's service, or `flotor emulate haply-service` without hardware"
             ))
         })?;
         let mut talk = |text: &str| {
@@ -137,12 +137,15 @@ fn choose(request: &Request, Inventory { arms, grips }: &Inventory) -> Result<Ch
     let ids: Vec<&str> = arms.iter().map(String::as_str).collect();
     let arm = match (&request.arm, arms.as_slice()) {
         (Some(named), _) => arms.iter().find(|id| id.eq_ignore_ascii_case(named)).ok_or_else(|| {
-            format!("it has no device {named}, but {}; `device` must be one of them", listed(&ids))
+            format!("the service has no device {named}; set `device` to one of its devices: {}", listed(&ids))
         })?,
         (None, [only]) => only,
-        (None, []) => return Err("it has no device; is one connected, and its power on?".to_owned()),
+        (None, []) => return Err("the service has no device; connect a device and switch it on".to_owned()),
         (None, _) => {
-            return Err(format!("it has several devices; say with `device` which: {}", listed(&ids)));
+            return Err(format!(
+                "the service has several devices; choose one with `device`: {}",
+                listed(&ids)
+            ));
         }
     };
     let ids: Vec<&str> = grips.iter().map(|grip| grip.id.as_str()).collect();
@@ -150,12 +153,18 @@ fn choose(request: &Request, Inventory { arms, grips }: &Inventory) -> Result<Ch
         (GripRequest::None, _) | (GripRequest::OnlyOne, []) => None,
         (GripRequest::OnlyOne, [only]) => Some(only.clone()),
         (GripRequest::OnlyOne, _) => {
-            return Err(format!("it has several grips; say with `grip` which, or `none`: {}", listed(&ids)));
+            return Err(format!(
+                "the service has several grips; choose one with `grip`, or `none`: {}",
+                listed(&ids)
+            ));
         }
         (GripRequest::Named(named), _) => {
             let found: Option<&Grip> = grips.iter().find(|grip| grip.id.eq_ignore_ascii_case(named));
             Some(found.cloned().ok_or_else(|| {
-                format!("it has no grip {named}, but {}; `grip` must be one of them, or `none`", listed(&ids))
+                format!(
+                    "the service has no grip {named}; set `grip` to one of its grips, or `none`: {}",
+                    listed(&ids)
+                )
             })?)
         }
     };

@@ -60,19 +60,19 @@ impl From<Malformed> for SessionError {
 impl fmt::Display for SessionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Gone => f.write_str("it closed the connection; start it again"),
-            Self::Silent => f.write_str("it does not answer; start it again"),
-            Self::Unfinished => f.write_str("a state of it does not end; start it again"),
-            Self::TooLong(bytes) => write!(f, "a message of {bytes} bytes is no state of a device; {UPDATE}"),
-            Self::NoFrame => write!(f, "what it sends is no whole message of a WebSocket; {UPDATE}"),
-            Self::NoState => write!(f, "what it sends is no state of a device; {UPDATE}"),
-            Self::Missing(field) => write!(f, "its state has no `{field}`; {UPDATE}"),
-            Self::Infinite(field) => write!(f, "`{field}` of its state is no finite number; {UPDATE}"),
-            Self::Unplugged => f.write_str("the device is no longer there; connect it, and switch it on"),
+            Self::Gone => f.write_str("the service closed the connection; restart the service"),
+            Self::Silent => f.write_str("the service does not reply; restart the service"),
+            Self::Unfinished => f.write_str("the service sent an incomplete state; restart the service"),
+            Self::TooLong(bytes) => write!(f, "a message of {bytes} bytes is too long for a device state; {UPDATE}"),
+            Self::NoFrame => write!(f, "the service sent a malformed WebSocket frame; {UPDATE}"),
+            Self::NoState => write!(f, "the service sent a malformed device state; {UPDATE}"),
+            Self::Missing(field) => write!(f, "the device state has no `{field}`; {UPDATE}"),
+            Self::Infinite(field) => write!(f, "`{field}` of the device state is not a finite number; {UPDATE}"),
+            Self::Unplugged => f.write_str("the device is no longer connected; connect the device, and switch it on"),
             Self::NotReady => f.write_str(
-                "the device has no power, or is not calibrated; switch it on, and wait until it is, up to 25 s",
+                "the device has no power, or is not calibrated; switch the device on, and wait for its calibration, up to 25 s",
             ),
-            Self::ForeignForce => f.write_str("another program pushes the device, too; end that one first"),
+            Self::ForeignForce => f.write_str("another program also commands a force; end that program first"),
         }
     }
 }

@@ -42,7 +42,7 @@ impl Socket {
     /// One clause with the error of the system or of the upgrade.
     pub fn connect(address: &str, patience: Duration) -> Result<Self, String> {
         let lookup = address.to_socket_addrs().map_err(|error| error.to_string())?;
-        let mut failed = "no host has that name".to_owned();
+        let mut failed = "unknown host name; check the address".to_owned();
         for candidate in lookup {
             match TcpStream::connect_timeout(&candidate, patience) {
                 Ok(stream) => return Self::on(stream, address, patience).map_err(|error| error.to_string()),
@@ -67,7 +67,8 @@ impl Socket {
     }
 
     fn upgrade(&mut self, host: &str, key: &str) -> io::Result<()> {
-        let no_service = || io::Error::new(ErrorKind::InvalidData, "what answers there is no WebSocket");
+        let no_service =
+            || io::Error::new(ErrorKind::InvalidData, "the server at this address is not a WebSocket server");
         write!(
             self.stream,
             "GET / HTTP/1.1\r\nHost: {host}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\

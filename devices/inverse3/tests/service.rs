@@ -233,9 +233,13 @@ fn what_cannot_be_opened_is_refused_in_one_sentence_with_what_to_do() {
         (
             plain(),
             vec![("device", "")],
-            format!("several devices; say with `device` which: {OTHER_ARM}, {ARM}"),
+            format!("several devices; choose one with `device`: {OTHER_ARM}, {ARM}"),
         ),
-        (plain(), vec![("grip", "1234")], format!("no grip 1234, but {GRIP}")),
+        (
+            plain(),
+            vec![("grip", "1234")],
+            format!("no grip 1234; set `grip` to one of its grips, or `none`: {GRIP}"),
+        ),
         (answering(1, configured(0.3)), vec![], "`config.filters.force_gate.gain` of the device".to_owned()),
     ] {
         refused_with(&service, &more, &[&words]);
@@ -265,7 +269,7 @@ fn commanded() -> String {
 }
 
 const BUSY: &str =
-    "another program commands this Inverse3, and the forces of both would add up; end that one first";
+    "another program commands this Inverse3, and the forces of both would add up; end that program first";
 
 #[test]
 fn where_no_service_listens_the_address_and_what_to_start_are_named() {
@@ -280,32 +284,36 @@ fn where_no_service_listens_the_address_and_what_to_start_are_named() {
 #[test]
 fn a_service_without_a_device_asks_for_cable_and_power() {
     let empty = answering(0, "{\"session_id\":1,\"inverse3\":[],\"verse_grip\":[]}".to_owned());
-    refused_with(&empty, &[("device", "")], &["it has no device; is one connected, and its power on?"]);
+    refused_with(
+        &empty,
+        &[("device", "")],
+        &["the service has no device; connect a device and switch it on"],
+    );
 }
 
 #[test]
 fn a_service_without_the_wanted_device_lists_those_it_has() {
-    let listed = format!("no device 1234, but {OTHER_ARM}, {ARM}");
-    refused_with(&until(usize::MAX, Said::Nothing), &[("device", "1234")], &[&listed, "must be one of them"]);
+    let listed = format!("no device 1234; set `device` to one of its devices: {OTHER_ARM}, {ARM}");
+    refused_with(&until(usize::MAX, Said::Nothing), &[("device", "1234")], &[&listed]);
 }
 
 #[test]
 fn messages_of_another_version_are_told_with_the_version_that_is_needed() {
     const UPDATE: &str = "update the service to 3.5 or newer";
     let of_old = |text: &str| answering(1, text.to_owned());
-    refused_with(&of_old("nonsense"), &[], &["what it sends is no state of a device", UPDATE]);
+    refused_with(&of_old("nonsense"), &[], &["the service sent a malformed device state", UPDATE]);
     // It knows no presets.
     let told = configured(0.0).replace("\"preset\":\"arm_front_centered\",", "");
     refused_with(&of_old(&told), &[], &["`config.preset` of the device", "is nothing", UPDATE]);
     // Its states have another name for a field.
     let told = state(HELD_M, DVec3::ZERO).replace("cursor_velocity", "velocity");
-    refused_with(&answering(2, told), &[], &["its state has no `cursor_velocity`", UPDATE]);
+    refused_with(&answering(2, told), &[], &["the device state has no `cursor_velocity`", UPDATE]);
 }
 
 #[test]
 fn a_device_without_power_is_not_opened() {
     let told = state(HELD_M, DVec3::ZERO).replace("\"power_supply\":true", "\"power_supply\":false");
-    refused_with(&answering(2, told), &[], &["no power, or is not calibrated; switch it on"]);
+    refused_with(&answering(2, told), &[], &["no power, or is not calibrated; switch the device on"]);
 }
 
 #[test]

@@ -45,7 +45,7 @@ impl std::fmt::Display for Aborted {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Lost => f.write_str("the link to the controller broke"),
-            Self::Silent => f.write_str("the controller fell silent"),
+            Self::Silent => f.write_str("the controller does not reply"),
             Self::Faulted(condition) => write!(f, "the controller faulted ({condition})"),
         }
     }

@@ -59,7 +59,7 @@ pub(crate) struct MlActive {
 fn refused(address: &str, failed: Failed) -> Refusal {
     let hint = match failed {
         Failed::At(_, NoResults::Lost | NoResults::Silent) => {
-            "; `flotor emulate maglev --protocol ml-api` starts one without hardware"
+            "; without hardware start the emulator with `flotor emulate maglev --protocol ml-api`"
         }
         Failed::At(_, NoResults::Refused(Status::RECEIVE_ONLY)) => "; end the other program first",
         _ => "",

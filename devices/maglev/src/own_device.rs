@@ -138,7 +138,7 @@ impl OwnDevice {
             Err(Unanswered::Lost) => {
                 let (link, description) = connect(&self.options)?;
                 if description != self.description {
-                    let reason = "another controller answers than the one that was opened; start again";
+                    let reason = "another controller than the opened controller replies; start again";
                     return Err(Refusal::resource(reason));
                 }
                 self.link = link;
@@ -176,14 +176,16 @@ fn connect(options: &Options) -> Result<(HostLink, Description), Refusal> {
 fn refused(options: &Options, unanswered: Unanswered) -> Refusal {
     let Options { kind, address, .. } = options;
     let hint = match kind {
-        Kind::Tcp => "; `flotor emulate maglev` starts one without hardware",
+        Kind::Tcp => "; without hardware start the emulator with `flotor emulate maglev`",
         Kind::Serial | Kind::Usb | Kind::Hid => "",
     };
     Refusal::resource(match unanswered {
         Unanswered::Lost => {
-            format!("the controller at {address} closed the connection; does another program use it?")
+            format!(
+                "the controller at {address} closed the connection; end other programs that use the controller"
+            )
         }
-        Unanswered::Silent => format!("no controller of this device answers at {address}{hint}"),
+        Unanswered::Silent => format!("no controller of this device replies at {address}{hint}"),
     })
 }
 

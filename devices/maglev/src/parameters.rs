@@ -20,18 +20,19 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "protocol",
         PROTOCOLS,
         0,
-        "What the controller speaks: flotor (on every transport), or the ML API 1.5b of the Maglev 200 (tcp)",
+        "Protocol of the controller: flotor (on every transport), or the ML API 1.5b of the Maglev 200 (tcp)",
     ),
-    Parameter::choice("transport", TRANSPORTS, 0, "How the controller is reached"),
+    Parameter::choice("transport", TRANSPORTS, 0, "Transport to the controller"),
     Parameter::text(
         "address",
-        "Where: host:port (default 127.0.0.1, port 5679, with ml-api 5678), a serial port's path, or vendor:product in hex (usb, hid)",
+        "Address: host:port (default 127.0.0.1, port 5679, with ml-api 5678), path of a serial port, or \
+         vendor:product in hex (usb, hid)",
     ),
     Parameter::choice(
         "pace",
         PACES,
         0,
-        "real: answers are taken as they come; lockstep: each tick waits for its answer (virtual clock, emulator)",
+        "real: each tick uses the newest reply; lockstep: each tick waits for its reply (virtual clock, emulator)",
     ),
     Parameter::real(
         "watchdog_ms",
@@ -41,14 +42,14 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         8.0,
         "Watchdog of the controller: time without a command after which it ends the session and holds",
     ),
-    Parameter::real("timeout_ms", "ms", 2.0, 10_000.0, 15.0, "Silence of the controller that is a fault"),
+    Parameter::real("timeout_ms", "ms", 2.0, 10_000.0, 15.0, "Timeout for replies of the controller"),
     Parameter::real(
         "feedforward_n",
         "N",
         -50.0,
         50.0,
         0.0,
-        "Vertical force the controller adds by itself; a calibration corrects the sum",
+        "Vertical force that the controller adds; a calibration corrects the sum",
     ),
     Parameter::real(
         "takeoff_ms",
@@ -62,7 +63,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "gravity",
         GRAVITY,
         0,
-        "Gravity compensation: off (the controller or the scene does it), defy (measured at take-off, then applied); \
+        "Gravity compensation: off (the controller or the scene compensates), defy (measured at take-off, then applied); \
          auto: off, with ml-api defy",
     ),
     Parameter::real(
@@ -71,7 +72,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         10_000.0,
         1000.0,
-        "With ml-api: time in which the controller's gains fade before forces take their place",
+        "With ml-api: time in which the controller's gains fade out before forces are commanded",
     ),
     Parameter::real(
         "boundary_mm",
@@ -87,31 +88,31 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         1.0,
         5000.0,
         200.0,
-        "With ml-api: velocity is the difference of poses, smoothed below this frequency",
+        "With ml-api: cutoff frequency of the low-pass filter of the velocity, which is the difference of poses",
     ),
     Parameter::file(
         "first_contact",
         choices![],
-        "With ml-api: report of tests/hardware/first_contact.py; its parameters take the place of the defaults",
+        "With ml-api: report of tests/hardware/first_contact.py; its parameters replace the defaults",
     ),
-    Parameter::real("landing_ms", "ms", 0.0, 10_000.0, 0.0, "Time in which the handle is let down at the end"),
+    Parameter::real("landing_ms", "ms", 0.0, 10_000.0, 0.0, "Time in which the handle is lowered at the end"),
     Parameter::choice(
         "walls",
         WALLS,
         0,
-        "Walls of the device, inside those of the scene: off, the maker's, or those of the thesis",
+        "Walls of the device, inside the walls of the scene: off, as the maker's, or as in the thesis",
     ),
-    Parameter::real("wall_radius_mm", "mm", 1.0, 12.0, 11.0, "Where the spherical wall begins").live(),
-    Parameter::real("wall_x_mm", "mm", 0.5, 12.0, 12.0, "Where the walls on x begin").live(),
-    Parameter::real("wall_y_mm", "mm", 0.5, 12.0, 12.0, "Where the walls on y begin").live(),
-    Parameter::real("wall_z_mm", "mm", 0.5, 12.0, 12.0, "Where the walls on z begin").live(),
+    Parameter::real("wall_radius_mm", "mm", 1.0, 12.0, 11.0, "Distance of the spherical wall from home").live(),
+    Parameter::real("wall_x_mm", "mm", 0.5, 12.0, 12.0, "Distance of the walls on x from home").live(),
+    Parameter::real("wall_y_mm", "mm", 0.5, 12.0, 12.0, "Distance of the walls on y from home").live(),
+    Parameter::real("wall_z_mm", "mm", 0.5, 12.0, 12.0, "Distance of the walls on z from home").live(),
     Parameter::real(
         "wall_stiffness_n_per_m",
         "N/m",
         0.0,
         facts::MAX_STIFFNESS_N_PER_M,
         15_000.0,
-        "Stiffness of the walls (proportional gain); scaled down to what is stable",
+        "Stiffness of the walls (proportional gain); reduced to the stability limit",
     )
     .live(),
     Parameter::real("wall_damping_ns_per_m", "N s/m", 0.0, 40.0, 15.0, "Damping of the walls").live(),
@@ -121,7 +122,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.1,
         7.0,
         2.864_788_975_654_116,
-        "Where tilt and yaw are limited",
+        "Limit of tilt and yaw",
     )
     .live(),
     Parameter::real(
@@ -130,7 +131,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         facts::MAX_STIFFNESS_NM_PER_RAD,
         50.0,
-        "Stiffness beyond it, with the maker's walls; scaled down to what is stable",
+        "Stiffness beyond the angle limit, with the maker's walls; reduced to the stability limit",
     )
     .live(),
     Parameter::real(
@@ -148,7 +149,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         1.0,
         0.15,
-        "Damping beyond it; thesis: everywhere",
+        "Damping beyond the angle limit; thesis: at every angle",
     )
     .live(),
     Parameter::real(
@@ -157,7 +158,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         50.0,
         0.0,
-        "Spring of yaw about home; scaled down to what is stable",
+        "Stiffness of the yaw spring about home; reduced to the stability limit",
     )
     .live(),
 ];
@@ -214,7 +215,7 @@ impl Options {
             (Protocol::MlApi, Kind::Tcp) => ml_api::PORT,
             (Protocol::MlApi, _) => {
                 let reason =
-                    "the ML API is spoken over TCP only; remove `transport`, or say `protocol = \"flotor\"`";
+                    "the ML API works over TCP only; remove `transport`, or set `protocol = \"flotor\"`";
                 return Err(Refusal::parameter(reason));
             }
         };
@@ -279,7 +280,7 @@ impl Values {
         let parameters = table.get("device").and_then(|device| device.get("parameters"));
         let Some(parameters) = parameters.and_then(toml::Value::as_table) else {
             return Err(wrong(
-                &"there is no table [device.parameters]; the script writes it after the third step",
+                &"the table [device.parameters] is missing; the script writes this table after the third step",
             ));
         };
         for (id, value) in parameters {

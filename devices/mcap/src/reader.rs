@@ -25,7 +25,7 @@ pub enum OpenError {
     #[error("{0}")]
     Io(#[from] io::Error),
     /// The file has another format.
-    #[error("it is no MCAP file")]
+    #[error("not an MCAP file")]
     NotMcap,
 }
 
@@ -40,10 +40,10 @@ pub enum Damage {
     #[error("{0}")]
     Container(McapError),
     /// The file is compressed; only uncompressed chunks are read.
-    #[error("it is compressed with `{0}`; `mcap decompress` makes a copy that can be read")]
+    #[error("the file is compressed with `{0}`; make a readable copy with `mcap decompress`")]
     Compressed(String),
     /// The records of a chunk do not fill it.
-    #[error("the records of a chunk do not fill it")]
+    #[error("the records of a chunk are shorter than the chunk")]
     Chunk,
 }
 

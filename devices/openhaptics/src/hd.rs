@@ -61,12 +61,12 @@ impl Failed {
     pub(crate) fn refusal(&self) -> Refusal {
         let remedy = match self.code {
             0x0300 => {
-                "is it connected, configured with the maker's setup program, and may this user open it? `flotor doctor --device \
-                 openhaptics` looks"
+                "check that the device is connected, configured with the maker's setup program, and permitted for \
+                 this user: `flotor doctor --device openhaptics`"
             }
-            0x0301 => "end the other program, or the other device of the scene, that uses it",
-            0x0302 | 0x0303 => "check cable, hub and power, and the folder that $GTDD_HOME names",
-            _ => "try it with the maker's own diagnostic program first",
+            0x0301 => "end the other program, or remove the other device of the scene, that uses this device",
+            0x0302 | 0x0303 => "check cable, hub and power, and the folder $GTDD_HOME",
+            _ => "test the device with the maker's own diagnostic program first",
         };
         Refusal::resource(format!(
             "{} failed (error 0x{:04x} of the SDK: {}); {remedy}",
@@ -118,8 +118,9 @@ impl Hd {
             }));
         }
         let told = name.map(|name| {
-            name_of(name)
-                .ok_or_else(|| Refusal::parameter("`name` has a null character; no device is called so"))
+            name_of(name).ok_or_else(|| {
+                Refusal::parameter("`name` has a null character, which no device name has; correct the name")
+            })
         });
         let told = told.transpose()?;
         // Discards errors of earlier calls.
@@ -145,7 +146,7 @@ impl Hd {
         let [force_n] = functions.numbers(MAX_FORCE);
         let [torque_mnm] = if output >= 6 { functions.numbers(MAX_TORQUE) } else { [0.0] };
         let [stiffness_n_per_mm] = functions.numbers(MAX_STIFFNESS);
-        self.check("asking the device what it can do").map_err(|failed| failed.refusal())?;
+        self.check("reading the capabilities of the device").map_err(|failed| failed.refusal())?;
         Ok(Facts {
             centre_m: (least + most) / 2.0,
             range_m: (most - least).abs() / 2.0,
@@ -194,7 +195,7 @@ impl Hd {
             self.functions.update_calibration(styles);
         }
         let state = self.functions.check_calibration();
-        self.check("asking for the calibration").map_err(|failed| failed.refusal())?;
+        self.check("reading the calibration").map_err(|failed| failed.refusal())?;
         if state != NEEDS_UPDATE && state != NEEDS_MANUAL_INPUT {
             return Ok(());
         }

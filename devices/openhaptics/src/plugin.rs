@@ -24,33 +24,32 @@ const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "library",
         choices![],
-        "OpenHaptics' library, libHD.so; without it, looked for where the SDK and the system have libraries",
+        "Library of OpenHaptics, libHD.so (default: searched in the library folders of the SDK and the system)",
     ),
-    Parameter::choice(
-        "stand_in",
-        NO_YES,
-        0,
-        "Whether Flotor's own drop-in library may stand in for a device",
+    Parameter::choice("stand_in", NO_YES, 0, "Accept Flotor's own drop-in library, which simulates a device"),
+    Parameter::text("name", "Name of the device in the maker's setup program (default: its default device)"),
+    Parameter::real(
+        "max_force_n",
+        "N",
+        0.0,
+        40.0,
+        0.0,
+        "Largest force on the hand; 0: the limit of the device",
     ),
-    Parameter::text(
-        "name",
-        "Name of the device, as the maker's setup program calls it; the default one without it",
-    ),
-    Parameter::real("max_force_n", "N", 0.0, 40.0, 0.0, "Largest force on the hand; 0: that of the device"),
     Parameter::real(
         "max_torque_nm",
         "N·m",
         0.0,
         1.0,
         0.0,
-        "Largest torque on the hand; 0: that of the device",
+        "Largest torque on the hand; 0: the limit of the device",
     ),
-    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Time without a sample that is a fault"),
+    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Timeout for samples of the device"),
     Parameter::choice(
         "pace",
         PACES,
         0,
-        "real: samples are taken as they come; lockstep: each tick waits for its own (virtual clock, simulated device)",
+        "real: each tick uses the newest sample; lockstep: each tick waits for its sample (virtual clock, simulated device)",
     ),
 ];
 
@@ -75,7 +74,7 @@ impl Device for TouchDevice {
     const INFO: DeviceInfo = DeviceInfo::new(
         "openhaptics",
         "3D Systems Touch, Geomagic Touch, Phantom",
-        "An arm with a stylus, over the OpenHaptics that its user has installed; its scheduler sets the pace",
+        "An arm with a stylus, over the OpenHaptics that the user has installed; its scheduler sets the pace",
     );
     const PARAMETERS: &'static [Parameter] = SCHEMA;
     type Active = ScheduledDevice;

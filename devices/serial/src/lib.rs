@@ -42,10 +42,12 @@ pub enum NotOpened {
 impl fmt::Display for NotOpened {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Forbidden { remedy } => write!(f, "this user may not use it; {remedy}"),
-            Self::InUse => f.write_str("another program uses it; close that one first"),
-            Self::NoPort => write!(f, "it is no serial port; {}", platform::PORT_LIST),
-            Self::Missing { cause } => write!(f, "{cause}; is it connected? {}", platform::PORT_LIST),
+            Self::Forbidden { remedy } => write!(f, "this user may not open the port; {remedy}"),
+            Self::InUse => f.write_str("another program uses the port; close that program first"),
+            Self::NoPort => write!(f, "the file is not a serial port; {}", platform::PORT_LIST),
+            Self::Missing { cause } => {
+                write!(f, "{cause}; check that the device is connected; {}", platform::PORT_LIST)
+            }
         }
     }
 }

@@ -33,8 +33,7 @@ pub(crate) fn refuse_idle(settings: &Settings<'_>) -> Result<(), Refusal> {
     let is_idle = |id: &str| SCHEMA.iter().any(|known| known.id() == id && known.doc().starts_with(OF_FULL));
     settings.ids().find(|id| is_idle(id)).map_or(Ok(()), |id| {
         Err(Refusal::parameter(format!(
-            "`{id}` has no say in preset `plain`, which leaves coils, sensors and faults out; set `preset` to `full` as \
-             well"
+            "`{id}` has no effect in preset `plain`, which omits coils, sensors and faults; set `preset` to `full` as well"
         )))
     })
 }

@@ -57,14 +57,14 @@ impl fmt::Display for InvalidParameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotFinite { name } => write!(f, "{name} is not a finite number"),
-            Self::NotPositive { name, value } => write!(f, "{name} is {value}, it must be above zero"),
-            Self::Negative { name, value } => write!(f, "{name} is {value}, it must not be negative"),
+            Self::NotPositive { name, value } => write!(f, "{name} is {value}, but must be above zero"),
+            Self::Negative { name, value } => write!(f, "{name} is {value}, but must not be negative"),
             Self::ImpossibleInertia { principal_kg_m2: i } => {
                 write!(f, "no body has the moments of inertia {}, {}, {} kg m^2: ", i.x, i.y, i.z)?;
                 write!(f, "each may be at most the sum of the other two")
             }
             Self::NotARotation { name, length } => {
-                write!(f, "{name} has length {length}, a rotation is a quaternion of length 1")
+                write!(f, "{name} has length {length}, but a rotation is a quaternion of length 1")
             }
             Self::DependentCoils => {
                 write!(

@@ -22,16 +22,16 @@ const HOME_BUTTON: usize = 5;
 const SCHEMA: &[Parameter] = &[
     Parameter::real("speed_mm_per_s", "mm/s", 0.1, 1000.0, 20.0, "Speed at full deflection").live(),
     Parameter::real("spin_deg_per_s", "°/s", 0.0, 360.0, 20.0, "Angular speed at full deflection").live(),
-    Parameter::real("dead_zone", "1", 0.0, 0.9, 0.08, "Share of full deflection that counts as none").live(),
-    Parameter::real("range_mm", "mm", 0.1, 1000.0, 12.0, "Farthest from home"),
-    Parameter::real("range_deg", "°", 0.0, 170.0, 7.0, "Farthest from home"),
+    Parameter::real("dead_zone", "1", 0.0, 0.9, 0.08, "Dead zone, as a share of full deflection").live(),
+    Parameter::real("range_mm", "mm", 0.1, 1000.0, 12.0, "Largest distance from home"),
+    Parameter::real("range_deg", "°", 0.0, 170.0, 7.0, "Largest distance from home"),
     Parameter::real(
         "home_button",
         "1",
         0.0,
         32.0,
         1.0,
-        "Button that brings the pose home while held; 0: none",
+        "Button that moves the pose home while pressed; 0: none",
     )
     .live(),
     Parameter::text("path", PATH_HELP),

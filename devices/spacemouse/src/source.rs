@@ -60,7 +60,7 @@ impl Reports for HidPuck {
             Some(path) => std::ffi::CString::new(path).map_err(Refusal::parameter)?,
             None => api.device_list().find(puck).map(|info| info.path().to_owned()).ok_or_else(|| {
                 Refusal::resource(format!(
-                    "no SpaceMouse is plugged in; if there is one, `path` says where, as {PATH_EXAMPLE}"
+                    "no SpaceMouse found; connect a SpaceMouse, or set its `path`, such as {PATH_EXAMPLE}"
                 ))
             })?,
         };

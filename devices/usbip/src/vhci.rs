@@ -33,9 +33,9 @@ pub fn is_available() -> bool {
 pub fn attach(stream: &UnixStream, speed: Speed) -> io::Result<()> {
     let explained = |error: io::Error| {
         let hint = match error.kind() {
-            ErrorKind::NotFound => "load the kernel's module: sudo modprobe vhci_hcd",
-            ErrorKind::PermissionDenied => "only root may plug a device in",
-            _ => "no port took the device",
+            ErrorKind::NotFound => "load the kernel module: sudo modprobe vhci_hcd",
+            ErrorKind::PermissionDenied => "only root may attach a device; use sudo",
+            _ => "no virtual port accepted the device",
         };
         io::Error::new(error.kind(), format!("{FOLDER}: {error}; {hint}"))
     };

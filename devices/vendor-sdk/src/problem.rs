@@ -72,9 +72,9 @@ impl fmt::Display for LibraryProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotFound { sdk, searched } => {
-                let remedy = "install it, or name its file with the parameter `library`";
+                let remedy = "install the SDK, or name its library with the parameter `library`";
                 if let [place] = searched.as_slice() {
-                    return write!(f, "there is no {}; for {sdk}, {remedy}", place.display());
+                    return write!(f, "the file {} of {sdk} does not exist; {remedy}", place.display());
                 }
                 let named = |part: fn(&PathBuf) -> Option<&OsStr>| {
                     let mut names: Vec<String> = Vec::new();
@@ -88,7 +88,7 @@ impl fmt::Display for LibraryProblem {
                 let folders = named(|place| place.parent().map(Path::as_os_str));
                 write!(
                     f,
-                    "no library of {sdk}: {remedy}; looked for {} in {folders}",
+                    "no library of {sdk} found (searched for {} in {folders}); {remedy}",
                     named(|place| place.file_name())
                 )
             }
@@ -97,7 +97,7 @@ impl fmt::Display for LibraryProblem {
             }
             Self::NotALibrary { path } => write!(
                 f,
-                "{} is no shared library; name the file that ends in {LIBRARY_ENDING}",
+                "{} is not a shared library; name the file that ends in {LIBRARY_ENDING}",
                 path.display()
             ),
             Self::Architecture { path, found, needed } => write!(
@@ -110,8 +110,8 @@ impl fmt::Display for LibraryProblem {
             }
             Self::StandIn { path } => write!(
                 f,
-                "{} is Flotor's own drop-in library and no device is behind it; name the vendor's with `library`, or \
-                 accept a simulated device with `stand_in = true`",
+                "{} is Flotor's own drop-in library, which has no device; name the vendor's library with `library`, \
+                 or accept a simulated device with `stand_in = true`",
                 path.display()
             ),
             Self::MissingFunction { path, function, needed } => {

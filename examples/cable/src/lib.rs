@@ -40,7 +40,7 @@ impl Device for Knob {
         let path = settings.text("port").unwrap_or("/dev/ttyACM0");
         let port = TTYPort::open(&serialport::new(path, BAUD).timeout(TIMEOUT)).map_err(|error| {
             Refusal::resource(format!(
-                "{path}: {error}; is the board connected, and may this user use its port?"
+                "{path}: {error}; check that the board is connected and that this user may use its port"
             ))
         })?;
         Ok(Self::on(port))

@@ -68,7 +68,13 @@ fn bad(told: &str, count: usize) {
 fn a_falcon_that_is_not_there_is_told_by_its_numbers() {
     let told = Computer::default().doctor("falcon", &["address=tcp:127.0.0.1:1"]);
     finds(&told, "bad", "on USB", "no device 0403:cb48", "connect the device and switch it on");
-    finds(&told, "bad", "opening", "no emulated Falcon at 127.0.0.1:1", "`flotor emulate falcon` starts one");
+    finds(
+        &told,
+        "bad",
+        "opening",
+        "no emulated Falcon at 127.0.0.1:1",
+        "start one with `flotor emulate falcon`",
+    );
     bad(&told, 2);
 }
 
@@ -101,8 +107,8 @@ fn a_falcon_without_firmware_is_told_where_it_may_be() {
         &told,
         "bad",
         "opening",
-        "it has no firmware since its power was off",
-        "name your own file with `firmware`",
+        "the Falcon has no firmware after power-off",
+        "give your own firmware file with `firmware`",
     );
     bad(&told, 1);
 }
@@ -123,8 +129,8 @@ fn a_falcon_that_is_not_homed_is_told_to_whoever_does_not_wait() {
         &told,
         "bad",
         "opening",
-        "does not know where its handle is",
-        "push the handle in as far as it goes",
+        "has not found its home position",
+        "push the handle in as far as possible",
     );
     bad(&told, 1);
 }
@@ -155,9 +161,15 @@ fn what_keeps_an_inverse3_from_starting_is_told() {
     let well = state(DVec3::ZERO, DVec3::ZERO);
     let busy = well.replace("\"control_mode\":\"idle\"", "\"control_mode\":\"force\"");
     let cases = [
-        (usize::MAX, String::new(), "1234", "it has no device 1234, but ", "must be one of them"),
-        (1, "nonsense".to_owned(), ARM, "is no state of a device", "update the service to 3.5 or newer"),
-        (2, busy, ARM, "another program commands this Inverse3", "end that one first"),
+        (
+            usize::MAX,
+            String::new(),
+            "1234",
+            "the service has no device 1234; ",
+            "set `device` to one of its devices",
+        ),
+        (1, "nonsense".to_owned(), ARM, "malformed device state", "update the service to 3.5 or newer"),
+        (2, busy, ARM, "another program commands this Inverse3", "end that program first"),
     ];
     let computer = Computer::default();
     for (from, text, arm, words, remedy) in cases {

@@ -250,7 +250,11 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     let ran = calibrate(&emulator, &missing, &["vertical"]);
     assert!(ran.error().contains("no force sensor at"), "{}", ran.error());
     let ran = calibrate(&emulator, Path::new("/dev/null"), &["vertical"]);
-    assert!(ran.error().contains("no force sensor at /dev/null: it is no serial port"), "{}", ran.error());
+    assert!(
+        ran.error().contains("no force sensor at /dev/null: the file is not a serial port"),
+        "{}",
+        ran.error()
+    );
     for (set, words) in [
         ("timout_ms=50", "--sensor-set timout_ms: no parameter"),
         ("port=/dev/null", "--sensor-set port: omit this option; `--sensor PORT` sets the port"),

@@ -258,13 +258,13 @@ fn a_library_that_cannot_be_used_is_named_with_what_to_do() {
         let oldest: &[&str] = if api.id == DHD.id { &["MINOR=9"] } else { &["VERSION=\"2.9\""] };
         let lacking = if api.id == DHD.id { "dhdSetWatchdog" } else { "hdStopScheduler" };
         let cases = [
-            (scratch.path().join("nowhere.so"), "there is no "),
+            (scratch.path().join("nowhere.so"), " does not exist"),
             (scratch.file("32.so", head(1, 3)), "is for 32-bit x86 and this program for 64-bit"),
             (
                 scratch.file("arm.so", head(2, if cfg!(target_arch = "aarch64") { 62 } else { 183 })),
                 "is for 64-bit",
             ),
-            (scratch.file("text.so", "INPUT(libreal.so)"), "is no shared library"),
+            (scratch.file("text.so", "INPUT(libreal.so)"), "is not a shared library"),
             (
                 scratch.file("cut.so", head(2, if cfg!(target_arch = "aarch64") { 183 } else { 62 })),
                 "cannot be loaded (",
@@ -334,12 +334,12 @@ fn doctor_tells_what_keeps_a_device_from_starting() {
     }
     assert!(touch.contains("ENV{ID_MM_DEVICE_IGNORE}=\"1\"") && touch.contains("bad findings: 1"), "{touch}");
     let cases = [
-        (DHD, library(Path::new("/nowhere/libdrd.so.3")), "there is no /nowhere/libdrd.so.3"),
+        (DHD, library(Path::new("/nowhere/libdrd.so.3")), "the file /nowhere/libdrd.so.3 of"),
         (DHD, library(&elf32), "is for 32-bit x86 and this program for 64-bit"),
         (
             DHD,
             library(&DHD.broken(&scratch, "uninitialised", &["UNINITIALISED"])),
-            "does not know where its arm is",
+            "has no reference position",
         ),
         (
             DHD,
@@ -417,7 +417,7 @@ fn a_device_that_cannot_start_says_why_and_what_to_do() {
         return;
     }
     let cases: [(Api, &[&str], &str); 7] = [
-        (DHD, &["NO_DEVICE"], "connect it and switch it on"),
+        (DHD, &["NO_DEVICE"], "connect the device and switch it on"),
         (DHD, &["NO_DRIVER"], "doctor --device force-dimension"),
         (DHD, &["UNINITIALISED"], "initialise = \"automatic\""),
         (HD, &["NO_DEVICE"], "the maker's setup program"),

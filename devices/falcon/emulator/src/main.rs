@@ -16,7 +16,7 @@ use std::process::ExitCode;
 /// Emulate a Novint Falcon: a hand moves its handle up and down.
 #[derive(Parser)]
 #[command(name = "flotor emulate falcon", version, max_term_width = 110)]
-#[command(after_help = "A line on standard output says where it is.\n\nExamples:\n  \
+#[command(after_help = "A line on standard output has the address.\n\nExamples:\n  \
     flotor emulate falcon\n  \
     sudo modprobe vhci_hcd && sudo flotor emulate falcon --transport usb --power off\n  \
     flotor emulate falcon --calibration-rig /tmp/flotor-force")]
@@ -24,12 +24,12 @@ struct Arguments {
     /// Connection to the host
     #[arg(long, value_enum, default_value = "tcp")]
     transport: TransportOption,
-    /// Tcp: where to listen (port 0: any free one)
+    /// Tcp: address to listen at (port 0: any free port)
     #[arg(long, default_value = "127.0.0.1:4108", value_name = "HOST:PORT")]
     listen: String,
     #[command(flatten)]
     reach: ReachArguments,
-    /// Power state: whether the firmware runs already
+    /// Power state at the start: with or without running firmware
     #[arg(long, value_enum, default_value = "on")]
     power: PowerOption,
     /// Amplitude, from the middle of the motion to its ends, in mm
@@ -40,7 +40,7 @@ struct Arguments {
     frequency_hz: f64,
     #[command(flatten)]
     rig: RigArguments,
-    /// End when the first host is gone
+    /// End when the first host disconnects
     #[arg(long)]
     once: bool,
 }
@@ -61,14 +61,14 @@ impl Arguments {
 enum TransportOption {
     /// A connection, for the plugin with `address = "tcp:HOST:PORT"`
     Tcp,
-    /// This machine's own USB, for every program (with the module vhci_hcd, as root)
+    /// USB of this machine, for every program (with the module vhci_hcd, as root)
     #[cfg(target_os = "linux")]
     Usb,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
 enum PowerOption {
-    /// Power was off: the boot loader waits for a firmware, any bytes
+    /// After power-off: the boot loader waits for a firmware and accepts any bytes
     Off,
     /// The firmware runs, and the arms are homed
     On,

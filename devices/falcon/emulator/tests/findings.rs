@@ -7,7 +7,8 @@ use flotor_falcon_emulator::machine::{Fault, Power};
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{Axes, UsbAccess};
 
-const PUSH_AND_PULL: &str = "push the handle in as far as it goes, pull it out as far as it goes";
+const PUSH_AND_PULL: &str =
+    "push the handle in as far as possible and pull the handle out as far as possible";
 
 /// That it is refused when it is opened, in one line with all of these words.
 fn refused_with(address: &str, more: &[(&str, &str)], words: &[&str]) {
@@ -27,14 +28,21 @@ fn the_bus_is_searched_for_the_numbers_that_the_plugin_opens() {
 
 #[test]
 fn where_nothing_answers_the_address_and_what_to_start_are_named() {
-    refused_with("tcp:127.0.0.1:1", &[], &["127.0.0.1:1", "refused", "`flotor emulate falcon` starts one"]);
+    refused_with(
+        "tcp:127.0.0.1:1",
+        &[],
+        &["127.0.0.1:1", "refused", "start one with `flotor emulate falcon`"],
+    );
 }
 
 #[test]
 fn firmware_that_is_missing_is_told_with_where_it_may_be() {
     let (device, address) = serve(Power::Off, CENTRE_M);
-    let words =
-        ["it has no firmware since its power was off", "name your own file with `firmware`", "`nvent`"];
+    let words = [
+        "the Falcon has no firmware after power-off",
+        "give your own firmware file with `firmware`",
+        "`nvent`",
+    ];
     refused_with(&address, &[], &words);
     assert_eq!(device.machine().command().motors, [0; 3]);
 }
@@ -47,7 +55,7 @@ fn a_boot_loader_that_does_not_answer_is_told() {
     std::fs::write(&path, [7; 300]).expect("a folder for such files");
     let (name, digest) = (path.display().to_string(), flotor_falcon::firmware::digest(&[7; 300]));
     let with_file = [("firmware", name.as_str()), ("firmware_sha256", digest.as_str())];
-    refused_with(&address, &with_file, &["its boot loader did not answer", "switch its power off and on"]);
+    refused_with(&address, &with_file, &["the boot loader did not answer", "switch the Falcon off and on"]);
     std::fs::remove_file(&path).expect("it is ours");
 }
 
@@ -55,7 +63,7 @@ fn a_boot_loader_that_does_not_answer_is_told() {
 fn a_device_that_answers_and_is_not_homed_is_told_to_whoever_does_not_wait() {
     let (device, address) = serve(Power::On, CENTRE_M);
     device.machine().breaks(Some(Fault::Unhomed(0)));
-    refused_with(&address, &[("homing_s", "0")], &["does not know where its handle is", PUSH_AND_PULL]);
+    refused_with(&address, &[("homing_s", "0")], &["has not found its home position", PUSH_AND_PULL]);
     // Who waits opens it, and hears of it when the hand has done nothing for so long.
     let opened = open(&address, &[("homing_s", "0.1"), ("timeout_ms", "500")]).expect("it runs");
     let refused = opened.activate(&CONFIG).err().map(|(_, refusal)| refusal.to_string()).unwrap_or_default();

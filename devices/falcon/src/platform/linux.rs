@@ -4,7 +4,7 @@ use std::net::TcpStream;
 use std::os::fd::AsRawFd;
 
 /// Remedy for all other errors.
-pub(crate) const OTHER_REMEDY: &str = "connect it without a hub, and try again";
+pub(crate) const OTHER_REMEDY: &str = "connect the Falcon without a hub, and try again";
 
 /// Returns whether programs can reach a USB bus: a container has none by default.
 pub(crate) fn has_bus() -> bool {
@@ -14,8 +14,9 @@ pub(crate) fn has_bus() -> bool {
 /// Returns the remedy for a missing permission: a line for udev.
 pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     format!(
-        "put this line into /etc/udev/rules.d/70-flotor.rules, run `sudo udevadm control --reload` and plug it in again: \
-         SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{vendor:04x}\", ATTR{{idProduct}}==\"{product:04x}\", TAG+=\"uaccess\", \
+        "put this line into /etc/udev/rules.d/70-flotor.rules, run `sudo udevadm control --reload` and reconnect \
+         the device: SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{vendor:04x}\", ATTR{{idProduct}}==\"{product:04x}\", \
+         TAG+=\"uaccess\", \
          ENV{{ID_MM_DEVICE_IGNORE}}=\"1\""
     )
 }

@@ -4,8 +4,7 @@ use std::net::TcpStream;
 use std::os::windows::io::AsRawSocket;
 
 /// Remedy for all other errors.
-pub(crate) const OTHER_REMEDY: &str =
-    "give it the driver WinUSB with the program Zadig, connect it without a hub, and try again";
+pub(crate) const OTHER_REMEDY: &str = "install the driver WinUSB for the Falcon with the program Zadig, connect the Falcon without a hub, and try again";
 
 /// Returns whether programs can reach a USB bus.
 pub(crate) fn has_bus() -> bool {
@@ -15,7 +14,7 @@ pub(crate) fn has_bus() -> bool {
 /// Returns the remedy for a missing permission: another driver.
 pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     format!(
-        "close the program that uses {vendor:04x}:{product:04x}, or give it the driver WinUSB with the program Zadig"
+        "close the program that uses {vendor:04x}:{product:04x}, or install the driver WinUSB for the device with the program Zadig"
     )
 }
 

@@ -483,6 +483,6 @@ fn a_device_in_use_is_busy_and_a_forbidden_one_says_what_to_do() {
         // Nobody in particular.
         let output = command.uid(65_534).gid(65_534).output().unwrap();
         let said = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(said.contains("this user may not use") && said.contains(words), "{personality:?}: {said}");
+        assert!(said.contains("this user may not ") && said.contains(words), "{personality:?}: {said}");
     }
 }

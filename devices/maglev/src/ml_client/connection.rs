@@ -27,8 +27,8 @@ impl std::fmt::Display for NoResults {
         match self {
             Self::Lost => f.write_str("the controller closed the connection"),
             Self::Silent => f.write_str("the controller did not answer in time"),
-            Self::Malformed => f.write_str("the controller answered something that is no reply"),
-            Self::Refused(status) => write!(f, "the controller refused: {status}"),
+            Self::Malformed => f.write_str("the controller sent a malformed reply"),
+            Self::Refused(status) => write!(f, "the controller rejected the request: {status}"),
         }
     }
 }

@@ -64,7 +64,7 @@ impl std::fmt::Display for Failed {
             Self::At(function, why) => write!(f, "{}: {why}", function.name()),
             Self::Faulted(bits) => write!(
                 f,
-                "the controller stays faulted ({bits}); hold the handle inside the range of its sensors"
+                "the controller stays faulted ({bits}); hold the handle within the range of the sensors"
             ),
             Self::NoTick => f.write_str("the controller sends no ticks"),
         }

@@ -31,8 +31,8 @@ pub(crate) fn access_remedy(subsystem: &str, vendor: u16, product: u16) -> Strin
     // A hidraw node has its ids on a parent.
     let key = if subsystem == "hidraw" { "ATTRS" } else { "ATTR" };
     format!(
-        "put this line into /etc/udev/rules.d/70-flotor.rules, run `sudo udevadm control --reload` and plug it in \
-         again: SUBSYSTEM==\"{subsystem}\", {key}{{idVendor}}==\"{vendor:04x}\", \
+        "put this line into /etc/udev/rules.d/70-flotor.rules, run `sudo udevadm control --reload` and reconnect \
+         the device: SUBSYSTEM==\"{subsystem}\", {key}{{idVendor}}==\"{vendor:04x}\", \
          {key}{{idProduct}}==\"{product:04x}\", TAG+=\"uaccess\""
     )
 }

@@ -47,7 +47,7 @@ pub(crate) fn access_remedy(_: &str, vendor: u16, product: u16) -> String {
 /// Returns instructions for installing a driver with access for programs.
 #[cfg(feature = "usb")]
 pub(crate) fn driver_remedy(vendor: u16, product: u16) -> Option<String> {
-    Some(format!("give {vendor:04x}:{product:04x} the driver WinUSB, with the program Zadig"))
+    Some(format!("install the driver WinUSB for {vendor:04x}:{product:04x} with the program Zadig"))
 }
 
 /// Checks the availability of HID in a loop.
@@ -57,7 +57,7 @@ pub(crate) fn driver_remedy(vendor: u16, product: u16) -> Option<String> {
 #[cfg(feature = "hid")]
 pub(crate) fn hid_is_offered() -> Result<(), &'static str> {
     Err(
-        "`transport` = `hid` is not offered on Windows: sending a report may take a second there, and the loop would wait for it; \
+        "`transport` = `hid` is not supported on Windows, where sending a report may block the loop for a second; \
          use `serial` or `usb`",
     )
 }

@@ -134,24 +134,25 @@ impl std::fmt::Display for OpenError {
             Self::Missing { address, cause } => {
                 write!(
                     f,
-                    "no controller at {address} ({cause}); is it connected and switched on? The parameter `address` must be its address"
+                    "no controller at {address} ({cause}); check that the controller is connected and switched on, \
+                     and that the parameter `address` is right"
                 )
             }
             Self::Busy { address } => {
-                write!(f, "{address} is in use by another program; close that one first")
+                write!(f, "{address} is in use by another program; close that program first")
             }
             Self::Forbidden { address, remedy } => write!(f, "this user may not use {address}; {remedy}"),
             Self::Address { address, expected } => write!(f, "`address` = `{address}` is not {expected}"),
             Self::UnknownHost { host } => {
-                write!(f, "no host `{host}` is known (`address`); check the name or use its IP address")
+                write!(f, "unknown host `{host}` (`address`); check the name or use the IP address")
             }
             Self::NotOffered { why } => f.write_str(why),
             Self::NoDriver { address, remedy } => {
-                write!(f, "{address} has a driver that programs cannot use, or none; {remedy}")
+                write!(f, "{address} has no driver that programs can use; {remedy}")
             }
             Self::NotBuilt { feature } => write!(
                 f,
-                "this plugin was built without that transport; build it with `cargo build --release -p \
+                "this plugin was built without this transport; build the plugin with `cargo build --release -p \
                  flotor-maglev --features {feature}`"
             ),
         }

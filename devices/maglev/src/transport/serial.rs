@@ -22,7 +22,9 @@ fn refused(path: &str, reason: NotOpened) -> OpenError {
     match reason {
         NotOpened::Forbidden { remedy } => OpenError::Forbidden { address, remedy: remedy.to_owned() },
         NotOpened::InUse => OpenError::Busy { address },
-        NotOpened::NoPort => OpenError::Missing { address, cause: "it is no serial port".to_owned() },
+        NotOpened::NoPort => {
+            OpenError::Missing { address, cause: "the file is not a serial port".to_owned() }
+        }
         NotOpened::Missing { cause } => OpenError::Missing { address, cause },
     }
 }

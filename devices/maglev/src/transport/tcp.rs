@@ -62,7 +62,7 @@ mod tests {
         let told = |address: &str| connect(address).err().map(|error| error.to_string()).unwrap_or_default();
         assert_eq!(
             told(&format!("{host}:1")),
-            format!("no host `{host}` is known (`address`); check the name or use its IP address")
+            format!("unknown host `{host}` (`address`); check the name or use the IP address")
         );
         for malformed in ["here", "127.0.0.1:port", ""] {
             assert!(

@@ -10,7 +10,8 @@ use std::time::Duration;
 pub(crate) type System = TTYPort;
 
 /// Help text of a parameter `port`.
-pub(crate) const PORT_HELP: &str = "Path of its serial port, as /dev/ttyACM0 or one below /dev/serial/by-id";
+pub(crate) const PORT_HELP: &str =
+    "Path of the serial port, such as /dev/ttyACM0 or a path below /dev/serial/by-id";
 /// Example of a parameter `port`.
 pub(crate) const PORT_EXAMPLE: &str = "/dev/ttyACM0";
 /// Advice for listing the ports.
@@ -24,7 +25,7 @@ pub(crate) fn reason(path: &str, error: Error) -> NotOpened {
     let is_there = || Path::new(path).exists();
     match error.kind() {
         ErrorKind::Io(io::ErrorKind::PermissionDenied) => NotOpened::Forbidden {
-            remedy: "add the user to the group of the port (`sudo usermod -aG dialout $USER`, then log in anew)",
+            remedy: "add the user to the group of the port (`sudo usermod -aG dialout $USER`, then log in again)",
         },
         // The second program on a port finds it locked (TIOCEXCL), which serialport reports like this.
         ErrorKind::NoDevice if is_there() => NotOpened::InUse,
@@ -58,7 +59,7 @@ mod tests {
         let _first = Port::open(&path, 9600).expect("it is free");
         let in_use = Port::open(&path, 9600).expect_err("one at a time");
         assert_eq!(in_use, NotOpened::InUse);
-        assert_eq!(in_use.to_string(), "another program uses it; close that one first");
+        assert_eq!(in_use.to_string(), "another program uses the port; close that program first");
         let file = tempfile::NamedTempFile::new().expect("there is room");
         let file = file.path().to_str().expect("its name is text");
         assert_eq!(Port::open(file, 9600).err(), Some(NotOpened::NoPort));
@@ -67,11 +68,14 @@ mod tests {
         let refused = reason("/dev/ttyACM0", refused);
         assert!(matches!(refused, NotOpened::Forbidden { .. }));
         assert!(
-            refused.to_string().starts_with("this user may not use it; add the user to the group"),
+            refused.to_string().starts_with("this user may not open the port; add the user to the group"),
             "{refused}"
         );
         let nowhere = Port::open("/dev/nowhere", 9600).expect_err("there is none").to_string();
-        assert!(nowhere.ends_with("; is it connected? `ls /dev/serial/by-id` lists the ports"), "{nowhere}");
+        assert!(
+            nowhere.ends_with("; check that the device is connected; `ls /dev/serial/by-id` lists the ports"),
+            "{nowhere}"
+        );
     }
 
     #[test]

@@ -78,7 +78,7 @@ impl Recording {
     /// Creates a recording from samples in order of time; an error without any sample.
     fn new(samples: Vec<Sample>) -> Result<Self, String> {
         if samples.is_empty() {
-            return Err("holds no pose".to_owned());
+            return Err("has no pose".to_owned());
         }
         Ok(Self(samples.into()))
     }
@@ -111,8 +111,11 @@ impl Sample {
         }
         pose.check().map_err(|error| error.to_string())?;
         let inside = position_m.abs().max_element() <= FARTHEST_M;
-        let far =
-            || format!("({position_m}) m is outside the workspace of {FARTHEST_M} m; are these millimetres?");
+        let far = || {
+            format!(
+                "({position_m}) m is outside the workspace of {FARTHEST_M} m; give positions in metres, not millimetres"
+            )
+        };
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked above
         inside.then_some(Self { time_ns: (time_s * 1.0e9).round() as u64, pose }).ok_or_else(far)
     }

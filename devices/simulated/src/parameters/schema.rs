@@ -44,9 +44,9 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "preset",
         PRESETS,
         0,
-        "How much of the machine is simulated: plain is rigid body, gravity, drag and hand; full adds coils and sensors",
+        "Extent of the simulation: plain is rigid body, gravity, drag and hand; full adds coils and sensors",
     ),
-    Parameter::choice("flotor", FLOTORS, 0, "Mass and centre of mass: of the thesis, or of the Utah device"),
+    Parameter::choice("flotor", FLOTORS, 0, "Mass and centre of mass: as in the thesis, or as the Utah device"),
     Parameter::real("mass_kg", "kg", 0.01, 10.0, DEMO.mass_kg, "Mass of the flotor"),
     Parameter::real(
         "inertia_x_kg_m2",
@@ -82,7 +82,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         -50.0,
         50.0,
         0.58 * DEMO.gravity_m_per_s2,
-        "Upward force at the centre of mass that compensates gravity; unless set, exactly the weight",
+        "Upward force at the centre of mass that compensates gravity (default: exactly the weight)",
     ),
     Parameter::real(
         "damping_ns_per_m",
@@ -125,13 +125,13 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         50.0,
         0.0,
-        "Noise of the forces a script pushes with, rms (3 to 5 in people)",
+        "Noise of the pushing forces of a script, rms (3 to 5 in people)",
     ),
     Parameter::choice(
         "hand_grip",
         GRIPS,
         0,
-        "How the hand holds: impedance from the literature; unless set, as the script says",
+        "Grip of the hand: impedance from the literature (default: the grip of the script)",
     ),
     Parameter::real(
         "hand_stiffness_n_per_m",
@@ -139,7 +139,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         20_000.0,
         2000.0,
-        "Stiffness of the hand; unless set, that of the grip",
+        "Stiffness of the hand (default: the stiffness of the grip)",
     ),
     Parameter::real(
         "hand_damping_ns_per_m",
@@ -147,7 +147,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         1000.0,
         70.0,
-        "Damping of the hand; unless set, that of the grip",
+        "Damping of the hand (default: the damping of the grip)",
     ),
     Parameter::real(
         "hand_mass_kg",
@@ -155,7 +155,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         5.0,
         0.5,
-        "Mass of the hand that moves with the handle; unless set, that of the grip",
+        "Mass of the hand that moves with the handle (default: the mass of the grip)",
     ),
     Parameter::real(
         "hand_centre_mm",
@@ -183,14 +183,14 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Press, hold, release: intended depth below home",
     ),
     Parameter::real("hand_rise_s", "s", 0.01, 60.0, 1.0, "Oscillate, press: time until the full movement"),
-    Parameter::real("hand_release_s", "s", 0.0, 3600.0, 1.0, "Release: when the hand opens"),
+    Parameter::real("hand_release_s", "s", 0.0, 3600.0, 1.0, "Release: time at which the hand opens"),
     Parameter::real(
         "hand_guide",
         "1",
         0.0,
         4_294_967_295.0,
         0.0,
-        "Client that guides the hand, by a number of its choice; 0: none. Silent for 1 s, it has released the hand",
+        "Number of the client that guides the hand, chosen by the client; 0: none. Without a message for 1 s the hand is released",
     )
     .live(),
     Parameter::real(
@@ -206,9 +206,9 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         .live(),
     Parameter::real("hand_target_z_mm", "mm", -50.0, 50.0, 0.0, "Guide: intended position of the handle, z")
         .live(),
-    Parameter::real("start_x_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, x"),
-    Parameter::real("start_y_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, y"),
-    Parameter::real("start_z_mm", "mm", -12.0, 12.0, 0.0, "Where the flotor starts, z"),
+    Parameter::real("start_x_mm", "mm", -12.0, 12.0, 0.0, "Initial position of the flotor, x"),
+    Parameter::real("start_y_mm", "mm", -12.0, 12.0, 0.0, "Initial position of the flotor, y"),
+    Parameter::real("start_z_mm", "mm", -12.0, 12.0, 0.0, "Initial position of the flotor, z"),
     Parameter::real("coil_radius_mm", "mm", 10.0, 500.0, 115.0, "Full: radius of the hemisphere of coils"),
     Parameter::real(
         "coil_ring_a_deg",
@@ -301,9 +301,9 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         32.0,
         1.0,
-        "Full: ticks from a sample to its arrival, of the device's own 1 kHz at every rate of the loop",
+        "Full: latency of a sample, in ticks of the device's own 1 kHz at every rate of the loop",
     ),
-    Parameter::choice("velocity", ESTIMATORS, 0, "Full: how velocity is estimated from the poses"),
+    Parameter::choice("velocity", ESTIMATORS, 0, "Full: method of estimating velocity from the poses"),
     Parameter::real(
         "velocity_bandwidth_hz",
         "Hz",
@@ -318,18 +318,18 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         1.0e-3,
         1.0e3,
         2.0,
-        "Full: acceleration the Kalman estimate expects",
+        "Full: acceleration expected by the Kalman estimate",
     ),
     Parameter::choice("fault", FAULTS, 0, "Full: kind of fault"),
     Parameter::real("fault_time_s", "s", 0.0, 3600.0, 1.0, "Full: time of the fault"),
-    Parameter::real("fault_duration_s", "s", 0.0, 3600.0, 0.01, "Full: for how long"),
+    Parameter::real("fault_duration_s", "s", 0.0, 3600.0, 0.01, "Full: duration of the fault"),
     Parameter::real(
         "fault_rate_per_s",
         "1/s",
         0.0,
         1000.0,
         0.0,
-        "Full: mean number of times a second, at random (0: once, at fault_time_s)",
+        "Full: mean rate of random faults per second (0: one fault, at fault_time_s)",
     ),
     Parameter::real(
         "fault_index",
@@ -337,6 +337,6 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         5.0,
         0.0,
-        "Full: which axis is stuck (x, y, z, rotations) or coil open",
+        "Full: number of the stuck axis (x, y, z, rotations) or of the open coil",
     ),
 ];

@@ -4,12 +4,13 @@ use hidapi::HidError;
 use std::io::ErrorKind;
 
 /// Help text of the parameter `path`.
-pub(crate) const PATH_HELP: &str = "Which puck, as /dev/hidraw2; the first one found if not said";
+pub(crate) const PATH_HELP: &str =
+    "Path of the device, such as /dev/hidraw2 (default: the first device found)";
 /// Example of the parameter `path`.
 pub(crate) const PATH_EXAMPLE: &str = "/dev/hidraw2";
 /// Remedy for a missing permission.
 pub(crate) const ACCESS_REMEDY: &str = "put `KERNEL==\"hidraw*\", ATTRS{idVendor}==\"256f\", TAG+=\"uaccess\"` into \
-    /etc/udev/rules.d/70-spacemouse.rules, run `sudo udevadm control --reload` and plug it in again";
+    /etc/udev/rules.d/70-spacemouse.rules, run `sudo udevadm control --reload` and reconnect the device";
 
 /// Returns whether an error is a missing permission.
 pub(crate) fn is_refused(error: &HidError) -> bool {

@@ -8,11 +8,11 @@ const SHARING_VIOLATION: i32 = 32;
 
 /// Help text of the parameter `path`.
 pub(crate) const PATH_HELP: &str =
-    r"Which puck, as \\?\HID#VID_256F and what follows there; the first one found if not said";
+    r"Path of the device, such as \\?\HID#VID_256F... (default: the first device found)";
 /// Example of the parameter `path`.
 pub(crate) const PATH_EXAMPLE: &str = r"\\?\HID#VID_256F and what follows there";
 /// Remedy for denied access.
-pub(crate) const ACCESS_REMEDY: &str = "close the program that uses it";
+pub(crate) const ACCESS_REMEDY: &str = "close the program that uses the device";
 
 /// Returns whether an error is denied access, because another program has the device open.
 pub(crate) fn is_refused(error: &HidError) -> bool {

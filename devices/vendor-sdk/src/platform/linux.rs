@@ -20,7 +20,7 @@ pub(crate) const LIBRARY_ENDING: &str = ".so or in .so and a version";
 
 /// Returns the remedy for a library that cannot be loaded.
 pub(crate) fn missing_remedy(path: &Path) -> String {
-    format!("`ldd {}` lists what it needs and what of that is missing", path.display())
+    format!("`ldd {}` lists the required libraries and the missing ones", path.display())
 }
 
 /// Returns the file names of the library.
@@ -141,7 +141,7 @@ mod tests {
         assert!(told(&head(1, 3)).contains("is for 32-bit x86 and this program for 64-bit"));
         assert!(told(&head(1, 40)).contains("is for 32-bit ARM"));
         assert!(told(&head(2, 243)).contains("a 64-bit processor of number 243"));
-        assert!(told(b"#!/bin/sh\n").contains("no shared library"));
-        assert!(told(&head(2, 62)[..19]).contains("no shared library"), "a head that is cut off");
+        assert!(told(b"#!/bin/sh\n").contains("not a shared library"));
+        assert!(told(&head(2, 62)[..19]).contains("not a shared library"), "a head that is cut off");
     }
 }

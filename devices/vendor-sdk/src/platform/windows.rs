@@ -129,7 +129,7 @@ mod tests {
         assert!(told(&head(0x014c)).contains("is for 32-bit x86 and this program for 64-bit"));
         assert!(told(&head(0xaa64)).contains("is for 64-bit ARM"));
         assert!(told(&head(0x0200)).contains("a processor of number 0x200"));
-        assert!(told(b"#!/bin/sh\n").contains("no shared library"));
-        assert!(told(&head(0x8664)[..0x85]).contains("no shared library"), "a head that is cut off");
+        assert!(told(b"#!/bin/sh\n").contains("not a shared library"));
+        assert!(told(&head(0x8664)[..0x85]).contains("not a shared library"), "a head that is cut off");
     }
 }

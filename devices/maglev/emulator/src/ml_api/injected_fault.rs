@@ -61,7 +61,7 @@ impl fmt::Display for Unknown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "`{}` is no fault: write KIND[@STATE][+MS]; kinds: silence, half-frame, close, reset, stall, wrong-length, \
+            "`{}` is not a fault: write KIND[@STATE][+MS]; kinds: silence, half-frame, close, reset, stall, wrong-length, \
              status=CODE/N, late-tick, out-of-range, over-temperature, over-current, over-speed; states: landed, \
              taking-off, flying, ticking, landing",
             self.0

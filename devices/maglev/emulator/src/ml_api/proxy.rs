@@ -23,21 +23,27 @@ const SILENCE: Choices = choices!["land", "ignore"];
 const SCHEMA: &[Parameter] = &[
     Parameter::text(
         "listen",
-        "Where clients connect, as host:port; without it nobody does, and there is no force",
+        "Address for clients, as host:port; without an address no client connects and the force is zero",
     ),
     Parameter::choice(
         "reach",
         REACHES,
         0,
-        "Programs that may connect: this user's, those of every user of this machine, or all that reach the address",
+        "Programs that may connect: programs of this user, of every user of this machine, or of all machines that \
+         reach the address",
     ),
-    Parameter::choice("force_command", FORCE_COMMANDS, 0, "What a force command does to the gains"),
-    Parameter::choice("commanders", COMMANDERS, 0, "Who may command: the first client that does, or all"),
+    Parameter::choice("force_command", FORCE_COMMANDS, 0, "Effect of a force command on the gains"),
+    Parameter::choice(
+        "commanders",
+        COMMANDERS,
+        0,
+        "Clients that may command: the first client that sends a command, or all",
+    ),
     Parameter::choice(
         "on_silence",
         SILENCE,
         0,
-        "What becomes of a flotor in the air whose client is gone or acknowledges no tick",
+        "Reaction to the loss of a client, or of its tick acknowledgements, while the flotor is levitating",
     ),
     Parameter::real(
         "watchdog_ms",
@@ -45,7 +51,7 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         60_000.0,
         500.0,
-        "Longest time without an acknowledged tick while a client drives by forces and wants ticks",
+        "Longest time without an acknowledged tick while a client commands forces and is registered for ticks",
     ),
 ];
 

@@ -10,11 +10,11 @@ use std::io::{Read, Seek};
 const POSE_SCHEMA: &str = "foxglove.FrameTransform";
 
 /// Remedy for another kind of file.
-const HOW_TO_MAKE_ONE: &str = "`flotor run --record FILE.mcap` makes one";
+const HOW_TO_MAKE_ONE: &str = "make a recording with `flotor run --record FILE.mcap`";
 
 /// Problem and remedy of a recording without its end.
-const TRUNCATED: &str = "is truncated: the end of the run is missing; record again, or name the copy that `mcap recover` \
-                         makes of what is there";
+const TRUNCATED: &str = "is truncated: the end of the run is missing; record again, or make a copy of the readable \
+part with `mcap recover` and name the copy";
 
 /// Decoded fields of `foxglove.FrameTransform` (<https://docs.foxglove.dev/docs/sdk/schemas/frame-transform>).
 #[derive(Clone, PartialEq, Message)]
@@ -64,7 +64,7 @@ enum Topic {
 pub(super) fn read(file: impl Read + Seek) -> Result<Vec<Sample>, String> {
     let mut messages = MessageReader::open(file, topic_of).map_err(|error| match error {
         OpenError::Io(cause) => format!("cannot be read: {cause}"),
-        _ => format!("is no MCAP file; {HOW_TO_MAKE_ONE}"),
+        _ => format!("is not an MCAP file; {HOW_TO_MAKE_ONE}"),
     })?;
     if messages.ending() == Ending::CutOff {
         return Err(TRUNCATED.to_owned());

@@ -33,7 +33,7 @@ fn complaints_name_the_line_and_the_column() {
     for (text, expected) in [
         ("", "t:1: the table is empty"),
         ("t,x,y,z\n0,0,0,0\n", "t:1: the columns are time_s,x_m,y_m,z_m or time_s,"),
-        ("time_s,x_m,y_m,z_m\n", "holds no pose"),
+        ("time_s,x_m,y_m,z_m\n", "has no pose"),
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n1,0,up,0\n", "t:3: `y_m` must be a number, not `up`"),
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n0,0,0,0\n", "t:3: time 0 ns is not after 0 ns"),
         ("time_s,x_m,y_m,z_m\n0,0,0,nan\n", "t:2: `z_m` must be finite"),

@@ -255,7 +255,7 @@ pub(super) fn read_file(path: &Path) -> Result<Script, ScriptError> {
         wrong(format!("cannot be read: {error}; a script is a TOML file or one of {names}"))
     })?;
     if !size.is_file() || size.len() > MAX_BYTES {
-        return Err(wrong(format!("is no script: that is a TOML file of at most {MAX_BYTES} bytes")));
+        return Err(wrong(format!("is not a script: a script is a TOML file of at most {MAX_BYTES} bytes")));
     }
     let text = read_text(path, "the script").map_err(|TextProblem { line, problem }| ScriptError {
         line,
@@ -274,10 +274,10 @@ pub(super) fn read(file: &str, text: &str) -> Result<Script, ScriptError> {
     let whole = |problem: String| ScriptError { file: file.to_owned(), line: 0, problem };
     let count = script.step.len().saturating_mul(script.repeat.0);
     if script.step.is_empty() {
-        return Err(whole("`step` is empty: a script is at least one [[step]]".to_owned()));
+        return Err(whole("`step` is empty: a script needs at least one [[step]]".to_owned()));
     }
     if count > MAX_LEGS {
-        return Err(whole(format!("{count} movements, `repeat` included; at most {MAX_LEGS} are possible")));
+        return Err(whole(format!("{count} movements, `repeat` included; write at most {MAX_LEGS}")));
     }
     let releases = script.step.iter().position(|step| matches!(step, StepText::Release(_)));
     if let Some(index) = releases

@@ -51,7 +51,7 @@ struct Arguments {
     listen: Option<String>,
     #[command(flatten)]
     reach: ReachArguments,
-    /// Pty: a name for the terminal, as a symbolic link
+    /// Pty: symbolic link to the terminal
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
     /// Clock of the controller's cycles

@@ -42,7 +42,7 @@ pub(crate) struct MlApiArguments {
     /// Effect of a force command on the gains
     #[arg(long, value_enum, default_value = "replace", value_name = "WHAT")]
     force_command: ForceOption,
-    /// Clients that may command: the first one that does, or all
+    /// Clients that may command: the first client that sends a command, or all
     #[arg(long, value_enum, default_value = "one", value_name = "WHO")]
     commanders: CommandersOption,
     /// Reaction to the loss of a client, or of its tick acknowledgements, while the flotor is levitating

@@ -41,7 +41,8 @@ pub(crate) fn load_device(id: &str) -> Result<Plugin, Box<dyn Error>> {
         }
     }
     let folder = own.display();
-    Err(format!("no plugin `{id}` beside {folder}; `cargo build -p flotor-{id}` makes it").into())
+    Err(format!("no plugin `{id}` in or beside {folder}; build the plugin with `cargo build -p flotor-{id}`")
+        .into())
 }
 
 /// Loads a plugin file; runs its code.

@@ -88,7 +88,9 @@ impl FromStr for Press {
             };
             Some(Self { bit, from_s: from.trim().parse().ok()?, to_s: to.trim().parse().ok()? })
         };
-        parse().ok_or_else(|| format!("`{text}` is no press: write left@1.5-2 or right@0-10, times in s"))
+        parse().ok_or_else(|| {
+            format!("`{text}` is not a button press: write left@1.5-2 or right@0-10, times in s")
+        })
     }
 }
 
