@@ -81,13 +81,15 @@ impl Fault {
         match self {
             Self::SensorOutOfRange => "the handle left the sensor's range; move it back and start again",
             Self::OverTemperature => "a coil is too hot; let the device cool",
-            Self::OverCurrent => "a coil carried too much current for too long; reduce stiffness or load",
+            Self::OverCurrent => "the current of a coil was too high for too long; reduce stiffness or load",
             Self::OverSpeed => "the handle moved faster than the device allows",
             Self::Disconnected => "the device is gone; check cable and power",
             Self::Timeout => "the device did not answer in time; check cable, hub and machine load",
-            Self::Protocol => "the device answered something that makes no sense; check its firmware version",
-            Self::EmergencyStop => "the emergency stop of the device is pressed; release it to go on",
-            Self::Broken => "the device plugin broke the contract; report it to its author",
+            Self::Protocol => "the device sent malformed data; check its firmware version",
+            Self::EmergencyStop => {
+                "the emergency stop of the device is pressed; release the stop to continue"
+            }
+            Self::Broken => "the device plugin violated the contract; report the fault to its author",
         }
     }
 }

@@ -81,13 +81,14 @@ impl<'a> Table<'a> {
         let columns: Vec<String> = cells(header).map_err(at)?.into_iter().map(Cow::into_owned).collect();
         if let Some(unnamed) = columns.iter().position(String::is_empty) {
             let problem = format!(
-                "column {} has no name; remove it, or name it (pandas writes its index so: `to_csv(FILE, index=False)`)",
+                "column {} has no name; remove the column, or name the column (pandas writes its index so: \
+                 `to_csv(FILE, index=False)`)",
                 unnamed + 1
             );
             return Err(at(problem));
         }
         if let Some(twice) = (1..columns.len()).find(|&index| columns[..index].contains(&columns[index])) {
-            return Err(at(format!("the column `{}` is there twice", quoted(&columns[twice]))));
+            return Err(at(format!("the column `{}` is given twice; remove one", quoted(&columns[twice]))));
         }
         Ok(Self { lines, header_line, columns })
     }
@@ -173,7 +174,7 @@ impl Row<'_> {
 /// Splits a line of bounded length into cells. Quotation marks around a cell are removed, doubled marks inside become single.
 fn cells(line: &str) -> Result<Vec<Cow<'_, str>>, String> {
     if line.len() > LONGEST_LINE_BYTES {
-        return Err(format!("the line has more than {LONGEST_LINE_BYTES} bytes: this is no table"));
+        return Err(format!("the line has more than {LONGEST_LINE_BYTES} bytes: the file is not a table"));
     }
     let mut cells = Vec::new();
     let mut rest = line;
@@ -219,8 +220,8 @@ fn quoted_cell(text: &str) -> Result<(String, &str), String> {
 fn other_separator(separator: &str) -> String {
     let name = if separator == "\t" { "tabs".to_owned() } else { format!("`{}`", quoted(separator)) };
     format!(
-        "columns are separated by {name}; separate them with commas, and write numbers with a decimal point (a spreadsheet \
-         does with an English locale)"
+        "columns are separated by {name}; separate them with commas, and write numbers with a decimal point (set \
+         the spreadsheet to an English locale)"
     )
 }
 
@@ -268,7 +269,7 @@ mod tests {
             ("x,y\n\"0,5\",\"1,5\"\n", "t:2: `x` must be a number, not `0,5`: write a decimal point"),
             ("x,y\n1,\n", "t:2: `y` must be a number, not ``"),
             (",x\n0,1\n", "t:1: column 1 has no name"),
-            ("x,y,x\n0,1,2\n", "t:1: the column `x` is there twice"),
+            ("x,y,x\n0,1,2\n", "t:1: the column `x` is given twice; remove one"),
             ("x,y\n\"1,2\n", "t:2: a quotation mark is not closed"),
             ("x,y\n\"1\"2,3\n", "t:2: a comma is expected"),
             ("x,y\n\u{1b}[31m,3\n", "t:2: `x` must be a number, not `\\u{1b}[31m`"),

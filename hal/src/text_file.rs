@@ -51,7 +51,7 @@ pub fn open_file(path: &Path) -> io::Result<File> {
         return Err(io::ErrorKind::IsADirectory.into());
     }
     if !attributes.is_file() {
-        let problem = "it is a pipe or a device; write its contents to a file and name that";
+        let problem = "the path is a pipe or a device; write its contents to a file and name the file";
         return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     }
     File::open(path)
@@ -65,7 +65,7 @@ pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open_file(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most_bytes {
-        let problem = format!("it has more than {} MiB", most_bytes >> 20);
+        let problem = format!("the file has more than {} MiB", most_bytes >> 20);
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, problem));
     }
     Ok(bytes)
@@ -91,7 +91,7 @@ pub fn text_from_bytes(mut bytes: Vec<u8>) -> Result<String, TextProblem> {
         bytes.drain(..BYTE_ORDER_MARK.len());
     }
     if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
-        return Err(TextProblem::at(1, "this is UTF-16; save the file as UTF-8"));
+        return Err(TextProblem::at(1, "the file is UTF-16; save the file as UTF-8"));
     }
     if bytes.contains(&b'\r') && !bytes.contains(&b'\n') {
         bytes.iter_mut().filter(|byte| **byte == b'\r').for_each(|byte| *byte = b'\n');
@@ -100,13 +100,13 @@ pub fn text_from_bytes(mut bytes: Vec<u8>) -> Result<String, TextProblem> {
         let line = 1 + bytes.iter().take(at).filter(|byte| **byte == b'\n').count();
         return Err(TextProblem::at(
             line,
-            "there is a byte 0: this is no text, or a part of it was never written",
+            "the file contains a byte 0, so it is not a text, or a part of the file was not written",
         ));
     }
     String::from_utf8(bytes).map_err(|error| {
         let before = error.as_bytes().iter().take(error.utf8_error().valid_up_to());
         let line = 1 + before.filter(|byte| **byte == b'\n').count();
-        TextProblem::at(line, "this is not UTF-8; save the file as UTF-8")
+        TextProblem::at(line, "the file is not UTF-8; save the file as UTF-8")
     })
 }
 
@@ -119,12 +119,12 @@ mod tests {
         let path = std::env::temp_dir().join(format!("flotor-text-{}", std::process::id()));
         std::fs::write(&path, b"one\ntwo \xff\nthree\xfe\n").expect("the folder can be written to");
         let told = read_text(&path, "it").map_err(|wrong| wrong.in_file("it.txt"));
-        assert_eq!(told.unwrap_err(), "it.txt:2: this is not UTF-8; save the file as UTF-8");
+        assert_eq!(told.unwrap_err(), "it.txt:2: the file is not UTF-8; save the file as UTF-8");
         std::fs::write(&path, b"\xef\xbb\xbfx,y\n").expect("the folder can be written to");
         assert_eq!(read_text(&path, "it"), Ok("x,y\n".to_owned()), "spreadsheets write a mark first");
         assert_eq!(text_from_bytes(b"x,y\r1,2\r".to_vec()), Ok("x,y\n1,2\n".to_owned()));
         let told = text_from_bytes(b"\xff\xfex\0".to_vec()).map_err(|wrong| wrong.in_file("it.txt"));
-        assert_eq!(told.unwrap_err(), "it.txt:1: this is UTF-16; save the file as UTF-8");
+        assert_eq!(told.unwrap_err(), "it.txt:1: the file is UTF-16; save the file as UTF-8");
         let told = text_from_bytes(b"x\n\0\0".to_vec()).map_err(|wrong| wrong.line);
         assert_eq!(told, Err(2));
         assert_eq!(read_file(&path, 7).expect("seven bytes").len(), 7);

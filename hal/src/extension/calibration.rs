@@ -54,11 +54,11 @@ impl std::fmt::Display for InvalidCalibration {
         match self {
             Self::Range([from, to]) => write!(f, "invalid range {from:?} m to {to:?} m"),
             Self::Count(count) => {
-                write!(f, "{count} coefficients; there must be 1 to {CALIBRATION_COEFFICIENTS}")
+                write!(f, "{count} coefficients; give 1 to {CALIBRATION_COEFFICIENTS}")
             }
             Self::Share { height_m, share } => write!(
                 f,
-                "{share:?} of the force would arrive at {:.3} mm; a share between {} and {} is plausible",
+                "the ratio of delivered to commanded force is {share:?} at {:.3} mm; a ratio between {} and {} is plausible",
                 height_m * 1.0e3,
                 PLAUSIBLE_SHARE[0],
                 PLAUSIBLE_SHARE[1]
@@ -259,7 +259,7 @@ impl OpenedDevice {
     pub fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
         let calibrate = self.extensions().calibration.and_then(|table| table.calibrate_vertical);
         let Some(calibrate) = calibrate else {
-            return Err(Refusal::unsupported("this device takes no calibration of the vertical force"));
+            return Err(Refusal::unsupported("this device has no calibration of the vertical force"));
         };
         let mut message = Message::default();
         // SAFETY: a live instance, used by this thread only (`&mut`), pointers valid for the call.

@@ -182,7 +182,7 @@ pub mod means {
                 return match (length, declared.within_ns) {
                     (0, NEVER_NS) => Ok(None),
                     (0, within_ns) => Ok(Some(Self::Itself { within_ns, state })),
-                    _ => Err(wrong("has a message and no descriptor".to_owned())),
+                    _ => Err(wrong("has a message but no descriptor".to_owned())),
                 };
             }
             let message = declared.message.get(..length).filter(|message| !message.is_empty());
@@ -210,7 +210,7 @@ impl OpenedDevice {
         // Invalid initial value: rejected below unless the plugin writes it.
         let unfilled = IndependentStop::by_message(BY_ITSELF, &[0], StoppedState::Zero, 0);
         let Some(declared) = self.asked(ask, unfilled) else {
-            return Err(Refusal::broken("it does not say how it is stopped without its host"));
+            return Err(Refusal::broken("the device does not declare its stop without the host"));
         };
         Independence::of(&declared)
     }

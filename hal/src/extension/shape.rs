@@ -357,7 +357,7 @@ impl std::fmt::Display for InvalidShape {
             Self::Failed => "the call failed",
             Self::TooLarge => "more than a million corners, triangles or primitives",
             Self::Empty => "neither a primitive nor a triangle",
-            Self::Missing => "a list of the given length is not there",
+            Self::Missing => "a list is missing although its length is not 0",
             Self::Corner => "a triangle has a corner that is not in the list",
             Self::Number => "a number is not finite, or a side is negative",
             Self::Text => "the name or the unit of its field is longer than 64 bytes",

@@ -80,7 +80,7 @@ impl Load {
 
 impl ForceModel for Load {
     const INFO: ModelInfo =
-        ModelInfo::new("load", "Load", "A force to be held or to be overcome").serving(Demand::ALL);
+        ModelInfo::new("load", "Load", "A force to hold or to overcome").serving(Demand::ALL);
 
     const PARAMETERS: &'static [Parameter] = &[
         Parameter::choice("kind", KINDS, 0, "A weight that pulls down, or a resistance to pushing down"),
@@ -91,7 +91,7 @@ impl ForceModel for Load {
             0.01,
             100.0,
             1.0,
-            "Depth over which a resistance comes up (exerted)",
+            "Depth over which a resistance rises to its full force (exerted)",
         )
         .live(),
     ];

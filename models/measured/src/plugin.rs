@@ -53,7 +53,7 @@ impl ForceModel for Measured {
         Parameter::file(
             "curve",
             choices![],
-            "Table compression_mm,force_n; without one, a straight 0.68 N/mm",
+            "Table compression_mm,force_n (default: a straight line of 0.68 N/mm)",
         ),
         Parameter::real(
             "stiffness_scale",
@@ -79,7 +79,7 @@ impl ForceModel for Measured {
         let (free_length_m, coil_diameter_m) = (metres("free_length_mm"), metres("coil_diameter_mm"));
         if curve.deepest_m() >= free_length_m {
             return Err(Refusal::parameter(format!(
-                "the curve goes to {:.3} mm, but the spring is only {:.3} mm long; set `free_length_mm`",
+                "the curve ends at {:.3} mm, but the spring is only {:.3} mm long; set `free_length_mm`",
                 curve.deepest_m() * 1.0e3,
                 free_length_m * 1.0e3
             )));

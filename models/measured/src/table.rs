@@ -34,7 +34,7 @@ pub fn parse(text: &str) -> Result<Curve, TextProblem> {
     Curve::new(&knots).map_err(|error| match error {
         CurveError::Count(count) => {
             let last = numbers.last().copied().unwrap_or(1);
-            TextProblem::at(last, format!("{count} rows up to here; a curve has 3 to {}", Curve::MOST_KNOTS))
+            TextProblem::at(last, format!("{count} rows up to this line; a curve needs 3 to {}", Curve::MOST_KNOTS))
         }
         CurveError::Start => {
             let first = numbers.first().copied().unwrap_or(1);
@@ -45,7 +45,7 @@ pub fn parse(text: &str) -> Result<Curve, TextProblem> {
             TextProblem::at(
                 number,
                 "compression must grow from row to row and the force must not fall; `flotor study spring FILE \
-                 --curve-scene SCENE.toml` makes such a table of a measurement",
+                 --curve-scene SCENE.toml` converts a measurement to such a table",
             )
         }
     })

@@ -114,14 +114,15 @@ impl Mesh {
         let border = topology.border();
         if let Some(at_m) = topology.part_without(&border) {
             let problem = format!(
-                "nothing holds the part at {}: each of its edges has two faces or none; leave a border open",
+                "the part at {} has no fixed border: each of its edges has two faces or none; leave a border open",
                 in_mm(at_m)
             );
             return Err(TextProblem::of_file(problem));
         }
         let Topology { places_m: positions_m, faces, edges } = topology;
         if border.len() == positions_m.len() {
-            let problem = "there is nothing in it that could move: no mass inside a border of edges";
+            let problem =
+                "no mass can move, because every vertex is on the border; add vertices inside the border";
             return Err(TextProblem::of_file(problem));
         }
         let node_kg = mass_kg / (positions_m.len() - border.len()) as f64;
@@ -186,12 +187,14 @@ mod tests {
     #[test]
     fn a_mesh_that_nothing_holds_is_refused_with_the_place() {
         let error = |text: &str| Mesh::from_obj(text, 1.0, 1.0, 1.0).unwrap_err().in_file("m");
-        assert!(error("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").starts_with("m: there is nothing"));
+        assert!(error("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").starts_with("m: no mass can move"));
         let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n";
-        assert!(error(tetrahedron).starts_with("m: nothing holds the part at (0.000, 0.000, 0.000) mm"));
+        assert!(
+            error(tetrahedron).starts_with("m: the part at (0.000, 0.000, 0.000) mm has no fixed border")
+        );
         let beside = format!(
             "{SQUARE}v 9 0 0\nv 10 0 0\nv 9 1 0\nv 9 0 1\nf -4 -3 -2\nf -4 -3 -1\nf -4 -2 -1\nf -3 -2 -1\n"
         );
-        assert!(error(&beside).starts_with("m: nothing holds the part at (9000.000, 0.000, 0.000) mm"));
+        assert!(error(&beside).starts_with("m: the part at (9000.000, 0.000, 0.000) mm has no fixed border"));
     }
 }

@@ -45,7 +45,7 @@ impl Obj {
             obj.read_line(&text).map_err(|problem| TextProblem::at(line, problem))?;
         }
         if obj.faces.is_empty() {
-            let problem = "there is no face (`f`) in it; export the mesh as Wavefront OBJ, with faces";
+            let problem = "the file has no face (`f`); export the mesh as Wavefront OBJ, with faces";
             return Err(TextProblem::of_file(problem));
         }
         Ok(obj)
@@ -71,7 +71,7 @@ impl Obj {
                 let corners = corners.collect::<Option<Vec<usize>>>();
                 let (least, word) = if kind == "f" { (3, "three") } else { (2, "two") };
                 let corners = corners.filter(|corners| corners.len() >= least).ok_or_else(|| {
-                    format!("`{kind}` takes {word} and more numbers of vertices that stand above it")
+                    format!("`{kind}` needs {word} or more numbers of vertices of earlier lines")
                 })?;
                 match kind {
                     "f" => self.faces.push(corners),
@@ -80,7 +80,7 @@ impl Obj {
             }
             Some(other) if !other.starts_with('#') && !UNUSED.contains(&other) => {
                 let other: String = other.chars().take(20).flat_map(char::escape_debug).collect();
-                return Err(format!("`{other}` is no statement of a mesh in Wavefront OBJ"));
+                return Err(format!("`{other}` is not a statement of a mesh in Wavefront OBJ"));
             }
             _ => {}
         }
@@ -118,9 +118,9 @@ mod tests {
             assert!(error(&text).starts_with("m:2: a vertex"), "{vertex}");
         }
         assert!(error("v 0 0 0\nf 1 2 3\n").starts_with("m:2: `f`"));
-        assert!(error("").starts_with("m: there is no face"));
-        assert!(error("v 0 0 0\nv 1 0 0\nf 1 2\n").starts_with("m:3: `f` takes three"));
-        assert!(error("v 0 0 0\n0 0 0\n").starts_with("m:2: `0` is no statement"));
+        assert!(error("").starts_with("m: the file has no face"));
+        assert!(error("v 0 0 0\nv 1 0 0\nf 1 2\n").starts_with("m:3: `f` needs three"));
+        assert!(error("v 0 0 0\n0 0 0\n").starts_with("m:2: `0` is not a statement"));
         let stl = "solid sheet\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n";
         assert_eq!(error(stl), "m:1: this is an STL file; export the mesh as Wavefront OBJ");
     }

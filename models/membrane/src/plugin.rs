@@ -28,10 +28,10 @@ const SCHEMA: &[Parameter] = &[
         3.0,
         200.0,
         17.0,
-        "Masses along a side of the sheet; the border is held",
+        "Number of masses along a side of the sheet; the border is fixed",
     ),
     Parameter::real("side_mm", "mm", 1.0, 1000.0, 40.0, "Length of a side of the sheet"),
-    Parameter::real("mass_g", "g", 0.01, 1.0e5, 10.0, "Mass of the whole"),
+    Parameter::real("mass_g", "g", 0.01, 1.0e5, 10.0, "Total mass"),
     Parameter::real(
         "stiffness_n_per_m",
         "N/m",
@@ -40,10 +40,16 @@ const SCHEMA: &[Parameter] = &[
         200.0,
         "Stiffness of a spring between two masses",
     ),
-    Parameter::real("stretch", "1", 0.5, 3.0, 1.25, "Length of a spring over its length without force"),
+    Parameter::real(
+        "stretch",
+        "1",
+        0.5,
+        3.0,
+        1.25,
+        "Ratio of the length of a spring to its length without force",
+    ),
     Parameter::real("gravity_m_per_s2", "m/s²", 0.0, 30.0, 0.0, "Gravity, downwards"),
-    Parameter::real("damping_per_s", "1/s", 0.0, 1.0e4, 50.0, "Rate at which drag takes velocity away")
-        .live(),
+    Parameter::real("damping_per_s", "1/s", 0.0, 1.0e4, 50.0, "Decay rate of the velocity by drag").live(),
     Parameter::real("ball_radius_mm", "mm", 0.1, 100.0, 5.0, "Radius of the ball at the handle"),
     Parameter::real(
         "contact_n_per_m",
@@ -51,12 +57,12 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         1.0e5,
         400.0,
-        "Stiffness with which the ball pushes a mass out",
+        "Contact stiffness between the ball and a mass",
     ),
     Parameter::file(
         "file",
         choices![],
-        "A mesh instead of the sheet: Wavefront OBJ, metres, z up; the border is held",
+        "A mesh instead of the sheet: Wavefront OBJ, metres, z up; the border is fixed",
     ),
 ];
 
@@ -104,7 +110,7 @@ impl ForceModel for Membrane {
         let nodes = number("nodes_per_side");
         if nodes.fract() != 0.0 {
             return Err(Refusal::parameter(format!(
-                "`nodes_per_side` counts masses; {nodes} is no whole number"
+                "`nodes_per_side` counts masses; {nodes} is not a whole number"
             )));
         }
         let (stiffness_n_per_m, stretch) = (number("stiffness_n_per_m"), number("stretch"));
@@ -141,7 +147,7 @@ impl ForceModel for Membrane {
         let steps_per_ms = 1.0e-3 / network.longest_step_s();
         if steps_per_ms > MOST_STEPS_PER_MS {
             return Err(Refusal::parameter(format!(
-                "springs this stiff on masses this light swing so fast that a millisecond takes {steps_per_ms:.0} steps \
+                "the springs are so stiff and the masses so light that a millisecond needs {steps_per_ms:.0} steps \
                  (at most {MOST_STEPS_PER_MS}); raise `mass_g` or lower the stiffness"
             )));
         }

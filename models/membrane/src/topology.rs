@@ -62,7 +62,7 @@ impl Topology {
         }
         match topology.crack_m() {
             Some(at_m) => Err(TextProblem::of_file(format!(
-                "at {} two edges of the border lie beside each other without being joined; merge the vertices there \
+                "at {} two edges of the border coincide but are not joined; merge the vertices there \
                  (\"merge by distance\"), or move them apart",
                 in_mm(at_m)
             ))),

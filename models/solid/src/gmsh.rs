@@ -64,7 +64,7 @@ impl Words<'_> {
         word.and_then(|word| word.parse().ok()).ok_or_else(|| FormatError {
             line: self.line,
             problem: match word {
-                Some(word) => format!("`{word}` is not the number that belongs here"),
+                Some(word) => format!("a number is expected instead of `{word}`"),
                 None => "a number is missing".to_owned(),
             },
         })
@@ -158,7 +158,7 @@ impl Reader {
             ));
         }
         if is_binary {
-            return lines.fail("a binary file: write text (`Mesh.Binary = 0`)");
+            return lines.fail("the file is binary: write text (`Mesh.Binary = 0`)");
         }
         self.has_format = true;
         Ok(())
@@ -207,7 +207,7 @@ impl Reader {
                 let mut words = lines.words()?;
                 let position = [words.number()?, words.number()?, words.number()?];
                 if self.numbers.insert(tag, self.parts.nodes_m.len()).is_some() {
-                    return lines.fail(format!("node {tag} is here twice"));
+                    return lines.fail(format!("node {tag} is given twice; remove one"));
                 }
                 self.parts.nodes_m.push(position);
             }
@@ -236,12 +236,13 @@ impl Reader {
                 }
                 10 | 12 => {
                     return lines
-                        .fail("bricks of 27 nodes: write those of 20 (`Mesh.SecondOrderIncomplete = 1`)");
+                        .fail("bricks of 27 nodes are not read: write bricks of 20 nodes (`Mesh.SecondOrderIncomplete = 1`)");
                 }
                 1 | 8 | 15 => 0, // lines and points
                 _ => {
                     return lines.fail(format!(
-                        "elements of Gmsh's type {kind} are not read: tetrahedra of 10 nodes (11) and bricks of 20 (17) are"
+                        "elements of Gmsh's type {kind} are not read: use tetrahedra of 10 nodes (type 11) and \
+                         bricks of 20 nodes (type 17)"
                     ));
                 }
             };

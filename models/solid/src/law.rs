@@ -137,7 +137,7 @@ impl Description {
             2 => {
                 if settings.number("size_y_mm").is_some_and(|y| y * 1.0e-3 != size_m[0]) {
                     return Err(Refusal::parameter(
-                        "a cylinder is round: leave `size_y_mm` out, `size_x_mm` is its diameter",
+                        "a cylinder is round: omit `size_y_mm`, because `size_x_mm` is its diameter",
                     ));
                 }
                 Body::Cylinder { radius_m: 0.5 * size_m[0], height_m: size_m[2] }
@@ -168,13 +168,13 @@ impl Description {
         };
         if settings.choice_or_default("tool_count") > 0 && matches!(tool, Tool::Plate | Tool::Punch { .. }) {
             return Err(Refusal::parameter(
-                "`tool_count` is of spheres: leave it out, or set tool = \"sphere\"",
+                "`tool_count` is only for spheres: omit this parameter, or set tool = \"sphere\"",
             ));
         }
         if settings.number("bond") == Some(0.0) && matches!(tool, Tool::Sphere { .. } | Tool::Spheres { .. })
         {
             return Err(Refusal::parameter(
-                "a sphere is not bonded: leave `bond` out, and set `friction` if it shall not slide freely",
+                "a sphere is not bonded: omit `bond`, and set `friction` for a sphere that does not slide freely",
             ));
         }
         if bond == Bond::Frictionless && tool == Tool::Plate {
@@ -206,10 +206,10 @@ impl Description {
             | (Body::File { .. }, _)
             | (Body::HalfSpace, Tool::Sphere { .. } | Tool::Spheres { .. } | Tool::Punch { .. }) => Ok(()),
             (Body::Beam { .. }, _) => {
-                Err(Refusal::unsupported("a beam is held by its end: set tool = \"plate\""))
+                Err(Refusal::unsupported("a beam is moved by a plate at its end: set tool = \"plate\""))
             }
             (Body::HalfSpace, Tool::Plate) => Err(Refusal::parameter(
-                "a half-space has no face a plate could cover: choose another `tool` or `body`",
+                "a half-space has no face for a plate: choose another `tool` or `body`",
             )),
             (Body::Block(_) | Body::Cylinder { .. }, _) => {
                 let least_m = match self.body {
@@ -220,7 +220,7 @@ impl Description {
                 let limit_m = 0.9 * least_m;
                 if extent_m > limit_m {
                     return Err(Refusal::parameter(format!(
-                        "{what} is {:.4} mm, too much for this body (at most {:.4} mm): make the tool smaller or the body larger",
+                        "{what} is {:.4} mm, but at most {:.4} mm for this body: make the tool smaller or the body larger",
                         extent_m * 1.0e3,
                         limit_m * 1.0e3
                     )));
@@ -234,7 +234,7 @@ impl Description {
         let mm = |m: f64| m * 1.0e3;
         if spacing_m < 2.0 * radius_m {
             return Err(Refusal::parameter(format!(
-                "`tool_spacing_mm` is {:.4} mm, but spheres of {:.4} mm are at least {:.4} mm apart: make them smaller or the spacing larger",
+                "`tool_spacing_mm` is {:.4} mm, but spheres of {:.4} mm are at least {:.4} mm apart: make the spheres smaller or the spacing larger",
                 mm(spacing_m),
                 mm(radius_m),
                 mm(2.0 * radius_m)
@@ -249,13 +249,13 @@ impl Description {
                     return Ok(());
                 }
                 Err(Refusal::parameter(format!(
-                    "`tool_spacing_mm` is {:.4} mm, too much for this face (at most {:.4} mm): make it smaller or the body larger",
+                    "`tool_spacing_mm` is {:.4} mm, but at most {:.4} mm for this face: make the spacing smaller or the body larger",
                     mm(spacing_m),
                     mm(least_m / 0.6)
                 )))
             }
             Body::Cylinder { .. } | Body::File { .. } => Err(Refusal::unsupported(
-                "several spheres touch a block or a half-space: leave `tool_count` out, or choose another `body`",
+                "several spheres are only for a block or a half-space: omit `tool_count`, or choose another `body`",
             )),
         }
     }
@@ -379,7 +379,8 @@ impl Description {
         let uneven_m = body::unevenness_m(mesh);
         if uneven_m > 1.0e-6 * (right - left).max(back - front) {
             return Err(Refusal::parameter(format!(
-                "the touched face is not plane, or not the top of the body (by {:.4} mm): turn the mesh so that it is the highest face, across z; or set tool = \"plate\", which fits any face",
+                "the touched face is not plane, or not the top of the body (by {:.4} mm): turn the mesh so that the \
+                 touched face is the top, across z; or set tool = \"plate\", which fits every face",
                 uneven_m * 1.0e3
             )));
         }
@@ -395,7 +396,7 @@ impl Description {
         let base = body::Body::new(mesh, solid).map_err(not_positive)?;
         if !outline.rim().into_iter().all(|at| base.is_on_face(at)) {
             return Err(Refusal::parameter(
-                "the punch reaches beyond the touched face, whose middle it stands on: make it smaller",
+                "the punch at the middle of the touched face reaches beyond the face: make the punch smaller",
             ));
         }
         let nodes: Vec<f64> = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|share| share * extent_m).to_vec();
@@ -526,6 +527,7 @@ fn to_numbers(law: &Law, mesh_error: f64) -> Vec<f64> {
 
 fn not_positive(NotPositive { pivot }: NotPositive) -> Refusal {
     Refusal::parameter(format!(
-        "the stiffness matrix is not positive definite (unknown {pivot}): sides too unlike each other, or a Poisson's ratio too near 0.5"
+        "the stiffness matrix is not positive definite (unknown {pivot}): use more similar sides, or a Poisson's \
+         ratio farther from 0.5"
     ))
 }

@@ -116,29 +116,32 @@ impl fmt::Display for MeshError {
         match self {
             Self::NoVolume { open_m: Some(at) } => write!(
                 f,
-                "an open surface and no volume: the surface ends at {}; close it, and mesh the volume (`gmsh -3 -order 2`)",
+                "the mesh has an open surface and no volume: the surface ends at {}; close the surface, and mesh \
+                 the volume (`gmsh -3 -order 2`)",
                 mm(at)
             ),
             Self::NoVolume { open_m: None } => {
                 write!(
                     f,
-                    "no element has a volume: mesh it (`gmsh -3 -order 2`), and give the volume a physical group"
+                    "no element has a volume: mesh the volume (`gmsh -3 -order 2`), and give the volume a physical group"
                 )
             }
             Self::Inverted { tag, jacobian_m3 } => write!(
                 f,
-                "element {tag} is inverted or folded (Jacobian determinant {jacobian_m3:.3e} m3): its nodes are in the wrong order, or a curved edge is bent too far"
+                "element {tag} is inverted or folded (Jacobian determinant {jacobian_m3:.3e} m3): correct the order \
+                 of its nodes, or bend its curved edges less"
             ),
             Self::Overlap { tag } => {
                 write!(
                     f,
-                    "the faces of element {tag} do not fit those of its neighbours: elements overlap or differ in kind there"
+                    "the faces of element {tag} do not match the faces of its neighbours: elements overlap or \
+                     differ in kind there; mesh the body again"
                 )
             }
             Self::Twins { at_m } => {
                 write!(
                     f,
-                    "two nodes at {}: the body has a crack there; merge them (`Coherence Mesh;`)",
+                    "two nodes at {}: the body has a crack there; merge the nodes (`Coherence Mesh;`)",
                     mm(at_m)
                 )
             }
@@ -151,12 +154,13 @@ impl fmt::Display for MeshError {
                 };
                 write!(
                     f,
-                    "{what}: no physical surface is named \"{name}\" (there are: {known}); name one so, or set `{parameter}`"
+                    "{what}: no physical surface has the name \"{name}\" (physical surfaces: {known}); rename a \
+                     surface, or set `{parameter}`"
                 )
             }
             Self::NotOnSurface { name, at_m } => write!(
                 f,
-                "the surface \"{name}\" is open: at {} it is not the border of the elements; elements are missing there, or it lies inside",
+                "the surface \"{name}\" is open: at {} the surface is not on the border of the elements; add the missing elements, or choose a surface on the border",
                 mm(at_m)
             ),
             Self::Loose { tag } => {

@@ -33,7 +33,7 @@ const SCHEMA: &[Parameter] = &[
         "body",
         BODIES,
         0,
-        "What is touched; block, cylinder: bottom clamped; beam: clamped at -x",
+        "Touched body; block, cylinder: bottom clamped; beam: clamped at -x",
     ),
     Parameter::real(
         "size_x_mm",
@@ -61,7 +61,7 @@ const SCHEMA: &[Parameter] = &[
     ),
     Parameter::real("youngs_modulus_pa", "Pa", 1.0, 1.0e9, 1.0e4, "Young's modulus").live(),
     Parameter::real("poisson_ratio", "1", 0.0, 0.49, 0.3, "Poisson's ratio"),
-    Parameter::choice("tool", TOOLS, 0, "What touches: a sphere, or what is bonded to a face"),
+    Parameter::choice("tool", TOOLS, 0, "Tool: a sphere, or a punch or plate on a face"),
     Parameter::real("tool_radius_mm", "mm", 0.1, 500.0, 12.7, "Radius of the sphere or of the round punch"),
     Parameter::real("tool_side_mm", "mm", 0.1, 1000.0, 20.0, "Side of the square punch"),
     Parameter::choice(
@@ -76,29 +76,30 @@ const SCHEMA: &[Parameter] = &[
         0.2,
         1000.0,
         30.0,
-        "Between the centres of neighbouring spheres, if there are several",
+        "Distance between the centres of neighbouring spheres",
     ),
-    Parameter::choice("bond", BONDS, 0, "How a punch holds the surface"),
+    Parameter::choice("bond", BONDS, 0, "Contact of a punch with the surface"),
     Parameter::real("friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction of the sphere"),
     Parameter::choice(
         "resolution",
         RESOLUTIONS,
         1,
-        "Elements and contact cells of the preparation; a tick costs the same; linear-tetrahedra: what others use, under a plate",
+        "Elements and contact cells of the preparation, without effect on the time of a tick; linear-tetrahedra: \
+         for comparison, under a plate",
     ),
     Parameter::file(
         "file",
         choices![],
         "The mesh of body `file`: Gmsh 4.1 text, metres, tetrahedra of 10 nodes, bricks of 20",
     ),
-    Parameter::text("fixed_face", "Physical surface of the mesh that is fixed; `fixed`, if empty"),
-    Parameter::text("touched_face", "Physical surface of the mesh that is touched; `touched`, if empty"),
+    Parameter::text("fixed_face", "Fixed physical surface of the mesh; `fixed`, if empty"),
+    Parameter::text("touched_face", "Touched physical surface of the mesh; `touched`, if empty"),
 ];
 
 const DETAILS: &[Detail] = &[
-    Detail::number("depth_m", "m", "How far the face is inside the sphere"),
-    Detail::number("contacts", "1", "How many spheres are in contact"),
-    Detail::number("mesh_error", "1", "Estimated relative error of the stiffness that comes from the mesh"),
+    Detail::number("depth_m", "m", "Penetration depth of the sphere"),
+    Detail::number("contacts", "1", "Number of spheres in contact"),
+    Detail::number("mesh_error", "1", "Estimated relative error of the stiffness due to the mesh"),
 ];
 
 /// Elastic solid with the tool that touches it.
@@ -146,7 +147,7 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     let faces = ["fixed_face", "touched_face"].map(|id| settings.text(id));
     if BODIES.as_slice()[settings.choice_or_default("body")].as_str() != "file" {
         let stray = [file, faces[0], faces[1]].iter().any(Option::is_some);
-        let refusal = "`file`, `fixed_face` and `touched_face` belong to a mesh: set body = \"file\"";
+        let refusal = "`file`, `fixed_face` and `touched_face` are only for a mesh: set body = \"file\"";
         return if stray { Err(Refusal::parameter(refusal)) } else { Ok(None) };
     }
     let Some(path) = file else {
@@ -154,7 +155,7 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     };
     let sizes = ["size_x_mm", "size_y_mm", "size_z_mm"];
     if let Some(id) = sizes.into_iter().find(|id| settings.number(id).is_some()) {
-        return Err(Refusal::parameter(format!("`{id}`: a mesh has a size of its own; leave it out")));
+        return Err(Refusal::parameter(format!("`{id}`: a mesh has its own size; omit this parameter")));
     }
     let bytes = read_file(Path::new(path), MOST_MESH_BYTES)
         .map_err(|error| Refusal::resource(format!("{path}: cannot read the mesh: {error}")))?;

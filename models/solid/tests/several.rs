@@ -280,10 +280,7 @@ fn settings_of_several_spheres_that_do_not_fit_are_refused() {
     let plugin = Plugin::in_process(&flotor_solid::FLOTOR_ENTRY).expect("the solid is a plugin");
     for (settings, wanted) in [
         (vec![("tool_count", "2"), ("tool_spacing_mm", "20")], "at least 25.4"),
-        (
-            vec![("tool_count", "2"), ("tool_radius_mm", "5"), ("tool_spacing_mm", "90")],
-            "too much for this face",
-        ),
+        (vec![("tool_count", "2"), ("tool_radius_mm", "5"), ("tool_spacing_mm", "90")], "mm for this face"),
         (vec![("tool_count", "3"), ("body", "cylinder")], "block or a half-space"),
         (vec![("tool_count", "3"), ("tool", "punch-round")], "tool_count"),
         (vec![("tool_count", "3"), ("bond", "bonded")], "not bonded"),

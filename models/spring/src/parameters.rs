@@ -98,25 +98,25 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "variant",
         VARIANTS,
         3,
-        "Law: the thesis's code, its law without jumps, that corrected, conservative in 3D, or the exact rod",
+        "Law: code of the thesis, its law without jumps, its corrected law, a conservative law in 3D, or the exact rod",
     ),
     Parameter::choice("precision", PRECISIONS, 0, "Storage of numbers (variants thesis and closed-form)"),
-    Parameter::choice("accuracy", ACCURACIES, 0, "For the servo, or for reference (variant rod)"),
-    Parameter::choice("seat", SEATS, 0, "Lower plate held, or free to roll up and lift off (energy, rod)"),
+    Parameter::choice("accuracy", ACCURACIES, 0, "Accuracy for the servo or for reference (variant rod)"),
+    Parameter::choice("seat", SEATS, 0, "Lower plate fixed, or free to roll up and lift off (energy, rod)"),
     Parameter::real(
         "seat_friction",
         "1",
         0.01,
         10.0,
         10.0,
-        "Friction under a free seat; at 10 hardly any base slides",
+        "Coefficient of friction under a free seat; at 10 the base hardly slides",
     )
     .live(),
     Parameter::choice(
         "hand_over",
         OFF_ON,
         1,
-        "To the rod where the law errs by more than the tolerance, as one energy (variant energy)",
+        "Blend the energy with the rod where the error of the law exceeds the tolerance (variant energy)",
     ),
     Parameter::real(
         "tolerance_n",
@@ -127,14 +127,14 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Largest error of the force against the rod short of buckling (energy with hand_over)",
     )
     .live(),
-    Parameter::choice("coil_contact", OFF_ON, 0, "Coils that meet press on each other (energy, rod)"),
+    Parameter::choice("coil_contact", OFF_ON, 0, "Contact forces between coils (energy, rod)"),
     Parameter::choice(
         "wire",
         OFF_ON,
         0,
-        "Twist under compression and off-axis ends of the wire (energy, rod)",
+        "Effects of twist under compression and of the off-axis ends of the wire (energy, rod)",
     ),
-    Parameter::choice("mode", MODES, 0, "Which constant rules the stiffness; the others follow from it"),
+    Parameter::choice("mode", MODES, 0, "Constant that determines the stiffness and the other constants"),
     Parameter::real("free_length_mm", "mm", 1.0, 1000.0, 25.0, "Distance of the end plates without load")
         .live(),
     Parameter::real("coil_diameter_mm", "mm", 0.5, 200.0, 6.07, "Diameter of the coil between wire centres")
@@ -143,8 +143,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::real("shear_modulus_mpa", "MPa", 1.0, 1.0e6, 75_842.0, "Shear modulus of the wire").live(),
     Parameter::real("wire_diameter_mm", "mm", 0.05, 50.0, 0.63, "Diameter of the wire (mode physical)")
         .live(),
-    Parameter::real("active_coils", "1", 1.0, 500.0, 11.8, "Number of coils that deform (mode physical)")
-        .live(),
+    Parameter::real("active_coils", "1", 1.0, 500.0, 11.8, "Number of active coils (mode physical)").live(),
     Parameter::real(
         "gamma_n",
         "N",
@@ -197,7 +196,7 @@ impl Choice {
         let rod_blend = rod_blend(settings, variant)?;
         if rod_blend == Switch::Off && settings.number("tolerance_n").is_some() {
             return Err(Refusal::parameter(
-                "`tolerance_n` is of a law that blends into the rod; set `variant` to `energy` and `hand_over` to `on` as well",
+                "`tolerance_n` needs a law that blends into the rod; set `variant` to `energy` and `hand_over` to `on` as well",
             ));
         }
         let coil_contact = coil("coil_contact", settings, variant)?;
@@ -229,7 +228,7 @@ impl Choice {
         let spring = Spring::new(geometry, material, stiffness).map_err(Refusal::parameter)?;
         if seat == SeatChoice::Fixed && settings.number("seat_friction").is_some() {
             return Err(Refusal::parameter(
-                "`seat_friction` has no say in a seat that is held; set `seat` to `free` as well",
+                "`seat_friction` has no effect on a fixed seat; set `seat` to `free` as well",
             ));
         }
         let friction = Friction { coefficient: settings.number_or_default("seat_friction") };
@@ -366,7 +365,7 @@ fn precision(settings: &Settings<'_>, variant: Variant) -> Result<Precision, Ref
     match (settings.choice_or_default("precision"), variant) {
         (1, Variant::Thesis | Variant::ClosedForm) => Ok(Precision::Single),
         (1, Variant::CurrentLength | Variant::Energy | Variant::Rod) => Err(Refusal::parameter(
-            "`precision` f32 is for comparing the variants `thesis` and `closed-form`; the others have f64 alone",
+            "`precision` f32 is only for the variants `thesis` and `closed-form`; the other variants need f64",
         )),
         _ => Ok(Precision::Double),
     }
@@ -377,7 +376,9 @@ fn accuracy(settings: &Settings<'_>, variant: Variant) -> Result<Accuracy, Refus
     match (settings.choice_or_default("accuracy"), variant) {
         (1, Variant::Rod) => Ok(Accuracy::Tight),
         (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Energy) => {
-            Err(Refusal::parameter("`accuracy` tight is for variant `rod`; the other laws have closed forms"))
+            Err(Refusal::parameter(
+                "`accuracy` tight is only for variant `rod`; the other laws have closed forms",
+            ))
         }
         _ => Ok(Accuracy::Servo),
     }
@@ -443,7 +444,7 @@ fn refuse_derived(settings: &Settings<'_>, mode: Mode) -> Result<(), Refusal> {
         Mode::Physical => "physical",
     };
     Err(Refusal::parameter(format!(
-        "`{id}` has no say in mode `{now}`, where it follows from the others; set `mode` to `{own}` as well"
+        "`{id}` has no effect in mode `{now}`, which computes it from other parameters; set `mode` to `{own}` as well"
     )))
 }
 

@@ -83,13 +83,13 @@ impl DetailsModel for SpringModel {
         Detail::word(
             "branch",
             BRANCHES,
-            "Whether the plates are closer than where a straight rod buckles (rod)",
+            "Branch of the rod: buckled if the plates are closer than the buckling length of a straight rod (rod)",
         ),
-        Detail::flag("stable", "Whether the shape is a minimum of the stored energy (rod)"),
+        Detail::flag("stable", "True if the shape is a minimum of the stored energy (rod)"),
         Detail::number(
             "seat_roll_rad",
             "rad",
-            "Roll of the lower plate about y; none for a spring in the air",
+            "Roll of the lower plate about y; no value for a spring in the air",
         ),
         Detail::number("rod_share", "1", "Share of the exact rod in the energy (energy with hand_over)"),
     ];

@@ -310,7 +310,7 @@ impl fmt::Display for ParameterError {
         match self {
             Self::NotFinite { quantity } => write!(f, "the {quantity} is not a finite number"),
             Self::NotPositive { quantity, value } => {
-                write!(f, "the {quantity} must be positive, it is {value:e} in SI units")
+                write!(f, "the {quantity} must be positive, but is {value:e} in SI units")
             }
             Self::CoilNotWiderThanWire { coil_diameter_m, wire_diameter_m } => write!(
                 f,
@@ -326,8 +326,8 @@ impl fmt::Display for ParameterError {
             ),
             Self::ImpossiblePoissonRatio { poisson_ratio, material } => write!(
                 f,
-                "Young's modulus {} MPa and shear modulus {} MPa give a Poisson ratio of {poisson_ratio:.6}, it must lie \
-                 between -1 and 0.5",
+                "Young's modulus {} MPa and shear modulus {} MPa give a Poisson ratio of {poisson_ratio:.6}, which \
+                 must be between -1 and 0.5",
                 material.youngs_modulus_pa * 1e-6,
                 material.shear_modulus_pa * 1e-6
             ),

@@ -48,8 +48,15 @@ impl ForceModel for Wall {
         )
         .live(),
         Parameter::real("friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction").live(),
-        Parameter::choice("shape", SHAPES, 0, "Which solid: below a plane, a ball, or a cube"),
-        Parameter::real("size_mm", "mm", 0.1, 1000.0, 10.0, "Radius of the ball, half the edge of the cube"),
+        Parameter::choice("shape", SHAPES, 0, "Shape of the solid: half-space below a plane, ball, or cube"),
+        Parameter::real(
+            "size_mm",
+            "mm",
+            0.1,
+            1000.0,
+            10.0,
+            "Radius of the ball, or half the edge of the cube",
+        ),
         Parameter::real("height_mm", "mm", -100.0, 100.0, 0.0, "Top of the solid above home"),
     ];
 

@@ -56,7 +56,7 @@ fn a_fault_is_no_cycle_for_a_compiler_and_an_unknown_cycle_is_named() {
     let scene = scratch.file("scene.toml", format!("duration_s = 1\n[device]\nplugin = {post:?}\n"));
     let ran = Flotor::with(["run", &scene.display().to_string(), "--clock", "virtual"]).run();
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:#?}");
-    let named = "`read` returned 5, which is no cycle; a fault is FLOTOR_CYCLE_FAULT(5)";
+    let named = "`read` returned 5, which is not a cycle; return a fault as FLOTOR_CYCLE_FAULT(5)";
     assert!(ran.stderr.contains(named), "{ran:#?}");
 }
 
@@ -152,22 +152,31 @@ fn a_mistake_in_c_is_told_in_one_line() {
         return;
     }
     let wrong = [
-        ("WITHOUT_STEP", "`flotor.force/1` lacks `step`; a plugin must offer it"),
-        ("WITHOUT_TABLE", "`flotor.force/1` lacks its function table; a plugin must offer it"),
-        ("SHORT_TABLE", "`flotor.force/1` lacks part of its table; a plugin must offer it"),
-        ("MISALIGNED_TABLE", "`flotor.force/1` lacks an aligned table; a plugin must offer it"),
-        ("SHORT_EXTENSION", "`flotor.active-region/1` lacks part of its table; a plugin must offer it"),
-        ("OTHER_KIND", "the metadata say model, the entry's `kind` is 2 (device); make both say the same"),
-        ("ODD_KIND", "the metadata say model, the entry's `kind` is 7 (unknown); make both say the same"),
+        ("WITHOUT_STEP", "`flotor.force/1` lacks `step`, which every plugin of this kind needs"),
+        ("WITHOUT_TABLE", "`flotor.force/1` lacks its function table, which every plugin of this kind needs"),
+        ("SHORT_TABLE", "`flotor.force/1` lacks part of its table, which every plugin of this kind needs"),
+        (
+            "MISALIGNED_TABLE",
+            "`flotor.force/1` lacks an aligned table, which every plugin of this kind needs",
+        ),
+        (
+            "SHORT_EXTENSION",
+            "`flotor.active-region/1` lacks part of its table, which every plugin of this kind needs",
+        ),
+        ("OTHER_KIND", "the metadata have the kind model, the entry's `kind` is 2 (device); make both equal"),
+        ("ODD_KIND", "the metadata have the kind model, the entry's `kind` is 7 (unknown); make both equal"),
         (
             "WITHOUT_LAYOUTS",
-            "the plugin carries no layout table; rebuild the plugin against this host's flotor-hal",
+            "the plugin has no layout table; rebuild the plugin against this host's flotor-hal",
         ),
-        ("OTHER_CANDIDATE", "built for plugin contract 1.0, this host speaks 1.0-rc; rebuild the plugin"),
+        (
+            "OTHER_CANDIDATE",
+            "built for plugin contract 1.0, but this host has contract 1.0-rc; rebuild the plugin",
+        ),
         ("SHORT_ENTRY", "no plugin entry `flotor_entry_wall` in the library"),
         (
             "HIDDEN_ENTRY",
-            "no plugin entry `flotor_entry_wall` in the library; export it with default visibility",
+            "no plugin entry `flotor_entry_wall` in the library; export the entry with default visibility",
         ),
     ];
     for (mistake, cause) in wrong {

@@ -206,15 +206,15 @@ fn wrong_parameters_are_told_with_what_would_be_right() {
         (&["gamma_n=nan"], "--set gamma_n: `gamma_n` = NaN: must be 0.01 to 10000 N"),
         (
             &["alpha_n_mm2=180"],
-            "`alpha_n_mm2` has no say in mode `gamma`, where it follows from the others; set `mode` to `alpha`",
+            "`alpha_n_mm2` has no effect in mode `gamma`, which computes it from other parameters; set `mode` to `alpha`",
         ),
         (
             &["seat_friction=0.2"],
-            "`seat_friction` has no say in a seat that is held; set `seat` to `free` as well",
+            "`seat_friction` has no effect on a fixed seat; set `seat` to `free` as well",
         ),
         (
             &["mode=physical", "gamma_n=17"],
-            "`gamma_n` has no say in mode `physical`, where it follows from the others; set `mode` to `gamma`",
+            "`gamma_n` has no effect in mode `physical`, which computes it from other parameters; set `mode` to `gamma`",
         ),
     ];
     for (sets, cause) in wrong {

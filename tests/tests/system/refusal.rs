@@ -55,7 +55,7 @@ const WRONG_FILES: &[WrongFile] = &[
             scratch.file("half.so", &bytes[..bytes.len() / 2])
         },
         cause: "the file is truncated",
-        remedy: "copy or build it again",
+        remedy: "copy or build the plugin again",
     },
     WrongFile {
         name: "a C library without an entry",
@@ -88,7 +88,7 @@ const WRONG_FILES: &[WrongFile] = &[
             scratch.file("yaml.so", bytes)
         },
         cause: "unreadable plugin metadata",
-        remedy: "build it with the export macros or the current header",
+        remedy: "build the plugin with the export macros or the current header",
     },
     WrongFile {
         name: "a kind nobody knows",
@@ -97,7 +97,7 @@ const WRONG_FILES: &[WrongFile] = &[
             scratch.file("muddl.so", bytes)
         },
         cause: "kind `muddl` is neither model nor device",
-        remedy: "build it with the export macros or the current header",
+        remedy: "build the plugin with the export macros or the current header",
     },
     WrongFile {
         name: "another contract, said by the metadata",
@@ -105,7 +105,7 @@ const WRONG_FILES: &[WrongFile] = &[
             let bytes = patched(plugin_bytes(MODEL), b"abi = \"1.0-rc\"", b"abi = \"9.0-rc\"");
             scratch.file("other_contract.so", bytes)
         },
-        cause: "built for plugin contract 9.0-rc, this host speaks 1.0-rc",
+        cause: "built for plugin contract 9.0-rc, but this host has contract 1.0-rc",
         remedy: "rebuild the plugin against this version",
     },
     WrongFile {
@@ -115,7 +115,7 @@ const WRONG_FILES: &[WrongFile] = &[
             compile_c(&METADATA_IN_C.replace("1.0-rc", "1.0"), &library);
             library
         },
-        cause: "built for plugin contract 1.0, this host speaks 1.0-rc",
+        cause: "built for plugin contract 1.0, but this host has contract 1.0-rc",
         remedy: "rebuild the plugin against this version",
     },
     WrongFile {
@@ -124,7 +124,7 @@ const WRONG_FILES: &[WrongFile] = &[
             let bytes = patched(plugin_bytes(MODEL), &entry_head(ABI_MAJOR), &entry_head(ABI_MAJOR + 8));
             scratch.file("other_entry.so", bytes)
         },
-        cause: "built for plugin contract 9.0-rc, this host speaks 1.0-rc",
+        cause: "built for plugin contract 9.0-rc, but this host has contract 1.0-rc",
         remedy: "rebuild the plugin against this version",
     },
     WrongFile {
@@ -136,7 +136,7 @@ const WRONG_FILES: &[WrongFile] = &[
             scratch.file("no_magic.so", bytes)
         },
         cause: "no plugin entry `flotor_entry_fixture_faulty_model`",
-        remedy: "export it with default visibility",
+        remedy: "export the entry with default visibility",
     },
     WrongFile {
         name: "an entry that is not exported",
@@ -146,7 +146,7 @@ const WRONG_FILES: &[WrongFile] = &[
             scratch.file("no_entry.so", patched(plugin_bytes(MODEL), named, absent))
         },
         cause: "no plugin entry `flotor_entry_fixture_absent_model`",
-        remedy: "export it with default visibility",
+        remedy: "export the entry with default visibility",
     },
     WrongFile {
         name: "a struct with two fields exchanged",
@@ -232,7 +232,7 @@ fn a_setting_made_for_another_plugin_is_refused_in_one_line() {
         (load_file(&plugin_file(MODEL)).unwrap(), load_file(&plugin_file("flotor-spring")).unwrap());
     let setting = Setting::parse(spring.parameters(), "seat", "free").unwrap();
     let Err(refused) = model.create_model(&[setting]) else { panic!("a setting of the spring was taken") };
-    let told = "the setting `seat` was made for another plugin; make it for this one's parameters";
+    let told = "the setting `seat` was created for another plugin; create the setting from the parameters of this plugin";
     assert!(refused.to_string().ends_with(told), "{refused}");
 }
 
@@ -518,8 +518,8 @@ fn a_device_that_fails_before_the_start_is_a_refused_plugin() {
 fn a_device_that_fails_in_the_loop_ends_the_run_in_one_line() {
     let file = plugin_file(DEVICE);
     let wrong = [
-        ("panics-in-read", ": read gave up", "report it to its author"),
-        ("panics-in-write", ": write gave up", "report it to its author"),
+        ("panics-in-read", ": read gave up", "report the fault to its author"),
+        ("panics-in-write", ": write gave up", "report the fault to its author"),
         ("over-temperature", "a coil is too hot", "let the device cool"),
     ];
     for (fault, cause, remedy) in wrong {

@@ -303,7 +303,7 @@ fn a_file_that_is_no_text_is_told_with_its_line() {
     for (name, scene) in scenes {
         let ran = Flotor::with(["run", &scene, "--clock", "virtual"]).run();
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
-        assert!(ran.error().contains(&format!("{name}:3: this is not UTF-8")), "{ran:?}");
+        assert!(ran.error().contains(&format!("{name}:3: the file is not UTF-8")), "{ran:?}");
     }
 }
 

@@ -385,7 +385,7 @@ fn a_device_that_fails_ends_the_run_by_name_and_the_force_goes() {
     let cases: [(Api, &[&str], &str); 8] = [
         (DHD, &["LOST"], "the device is gone"),
         (DHD, &["SILENT"], "did not answer in time"),
-        (DHD, &["REFUSED"], "makes no sense"),
+        (DHD, &["REFUSED"], "malformed data"),
         (DHD, &["FORCE_OFF=2"], "moved faster than the device allows"),
         (DHD, &["FORCE_OFF=6"], "emergency stop"),
         (HD, &["ERROR=0x0302"], "the device is gone"),

@@ -55,8 +55,9 @@ pub(super) fn check(declared: &Capabilities) -> Result<(), Refusal> {
     let are_rates = slowest_hz > 0.0 && slowest_hz <= fastest_hz && fastest_hz <= MOST_RATE_HZ; // false for NaN
     if !are_rates {
         let found = format!("{slowest_hz} to {fastest_hz} Hz");
-        let mend =
-            format!("say the slowest rate first, more than 0, and the fastest, at most {MOST_RATE_HZ} Hz");
+        let mend = format!(
+            "declare the slowest rate first, above 0, and then the fastest, at most {MOST_RATE_HZ} Hz"
+        );
         return Err(wrong("rate_hz", &found, &mend));
     }
     Ok(())
@@ -97,17 +98,22 @@ impl Group {
         limit.has_an_end()?;
         let driven = axes.map(|axis| declared.actuated.contains(axis));
         let held = axes.map(|axis| declared.actuated.contains(axis) && declared.sensed.contains(axis));
-        limit
-            .is_more_than_nothing_on(driven, "say the most it gives there, or leave it out of `actuated`")?;
+        limit.is_more_than_nothing_on(
+            driven,
+            "declare its largest value, or remove the axis from `actuated`",
+        )?;
         // Without a range the boundary wall would stand at home.
-        range.is_more_than_nothing_on(held, "say how far it moves there, or leave it out of `actuated`")?;
+        range.is_more_than_nothing_on(
+            held,
+            "declare its range of motion, or remove the axis from `actuated`",
+        )?;
         if driven == [false; 3] {
             // Without an actuated axis the slew has no effect: infinity and 0 are valid.
             return if slew.value >= 0.0 { Ok(()) } else { Err(slew.wrong("must be 0 or more")) };
         }
         slew.has_an_end()?;
         if slew.value == 0.0 {
-            return Err(slew.wrong("its force could never change; say how fast it may"));
+            return Err(slew.wrong("its force could never change; declare a rate above 0"));
         }
         Ok(())
     }
@@ -238,12 +244,15 @@ mod tests {
     #[test]
     fn what_contradicts_itself_is_refused_with_what_to_mend() {
         let cases = [
-            (Capabilities { rate_hz: [1000.0, 100.0], ..HELD }, "say the slowest rate first"),
+            (Capabilities { rate_hz: [1000.0, 100.0], ..HELD }, "declare the slowest rate first"),
             (Capabilities { sensed: Axes { bits: 0x7f }, ..HELD }, "`sensed` is 0b1111111: there are six"),
             (Capabilities { actuated: Axes { bits: u32::MAX }, ..HELD }, "set no bit beyond them"),
-            (Capabilities { max_torque_nm: [0.0; 3], ..HELD }, "x is driven, so say the most it gives there"),
-            (Capabilities { actuated: Axes::TRANSLATION, ..PLANAR }, "z is driven, so say the most it gives"),
-            (Capabilities { range_m: [0.0; 3], ..HELD }, "x is driven, so say how far it moves there"),
+            (Capabilities { max_torque_nm: [0.0; 3], ..HELD }, "x is driven, so declare its largest value"),
+            (
+                Capabilities { actuated: Axes::TRANSLATION, ..PLANAR },
+                "z is driven, so declare its largest value",
+            ),
+            (Capabilities { range_m: [0.0; 3], ..HELD }, "x is driven, so declare its range of motion"),
         ];
         for (declared, words) in cases {
             let reason = check(&declared).expect_err(words).reason;

@@ -19,7 +19,7 @@ pub(super) enum Proof {
 /// `entry` is a live entry whose magic, size and contract version were checked: its pointers may be followed.
 pub(super) unsafe fn contract(entry: &'static Entry) -> Result<Proof, String> {
     if entry.layouts.is_null() || !entry.layouts.is_aligned() || entry.layout_count == 0 {
-        return Err("the plugin carries no layout table".to_owned());
+        return Err("the plugin has no layout table".to_owned());
     }
     // SAFETY: the contract of an entry: a static array of so many rows.
     let theirs = unsafe { std::slice::from_raw_parts(entry.layouts, entry.layout_count as usize) };
@@ -46,14 +46,14 @@ fn difference(ours: &[FieldLayout], theirs: &[FieldLayout]) -> Option<String> {
                 return Some(format!("`{}` is {ours} in the host and {theirs} in the plugin", our.name()));
             }
             None if number < CORE_COUNT || named(theirs, our.struct_name()).is_some() => {
-                return Some(format!("the plugin knows no `{}`", our.name()));
+                return Some(format!("the plugin lacks `{}`", our.name()));
             }
             None => {}
         }
     }
     let known = |row: &&FieldLayout| named(ours, row.struct_name()).is_some();
     let unknown = theirs.iter().filter(known).find(|row| named(ours, row.name()).is_none());
-    unknown.map(|row| format!("the host knows no `{}`", row.name()))
+    unknown.map(|row| format!("the host lacks `{}`", row.name()))
 }
 
 #[cfg(not(feature = "layout-proof"))]
@@ -144,9 +144,9 @@ mod tests {
         let without =
             |name: &str| -> Vec<_> { LAYOUTS.into_iter().filter(|row| row.name() != name).collect() };
         let told = difference(&LAYOUTS, &without("Wrench.torque_nm"));
-        assert_eq!(told.as_deref(), Some("the plugin knows no `Wrench.torque_nm`"));
+        assert_eq!(told.as_deref(), Some("the plugin lacks `Wrench.torque_nm`"));
         let told = difference(&without("PacingTable.wait_for_sample"), &LAYOUTS);
-        assert_eq!(told.as_deref(), Some("the host knows no `PacingTable.wait_for_sample`"));
+        assert_eq!(told.as_deref(), Some("the host lacks `PacingTable.wait_for_sample`"));
         let core: Vec<_> = LAYOUTS.into_iter().take(CORE_COUNT).collect();
         assert_eq!(difference(&LAYOUTS, &core), None, "a plugin that knows no extension");
         assert!(difference(&LAYOUTS, &core[1..]).is_some(), "a plugin that does not know `Str`");

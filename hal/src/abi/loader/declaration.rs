@@ -17,7 +17,7 @@ pub(super) fn check(interface: &Interface, id: &str) -> Result<(), String> {
         }
     };
     if own != id {
-        return Err(format!("the id `{own}`, but its metadata say `{id}`"));
+        return Err(format!("the id `{own}`, but its metadata have `{id}`"));
     }
     list("parameters", has_list, count)?;
     match interface {

@@ -98,7 +98,7 @@ impl OpenedDevice {
         let code = preserving_float_control(&mut 0, opened);
         refusal_from(code, &message)?;
         if instance.is_null() {
-            return Err(Refusal::broken("it reported success but opened nothing"));
+            return Err(Refusal::broken("the plugin reported success but opened no device"));
         }
         Ok(Self { handle: Arc::new(Handle { instance, table, extensions, parameters }), declared: None })
     }
@@ -265,7 +265,7 @@ impl ActiveDevice {
     pub fn last_message(&mut self) -> String {
         if let Some((function, CycleCode { code })) = self.unknown {
             return format!(
-                "`{function}` returned {code}, which is no cycle; a fault is FLOTOR_CYCLE_FAULT({code})"
+                "`{function}` returned {code}, which is not a cycle; return a fault as FLOTOR_CYCLE_FAULT({code})"
             );
         }
         let mut message = Message::default();

@@ -27,7 +27,7 @@ pub enum LoadError {
         cause: object::Error,
     },
     /// The library is shorter than its own tables require.
-    #[error("{}: the file is truncated ({have} bytes of at least {need}); copy or build it again", path.display())]
+    #[error("{}: the file is truncated ({have} bytes of at least {need}); copy or build the plugin again", path.display())]
     Truncated {
         /// Path of the plugin.
         path: PathBuf,
@@ -46,7 +46,7 @@ pub enum LoadError {
         path: PathBuf,
     },
     /// The metadata section is malformed or incomplete.
-    #[error("{}: unreadable plugin metadata: {cause}; build it with the export macros or the current header", path.display())]
+    #[error("{}: unreadable plugin metadata: {cause}; build the plugin with the export macros or the current header", path.display())]
     BadMetadata {
         /// Path of the plugin.
         path: PathBuf,
@@ -55,7 +55,7 @@ pub enum LoadError {
     },
     /// The plugin was built for another contract.
     #[error(
-        "{}: built for plugin contract {theirs}, this host speaks {CONTRACT}; rebuild the plugin against this \
+        "{}: built for plugin contract {theirs}, but this host has contract {CONTRACT}; rebuild the plugin against this \
          version", path.display()
     )]
     OtherContract {
@@ -81,7 +81,7 @@ pub enum LoadError {
         cause: std::io::Error,
     },
     /// The entry that the metadata names is not exported, or not an entry.
-    #[error("{}: no plugin entry `{symbol}` in the library; export it with default visibility", path.display())]
+    #[error("{}: no plugin entry `{symbol}` in the library; export the entry with default visibility", path.display())]
     NoEntry {
         /// Path of the plugin.
         path: PathBuf,
@@ -90,7 +90,7 @@ pub enum LoadError {
     },
     /// The kind in the entry differs from the kind in the metadata, or is unknown.
     #[error(
-        "{}: the metadata say {metadata}, the entry's `kind` is {entry} ({}); make both say the same and build \
+        "{}: the metadata have the kind {metadata}, the entry's `kind` is {entry} ({}); make both equal and build \
          the plugin again", path.display(), kind_word(*entry)
     )]
     OtherEntryKind {
@@ -110,7 +110,7 @@ pub enum LoadError {
         difference: String,
     },
     /// The plugin declares an invalid id or list.
-    #[error("{}: it declares {cause}; correct its tables and build it again", path.display())]
+    #[error("{}: the plugin declares {cause}; correct its tables and build the plugin again", path.display())]
     BadDeclaration {
         /// Path of the plugin.
         path: PathBuf,
@@ -118,7 +118,7 @@ pub enum LoadError {
         cause: String,
     },
     /// The interface of the plugin's kind, or a required function of the interface, is missing.
-    #[error("{}: `{interface}` lacks {missing}; a plugin must offer it", path.display())]
+    #[error("{}: `{interface}` lacks {missing}, which every plugin of this kind needs", path.display())]
     MissingFunction {
         /// Path of the plugin.
         path: PathBuf,
@@ -128,7 +128,7 @@ pub enum LoadError {
         missing: &'static str,
     },
     /// The parameter schema has invalid counts or texts.
-    #[error("{}: its list of parameters cannot be read: {problem}; correct it and build the plugin again", path.display())]
+    #[error("{}: the list of parameters cannot be read: {problem}; correct the list and build the plugin again", path.display())]
     Schema {
         /// Path of the plugin.
         path: PathBuf,

@@ -160,7 +160,8 @@ mod tests {
     }
 
     fn is_held_to_its_length<T: Table>() {
-        let told = |what: &str| format!("some.so: `{}` lacks {what}; a plugin must offer it", T::ID);
+        let told =
+            |what: &str| format!("some.so: `{}` lacks {what}, which every plugin of this kind needs", T::ID);
         assert_eq!(refusal::<T>(short), told("part of its table"));
         assert_eq!(refusal::<T>(askew), told("an aligned table"));
         let offers = Offers { path: Path::new("some.so"), get_interface: nothing };

@@ -72,7 +72,7 @@ pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Res
     let text = std::str::from_utf8(text).map_err(|cause| bad(cause.to_string()))?;
     let pairs = text.trim_end_matches('\0').lines().map(str::trim).filter(|line| !line.is_empty());
     let pairs: Option<Vec<(&str, &str)>> = pairs.map(key_and_value).collect();
-    let pairs = pairs.ok_or_else(|| bad("a line is not `key = \"value\"`".to_owned()))?;
+    let pairs = pairs.ok_or_else(|| bad("a line does not have the form `key = \"value\"`".to_owned()))?;
     let value = |key: &str| {
         let found = pairs.iter().find(|(name, text)| *name == key && !text.is_empty());
         found.map(|(_, text)| (*text).to_owned()).ok_or_else(|| bad(format!("`{key}` is missing")))

@@ -53,7 +53,7 @@ impl Model {
         let code = preserving_float_control(&mut float_changes, made);
         refusal_from(code, &message)?;
         if instance.is_null() {
-            return Err(Refusal::broken("it reported success but made nothing"));
+            return Err(Refusal::broken("the plugin reported success but created no model"));
         }
         let variant = VariantInfo::new(table.info.serves(), table.info.memory());
         let extensions = tables.extensions;

@@ -21,7 +21,7 @@ pub(super) unsafe fn checked(
     }
     let count = count as usize;
     if count > MOST_ENTRIES {
-        return Err(format!("it has {count} parameters, and {MOST_ENTRIES} is the most"));
+        return Err(format!("the plugin has {count} parameters, above the limit of {MOST_ENTRIES}"));
     }
     // SAFETY: as this function demands.
     let schema = unsafe { std::slice::from_raw_parts(parameters, count) };
@@ -40,7 +40,10 @@ fn check(number: usize, parameter: &Parameter) -> Result<(), String> {
 
 fn check_choices(choices: &Choices) -> Result<(), String> {
     if choices.count() > MOST_ENTRIES {
-        return Err(format!("it has {} choices, and {MOST_ENTRIES} is the most", choices.count()));
+        return Err(format!(
+            "the parameter has {} choices, above the limit of {MOST_ENTRIES}",
+            choices.count()
+        ));
     }
     choices.as_slice().iter().try_for_each(|choice| check_text("choice", choice))
 }
@@ -49,7 +52,7 @@ fn check_choices(choices: &Choices) -> Result<(), String> {
 pub(super) fn check_text(name: &str, text: &Str) -> Result<(), String> {
     let bytes = text.bytes();
     if bytes > MOST_BYTES {
-        return Err(format!("`{name}` has {bytes} bytes, and {MOST_BYTES} is the most"));
+        return Err(format!("`{name}` has {bytes} bytes, above the limit of {MOST_BYTES}"));
     }
     if text.as_str().len() != bytes {
         return Err(format!("`{name}` is not UTF-8"));
@@ -75,10 +78,13 @@ mod tests {
         let one = HONEST;
         // SAFETY: it is refused before it is read.
         let refused = unsafe { checked(&raw const one, 1_000_000) };
-        assert_eq!(refused.err(), Some("it has 1000000 parameters, and 4096 is the most".to_owned()));
+        assert_eq!(
+            refused.err(),
+            Some("the plugin has 1000000 parameters, above the limit of 4096".to_owned())
+        );
         let choices = Choices::of_raw(&raw const one.id, 1 << 50);
         let said = told(&Parameter { choices, ..HONEST });
-        assert_eq!(said, "parameter 0: it has 1125899906842624 choices, and 4096 is the most");
+        assert_eq!(said, "parameter 0: the parameter has 1125899906842624 choices, above the limit of 4096");
         let doc = Str::of_raw(b"x".as_ptr(), 1 << 40);
         assert_eq!(
             told(&Parameter { doc, ..HONEST }),

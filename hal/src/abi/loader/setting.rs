@@ -146,7 +146,7 @@ pub(super) unsafe fn to_raw(
         if !schema.get(setting.index()).is_some_and(|own| std::ptr::eq(own, setting.parameter)) {
             let id = setting.parameter.id();
             return Err(Refusal::parameter(format!(
-                "the setting `{id}` was made for another plugin; make it for this one's parameters"
+                "the setting `{id}` was created for another plugin; create the setting from the parameters of this plugin"
             )));
         }
         // SAFETY: by the contract of this function nothing borrowed here outlives the setting.

@@ -93,16 +93,13 @@ pub(crate) fn link_remedy(cause: &str) -> &'static str {
     const REMEDIES: [(&str, &str); 6] = [
         (
             "static TLS",
-            "the room for thread-local variables is used up, also by what was loaded before (a hot swap unloads nothing): start the \
-             host again, or with GLIBC_TUNABLES=glibc.rtld.optional_static_tls=16384",
+            "the memory for thread-local variables is used up by this and earlier plugins (a hot swap unloads no \
+             plugin): start the host again, or start with GLIBC_TUNABLES=glibc.rtld.optional_static_tls=16384",
         ),
-        ("it: cannot open shared object file", "a plugin is opened through /proc/self/fd: mount /proc"),
-        (
-            "cannot open shared object file",
-            "install the library of this name, or set LD_LIBRARY_PATH to its folder",
-        ),
+        ("it: cannot open shared object file", "the host opens plugins through /proc/self/fd: mount /proc"),
+        ("cannot open shared object file", "install this library, or set LD_LIBRARY_PATH to its folder"),
         ("undefined symbol", "link the library that has the symbol, and rebuild the plugin"),
-        ("' not found", "rebuild the plugin on this system, or install a library of that version"),
+        ("' not found", "rebuild the plugin on this system, or install a library of this version"),
         ("cannot allocate memory", "allow more memory (`ulimit -v`, control group)"),
     ];
     let found = REMEDIES.iter().find(|(text, _)| cause.contains(text));
@@ -162,7 +159,10 @@ mod tests {
         for (cause, remedy) in [
             ("it: cannot allocate memory in static TLS block", "optional_static_tls=16384"),
             ("it: cannot open shared object file: No such file or directory", "mount /proc"),
-            ("libfoo.so.2: cannot open shared object file: No such file or directory", "install the library"),
+            (
+                "libfoo.so.2: cannot open shared object file: No such file or directory",
+                "install this library",
+            ),
             ("it: undefined symbol: bar", "link the library that has the symbol"),
             (
                 "libc.so.6: version `GLIBC_2.99' not found (required by it)",

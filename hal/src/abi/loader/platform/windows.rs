@@ -25,7 +25,7 @@ const OPENED_WITHIN: Duration = Duration::from_secs(60);
 
 /// Returns the remedy if the system cannot link a library.
 pub(crate) fn link_remedy(_: &str) -> &'static str {
-    "install what is missing or rebuild the plugin"
+    "install the missing library or rebuild the plugin"
 }
 
 /// Placeholder for a plugin's descriptor: on Windows no other process uses the descriptor yet.
