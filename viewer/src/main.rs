@@ -73,7 +73,7 @@ struct Arguments {
     /// is the default
     #[arg(long, value_name = "OUT", requires = "recording", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
-    /// Traces shown (default: force,position; in a window: those shown last)
+    /// Traces shown (default: force,position; in a window: the traces of the last window)
     #[arg(
         long,
         value_name = "LIST",

@@ -49,7 +49,7 @@ pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
             let known =
                 KNOWN.map(|(name, size, begins)| format!("{name} ({size} bytes, SHA-256 {begins}...)"));
             format!(
-                "firmware {path} has {} bytes and the SHA-256 {digest}; known are {}. If the file is right, confirm \
+                "firmware {path} has {} bytes and the SHA-256 {digest}; known firmware: {}. If the file is right, confirm \
                  its SHA-256 with `firmware_sha256`",
                 bytes.len(),
                 known.join(" and ")

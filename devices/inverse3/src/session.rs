@@ -77,8 +77,7 @@ impl Session {
         let wanted = message::settings(request.force_gate);
         if let Some((path, said)) = message::differing(&reported, &chosen.arm, &wanted).map_err(failed)? {
             return Err(of_service(format!(
-                "`{}` of the device {} is {said} and cannot be changed; the force on the hand would not be the commanded one. \
-                 End other programs that configure the device, and update the service to 3.5 or newer",
+                "`{}` of the device {} is {said} and cannot be changed; the force on the hand would differ from the commanded force. End other programs that configure the device, and update the service to 3.5 or newer",
                 path.join("."),
                 chosen.arm
             )));

@@ -137,7 +137,7 @@ impl PluginPathOption {
 /// output.
 #[derive(Args, Clone, Debug, Default)]
 pub struct JsonOption {
-    /// Write the result as JSON: to a file, or without one (or with -) to standard output
+    /// Write the result as JSON to this file; without a file or with -, to standard output
     #[arg(long, value_name = "FILE.json", num_args = 0..=1, default_missing_value = "-", value_parser = json_output)]
     json: Option<PathBuf>,
 }

@@ -88,7 +88,7 @@ enum Command {
     View(Box<view::ViewArguments>),
     /// Evaluate a force model at poses from a CSV file
     Eval(Separate),
-    /// List Flotor's own scenes, or print one to begin from
+    /// List Flotor's own scenes, or print a scene as a template
     Scenes(scenes::ScenesArguments),
     /// List the installed plugins, without running any of them
     Plugins(plugins::PluginsArguments),

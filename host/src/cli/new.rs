@@ -22,7 +22,7 @@ pub(crate) struct NewArguments {
     /// Programming language
     #[arg(long, value_enum, default_value = "rust")]
     language: Language,
-    /// Folder of the contract's sources (default: those of this installation)
+    /// Folder of the contract's sources (default: the sources of this installation)
     #[arg(long, value_name = "PATH")]
     hal: Option<PathBuf>,
     /// Copy the contract's sources into the new folder: it then builds in every checkout

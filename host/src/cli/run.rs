@@ -42,10 +42,10 @@ use std::path::{Path, PathBuf};
 pub(crate) struct RunArguments {
     /// Scene file (TOML), or the name of one of Flotor's own scenes (default: demo)
     scene: Option<PathBuf>,
-    /// Duration of the run: 10s, 500ms, 2min; a number alone is in seconds (default: that of the scene)
+    /// Duration of the run: 10s, 500ms, 2min; a number alone is in seconds (default: the duration in the scene)
     #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]
     duration: Option<f64>,
-    /// Loop rate in Hz, 100 to 10000 (default: that of the scene)
+    /// Loop rate in Hz, 100 to 10000 (default: the rate in the scene)
     #[arg(long, value_parser = rate_hz, value_name = "HZ")]
     rate: Option<f64>,
     /// Real time, or as fast as possible and bit-exact
@@ -68,7 +68,7 @@ pub(crate) struct RunArguments {
     plot_bound: Vec<PeakBound>,
     #[command(flatten)]
     json: JsonOption,
-    /// Compute an output of the models although neither the hand nor an observer needs it (repeatable)
+    /// Compute an output of the models even if neither the hand nor an observer needs the output (repeatable)
     #[arg(long, value_enum, value_name = "OUTPUT")]
     compute: Vec<OutputOption>,
     /// Set a parameter of a plugin of the scene (repeatable)

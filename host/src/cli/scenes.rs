@@ -7,12 +7,12 @@ use flotor_session::RunError;
 use flotor_session::scene::{OWN_SCENES, OwnScene, did_you_mean};
 use serde::Serialize;
 
-/// List Flotor's own scenes, or print one to begin from.
+/// List Flotor's own scenes, or print a scene as a template.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  \
     flotor scenes\n  \
     flotor run wall\n  \
-    flotor scenes wall > mine.toml      a scene of one's own, to be changed and run with `flotor run mine.toml`")]
+    flotor scenes wall > mine.toml      a scene to edit and run with `flotor run mine.toml`")]
 pub(crate) struct ScenesArguments {
     /// Name of a scene: print its text
     name: Option<String>,

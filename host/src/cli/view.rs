@@ -41,7 +41,7 @@ pub(crate) struct ViewArguments {
     /// Write the traces of the recording as a table (.csv) or a plot (.svg, .png), which is light without --look dark
     #[arg(long, value_name = "OUT", requires = "file", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
-    /// Traces shown, by name, such as force,stiffness (default: force,position; in a window: those shown last)
+    /// Traces shown, by name, such as force,stiffness (default: force,position; in a window: the traces of the last window)
     #[arg(long, value_name = "LIST")]
     traces: Option<String>,
     /// Plot force over position along this axis, beside the traces
@@ -50,7 +50,7 @@ pub(crate) struct ViewArguments {
     /// Force of an arrow of full length, N; the same for pictures to compare (default: the largest of the run)
     #[arg(long, value_name = "NEWTONS", conflicts_with = "export")]
     arrow_force: Option<String>,
-    /// With --export: title (default: that of the scene)
+    /// With --export: title of the plot (default: the title of the scene)
     #[arg(long, value_name = "TEXT", requires = "export")]
     title: Option<String>,
     /// With --screenshot: draw a screen of a sitting, as `flotor study --screen json` writes it
@@ -62,7 +62,7 @@ pub(crate) struct ViewArguments {
     /// Device of the recording whose numbers and traces are shown, where there are several (default: the first)
     #[arg(long, value_name = "NAME", requires = "file")]
     device: Option<String>,
-    /// Moment of the recording to show, s (default: that of the largest force)
+    /// Time in the recording to show, s (default: the time of the largest force)
     #[arg(long, value_name = "SECONDS", requires = "file", conflicts_with = "export")]
     at: Option<String>,
     /// Colours: dark or light

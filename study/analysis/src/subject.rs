@@ -193,7 +193,7 @@ impl SubjectQuality {
         }
         if let (Some(unsure), Some(first)) = (self.dont_know, self.first) {
             let (unsure, first) = (percent(unsure), percent(first));
-            lines.push(format!("  \"I don't know\" {unsure}; of the others {first} named the first"));
+            lines.push(format!("  \"I don't know\" {unsure}; {first} of the other answers named the first"));
         }
         let checks = self.checks.to_text();
         lines.extend((!checks.is_empty()).then(|| format!("  checks: {checks}")));

@@ -23,8 +23,8 @@ use std::path::PathBuf;
 /// Analyse the data of a perception experiment
 #[derive(Args)]
 #[command(
-    after_help = "The command verifies every event log first. If a line of a log was changed, the command refuses the \
-    data and gives the number of the line. It omits incomplete sittings, with a note.\n\n\
+    after_help = "The command verifies every event log first. If a line of a log was changed, the command rejects \
+    the data and prints the number of the line. It omits incomplete sittings, with a note.\n\n\
     Examples:\n  \
     flotor analyse data\n  \
     flotor analyse data --json result.json --type II"

@@ -72,7 +72,7 @@ enum Task {
     Run(plan::RunArguments),
     /// Explore a spring by hand while its dimensions and material change, without trials
     Explore(explore::ExploreArguments),
-    /// Fit a spring to the measured curve of a real one
+    /// Fit a spring model to the measured curve of a real spring
     Spring(spring::SpringArguments),
     /// Add a note of the experimenter to a subject's log
     Note(NoteArguments),
@@ -98,10 +98,10 @@ const MOST_JOBS: NonZeroUsize = NonZeroUsize::MIN.saturating_add(1023);
 /// Options common to all experiments.
 #[derive(Args)]
 struct Common {
-    /// Observer who answers
+    /// Kind of observer
     #[arg(long, value_enum, default_value_t)]
     observer: ObserverOption,
-    /// Number of subjects; their numbers start at 1
+    /// Number of subjects, who are numbered from 1
     #[arg(long, default_value_t = 16, value_parser = count(1..=SubjectNumber::MOST), value_name = "N")]
     subjects: u16,
     /// Simulated subjects in parallel (default: one per core)
@@ -113,7 +113,7 @@ struct Common {
     /// Folder for the data
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Number of the person (human; default: the first free one)
+    /// Number of the person (human; default: the first free number)
     #[arg(long, value_parser = count(1..=SubjectNumber::MOST), value_name = "N")]
     subject: Option<u16>,
     /// Scene of the stimuli (TOML); without it, a spring on the simulated flotor
@@ -156,16 +156,16 @@ struct Common {
     /// Preferred hand of the person, for participants.tsv (human)
     #[arg(long, value_parser = ["left", "right", "ambidextrous"], value_name = "HAND")]
     handedness: Option<String>,
-    /// Key that is the emergency stop in the viewer's window (human)
+    /// Key of the emergency stop in the viewer's window (human)
     #[arg(long, value_enum, default_value_t, value_name = "KEY")]
     stop_key: front::StopKeyOption,
     /// Texts of the screens in the viewer's window, in the language of the person (human; default: English)
     #[arg(long, value_name = "FILE")]
     texts: Option<PathBuf>,
-    /// Least time for which each stimulus must be felt (human)
+    /// Minimum time for which each stimulus must be felt (human)
     #[arg(long, default_value = "0.5s", value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]
     least_time: f64,
-    /// Least path length of the handle while a stimulus is felt, up and down together, mm (human)
+    /// Minimum path length of the handle while a stimulus is felt, up and down together, mm (human)
     #[arg(long, default_value_t = 2.0, value_parser = real, allow_hyphen_values = true, value_name = "MM")]
     least_movement_mm: f64,
     /// Maximum number of times a person may feel a trial again (human; default: no limit)
@@ -276,7 +276,7 @@ struct JndArguments {
     /// Difference of the obvious pairs, as a share of the base
     #[arg(long, default_value_t = 0.6, value_parser = real, value_name = "SHARE")]
     obvious_difference: f64,
-    /// No practice pairs
+    /// Omit the practice pairs
     #[arg(long)]
     no_demo: bool,
 }
@@ -288,7 +288,7 @@ struct MagnitudeArguments {
     /// Smallest and largest stimulus, in its unit
     #[arg(long, default_value = "12-48", value_parser = range, value_name = "LEAST-MOST")]
     range: (f64, f64),
-    /// Stimuli, at equal distances
+    /// Number of equidistant stimuli
     #[arg(long, default_value_t = 12, value_parser = count(3..=1000_u32), value_name = "N")]
     stimuli: u32,
     /// Replications in each modality
@@ -297,7 +297,7 @@ struct MagnitudeArguments {
     /// Stimuli presented once more in each replication to check the consistency of ratings; they do not count
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     repeat_checks: u32,
-    /// Stimuli shown before each modality
+    /// Number of stimuli shown before each modality
     #[arg(long, default_value_t = 5, value_parser = count(0..=1000_u32), value_name = "N")]
     demo: u32,
 }

@@ -20,7 +20,7 @@ use std::time::Duration;
 const LONGEST: Duration = Duration::from_secs(2);
 
 /// What a host says that dies and stops its devices.
-const HELD: &str = "every device was told to stop";
+const HELD: &str = "every device was commanded to stop";
 
 /// Runs the model that dies so to the end of the process: the board is at rest then.
 fn died(death: &str, model: &Path) -> (Board, Scratch, Ran) {

@@ -60,7 +60,7 @@ fn an_option_of_many_commands_is_the_same_in_each() {
     for (option, row, commands) in [
         (
             "--json",
-            "| `--json [FILE.json]` |  | Write the result as JSON: to a file, or without one (or with -) to standard output |",
+            "| `--json [FILE.json]` |  | Write the result as JSON to this file; without a file or with -, to standard output |",
             &[
                 "run",
                 "replay",

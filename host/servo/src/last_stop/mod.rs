@@ -271,14 +271,14 @@ fn describe(line: &mut Line, death: Death, own: i32) {
         let _ = write!(line, "error: {}: ", call.text());
         describe_death(line, death);
         if is_armed() {
-            let _ = write!(line, "; every device was told to stop");
+            let _ = write!(line, "; every device was commanded to stop");
         }
         return;
     }
     let is_own = |run: &ManuallyDrop<Arc<Armed>>| run.thread.load(Ordering::Acquire) == own;
     let own_run = runs().find(|run| is_own(run) && !run.is_over());
     let Some(run) = own_run.or_else(|| runs().find(|run| !run.is_over())) else {
-        let _ = write!(line, "error: the process was ended; every device was told to stop");
+        let _ = write!(line, "error: the process was ended; every device was commanded to stop");
         return;
     };
     let Stuck { tick, place } = run.heartbeat.now();
@@ -302,7 +302,7 @@ fn describe(line: &mut Line, death: Death, own: i32) {
             let _ = write!(line, " `{name}`");
         }
     }
-    let _ = write!(line, "; every device was told to stop");
+    let _ = write!(line, "; every device was commanded to stop");
 }
 
 fn describe_death(line: &mut Line, death: Death) {

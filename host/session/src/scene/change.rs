@@ -85,7 +85,8 @@ pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneEr
         }
         if alone != Alternative::default() && !either.is_empty() {
             return wrong(
-                "`change.either` has `plugin` and `parameters` in each alternative; remove those beside `either`",
+                "`change.either` has `plugin` and `parameters` in each alternative; remove the keys `plugin` and \
+                 `parameters` beside `either`",
             );
         }
         if let Some(swap) = swap {

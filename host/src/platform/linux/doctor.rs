@@ -79,8 +79,9 @@ fn of_limit(limit: &GroupLimit) -> Option<Diagnosis> {
         LimitValue::Cores(cores) => {
             let found = format!("{cores:.2} cores in the control group (`{file}`)");
             let remedy = format!(
-                "the kernel suspends the program whenever the quota of a period is used up, and ticks are missed; only a loop with \
-                 real-time priority goes on: `echo {} > {file}` as root, or without `docker run --cpus`, `CPUQuota=`",
+                "the kernel suspends the program whenever the quota of a period is used up, and ticks are missed; \
+                 only a loop with real-time priority continues: `echo {} > {file}` as root, or without `docker run \
+                 --cpus`, `CPUQuota=`",
                 if limit.file.ends_with("cpu.max") { "max" } else { "-1" }
             );
             if cores < 1.0 {

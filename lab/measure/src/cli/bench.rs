@@ -45,7 +45,7 @@ pub(crate) struct BenchArguments {
     /// Reference case of the errors
     #[arg(long, value_name = "KEY=VALUE,...")]
     reference: Option<String>,
-    /// Baseline case of the times [default: the first]
+    /// Baseline case of the times [default: the first case]
     #[arg(long, value_name = "KEY=VALUE,...")]
     yardstick: Option<String>,
     /// Depth of the middle of the motion below home
@@ -60,7 +60,7 @@ pub(crate) struct BenchArguments {
     /// Report separately the calls that return more than zero for this detail (a column of `eval --details`)
     #[arg(long, value_name = "DETAIL")]
     apart: Option<String>,
-    /// Measure the whole tick around the model: on a scripted device, on the simulated flotor, and with the model in a process
+    /// Measure the whole tick with the model: on a scripted device, on the simulated flotor, and with the model in a process
     /// of its own
     #[arg(long, conflicts_with_all = ["cases", "sets", "reference", "yardstick", "apart", "csv", "plot"])]
     tick: bool,
