@@ -16,7 +16,7 @@ pub enum Rule {
     Defaults,
     /// A model gives finite numbers at home and near home.
     FiniteNearHome,
-    /// NaN and infinity in the pose give a status, not NaN, and no panic.
+    /// NaN and infinity in the pose cause a status, not NaN and not a panic.
     SurvivesNotFinite,
     /// Poses far outside any workspace give finite numbers and no panic.
     SurvivesFarPoses,
@@ -105,11 +105,14 @@ impl Rule {
             Rule::Schema => "every parameter has an id of its own, a doc and a default inside its range",
             Rule::Defaults => "an instance can be created with all parameters at their defaults",
             Rule::FiniteNearHome => "at home and near home the wrench is finite",
-            Rule::SurvivesNotFinite => "NaN and infinity in the pose give a status, not NaN, and no panic",
-            Rule::SurvivesFarPoses => "poses far outside any workspace give finite numbers and no panic",
-            Rule::ResetRepeats => "after reset the same poses give the same bits",
-            Rule::TimeBudget => "99 of 100 steps take less than half a period at 1 kHz",
-            Rule::Independent => "two instances give the same answers alternately, on two threads and alone",
+            Rule::SurvivesNotFinite => "NaN and infinity in the pose cause a status, not NaN and not a panic",
+            Rule::SurvivesFarPoses => "poses far outside any workspace cause finite outputs and no panic",
+            Rule::ResetRepeats => "after reset the same poses produce the same bits",
+            Rule::TimeBudget => "99 of 100 steps need less than half a period at 1 kHz",
+            Rule::Independent => {
+                "an instance returns the same results alone, alternately with another instance, \
+            and on two threads"
+            }
             Rule::NoThreads => "neither create, prepare, a step nor destroy leaves a thread behind",
             Rule::EnergyGradient => {
                 "the force of a model without a history is minus the gradient of its energy"
@@ -120,7 +123,7 @@ impl Rule {
                 "after safe_stop from another thread the device exerts no wrench and still returns samples"
             }
             Rule::DeviceTime => {
-                "reads and writes take less than half a period, a stop 100 ms, the rest of the life cycle 2 s"
+                "reads and writes need less than half a period, a stop less than 100 ms, the rest of the life cycle less than 2 s"
             }
             Rule::Extensions => {
                 "every offered extension returns valid data, and the instance works afterwards"

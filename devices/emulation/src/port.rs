@@ -93,10 +93,10 @@ impl Port {
             }
             let cause = match peer::user(&stream) {
                 Ok(user) if user.is_root() || user == geteuid() => return Ok(stream),
-                Ok(user) => format!("its program belongs to user {}", user.as_raw()),
+                Ok(user) => format!("the connecting program belongs to user {}", user.as_raw()),
                 // The client closed the connection at once.
                 Err(error) if error.kind() == ErrorKind::NotFound => continue,
-                Err(error) => format!("the user of its program is unknown: {error}"),
+                Err(error) => format!("the user of the connecting program is unknown: {error}"),
             };
             REFUSAL.call_once(|| {
                 warn(&format!(

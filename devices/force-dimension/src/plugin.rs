@@ -234,7 +234,7 @@ fn which(serial: f64) -> Result<Which, Refusal> {
     let number = serial as u16;
     match f64::from(number) == serial {
         true => Ok(Which::Serial(number)),
-        false => Err(Refusal::parameter(format!("`serial` is {serial}; it must be a whole number"))),
+        false => Err(Refusal::parameter(format!("`serial` is {serial}, but must be a whole number"))),
     }
 }
 

@@ -175,7 +175,7 @@ pub mod means {
             let state = match declared.state {
                 0 => StoppedState::Zero,
                 1 => StoppedState::Landed,
-                other => return Err(wrong(format!("leads to state {other}; it must be 0 or 1"))),
+                other => return Err(wrong(format!("leads to state {other}, but must lead to 0 or 1"))),
             };
             let length = declared.length as usize;
             if declared.descriptor == BY_ITSELF {
@@ -187,7 +187,7 @@ pub mod means {
             }
             let message = declared.message.get(..length).filter(|message| !message.is_empty());
             let Some(message) = message.map(<[u8]>::to_vec) else {
-                return Err(wrong(format!("has {length} bytes; it must have 1 to {STOP_MESSAGE_BYTES}")));
+                return Err(wrong(format!("has {length} bytes, but must have 1 to {STOP_MESSAGE_BYTES}")));
             };
             // SAFETY: the plugin keeps it open until the device is closed (contract), and the device is open.
             let handle = unsafe { writable_duplicate(declared.descriptor) }.map_err(wrong)?;

@@ -39,7 +39,7 @@ impl TickMessages {
 /// [`InvalidMessage`] if they cannot be decoded, are incomplete, or belong to two different ticks.
 pub fn tick_from_messages(pose: &[u8], tick: &[u8]) -> Result<TickRecord, InvalidMessage> {
     let wrong = |message: &'static str| move |reason: String| InvalidMessage { message, reason };
-    let lacks = |Missing(part)| format!("it has no `{part}`");
+    let lacks = |Missing(part)| format!("the message has no `{part}`");
     let of_pose = wrong("foxglove.FrameTransform");
     let of_tick = wrong("flotor.Tick");
     let transform = FrameTransform::decode(pose).map_err(|cause| of_pose(cause.to_string()))?;
@@ -47,7 +47,7 @@ pub fn tick_from_messages(pose: &[u8], tick: &[u8]) -> Result<TickRecord, Invali
     let record = tick.record(transform.pose().map_err(|part| of_pose(lacks(part)))?);
     let record = record.map_err(|part| of_tick(lacks(part)))?;
     if !transform.is_of(&record) {
-        return Err(of_pose("its time differs from the time of the tick".to_owned()));
+        return Err(of_pose("the time of the pose differs from the time of the tick".to_owned()));
     }
     Ok(record)
 }
@@ -65,7 +65,7 @@ pub fn change_to_bytes(change: &Change) -> Vec<u8> {
 pub fn change_from_bytes(bytes: &[u8], time_ns: u64) -> Result<Change, InvalidMessage> {
     let wrong = |reason: String| InvalidMessage { message: "flotor.Change", reason };
     let message = ChangeMessage::decode(bytes).map_err(|cause| wrong(cause.to_string()))?;
-    message.change(time_ns).map_err(|Missing(part)| wrong(format!("it has no `{part}`")))
+    message.change(time_ns).map_err(|Missing(part)| wrong(format!("the message has no `{part}`")))
 }
 
 #[cfg(test)]

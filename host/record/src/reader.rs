@@ -64,15 +64,15 @@ pub enum ReadError {
         cause: io::Error,
     },
     /// The file has another format.
-    #[error("`{}` is not an MCAP file; `flotor run --record FILE.mcap` makes recordings", path.display())]
+    #[error("`{}` is not an MCAP file; make a recording with `flotor run --record FILE.mcap`", path.display())]
     NotMcap {
         /// Path of the file.
         path: PathBuf,
     },
     /// The file is MCAP, but no recording of a run.
     #[error(
-        "`{}` is an MCAP file, but not a recording of a run: its first message is not on `/flotor/run`; \
-         `flotor run --record FILE.mcap` makes recordings",
+        "`{}` is an MCAP file, but not a recording of a run: its first message is not on `/flotor/run`; make a \
+         recording with `flotor run --record FILE.mcap`",
         path.display()
     )]
     NotARecording {
@@ -87,7 +87,7 @@ pub enum ReadError {
     },
     /// A later version wrote the file.
     #[error(
-        "`{}` has format {format}, written by flotor {flotor_version}; this one reads up to {FORMAT}: update flotor",
+        "`{}` has format {format}, written by flotor {flotor_version}; this version reads formats up to {FORMAT}: update flotor",
         path.display()
     )]
     TooNew {
@@ -100,7 +100,7 @@ pub enum ReadError {
     },
     /// The file is compressed, which no writer of this crate does.
     #[error(
-        "`{}` is compressed with `{compression}`; `mcap decompress` makes a copy that can be read",
+        "`{}` is compressed with `{compression}`; make a readable copy with `mcap decompress`",
         path.display()
     )]
     Compressed {

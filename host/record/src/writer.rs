@@ -29,8 +29,7 @@ const EVENT_BITS: &str = "events";
 pub enum RecordError {
     /// A file of that name exists: recordings are never overwritten.
     #[error(
-        "the recording `{}` exists already, and recordings are not overwritten; name another file, or remove \
-         this one",
+        "the recording `{}` exists already, and recordings are not overwritten; name another file, or remove the recording",
         path.display()
     )]
     Exists {

@@ -52,7 +52,7 @@ impl Reported {
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         match (self.untaken, self.implausible.first_tick()) {
-            (1.., _) => Some(format!("it has not read the last {} commands", self.untaken)),
+            (1.., _) => Some(format!("the device has not read the last {} commands", self.untaken)),
             (0, Some(_)) => Some(self.implausible.to_string()),
             (0, None) => None,
         }

@@ -480,7 +480,7 @@ pub fn end_cause(end: &RunEnd) -> String {
         RunEnd::Oscillation => "the force oscillated between its limits".to_owned(),
         RunEnd::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
         RunEnd::Unguarded => "the watchdog process had ended".to_owned(),
-        RunEnd::Finished | RunEnd::Stopped => "it was stopped".to_owned(),
+        RunEnd::Finished | RunEnd::Stopped => "the run was stopped".to_owned(),
     }
 }
 

@@ -160,7 +160,7 @@ fn plugins(registry: &Registry) -> Diagnosis {
         (false, _) => Diagnosis::note(
             "plugins",
             format!("{}; {broken} files are unreadable", ids.join(", ")),
-            "`flotor plugins` gives the reasons",
+            "`flotor plugins` lists the reasons",
         ),
     }
 }

@@ -18,7 +18,7 @@ const SWAP_LIMIT: Duration = Duration::from_secs(5);
 #[derive(Args)]
 #[command(
     after_help = "The host creates the new model outside the loop and blends it in over `fade_s` of the model.\n\
-    Without --plugin, it reads the plugin file of the scene again and keeps the scene's settings; another plugin\n\
+    Without --plugin, the host reads the plugin file of the scene again and keeps the scene's settings; another plugin\n\
     starts from its own defaults. Changes of parameters during the session are lost.\n\n\
     Examples:\n  \
     flotor swap spring                                      the same plugin, just rebuilt\n  \
@@ -116,7 +116,7 @@ fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMe
         return Ok(change);
     }
     Err(CommandError::Failed(format!(
-        "no answer from the host in {} s; it may still swap the model",
+        "no reply from the host in {} s; the host may still swap the model",
         CREATION_LIMIT.as_secs()
     )))
 }

@@ -101,7 +101,7 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         && let Some(what) = of_recordings_only(arguments)
     {
         return Err(CommandError::Usage(format!(
-            "{what} needs a recording: `flotor record zenoh/NAME --out FILE.mcap` makes one"
+            "{what} needs a recording: record the session with `flotor record zenoh/NAME --out FILE.mcap`"
         )));
     }
     let registry = arguments.plugin_path.registry();
@@ -192,7 +192,7 @@ fn tell_damage(file: &Path, mut recording: Recording, what: &str) {
     let broken = recording.by_ref().find_map(Result::err);
     let damage = match (broken, recording.ending()) {
         (Some(error), _) => error.to_string(),
-        (None, Ending::CutOff) => format!("{}: its end is missing", file.display()),
+        (None, Ending::CutOff) => format!("{}: the end of the recording is missing", file.display()),
         (None, _) => return,
     };
     note(format_args!("{damage}; {what} the readable part"));

@@ -85,7 +85,7 @@ pub(crate) mod usb {
         vec![Diagnosis::note(
             "USB",
             "not checked on Windows yet",
-            "the Device Manager lists what is connected",
+            "the Device Manager lists the connected devices",
         )]
     }
 }

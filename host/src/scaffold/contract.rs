@@ -71,7 +71,7 @@ impl Contract {
             Self::Patched(folder) => {
                 let path = folder.as_text()?;
                 let text = format!(
-                    "# Until the registry has flotor-hal: its sources on this machine. Git ignores this file.\n\
+                    "# Sources of flotor-hal on this machine, until the registry has the crate. Git ignores this file.\n\
                      [patch.crates-io]\nflotor-hal = {{ path = \"{path}\" }}\n"
                 );
                 write_file(&plugin.join(CONFIG), &text)?;

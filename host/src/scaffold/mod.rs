@@ -60,7 +60,7 @@ pub enum ScaffoldError {
     )]
     NoContract(PathBuf),
     /// The manifest of the contract cannot be copied.
-    #[error("{}: {reason}; give the folder of whole sources with --hal PATH", path.display())]
+    #[error("{}: {reason}; give the folder of complete sources with --hal PATH", path.display())]
     Manifest {
         /// Path of the manifest.
         path: PathBuf,

@@ -77,7 +77,7 @@ fn write_out(entries: &mut Table, shared: Option<&Table>) -> Result<(), String> 
             continue;
         };
         let theirs = shared.and_then(|shared| shared.get(name));
-        let theirs = theirs.ok_or_else(|| format!("its workspace has no `{name}`"))?;
+        let theirs = theirs.ok_or_else(|| format!("the workspace of the contract has no `{name}`"))?;
         own.remove("workspace");
         *value = with(theirs, std::mem::take(own));
     }

@@ -299,7 +299,7 @@ impl Description {
         let Tool::Spheres { radius_m, count, spacing_m } = self.tool else { return one(self) };
         let single = Self { tool: Tool::Sphere { radius_m }, ..*self };
         let (Law::Sphere(atlas), mesh_error) = one(&single)? else {
-            return Err(Refusal::unsupported("this body has no law for spheres"));
+            return Err(Refusal::unsupported("this body supports no spheres; set tool = \"plate\""));
         };
         let beyond = match self.body {
             Body::Block(size) => {
@@ -390,7 +390,7 @@ impl Description {
             return Ok(sphere(prepared.map_err(not_positive)?));
         }
         let Tool::Punch { outline, bond } = self.tool else {
-            return Err(Refusal::unsupported("this tool does not touch a mesh"));
+            return Err(Refusal::unsupported("this tool does not fit a mesh; choose another `tool`"));
         };
         let extent_m = outline.extent_m();
         let base = body::Body::new(mesh, solid).map_err(not_positive)?;

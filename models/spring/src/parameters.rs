@@ -93,7 +93,7 @@ const N_MM2: f64 = 1.0e-6;
 /// Parameter schema. Defaults are those of preset `thesis-1`; other presets have their own. The kind of spring is
 /// fixed, its numbers are live.
 pub(crate) const SCHEMA: &[Parameter] = &[
-    Parameter::choice("preset", PRESETS, 0, "Spring of the thesis, or a slender one that buckles"),
+    Parameter::choice("preset", PRESETS, 0, "Spring of the thesis, or a slender spring that buckles"),
     Parameter::choice(
         "variant",
         VARIANTS,

@@ -211,7 +211,7 @@ pub fn effect_text(effect: &Effect) -> String {
 #[must_use]
 pub fn order_note(effects: &[Effect]) -> Option<&'static str> {
     effects.iter().all(|effect| effect.effect != "order").then_some(
-        "order is not in the model: it needs three subjects or more, and subjects who start with each modality",
+        "order is not in the model, because the factor needs three subjects or more, and subjects who start with each modality",
     )
 }
 

@@ -35,7 +35,7 @@ use serde::Serialize;
 #[non_exhaustive]
 pub enum StatisticsError {
     /// Too few values for the result.
-    #[error("{what} needs at least {needed} {unit}, there are {found}")]
+    #[error("{what} needs at least {needed} {unit}, but has {found}")]
     TooFew {
         /// Name of the result.
         what: &'static str,

@@ -95,7 +95,7 @@ fn a_run_names_the_control_group_that_refuses_real_time_priority() {
     let enter = format!("echo $$ > {}; exec \"$@\"", group.list().display());
     let run = || Flotor::with(["run", "--duration", "0.1"]).through_shell(&enter).run();
     let named = format!(
-        "its control group has no budget for real-time threads, which every other permission requires: as root `echo 950000 > {}`",
+        "the control group has no budget for real-time threads, which every other permission requires: as root `echo 950000 > {}`",
         file.display()
     );
     let refused = run();

@@ -501,7 +501,7 @@ fn a_device_that_fails_before_the_start_is_a_refused_plugin() {
         ("refuses-to-activate", "the power supply is off; switch it on"),
         (
             "nan-limit",
-            "its capability `max_force_n` is [NaN, NaN, NaN]: must be 0 to 100000 N on each axis; report this to the \
+            "the capability `max_force_n` is [NaN, NaN, NaN]: must be 0 to 100000 N on each axis; report this to the \
              author of the plugin",
         ),
     ];
@@ -638,8 +638,10 @@ fn a_device_that_takes_no_command_is_stopped_and_named() {
     let (ran, commanded) = run_with_odd_samples("takes-nothing");
     assert_eq!(ran.code, Some(exit_code::DEVICE_FAULT), "{ran:#?}");
     assert_eq!(commanded.last(), Some(&(49, 0.1)), "the control: it took those before");
-    let told =
-        format!("{}: device fault: it has not read the last 101 commands; ", plugin_file(DEVICE).display());
+    let told = format!(
+        "{}: device fault: the device has not read the last 101 commands; ",
+        plugin_file(DEVICE).display()
+    );
     assert!(ran.error().starts_with(&told), "{ran:#?}");
 }
 

@@ -475,7 +475,7 @@ fn a_model_that_ends_its_process_is_out_and_the_loop_goes_on() {
     let [(name, health, words)] = &run.outcome.models[..] else { panic!("one model") };
     let lost = health.lost_at.expect("it is gone");
     assert!((50..=52).contains(&lost), "{lost}");
-    assert_eq!((name.as_str(), words.as_str()), ("block", "its process was ended by signal 6"));
+    assert_eq!((name.as_str(), words.as_str()), ("block", "the worker process was ended by signal 6"));
     assert_force_ends_within_two_ticks(&run, 50);
 }
 
@@ -490,7 +490,7 @@ fn a_model_that_crashes_its_process_is_out_and_the_loop_goes_on() {
     let run = watch(&crashing);
     assert_eq!((run.outcome.end, run.records.len()), (RunEnd::Finished, 200));
     let [(_, _, words)] = &run.outcome.models[..] else { panic!("one model") };
-    assert_eq!(words, "its process was ended by signal 11");
+    assert_eq!(words, "the worker process was ended by signal 11");
     assert!(the_model(&run).lost_at.is_some());
     assert_force_ends_within_two_ticks(&run, 50);
 }

@@ -74,7 +74,7 @@ fn every_mistake_of_a_model_is_found_under_its_rule() {
         ("ALLOCATES", "no-system-calls", "a step allocated memory or made another system call"),
         ("OPENS_FILES", "no-system-calls", "a step allocated memory or made another system call"),
         ("STARTS_THREADS", "no-system-calls", "a step allocated memory or made another system call"),
-        ("WRITES", "no-system-calls", "it read or wrote"),
+        ("WRITES", "no-system-calls", "the model read or wrote"),
     ];
     for (mistake, rule, words) in mistakes {
         // Not every kernel counts what a thread writes.
@@ -111,12 +111,16 @@ fn every_mistake_of_a_device_is_found_under_its_rule() {
             "`max_torque_nm` is [0, 0, 0]: x is driven, so declare its largest value",
         ),
         ("NEGATIVE_TORQUE", "capabilities", "`max_torque_nm` is [0.5, 0.5, -1]: must be 0 to 100000 N·m"),
-        ("NO_SLEW", "capabilities", "`max_force_slew_n_per_s` is 0: its force could never change"),
+        (
+            "NO_SLEW",
+            "capabilities",
+            "`max_force_slew_n_per_s` is 0: a force with this slew rate could never change",
+        ),
         ("ENDLESS_SLEW", "capabilities", "`max_torque_slew_nm_per_s` is inf: must be 0 to"),
         ("ENDLESS_STIFFNESS", "capabilities", "`max_stiffness_n_per_m` is inf: must be 0 to"),
         ("SEVEN_AXES", "capabilities", "`sensed` is 0b1111111: there are six axes"),
         ("EVERY_AXIS", "capabilities", "`actuated` is 0b11111111111111111111111111111111: there are six"),
-        ("CHANGES_ITS_MIND=0", "capabilities", "capabilities changed from one call to the next"),
+        ("CHANGES_ITS_MIND=0", "capabilities", "capabilities changed between two calls"),
         ("STALE", "lifecycle", "no fresh sample within"),
         ("NO_QUATERNION", "lifecycle", "a quaternion of length 0"),
         ("NAN_DELIVERED", "lifecycle", "NaN"),
@@ -140,8 +144,8 @@ fn a_run_refuses_a_device_whose_capabilities_cannot_be_enforced() {
         ("ENDLESS_SLEW", "`max_torque_slew_nm_per_s` is inf: must be 0 to"),
         ("RATES_REVERSED", "`rate_hz` is 10000 to 100 Hz: declare the slowest rate first"),
         ("NAN_LATENCY", "`latency_s` is NaN: must be 0 to 10 s"),
-        ("SEVEN_AXES", "`sensed` is 0b1111111: there are six axes; set no bit beyond them"),
-        ("CHANGES_ITS_MIND=0", "its capabilities changed from one call to the next"),
+        ("SEVEN_AXES", "`sensed` is 0b1111111: there are six axes; clear the bits above the sixth"),
+        ("CHANGES_ITS_MIND=0", "the capabilities changed between two calls"),
     ];
     let run = |library: &Path| {
         let scratch = Scratch::default();

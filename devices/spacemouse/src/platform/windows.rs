@@ -10,7 +10,7 @@ const SHARING_VIOLATION: i32 = 32;
 pub(crate) const PATH_HELP: &str =
     r"Path of the device, such as \\?\HID#VID_256F... (default: the first device found)";
 /// Example of the parameter `path`.
-pub(crate) const PATH_EXAMPLE: &str = r"\\?\HID#VID_256F and what follows there";
+pub(crate) const PATH_EXAMPLE: &str = r"\\?\HID#VID_256F...";
 /// Remedy for denied access.
 pub(crate) const ACCESS_REMEDY: &str = "close the program that uses the device";
 

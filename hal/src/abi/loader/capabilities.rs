@@ -31,7 +31,7 @@ pub(super) fn check(declared: &Capabilities) -> Result<(), Refusal> {
     for (field, axes) in [("sensed", declared.sensed), ("actuated", declared.actuated)] {
         if !Axes::ALL.contains(axes) {
             let found = format!("{:#b}", axes.bits);
-            return Err(wrong(field, &found, "there are six axes; set no bit beyond them"));
+            return Err(wrong(field, &found, "there are six axes; clear the bits above the sixth"));
         }
     }
     let translation = Group {
@@ -87,7 +87,7 @@ pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Resu
         format!("`{field}` was {}, then {}", list(&before), list(&now))
     });
     Err(Refusal::broken(format!(
-        "its capabilities changed from one call to the next; they are constant from `open` on: {changed}"
+        "the capabilities changed between two calls, but must be constant from `open` on: {changed}"
     )))
 }
 
@@ -113,7 +113,7 @@ impl Group {
         }
         slew.has_an_end()?;
         if slew.value == 0.0 {
-            return Err(slew.wrong("its force could never change; declare a rate above 0"));
+            return Err(slew.wrong("a force with this slew rate could never change; declare a rate above 0"));
         }
         Ok(())
     }
@@ -166,7 +166,7 @@ const fn number<T>(field: &'static str, value: T, most: f64, unit: &'static str)
 }
 
 fn wrong(field: &str, found: &str, mend: &str) -> Refusal {
-    Refusal::broken(format!("its capability `{field}` is {found}: {mend}"))
+    Refusal::broken(format!("the capability `{field}` is {found}: {mend}"))
 }
 
 #[cfg(test)]
@@ -235,7 +235,7 @@ mod tests {
                     continue;
                 }
                 let reason = check(&declared).expect_err(field).reason;
-                assert!(reason.starts_with(&format!("its capability `{field}")), "{value}: {reason}");
+                assert!(reason.starts_with(&format!("the capability `{field}")), "{value}: {reason}");
                 assert!(reason.contains(": ") && !reason.contains('\n'), "{reason}");
             }
         }
@@ -246,7 +246,7 @@ mod tests {
         let cases = [
             (Capabilities { rate_hz: [1000.0, 100.0], ..HELD }, "declare the slowest rate first"),
             (Capabilities { sensed: Axes { bits: 0x7f }, ..HELD }, "`sensed` is 0b1111111: there are six"),
-            (Capabilities { actuated: Axes { bits: u32::MAX }, ..HELD }, "set no bit beyond them"),
+            (Capabilities { actuated: Axes { bits: u32::MAX }, ..HELD }, "clear the bits above the sixth"),
             (Capabilities { max_torque_nm: [0.0; 3], ..HELD }, "x is driven, so declare its largest value"),
             (
                 Capabilities { actuated: Axes::TRANSLATION, ..PLANAR },

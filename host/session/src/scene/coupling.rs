@@ -59,8 +59,8 @@ fn coupling(
         (Partner::Elsewhere, [here]) => CouplingEnds::Remote(*here),
         (Partner::Here, _) => {
             return Err(wrong(
-                "a coupling has two ends: `[[coupling.end]]` twice, each with its `device`; if one is on another host, \
-                 write `partner = \"elsewhere\"`",
+                "a coupling has two ends: `[[coupling.end]]` twice, each with its `device`; for an end on another \
+                 host, write `partner = \"elsewhere\"`",
             ));
         }
         (Partner::Elsewhere, _) => {

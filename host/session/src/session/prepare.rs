@@ -240,7 +240,7 @@ fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolat
             Err(complain(
                 model,
                 &format!(
-                    "it comes from outside the installation, and each of its {objects} objects would have a process \
+                    "the plugin is from outside the installation, and each of its {objects} objects would have a process \
                      of its own; set `isolation = \"process\"` or `isolation = \"none\"`"
                 ),
             ))

@@ -35,7 +35,8 @@ impl StopWithoutHost {
     /// Returns the reason to reject the device if a stop is required; `None` for a device with a stop or without force.
     pub(super) fn missing(&self) -> Option<String> {
         self.is_missing().then(|| {
-            "nothing stops it if this program is killed: its plugin lacks the extension `flotor.independent-stop/1`; remove \
+            "no process stops the device if this program is killed: its plugin lacks the extension \
+             `flotor.independent-stop/1`; remove \
              `[limits] require_independent_stop`, and keep a hand at its power switch"
                 .to_owned()
         })

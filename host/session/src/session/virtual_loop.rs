@@ -118,7 +118,7 @@ impl VirtualLoop {
 
     /// Runs `ticks` ticks, or until the batch is full or the run ends; returns the remaining ticks.
     fn batch(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<u64, RunError> {
-        let batch = self.batch.take().ok_or(RunError::Thread("did not come back"))?;
+        let batch = self.batch.take().ok_or(RunError::Thread("did not return its state"))?;
         self.requested.change_to(observer.demand());
         let ticked = self.thread.tick(Batch { ticks, ..batch }, &self.heartbeat, &self.stop);
         if !matches!(&ticked, Ok(batch) if batch.runner.end().is_none()) {
@@ -149,7 +149,7 @@ impl VirtualLoop {
 
     /// Ends the run. Not real-time.
     fn finish(mut self) -> Result<Finished, RunError> {
-        let batch = self.batch.take().ok_or(RunError::Thread("did not come back"))?;
+        let batch = self.batch.take().ok_or(RunError::Thread("did not return its state"))?;
         Ok(Finished::of(batch.runner, 0, RealTimeReport::not_requested()))
     }
 }

@@ -46,11 +46,13 @@ pub(crate) fn core_remedy(root: &Path) -> String {
     match limits.iter().find(is_one) {
         Some(limit) if !has_one_core() => {
             format!(
-                "its control group allows no more, the machine has more: raise `{}`",
+                "the control group allows no more cores, but the machine has more: raise `{}`",
                 limit.file.display()
             )
         }
-        None if !has_one_core() => "the machine has more: start it without `taskset`".to_owned(),
+        None if !has_one_core() => {
+            "the machine has more cores: start the program without `taskset`".to_owned()
+        }
         _ => "use a machine with two cores or more".to_owned(),
     }
 }
@@ -147,8 +149,8 @@ fn supervision() -> Diagnosis {
         "supervisor",
         "none: process 1 of a container runs the plugins itself, because a kill of the container closes the device of process 1 alone \
          before it kills the watchdog process",
-        "`flotor validate` finds a plugin that ends the process; `docker run --init` gives a supervisor, and a kill of the container may \
-         then leave the force on",
+        "`flotor validate` finds a plugin that ends the process; `docker run --init` starts a supervisor, but a \
+         kill of the container may then leave the force on",
     )
 }
 

@@ -278,7 +278,7 @@ fn lend(arguments: &LendArguments) -> Result<i32, Early> {
             |api| format!("nothing of `--api {}`", api.word()),
         );
         note(format_args!(
-            "`{}` opened no device: it called {which}, was linked statically with its maker's library (link it with \
+            "`{}` opened no device: it called {which}, was linked statically with the maker's library (link it with \
              the library of `flotor lend`), or lost `LD_LIBRARY_PATH` (a script that sets the variable has to \
              append the old value; `env -i` removes the variable)",
             program.path.display()

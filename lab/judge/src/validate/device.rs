@@ -94,7 +94,7 @@ fn within(call: &str, took: Duration, limit: Duration) -> Result<(), String> {
         return Ok(());
     }
     let [took, limit] = [took, limit].map(wording::time);
-    Err(format!("{call} takes {took}, above the limit of {limit}"))
+    Err(format!("{call} needs {took}, above the limit of {limit}"))
 }
 
 pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), Outcome> {

@@ -206,7 +206,7 @@ pub fn validate(
             Ok(None) if check == Check::Contract(Rule::InsideMemory) => {
                 let patience = wording::time(patience);
                 let late = format!(
-                    "the life cycle of an instance takes more than {patience} with the guarding allocator"
+                    "the life cycle of an instance needs more than {patience} with the guarding allocator"
                 );
                 Verdict { seen: Some(Outcome::Missing(late)), figures: None }
             }

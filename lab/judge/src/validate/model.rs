@@ -267,7 +267,7 @@ pub(super) fn activity(model: &mut Model) -> Result<(), Outcome> {
                 let acts = output.wrench != Wrench::ZERO || output.energy_j.abs() > 0.0;
                 if acts && !region.contains(pose.position()) {
                     return Err(Outcome::Violation(format!(
-                        "at {position_m} m, outside its active region, it returned {}",
+                        "at {position_m} m, outside its active region, the model returned {}",
                         wording::output(&output)
                     )));
                 }

@@ -98,8 +98,8 @@ pub enum DivergenceCause {
     },
     /// The recording began after the start of the run.
     #[error(
-        "the recording begins at tick {first_tick} of the run: it lacks the changes before it and the states of models and \
-         couplings"
+        "the recording begins at tick {first_tick} of the run, so the earlier changes and the states of models and \
+         couplings are unknown"
     )]
     JoinedLate {
         /// First recorded tick.

@@ -145,7 +145,7 @@ impl SittingLog {
         let mut before = CHAIN_START.to_owned();
         for (index, bytes) in whole.split_inclusive(|byte| *byte == b'\n').enumerate() {
             let number = index + 1;
-            let not_text = || at(number, LogProblem::Text("it is not UTF-8".to_owned()));
+            let not_text = || at(number, LogProblem::Text("the file is not UTF-8".to_owned()));
             let text = std::str::from_utf8(bytes).map_err(|_| not_text())?;
             let text = text.strip_suffix('\n').unwrap_or(text);
             // Line ends may have been changed by a copy through Windows or git.
@@ -211,7 +211,7 @@ impl SittingLog {
             Event::Trial(event) => self.replay(*event),
             Event::Withdrawn { trial } => self.withdraw(trial),
             Event::Resume { trials, .. } if trials != self.sitting.presented() => {
-                Err(LogProblem::Order("`resume` gives another number of trials than the log has"))
+                Err(LogProblem::Order("`resume` has another number of trials than the log"))
             }
             Event::Resume { .. } => {
                 self.resumed += 1;

@@ -182,7 +182,7 @@ fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
     found.sort();
     match found.as_slice() {
         [one] => Ok(one.clone()),
-        [] => Err(CommandError::Usage(format!("there is no NAME{ENDING} in this folder; name a study file"))),
+        [] => Err(CommandError::Usage(format!("this folder has no file NAME{ENDING}; name a study file"))),
         several => {
             let names: Vec<String> = several.iter().map(|file| file.display().to_string()).collect();
             Err(CommandError::Usage(format!(

@@ -60,7 +60,7 @@ pub(super) fn check(folder: &Path, need: Need) -> Result<(), CommandError> {
             "free some"
         };
         let (folder, [free, bytes]) = (folder.display(), [free, bytes].map(|bytes| bytes / 1.0e6));
-        format!("{folder}: {free:.1} MB are free, and {what} takes about {bytes:.1} MB; {advice}")
+        format!("{folder}: {free:.1} MB are free, but {what} needs about {bytes:.1} MB; {advice}")
     };
     match need.of(free) {
         Room::Enough => {}

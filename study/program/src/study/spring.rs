@@ -142,7 +142,7 @@ fn scene(fit: &SpringFit, coil_diameter_mm: Option<f64>) -> Result<String, Curve
         free_length_m * 1.0e3,
         coil(coil_diameter_mm)
     );
-    let head = "# A spring fitted to a real one; an experiment sets its stiffness gamma / L0 between trials.\n\
+    let head = "# A spring fitted to a real spring; an experiment sets its stiffness gamma / L0 between trials.\n\
                 title = \"A real spring, fitted\"\n";
     Ok(life_size(head, "spring", &parameters))
 }

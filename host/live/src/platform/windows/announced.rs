@@ -67,7 +67,7 @@ fn create(path: &Path) -> io::Result<File> {
 }
 
 fn no_port() -> io::Error {
-    io::Error::new(ErrorKind::InvalidData, "its file contains no port")
+    io::Error::new(ErrorKind::InvalidData, "the file of the session contains no port")
 }
 
 #[cfg(test)]

@@ -57,7 +57,10 @@ impl Datagrams {
         socket.set_nonblocking(true)?;
         let announced = Announced::new(socket.local_addr()?.port())?;
         let _file = announced.write(path)?;
-        let path = path.to_str().ok_or_else(|| io::Error::other("its name is not valid Unicode"))?.to_owned();
+        let path = path
+            .to_str()
+            .ok_or_else(|| io::Error::other("the name of the socket is not valid Unicode"))?
+            .to_owned();
         Ok(Self { socket, secret: announced.secret, path, known: Mutex::default(), _file })
     }
 

@@ -108,7 +108,7 @@ impl Worker {
                         "`create` or `prepare` did not return within {create_timeout_s} s in its process"
                     )));
                 }
-                Err(Refusal::broken(format!("its process ended before the model was created ({end})")))
+                Err(Refusal::broken(format!("the worker process ended before the model was created ({end})")))
             }
         }
     }
@@ -233,8 +233,8 @@ impl Worker {
     pub fn last_message(&mut self) -> String {
         match self.child.try_wait() {
             Ok(Some(end)) => match processes::ending_signal(end) {
-                Some(signal) => format!("its process was ended by signal {signal}"),
-                None => format!("its process ended ({end})"),
+                Some(signal) => format!("the worker process was ended by signal {signal}"),
+                None => format!("the worker process ended ({end})"),
             },
             _ => self.memory.message(),
         }

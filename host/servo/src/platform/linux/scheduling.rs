@@ -25,7 +25,7 @@ pub(crate) fn priority_advice() -> String {
 pub fn real_time_budget_advice(file: &Path) -> String {
     let file = file.display();
     format!(
-        "its control group has no budget for real-time threads, which every other permission requires: as root \
+        "the control group has no budget for real-time threads, which every other permission requires: as root \
          `echo 950000 > {file}`, then the same for each inner group (`docker run --cpu-rt-runtime=950000`), or \
          start the run outside the group"
     )

@@ -59,7 +59,7 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Outcome> {
     let of_thread = Arc::clone(&stage);
     let walking = std::thread::Builder::new().spawn(move || walk_locked_in(model, &ready, &of_thread));
     walking.map_err(|cause| Outcome::no_thread(&cause))?;
-    let ended = |_| Outcome::Violation("its thread ended before the test".to_owned());
+    let ended = |_| Outcome::Violation("the thread of the plugin ended before the test".to_owned());
     let thread = told.recv().map_err(ended)?;
     let folder = PathBuf::from(format!("/proc/self/task/{thread}"));
     if !folder.exists() {
@@ -82,7 +82,7 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Outcome> {
     }
     match (before, transfers(&folder)) {
         (Some(before), Some(after)) if after > before => {
-            Err(Outcome::Violation(format!("it read or wrote {} times in {STEPS} steps", after - before)))
+            Err(Outcome::Violation(format!("the model read or wrote {} times in {STEPS} steps", after - before)))
         }
         _ => Ok(()),
     }
