@@ -183,7 +183,7 @@ fn watched_over(run: impl FnOnce(&Arc<AtomicBool>) -> eframe::Result) -> Result<
         (Ok(Err(error)), false) => Err(WindowError::NoDisplay(one_line(&error.to_string()))),
         (Err(panic), true) => Err(WindowError::Broken(words_of(&*panic, "without a word"))),
         (Err(panic), false) => {
-            Err(WindowError::NoDisplay(words_of(&*panic, "the display's libraries do not work")))
+            Err(WindowError::NoDisplay(words_of(&*panic, "the libraries of the display cannot be loaded")))
         }
     }
 }

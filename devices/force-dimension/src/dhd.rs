@@ -117,8 +117,8 @@ impl Dhd {
     fn opened(functions: Functions, index: i8) -> Result<Self, Refusal> {
         let id = without_signals(|| functions.open(index));
         let id = checked(&functions, id, "opening the device").map_err(|failed| failed.refusal())?;
-        let id =
-            i8::try_from(id).map_err(|_| Refusal::broken(format!("the SDK opened the device as {id}")))?;
+        let id = i8::try_from(id)
+            .map_err(|_| Refusal::broken(format!("the SDK returned the invalid device number {id}")))?;
         let wrist = match (functions.has_wrist(id), functions.has_active_wrist(id)) {
             (_, true) => Wrist::Driven,
             (true, false) => Wrist::Sensed,

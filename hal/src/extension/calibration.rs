@@ -259,7 +259,10 @@ impl OpenedDevice {
     pub fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
         let calibrate = self.extensions().calibration.and_then(|table| table.calibrate_vertical);
         let Some(calibrate) = calibrate else {
-            return Err(Refusal::unsupported("this device has no calibration of the vertical force"));
+            return Err(Refusal::unsupported(
+                "this device has no calibration of the vertical force; remove \
+            `calibration` from the scene",
+            ));
         };
         let mut message = Message::default();
         // SAFETY: a live instance, used by this thread only (`&mut`), pointers valid for the call.

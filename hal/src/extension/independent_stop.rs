@@ -210,7 +210,10 @@ impl OpenedDevice {
         // Invalid initial value: rejected below unless the plugin writes it.
         let unfilled = IndependentStop::by_message(BY_ITSELF, &[0], StoppedState::Zero, 0);
         let Some(declared) = self.asked(ask, unfilled) else {
-            return Err(Refusal::broken("the device does not declare its stop without the host"));
+            return Err(Refusal::broken(
+                "the device plugin offers `flotor.independent-stop/1` but declares no stop; \
+            declare a stop or remove the extension",
+            ));
         };
         Independence::of(&declared)
     }

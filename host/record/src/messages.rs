@@ -7,7 +7,7 @@ use prost::Message;
 
 /// Error of bytes that are not a complete message of a recording.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no {message}: {reason}")]
+#[error("not a valid message {message}: {reason}")]
 pub struct InvalidMessage {
     message: &'static str,
     reason: String,

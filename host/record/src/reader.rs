@@ -55,7 +55,7 @@ pub enum Damage {
 #[non_exhaustive]
 pub enum ReadError {
     /// The file cannot be opened.
-    #[error("cannot open the recording `{}`: {cause}", path.display())]
+    #[error("cannot open the recording `{}`: {cause}; check the path and its permissions", path.display())]
     Open {
         /// Path of the file.
         path: PathBuf,

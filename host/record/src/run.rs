@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 
 /// Error of bytes that do not describe a run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("not a run description: {0}")]
+#[error("invalid run description: {0}")]
 pub struct InvalidRun(String);
 
 /// Description of a run before its start.

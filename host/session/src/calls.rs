@@ -387,7 +387,7 @@ pub enum CallError {
     #[error("cannot start a thread for the calls of a plugin; {THREAD_ADVICE}")]
     NoThread,
     /// The run was stopped or over before the call returned.
-    #[error("the run was stopped before `create`, `open` or the like returned")]
+    #[error("the run was stopped before `create`, `open` or another call returned; start the run again")]
     Stopped,
 }
 

@@ -73,10 +73,9 @@ fn for_host(plugin: &str) -> Result<String, CommandError> {
     }
     let whole = std::path::absolute(plugin)
         .map_err(|cause| CommandError::file(plugin.as_ref(), "cannot be found", cause))?;
-    whole
-        .into_os_string()
-        .into_string()
-        .map_err(|path| CommandError::Usage(format!("`{}`: the path is not valid UTF-8", path.display())))
+    whole.into_os_string().into_string().map_err(|path| {
+        CommandError::Usage(format!("`{}`: the path is not valid UTF-8; rename the file", path.display()))
+    })
 }
 
 /// Requests the swap and waits for its result: the change in the loop, or `None` if the loop does not report it in time.

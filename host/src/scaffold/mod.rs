@@ -71,7 +71,7 @@ pub enum ScaffoldError {
     #[error("{}: the path is not valid UTF-8, or has quotes or backslashes; use another folder", .0.display())]
     NotText(PathBuf),
     /// A file cannot be read.
-    #[error("{}: cannot read: {cause}", path.display())]
+    #[error("{}: cannot read the file: {cause}; check its permissions", path.display())]
     Read {
         /// Path of the file.
         path: PathBuf,
@@ -79,7 +79,7 @@ pub enum ScaffoldError {
         cause: std::io::Error,
     },
     /// A file or folder cannot be written.
-    #[error("{}: cannot write: {cause}", path.display())]
+    #[error("{}: cannot write: {cause}; choose a folder where you may write", path.display())]
     Write {
         /// Path of the file or folder.
         path: PathBuf,

@@ -54,7 +54,7 @@ pub enum AccessError {
     )]
     Twice(Name),
     /// A certificate could not be created.
-    #[error("no certificate: {0}")]
+    #[error("cannot create a certificate: {0}")]
     Certificate(#[from] rcgen::Error),
 }
 

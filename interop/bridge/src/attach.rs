@@ -55,7 +55,10 @@ pub fn attach(
             Arc::new(remote.requests()),
             ObserverDemand::default(),
         )?;
-        report_line(&format!("`{title}` is at {}; `flotor view` shows it", publication.path().display()));
+        report_line(&format!(
+            "`{title}` is republished at {}; show the run with `flotor view`",
+            publication.path().display()
+        ));
         let lost_before = remote.lost();
         let End { words, kind } = show(remote, &publication, stop);
         let lost = remote.lost() - lost_before;

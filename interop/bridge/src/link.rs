@@ -40,7 +40,7 @@ pub struct LinkOptions {
 #[non_exhaustive]
 pub enum LinkError {
     /// The configuration is invalid.
-    #[error("the configuration{} cannot be used: {reason}", file.as_ref().map_or(String::new(), |f| format!(" {}", f.display())))]
+    #[error("the configuration{} is invalid: {reason}", file.as_ref().map_or(String::new(), |f| format!(" {}", f.display())))]
     Config {
         /// Path of the configuration; `None` without one.
         file: Option<PathBuf>,
@@ -67,7 +67,7 @@ pub enum LinkError {
     #[error("cannot open the session: {0}; check that the endpoint is free and the peer is running")]
     Open(String),
     /// The network refuses an operation.
-    #[error("network error: {0}")]
+    #[error("network error: {0}; check the connection and the peer")]
     Network(String),
 }
 

@@ -78,7 +78,7 @@ pub enum SweepError {
         problem: String,
     },
     /// A plugin file cannot be read, for its digest.
-    #[error("cannot read `{}`: {cause}", path.display())]
+    #[error("cannot read `{}`: {cause}; check the path and its permissions", path.display())]
     Plugin {
         /// Path of the plugin file.
         path: PathBuf,

@@ -57,8 +57,7 @@ pub enum CalibrationError {
     /// The force of a locked axis alternated between its limits, and the envelope removed it.
     #[error(
         "the force of a locked axis alternated between its limits, so the host removed the force; check that the \
-         handle moves freely and that \
-         the device is the one of the calibration"
+         handle moves freely and that the calibration file belongs to this device"
     )]
     Oscillated,
     /// The sensor was not moved to the requested height.
@@ -97,13 +96,13 @@ pub enum CalibrationError {
     #[error("calibration aborted; handle lowered, no file written")]
     Aborted,
     /// The thread that holds the handle cannot be started.
-    #[error("cannot start the holding controller thread: {0}")]
+    #[error("cannot start the thread of the holding controller: {0}; end other programs of this user")]
     NoThread(std::io::Error),
     /// A general rule for programs that drive a device was violated.
     #[error(transparent)]
     Run(#[from] RunError),
     /// The device rejects activation or calibration.
-    #[error("device refused: {0}")]
+    #[error("the device rejected the calibration: {0}")]
     Refused(Refusal),
     /// The device faulted.
     #[error("device fault: {}", .0.advice())]

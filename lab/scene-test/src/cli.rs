@@ -189,7 +189,10 @@ fn found(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
             }
         }
         if found.len() == before {
-            return Err(CommandError::Usage(format!("{}: no file NAME{SUFFIX} in it", path.display())));
+            return Err(CommandError::Usage(format!(
+                "{}: the folder contains no file NAME{SUFFIX}",
+                path.display()
+            )));
         }
     }
     let plain = |path: PathBuf| path.strip_prefix(".").map_or_else(|_| path.clone(), Path::to_owned);

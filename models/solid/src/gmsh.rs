@@ -259,7 +259,7 @@ impl Reader {
                         Some(&number) => found.push(number),
                         None => {
                             return lines
-                                .fail(format!("element {tag} has a node {node} that is not in `$Nodes`"));
+                                .fail(format!("element {tag} has a node {node} that is not in `$Nodes`; export the mesh again"));
                         }
                     }
                 }

@@ -157,8 +157,11 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     if let Some(id) = sizes.into_iter().find(|id| settings.number(id).is_some()) {
         return Err(Refusal::parameter(format!("`{id}`: a mesh has its own size; omit this parameter")));
     }
-    let bytes = read_file(Path::new(path), MOST_MESH_BYTES)
-        .map_err(|error| Refusal::resource(format!("{path}: cannot read the mesh: {error}")))?;
+    let bytes = read_file(Path::new(path), MOST_MESH_BYTES).map_err(|error| {
+        Refusal::resource(format!(
+            "{path}: cannot read the mesh: {error}; check the path and its permissions"
+        ))
+    })?;
     let [fixed, touched] = [faces[0].unwrap_or("fixed"), faces[1].unwrap_or("touched")];
     let wrong = |problem: &dyn std::fmt::Display| Refusal::resource(format!("{path}: {problem}"));
     // Accept a binary file here: the reader reports its format from the second line.

@@ -403,7 +403,9 @@ fn rod_blend(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusa
         Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Rod
             if wanted && settings.number("hand_over").is_some() =>
         {
-            Err(Refusal::parameter("`hand_over` on is for variant `energy`, which blends into the rod"))
+            Err(Refusal::parameter(
+                "`hand_over` on needs variant `energy`, which blends into the rod; set `variant` to `energy`",
+            ))
         }
         _ => Ok(Switch::Off),
     }

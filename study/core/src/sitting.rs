@@ -34,13 +34,13 @@ pub enum Verdict {
 #[non_exhaustive]
 pub enum AnswerError {
     /// A rating for a pair, or a comparison for one stimulus.
-    #[error("`{}` is not a valid answer in this trial", .0.word())]
+    #[error("`{}` is not a valid answer in this trial; give one of the offered answers", .0.word())]
     Kind(Response),
     /// A rating that is not finite.
     #[error("a rating must be a finite number")]
     NotFinite,
     /// All trials were presented already.
-    #[error("the experiment is over")]
+    #[error("the experiment is complete; no further answer is accepted")]
     Over,
 }
 

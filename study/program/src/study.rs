@@ -564,7 +564,7 @@ fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
     let log = logs.into_iter().find(|log| log.begin.subject.get() == arguments.subject);
     let log = log.ok_or_else(|| {
         let (data, subject) = (arguments.data.display(), arguments.subject);
-        CommandError::Usage(format!("{data}: no subject {subject}"))
+        CommandError::Usage(format!("{data}: the study has no subject {subject}; choose one of its subjects"))
     })?;
     log.annotate(&arguments.text).map_err(|error| CommandError::Failed(error.to_string()))
 }

@@ -47,7 +47,7 @@ pub enum StatisticsError {
         found: usize,
     },
     /// A number is NaN or infinite.
-    #[error("{what}: value {index} is not finite")]
+    #[error("{what}: value {index} is not finite; correct the value")]
     NotFinite {
         /// Name of the result.
         what: &'static str,
@@ -55,7 +55,7 @@ pub enum StatisticsError {
         index: usize,
     },
     /// Paired lists differ in length.
-    #[error("{what}: {left} values on one side, {right} on the other")]
+    #[error("{what}: {left} values are paired with {right}; give equally many")]
     Lengths {
         /// Name of the result.
         what: &'static str,
@@ -65,7 +65,7 @@ pub enum StatisticsError {
         right: usize,
     },
     /// The values do not vary, so there is no error to test against.
-    #[error("{what}: the values do not vary")]
+    #[error("{what}: the values do not vary, so the statistic is undefined")]
     Constant {
         /// Name of the result.
         what: &'static str,

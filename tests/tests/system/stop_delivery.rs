@@ -12,7 +12,7 @@ const ALL: &str = "all runs of this machine are stopped, and none starts until `
 /// What a run says that knows of no other.
 const ONE: &str = "the emergency stop is confirmed for this run only";
 /// What a run says before it energises a device.
-const UNKEPT: &str = "an emergency stop does not outlast this run and may reach no other run";
+const UNKEPT: &str = "an emergency stop of this run is not stored and may not reach other runs";
 
 /// Exit code and standard error of three runs: the one that is stopped, the other, and one started afterwards.
 struct Three {

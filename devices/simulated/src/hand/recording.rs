@@ -126,7 +126,9 @@ impl Sample {
             Some(last) if self.time_ns <= last.time_ns => {
                 Err(format!("time {} ns is not after {} ns", self.time_ns, last.time_ns))
             }
-            _ if samples.len() >= MAX_SAMPLES => Err(format!("has more than {MAX_SAMPLES} poses")),
+            _ if samples.len() >= MAX_SAMPLES => {
+                Err(format!("has more than {MAX_SAMPLES} poses; use a shorter recording"))
+            }
             _ => {
                 samples.push(self);
                 Ok(())

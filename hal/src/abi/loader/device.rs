@@ -87,7 +87,9 @@ impl OpenedDevice {
         // SAFETY: `settings` outlives the call, and the plugin keeps no copy past it (contract).
         let values = unsafe { to_raw(settings, parameters) }?;
         let Some(open) = table.open else {
-            return Err(Refusal::broken("a required entry of its function table is null"));
+            return Err(Refusal::broken(
+                "a required entry of the function table is null; set every required entry",
+            ));
         };
         let mut message = Message::default();
         let mut instance = std::ptr::null_mut();
@@ -145,7 +147,10 @@ impl OpenedDevice {
     pub fn activate(self, config: &LoopConfig) -> Result<ActiveDevice, (Self, Refusal)> {
         let table = self.handle.table;
         let (Some(activate), Some(read), Some(write)) = (table.activate, table.read, table.write) else {
-            return Err((self, Refusal::broken("a required entry of its function table is null")));
+            return Err((
+                self,
+                Refusal::broken("a required entry of the function table is null; set every required entry"),
+            ));
         };
         let mut message = Message::default();
         // SAFETY: a live instance, used by this thread only (`self` is owned), pointers valid for the call.

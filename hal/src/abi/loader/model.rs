@@ -42,7 +42,9 @@ impl Model {
         let values = unsafe { to_raw(settings, parameters) }?;
         let table = tables.force;
         let (Some(create), Some(step)) = (table.create, table.step) else {
-            return Err(Refusal::broken("a required entry of its function table is null"));
+            return Err(Refusal::broken(
+                "a required entry of the function table is null; set every required entry",
+            ));
         };
         let mut message = Message::default();
         let mut instance = std::ptr::null_mut();

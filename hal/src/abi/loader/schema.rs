@@ -58,7 +58,7 @@ pub(super) fn check_text(name: &str, text: &Str) -> Result<(), String> {
         return Err(format!("`{name}` is not UTF-8"));
     }
     match text.as_str().chars().find(|character| character.is_control() && *character != '\n') {
-        Some(control) => Err(format!("`{name}` holds the control character {}", control.escape_default())),
+        Some(control) => Err(format!("`{name}` contains the control character {}", control.escape_default())),
         None => Ok(()),
     }
 }
@@ -99,6 +99,6 @@ mod tests {
         assert_eq!(told(&Parameter { unit, ..HONEST }), "parameter 0: `unit` is not UTF-8");
         let doc = Str::new("\x1b[2J");
         let said = told(&Parameter { doc, ..HONEST });
-        assert_eq!(said, "parameter 0: `doc` holds the control character \\u{1b}");
+        assert_eq!(said, "parameter 0: `doc` contains the control character \\u{1b}");
     }
 }

@@ -54,7 +54,7 @@ pub enum PublishError {
     #[error(transparent)]
     Directory(#[from] DirectoryError),
     /// A thread or a second handle to the socket is refused.
-    #[error("cannot start the telemetry threads: {0}")]
+    #[error("cannot start the telemetry threads: {0}; end other programs of this user")]
     Thread(#[from] io::Error),
 }
 

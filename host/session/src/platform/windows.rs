@@ -58,7 +58,8 @@ pub fn is_same_file(one: &Path, other: &Path) -> bool {
 }
 
 /// Error text if the system does not report the path of this program.
-pub(crate) const UNKNOWN_PROGRAM: &str = "the folder of this program is unknown; name folders of plugins";
+pub(crate) const UNKNOWN_PROGRAM: &str =
+    "the folder of this program is unknown; give plugin folders with --plugin-path";
 
 /// Returns the folder of a user's plugins for all installations.
 pub(crate) fn user_folder() -> Option<PathBuf> {

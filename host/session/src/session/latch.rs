@@ -57,7 +57,7 @@ impl LatchGuard {
     #[must_use]
     pub fn warning(&self) -> Option<String> {
         let problem = self.latch.problem()?;
-        Some(format!("an emergency stop does not outlast this run and may reach no other run: {problem}"))
+        Some(format!("an emergency stop of this run is not stored and may not reach other runs: {problem}"))
     }
 
     /// Checks the latch right before a device is energised, after [`LatchGuard::watch`]. Not real-time.
@@ -269,7 +269,7 @@ mod tests {
         let file = scratch.path().join("file");
         std::fs::write(&file, "").unwrap();
         let apart = LatchGuard::of(&Directory::at(file.join("runs")));
-        assert!(apart.warning().unwrap().contains("does not outlast this run"));
+        assert!(apart.warning().unwrap().contains("is not stored"));
         assert!(apart.press(EmergencySource::Key).to_string().contains("does not prevent a later run"));
         let usual = LatchGuard::of(&Directory::at(scratch.path().join("runs")));
         assert_eq!(usual.warning(), None);

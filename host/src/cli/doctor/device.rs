@@ -103,7 +103,7 @@ fn axes(declared: &Capabilities) -> String {
     };
     let most = |axes: [f64; 3]| axes.into_iter().fold(0.0, f64::max);
     format!(
-        "{} sensed, {} driven; at most {} N and {} N·m along one",
+        "{} sensed, {} driven; at most {} N and {} N·m along one axis",
         count(declared.sensed),
         count(declared.actuated),
         most(declared.max_force_n),

@@ -143,7 +143,10 @@ fn killed_together() -> Diagnosis {
 /// Returns the finding on a supervisor of the process that runs plugins.
 fn supervision() -> Diagnosis {
     if std::process::id() != 1 {
-        return Diagnosis::good("supervisor", "an end without a report fails");
+        return Diagnosis::good(
+            "supervisor",
+            "present: it reports a run that ends without a result as failed",
+        );
     }
     Diagnosis::note(
         "supervisor",

@@ -306,7 +306,11 @@ fn folder_of_libraries(api: Option<Api>, program: &Program, own: &Path) -> Resul
     }
     if !folder.0.join("lib").exists() && !beside.exists() {
         let missing = Api::Dhd.library(own).err();
-        return Err(missing.unwrap_or_else(|| CommandError::Failed("no library".to_owned())));
+        return Err(missing.unwrap_or_else(|| {
+            CommandError::Failed(
+                "no drop-in library was found; build the libraries or reinstall Flotor".to_owned(),
+            )
+        }));
     }
     Ok(folder)
 }

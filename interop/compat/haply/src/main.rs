@@ -130,7 +130,7 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
     let access = Access::new(arguments.allow_origin, simulation_at);
     let host = prepare(settings, &stop).map_err(CommandError::Usage)?;
     if (0..host.stations().len()).any(|number| !host.open(number)) {
-        return Err(CommandError::Failed("the run did not start".to_owned()));
+        return Err(CommandError::Failed("the run did not start; its message is above".to_owned()));
     }
     let service = Service::leak(host, access);
     let started = service.follow().and_then(|()| events::serve(service, events));

@@ -87,7 +87,11 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
 /// Reads the poses from a file or from standard input.
 fn read_poses(path: &Path) -> Result<Poses, CommandError> {
     let problem = |cause| {
-        CommandError::Usage(format!("{}: {}", path.display(), format_args!("cannot read the poses: {cause}")))
+        CommandError::Usage(format!(
+            "{}: {}",
+            path.display(),
+            format_args!("cannot read the poses: {cause}; check the path and its permissions")
+        ))
     };
     let bytes = read(path).map_err(problem)?;
     Poses::parse(&path.display().to_string(), bytes).map_err(|error| CommandError::Usage(error.to_string()))

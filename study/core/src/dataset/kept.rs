@@ -12,7 +12,7 @@ pub enum Unmergeable {
     #[error("the first line has no column `{0}`; separate the columns with tabs")]
     NoKey(&'static str),
     /// A line whose number of cells differs from the number of columns.
-    #[error("line {line} has {cells} cells instead of {columns}")]
+    #[error("line {line} has {cells} cells instead of {columns}, one for each column")]
     Ragged {
         /// Line, from 1.
         line: usize,

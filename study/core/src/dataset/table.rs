@@ -30,7 +30,7 @@ const COLUMNS: [(&str, &str); 30] = [
     ("delta", "Difference of comparison and base as a share of the base"),
     ("comparison_at", "first or second: position of the comparison in the pair"),
     ("response", "first, second, dont_know, rating or seen"),
-    ("rating", "The number given, in the subject's own scale"),
+    ("rating", "Rating, in the subject's own scale"),
     ("judgement", "correct, wrong or unsure"),
     ("is_reversal", "1 if the answer turned the direction of the track"),
     ("repeated", "1 if the presentation is repeated and its answer does not count"),

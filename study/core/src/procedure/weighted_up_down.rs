@@ -134,7 +134,7 @@ impl WeightedUpDownRule {
             return Err(InvalidRule::new("--average-from", self.average_from, legal));
         }
         if self.trials_most < self.stop_after {
-            let legal = format!("must be 1 to {}, the most trials of a track", self.trials_most);
+            let legal = format!("must be 1 to {}, the largest number of trials of a track", self.trials_most);
             return Err(InvalidRule::new("--stop-after", self.stop_after, legal));
         }
         Ok(())

@@ -47,7 +47,7 @@ pub enum InputError {
     #[error("{0}")]
     NotNow(&'static str),
     /// A rating of 0 or below, which a ratio scale does not have.
-    #[error("a rating is a number above 0")]
+    #[error("a rating must be a number above 0")]
     NotAbove0,
     /// The answer does not fit the question.
     #[error(transparent)]

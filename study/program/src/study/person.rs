@@ -139,7 +139,11 @@ fn text_of(path: &Path) -> Result<String, CommandError> {
         read_text(path, "the text").map_err(|wrong| CommandError::Usage(wrong.in_file(path.display())))?;
     let text = text.trim().to_owned();
     if text.is_empty() {
-        return Err(CommandError::Usage(format!("{}: the file is empty", path.display())));
+        return Err(CommandError::Usage(format!(
+            "{}: the file is empty; write a title in its first line, and then \
+        the text",
+            path.display()
+        )));
     }
     Ok(text)
 }

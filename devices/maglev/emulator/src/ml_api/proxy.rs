@@ -116,7 +116,12 @@ impl ForceModel for MlApiModel {
     fn prepare(&mut self, config: &LoopConfig) -> Result<(), Refusal> {
         self.period_s = config.period_ns as f64 * 1.0e-9;
         let (Some(listen), None) = (&self.listen, &self.server) else { return Ok(()) };
-        let refused = |error| Refusal::resource(format!("cannot listen at {listen}: {error}"));
+        let refused = |error| {
+            Refusal::resource(format!(
+                "cannot listen at {listen}: {error}; choose another address \
+        with `listen`"
+            ))
+        };
         let port = Port::bind(listen, self.reach).map_err(|error| match error.kind() {
             ErrorKind::InvalidInput => Refusal::parameter(error.to_string()),
             _ => Refusal::resource(error.to_string()),

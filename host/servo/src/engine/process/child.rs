@@ -121,7 +121,7 @@ fn prepare(arguments: &WorkerArguments, load: LoadFile) -> Result<Prepared, Refu
     };
     let plugin = load(&arguments.plugin).map_err(said_no)?;
     if plugin.metadata().kind != PluginKind::Model {
-        return Err(Refusal::unsupported("a worker process runs models only"));
+        return Err(Refusal::unsupported("a worker process runs models only; name a model plugin"));
     }
     let schema = plugin.parameters();
     let parse = |set: &String| {

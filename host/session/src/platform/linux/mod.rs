@@ -35,7 +35,8 @@ pub fn is_same_file(one: &Path, other: &Path) -> bool {
 }
 
 /// Error text if the system does not report the path of this program.
-pub(crate) const UNKNOWN_PROGRAM: &str = "the folder of this program is unknown, because /proc is not mounted: mount it, or name folders of plugins";
+pub(crate) const UNKNOWN_PROGRAM: &str = "the folder of this program is unknown, because /proc is not mounted: \
+mount /proc, or give plugin folders with --plugin-path";
 
 /// Returns the folder of a user's plugins for all installations, by the XDG base directory specification. None for root: a file in
 /// a home folder must not run with all rights.

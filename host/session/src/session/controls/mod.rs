@@ -62,7 +62,7 @@ pub enum ControlError {
         live: Vec<String>,
     },
     /// A device has no weight and cannot be replaced.
-    #[error("only models have a weight and can be swapped; this is a device")]
+    #[error("only models have a weight and can be swapped; name a model instead of a device")]
     NoWeight,
     /// A model cannot be replaced.
     #[error("[{model}] model unchanged: {problem}")]
@@ -78,7 +78,7 @@ pub enum ControlError {
     #[error("previous changes are pending, or a swap is still fading in; try again in a moment")]
     Busy,
     /// The loop has ended.
-    #[error("the run is over")]
+    #[error("the run has ended; start a new run")]
     Ended,
 }
 

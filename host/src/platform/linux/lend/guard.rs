@@ -97,7 +97,7 @@ impl Display for Descendant {
 pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
     let failed = |cause: std::io::Error| CommandError::Failed(format!("cannot guard the program: {cause}"));
     let [program, rest @ ..] = arguments.program.as_slice() else {
-        return Err(CommandError::Usage("no program".to_owned()));
+        return Err(CommandError::Usage("the program to guard is missing".to_owned()));
     };
     stopping::outlive_signals();
     let signals = [Signal::TERM, Signal::CHILD, KILL_GROUP].map(Signal::as_raw);

@@ -41,7 +41,9 @@ impl Window {
             |cause| CommandError::file(SeparateProgram::VIEWER.program.as_ref(), "cannot be started", cause);
         let mut viewer = Running(spawn_unblocked(&mut command).map_err(failed)?);
         let (Some(input), Some(output)) = (viewer.0.stdin.take(), viewer.0.stdout.take()) else {
-            return Err(CommandError::Failed("cannot open the pipes of the viewer".to_owned()));
+            return Err(CommandError::Failed(
+                "cannot open the pipes of the viewer; use --screen terminal".to_owned(),
+            ));
         };
         let heard = lines_of(BufReader::new(output)).map_err(failed)?;
         // The first message reports the open window; without a window, the stream ends.
