@@ -194,7 +194,7 @@ class Laboratory:
             self.report.say("statuses", take_off_in_a_fault=takeoff)
             time.sleep(0.5)
         else:
-            raise SystemExit("the controller stays faulted; the file says with what")
+            raise SystemExit("the controller stays faulted; the output file has the cause")
         began = time.monotonic()
         status, _ = self.control.call(TAKE_OFF, timeout_s=PROCEDURE_TIMEOUT_S)
         self.report.say("take_off", status=status, seconds=round(time.monotonic() - began, 2), at=self.control.pose()[2])
@@ -211,7 +211,7 @@ class Laboratory:
         self.gravity = list(struct.unpack("<6f", results[:24]))
         self.report.say("gravity", status=status, seconds=round(time.monotonic() - began, 2), wrench=self.gravity)
         if not 1.0 < self.gravity[2] < 20.0:
-            raise SystemExit("that is no weight of a flotor; not going on")
+            raise SystemExit("the measured weight is not the weight of a flotor; stopped")
         self.control.call(SET_GRAVITY, struct.pack("<6f", *self.gravity))
         self.report.say("gravity", defy_status=self.control.call(DEFY_GRAVITY)[0])
 
@@ -351,16 +351,16 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("address", help="IPv4 address of the controller")
     parser.add_argument("--port", type=int, default=5678)
-    parser.add_argument("--out", default="first-contact.toml", help="file of the answers")
+    parser.add_argument("--out", default="first-contact.toml", help="file for the results")
     parser.add_argument("--force-limit", type=float, default=2.0, help="largest force beyond the weight, N (at most 5)")
-    parser.add_argument("--steps", type=int, default=9, help="only the first so many of the nine steps")
+    parser.add_argument("--steps", type=int, default=9, help="number of steps to execute, of nine")
     parser.add_argument("--yes", action="store_true", help="do not wait for Enter")
     options = parser.parse_args()
     options.force_limit = max(0.0, min(5.0, options.force_limit))
     try:
         Laboratory(options).run()
     except KeyboardInterrupt:
-        sys.exit("ended by hand; landed")
+        sys.exit("ended by the user; landed")
 
 
 if __name__ == "__main__":

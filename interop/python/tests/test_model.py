@@ -115,7 +115,7 @@ def test_a_batch_is_stepped_where_it_lies():
     every_other = inputs[::2]
     with pytest.raises((flotor.FlotorError, ValueError, TypeError)):
         model.step_batch(every_other, np.empty(len(every_other), flotor.OUTPUT))
-    with pytest.raises(flotor.FlotorError, match="inputs and room"):
+    with pytest.raises(flotor.FlotorError, match="rows for outputs"):
         model.step_batch(inputs, outputs[:-1])
     with pytest.raises(TypeError):
         model.step_batch(np.zeros(3), outputs[:3])
@@ -127,10 +127,10 @@ def test_an_array_that_is_not_aligned_is_refused():
     memory = bytearray(inputs.nbytes + 1)
     odd = np.frombuffer(memory, flotor.INPUT, offset=1)
     odd[:] = inputs
-    with pytest.raises(flotor.FlotorError, match="multiple of 8 bytes"):
+    with pytest.raises(flotor.FlotorError, match="aligned to 8 bytes"):
         model.step_batch(odd, np.empty(len(odd), flotor.OUTPUT))
     odd = np.frombuffer(bytearray(len(inputs) * 64 + 1), flotor.OUTPUT, offset=1)
-    with pytest.raises(flotor.FlotorError, match="multiple of 8 bytes"):
+    with pytest.raises(flotor.FlotorError, match="aligned to 8 bytes"):
         model.step_batch(inputs, odd)
 
 

@@ -51,7 +51,7 @@ def test_events_have_names(tmp_path):
     recording = flotor.read_recording(file)
     ramping = recording.event("ramping")
     assert ramping[0] and not ramping[-1]
-    with pytest.raises(flotor.FlotorError, match="no event 'ramp'; the events are stale_sample, "):
+    with pytest.raises(flotor.FlotorError, match="unknown event 'ramp'; the events are stale_sample, "):
         recording.event("ramp")
 
 

@@ -33,8 +33,8 @@ fn all_commands() -> String {
 
 #[test]
 fn commands() {
-    let head = "# Reference: commands\n\nEvery command with its arguments, as `--help` says it. \
-                [Command line](../command-line.md) tells what they are for.\n\n";
+    let head = "# Reference: commands\n\nEvery command with its arguments, as `--help` prints them. \
+                [Command line](../command-line.md) describes their purpose.\n\n";
     let commands = all_commands();
     committed("commands.md", &format!("{NOTE}{head}{commands}"));
 }
@@ -195,7 +195,7 @@ fn default(parameter: &Parameter) -> String {
 #[test]
 fn parameters() {
     let mut text = format!(
-        "{NOTE}# Reference: parameters\n\nEvery parameter of the plugins in this repository, as their schemas say it. Those \
+        "{NOTE}# Reference: parameters\n\nEvery parameter of the plugins in this repository, as their schemas describe it. Those \
          marked live may change while the loop runs.\n\n"
     );
     for folder in plugin_folders() {

@@ -65,7 +65,7 @@ def _folders() -> list[Path]:
 def _text(value: object) -> str:
     """A parameter's value as it is typed in a scene; floats keep every bit."""
     if isinstance(value, bool):
-        raise FlotorError(f"{value!r} is no value of a parameter; choices are words, like 'on' or 'off'")
+        raise FlotorError(f"{value!r} is not a value of a parameter; write a choice as a word, like 'on' or 'off'")
     if isinstance(value, str):
         return value
     return repr(float(value))
@@ -171,7 +171,7 @@ class Model:
         is being written to. A child of ``os.fork()`` makes models of its own.
         """
         if isinstance(inputs, np.ma.MaskedArray) or isinstance(outputs, np.ma.MaskedArray):
-            raise FlotorError("inputs and outputs have no masks; pass rows that are not masked (`inputs.compressed()`)")
+            raise FlotorError("inputs and outputs have no masks; pass unmasked rows (`inputs.compressed()`)")
         if outputs is None:
             outputs = np.empty(len(inputs), OUTPUT)
         self._model.step_batch(inputs, outputs)
@@ -226,7 +226,7 @@ def _poses(poses: object) -> np.ndarray:
         poses = np.column_stack([_numbers(poses[name]) for name in _POSE])
     poses = np.require(_numbers(poses), np.float64, ["C_CONTIGUOUS", "ALIGNED"])
     if poses.ndim != 2 or poses.shape[1] != 6:
-        raise FlotorError(f"poses have shape {poses.shape}; it is (n, 6): x_m, y_m, z_m, rx_rad, ry_rad, rz_rad")
+        raise FlotorError(f"poses have shape {poses.shape}; pass the shape (n, 6): x_m, y_m, z_m, rx_rad, ry_rad, rz_rad")
     return poses
 
 
@@ -303,7 +303,7 @@ class Recording:
     def event(self, name: str) -> np.ndarray:
         """The ticks with an event, as booleans (n,): ``recording.event("force_limited")``; the names are :data:`EVENTS`."""
         if name not in EVENTS:
-            raise FlotorError(f"no event {name!r}; the events are {', '.join(EVENTS)}")
+            raise FlotorError(f"unknown event {name!r}; the events are {', '.join(EVENTS)}")
         return self.columns["events"] & np.uint32(1 << EVENTS.index(name)) != 0
 
     def flat(self) -> dict[str, np.ndarray]:

@@ -4,7 +4,7 @@
     >>> flotor.sweep.run("plan.toml", "results", flotor.sweep.dask(Client()))  # doctest: +SKIP
 
 A task is a pure function of its content and leaves one file, named by its key, in ``OUT/tasks``. Workers need the
-plan and ``OUT`` on a file system they share. Whatever is killed, running again goes on where it was.
+plan and ``OUT`` on a file system they share. A killed sweep resumes with the next run.
 """
 
 from __future__ import annotations
