@@ -115,7 +115,8 @@ fn axis(text: &str) -> Result<usize, String> {
 
 /// Parses a screen from a line of JSON.
 fn screen(text: &str) -> Result<Screen, String> {
-    serde_json::from_str(text).map_err(|error| format!("no screen: {error}"))
+    serde_json::from_str(text)
+        .map_err(|error| format!("invalid screen: {error}; pass a line of `flotor study --screen json`"))
 }
 
 /// Reads the texts from a file, such as `german.toml`.

@@ -42,7 +42,7 @@ fn refused(path: &str, error: &HidError) -> Refusal {
     Refusal::resource(if is_refused(error) {
         format!("this user may not use {path}; {ACCESS_REMEDY}")
     } else {
-        format!("cannot open {path}: {error}")
+        format!("cannot open {path}: {error}; check the connection of the device")
     })
 }
 

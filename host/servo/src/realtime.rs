@@ -128,7 +128,7 @@ pub fn probe_real_time() -> RealTimeReport {
     match asked {
         Ok(asked) => asked.join().unwrap_or_else(|_| RealTimeReport::not_requested()),
         Err(cause) => {
-            let refused = || Privilege::Refused(format!("no thread: {cause}; {THREAD_ADVICE}"));
+            let refused = || Privilege::Refused(format!("cannot start a thread: {cause}; {THREAD_ADVICE}"));
             RealTimeReport { fifo: refused(), memory_lock: refused(), core: Privilege::NotRequested }
         }
     }

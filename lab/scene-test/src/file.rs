@@ -385,7 +385,7 @@ fn expectations(written: &BTreeMap<Spanned<String>, Value>) -> Result<Vec<Expect
                     below(&format!("{path}.{key}"), at, value, found)?;
                 }
             }
-            _ => return Err(format!("`{path}`: no bound")),
+            _ => return Err(format!("`{path}`: the bound is missing; write min, max, or value and within")),
         }
         Ok(())
     }

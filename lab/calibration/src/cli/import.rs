@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<(), CommandError> {
     let vertical = VerticalCurve { range_mm: *range_mm, coefficients_per_mm: coefficients };
     vertical
         .calibration()
-        .map_err(|invalid| CommandError::Usage(format!("invalid polynomial: {invalid}")))?;
+        .map_err(|invalid| CommandError::Usage(format!("invalid polynomial of --excess: {invalid}")))?;
     let note = if from_report {
         format!("CMU-RI-TR-07-21, section 3.4, taken at a commanded force of {at} N")
     } else {

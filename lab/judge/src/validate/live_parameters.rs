@@ -65,7 +65,7 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
         CallStatus::Unsupported => {
             return Err(format!("`{id}` is declared live, but the plugin has no `set_parameter`"));
         }
-        CallStatus::Panicked => return Err(format!("`{id}` = {value}: it {}", model.last_message())),
+        CallStatus::Panicked => return Err(format!("`{id}` = {value}: the model {}", model.last_message())),
         CallStatus::WrongPhase => {
             return Err(format!("setting `{id}` = {value} returned `{}`", wording::status(last)));
         }

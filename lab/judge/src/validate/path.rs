@@ -59,8 +59,8 @@ pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
 /// Makes one step; returns the answer, or a description of the failure.
 pub(super) fn step(model: &mut Model, input: &Input) -> Result<Output, String> {
     call(model, input).map_err(|status| match status {
-        CallStatus::Panicked => format!("{} it {}", place(input), model.last_message()),
-        other => format!("{} it returned `{}`", place(input), wording::status(other)),
+        CallStatus::Panicked => format!("{} the model {}", place(input), model.last_message()),
+        other => format!("{} the model returned `{}`", place(input), wording::status(other)),
     })
 }
 
@@ -70,7 +70,7 @@ pub(super) fn finite(model: &mut Model, input: &Input) -> Result<Output, String>
     if output.wrench.is_finite() && !output.energy_j.is_infinite() && output.status().is_some() {
         return Ok(output);
     }
-    Err(format!("{} it returned {}", place(input), wording::output(&output)))
+    Err(format!("{} the model returned {}", place(input), wording::output(&output)))
 }
 
 fn place(input: &Input) -> String {

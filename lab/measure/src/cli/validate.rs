@@ -40,7 +40,7 @@ pub(crate) struct ValidateArguments {
 }
 
 fn rule(id: &str) -> Result<Check, String> {
-    Check::from_id(id).ok_or_else(|| format!("unknown rule `{id}`"))
+    Check::from_id(id).ok_or_else(|| format!("unknown rule `{id}`; `flotor validate PLUGIN` lists the rules"))
 }
 
 pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {

@@ -113,8 +113,8 @@ fn others(trial: &TrialView) -> String {
     let key = |may: &May| match may {
         May::Practise => "; p practises first".to_owned(),
         May::Withdraw => "; u takes the last answer back".to_owned(),
-        May::Again { left: None } => "; a repeats it".to_owned(),
-        May::Again { left: Some(left) } => format!("; a repeats it, at most {left} more times"),
+        May::Again { left: None } => "; a repeats the trial".to_owned(),
+        May::Again { left: Some(left) } => format!("; a repeats the trial, at most {left} more times"),
     };
     trial.may.iter().map(key).collect()
 }
@@ -159,7 +159,7 @@ fn typed(line: &str, screen: &Screen) -> Result<Input, String> {
             _ => Err("type 1, 2 or 0".to_owned()),
         },
         Screen::Ask { question: Question::HowMuch, .. } => line.replace(',', ".").parse().map_or_else(
-            |_| Err(format!("invalid number `{line}`")),
+            |_| Err(format!("invalid number `{line}`; write a number such as 25")),
             |rating: f64| answer(Response::Rating(rating)),
         ),
         _ => Err("no question is open; Enter continues".to_owned()),
