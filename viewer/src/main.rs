@@ -85,7 +85,7 @@ struct Arguments {
     /// Plot force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z", value_parser = axis, conflicts_with = "sitting")]
     force_position: Option<usize>,
-    /// Force of an arrow of full length, N; the same for pictures to compare (default: the largest of the run)
+    /// Force of an arrow of full length, N; set this force for comparable pictures (default: the largest force of the run)
     #[arg(long, value_name = "NEWTONS", value_parser = arrow_force, conflicts_with_all = ["sitting", "export"])]
     arrow_force: Option<f64>,
     /// Title of the file of traces (default: the title of the run)

@@ -24,7 +24,7 @@ pub(crate) struct DoctorArguments {
     /// Id of a device: check why it does not start
     #[arg(long, value_name = "ID")]
     device: Option<String>,
-    /// Parameter with which the device is opened (repeatable)
+    /// Set a parameter of the device (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "device")]
     sets: Vec<KeyValue>,
     /// Folder used as the root of the machine's files

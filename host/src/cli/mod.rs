@@ -130,13 +130,13 @@ enum Command {
     Lend(lend::LendArguments),
     /// Check this machine's real-time configuration and suggest fixes
     Doctor(doctor::DoctorArguments),
-    /// A process that holds one force model, started by `run` for `isolation = "process"`
+    /// Process with one force model, started by `run` for `isolation = "process"`
     #[command(hide = true)]
     Worker(worker::WorkerArguments),
-    /// A process that stops devices when the host is gone, started by `run`
+    /// Process that stops devices when the host has ended, started by `run`
     #[command(hide = true)]
     Watchdog(watchdog::WatchdogArguments),
-    /// A process that starts the program of `lend`, and kills what remains of it
+    /// Process that starts the program of `lend`, and kills its remaining processes
     #[command(hide = true)]
     ProgramGuard(lend::guard::GuardArguments),
     /// Print a completion script for a shell

@@ -27,7 +27,7 @@ pub(crate) struct RecordArguments {
     /// Remote session: zenoh/NAME (default: the newest session of this machine)
     #[arg(value_name = "zenoh/NAME")]
     source: Option<String>,
-    /// The recording
+    /// Recording to write
     #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
     out: PathBuf,
     #[command(flatten)]

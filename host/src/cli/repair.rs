@@ -15,9 +15,9 @@ use std::path::PathBuf;
     Example:\n  flotor repair cut.mcap --out whole.mcap"
 )]
 pub(crate) struct RepairArguments {
-    /// The truncated recording
+    /// Truncated recording
     recording: PathBuf,
-    /// The new file
+    /// File to write
     #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
     out: PathBuf,
 }

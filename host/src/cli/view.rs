@@ -47,7 +47,7 @@ pub(crate) struct ViewArguments {
     /// Plot force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z")]
     force_position: Option<String>,
-    /// Force of an arrow of full length, N; the same for pictures to compare (default: the largest of the run)
+    /// Force of an arrow of full length, N; set this force for comparable pictures (default: the largest force of the run)
     #[arg(long, value_name = "NEWTONS", conflicts_with = "export")]
     arrow_force: Option<String>,
     /// With --export: title of the plot (default: the title of the scene)

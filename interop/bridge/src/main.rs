@@ -64,7 +64,7 @@ enum Command {
     Record {
         /// The bridge
         name: Name,
-        /// The recording
+        /// Recording to write
         #[arg(value_name = "FILE.mcap")]
         file: PathBuf,
     },

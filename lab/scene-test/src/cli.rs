@@ -71,7 +71,7 @@ struct TestArguments {
     /// Draw a picture of each failure into this folder
     #[arg(long, value_name = "FOLDER")]
     plots: Option<PathBuf>,
-    /// In the files, replace the value of each missed { value, within } with the measured one
+    /// In the files, replace the value of each missed { value, within } with the measured value
     #[arg(long, conflicts_with_all = ["filter", "shard", "list"])]
     bless: bool,
     /// With --bless: write the digest of every run too

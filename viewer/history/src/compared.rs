@@ -42,7 +42,7 @@ impl Compared {
         let (rate_hz, [_, last_s]) =
             self.histories.first().map_or((0.0, [0.0; 2]), |first| (first.run().rate_hz, first.span_s()));
         format!(
-            "Dashed: {}, {rate_hz} Hz, {last_s:.3} s; both times from the start of the run; Escape closes this recording",
+            "Dashed: {}, {rate_hz} Hz, {last_s:.3} s; both times from the start of the run; Escape: close",
             self.name
         )
     }

@@ -57,7 +57,7 @@ pub fn panel(ui: &mut Ui, panel: &mut Panel, palette: &Palette) -> Vec<usize> {
             }
             let follow = of(panel, |editability| matches!(editability, Editability::Follows(_)));
             if !follow.is_empty() {
-                heading(ui, "Determined by these parameters, or without effect", palette);
+                heading(ui, "Computed, or without effect", palette);
                 for index in follow {
                     let _ = row(ui, &mut panel.entries[index], palette);
                 }
@@ -205,7 +205,7 @@ fn help(entry: &PanelEntry) -> String {
     match &entry.editability {
         Editability::Free => {}
         Editability::Follows(reason) if reason.is_empty() => {
-            help += "\nDetermined by other parameters, or without effect"
+            help += "\nComputed from other parameters, or without effect"
         }
         Editability::Follows(reason) => help += &format!("\n{reason}"),
         Editability::Fixed => help += "\nCannot change while the loop runs",

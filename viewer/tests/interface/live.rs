@@ -235,7 +235,7 @@ fn physical_parameters_drive_the_rigidities_and_not_the_other_way_round() {
     };
     assert_eq!(editability(&window, "wire_diameter_mm"), Editability::Free);
     assert!(matches!(editability(&window, "gamma_n"), Editability::Follows(_)));
-    window.get_by_label("Determined by these parameters, or without effect");
+    window.get_by_label("Computed, or without effect");
     // Under a seat that is held, friction has no effect.
     assert!(matches!(editability(&window, "seat_friction"), Editability::Follows(_)));
     assert!(window.get_by_role_and_label(Role::Slider, "gamma").accesskit_node().is_disabled());

@@ -22,7 +22,7 @@ use std::time::Instant;
     flotor replay run.mcap --plugin-path target/release"
 )]
 pub(crate) struct ReplayArguments {
-    /// The recording
+    /// Recording to replay
     recording: PathBuf,
     /// Set a parameter of a model of the recording (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]

@@ -52,7 +52,7 @@ const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
     flotor study run                              the only study file of this folder: begins or resumes"
 )]
 pub(super) struct RunArguments {
-    /// Study file (default: the one NAME.study.toml in this folder)
+    /// Study file (default: the only NAME.study.toml in this folder)
     #[arg(value_name = "FILE", allow_hyphen_values = true)]
     file: Option<PathBuf>,
     /// Further options of the task, such as --subject 3

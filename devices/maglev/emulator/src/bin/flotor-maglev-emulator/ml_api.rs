@@ -23,7 +23,7 @@ const ON_STATOR: &[(&str, &str)] =
 #[derive(Args)]
 #[command(next_help_heading = "ML API")]
 pub(crate) struct MlApiArguments {
-    /// Serve this device, by the id of its plugin, instead of the emulated one: `--set` is for its parameters; the host's
+    /// Serve this device, by the id of its plugin, instead of the emulated device: `--set` sets its parameters; the host's
     /// envelope and watchdog stay active
     #[arg(long, value_name = "ID", conflicts_with_all = ["faults", "presses", "plant", "calibration_rig"])]
     pub(crate) device: Option<String>,
