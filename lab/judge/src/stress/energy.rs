@@ -284,8 +284,8 @@ pub(super) fn measure_loops(setup: &Setup<'_>) -> Result<(Measure, Decades), Loa
 fn judge_loops(total: &LoopTally) -> Measure {
     let verdict = Verdict::of(total.worst.value, CONSERVATIVE, CONSERVATIVE);
     let known = match total.comparable - total.resolved {
-        0 => format!("{} laps, all computed more accurately than the bound", total.laps),
-        unknown => format!("{unknown} of {} laps are less accurate than the bound", total.laps),
+        0 => format!("{} laps, all resolved to the bound", total.laps),
+        unknown => format!("{unknown} of {} laps are not resolved to the bound", total.laps),
     };
     let comment = match verdict {
         Verdict::Fail => format!(

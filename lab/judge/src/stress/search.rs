@@ -341,9 +341,8 @@ fn judge(total: &Tally) -> Measure {
         .count("laps known to the bound", total.laps_resolved)
         .with("largest wrench", total.size.value, "N");
     let possible = if total.laps_resolved > 0 { value.value } else { f64::INFINITY };
-    Measure { verdict, pose: pose.map(PoseRecord::from), ..measure }.unless_uncertain(possible, || {
-        "no lap of the search was computed more accurately than the bound".to_owned()
-    })
+    Measure { verdict, pose: pose.map(PoseRecord::from), ..measure }
+        .unless_uncertain(possible, || "no lap of the search is resolved to the bound".to_owned())
 }
 
 #[cfg(test)]

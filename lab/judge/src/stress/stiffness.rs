@@ -192,7 +192,7 @@ fn reciprocity(total: &Tally) -> Measure {
     let share = total.resolved as f64 / total.comparable.max(1) as f64;
     let uncertain = total.uncertain;
     let comment = format!(
-        "computed more accurately than the bound at {share:.4} of the poses; uncertainty of the differences \
+        "resolved to the bound at {share:.4} of the poses; uncertainty of the differences \
          {uncertain:.0e}"
     );
     let possible = if share >= MOSTLY { total.asymmetry.value } else { f64::INFINITY };
