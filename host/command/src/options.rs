@@ -302,7 +302,8 @@ pub fn seed(text: &str) -> Result<u64, String> {
 /// # Errors
 /// If the text is no number, or the system has no core with this number.
 pub fn core(text: &str) -> Result<Core, String> {
-    let number = text.trim().parse().map_err(|_| format!("invalid core number `{text}`"))?;
+    let number =
+        text.trim().parse().map_err(|_| format!("invalid core number `{text}`; write a whole number"))?;
     Core::new(number).ok_or_else(|| format!("no core {number} on this machine"))
 }
 

@@ -64,7 +64,7 @@ pub enum ApparatusError {
         numbers: Vec<String>,
     },
     /// A file of the scene has become unreadable.
-    #[error("{}: {cause}; the file was readable before: restore the file and start again", path.display())]
+    #[error("{}: {cause}; the file was readable at the start: restore the file and start again", path.display())]
     Unreadable {
         /// Path of the file.
         path: PathBuf,

@@ -339,7 +339,7 @@ impl Dataset {
         }
         let aside = path.with_extension("part");
         self.file(&aside, "cannot write the table", std::fs::write(&aside, text))?;
-        self.file(path, "cannot put the table in place", std::fs::rename(&aside, path))
+        self.file(path, "cannot replace the old table", std::fs::rename(&aside, path))
     }
 
     #[allow(clippy::unused_self)] // method for readability

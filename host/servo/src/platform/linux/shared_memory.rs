@@ -51,7 +51,7 @@ impl SharedMemory {
         let is_sealed = fcntl_get_seals(&file).is_ok_and(|seals| seals.contains(SealFlags::SHRINK));
         let held = rustix::fs::fstat(&file)?.st_size;
         if !is_sealed || usize::try_from(held).unwrap_or(0) < size_of::<SharedPage>() {
-            return Err(io::Error::other("this is not the memory of a worker"));
+            return Err(io::Error::other("standard input is not the shared memory of a worker"));
         }
         let (length, protection) = (size_of::<SharedPage>(), ProtFlags::READ | ProtFlags::WRITE);
         // SAFETY: a new mapping at an address of the system's choice aliases nothing of this process. The file is at

@@ -63,7 +63,7 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Outcome> {
     let thread = told.recv().map_err(ended)?;
     let folder = PathBuf::from(format!("/proc/self/task/{thread}"));
     if !folder.exists() {
-        return Err(Outcome::Missing("the system has no /proc, which the test needs".to_owned()));
+        return Err(Outcome::Missing("the test needs /proc; mount /proc".to_owned()));
     }
     let before = transfers(&folder);
     stage.store(LOCKED, Ordering::Release);

@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// Returns the finding that `/proc` is missing.
 fn no_files() -> Outcome {
-    Outcome::Missing("the system has no /proc, which the test needs".to_owned())
+    Outcome::Missing("the test needs /proc; mount /proc".to_owned())
 }
 
 /// Returns the parts of the state of this process and thread that only the kernel knows, or the reason of a failure.
