@@ -1,20 +1,15 @@
 /* A force model in C that ends the process, or takes signals away from the host, as the environment variable FIXTURE_DEATH
  * says: until tick 400 of a run it is an honest spring to home. Where it loops, it makes the file FIXTURE_MARK before. */
 #define _GNU_SOURCE
-#include "flotor.h"
+#include "fixture.h"
 #include <math.h>
 #include <pthread.h>
 #include <signal.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 #include <sys/time.h>
 #include <unistd.h>
-
-FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-c-dies\"\nname = \"Dies\"\ndoc = \"A spring that ends the process\"\n"
-                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_dies\"\n");
 
 static const double stiffness_n_per_m = 200.0;
 static const uint64_t at_tick = 400;
@@ -159,21 +154,5 @@ static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOu
     return FlotorCallStatus_Ok;
 }
 
-static const FlotorForceTable table = {
-    .size = sizeof(FlotorForceTable),
-    .info = {.id = FLOTOR_STR("fixture-c-dies"), .name = FLOTOR_STR("Dies"),
-             .doc = FLOTOR_STR("A spring that ends the process"),
-             .serves = {FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_TORQUE}, .memory = FlotorMemory_Stateless},
-    .create = create,
-    .destroy = destroy,
-    .step = step,
-};
-
-static const void *get_interface(FlotorStr id) {
-    size_t length = strlen(FLOTOR_INTERFACE_FORCE);
-    return id.len == length && memcmp(id.ptr, FLOTOR_INTERFACE_FORCE, length) == 0 ? &table : NULL;
-}
-
-FLOTOR_ENTRY(flotor_entry_dies) = {
-    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model), NULL, get_interface, NULL,
-};
+MODEL(dies, "fixture-c-dies", "Dies", "A spring that ends the process", FlotorMemory_Stateless,
+      .create = create, .destroy = destroy, .step = step);

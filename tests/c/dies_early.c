@@ -1,16 +1,12 @@
 /* A force model in C with a thread that ends the process FIXTURE_AT_MS milliseconds after the model is made, as the environment
  * variable FIXTURE_DEATH says. The model itself exerts no force. */
 #define _GNU_SOURCE
-#include "flotor.h"
+#include "fixture.h"
 #include <math.h>
 #include <pthread.h>
 #include <stdlib.h>
-#include <string.h>
 #include <time.h>
 #include <unistd.h>
-
-FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-c-dies-early\"\nname = \"Dies early\"\ndoc = \"A thread that ends the process\"\n"
-                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_dies_early\"\n");
 
 static volatile int zero = 0;
 
@@ -63,21 +59,5 @@ static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOu
     return FlotorCallStatus_Ok;
 }
 
-static const FlotorForceTable table = {
-    .size = sizeof(FlotorForceTable),
-    .info = {.id = FLOTOR_STR("fixture-c-dies-early"), .name = FLOTOR_STR("Dies early"),
-             .doc = FLOTOR_STR("A thread that ends the process"),
-             .serves = {FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_TORQUE}, .memory = FlotorMemory_Stateless},
-    .create = create,
-    .destroy = destroy,
-    .step = step,
-};
-
-static const void *get_interface(FlotorStr id) {
-    size_t length = strlen(FLOTOR_INTERFACE_FORCE);
-    return id.len == length && memcmp(id.ptr, FLOTOR_INTERFACE_FORCE, length) == 0 ? &table : NULL;
-}
-
-FLOTOR_ENTRY(flotor_entry_dies_early) = {
-    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model), NULL, get_interface, NULL,
-};
+MODEL(dies_early, "fixture-c-dies-early", "Dies early", "A thread that ends the process", FlotorMemory_Stateless,
+      .create = create, .destroy = destroy, .step = step);

@@ -1,19 +1,15 @@
 /* A force model in C that is right as it stands: a spring to home, 100 N/m. Each macro is a statement that runs at one place
  * of its life; `hang();` and `leave();` are there for it. */
 #define _GNU_SOURCE
-#include "flotor.h"
+#include "fixture.h"
 #include <math.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <locale.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
-
-FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-c-model-that\"\nname = \"Model that\"\ndoc = \"A spring with a habit\"\n"
-                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_model_that\"\n");
 
 #ifndef IN_INITIALISER
 #define IN_INITIALISER (void)0;
@@ -75,23 +71,5 @@ static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOu
     return FlotorCallStatus_Ok;
 }
 
-static const FlotorForceTable table = {
-    .size = sizeof(FlotorForceTable),
-    .info = {.id = FLOTOR_STR("fixture-c-model-that"), .name = FLOTOR_STR("Model that"),
-             .doc = FLOTOR_STR("A spring with a habit"),
-             .serves = {FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_TORQUE}, .memory = FlotorMemory_Stateless},
-    .create = create,
-    .destroy = destroy,
-    .prepare = prepare,
-    .step = step,
-};
-
-static const void *get_interface(FlotorStr id) {
-    static const char force[] = FLOTOR_INTERFACE_FORCE;
-    return id.len == sizeof force - 1 && memcmp(id.ptr, force, id.len) == 0 ? &table : NULL;
-}
-
-FLOTOR_ENTRY(flotor_entry_model_that) = {
-    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model),
-    .get_interface = get_interface,
-};
+MODEL(model_that, "fixture-c-model-that", "Model that", "A spring with a habit", FlotorMemory_Stateless,
+      .create = create, .destroy = destroy, .prepare = prepare, .step = step);

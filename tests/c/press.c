@@ -3,12 +3,8 @@
 #ifndef PRESS_N
 #define PRESS_N 1.0
 #endif
-#include "flotor.h"
+#include "fixture.h"
 #include <stdlib.h>
-#include <string.h>
-
-FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-press\"\nname = \"Press\"\ndoc = \"Presses along each axis\"\n"
-                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_press\"\n");
 
 enum { BEGIN = 400, PRESSED = 300, ROUND = 600 };
 
@@ -36,22 +32,5 @@ static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOu
     return FlotorCallStatus_Ok;
 }
 
-static const FlotorForceTable table = {
-    .size = sizeof(FlotorForceTable),
-    .info = {.id = FLOTOR_STR("fixture-press"), .name = FLOTOR_STR("Press"), .doc = FLOTOR_STR("Presses along each axis"),
-             .serves = {FLOTOR_DEMAND_FORCE | FLOTOR_DEMAND_TORQUE},
-             .memory = FlotorMemory_PathDependent},
-    .create = create,
-    .destroy = destroy,
-    .step = step,
-};
-
-static const void *get_interface(FlotorStr id) {
-    static const char force[] = FLOTOR_INTERFACE_FORCE;
-    return id.len == sizeof force - 1 && memcmp(id.ptr, force, id.len) == 0 ? &table : NULL;
-}
-
-FLOTOR_ENTRY(flotor_entry_press) = {
-    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model),
-    .get_interface = get_interface,
-};
+MODEL(press, "fixture-press", "Press", "Presses along each axis", FlotorMemory_PathDependent,
+      .create = create, .destroy = destroy, .step = step);

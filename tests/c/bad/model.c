@@ -1,15 +1,12 @@
 /* A force model in C that is right as it stands: a spring to home whose stiffness may change while it is felt. Each macro
  * makes one mistake, which `flotor validate` has to find; PRINTS is none. */
-#include "flotor.h"
+#include "../fixture.h"
 #include <math.h>
 #include <pthread.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
-FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-c-bad-model\"\nname = \"Bad model\"\ndoc = \"A spring with a mistake\"\n"
-                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_bad_model\"\n");
+DESCRIPTION("model", bad_model, "fixture-c-bad-model", "Bad model", "A spring with a mistake");
 
 #if defined(INTEGRATES) || defined(INTEGRATES_AND_RESETS)
 #define MEMORY FlotorMemory_PathDependent
@@ -236,10 +233,6 @@ static uint32_t region(FlotorInstance instance, FlotorActiveRegion *out) {
 static const FlotorActiveRegionTable activity_table = {.size = sizeof(FlotorActiveRegionTable), .region = region};
 #endif
 
-static bool is_called(FlotorStr id, const char *name) {
-    return id.len == strlen(name) && memcmp(id.ptr, name, id.len) == 0;
-}
-
 static const void *get_interface(FlotorStr id) {
 #if defined(LOCAL) || defined(ACTS_OUTSIDE)
     if (is_called(id, FLOTOR_INTERFACE_ACTIVE_REGION)) {
@@ -249,7 +242,4 @@ static const void *get_interface(FlotorStr id) {
     return is_called(id, FLOTOR_INTERFACE_FORCE) ? &table : NULL;
 }
 
-FLOTOR_ENTRY(flotor_entry_bad_model) = {
-    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model),
-    .get_interface = get_interface,
-};
+ENTRY(FlotorPluginKind_Model, bad_model);

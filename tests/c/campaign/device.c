@@ -4,13 +4,11 @@
  * Its handle goes round on its own, beyond the range too. Some samples are lost, some cannot be. SIMULATED makes it one that no
  * hand holds. */
 #define _GNU_SOURCE
-#include "flotor.h"
+#include "../fixture.h"
 #include <fcntl.h>
 #include <math.h>
 #include <stdatomic.h>
-#include <stdbool.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -19,9 +17,6 @@
 #else
 #define EMBODIMENT FlotorEmbodiment_Physical
 #endif
-
-FLOTOR_METADATA("kind = \"device\"\nid = \"fixture-logs\"\nname = \"Logs\"\ndoc = \"A handle that goes round, with a log\"\n"
-                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_logs\"\n");
 
 enum { LOG, SEED, LOST, IMPOSSIBLE, UNTAKEN, FAULT_AT, FORCE, TORQUE, SLEW, RANGE_MM, AMPLITUDE_MM, AXES, PARAMETERS };
 
@@ -214,28 +209,7 @@ static void safe_stop(FlotorInstance instance) {
     note(instance, STOPPED, 0, NULL);
 }
 
-static const FlotorDeviceTable table = {
-    .size = sizeof(FlotorDeviceTable),
-    .parameter_count = PARAMETERS,
-    .parameters = parameters,
-    .info = {.id = FLOTOR_STR("fixture-logs"), .name = FLOTOR_STR("Logs"),
-             .doc = FLOTOR_STR("A handle that goes round, with a log"), .embodiment = EMBODIMENT},
-    .open = open_handle,
-    .close = close_handle,
-    .capabilities = capabilities,
-    .activate = activate,
-    .deactivate = deactivate,
-    .read = read_handle,
-    .write = write_handle,
-    .safe_stop = safe_stop,
-};
-
-static const void *get_interface(FlotorStr id) {
-    static const char device[] = FLOTOR_INTERFACE_DEVICE;
-    return id.len == sizeof device - 1 && memcmp(id.ptr, device, id.len) == 0 ? &table : NULL;
-}
-
-FLOTOR_ENTRY(flotor_entry_logs) = {
-    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Device),
-    .get_interface = get_interface,
-};
+DEVICE(logs, "fixture-logs", "Logs", "A handle that goes round, with a log",
+       .info.embodiment = EMBODIMENT, .parameter_count = PARAMETERS, .parameters = parameters,
+       .open = open_handle, .close = close_handle, .capabilities = capabilities, .activate = activate,
+       .deactivate = deactivate, .read = read_handle, .write = write_handle, .safe_stop = safe_stop);

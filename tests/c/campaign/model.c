@@ -1,19 +1,17 @@
 /* A model in C that asks for anything: numbers of every size and none, by chance, changing its mind every now and then. At one step
  * it may end its process, or be late from then on. It offers a local linear field, which is as wild. */
 #define _GNU_SOURCE
-#include "flotor.h"
+#include "../fixture.h"
 #include <fenv.h>
 #include <float.h>
 #include <math.h>
 #include <pthread.h>
 #include <signal.h>
 #include <stdlib.h>
-#include <string.h>
 #include <time.h>
 #include <unistd.h>
 
-FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-wild\"\nname = \"Wild\"\ndoc = \"Asks for anything\"\n"
-                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_wild\"\n");
+DESCRIPTION("model", wild, "fixture-wild", "Wild", "Asks for anything");
 
 enum { SEED, SCALE, DEATH, AT, PARAMETERS };
 
@@ -191,14 +189,10 @@ static const FlotorForceTable table = {
 static const FlotorLinearFieldTable field_table = {.size = sizeof(FlotorLinearFieldTable), .linear_field = linear_field};
 
 static const void *get_interface(FlotorStr id) {
-    static const char force[] = FLOTOR_INTERFACE_FORCE, field[] = FLOTOR_INTERFACE_LINEAR_FIELD;
-    if (id.len == sizeof field - 1 && memcmp(id.ptr, field, id.len) == 0) {
+    if (is_called(id, FLOTOR_INTERFACE_LINEAR_FIELD)) {
         return &field_table;
     }
-    return id.len == sizeof force - 1 && memcmp(id.ptr, force, id.len) == 0 ? &table : NULL;
+    return is_called(id, FLOTOR_INTERFACE_FORCE) ? &table : NULL;
 }
 
-FLOTOR_ENTRY(flotor_entry_wild) = {
-    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model),
-    .get_interface = get_interface,
-};
+ENTRY(FlotorPluginKind_Model, wild);

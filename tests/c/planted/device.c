@@ -1,8 +1,6 @@
 /* A handle a millimetre below home that delivers what it is told, with one of the faults of a device. */
 #include "planted.h"
-
-FLOTOR_METADATA("kind = \"device\"\nid = \"fixture-planted-device\"\nname = \"Planted device\"\ndoc = \"A handle with a fault\"\n"
-                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_planted_device\"\n");
+#include "../handle.h"
 
 #define FAULTS(X)                                                                                                         \
     X(none) X(loop_open) X(loop_caps) X(loop_activate) X(loop_read) X(loop_write) X(loop_stop) X(loop_deactivate)         \
@@ -16,41 +14,39 @@ FLOTOR_METADATA("kind = \"device\"\nid = \"fixture-planted-device\"\nname = \"Pl
 PLANTED_SCHEMA
 
 typedef struct {
+    Handle handle;
     int fault;
-    FlotorWrench held;
-    atomic_bool stopped;
-    bool active;
     unsigned asked;
     unsigned reads;
     unsigned writes;
     char *block;
-} Handle;
+} Planted;
 
 static uint32_t open_handle(const FlotorParameterValue *values, uint32_t count, FlotorMessage *message, FlotorInstance *out) {
     (void)message;
-    Handle *handle = calloc(1, sizeof *handle);
-    if (handle == NULL) {
+    Planted *planted = calloc(1, sizeof *planted);
+    if (planted == NULL) {
         return FlotorRefusalKind_Resource;
     }
-    handle->fault = chosen(values, count);
-    handle->block = malloc(64);
-    if (handle->fault == FAULT_loop_open) {
+    planted->fault = chosen(values, count);
+    planted->block = malloc(64);
+    if (planted->fault == FAULT_loop_open) {
         loop_for_ever();
     }
-    *out = handle;
+    *out = planted;
     return 0;
 }
 
 static void close_handle(FlotorInstance instance) {
-    Handle *handle = instance;
-    if (handle->fault == FAULT_loop_close) {
+    Planted *planted = instance;
+    if (planted->fault == FAULT_loop_close) {
         loop_for_ever();
     }
-    if (handle->fault == FAULT_segv_close) {
+    if (planted->fault == FAULT_segv_close) {
         crash();
     }
-    free(handle->block);
-    free(handle);
+    free(planted->block);
+    free(planted);
 }
 
 static void set(double *numbers, double value) {
@@ -60,21 +56,12 @@ static void set(double *numbers, double value) {
 }
 
 static uint32_t capabilities(FlotorInstance instance, FlotorCapabilities *out) {
-    Handle *handle = instance;
-    *out = (FlotorCapabilities){
-        .sensed = {FLOTOR_AXES_ALL},
-        .actuated = {FLOTOR_AXES_ALL},
-        .range_m = {0.01, 0.01, 0.01},
-        .range_rad = {0.1, 0.1, 0.1},
-        .max_force_n = {10.0, 10.0, 10.0},
-        .max_torque_nm = {0.5, 0.5, 0.5},
-        .max_force_slew_n_per_s = 1.0e4,
-        .max_torque_slew_nm_per_s = 1.0e3,
-        .max_stiffness_n_per_m = 1.0e4,
-        .rate_hz = {100.0, 10000.0},
-    };
-    handle->asked += 1;
-    switch (handle->fault) {
+    Planted *planted = instance;
+    handle_capabilities(instance, out);
+    out->max_force_slew_n_per_s = 1.0e4;
+    out->max_torque_slew_nm_per_s = 1.0e3;
+    planted->asked += 1;
+    switch (planted->fault) {
     case FAULT_loop_caps: loop_for_ever(); break;
     case FAULT_caps_nan: out->max_force_n[1] = NAN; break;
     case FAULT_caps_neg: out->max_force_n[1] = -1.0; break;
@@ -85,7 +72,7 @@ static uint32_t capabilities(FlotorInstance instance, FlotorCapabilities *out) {
     case FAULT_caps_rate_swapped: out->rate_hz[0] = 10000.0, out->rate_hz[1] = 100.0; break;
     case FAULT_caps_axes_junk: out->sensed.bits = out->actuated.bits = 0xffffffffU; break;
     case FAULT_caps_range0: set(out->range_m, 0.0), set(out->range_rad, 0.0); break;
-    case FAULT_caps_change: out->max_force_n[2] += handle->asked; break;
+    case FAULT_caps_change: out->max_force_n[2] += planted->asked; break;
     default: break;
     }
     return FlotorCallStatus_Ok;
@@ -96,51 +83,39 @@ static void caught(int number) {
 }
 
 static uint32_t activate(FlotorInstance instance, const FlotorLoopConfig *config, FlotorMessage *message) {
-    (void)config;
-    Handle *handle = instance;
-    switch (handle->fault) {
+    Planted *planted = instance;
+    switch (planted->fault) {
     case FAULT_loop_activate: loop_for_ever(); break;
     case FAULT_activate_busy3s: sleep_us(3000000); break;
     case FAULT_activate_fail: memcpy(message->text, "no power", 8), message->len = 8; return FlotorRefusalKind_Resource;
     case FAULT_sighandlers: signal(SIGINT, caught), signal(SIGTERM, caught); break;
     default: break;
     }
-    memset(&handle->held, 0, sizeof handle->held);
-    atomic_store(&handle->stopped, false);
-    handle->active = true;
-    return 0;
+    return handle_activate(instance, config, message);
 }
 
 static uint32_t deactivate(FlotorInstance instance) {
-    Handle *handle = instance;
-    if (handle->fault == FAULT_loop_deactivate) {
+    Planted *planted = instance;
+    if (planted->fault == FAULT_loop_deactivate) {
         loop_for_ever();
     }
-    bool was_active = handle->active;
-    handle->active = false;
-    return was_active && handle->fault != FAULT_deactivate_fail ? (uint32_t)FlotorCallStatus_Ok
-                                                                : (uint32_t)FlotorCallStatus_WrongPhase;
+    const uint32_t status = handle_deactivate(instance);
+    return planted->fault == FAULT_deactivate_fail ? (uint32_t)FlotorCallStatus_WrongPhase : status;
 }
 
 static FlotorCycleCode read_handle(FlotorInstance instance, const FlotorTick *tick, FlotorDeviceState *state) {
-    Handle *handle = instance;
-    memset(state, 0, sizeof *state);
-    state->pose.position_m[2] = -0.001;
-    state->pose.orientation_xyzw[3] = 1.0;
-    state->sampled_ns = tick->time_ns;
-    if (!atomic_load(&handle->stopped)) {
-        state->delivered = handle->held;
-        /* It gives way a little: a micrometre a newton, and another for what is behind it. */
-        state->pose.position_m[2] += 1.0e-6 * handle->held.force_n[2];
+    Planted *planted = instance;
+    handle_read(instance, tick, state);
+    /* It gives way a little: a micrometre a newton, and another for what is behind it. */
+    state->pose.position_m[2] += 1.0e-6 * state->delivered.force_n[2];
+    planted->reads += 1;
+    if (planted->fault != FAULT_stuck) {
+        state->pose.position_m[0] = 1.0e-7 * (planted->reads % 7);
     }
-    handle->reads += 1;
-    if (handle->fault != FAULT_stuck) {
-        state->pose.position_m[0] = 1.0e-7 * (handle->reads % 7);
-    }
-    if (handle->reads < 2) {
+    if (planted->reads < 2) {
         return FLOTOR_CYCLE_FRESH;
     }
-    switch (handle->fault) {
+    switch (planted->fault) {
     case FAULT_loop_read: loop_for_ever(); break;
     case FAULT_segv_read: crash(); break;
     case FAULT_exit_read: exit(0);
@@ -162,7 +137,7 @@ static FlotorCycleCode read_handle(FlotorInstance instance, const FlotorTick *ti
     case FAULT_deliver_nan: state->delivered.force_n[2] = NAN; break;
     case FAULT_buttons_all: state->buttons = 0xffffffffU; break;
     case FAULT_cond_junk: state->conditions.bits = 0xffffffffU; break;
-    case FAULT_heap: ((volatile char *)handle->block)[64] = 1; break;
+    case FAULT_heap: ((volatile char *)planted->block)[64] = 1; break;
     case FAULT_rounding: fesetround(FE_UPWARD); break;
     default: break;
     }
@@ -170,17 +145,16 @@ static FlotorCycleCode read_handle(FlotorInstance instance, const FlotorTick *ti
 }
 
 static FlotorCycleCode write_handle(FlotorInstance instance, const FlotorTick *tick, const FlotorWrench *wrench) {
-    (void)tick;
-    Handle *handle = instance;
-    handle->writes += 1;
-    if (handle->fault == FAULT_write_stale) {
+    Planted *planted = instance;
+    planted->writes += 1;
+    if (planted->fault == FAULT_write_stale) {
         return FLOTOR_CYCLE_STALE;
     }
-    handle->held = *wrench;
-    if (handle->writes < 2) {
+    handle_write(instance, tick, wrench);
+    if (planted->writes < 2) {
         return FLOTOR_CYCLE_FRESH;
     }
-    switch (handle->fault) {
+    switch (planted->fault) {
     case FAULT_loop_write: loop_for_ever(); break;
     case FAULT_segv_write: crash(); break;
     case FAULT_sleep_write: sleep_us(3000); break;
@@ -191,39 +165,18 @@ static FlotorCycleCode write_handle(FlotorInstance instance, const FlotorTick *t
 }
 
 static void safe_stop(FlotorInstance instance) {
-    Handle *handle = instance;
-    switch (handle->fault) {
+    Planted *planted = instance;
+    switch (planted->fault) {
     case FAULT_loop_stop: loop_for_ever(); break;
     case FAULT_segv_stop: crash(); break;
     case FAULT_exit_stop: exit(0);
     case FAULT_stop_slow: sleep_us(2000000); break;
     default: break;
     }
-    atomic_store(&handle->stopped, true);
+    handle_safe_stop(instance);
 }
 
-static const FlotorDeviceTable table = {
-    .size = sizeof(FlotorDeviceTable),
-    .parameter_count = 1,
-    .parameters = parameters,
-    .info = {.id = FLOTOR_STR("fixture-planted-device"), .name = FLOTOR_STR("Planted device"),
-             .doc = FLOTOR_STR("A handle with a fault")},
-    .open = open_handle,
-    .close = close_handle,
-    .capabilities = capabilities,
-    .activate = activate,
-    .deactivate = deactivate,
-    .read = read_handle,
-    .write = write_handle,
-    .safe_stop = safe_stop,
-};
-
-static const void *get_interface(FlotorStr id) {
-    static const char device[] = FLOTOR_INTERFACE_DEVICE;
-    return id.len == sizeof device - 1 && memcmp(id.ptr, device, id.len) == 0 ? &table : NULL;
-}
-
-FLOTOR_ENTRY(flotor_entry_planted_device) = {
-    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Device),
-    .get_interface = get_interface,
-};
+DEVICE(planted_device, "fixture-planted-device", "Planted device", "A handle with a fault",
+       .parameter_count = 1, .parameters = parameters, .open = open_handle, .close = close_handle,
+       .capabilities = capabilities, .activate = activate, .deactivate = deactivate, .read = read_handle,
+       .write = write_handle, .safe_stop = safe_stop);

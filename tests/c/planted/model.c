@@ -1,8 +1,7 @@
 /* A spring to home with one of the faults of a force model. */
 #include "planted.h"
 
-FLOTOR_METADATA("kind = \"model\"\nid = \"fixture-planted-model\"\nname = \"Planted model\"\ndoc = \"A spring with a fault\"\n"
-                "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_planted_model\"\n");
+DESCRIPTION("model", planted_model, "fixture-planted-model", "Planted model", "A spring with a fault");
 
 #define FAULTS(X)                                                                                                         \
     X(none) X(loop_step) X(loop_create) X(loop_destroy) X(loop_prepare) X(loop_param) X(segv) X(stack) X(abort) X(exit0)  \
@@ -436,14 +435,11 @@ static const void *get_interface(FlotorStr id) {
     schema[1] = (FlotorParameter){.id = FLOTOR_STR("weight"), .unit = FLOTOR_STR("1"), .doc = FLOTOR_STR("Changes nothing"),
                                   .kind = FlotorParameterKind_Real, .mutability = FlotorMutability_Live, .max = 1.0};
     for (size_t at = 0; at < sizeof offered / sizeof *offered; at++) {
-        if (id.len == strlen(offered[at].id) && memcmp(id.ptr, offered[at].id, id.len) == 0) {
+        if (is_called(id, offered[at].id)) {
             return offered[at].table;
         }
     }
     return NULL;
 }
 
-FLOTOR_ENTRY(flotor_entry_planted_model) = {
-    FLOTOR_ENTRY_HEAD(FlotorPluginKind_Model),
-    .get_interface = get_interface,
-};
+ENTRY(FlotorPluginKind_Model, planted_model);

@@ -1,7 +1,7 @@
 /* What the plugins of this folder share: a fault is chosen by the setting `fault`, and comes with the second step, read or write
  * where it is one of those. Everything here is wrong on purpose. */
 #define _GNU_SOURCE
-#include "flotor.h"
+#include "../fixture.h"
 #include <errno.h>
 #include <fenv.h>
 #include <float.h>
@@ -10,10 +10,8 @@
 #include <sched.h>
 #include <signal.h>
 #include <stdatomic.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <sys/mman.h>
 #include <sys/ptrace.h>
 #include <sys/resource.h>

@@ -1,4 +1,4 @@
-//! A device that keeps its last force for ever and logs it (`tests/c/post.c`), and commands that drive it.
+//! A device that keeps its last force for ever and logs it (`tests/c/post_with_log.c`), and commands that drive it.
 
 use crate::force_log::ForceLog;
 use flotor_tests::library::compile_c_file;
@@ -27,7 +27,7 @@ impl Post {
     pub(crate) fn new() -> Self {
         let (terminal, log) = logged();
         let post = Self { scratch: Scratch::default(), terminal, sensor: force_sensor(), log };
-        compile_c_file(&workspace_root().join("tests/c/post.c"), &["KEEPS_FORCE"], &post.library());
+        compile_c_file(&workspace_root().join("tests/c/post_with_log.c"), &[], &post.library());
         post
     }
 
