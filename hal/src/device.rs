@@ -174,7 +174,7 @@ impl DeviceState {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.pose.non_finite_bits() | self.twist.non_finite_bits() == 0
+        self.pose.is_finite() & self.twist.is_finite() // without a branch
     }
 }
 

@@ -54,13 +54,7 @@ impl Pose {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.non_finite_bits() == 0
-    }
-
-    /// Returns 0 if every number is finite.
-    #[inline]
-    pub(crate) fn non_finite_bits(&self) -> u64 {
-        non_finite_bits(&self.position_m) | non_finite_bits(&self.orientation_xyzw)
+        non_finite_bits(&self.position_m) | non_finite_bits(&self.orientation_xyzw) == 0
     }
 }
 
@@ -104,13 +98,7 @@ impl Twist {
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.non_finite_bits() == 0
-    }
-
-    /// Returns 0 if every number is finite.
-    #[inline]
-    pub(crate) fn non_finite_bits(&self) -> u64 {
-        non_finite_bits(&self.linear_m_per_s) | non_finite_bits(&self.angular_rad_per_s)
+        non_finite_bits(&self.linear_m_per_s) | non_finite_bits(&self.angular_rad_per_s) == 0
     }
 }
 

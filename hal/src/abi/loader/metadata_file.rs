@@ -1,5 +1,6 @@
 //! Metadata of a plugin file, read without running the plugin's code.
 
+use super::platform::NoSection;
 use super::{LoadError, platform};
 use crate::abi::{CONTRACT, PluginKind};
 use object::{ReadCache, ReadRef};
@@ -67,7 +68,11 @@ impl Metadata {
 
 /// Parses the metadata section of a library.
 pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Result<Metadata, LoadError> {
-    let text = platform::metadata_section(path, data, length)?;
+    let text = platform::metadata_section(data, length).map_err(|reason| match reason {
+        NoSection::NotALibrary(cause) => LoadError::NotALibrary { path: path.into(), cause },
+        NoSection::Truncated { need } => LoadError::Truncated { path: path.into(), have: length, need },
+        NoSection::NotAPlugin => LoadError::NotAPlugin { path: path.into() },
+    })?;
     let bad = |cause: String| LoadError::BadMetadata { path: path.into(), cause };
     let text = std::str::from_utf8(text).map_err(|cause| bad(cause.to_string()))?;
     let pairs = text.trim_end_matches('\0').lines().map(str::trim).filter(|line| !line.is_empty());

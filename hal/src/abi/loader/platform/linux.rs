@@ -1,6 +1,6 @@
 //! Linux: ELF, a copy in memory without a name, `dlopen`.
 
-use crate::abi::loader::LoadError;
+use super::NoSection;
 use crate::abi::metadata;
 use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 use object::elf::FileHeader64;
@@ -109,34 +109,28 @@ pub(crate) fn link_remedy(cause: &str) -> &'static str {
 /// Returns the bytes of the metadata section.
 ///
 /// # Errors
-/// [`LoadError`] if the file is no complete ELF library or has no metadata section.
-pub(crate) fn metadata_section<'d>(
-    path: &Path,
-    data: impl ReadRef<'d>,
-    length: u64,
-) -> Result<&'d [u8], LoadError> {
-    let not_a_library = |cause| LoadError::NotALibrary { path: path.into(), cause };
+/// [`NoSection`] if the file is no complete ELF library or has no metadata section.
+pub(crate) fn metadata_section<'d>(data: impl ReadRef<'d>, length: u64) -> Result<&'d [u8], NoSection> {
     // Check the header first: its section table is at the end of the file, which a truncation removes first.
-    let header = FileHeader64::<Endianness>::parse(data).map_err(not_a_library)?;
-    let truncated = |need| LoadError::Truncated { path: path.into(), have: length, need };
-    let need = end_of_section_headers(header).map_err(not_a_library)?;
+    let header = FileHeader64::<Endianness>::parse(data)?;
+    let need = end_of_section_headers(header)?;
     if need > length {
-        return Err(truncated(need));
+        return Err(NoSection::Truncated { need });
     }
-    let endian = header.endian().map_err(not_a_library)?;
-    let segments = header.program_headers(endian, data).map_err(not_a_library)?;
-    let sections = header.sections(endian, data).map_err(not_a_library)?;
+    let endian = header.endian()?;
+    let segments = header.program_headers(endian, data)?;
+    let sections = header.sections(endian, data)?;
     // `dlopen` maps all segments and raises SIGBUS if the file is shorter.
     let ends =
         segments.iter().map(|segment| segment.p_offset(endian).saturating_add(segment.p_filesz(endian)));
     let ranges = sections.iter().filter_map(|section| section.file_range(endian));
     let need = ends.chain(ranges.map(|(offset, size)| offset.saturating_add(size))).max().unwrap_or(0);
     if need > length {
-        return Err(truncated(need));
+        return Err(NoSection::Truncated { need });
     }
     let section = sections.section_by_name(endian, metadata::SECTION.as_bytes());
-    let (_, section) = section.ok_or_else(|| LoadError::NotAPlugin { path: path.into() })?;
-    section.data(endian, data).map_err(not_a_library)
+    let (_, section) = section.ok_or(NoSection::NotAPlugin)?;
+    Ok(section.data(endian, data)?)
 }
 
 /// Returns the file length that the section headers require, bytes.

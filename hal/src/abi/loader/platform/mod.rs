@@ -16,6 +16,25 @@ pub(crate) use linux::{Handle, PrivateCopy, link_remedy, metadata_section, writa
 #[cfg(windows)]
 pub(crate) use windows::{Handle, PrivateCopy, link_remedy, metadata_section, writable_duplicate};
 
+/// Reason why a file has no metadata section that can be read.
+pub(crate) enum NoSection {
+    /// The file is no library of this system.
+    NotALibrary(object::Error),
+    /// The file is shorter than the library's tables require.
+    Truncated {
+        /// Bytes required.
+        need: u64,
+    },
+    /// The library has no such section.
+    NotAPlugin,
+}
+
+impl From<object::Error> for NoSection {
+    fn from(cause: object::Error) -> Self {
+        Self::NotALibrary(cause)
+    }
+}
+
 /// Returns the text of an error with the chain of its causes.
 fn whole_cause(error: &dyn std::error::Error) -> String {
     let mut text = error.to_string();

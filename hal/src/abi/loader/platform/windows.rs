@@ -1,6 +1,6 @@
 //! Windows: PE, a copy in the folder for temporary files, `LoadLibrary`.
 
-use crate::abi::loader::LoadError;
+use super::NoSection;
 use crate::abi::metadata;
 use libloading::os::windows::Library;
 use object::ReadRef;
@@ -107,27 +107,22 @@ fn remove_those_nobody_has(folder: &Path) {
 /// Returns the bytes of the metadata section.
 ///
 /// # Errors
-/// [`LoadError`] if the file is no complete 64-bit PE library or has no metadata section.
-pub(crate) fn metadata_section<'d>(
-    path: &Path,
-    data: impl ReadRef<'d>,
-    length: u64,
-) -> Result<&'d [u8], LoadError> {
-    let not_a_library = |cause| LoadError::NotALibrary { path: path.into(), cause };
-    let dos = ImageDosHeader::parse(data).map_err(not_a_library)?;
+/// [`NoSection`] if the file is no complete 64-bit PE library or has no metadata section.
+pub(crate) fn metadata_section<'d>(data: impl ReadRef<'d>, length: u64) -> Result<&'d [u8], NoSection> {
+    let dos = ImageDosHeader::parse(data)?;
     let mut offset = u64::from(dos.nt_headers_offset());
-    let (headers, _) = ImageNtHeaders64::parse(data, &mut offset).map_err(not_a_library)?;
-    let sections = headers.sections(data, offset).map_err(not_a_library)?;
+    let (headers, _) = ImageNtHeaders64::parse(data, &mut offset)?;
+    let sections = headers.sections(data, offset)?;
     let need = sections.iter().map(|section| {
         let (at, size) = section.pe_file_range();
         u64::from(at) + u64::from(size)
     });
     let need = need.max().unwrap_or(0);
     if need > length {
-        return Err(LoadError::Truncated { path: path.into(), have: length, need });
+        return Err(NoSection::Truncated { need });
     }
     let named = |name: &[u8]| name.strip_suffix(b"\0").unwrap_or(name) == metadata::SECTION.as_bytes();
     let section = sections.iter().find(|section| named(&section.name));
-    let section = section.ok_or_else(|| LoadError::NotAPlugin { path: path.into() })?;
-    section.pe_data(data).map_err(not_a_library)
+    let section = section.ok_or(NoSection::NotAPlugin)?;
+    Ok(section.pe_data(data)?)
 }
