@@ -6,10 +6,10 @@ use clap::Command;
 #[must_use]
 pub fn whole_program() -> Command {
     let separate = [
-        flotor_lab::cli::command(),
-        flotor_study_program::command(),
-        flotor_calibration::cli::command(),
-        flotor_test::cli::command(),
+        flotor_lab::cli::PARSER(),
+        flotor_study_program::PARSER(),
+        flotor_calibration::cli::PARSER(),
+        flotor_test::cli::PARSER(),
     ];
     flotor_command::whole_program(flotor::cli::command(), &separate)
 }

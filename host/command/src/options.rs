@@ -1,7 +1,7 @@
 //! Options of several commands, and their parsers.
 
 use crate::CommandError;
-use clap::{Args, Command, Parser, ValueEnum};
+use clap::{Args, Command, CommandFactory, Parser, Subcommand, ValueEnum};
 pub use flotor_core::LARGEST_SEED;
 use flotor_core::limits::Limits;
 use flotor_hal::abi::loader::{Plugin, Setting};
@@ -41,6 +41,25 @@ pub fn arguments<T: Parser>() -> T {
     T::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
+// Without a doc comment, which would replace the description of the program: that of the commands.
+#[derive(Parser)]
+#[command(name = "flotor", bin_name = "flotor", version, max_term_width = 110)]
+struct SeparateArguments<C: Subcommand> {
+    #[command(subcommand)]
+    command: C,
+}
+
+/// Returns the parser of a program that `flotor` starts for these commands. Not real-time.
+#[must_use]
+pub fn parser_of<C: Subcommand>() -> Command {
+    SeparateArguments::<C>::command()
+}
+
+/// Parses the command of this process, a program that `flotor` starts; as [`arguments`] does.
+pub fn command_of<C: Subcommand>() -> C {
+    arguments::<SeparateArguments<C>>().command
+}
+
 fn with_negative_numbers(command: Command) -> Command {
     let command = command.mut_args(|arg| {
         let takes_values = arg.get_action().takes_values();
@@ -59,20 +78,47 @@ pub enum ClockOption {
     Virtual,
 }
 
-/// `--allow-strong`, of each command that runs a scene on a device.
-#[derive(Args, Clone, Copy, Debug, Default)]
-pub struct StrengthOption {
+/// Options of each command that runs a scene on a device.
+#[derive(Args, Clone, Debug, Default)]
+pub struct SceneOptions {
+    #[command(flatten)]
+    plugin_path: PluginPathOption,
     /// Lift the host's ceiling of 20 N and 1 N·m for devices that are not simulated
     #[arg(long)]
     allow_strong: bool,
+    #[command(flatten)]
+    control_group: ControlGroupOption,
 }
 
-impl StrengthOption {
-    /// Returns the strength that the option selects.
+impl SceneOptions {
+    /// Returns the strength that `--allow-strong` selects.
     #[must_use]
-    pub fn strength(self) -> Strength {
+    pub fn strength(&self) -> Strength {
         if self.allow_strong { Strength::Strong } else { Strength::UnderCeiling }
     }
+
+    /// Adds the folders of plugins and the consent to a shared control group to a scene.
+    pub fn apply(&self, scene: &mut Scene) {
+        self.plugin_path.put_before_those_of(scene);
+        self.control_group.apply(&mut scene.limits);
+    }
+}
+
+/// Options of each command that lends a device to programs of other makers' interfaces.
+#[derive(Args, Clone, Debug, Default)]
+pub struct LendOptions {
+    /// Record every tick to an MCAP file
+    #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
+    pub record: Option<PathBuf>,
+    /// Write the summary as JSON
+    #[arg(long, value_parser = json_file, value_name = "FILE.json")]
+    pub json: Option<PathBuf>,
+    /// Folders to search for plugins.
+    #[command(flatten)]
+    pub plugin_path: PluginPathOption,
+    /// Consent to a shared control group.
+    #[command(flatten)]
+    pub control_group: ControlGroupOption,
 }
 
 /// `--accept-shared-control-group`, of each command that drives a device.

@@ -5,8 +5,8 @@ use crate::platform::most_open_files;
 use crate::run_picture::RunPicture;
 use clap::{Args, ValueEnum};
 use flotor_command::options::{
-    ClockOption, ControlGroupOption, JsonOption, PluginKeyValue, PluginPathOption, StrengthOption, core,
-    duration_s, mcap_file, rate_hz, seed, svg_file,
+    ClockOption, JsonOption, PluginKeyValue, SceneOptions, core, duration_s, mcap_file, rate_hz, seed,
+    svg_file,
 };
 use flotor_command::stopping::{Keys, stop_on_signals, stop_run_on_signals};
 use flotor_command::{
@@ -78,11 +78,7 @@ pub(crate) struct RunArguments {
     #[arg(long, hide = true, value_name = "HOST:PORT")]
     ml_api: Option<String>,
     #[command(flatten)]
-    plugin_path: PluginPathOption,
-    #[command(flatten)]
-    strength: StrengthOption,
-    #[command(flatten)]
-    control_group: ControlGroupOption,
+    options: SceneOptions,
 }
 
 impl RunArguments {
@@ -135,7 +131,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let options = RunOptions { clock, seed: arguments.seed };
     let registry = Registry::search(&scene.plugin_folders);
     let session = while_preparing(&scene.title, || Session::prepare(&scene, &registry, &options))?;
-    let mut session = session.with_strength(arguments.strength.strength()).on_core(arguments.core);
+    let mut session = session.with_strength(arguments.options.strength()).on_core(arguments.core);
     if !arguments.is_lent() {
         session.notices().into_iter().for_each(note);
     }
@@ -172,6 +168,17 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let ObservedRun { observer: Watchers { tally, digest, mut recording, plot, progress, .. }, publication } =
         watched;
     progress.finish_and_clear();
+    let facts = RunFacts {
+        title: &scene.title,
+        clock: clock_word,
+        seed: arguments.seed,
+        rate_hz: scene.rate_hz,
+        plugins: &plugins,
+        requested,
+        couplings: &[],
+        carried: &[],
+        trace_digest: digest.finish(),
+    };
     let outcome = match outcome {
         Ok(outcome) => outcome,
         Err(error) => {
@@ -179,17 +186,6 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
             let reported = match (&error, arguments.json.file()) {
                 (RunError::Hung { who, stuck, .. }, Some(json)) => {
                     let elapsed_ns = tally.last_ns();
-                    let facts = RunFacts {
-                        title: &scene.title,
-                        clock: clock_word,
-                        seed: arguments.seed,
-                        rate_hz: scene.rate_hz,
-                        plugins: &plugins,
-                        requested,
-                        couplings: &[],
-                        carried: &[],
-                        trace_digest: digest.finish(),
-                    };
                     let summary = RunSummary::new(facts, &Outcome::of_hung_loop(*stuck, elapsed_ns), &tally);
                     write_json(json, &summary.with_health(who, &error.to_string()))
                 }
@@ -204,17 +200,7 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     if let Some(publication) = publication {
         publication.end(&end_words(&outcome, scene.rate_hz), end_kind(outcome.end));
     }
-    let facts = RunFacts {
-        title: &scene.title,
-        clock: clock_word,
-        seed: arguments.seed,
-        rate_hz: scene.rate_hz,
-        plugins: &plugins,
-        requested,
-        couplings: &scene.couplings,
-        carried: &carried,
-        trace_digest: digest.finish(),
-    };
+    let facts = RunFacts { couplings: &scene.couplings, carried: &carried, ..facts };
     let summary = RunSummary::new(facts, &outcome, &tally);
     // Before any other step that can fail: the recording cannot be repeated.
     let recorded = recording.finish(&notes(&outcome, &summary)).map_err(Into::into);
@@ -317,8 +303,7 @@ fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
         let added = Scene::parse(Path::new("--ml-api"), ML_API).map_err(RunError::Scene)?.models;
         scene.models.extend(added.iter().map(|model| model.replaced_by(None, &[("listen", listen)])));
     }
-    arguments.control_group.apply(&mut scene.limits);
-    arguments.plugin_path.put_before_those_of(&mut scene);
+    arguments.options.apply(&mut scene);
     for set in &arguments.sets {
         set.apply(&mut scene).map_err(CommandError::Usage)?;
     }

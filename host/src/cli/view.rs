@@ -75,13 +75,8 @@ pub(crate) struct ViewArguments {
     #[arg(long, value_name = "FACTOR", conflicts_with = "export")]
     scale: Option<String>,
     /// With --screenshot: degrees of the camera to the right and above the horizon, and magnification (default: 31.5,13.8)
-    #[arg(
-        long,
-        value_name = "AZIMUTH,INCLINATION[,ZOOM]",
-        requires = "screenshot",
-        conflicts_with = "window",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "AZIMUTH,INCLINATION[,ZOOM]", allow_hyphen_values = true)]
+    #[arg(requires = "screenshot", conflicts_with = "window")]
     view: Option<String>,
     /// Measure the processor time of the window for this duration, then close the window
     #[arg(long, value_name = "SECONDS", conflicts_with_all = ["screenshot", "export"])]

@@ -7,7 +7,7 @@ use crate::file::{SUFFIX, TestFile};
 use crate::numbers::misspelt;
 use crate::process::{Flotor, ProcessResult};
 use crate::report::{Report, deliver, is_output, remove};
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, Subcommand};
 use flotor_command::options::{JsonOption, PluginPathOption, count, duration_s, new_file};
 use flotor_command::{CommandError, exit_code_of, options, print_error_line, report_line};
 use std::num::NonZeroUsize;
@@ -18,13 +18,6 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// Test force models and devices; `flotor test` starts this program.
-#[derive(Parser)]
-#[command(name = "flotor", bin_name = "flotor", version, max_term_width = 110)]
-struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
 #[derive(Subcommand)]
 enum Command {
     Test(TestArguments),
@@ -79,16 +72,13 @@ struct TestArguments {
     digest: bool,
 }
 
-/// Returns the command with its arguments. Not real-time.
-#[must_use]
-pub fn command() -> clap::Command {
-    Arguments::command()
-}
+/// Parser of the commands. Not real-time.
+pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    let Command::Test(arguments) = options::arguments::<Arguments>().command;
+    let Command::Test(arguments) = options::command_of::<Command>();
     exit_code_of(run(&arguments))
 }
 

@@ -5,36 +5,26 @@ mod page;
 mod platform;
 mod study;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::Subcommand;
 use flotor_command::{CommandError, exit_code_of, options, supervised};
 use flotor_study::dataset::DatasetError;
 use std::process::ExitCode;
 
 /// Run and analyse perception experiments; `flotor COMMAND` starts this program.
-#[derive(Parser)]
-#[command(name = "flotor", bin_name = "flotor", version, max_term_width = 110)]
-struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
 #[derive(Subcommand)]
 enum Command {
     Study(Box<study::StudyArguments>),
     Analyse(analyse::AnalyseArguments),
 }
 
-/// Returns the clap command with all arguments. Not real-time.
-#[must_use]
-pub fn command() -> clap::Command {
-    Arguments::command()
-}
+/// Parser of the commands. Not real-time.
+pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
 /// Runs the command given on the command line.
 #[must_use]
 pub fn main() -> ExitCode {
     flotor_session::on_notice(|notice| flotor_command::note(notice));
-    match options::arguments::<Arguments>().command {
+    match options::command_of::<Command>() {
         Command::Study(arguments) => supervised(|| study::run(&arguments)),
         Command::Analyse(arguments) => exit_code_of(analyse::run(&arguments)),
     }

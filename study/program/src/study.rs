@@ -17,9 +17,7 @@ use choices::{
     range, thresholds,
 };
 use clap::{Args, Subcommand, ValueEnum};
-use flotor_command::options::{
-    ControlGroupOption, PluginKeyValue, PluginPathOption, StrengthOption, count, duration_s, real, seed,
-};
+use flotor_command::options::{PluginKeyValue, SceneOptions, count, duration_s, real, seed};
 use flotor_command::say;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, command_line, progress_bar, style};
@@ -190,11 +188,7 @@ struct Common {
     #[arg(skip)]
     plan: Option<Plan>,
     #[command(flatten)]
-    plugin_path: PluginPathOption,
-    #[command(flatten)]
-    strength: StrengthOption,
-    #[command(flatten)]
-    control_group: ControlGroupOption,
+    options: SceneOptions,
 }
 
 #[derive(Args)]
@@ -388,8 +382,7 @@ impl Common {
             None => (Scene::study(&stimulus.model), way.map(ForceWay::hand)),
         };
         let mut scene = scene.map_err(RunError::Scene)?;
-        self.plugin_path.put_before_those_of(&mut scene);
-        self.control_group.apply(&mut scene.limits);
+        self.options.apply(&mut scene);
         set(&mut scene, hand.unwrap_or_default())?;
         self.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
         set(&mut scene, way.map(ForceWay::load).unwrap_or_default())?;
@@ -470,7 +463,7 @@ fn carry_out(common: &Common, protocol: Protocol, way: Option<ForceWay>) -> Resu
             .map_err(|error| CommandError::Usage(format!("{}: {error}", plan.file)))?;
     }
     let scene = common.scene(protocol.stimulus(), way)?;
-    let strength = common.strength.strength();
+    let strength = common.options.strength();
     let apparatus = Apparatus::check_with(scene, &protocol, strength).map_err(unfit)?;
     apparatus.notices().iter().for_each(flotor_command::note);
     match (common.observer, common.apparatus) {

@@ -8,7 +8,7 @@ mod service;
 mod stop_request;
 
 use clap::{Args, ValueEnum};
-use flotor_command::options::{ControlGroupOption, PluginPathOption, json_file, mcap_file, seed};
+use flotor_command::options::{LendOptions, seed};
 use flotor_command::{CommandError, INTERRUPTED, note, write_json};
 use flotor_servo::last_stop::spawn_unblocked;
 use flotor_session::registry::{PATH_VARIABLE, Registry};
@@ -37,6 +37,7 @@ use stop_request::{Stage, StopRequest};
     Environment variables: FLOTOR_SIGNALS=stop stops the devices before a signal ends the program. FLOTOR_DHD_TYPE,\n\
     FLOTOR_HD_MODEL and FLOTOR_PHANTOM_TYPE set the type of device that the program sees.\n\n\
     The exit code is that of the program; 4 if the program ended with 0 after its run had failed.")]
+#[command(mut_arg("json", |json| json.help("Write the summary as JSON; standard output is for the program")))]
 pub(crate) struct LendArguments {
     /// The interface that the program calls (default: the program finds the three libraries)
     #[arg(long, value_name = "dhd|openhaptics|chai3d|haply|ml-api")]
@@ -50,16 +51,8 @@ pub(crate) struct LendArguments {
     /// Seed of all random numbers
     #[arg(long, value_parser = seed, default_value_t = 0, value_name = "N")]
     seed: u64,
-    /// Record every tick to an MCAP file
-    #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
-    record: Option<PathBuf>,
-    /// Write the summary as JSON; standard output is for the program
-    #[arg(long, value_parser = json_file, value_name = "FILE.json")]
-    json: Option<PathBuf>,
     #[command(flatten)]
-    plugin_path: PluginPathOption,
-    #[command(flatten)]
-    control_group: ControlGroupOption,
+    options: LendOptions,
     /// Scene file (TOML); without it, a simulated flotor held by a hand
     scene: Option<PathBuf>,
     /// The program and its arguments
@@ -272,7 +265,7 @@ fn lend(arguments: &LendArguments) -> Result<i32, Early> {
     environment(&mut command, arguments, &folder.0, &own)?;
     let end = carry_out(&mut command, &program, &folder, &stop)?;
     let runs = Runs::read(&folder.0, &end);
-    if !runs.tell(&program, arguments.record.as_deref()) {
+    if !runs.tell(&program, arguments.options.record.as_deref()) {
         let which = api.map_or_else(
             || "none of dhd, openhaptics and chai3d".to_owned(),
             |api| format!("nothing of `--api {}`", api.word()),
@@ -284,7 +277,7 @@ fn lend(arguments: &LendArguments) -> Result<i32, Early> {
             program.path.display()
         ));
     }
-    arguments.json.as_deref().map_or(Ok(()), |json| runs.write(json))?;
+    arguments.options.json.as_deref().map_or(Ok(()), |json| runs.write(json))?;
     Ok(runs.exit_code())
 }
 
@@ -360,8 +353,8 @@ fn serve(
     let end = carry_out(&mut guarded(program, rest, &folder, own), program, &folder, stop)?;
     let served = served.finish();
     let runs = Runs::read(&folder.0, &end);
-    runs.tell(program, arguments.record.as_deref());
-    if let Some(json) = &arguments.json {
+    runs.tell(program, arguments.options.record.as_deref());
+    if let Some(json) = &arguments.options.json {
         match served {
             _ if service.writes_summary() => runs.write(json)?,
             ServiceEnd::Killed => write_json(json, &json!({ "end": ServiceEnd::KILLED }))?,
@@ -385,7 +378,7 @@ fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
         )));
     }
     let mut scene = Scene::load(file).map_err(RunError::Scene)?;
-    arguments.plugin_path.put_before_those_of(&mut scene);
+    arguments.options.plugin_path.put_before_those_of(&mut scene);
     check_plugins(&scene, &Registry::search(&scene.plugin_folders))?;
     if scene.duration_s != Scene::DURATION_S {
         note(format_args!(
@@ -429,14 +422,14 @@ fn set_environment(
     if let Some(scene) = &arguments.scene {
         command.env("FLOTOR_SCENE", absolute(scene)?);
     }
-    if let Some(record) = &arguments.record {
+    if let Some(record) = &arguments.options.record {
         command.env("FLOTOR_RECORD", absolute(record)?);
     }
-    if !arguments.plugin_path.folders().is_empty() {
+    if !arguments.options.plugin_path.folders().is_empty() {
         let before = std::env::var_os(PATH_VARIABLE);
         let before =
             before.iter().flat_map(std::env::split_paths).filter(|folder| !folder.as_os_str().is_empty());
-        let folders = arguments.plugin_path.folders().iter().map(|folder| absolute(folder));
+        let folders = arguments.options.plugin_path.folders().iter().map(|folder| absolute(folder));
         let folders = folders.chain(before.map(Ok)).collect::<Result<Vec<_>, CommandError>>()?;
         let folders = std::env::join_paths(folders)
             .map_err(|error| CommandError::Usage(format!("--plugin-path: {error}")))?;
@@ -444,7 +437,7 @@ fn set_environment(
     }
     command.env("FLOTOR_PACE", if arguments.pace == PaceOption::Real { "real" } else { "lockstep" });
     command.env("FLOTOR_SEED", arguments.seed.to_string());
-    if arguments.control_group.is_accepted() {
+    if arguments.options.control_group.is_accepted() {
         command.env("FLOTOR_SHARED_CONTROL_GROUP", "accept");
     }
     let [report, summary] = Runs::files(folder);

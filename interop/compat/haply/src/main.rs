@@ -29,7 +29,7 @@ mod view;
 
 use access::Access;
 use clap::{Parser, ValueEnum};
-use flotor_command::options::{ControlGroupOption, PluginPathOption, arguments, json_file, mcap_file, seed};
+use flotor_command::options::{LendOptions, arguments, seed};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, say, supervised};
 use flotor_compat::{Pace, Settings, SharedControlGroup, prepare};
@@ -68,16 +68,8 @@ struct Arguments {
     /// Seed of all random numbers
     #[arg(long, value_parser = seed, value_name = "N")]
     seed: Option<u64>,
-    /// Record every tick to an MCAP file
-    #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
-    record: Option<PathBuf>,
-    /// Write the summary as JSON
-    #[arg(long, value_parser = json_file, value_name = "FILE.json")]
-    json: Option<PathBuf>,
     #[command(flatten)]
-    plugin_path: PluginPathOption,
-    #[command(flatten)]
-    control_group: ControlGroupOption,
+    options: LendOptions,
     /// End with the parent process
     #[arg(long, hide = true)]
     lent: bool,
@@ -109,16 +101,16 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
     let stop = stop_on_signals()?;
     let mut settings = Settings::from_environment().map_err(CommandError::Usage)?.of_own_process();
     settings.scene = arguments.scene.or(settings.scene);
-    settings.plugin_folders = arguments.plugin_path.folders().to_vec();
-    settings.record = arguments.record.or(settings.record);
-    settings.json = arguments.json.or(settings.json);
+    settings.plugin_folders = arguments.options.plugin_path.folders().to_vec();
+    settings.record = arguments.options.record.or(settings.record);
+    settings.json = arguments.options.json.or(settings.json);
     settings.seed = arguments.seed.unwrap_or(settings.seed);
     settings.pace = match arguments.pace {
         Some(PaceOption::Real) => Pace::Real,
         Some(PaceOption::Lockstep) => Pace::Lockstep,
         None => settings.pace,
     };
-    if arguments.control_group.is_accepted() {
+    if arguments.options.control_group.is_accepted() {
         settings.shared_control_group = SharedControlGroup::Accepted;
     }
     if settings.report.is_none() {

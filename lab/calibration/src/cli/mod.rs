@@ -7,7 +7,7 @@ mod verify;
 mod vertical;
 
 use crate::CalibrationError;
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, Subcommand};
 use flotor_command::{CommandError, options, supervised, write_text};
 use flotor_session::calibration_file::{CalibrationFile, Provenance, Source, today};
 use std::ops::RangeInclusive;
@@ -15,28 +15,18 @@ use std::path::Path;
 use std::process::ExitCode;
 
 /// Calibrate devices; `flotor calibrate` starts this program.
-#[derive(Parser)]
-#[command(name = "flotor", bin_name = "flotor", version, max_term_width = 110)]
-struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
 #[derive(Subcommand)]
 enum Command {
     Calibrate(CalibrateArguments),
 }
 
-/// Returns the command with its arguments. Not real-time.
-#[must_use]
-pub fn command() -> clap::Command {
-    Arguments::command()
-}
+/// Parser of the commands. Not real-time.
+pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
-    let Command::Calibrate(arguments) = options::arguments::<Arguments>().command;
+    let Command::Calibrate(arguments) = options::command_of::<Command>();
     flotor_session::on_notice(|notice| flotor_command::note(notice));
     supervised(|| run(&arguments))
 }
@@ -100,7 +90,7 @@ mod tests {
 
     fn refusal(arguments: &str) -> String {
         let words = ["flotor", "calibrate"].into_iter().chain(arguments.split(' '));
-        match Arguments::try_parse_from(words) {
+        match PARSER().try_get_matches_from(words) {
             Ok(_) => String::new(),
             Err(error) => error.to_string(),
         }

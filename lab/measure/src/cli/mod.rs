@@ -11,18 +11,11 @@ mod validate;
 
 use crate::Progress;
 use crate::replay::ReplayError;
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::Subcommand;
 use flotor_command::{CommandError, exit_code_of, options, progress_bar, supervised};
 use std::process::ExitCode;
 
 /// Measure plugins, loops and recordings; `flotor COMMAND` starts this program.
-#[derive(Parser)]
-#[command(name = "flotor", bin_name = "flotor", version, max_term_width = 110)]
-struct Arguments {
-    #[command(subcommand)]
-    command: Command,
-}
-
 #[derive(Subcommand)]
 enum Command {
     Replay(replay::ReplayArguments),
@@ -34,17 +27,14 @@ enum Command {
     Stress(stress::StressArguments),
 }
 
-/// Returns the commands with their arguments. Not real-time.
-#[must_use]
-pub fn command() -> clap::Command {
-    Arguments::command()
-}
+/// Parser of the commands. Not real-time.
+pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
 /// Runs the command of this process.
 #[must_use]
 pub fn main() -> ExitCode {
     flotor_session::on_notice(|notice| flotor_command::note(notice));
-    match options::arguments::<Arguments>().command {
+    match options::command_of::<Command>() {
         Command::Replay(arguments) => supervised(|| replay::run(&arguments)),
         Command::Eval(arguments) => supervised(|| eval::run(&arguments)),
         Command::Jitter(arguments) => supervised(|| jitter::run(&arguments)),

@@ -3,7 +3,7 @@
 
 use super::front::lines_of;
 use clap::Args;
-use flotor_command::options::{ControlGroupOption, PluginKeyValue, PluginPathOption, StrengthOption};
+use flotor_command::options::{PluginKeyValue, SceneOptions};
 use flotor_command::say;
 use flotor_command::stopping::stop_run_on_signals;
 use flotor_command::{CommandError, note, style};
@@ -51,11 +51,7 @@ pub(super) struct ExploreArguments {
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
     #[command(flatten)]
-    plugin_path: PluginPathOption,
-    #[command(flatten)]
-    strength: StrengthOption,
-    #[command(flatten)]
-    control_group: ControlGroupOption,
+    options: SceneOptions,
 }
 
 pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
@@ -65,7 +61,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let registry = Registry::search(&scene.plugin_folders);
     let options = RunOptions { clock: Clock::Real, seed: 0 };
     let session = Session::prepare(&scene, &registry, &options)?;
-    let session = session.with_strength(arguments.strength.strength());
+    let session = session.with_strength(arguments.options.strength());
     session.notices().into_iter().for_each(note);
     session.warnings().iter().for_each(note);
     let model =
@@ -142,8 +138,7 @@ fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
         ),
     };
     let mut scene = scene.map_err(RunError::Scene)?;
-    arguments.plugin_path.put_before_those_of(&mut scene);
-    arguments.control_group.apply(&mut scene.limits);
+    arguments.options.apply(&mut scene);
     arguments.sets.iter().try_for_each(|set| set.apply(&mut scene)).map_err(CommandError::Usage)?;
     scene.duration_s = 86_400.0;
     Ok(scene)

@@ -105,8 +105,10 @@ impl Service {
         let mut command = Command::new(own);
         command.arg("run").arg(scene).args(["--duration", LONGEST, "--seed", &arguments.seed.to_string()]);
         command.args(["--ml-api", arguments.listen.as_deref().unwrap_or(self.usual())]);
-        command.args(arguments.plugin_path.arguments()).args(arguments.control_group.arguments());
-        for (option, file) in [("--record", &arguments.record), ("--json", &arguments.json)] {
+        command
+            .args(arguments.options.plugin_path.arguments())
+            .args(arguments.options.control_group.arguments());
+        for (option, file) in [("--record", &arguments.options.record), ("--json", &arguments.options.json)] {
             if let Some(file) = file {
                 command.arg(option).arg(file);
             }
