@@ -20,7 +20,7 @@ use flotor_core::region::Region;
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::Events;
 use flotor_coupling::port_energy::{Controller, PortObserver};
-use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Wrench};
+use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Twist, Wrench};
 use slew::SlewLimit;
 
 /// Effect of a stage of the envelope over a run.
@@ -116,7 +116,7 @@ impl Envelope {
         let bounded = self.limit_wrench(walled, events);
         let calmed = self.limit_oscillation(bounded, state, tick, events);
         let passive = self.limit_energy(calmed, state, tick, events);
-        let sent = self.limit_slew(passive, state, tick, events);
+        let sent = self.limit_slew(passive, &state.twist, tick, events);
         self.last = sent;
         sent
     }
@@ -225,16 +225,10 @@ impl Envelope {
 
     /// Limits the change of force and torque since the last tick.
     #[inline]
-    fn limit_slew(
-        &mut self,
-        wrench: Wrench,
-        state: &DeviceState,
-        tick: &Tick,
-        events: &mut Events,
-    ) -> Wrench {
+    fn limit_slew(&mut self, wrench: Wrench, twist: &Twist, tick: &Tick, events: &mut Events) -> Wrench {
         let dt_ns = self.slew_time_ns(tick);
         let regions = [&self.force, &self.torque];
-        let limited = self.slew.limit(&wrench, &self.last, &state.twist, dt_ns as f64 * 1.0e-9, regions);
+        let limited = self.slew.limit(&wrench, &self.last, twist, dt_ns as f64 * 1.0e-9, regions);
         let Some(limited) = limited else { return wrench };
         events.insert(Events::SLEW_LIMITED);
         self.effects.slew.active_ns += dt_ns;

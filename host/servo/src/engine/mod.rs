@@ -1,6 +1,7 @@
 //! Execution of a model: in the loop, asynchronously, or in a worker process.
 
 pub mod asynchronous;
+mod field_words;
 pub mod process;
 
 use asynchronous::AsynchronousModel;

@@ -58,7 +58,7 @@ impl SlewLimit {
         held: &Wrench,
         twist: &Twist,
         dt_s: f64,
-        [forces, torques]: [&Region; 2],
+        regions: [&Region; 2],
     ) -> Option<Wrench> {
         let is_slow = self.force.allows(request.force(), held.force(), dt_s)
             && self.torque.allows(request.torque(), held.torque(), dt_s);
@@ -66,7 +66,7 @@ impl SlewLimit {
             self.requested = None;
             return None;
         }
-        self.limit_fast(request, held, twist, dt_s, [forces, torques])
+        self.limit_fast(request, held, twist, dt_s, regions)
     }
 
     /// Limits a change that is too fast, or any change while energy is to be paid back.

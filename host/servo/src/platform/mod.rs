@@ -25,3 +25,14 @@ pub use linux::scheduling::real_time_budget_advice;
 pub use linux::{block_sent_signals, block_signals, wait_for_signal};
 pub use system::scheduling::{PRIORITY_NAME, THREAD_ADVICE};
 pub(crate) use system::{clock, last_stop, processes, scheduling, shared_memory, watchdog_process};
+
+/// Role of a thread, which determines its priority.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Duty {
+    /// Thread of the loop.
+    Loop,
+    /// Model in a worker process: below the loop, which waits for the model with a timeout.
+    Worker,
+    /// Watchdog, which interrupts the loop: above it, or at its priority where the system has none above.
+    Watchdog,
+}

@@ -3,9 +3,10 @@
 //! Loop and thread share two latest-value cells, a queue of commands and two flags; neither waits for the other.
 
 use super::Arrival;
+use crate::engine::field_words::{FIELD_WORDS, Sent};
 use crate::{Engine, Stepped, THREAD_ADVICE, enter_worker_priority};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{Demand, Input, LinearField, Pose, Refusal, Twist, Wrench};
+use flotor_hal::{Demand, Input, LinearField, Pose, Refusal, Twist};
 use flotor_sync::{Observer, Publisher, Words, latest};
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -50,40 +51,6 @@ impl Words<SAMPLE_WORDS> for HandleSample {
             #[allow(clippy::cast_possible_truncation)] // the 32 bits written
             buttons: buttons as u32,
         }
-    }
-}
-
-/// Field sent to the loop.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Sent(LinearField);
-
-const FIELD_WORDS: usize = 7 + 6 + 36 + 3;
-
-impl Words<FIELD_WORDS> for Sent {
-    fn to_words(&self) -> [u64; FIELD_WORDS] {
-        let Self(LinearField { anchor, wrench, stiffness, valid_m, valid_rad, time_ns }) = self;
-        let numbers = anchor.position_m.iter().chain(&anchor.orientation_xyzw);
-        let numbers =
-            numbers.chain(&wrench.force_n).chain(&wrench.torque_nm).chain(stiffness.iter().flatten());
-        let numbers = numbers.chain([valid_m, valid_rad]).map(|number| number.to_bits());
-        let mut words = [0; FIELD_WORDS];
-        words.iter_mut().zip(numbers.chain([*time_ns])).for_each(|(place, word)| *place = word);
-        words
-    }
-
-    fn from_words(words: &[u64; FIELD_WORDS]) -> Self {
-        let mut numbers = words.iter().map(|word| f64::from_bits(*word));
-        let mut next = || numbers.next().unwrap_or(f64::NAN);
-        let anchor = Pose {
-            position_m: std::array::from_fn(|_| next()),
-            orientation_xyzw: std::array::from_fn(|_| next()),
-        };
-        let wrench =
-            Wrench { force_n: std::array::from_fn(|_| next()), torque_nm: std::array::from_fn(|_| next()) };
-        let stiffness = std::array::from_fn(|_| std::array::from_fn(|_| next()));
-        let (valid_m, valid_rad) = (next(), next());
-        let time_ns = words.last().copied().unwrap_or(0);
-        Self(LinearField { anchor, wrench, stiffness, valid_m, valid_rad, time_ns })
     }
 }
 
@@ -269,6 +236,7 @@ impl Computer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use flotor_hal::Wrench;
 
     #[test]
     fn looks_and_fields_cross_bit_for_bit() {

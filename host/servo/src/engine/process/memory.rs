@@ -2,6 +2,7 @@
 //!
 //! All fields are atomics, and every bit pattern is a valid value: neither process can make the other read invalid data.
 
+use crate::engine::field_words::FIELD_WORDS;
 pub(super) use crate::platform::shared_memory::{SharedMemory, create_file};
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64};
 
@@ -13,8 +14,6 @@ pub(super) const OUTPUT_WORDS: usize = 8;
 pub(super) const REGION_WORDS: usize = 7;
 /// Words of workspace bounds: lower and upper corner.
 pub(super) const BOUNDS_WORDS: usize = 6;
-/// Words of a linear field: pose, wrench, stiffness, validity, time.
-pub(super) const FIELD_WORDS: usize = 7 + 6 + 36 + 3;
 /// Capacity of a message, bytes.
 pub(super) const MESSAGE_BYTES: usize = 508;
 

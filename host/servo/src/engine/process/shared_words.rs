@@ -1,6 +1,7 @@
 //! Encoding of requests and replies in shared memory.
 
-use super::memory::{BOUNDS_WORDS, FIELD_WORDS, INPUT_WORDS, OUTPUT_WORDS, REGION_WORDS, SharedPage};
+use super::memory::{BOUNDS_WORDS, INPUT_WORDS, OUTPUT_WORDS, REGION_WORDS, SharedPage};
+use crate::engine::field_words::Sent;
 pub(super) use crate::platform::shared_memory::wait_for_change;
 use crate::platform::shared_memory::wake;
 use flotor_hal::abi::CallStatus;
@@ -8,6 +9,7 @@ use flotor_hal::{
     ActiveRegion, Demand, Input, LinearField, Output, Pose, RegionShape, StepStatus, Twist, WorkspaceBounds,
     Wrench,
 };
+use flotor_sync::Words;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Operation that the host requests of a worker.
@@ -167,29 +169,11 @@ impl SharedPage {
     }
 
     pub(super) fn put_field(&self, field: &LinearField) {
-        put(&self.field, field_words(field));
+        put(&self.field, Sent(*field).to_words().into_iter());
     }
 
     pub(super) fn field(&self) -> LinearField {
-        let words: [u64; FIELD_WORDS] = std::array::from_fn(|i| load(self.field.get(i)));
-        let mut numbers = words.iter().map(|word| f64::from_bits(*word));
-        let mut next = || numbers.next().unwrap_or(f64::NAN);
-        let anchor = Pose {
-            position_m: std::array::from_fn(|_| next()),
-            orientation_xyzw: std::array::from_fn(|_| next()),
-        };
-        let wrench =
-            Wrench { force_n: std::array::from_fn(|_| next()), torque_nm: std::array::from_fn(|_| next()) };
-        let stiffness = std::array::from_fn(|_| std::array::from_fn(|_| next()));
-        let (valid_m, valid_rad) = (next(), next());
-        LinearField {
-            anchor,
-            wrench,
-            stiffness,
-            valid_m,
-            valid_rad,
-            time_ns: words.last().copied().unwrap_or(0),
-        }
+        Sent::from_words(&std::array::from_fn(|i| load(self.field.get(i)))).0
     }
 
     pub(super) fn output(&self) -> Output {
@@ -211,14 +195,6 @@ pub(super) const NO_DEMAND: Demand = Demand::FORCE.limited_to(Demand::TORQUE);
 pub(super) const DEMANDS: [Demand; 3] = [Demand::FORCE, Demand::TORQUE, Demand::ENERGY];
 
 /// Encodes a field as words.
-fn field_words(field: &LinearField) -> impl Iterator<Item = u64> {
-    let LinearField { anchor, wrench, stiffness, valid_m, valid_rad, time_ns } = *field;
-    let numbers = anchor.position_m.into_iter().chain(anchor.orientation_xyzw);
-    let numbers = numbers.chain(wrench.force_n).chain(wrench.torque_nm);
-    let numbers = numbers.chain(stiffness.into_iter().flatten()).chain([valid_m, valid_rad]);
-    numbers.map(f64::to_bits).chain([time_ns])
-}
-
 fn put(slots: &[AtomicU64], words: impl Iterator<Item = u64>) {
     slots.iter().zip(words).for_each(|(slot, word)| slot.store(word, Ordering::Relaxed));
 }

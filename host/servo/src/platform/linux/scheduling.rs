@@ -1,6 +1,7 @@
 //! Priorities, cores and locked memory.
 
 use super::group_limits::file_without_real_time;
+use crate::platform::Duty;
 use rustix::fs::readlink;
 use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::process::{Resource, getrlimit};
@@ -50,17 +51,6 @@ const LOOP_PRIORITY: u8 = 80;
 
 /// Name of the initial user namespace, a constant of the kernel's interface.
 const FIRST_USER_NAMESPACE: &[u8] = b"user:[4026531837]";
-
-/// Role of a thread, which determines its priority.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Duty {
-    /// Thread of the loop.
-    Loop,
-    /// Model in a worker process: below the loop, which waits for the model with a timeout.
-    Worker,
-    /// Watchdog: above the loop, to interrupt it.
-    Watchdog,
-}
 
 /// Locks the memory of the process; future memory as well, unless a limit would then refuse memory to the process. `None` if the
 /// system locks no process. Not real-time.

@@ -1,6 +1,7 @@
 //! Priorities, cores and locked memory.
 #![allow(unsafe_code)] // calls of the system about the calling thread; tests/tests/system/architecture.rs lists it
 
+use crate::platform::Duty;
 use std::io;
 use windows_sys::Win32::System::Threading::{
     GetCurrentThread, SetThreadAffinityMask, SetThreadPriority, THREAD_PRIORITY_HIGHEST,
@@ -24,17 +25,6 @@ pub(crate) fn priority_advice() -> String {
 pub(crate) const MEMORY_ADVICE: &str = "Windows cannot lock the whole memory of a program";
 /// Advice for users to find the cores that a process may use.
 pub(crate) const CORE_ADVICE: &str = "the Task Manager lists them under \"Set affinity\"";
-
-/// Role of a thread, which determines its priority.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Duty {
-    /// Thread of the loop.
-    Loop,
-    /// Model in a worker process: below the loop, which waits for the model with a timeout.
-    Worker,
-    /// Watchdog, which interrupts the loop, at the loop's priority: the system has none above.
-    Watchdog,
-}
 
 /// Returns `None`: this system locks no whole process.
 pub(crate) fn lock_memory() -> Option<Result<(), String>> {
