@@ -8,21 +8,32 @@ use std::str::FromStr;
 /// Duration of an injected fault of the machine, s.
 const MACHINE_FAULT_S: f64 = 0.5;
 
-/// Kind of an injected fault.
+/// Treatment of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum InjectedFaultKind {
-    /// No more replies to this client.
+pub enum Deed {
+    /// Normal reply.
+    Answer,
+    /// No reply to this client, now and later.
     Silence,
-    /// Half a reply, and no more after that.
+    /// Half of the reply, and no more after that.
     HalfFrame,
     /// Orderly close of the client's connections.
     Close,
     /// Reset of the client's connections.
     Reset,
-    /// A reply delayed by three seconds.
+    /// Reply delayed by three seconds.
     Stall,
-    /// A reply shortened by four bytes.
+    /// Reply shortened by four bytes.
     WrongLength,
+    /// Reply with this status, without any effect of the call.
+    Status(Status),
+}
+
+/// Kind of an injected fault.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MisbehaviorKind {
+    /// This treatment of one call.
+    Call(Deed),
     /// This status in every Nth reply.
     Status(Status, u32),
     /// A tick delayed by 50 ms.
@@ -95,12 +106,12 @@ impl FromStr for InjectedFault {
             None => (rest, When::Anytime),
         };
         let kind = match kind {
-            "silence" => InjectedFaultKind::Silence,
-            "half-frame" => InjectedFaultKind::HalfFrame,
-            "close" => InjectedFaultKind::Close,
-            "reset" => InjectedFaultKind::Reset,
-            "stall" => InjectedFaultKind::Stall,
-            "wrong-length" => InjectedFaultKind::WrongLength,
+            "silence" => InjectedFaultKind::Call(Deed::Silence),
+            "half-frame" => InjectedFaultKind::Call(Deed::HalfFrame),
+            "close" => InjectedFaultKind::Call(Deed::Close),
+            "reset" => InjectedFaultKind::Call(Deed::Reset),
+            "stall" => InjectedFaultKind::Call(Deed::Stall),
+            "wrong-length" => InjectedFaultKind::Call(Deed::WrongLength),
             "late-tick" => InjectedFaultKind::LateTick,
             "out-of-range" => InjectedFaultKind::Machine(FaultBits::SENSOR_RANGE),
             "over-temperature" => InjectedFaultKind::Machine(FaultBits::OVER_TEMPERATURE),
@@ -118,27 +129,6 @@ impl FromStr for InjectedFault {
         };
         Ok(Self { kind, when, after_s })
     }
-}
-
-/// Treatment of a call.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Deed {
-    /// Normal reply.
-    Answer,
-    /// No reply, now and later.
-    Silence,
-    /// Half of the reply, and no more after that.
-    HalfFrame,
-    /// Orderly close of the connections.
-    Close,
-    /// Reset of the connections.
-    Reset,
-    /// Delayed reply.
-    Stall,
-    /// Reply shortened by four bytes.
-    WrongLength,
-    /// Reply with this status, without any effect of the call.
-    Status(Status),
 }
 
 /// Pending faults, and the affected client.
@@ -205,19 +195,8 @@ impl Plan {
             self.calls += 1;
             return if self.calls.is_multiple_of(every) { Deed::Status(status) } else { Deed::Answer };
         }
-        let on_a_connection = |kind| {
-            !matches!(
-                kind,
-                InjectedFaultKind::Machine(_) | InjectedFaultKind::LateTick | InjectedFaultKind::Status(..)
-            )
-        };
-        let deed = match self.take(on_a_connection) {
-            Some(InjectedFaultKind::Silence) => Deed::Silence,
-            Some(InjectedFaultKind::HalfFrame) => Deed::HalfFrame,
-            Some(InjectedFaultKind::Close) => Deed::Close,
-            Some(InjectedFaultKind::Reset) => Deed::Reset,
-            Some(InjectedFaultKind::Stall) => Deed::Stall,
-            Some(InjectedFaultKind::WrongLength) => Deed::WrongLength,
+        let deed = match self.take(|kind| matches!(kind, InjectedFaultKind::Call(_))) {
+            Some(InjectedFaultKind::Call(deed)) => deed,
             _ => Deed::Answer,
         };
         if matches!(deed, Deed::Silence | Deed::HalfFrame) {

@@ -25,27 +25,22 @@ struct FrameTransform {
     rotation: Option<Quaternion>,
 }
 
+/// x, y and z.
 #[derive(Clone, Copy, PartialEq, Message)]
-struct Vector3 {
-    #[prost(double, tag = "1")]
-    x: f64,
-    #[prost(double, tag = "2")]
-    y: f64,
-    #[prost(double, tag = "3")]
-    z: f64,
-}
+struct Vector3(
+    #[prost(double, tag = "1")] f64,
+    #[prost(double, tag = "2")] f64,
+    #[prost(double, tag = "3")] f64,
+);
 
+/// x, y, z and w.
 #[derive(Clone, Copy, PartialEq, Message)]
-struct Quaternion {
-    #[prost(double, tag = "1")]
-    x: f64,
-    #[prost(double, tag = "2")]
-    y: f64,
-    #[prost(double, tag = "3")]
-    z: f64,
-    #[prost(double, tag = "4")]
-    w: f64,
-}
+struct Quaternion(
+    #[prost(double, tag = "1")] f64,
+    #[prost(double, tag = "2")] f64,
+    #[prost(double, tag = "3")] f64,
+    #[prost(double, tag = "4")] f64,
+);
 
 /// Topic of the ticks of a run.
 const TICK_TOPIC: &str = "/flotor/tick";
@@ -114,5 +109,5 @@ fn pose(message: &[u8]) -> Result<(DVec3, DQuat), String> {
     let (Some(at), Some(turn)) = (transform.translation, transform.rotation) else {
         return Err("a pose lacks its translation or its rotation".to_owned());
     };
-    Ok((DVec3::new(at.x, at.y, at.z), DQuat::from_xyzw(turn.x, turn.y, turn.z, turn.w)))
+    Ok((DVec3::new(at.0, at.1, at.2), DQuat::from_xyzw(turn.0, turn.1, turn.2, turn.3)))
 }
