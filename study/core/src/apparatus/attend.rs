@@ -1,9 +1,9 @@
 //! Runs the sitting of a person: shows screens, presents stimuli and logs each answer before the next trial begins.
 
 use super::real_time_rig::RealTimeRig;
-use crate::conduct::{ApparatusOrFrontEndError, Ending};
-use crate::log::{Event, Incident, LogWriter, TrialEvent, digest};
-use crate::screen::{Input, May, Screen, ScreenStateMachine, Step, StimulusExploration};
+use crate::conduct::{Ending, ApparatusOrFrontEndError};
+use crate::log::{Event, Incident, LogWriter, digest};
+use crate::screen::{ScreenStateMachine, StimulusExploration, Input, May, Screen, Step};
 use crate::trial::Trial;
 use std::time::Instant;
 
@@ -70,8 +70,7 @@ pub trait FrontEnd {
     fn refuse(&mut self, why: &str) -> Result<(), ApparatusOrFrontEndError>;
 }
 
-/// Runs a sitting until it is complete or stopped, and logs each interruption and disturbance. `watch` is called for every trial
-/// that is on disk.
+/// Runs a sitting until it is complete or stopped, and logs each interruption and disturbance.
 ///
 /// # Errors
 /// Errors of apparatus, front end or log; the log stays valid and can be resumed.
@@ -81,24 +80,26 @@ pub fn attend(
     rig: &mut RealTimeRig<'_>,
     front: &mut dyn FrontEnd,
     least: MinimumExploration,
-    watch: &mut dyn FnMut(&TrialEvent),
 ) -> Result<Ending, ApparatusOrFrontEndError> {
-    let result = sit(attended, log, rig, front, least, watch);
+    let mut parties = Parties { attended, log, rig, front };
+    let result = sit(&mut parties, least);
     if let Err(error) = &result {
         // The first error is returned; a failure to log it matters less.
-        let _ = log.write(&Event::Incident(rig.incident_of(error.as_ref())));
+        let _ = parties.log.write(&Event::Incident(parties.rig.incident_of(error.as_ref())));
     }
     result
 }
 
-fn sit(
-    attended: &mut ScreenStateMachine,
-    log: &mut LogWriter,
-    rig: &mut RealTimeRig<'_>,
-    front: &mut dyn FrontEnd,
-    least: MinimumExploration,
-    watch: &mut dyn FnMut(&TrialEvent),
-) -> Result<Ending, ApparatusOrFrontEndError> {
+/// Parties of a sitting: trials, log, apparatus and front end.
+struct Parties<'a, 'r> {
+    attended: &'a mut ScreenStateMachine,
+    log: &'a mut LogWriter,
+    rig: &'a mut RealTimeRig<'r>,
+    front: &'a mut dyn FrontEnd,
+}
+
+fn sit(parties: &mut Parties<'_, '_>, least: MinimumExploration) -> Result<Ending, ApparatusOrFrontEndError> {
+    let Parties { attended, log, rig, front } = parties;
     loop {
         let screen = attended.screen();
         if screen == Screen::Over {
@@ -119,7 +120,7 @@ fn sit(
         front.show(&screen)?;
         let shown = Instant::now();
         let step = loop {
-            let input = match wait_for_input(rig, front, &screen, felt.as_ref(), log)? {
+            let input = match wait_for_input(rig, &mut **front, &screen, felt.as_ref(), log)? {
                 Ok(input) => input,
                 Err(incident) => {
                     log.write(&Event::Incident(incident))?;
@@ -153,9 +154,8 @@ fn sit(
         match step {
             Step::Answered(event) => {
                 // Log the answer before the movement: it is small, and cannot be measured again.
-                log.write(&Event::Trial(event.clone()))?;
+                log.write(&Event::Trial(event))?;
                 close_recording(rig, log)?;
-                watch(&event);
             }
             Step::Withdrawn(trial) => {
                 log.write(&Event::Withdrawn { trial })?;

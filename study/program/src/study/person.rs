@@ -110,7 +110,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
             .map_err(failed)?;
         attended = attended.with_again_at_most(times);
     }
-    let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), least, &mut |_| ());
+    let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), least);
     // Write the tables from the log, however the sitting ended.
     let tables = dataset.write_tables();
     let ended = ending.and_then(|ending| rig.finish_after(ending)).map_err(|error| {

@@ -31,7 +31,7 @@ pub enum Deed {
 
 /// Kind of an injected fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MisbehaviorKind {
+pub enum InjectedFaultKind {
     /// This treatment of one call.
     Call(Deed),
     /// This status in every Nth reply.
