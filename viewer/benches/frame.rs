@@ -10,6 +10,7 @@ use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_drawing::camera::Camera;
 use flotor_drawing::gpu::GpuScene;
+use flotor_drawing::raster::View;
 use flotor_hal::{Demand, Pose};
 use flotor_history::quantity::Quantity;
 use flotor_history::{History, Retention, unknown_run};
@@ -217,7 +218,8 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     );
     let mut canvas = Canvas::new(None);
     criterion.bench_function("3D scene drawn on the processor", |bench| {
-        bench.iter(|| black_box(canvas.draw(&context, mesh, &camera, palette.backdrop, SCENE_PX)));
+        let view = View { camera: &camera, backdrop: palette.backdrop, size: SCENE_PX };
+        bench.iter(|| black_box(canvas.draw(&context, mesh, &view)));
     });
 
     let screen = egui::Rect::from_min_size(egui::Pos2::ZERO, egui::vec2(1280.0, 800.0));
@@ -280,11 +282,12 @@ fn scene_by_adapter(criterion: &mut Criterion) {
     let (mesh, _) =
         builder.build(&mut shapes, Moment::of(&[sample]), &palette, &camera, HEIGHT_PX, scale, true);
     let mut scene = GpuScene::new(&state.device, &state.queue);
+    let view = View { camera: &camera, backdrop: palette.backdrop, size: [1280, 800] };
     criterion.bench_function(
         &format!("3D scene at 1280x800 drawn by {} ({})", info.name, info.backend),
         |bench| {
             bench.iter(|| {
-                black_box(scene.draw(mesh, &camera, palette.backdrop, [1280, 800]));
+                black_box(scene.draw(mesh, &view));
                 state.device.poll(wgpu::PollType::wait_indefinitely()).expect("the adapter answers");
             });
         },

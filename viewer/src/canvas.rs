@@ -3,10 +3,9 @@
 
 use eframe::egui_wgpu::RenderState;
 use egui::{ColorImage, Context, TextureHandle, TextureId, TextureOptions};
-use flotor_drawing::camera::Camera;
 use flotor_drawing::geometry::Mesh;
 use flotor_drawing::gpu::GpuScene;
-use flotor_drawing::raster::{Backdrop, Rasterizer};
+use flotor_drawing::raster::{Rasterizer, View};
 
 /// Renderer of the 3D view, with its last texture.
 pub enum Canvas {
@@ -52,33 +51,26 @@ impl Canvas {
         Self::Cpu { rasterizer: Rasterizer::default(), samples, texture: None }
     }
 
-    /// Draws a mesh and returns the texture, of `size` pixels.
-    pub fn draw(
-        &mut self,
-        context: &Context,
-        mesh: &Mesh,
-        camera: &Camera,
-        backdrop: Backdrop,
-        size: [usize; 2],
-    ) -> TextureId {
+    /// Draws a mesh and returns the texture.
+    pub fn draw(&mut self, context: &Context, mesh: &Mesh, view: &View<'_>) -> TextureId {
         const FILTER: wgpu::FilterMode = wgpu::FilterMode::Nearest;
         match self {
             Self::Gpu { scene, state, shown } => {
-                let view = scene.draw(mesh, camera, backdrop, size);
+                let (drawn, size) = (scene.draw(mesh, view), view.size);
                 let (device, mut renderer) = (&state.device, state.renderer.write());
                 let id = match *shown {
                     Some((id, shown)) if shown == size => id,
                     Some((id, _)) => {
-                        renderer.update_egui_texture_from_wgpu_texture(device, view, FILTER, id);
+                        renderer.update_egui_texture_from_wgpu_texture(device, drawn, FILTER, id);
                         id
                     }
-                    None => renderer.register_native_texture(device, view, FILTER),
+                    None => renderer.register_native_texture(device, drawn, FILTER),
                 };
                 *shown = Some((id, size));
                 id
             }
             Self::Cpu { rasterizer, samples, texture } => {
-                let drawn = rasterizer.draw(mesh, camera, backdrop, size, *samples);
+                let drawn = rasterizer.draw(mesh, view, *samples);
                 let image = ColorImage::from_rgb(drawn.size, &drawn.rgb);
                 let load = || context.load_texture("scene", image.clone(), TextureOptions::NEAREST);
                 let texture = texture.get_or_insert_with(load);

@@ -61,8 +61,10 @@ pub struct Feed {
     waiting: Arc<Mutex<Waiting>>,
     is_over: Arc<AtomicBool>,
     request_client: RequestClient,
-    greeting: Greeting,
-    run: RunDescription,
+    /// Greeting of the host at the start of the connection.
+    pub(crate) greeting: Greeting,
+    /// Description of the run.
+    pub(crate) run: RunDescription,
 }
 
 impl Feed {
@@ -97,18 +99,6 @@ impl Feed {
             }
         })?;
         Ok(Self { waiting, is_over, request_client, greeting, run })
-    }
-
-    /// Returns the greeting of the host at the start of the connection.
-    #[must_use]
-    pub fn greeting(&self) -> &Greeting {
-        &self.greeting
-    }
-
-    /// Returns the description of the run.
-    #[must_use]
-    pub fn run(&self) -> &RunDescription {
-        &self.run
     }
 
     /// Takes the data received since the last call.

@@ -55,13 +55,8 @@ struct Arguments {
     #[arg(long, requires = "screenshot")]
     window: bool,
     /// Direction of the view, degrees: to the right of the front, above the horizon, and a zoom (default: 31.5,13.8)
-    #[arg(
-        long,
-        value_name = "AZIMUTH,INCLINATION[,ZOOM]",
-        requires = "screenshot",
-        conflicts_with = "window",
-        allow_hyphen_values = true
-    )]
+    #[arg(long, value_name = "AZIMUTH,INCLINATION[,ZOOM]", allow_hyphen_values = true)]
+    #[arg(requires = "screenshot", conflicts_with = "window")]
     view: Option<View>,
     /// Device for numbers and traces, if there are several (default: the first)
     #[arg(long, value_name = "NAME", requires = "recording")]

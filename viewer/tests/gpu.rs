@@ -9,7 +9,7 @@ use egui_kittest::wgpu::{create_render_state, default_wgpu_setup};
 use flotor_core::trace::Events;
 use flotor_drawing::camera::Camera;
 use flotor_drawing::gpu::GpuScene;
-use flotor_drawing::raster::{Image, Rasterizer};
+use flotor_drawing::raster::{Image, Rasterizer, View};
 use flotor_hal::Pose;
 use flotor_history::{History, Retention, Sample};
 use flotor_viewer::app::{Recorded, Start, Viewer};
@@ -93,8 +93,9 @@ fn an_adapter_and_the_processor_draw_the_same_scene() {
         let (mut builder, scale) = (SceneBuilder::default(), ArrowScale::fitting([&sample].into_iter()));
         let (mesh, _) =
             builder.build(&mut shapes, Moment::of(&[sample]), &palette, &camera, 400.0, scale, true);
-        let drawn = read(&state, gpu.draw(mesh, &camera, palette.backdrop, size).texture());
-        let expected = Rasterizer::default().draw(mesh, &camera, palette.backdrop, size, 4);
+        let view = View { camera: &camera, backdrop: palette.backdrop, size };
+        let drawn = read(&state, gpu.draw(mesh, &view).texture());
+        let expected = Rasterizer::default().draw(mesh, &view, 4);
         assert_eq!(drawn.size, expected.size);
         let (mean, far) = difference(&drawn.rgb, &expected.rgb);
         assert!(

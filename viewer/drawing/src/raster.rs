@@ -24,6 +24,17 @@ pub struct Backdrop {
     pub bottom: [u8; 3],
 }
 
+/// View of a picture.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// Camera.
+    pub camera: &'a Camera,
+    /// Background.
+    pub backdrop: Backdrop,
+    /// Width and height, pixels.
+    pub size: [usize; 2],
+}
+
 /// Rasteriser; its buffers are reused from picture to picture.
 #[derive(Debug, Default)]
 pub struct Rasterizer {
@@ -46,17 +57,10 @@ impl Rasterizer {
     /// Draws a mesh; `samples` per pixel and direction smooth the edges.
     ///
     /// Triangles that reach in front of the near plane are left out.
-    pub fn draw(
-        &mut self,
-        mesh: &Mesh,
-        camera: &Camera,
-        backdrop: Backdrop,
-        size: [usize; 2],
-        samples: usize,
-    ) -> Image {
-        let [width, height] = size.map(|length| length.max(1) * samples);
-        self.begin(backdrop, [width, height]);
-        self.project(mesh, camera, [width, height]);
+    pub fn draw(&mut self, mesh: &Mesh, view: &View<'_>, samples: usize) -> Image {
+        let [width, height] = view.size.map(|length| length.max(1) * samples);
+        self.begin(view.backdrop, [width, height]);
+        self.project(mesh, view.camera, [width, height]);
         for triangle in mesh.indices.chunks_exact(3) {
             let corner = |index: u32| self.corners.get(index as usize).copied();
             if let [Some(a), Some(b), Some(c)] =

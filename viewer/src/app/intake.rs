@@ -63,11 +63,11 @@ impl Viewer {
         let Ok(feed) = connect(wanted, context, &self.pace) else { return };
         let parts = Parts::of_host(&feed);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a minute of ticks
-        let kept = ((feed.run().rate_hz * KEPT_S) as usize).clamp(1, MOST_KEPT);
-        self.devices = Devices::new(History::of_each_device(feed.run(), Retention::Newest(kept)));
-        self.heading = Heading::of(feed.run());
-        self.limits = feed.greeting().limits;
-        (self.guide, self.drag) = (Guide::new(&feed.greeting().plugins), None);
+        let kept = ((feed.run.rate_hz * KEPT_S) as usize).clamp(1, MOST_KEPT);
+        self.devices = Devices::new(History::of_each_device(&feed.run, Retention::Newest(kept)));
+        self.heading = Heading::of(&feed.run);
+        self.limits = feed.greeting.limits;
+        (self.guide, self.drag) = (Guide::new(&feed.greeting.plugins), None);
         self.player = Player::live();
         self.compared = None;
         self.plots.start_over();

@@ -109,9 +109,9 @@ impl Parts {
     /// Builds the parts of a running host, from the plugin files of its greeting.
     #[must_use]
     pub(super) fn of_host(feed: &Feed) -> Self {
-        let files: Vec<PathBuf> = feed.greeting().plugins.iter().map(|plugin| plugin.file.clone()).collect();
-        let (mut shapes, missing) = shapes_of(feed.run(), &files);
-        let panels = feed.greeting().plugins.iter().map(|plugin| panel(plugin, &mut shapes)).collect();
+        let files: Vec<PathBuf> = feed.greeting.plugins.iter().map(|plugin| plugin.file.clone()).collect();
+        let (mut shapes, missing) = shapes_of(&feed.run, &files);
+        let panels = feed.greeting.plugins.iter().map(|plugin| panel(plugin, &mut shapes)).collect();
         Self { shapes, panels, missing: missing.iter().map(ToString::to_string).collect() }
     }
 

@@ -7,6 +7,7 @@ use crate::shape::Shape;
 use crate::ui::key::pressed_alone;
 use egui::{Color32, Key, PointerButton, Rect, Role, Sense, TextureId, Ui, Vec2, WidgetInfo, pos2};
 use flotor_drawing::camera::{Camera, Extent};
+use flotor_drawing::raster::View;
 use flotor_hal::Pose;
 
 /// Rotation per point of a drag, rad.
@@ -173,7 +174,8 @@ impl View3d {
                 let height_px = size[1] as f64;
                 let (mesh, facts) =
                     self.builder.build(shapes, moment, &palette, &camera, height_px, scale, shows_arrows);
-                let texture = self.canvas.draw(ui.ctx(), mesh, &camera, palette.backdrop, size);
+                let view = View { camera: &camera, backdrop: palette.backdrop, size };
+                let texture = self.canvas.draw(ui.ctx(), mesh, &view);
                 self.drawn = Some((wanted, texture, facts));
                 (texture, facts)
             }

@@ -8,7 +8,7 @@ mod target;
 
 use crate::camera::Camera;
 use crate::geometry::Mesh;
-use crate::raster::Backdrop;
+use crate::raster::{Backdrop, View};
 use bytemuck::{Pod, Zeroable};
 use pipeline::{Pipelines, pipelines};
 use target::Target;
@@ -71,21 +71,19 @@ impl GpuScene {
     }
 
     /// Draws a mesh and returns its texture view: `Rgba8Unorm`, in gamma space. A change of size creates a new view.
-    pub fn draw(
-        &mut self,
-        mesh: &Mesh,
-        camera: &Camera,
-        backdrop: Backdrop,
-        size: [usize; 2],
-    ) -> &TextureView {
-        let size = size.map(|length| u32::try_from(length.max(1)).unwrap_or(u32::MAX));
+    pub fn draw(&mut self, mesh: &Mesh, view: &View<'_>) -> &TextureView {
+        let size = view.size.map(|length| u32::try_from(length.max(1)).unwrap_or(u32::MAX));
         let size = size.map(|length| length.min(self.device.limits().max_texture_dimension_2d));
         let fits = self.target.as_ref().is_some_and(|target| target.size == size);
         if !fits {
             self.target = None; // free the old texture first: both at once may exceed the memory
         }
         let target = self.target.get_or_insert_with(|| Target::new(&self.device, size));
-        self.queue.write_buffer(&self.view, 0, bytemuck::bytes_of(&uniform(camera, backdrop, size)));
+        self.queue.write_buffer(
+            &self.view,
+            0,
+            bytemuck::bytes_of(&uniform(view.camera, view.backdrop, size)),
+        );
         self.vertices.write(&self.device, &self.queue, bytemuck::cast_slice(&mesh.vertices));
         self.indices.write(&self.device, &self.queue, bytemuck::cast_slice(&mesh.indices));
 
