@@ -5,8 +5,8 @@
 
 use flotor_hal::abi::{Entry, device_entry};
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Cycle, DVec3, Device, DeviceInfo, DeviceState, LoopConfig, Pose,
-    Refusal, SafeStop, Settings, Tick, Twist, Wrench, math,
+    ActiveDevice, Axes, Capabilities, Cycle, DVec3, Device, DeviceInfo, DeviceState, LoopConfig,
+    NothingToStop, Pose, Refusal, Settings, Tick, Twist, Wrench, math,
 };
 use std::f64::consts::TAU;
 
@@ -70,18 +70,11 @@ impl Phase {
     }
 }
 
-/// Stop without effect: nothing moves.
-struct NothingMoves;
-
-impl SafeStop for NothingMoves {
-    fn safe_stop(&self) {}
-}
-
 impl Device for Scripted {
     const INFO: DeviceInfo =
         DeviceInfo::new(SCRIPTED, "Scripted device", "A handle that follows a script").simulated();
     type Active = Following;
-    type Stop = NothingMoves;
+    type Stop = NothingToStop;
 
     fn open(_: &Settings<'_>) -> Result<Self, Refusal> {
         Ok(Self)
@@ -89,24 +82,17 @@ impl Device for Scripted {
 
     /// Returns range and limits of the thesis's machine.
     fn capabilities(&self) -> Capabilities {
+        let slew = 1.0e9; // no limit
+        let ranges = Capabilities::driving(Axes::ALL).with_range(0.012, 0.12);
         Capabilities {
-            sensed: Axes::ALL,
-            actuated: Axes::ALL,
-            range_m: [0.012; 3],
-            range_rad: [0.12; 3],
-            resolution_m: 0.0,
             max_force_n: [55.0, 55.0, 140.0],
             max_torque_nm: [6.3, 6.3, 12.2],
-            max_force_slew_n_per_s: 1.0e9, // no limit
-            max_torque_slew_nm_per_s: 1.0e9,
-            max_stiffness_n_per_m: 25.0e3,
-            rate_hz: [100.0, 10_000.0],
-            latency_s: 0.0,
+            ..ranges.with_slew(slew, slew).with_stiffness(25.0e3)
         }
     }
 
-    fn stopper(&self) -> NothingMoves {
-        NothingMoves
+    fn stopper(&self) -> NothingToStop {
+        NothingToStop
     }
 
     fn activate(self, config: &LoopConfig) -> Result<Following, (Self, Refusal)> {
