@@ -6,7 +6,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use flotor_hal::glam::{DQuat, DVec3};
+use flotor_hal::glam::DQuat;
 use flotor_hal::{Input, Output};
 use flotor_spring::batch::Batch;
 use flotor_spring::closed_form::{ClosedForm, Form};
@@ -16,30 +16,16 @@ use flotor_spring::precision::Precision;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::{Demand, Law, Response};
 use flotor_spring::thesis::Thesis;
+use flotor_tests::thesis_poses::thesis_pose;
 
 const POSES: usize = 1024;
 
 const DEMANDS: [(&str, Demand); 3] =
     [("force", Demand::Force), ("wrench", Demand::Wrench), ("energy", Demand::WrenchAndEnergy)];
 
-/// Low-discrepancy sequence: the additive recurrence of the generalised golden ratio in six dimensions.
 fn poses() -> Vec<Pose> {
-    const STEPS: [f64; 6] = [
-        0.891_487_826_846_4,
-        0.794_750_545_400_7,
-        0.708_508_436_203_4,
-        0.631_624_657_243_1,
-        0.563_083_683_016_8,
-        0.501_980_271_028_8,
-    ];
-    (0..POSES)
-        .map(|index| {
-            let [x, y, z, rx, ry, rz] = STEPS.map(|step| 2.0 * (step * index as f64).fract() - 1.0);
-            // A quarter of the free length aside, from 40 % compressed to 20 % stretched, 7 degrees.
-            let position_m = DVec3::new(0.25 * x, 0.25 * y, 0.3 * z - 0.1) * 0.025;
-            Pose::from_rotation_vector(position_m, DVec3::new(rx, ry, rz) * 0.122)
-        })
-        .collect()
+    let poses = (0..POSES).map(|index| thesis_pose(index, 0.025));
+    poses.map(|(position_m, rotation_rad)| Pose::from_rotation_vector(position_m, rotation_rad)).collect()
 }
 
 fn inputs(poses: &[Pose], demand: Demand) -> Vec<Input> {

@@ -12,7 +12,6 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use flotor_hal::glam::DVec3;
 use flotor_hal::{Demand, Input, Output};
 use flotor_spring::batch::Batch;
 use flotor_spring::closed_form::{ClosedForm, Form};
@@ -21,26 +20,16 @@ use flotor_spring::energy::EnergyForm;
 use flotor_spring::pose::Pose;
 use flotor_spring::preset::Preset;
 use flotor_spring::response::Law;
+use flotor_tests::thesis_poses::thesis_pose;
 
 /// Poses of a slice: they and their answers stay in the second-level cache.
 const POSES: usize = 1024;
 const ROUNDS: usize = 2001;
 
-/// The workspace of the thesis: a quarter of the free length aside, from 40 % compressed to 20 % stretched, 7 degrees.
 fn inputs(free_length_m: f64) -> Vec<Input> {
-    // The additive recurrence of the generalised golden ratio in six dimensions.
-    const STEPS: [f64; 6] = [
-        0.891_487_826_846_4,
-        0.794_750_545_400_7,
-        0.708_508_436_203_4,
-        0.631_624_657_243_1,
-        0.563_083_683_016_8,
-        0.501_980_271_028_8,
-    ];
     let input = |index: usize| {
-        let [x, y, z, rx, ry, rz] = STEPS.map(|step| 2.0 * (step * index as f64).fract() - 1.0);
-        let position_m = DVec3::new(0.25 * x, 0.25 * y, 0.3 * z - 0.1) * free_length_m;
-        let pose = Pose::from_rotation_vector(position_m, DVec3::new(rx, ry, rz) * 0.122);
+        let (position_m, rotation_rad) = thesis_pose(index, free_length_m);
+        let pose = Pose::from_rotation_vector(position_m, rotation_rad);
         let pose = flotor_hal::Pose::new(pose.position_m, pose.orientation);
         Input { demand: Demand::WRENCH, ..Input::at_rest(pose) }
     };

@@ -5,7 +5,7 @@
 #![allow(dead_code)] // each test program uses its part
 
 use rustix::process::{Resource, getrlimit, getuid};
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
@@ -52,6 +52,16 @@ impl Place {
             Self::Port(at) => TcpStream::connect_timeout(at, Duration::from_secs(5)),
             Self::Socket(path) => Ok(TcpStream::from(OwnedFd::from(UnixStream::connect(path)?))),
         }
+    }
+
+    /// Sends a request; returns whether anything is answered in time.
+    pub(crate) fn answers(&self, request: &[u8]) -> bool {
+        let asked = self.connect().and_then(|mut stream| {
+            stream.set_read_timeout(Some(Duration::from_secs(1)))?;
+            stream.write_all(request)?;
+            stream.read(&mut [0; 16])
+        });
+        asked.is_ok_and(|length| length > 0)
     }
 }
 

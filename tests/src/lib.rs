@@ -8,10 +8,12 @@ pub mod library;
 pub mod printed;
 pub mod process;
 pub mod program;
+pub mod random;
 pub mod scratch;
 pub mod side_by_side;
 pub mod stand_in;
 pub mod tables;
+pub mod thesis_poses;
 pub mod tools;
 pub mod watched;
 

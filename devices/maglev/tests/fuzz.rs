@@ -2,28 +2,15 @@
 //! know, as packets and on a stream. `FLOTOR_TEST_SIZE=full` makes it 1e8 of them; `tests/fuzz` has the same for libFuzzer.
 #![allow(clippy::cast_possible_truncation)] // random bytes
 
+#[path = "../../../tests/src/random.rs"]
+mod random;
+
 use flotor_maglev::protocol::stream::{CODED_BYTES, Received, StreamDecoder, coded};
 use flotor_maglev::protocol::{
     Answer, AnswerFrame, Condition, Description, FRAME_BYTES, Intake, Mode, Rejection, Request, RequestFrame,
     Status,
 };
-
-/// SplitMix64 (Steele, Lea, Flood 2014): short, fast, the same everywhere.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ (mixed >> 31)
-    }
-
-    fn below(&mut self, bound: usize) -> usize {
-        (self.next() % bound as u64) as usize
-    }
-}
+use random::Random;
 
 /// Numbers a link or a host gets wrong.
 const ODD: [u32; 8] = [0, 1, u32::MAX, 1 << 31, 0x7f80_0000, 0xff80_0000, 0x7fc0_0000, 0x0000_0001];
@@ -31,13 +18,13 @@ const ODD: [u32; 8] = [0, 1, u32::MAX, 1 << 31, 0x7f80_0000, 0xff80_0000, 0x7fc0
 fn request(random: &mut Random) -> [u8; FRAME_BYTES] {
     let request = match random.below(6) {
         0 => Request::Describe { page: random.below(5) as u16 },
-        1 => Request::Arm { period_us: 1000, watchdog_us: random.next() as u32 },
+        1 => Request::Arm { period_us: 1000, watchdog_us: random.bits() as u32 },
         2 => Request::TakeOff,
         3 => Request::Land,
         4 => Request::Disarm,
         _ => Request::Command { wrench: [1.0, -2.0, 3.0, 0.1, -0.2, 0.3], valid_us: 3000 },
     };
-    let (sequence, session) = (random.next() as u32, random.next() as u32);
+    let (sequence, session) = (random.bits() as u32, random.bits() as u32);
     RequestFrame { sequence, acknowledged: 1, time_us: 2, session, request }.encode()
 }
 
@@ -71,7 +58,7 @@ fn answer(random: &mut Random) -> [u8; FRAME_BYTES] {
         0 => Answer::Status(status),
         _ => Answer::Description(DESCRIPTION.page(random.below(3) as u16).expect("there are three")),
     };
-    let (sequence, session) = (random.next() as u32, random.next() as u32);
+    let (sequence, session) = (random.bits() as u32, random.bits() as u32);
     AnswerFrame { sequence, acknowledged: 1, time_us: 2, session, answer }.encode()
 }
 
@@ -83,8 +70,8 @@ fn wound(random: &mut Random, frame: [u8; FRAME_BYTES], other: &[u8; FRAME_BYTES
         let at = random.below(FRAME_BYTES);
         match random.below(7) {
             0 => bytes[at] ^= 1 << random.below(8),
-            1 => bytes[at] = random.next() as u8,
-            2 => bytes[3] = random.next() as u8,
+            1 => bytes[at] = random.bits() as u8,
+            2 => bytes[3] = random.bits() as u8,
             3 => {
                 let field = 4 * random.below(FRAME_BYTES / 4);
                 bytes[field..field + 4].copy_from_slice(&ODD[random.below(ODD.len())].to_le_bytes());
@@ -143,7 +130,7 @@ fn wounded_frames_are_frames_or_reasons() {
         let frame: [u8; FRAME_BYTES] = std::array::from_fn(|index| bytes[index]);
         let (mut line, line_length) = coded(&frame);
         if random.below(2) == 0 {
-            line[random.below(CODED_BYTES)] = random.next() as u8;
+            line[random.below(CODED_BYTES)] = random.bits() as u8;
         }
         for byte in &line[..line_length.min(1 + random.below(2 * CODED_BYTES))] {
             match stream.push(*byte) {

@@ -3,30 +3,19 @@
 //! for libFuzzer.
 #![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // random bytes
 
-use flotor_maglev::ml_api::*;
+#[path = "../../../tests/src/random.rs"]
+mod random;
 
-/// SplitMix64 (Steele, Lea, Flood 2014): short, fast, the same everywhere.
-struct Random(u64);
+use flotor_maglev::ml_api::*;
+use random::Random;
 
 impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ (mixed >> 31)
-    }
-
-    fn below(&mut self, bound: usize) -> usize {
-        (self.next() % bound as u64) as usize
-    }
-
     /// A number with all its bits at random, or a small one.
     fn word(&mut self) -> [u8; 4] {
         if self.below(2) == 0 {
             (self.below(9) as u32).to_le_bytes()
         } else {
-            (self.next() as u32).to_le_bytes()
+            (self.bits() as u32).to_le_bytes()
         }
     }
 }
@@ -41,7 +30,7 @@ fn frame(random: &mut Random, code: i32) -> ([u8; 128], usize) {
     bytes[..4].copy_from_slice(&(length as u32).to_le_bytes());
     bytes[4..8].copy_from_slice(&code.to_le_bytes());
     match random.below(8) {
-        0 => bytes[random.below(8)] = random.next() as u8,
+        0 => bytes[random.below(8)] = random.bits() as u8,
         1 => return (bytes, random.below(128)),
         _ => {}
     }
@@ -60,7 +49,7 @@ fn wounded_frames_of_the_ml_api_are_messages_or_nothing() {
     let mut random = Random(1);
     let (mut requests, mut replies, mut events, mut on_a_stream) = (0_u64, 0_u64, 0_u64, 0_u64);
     for _ in 0..executions {
-        let id = if random.below(16) == 0 { random.next() as i32 } else { random.below(80) as i32 };
+        let id = if random.below(16) == 0 { random.bits() as i32 } else { random.below(80) as i32 };
         let (bytes, length) = frame(&mut random, id);
         let bytes = &bytes[..length];
         match Request::decode(bytes) {

@@ -1,20 +1,14 @@
 //! The coupling against what it promises: energy, delay, lost and overtaken messages, scales and frames.
 
+#[path = "../../../tests/src/random.rs"]
+mod random;
+
 use super::*;
 use flotor_core::mapping::MappingConfig;
 use flotor_hal::{DQuat, DVec3, Pose, Twist};
+use random::Random;
 
 const PERIOD_S: f64 = 1.0e-3;
-
-/// SplitMix64 (Steele, Lea, Flood 2014) as numbers in -1..1.
-fn random(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut word = *state;
-    word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    let part = (word ^ (word >> 31)) as f64 / u64::MAX as f64;
-    2.0 * part - 1.0
-}
 
 /// A flotor of 0.58 kg that slides along z in a hand, or free; exact between two samples, as the wrench is held.
 struct Slider {
@@ -125,7 +119,7 @@ fn tanks_balance_and_energy_on_its_way_is_in_neither() {
 #[test]
 fn the_pair_generates_no_energy_whatever_becomes_of_the_messages() {
     for seed in 0..200 {
-        let mut state = seed;
+        let mut random = Random(seed);
         let config = CouplingConfig::default();
         let mut ends = [(); 2].map(|()| End::new(&config, &MappingConfig::default(), PERIOD_S));
         let mut sliders = [Slider::AT_REST, Slider::AT_REST];
@@ -139,8 +133,8 @@ fn the_pair_generates_no_energy_whatever_becomes_of_the_messages() {
                 ends[from].observe(&states[from], &sliders[from].held());
                 let peer = ends[from].send_state(&states[from]);
                 #[allow(clippy::cast_possible_truncation)] // up to 80 ticks
-                let late = (40.0 + 40.0 * random(&mut state)) as i32;
-                if random(&mut state) > -1.0 / 3.0 {
+                let late = (40.0 + 40.0 * random.symmetric()) as i32;
+                if random.symmetric() > -1.0 / 3.0 {
                     ways[1 - from].push((tick + late, peer));
                 }
             }
@@ -152,7 +146,7 @@ fn the_pair_generates_no_energy_whatever_becomes_of_the_messages() {
             assert!(gone_in_j >= -1.0e-12, "seed {seed}, tick {tick}: {gone_in_j} J");
             for index in [0, 1] {
                 // Hands that push now here, now there, softly held in the middle.
-                hand_n[index] += 0.02 * random(&mut state) - 0.01 * hand_n[index];
+                hand_n[index] += 0.02 * random.symmetric() - 0.01 * hand_n[index];
                 let hold_n = -40.0 * sliders[index].z_m - 2.0 * sliders[index].velocity_m_per_s;
                 let pull = ends[index].pull(&states[index]);
                 sliders[index].slide(hand_n[index] + hold_n, &pull);

@@ -1,13 +1,20 @@
+#[path = "../../../tests/src/plugin_description.rs"]
+mod plugin_description;
+#[path = "../../../tests/src/random.rs"]
+mod random;
+
 use super::file::NewFile;
 use super::schema::{DESCRIPTOR_SET, ENCODING, FORMAT, Topic};
 use super::*;
 use flotor_core::Clock;
-use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
+use flotor_core::mapping::MappingConfig;
 use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
 use flotor_hal::Demand;
 use flotor_sync::Words;
 use mcap::records::op;
+use plugin_description::described;
 use prost::Message;
+use random::Random;
 use std::fs::{self, File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -42,23 +49,9 @@ fn run() -> RunDescription {
     let turned = MappingConfig { rotation_xyzw: [0.6, 0.0, -0.0, 0.8], ..MappingConfig::default() };
     let scaled = MappingConfig { motion_scale: 25.0 / 15.0, torque_scale: Some(0.1), ..turned };
     let plugin = |name: &str, role, settings| PluginDescription {
-        name: name.to_owned(),
-        id: format!("{name}-id"),
-        version: "1.2.3".to_owned(),
-        file: format!("lib{name}.so"),
-        role,
-        places_m: if role == Role::Device { Vec::new() } else { vec![[0.001, -0.002, 0.003], [0.25; 3]] },
-        blend: if role == Role::Device {
-            Blend::default()
-        } else {
-            Blend { weight: 0.5, priority: 3, fade_s: 0.25 }
-        },
-        field: (role != Role::Device).then_some(FieldTiming { rate_hz: 200.0, latency_s: 0.0025 }),
-        latency_s: if role == Role::Device { 0.001 } else { 0.0 },
         at_hand: if role == Role::Device { Demand::FORCE } else { Demand::WRENCH },
         settings,
-        parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
-        device: 0,
+        ..described(name, role)
     };
     RunDescription {
         flotor_version: "9.8.7".to_owned(),
@@ -121,17 +114,6 @@ fn three_chunks() -> Vec<TickRecord> {
     (0..9).map(|index| tick(index, 100_000_000)).collect()
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014): every bit pattern, in no order.
-fn random_words(state: &mut u64) -> [u64; RECORD_WORDS] {
-    std::array::from_fn(|_| {
-        *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = *state;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    })
-}
-
 #[test]
 fn ticks_come_back_bit_for_bit() {
     let signaling_nan = 0x7ff0_0000_dead_beef;
@@ -146,8 +128,8 @@ fn ticks_come_back_bit_for_bit() {
     ];
     let mut ticks: Vec<TickRecord> =
         specials.iter().map(|&word| TickRecord::from_words(&[word; RECORD_WORDS])).collect();
-    let mut state = 1;
-    ticks.extend((0..2000).map(|_| TickRecord::from_words(&random_words(&mut state))));
+    let mut random = Random(1);
+    ticks.extend((0..2000).map(|_| TickRecord::from_words(&std::array::from_fn(|_| random.bits()))));
 
     let file = TestFile::new("bits");
     write(&file.0, &ticks);

@@ -21,6 +21,9 @@ mod parameters;
 mod passivity;
 pub mod platform;
 mod queue;
+#[cfg(test)]
+#[path = "../../../tests/src/random.rs"]
+mod random;
 mod realtime;
 mod run;
 mod servo;

@@ -26,28 +26,38 @@ fn members() -> Members {
     Members { hosts: vec!["localhost".to_owned(), "127.0.0.1".to_owned()], peers, valid: VALID }
 }
 
-/// A member, as its own configuration makes it, at the port of this test.
-fn visit(folder: &Path, who: &str, endpoint: &str, bridge: &Name) -> Remote {
-    let link = LinkOptions {
+/// A bridge of members, and the folder with their keys.
+fn closed(host: &FakeHost) -> (tempfile::TempDir, Bridge) {
+    let folder = tempfile::tempdir().unwrap();
+    write_keys(folder.path(), &members()).unwrap();
+    let link = LinkOptions { config: Some(folder.path().join("bridge.json5")), ..LinkOptions::default() };
+    let bridge =
+        Bridge::start_with(&host.directory, Right::Own, format!("tls/localhost:{}", free_port()), link);
+    (folder, bridge)
+}
+
+/// The link of a member to a bridge, as the member's own configuration makes it.
+fn link_of(folder: &Path, who: &str, bridge: &Bridge) -> LinkOptions {
+    LinkOptions {
         config: Some(folder.join(format!("{who}.json5"))),
-        connect: vec![endpoint.to_owned()],
+        connect: vec![bridge.endpoint.clone()],
         ..LinkOptions::default()
-    };
-    Remote::listen(&open(&link, End::Visiting).unwrap(), bridge).unwrap()
+    }
+}
+
+/// A member at a bridge.
+fn visit(folder: &Path, who: &str, bridge: &Bridge) -> Remote {
+    Remote::listen(&open(&link_of(folder, who, bridge), End::Visiting).unwrap(), &bridge.name).unwrap()
 }
 
 #[test]
 fn rights_are_what_the_keys_say() {
     let host = FakeHost::start();
-    let folder = tempfile::tempdir().unwrap();
-    write_keys(folder.path(), &members()).unwrap();
-    let endpoint = format!("tls/localhost:{}", free_port());
-    let link = LinkOptions { config: Some(folder.path().join("bridge.json5")), ..LinkOptions::default() };
-    let bridge = Bridge::start_with(&host.directory, Right::Own, endpoint.clone(), link);
+    let (folder, bridge) = closed(&host);
 
     let weight = || Request::Weight { model: "spring".to_owned(), weight: 0.5 };
     for (who, may_operate, may_own) in [("alan", false, false), ("grace", true, false), ("ada", true, true)] {
-        let remote = visit(folder.path(), who, &endpoint, &bridge.name);
+        let remote = visit(folder.path(), who, &bridge);
         let (greeting, _) = remote.wait_for_run(&NEVER).unwrap().expect("every member may see");
         assert_eq!(greeting.title, "Far away", "{who}");
         let requests = remote.requests();
@@ -62,15 +72,12 @@ fn rights_are_what_the_keys_say() {
 #[test]
 fn who_is_no_member_is_refused() {
     let host = FakeHost::start();
-    let (folder, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    write_keys(folder.path(), &members()).unwrap();
+    let (_folder, bridge) = closed(&host);
+    let elsewhere = tempfile::tempdir().unwrap();
     write_keys(elsewhere.path(), &members()).unwrap();
-    let endpoint = format!("tls/localhost:{}", free_port());
-    let link = LinkOptions { config: Some(folder.path().join("bridge.json5")), ..LinkOptions::default() };
-    let bridge = Bridge::start_with(&host.directory, Right::Own, endpoint.clone(), link);
     // The right name, vouched for by somebody else; then no certificate at all.
     for config in [Some(elsewhere.path().join("ada.json5")), None] {
-        let connect = vec![endpoint.clone()];
+        let connect = vec![bridge.endpoint.clone()];
         let link = LinkOptions { config, connect, ..LinkOptions::default() };
         match open(&link, End::Visiting) {
             Err(_) => {}
@@ -87,19 +94,10 @@ fn who_is_no_member_is_refused() {
 #[test]
 fn members_cannot_pretend_to_be_the_bridge() {
     let host = FakeHost::start();
-    let folder = tempfile::tempdir().unwrap();
-    write_keys(folder.path(), &members()).unwrap();
-    let endpoint = format!("tls/localhost:{}", free_port());
-    let link = LinkOptions { config: Some(folder.path().join("bridge.json5")), ..LinkOptions::default() };
-    let bridge = Bridge::start_with(&host.directory, Right::Own, endpoint.clone(), link);
-    let honest = visit(folder.path(), "alan", &endpoint, &bridge.name);
+    let (folder, bridge) = closed(&host);
+    let honest = visit(folder.path(), "alan", &bridge);
     honest.wait_for_run(&NEVER).unwrap();
-    let link = LinkOptions {
-        config: Some(folder.path().join("ada.json5")),
-        connect: vec![endpoint],
-        ..LinkOptions::default()
-    };
-    let session = open(&link, End::Visiting).unwrap();
+    let session = open(&link_of(folder.path(), "ada", &bridge), End::Visiting).unwrap();
     let lie = serde_json::to_vec(&flotor_live::End {
         words: "a lie".to_owned(),
         kind: flotor_live::EndKind::InOrder,
@@ -114,15 +112,8 @@ fn members_cannot_pretend_to_be_the_bridge() {
 #[test]
 fn members_ask_under_their_own_names_only() {
     let host = FakeHost::start();
-    let folder = tempfile::tempdir().unwrap();
-    write_keys(folder.path(), &members()).unwrap();
-    let endpoint = format!("tls/localhost:{}", free_port());
-    let link = LinkOptions { config: Some(folder.path().join("bridge.json5")), ..LinkOptions::default() };
-    let bridge = Bridge::start_with(&host.directory, Right::Own, endpoint.clone(), link);
-    let connect = vec![endpoint];
-    let link =
-        LinkOptions { config: Some(folder.path().join("grace.json5")), connect, ..LinkOptions::default() };
-    let session = open(&link, End::Visiting).unwrap();
+    let (folder, bridge) = closed(&host);
+    let session = open(&link_of(folder.path(), "grace", &bridge), End::Visiting).unwrap();
     assert_eq!(session.member(), &name("grace"));
     assert!(session.days_left().is_some_and(|days| (363..=365).contains(&days)));
     let remote = Remote::listen(&session, &bridge.name).unwrap();

@@ -12,17 +12,7 @@ from distributed import Client, LocalCluster
 
 import flotor
 
-PLAN = """
-seeds = [1]
-[ask]
-kind = "run"
-duration_s = {duration_s}
-[[axis]]
-key = "spring.gamma_n"
-from = 12
-to = 48
-steps = 40
-"""
+PLAN = (Path(__file__).parents[1] / "tests/runs.plan").read_text()
 
 
 def wall_s(plan, out, workers):
@@ -41,7 +31,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
         plan = folder / "plan.toml"
-        plan.write_text(PLAN.format(duration_s=duration_s))
+        plan.write_text(PLAN.format(seeds=[1], duration_s=duration_s, steps=40))
         one_s, one = wall_s(plan, folder / "one", 1)
         two_s, two = wall_s(plan, folder / "two", 2)
     print(f"40 runs of {duration_s} s: one worker {one_s:.1f} s, two {two_s:.1f} s, {one_s / two_s:.2f} times faster")

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -27,17 +28,7 @@ to = 0.004
 steps = 512
 """
 
-RUNS = """
-seeds = [1, 2]
-[ask]
-kind = "run"
-duration_s = {duration_s}
-[[axis]]
-key = "spring.gamma_n"
-from = 12
-to = 48
-steps = {steps}
-"""
+RUNS = (Path(__file__).parent / "runs.plan").read_text()
 
 
 @pytest.fixture
@@ -74,7 +65,7 @@ def test_rows_are_what_the_model_answers(plan, tmp_path):
 def test_a_killed_worker_loses_nothing(tmp_path):
     distributed = pytest.importorskip("distributed")
     plan = tmp_path / "plan.toml"
-    plan.write_text(RUNS.format(duration_s=20, steps=20))
+    plan.write_text(RUNS.format(seeds=[1, 2], duration_s=20, steps=20))
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         with distributed.Client(cluster) as client:
             pids = client.run(os.getpid)
@@ -94,7 +85,7 @@ def test_a_killed_worker_loses_nothing(tmp_path):
 
 def test_a_killed_driver_goes_on_where_it_was(tmp_path):
     plan, out = tmp_path / "plan.toml", tmp_path / "out"
-    plan.write_text(RUNS.format(duration_s=20, steps=40))
+    plan.write_text(RUNS.format(seeds=[1, 2], duration_s=20, steps=40))
     script = f"import flotor; flotor.sweep.run({str(plan)!r}, {str(out)!r}, flotor.sweep.threads(1))"
     driver = subprocess.Popen([sys.executable, "-c", script])
     deadline = time.monotonic() + 60

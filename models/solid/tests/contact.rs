@@ -148,27 +148,43 @@ fn the_force_does_not_jump() {
             DVec3::new(numbers.between(-1.0, 1.0), numbers.between(-1.0, 1.0), numbers.between(-1.0, 1.0));
         let to = from + way.normalize() * step_m;
         let change = (force(to) - force(from)).length();
-        let stiffness = [from, to].map(|at| {
-            let small = 0.1 * step_m;
-            let columns =
-                DVec3::AXES.map(|axis| (force(at + axis * small) - force(at - axis * small)) / (2.0 * small));
-            // The norm of Frobenius is at least the largest singular value and at most root three times it.
-            columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt()
-        });
-        let bound = 1.5 * stiffness[0].max(stiffness[1]) * step_m;
+        let bound = 1.5 * largest_stiffness([from, to], 0.1 * step_m, force) * step_m;
         largest = largest.max(change / (bound / 1.5).max(1.0e-12));
         assert!(change <= bound.max(1.0e-12), "{from} {to}: {change} {bound}");
     }
     println!("largest step: {largest:.3} of stiffness times travel");
 }
 
+/// Returns the larger stiffness of two places, N/m, from forces at small distances from them.
+pub(crate) fn largest_stiffness(places: [DVec3; 2], small_m: f64, force: impl Fn(DVec3) -> DVec3) -> f64 {
+    let stiffness = places.map(|at| {
+        let columns = DVec3::AXES
+            .map(|axis| (force(at + axis * small_m) - force(at - axis * small_m)) / (2.0 * small_m));
+        // The norm of Frobenius is at least the largest singular value and at most root three times it.
+        columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt()
+    });
+    stiffness[0].max(stiffness[1])
+}
+
+/// Checks that the plugin refuses each of these settings for the reason beside it.
+pub(crate) fn assert_refused(cases: &[(&[(&str, &str)], &str)]) {
+    let plugin = Plugin::in_process(&flotor_solid::FLOTOR_ENTRY).expect("the solid is a plugin");
+    for (settings, wanted) in cases {
+        let error =
+            plugin.create_model(&parsed(&plugin, settings)).map(|_| ()).expect_err(wanted).to_string();
+        assert!(error.contains(wanted), "{wanted}: {error}");
+    }
+}
+
+fn parsed(plugin: &Plugin, settings: &[(&str, &str)]) -> Vec<Setting> {
+    let parsed =
+        |(id, value): &(&str, &str)| Setting::parse(plugin.parameters(), id, value).expect("a setting");
+    settings.iter().map(parsed).collect()
+}
+
 pub(crate) fn model(settings: &[(&str, &str)]) -> Model {
     let plugin = Plugin::in_process(&flotor_solid::FLOTOR_ENTRY).expect("the solid is a plugin");
-    let settings: Vec<Setting> = settings
-        .iter()
-        .map(|(id, value)| Setting::parse(plugin.parameters(), id, value).expect("a setting"))
-        .collect();
-    plugin.create_model(&settings).expect("a solid")
+    plugin.create_model(&parsed(&plugin, settings)).expect("a solid")
 }
 
 pub(crate) fn step(model: &mut Model, pose: Pose) -> Output {

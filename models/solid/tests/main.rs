@@ -9,6 +9,7 @@ mod printed;
 mod rows;
 mod several;
 mod solver;
+#[path = "../../../tests/src/model_tables.rs"]
 mod table;
 
 use std::io::Write;

@@ -1,7 +1,7 @@
 //! Bodies from files and of curved bricks: what is read, what is refused, and whether the answers are those of a solid.
 
+use crate::contact::assert_refused;
 use crate::table::rows;
-use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{DVec3, Demand, orientation_from_rotation_vector};
 use flotor_solid::atlas::Atlas;
 use flotor_solid::cells::Kind;
@@ -168,7 +168,7 @@ fn a_plate_on_a_beam_from_a_file() {
                 panic!("a rigid patch")
             };
             let mut worst: f64 = 0.0;
-            for row in rows("a_cantilever_plate.csv").iter().filter(|row| row.number("nu") == nu) {
+            for row in rows("solid/a_cantilever_plate.csv").iter().filter(|row| row.number("nu") == nu) {
                 let rotation = orientation_from_rotation_vector(row.vector(["rx_rad", "ry_rad", "rz_rad"]));
                 let (wrench, _) = patch.answer(row.vector(["x_m", "y_m", "z_m"]), rotation, Demand::ALL);
                 let modulus = row.number("E_pa");
@@ -198,7 +198,7 @@ fn a_sphere_on_a_block_from_a_file() {
         panic!("a sphere")
     };
     println!("estimated {mesh_error:.4}");
-    let table = rows("b_block_sphere.csv");
+    let table = rows("solid/b_block_sphere.csv");
     let own = |category: &str| category.starts_with("centre") || category.starts_with("q34");
     let mut seen = 0;
     for row in table.iter().filter(|row| own(row.text("category"))) {
@@ -445,21 +445,13 @@ fn files_that_are_no_body_are_refused() {
 /// The plugin names the parameter that does not fit.
 #[test]
 fn settings_of_a_mesh_that_do_not_fit_are_refused() {
-    let plugin = Plugin::in_process(&flotor_solid::FLOTOR_ENTRY).expect("the solid is a plugin");
-    for (settings, wanted) in [
-        (vec![("body", "file")], "set `file`"),
-        (vec![("body", "file"), ("file", "/nonexistent.msh")], "cannot read"),
-        (vec![("file", "a.msh")], "body = \"file\""),
-        (vec![("fixed_face", "bottom")], "body = \"file\""),
-        (vec![("body", "file"), ("file", "a.msh"), ("size_x_mm", "10")], "size_x_mm"),
-        (vec![("body", "cylinder"), ("size_y_mm", "10")], "size_y_mm"),
-        (vec![("body", "cylinder"), ("tool_radius_mm", "60")], "tool_radius_mm"),
-    ] {
-        let settings: Vec<Setting> = settings
-            .iter()
-            .map(|(id, value)| Setting::parse(plugin.parameters(), id, value).expect("a setting"))
-            .collect();
-        let error = plugin.create_model(&settings).map(|_| ()).expect_err(wanted).to_string();
-        assert!(error.contains(wanted), "{wanted}: {error}");
-    }
+    assert_refused(&[
+        (&[("body", "file")], "set `file`"),
+        (&[("body", "file"), ("file", "/nonexistent.msh")], "cannot read"),
+        (&[("file", "a.msh")], "body = \"file\""),
+        (&[("fixed_face", "bottom")], "body = \"file\""),
+        (&[("body", "file"), ("file", "a.msh"), ("size_x_mm", "10")], "size_x_mm"),
+        (&[("body", "cylinder"), ("size_y_mm", "10")], "size_y_mm"),
+        (&[("body", "cylinder"), ("tool_radius_mm", "60")], "tool_radius_mm"),
+    ]);
 }

@@ -68,7 +68,7 @@ fn a_plate_at_the_end_of_a_beam() {
     let mut largest = Largest::default();
     for nu in [0.3, 0.45] {
         let law = solve(Body::Beam { size_m: [0.2, 0.04, 0.04] }, Tool::Plate, nu);
-        for row in rows("a_cantilever_plate.csv").iter().filter(|row| row.number("nu") == nu) {
+        for row in rows("solid/a_cantilever_plate.csv").iter().filter(|row| row.number("nu") == nu) {
             let (f, m) = errors(&law, row, 0.02);
             largest.add((f, m));
             assert!(f < 0.02 && m < 0.02, "{}: {f} {m}", row.text("id"));
@@ -90,7 +90,7 @@ fn a_punch_on_a_block() {
     ] {
         let mut largest = Largest::default();
         let mut solved: Option<(Size, f64, Bond, Law)> = None;
-        for row in &rows(file) {
+        for row in &rows(&format!("solid/{file}")) {
             let (size, nu) = (block(row), row.number("nu"));
             let frictionless = row.text("category") == "punch_frictionless";
             let bond = if frictionless { Bond::Frictionless } else { Bond::Bonded };
@@ -121,7 +121,7 @@ fn a_sphere_on_a_block() {
             }
             let law = solve(Body::Block(CUBE), Tool::Sphere { radius_m }, nu);
             let Law::Sphere(atlas) = law else { panic!("a sphere") };
-            let table = rows("b_block_sphere.csv");
+            let table = rows("solid/b_block_sphere.csv");
             for row in table.iter().filter(|row| row.number("nu") == nu && row.number("radius_m") == radius_m)
             {
                 let answer = atlas.answer(row.vector(["cx_m", "cy_m", "cz_m"]).to_array());
@@ -163,7 +163,7 @@ fn a_loaded_disc_on_a_block() {
     let area = std::f64::consts::PI * 0.005 * 0.005;
     let mut solved: Option<(Size, HalfSpace, Remainder)> = None;
     let mut largest = Largest::default();
-    for row in rows("c_surface.csv").iter().filter(|row| row.text("at") != "mean") {
+    for row in rows("solid/c_surface.csv").iter().filter(|row| row.text("at") != "mean") {
         let solid = HalfSpace { youngs_modulus_pa: row.number("E_pa"), poisson_ratio: row.number("nu") };
         let distance = row.text("at").parse::<f64>().unwrap_or(0.0) * 1.0e-3;
         let at = [0.8 * distance, 0.6 * distance];
@@ -237,7 +237,7 @@ fn errors_against_the_finest_beam_are_those_of_an_independent_program() {
         patch
     };
     let (modulus_pa, fine) = (1.0e4, patch(2));
-    let table = rows("bench_beam.csv");
+    let table = rows("solid/bench_beam.csv");
     assert_eq!(table.len(), 3);
     for row in &table {
         let resolution = match row.text("case") {

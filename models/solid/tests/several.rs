@@ -1,7 +1,6 @@
 //! Several spheres on one handle: beside contacts that are solved together, and the laws of one.
 
-use crate::contact::{Numbers, model, step};
-use flotor_hal::abi::loader::{Plugin, Setting};
+use crate::contact::{Numbers, assert_refused, largest_stiffness, model, step};
 use flotor_hal::{DQuat, DVec3, Pose, StepStatus};
 use flotor_solid::dense;
 use flotor_solid::half_space::HalfSpace;
@@ -233,13 +232,7 @@ fn several_spheres_do_not_jump() {
         let to = from + way.normalize() * step_m;
         let force = |at: DVec3| law.answer(at, turn).wrench.force();
         let change = (force(to) - force(from)).length();
-        let stiffness = [from, to].map(|at| {
-            let small = 0.1 * step_m;
-            let columns =
-                DVec3::AXES.map(|axis| (force(at + axis * small) - force(at - axis * small)) / (2.0 * small));
-            columns.iter().map(|c| c.length_squared()).sum::<f64>().sqrt()
-        });
-        let bound = 1.5 * stiffness[0].max(stiffness[1]) * step_m;
+        let bound = 1.5 * largest_stiffness([from, to], 0.1 * step_m, force) * step_m;
         assert!(change <= bound.max(1.0e-12), "{from} {to}: {change} {bound}");
     }
 }
@@ -277,19 +270,14 @@ fn any_pose_of_several_spheres_has_a_finite_answer() {
 /// Settings that do not go together are refused with the parameter.
 #[test]
 fn settings_of_several_spheres_that_do_not_fit_are_refused() {
-    let plugin = Plugin::in_process(&flotor_solid::FLOTOR_ENTRY).expect("the solid is a plugin");
-    for (settings, wanted) in [
-        (vec![("tool_count", "2"), ("tool_spacing_mm", "20")], "at least 25.4"),
-        (vec![("tool_count", "2"), ("tool_radius_mm", "5"), ("tool_spacing_mm", "90")], "mm for this face"),
-        (vec![("tool_count", "3"), ("body", "cylinder")], "block or a half-space"),
-        (vec![("tool_count", "3"), ("tool", "punch-round")], "tool_count"),
-        (vec![("tool_count", "3"), ("bond", "bonded")], "not bonded"),
-    ] {
-        let settings: Vec<Setting> = settings
-            .iter()
-            .map(|(id, value)| Setting::parse(plugin.parameters(), id, value).expect("a setting"))
-            .collect();
-        let error = plugin.create_model(&settings).map(|_| ()).expect_err(wanted).to_string();
-        assert!(error.contains(wanted), "{wanted}: {error}");
-    }
+    assert_refused(&[
+        (&[("tool_count", "2"), ("tool_spacing_mm", "20")], "at least 25.4"),
+        (
+            &[("tool_count", "2"), ("tool_radius_mm", "5"), ("tool_spacing_mm", "90")],
+            "mm for this face",
+        ),
+        (&[("tool_count", "3"), ("body", "cylinder")], "block or a half-space"),
+        (&[("tool_count", "3"), ("tool", "punch-round")], "tool_count"),
+        (&[("tool_count", "3"), ("bond", "bonded")], "not bonded"),
+    ]);
 }

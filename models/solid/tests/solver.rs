@@ -88,7 +88,7 @@ fn a_beam_of_few_elements_bends_as_it_should() {
     ];
     let loads: Vec<Vec<f64>> = modes.iter().map(|mode| spread(mode)).collect();
     assert!((0..count).filter(|&node| grid.index(node)[0] == last).count() == 25);
-    for row in rows("a_cantilever_load.csv") {
+    for row in rows("solid/a_cantilever_load.csv") {
         let lame = Lame::new(row.number("E_pa"), row.number("nu"));
         let stiffness = Stiffness::new(&GridStiffness::new(&grid, lame), fixed.clone()).unwrap();
         let mut u = vec![0.0; 3 * count];

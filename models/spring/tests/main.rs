@@ -8,6 +8,7 @@ mod invariance;
 mod laps;
 mod loops;
 mod oracle;
+mod preset;
 #[allow(unreachable_pub)] // shared with the other tests
 #[path = "../../../tests/src/printed.rs"]
 mod printed;
@@ -15,6 +16,7 @@ mod rod;
 mod rod_blend;
 mod sample;
 mod seat;
+#[path = "../../../tests/src/model_tables.rs"]
 mod table;
 mod thesis_vectors;
 mod totality;

@@ -1,7 +1,8 @@
 //! The spring against reference tables computed elsewhere: parameters, the thesis's closed form in 50-digit
 //! arithmetic, and the exact spatial rod. The tables are in `tests/data/cases`.
 
-use crate::table::{Row, preset, rows};
+use crate::preset::preset;
+use crate::table::{Row, rows};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::closed_form::{ClosedForm, Form};
 use flotor_spring::energy::EnergyForm;

@@ -1,8 +1,9 @@
 //! The exact rod against reference tables computed elsewhere, reached the way a hand reaches a pose; and what
 //! no table can show: convergence, energy, symmetry, totality. All rows and long walks with `FLOTOR_TEST_SIZE=full`.
 
+use crate::preset::preset;
 use crate::sample::{Loop, Sampler, Workspace, of};
-use crate::table::{Row, preset, rows};
+use crate::table::{Row, rows};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_spring::pose::Pose;
 use flotor_spring::preset::Preset;

@@ -1,7 +1,8 @@
 //! The spring on its seat against reference tables, and the properties of a free base.
 
+use crate::preset::preset;
 use crate::sample::{Sampler, Workspace, of};
-use crate::table::{preset, rows};
+use crate::table::rows;
 #[allow(dead_code)] // each test needs its part of the helpers
 use flotor_hal::glam::{DQuat, DVec2, DVec3};
 use flotor_spring::energy::EnergyForm;

@@ -8,6 +8,9 @@
 
 #![allow(clippy::unwrap_used)] // tests may panic
 
+#[path = "../../../tests/src/random.rs"]
+mod random;
+
 use flotor_analysis::power::{population, power, study};
 use flotor_analysis::{
     AnalysisOptions, PostHoc, SubjectQuality, SubjectRecord, analyse_jnd, analyse_magnitude,
@@ -19,6 +22,7 @@ use flotor_study::observer::{Population, SimulatedSubject};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, SubjectNumber};
 use flotor_study::sitting::Sitting;
 use flotor_study::trial::Exploration;
+use random::Random;
 use std::collections::BTreeMap;
 
 /// Level of the tests.
@@ -33,18 +37,7 @@ fn studies() -> u64 {
 }
 
 /// Numbers without any order, for movements that nothing depends on.
-struct Random(u64);
-
 impl Random {
-    fn uniform(&mut self) -> f64 {
-        // SplitMix64 (Steele, Lea and Flood 2014): seeds that are alike give streams that are not.
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ (mixed >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
     /// About normal: the sum of twelve.
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0

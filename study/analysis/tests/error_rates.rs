@@ -20,6 +20,7 @@ use flotor_study::procedure::{Procedure, QuestPlusRule};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, SubjectNumber};
 use flotor_study::sitting::{TrackResult, Verdict};
 use flotor_study::trial::{Exploration, Judgement, Modality, Phase, Presented, Response, Trial};
+use random::Random;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -27,6 +28,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 #[allow(unreachable_pub)] // another crate's, included
 #[path = "../../../tests/src/printed.rs"]
 mod printed;
+#[path = "../../../tests/src/random.rs"]
+mod random;
 
 const LEVEL: f64 = 0.05;
 /// The table of the book has the shares over so many.
@@ -42,25 +45,10 @@ fn data_sets() -> u64 {
     }
 }
 
-/// Random numbers of a data set (SplitMix64; Steele, Lea and Flood 2014).
-struct Random(u64);
-
 impl Random {
     fn of(seed: u64) -> Self {
         // Seeds that follow each other name streams far apart.
-        Self(Self(seed).next())
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut mixed = self.0;
-        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        mixed ^ (mixed >> 31)
-    }
-
-    fn uniform(&mut self) -> f64 {
-        (self.next() >> 11) as f64 / (1_u64 << 53) as f64
+        Self(Self(seed).bits())
     }
 
     fn normal(&mut self) -> f64 {

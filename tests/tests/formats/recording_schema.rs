@@ -1,12 +1,16 @@
 //! The schemas inside a recording: up to date with `host/proto`, and enough for a stranger to read every field.
 
+#[path = "../../src/plugin_description.rs"]
+mod plugin_description;
+
 use flotor_core::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, PassivityMode};
-use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
+use flotor_core::mapping::MappingConfig;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs};
-use flotor_hal::{Demand, Pose, Twist, Wrench};
+use flotor_hal::{Pose, Twist, Wrench};
 use flotor_record::{Note, PluginDescription, Recorder, Role, RunDescription, Severity};
 use flotor_servo::Clock;
+use plugin_description::described;
 use prost_reflect::prost::Message;
 use prost_reflect::prost_types::FileDescriptorSet;
 use prost_reflect::{DescriptorPool, DynamicMessage, ReflectMessage, Value};
@@ -109,26 +113,6 @@ fn record() -> TickRecord {
 }
 
 fn run() -> RunDescription {
-    let pair = |key: &str, value: &str| (key.to_owned(), value.to_owned());
-    let plugin = |name: &str, role| PluginDescription {
-        name: name.to_owned(),
-        id: format!("{name}-id"),
-        version: "1.2.3".to_owned(),
-        file: format!("lib{name}.so"),
-        role,
-        places_m: if role == Role::Device { Vec::new() } else { vec![[0.001, -0.002, 0.003], [0.25; 3]] },
-        blend: if role == Role::Device {
-            Blend::default()
-        } else {
-            Blend { weight: 0.5, priority: 3, fade_s: 0.25 }
-        },
-        field: (role != Role::Device).then_some(FieldTiming { rate_hz: 200.0, latency_s: 0.0025 }),
-        latency_s: if role == Role::Device { 0.001 } else { 0.0 },
-        at_hand: Demand::WRENCH,
-        settings: vec![pair("preset", "plain")],
-        parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
-        device: 0,
-    };
     let mapping = MappingConfig {
         rotation_xyzw: [0.5, 0.5, -0.5, 0.5],
         motion_scale: 25.0 / 15.0,
@@ -143,9 +127,9 @@ fn run() -> RunDescription {
         clock: Clock::Virtual,
         scene_toml: "rate_hz = 1000\n".to_owned(),
         plugins: vec![
-            plugin("left", Role::Device),
-            PluginDescription { device: 1, ..plugin("right", Role::Device) },
-            PluginDescription { device: 1, ..plugin("spring", Role::Model(mapping)) },
+            described("left", Role::Device),
+            PluginDescription { device: 1, ..described("right", Role::Device) },
+            PluginDescription { device: 1, ..described("spring", Role::Model(mapping)) },
         ],
         couplings: vec![CouplingDescription {
             name: "pair".to_owned(),

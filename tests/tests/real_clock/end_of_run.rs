@@ -49,20 +49,8 @@ impl Device for Button {
     }
 
     fn capabilities(&self) -> Capabilities {
-        Capabilities {
-            sensed: Axes::ALL,
-            actuated: Axes::ALL,
-            range_m: [0.012; 3],
-            range_rad: [0.12; 3],
-            resolution_m: 0.0,
-            max_force_n: [10.0; 3],
-            max_torque_nm: [1.0; 3],
-            max_force_slew_n_per_s: 1.0e6,
-            max_torque_slew_nm_per_s: 1.0e6,
-            max_stiffness_n_per_m: 1.0e4,
-            rate_hz: [100.0, 10_000.0],
-            latency_s: 0.0,
-        }
+        let full = Capabilities::driving(Axes::ALL).with_range(0.012, 0.12).with_limits(10.0, 1.0);
+        full.with_slew(1.0e6, 1.0e6).with_stiffness(1.0e4)
     }
 
     fn stopper(&self) -> Stop {

@@ -13,6 +13,7 @@ use flotor_simulated::hand::Script;
 use flotor_study::log::SittingLog;
 use flotor_tests::library::plugin_bytes;
 use flotor_tests::program::{Flotor, exit_code};
+use flotor_tests::random::Random;
 use flotor_tests::scratch::Scratch;
 use flotor_tests::{TestSize, workspace_root};
 use sha2::{Digest, Sha256};
@@ -21,19 +22,6 @@ use std::path::Path;
 /// Files per reader.
 fn cases() -> usize {
     TestSize::of_this_run().pick(2_000, 200_000)
-}
-
-/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014): random enough to break files.
-struct Random(u64);
-
-impl Random {
-    #[allow(clippy::cast_possible_truncation)] // less than `bound`
-    fn below(&mut self, bound: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mixed = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let mixed = (mixed ^ mixed >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((mixed ^ mixed >> 31) % bound.max(1) as u64) as usize
-    }
 }
 
 /// A copy of `whole` with one to eight wounds: flipped bits, wild bytes, wild 32-bit numbers, cuts, repeats.

@@ -15,6 +15,7 @@ use flotor_session::scene::Scene;
 use flotor_session::telemetry::Pairing;
 use flotor_session::{Observer, Steps};
 use flotor_tests::TestSize;
+use flotor_tests::random::Random;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -92,28 +93,6 @@ impl Host {
     }
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014).
-struct Random(u64);
-
-impl Random {
-    /// In 0..1.
-    fn next(&mut self) -> f64 {
-        self.bits() as f64 / u64::MAX as f64
-    }
-
-    fn below(&mut self, limit: u64) -> u64 {
-        self.bits() % limit
-    }
-
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut word = self.0;
-        word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        word ^ (word >> 31)
-    }
-}
-
 /// A way between two hosts: 20 ms give or take 5, and one datagram in a hundred lost. Messages may overtake one another.
 struct Way {
     random: Random,
@@ -129,8 +108,8 @@ impl Way {
     }
 
     fn send(&mut self, now: u64, to: usize, dispatch: Dispatch) {
-        let is_lost = self.random.next() < Self::LOSS;
-        let delay = 15 + self.random.below(11);
+        let is_lost = self.random.share() < Self::LOSS;
+        let delay = 15 + self.random.bits() % 11;
         if !is_lost {
             self.under_way.push((now + delay, to, dispatch));
         }

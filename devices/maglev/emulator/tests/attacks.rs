@@ -6,23 +6,11 @@ mod strangers;
 use flotor_maglev::ml_api::{Function, Request};
 use flotor_maglev::protocol::stream::coded;
 use flotor_maglev::protocol::{self, RequestFrame};
-use std::io::{Read, Write};
-use std::time::Duration;
-use strangers::{Listening, Place};
+use strangers::Listening;
 
 fn start(protocol: &str, options: &[&str]) -> Listening {
     let arguments = [&["--listen", "127.0.0.1:0", "--protocol", protocol], options].concat();
     Listening::start(env!("CARGO_BIN_EXE_flotor-maglev-emulator"), &arguments, "listening tcp ")
-}
-
-/// Sends a request; returns whether anything is answered in time.
-fn answers(place: &Place, request: &[u8]) -> bool {
-    let asked = place.connect().and_then(|mut stream| {
-        stream.set_read_timeout(Some(Duration::from_secs(1)))?;
-        stream.write_all(request)?;
-        stream.read(&mut [0; 16])
-    });
-    asked.is_ok_and(|length| length > 0)
 }
 
 /// A request of the own protocol.
@@ -41,19 +29,19 @@ fn version() -> Vec<u8> {
 #[test]
 fn strangers_at_the_port_of_the_own_protocol() {
     let request = description();
-    start("flotor", &[]).target.withstand(&request, |place| answers(place, &request));
+    start("flotor", &[]).target.withstand(&request, |place| place.answers(&request));
 }
 
 #[test]
 fn strangers_at_the_port_of_the_ml_api() {
     let request = version();
-    start("ml-api", &[]).target.withstand(&request, |place| answers(place, &request));
+    start("ml-api", &[]).target.withstand(&request, |place| place.answers(&request));
 }
 
 #[test]
 fn a_host_that_is_silent_makes_room() {
     let request = description();
-    start("flotor", &[]).target.makes_room(&request, |place| answers(place, &request));
+    start("flotor", &[]).target.makes_room(&request, |place| place.answers(&request));
 }
 
 #[test]

@@ -2,10 +2,9 @@
 //! flight that goes wrong says so.
 #![allow(clippy::unwrap_used)] // helpers of tests
 
+use crate::machine::CAPABILITIES;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
-use flotor_hal::{
-    Axes, Capabilities, Cycle, DVec3, DeviceState, LoopConfig, Pose, Refusal, Tick, Twist, Wrench,
-};
+use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, Pose, Refusal, Tick, Twist, Wrench};
 use flotor_maglev::protocol::Mode;
 use flotor_maglev::transport::stream::StreamLink;
 use flotor_maglev::transport::tcp::prepared;
@@ -19,21 +18,6 @@ const PERIOD_NS: u64 = 1_000_000;
 const START_M: f64 = -3.0e-3;
 /// The spring that holds the handle along z, N/m: it gives way under what it carries.
 const HOLDING_N_PER_M: f64 = 10_000.0;
-
-const CAPABILITIES: Capabilities = Capabilities {
-    sensed: Axes::ALL,
-    actuated: Axes::ALL,
-    range_m: [0.012; 3],
-    range_rad: [0.12; 3],
-    resolution_m: 2.0e-6,
-    max_force_n: [55.0, 55.0, 140.0],
-    max_torque_nm: [6.3, 6.3, 12.2],
-    max_force_slew_n_per_s: 55.0e3,
-    max_torque_slew_nm_per_s: 6.3e3,
-    max_stiffness_n_per_m: 25.0e3,
-    rate_hz: [100.0, 1.0e4],
-    latency_s: 0.0,
-};
 
 /// Nothing holds it but the coils: it falls. What they push with stands in `pushed_n`.
 struct Falling {

@@ -5,15 +5,16 @@
 //! a small virtual machine whose clock counts instructions: there, times are the program's and not the machine's.
 #![allow(clippy::unwrap_used)] // helpers of tests
 
+mod machine;
+
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
-use flotor_hal::{
-    Axes, Capabilities, Cycle, DVec3, DeviceState, Fault, LoopConfig, Pose, Tick, Twist, Wrench,
-};
+use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Pose, Tick, Twist, Wrench};
 use flotor_maglev::protocol::{Answer, AnswerFrame, Condition, Mode, Request, RequestFrame};
 use flotor_maglev::transport::{self, Incoming, Kind, LinkLost, OpenError, Transport};
 use flotor_maglev_emulator::controller::Sample;
 use flotor_maglev_emulator::gadget::{Gadget, Personality};
 use flotor_maglev_emulator::{Emulator, Event, Pace, Plant, controller_config};
+use machine::CAPABILITIES;
 use rustix::process::{Pid, Signal, kill_process};
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command, Stdio};
@@ -57,23 +58,6 @@ impl Plant for Mass {
     }
 }
 
-fn capabilities() -> Capabilities {
-    Capabilities {
-        sensed: Axes::ALL,
-        actuated: Axes::ALL,
-        range_m: [0.012; 3],
-        range_rad: [0.12; 3],
-        resolution_m: 2.0e-6,
-        max_force_n: [55.0, 55.0, 140.0],
-        max_torque_nm: [6.3, 6.3, 12.2],
-        max_force_slew_n_per_s: 55.0e3,
-        max_torque_slew_nm_per_s: 6.3e3,
-        max_stiffness_n_per_m: 25.0e3,
-        rate_hz: [100.0, 1.0e4],
-        latency_s: 0.0,
-    }
-}
-
 /// An emulated controller on a cable, in threads of this process.
 struct Controller {
     personality: Personality,
@@ -91,7 +75,7 @@ impl Controller {
         let ending = Arc::new(AtomicBool::new(false));
         let (cables, record, end) = (Arc::clone(&cable), Arc::clone(&pushes_n), Arc::clone(&ending));
         let thread = std::thread::spawn(move || {
-            let config = controller_config(&capabilities(), Pace::RealTime, "K-1");
+            let config = controller_config(&CAPABILITIES, Pace::RealTime, "K-1");
             let plant = Mass { position_m: 0.0, speed_m_per_s: 0.0, pushes_n: record };
             let mut emulator = Emulator::new(config, Pace::RealTime, plant);
             while !end.load(Ordering::Relaxed) {

@@ -4,3 +4,4 @@ mod attacks;
 mod boundary;
 mod emulator;
 mod flight;
+mod machine;

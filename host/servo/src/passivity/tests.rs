@@ -1,4 +1,5 @@
 use super::*;
+use crate::random::Random;
 use flotor_coupling::port_energy::PortObserver;
 use flotor_hal::{DQuat, Pose};
 
@@ -146,29 +147,20 @@ fn a_contact_at_any_speed_and_rate_has_its_force() {
     }
 }
 
-/// SplitMix64 (Steele, Lea, Flood 2014) as numbers in -1..1.
-fn random(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut word = *state;
-    word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    2.0 * ((word ^ (word >> 31)) as f64 / u64::MAX as f64) - 1.0
-}
-
 /// Hands that move to and fro with sums of sines of at most 50 m/s², into springs and models that pump: the energy is integrated here,
 /// from positions and forces.
 #[test]
 fn no_hand_gets_more_than_the_reserve_out_of_a_spring_or_a_pump() {
-    let mut seed = 45;
+    let mut random = Random(45);
     for rate_hz in [250.0, 1000.0, 4000.0] {
         for case in 0..60 {
-            let stiffness_n_per_m = 1000.0 * 20.0_f64.powf(0.5 + 0.5 * random(&mut seed));
+            let stiffness_n_per_m = 1000.0 * 20.0_f64.powf(0.5 + 0.5 * random.symmetric());
             let pump_ns_per_m = if case % 3 == 0 { 20.0 } else { 0.0 };
             let waves: Vec<[f64; 3]> = (0..4)
                 .map(|_| {
-                    let omega = 2.0 * std::f64::consts::TAU * 8.0_f64.powf(0.5 + 0.5 * random(&mut seed));
+                    let omega = 2.0 * std::f64::consts::TAU * 8.0_f64.powf(0.5 + 0.5 * random.symmetric());
                     let most_m = (12.0 / (omega * omega)).min(2.0e-3);
-                    [most_m * random(&mut seed), omega, 3.0 * random(&mut seed)]
+                    [most_m * random.symmetric(), omega, 3.0 * random.symmetric()]
                 })
                 .collect();
             let mut port = Port::new(1.0 / rate_hz);

@@ -3,10 +3,8 @@
 #[path = "../../../../tests/src/attacks.rs"]
 mod strangers;
 
-use std::io::{Read, Write};
 use std::process::Command;
-use std::time::Duration;
-use strangers::{Listening, Place};
+use strangers::Listening;
 
 #[test]
 fn the_program_names_its_ports() {
@@ -23,28 +21,18 @@ fn start(options: &[&str], before: &str) -> Listening {
     Listening::start(program, &arguments, before)
 }
 
-/// Sends a request; returns whether anything is answered in time.
-fn answers(place: &Place, request: &[u8]) -> bool {
-    let asked = place.connect().and_then(|mut stream| {
-        stream.set_read_timeout(Some(Duration::from_secs(1)))?;
-        stream.write_all(request)?;
-        stream.read(&mut [0; 16])
-    });
-    asked.is_ok_and(|length| length > 0)
-}
-
 const REQUEST: &[u8] = b"GET / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n";
 const SOCKET: &[u8] = b"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\
     Sec-WebSocket-Key: dGhlIHNhbXBsZQ==\r\n\r\n";
 
 #[test]
 fn strangers_at_the_simulation_channel_cost_little_and_a_client_is_served_all_the_same() {
-    start(&[], "listening ws://").target.withstand(REQUEST, |place| answers(place, REQUEST));
+    start(&[], "listening ws://").target.withstand(REQUEST, |place| place.answers(REQUEST));
 }
 
 #[test]
 fn strangers_at_the_events_channel_cost_little_and_a_client_is_served_all_the_same() {
-    start(&[], " events ws://").target.withstand(SOCKET, |place| answers(place, SOCKET));
+    start(&[], " events ws://").target.withstand(SOCKET, |place| place.answers(SOCKET));
 }
 
 #[test]

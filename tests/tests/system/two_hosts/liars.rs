@@ -54,8 +54,8 @@ fn drive(tick: u64, ahead_s: f64, dispatch: Dispatch) -> Dispatch {
 
 /// Any number there is, of any size.
 fn wild(random: &mut Random) -> f64 {
-    let exponent = 40.0 * random.next() - 20.0;
-    (random.next() - 0.5) * 10.0_f64.powf(exponent)
+    let exponent = 40.0 * random.share() - 20.0;
+    (random.share() - 0.5) * 10.0_f64.powf(exponent)
 }
 
 fn wild_state(random: &mut Random) -> PeerState {
@@ -95,7 +95,7 @@ const LIES: [(&str, Lie); 24] = [
     ("0.9 W on a swing", |tick, _, d| Dispatch { state: swing(tick, 0.004, 3.0, 0.9e-3 * tick as f64), ..d }),
     ("all the energy there is", |tick, _, d| Dispatch { state: swing(tick, 0.005, 2.0, f64::MAX), ..d }),
     ("a pose that jumps", |tick, random, d| Dispatch {
-        state: up(0.02 * (random.next() - 0.5), 0.0, 1.0e-3 * tick as f64),
+        state: up(0.02 * (random.share() - 0.5), 0.0, 1.0e-3 * tick as f64),
         ..d
     }),
     ("a pose out of this world", |tick, _, d| Dispatch { state: up(1.7e308, 0.0, 0.01 * tick as f64), ..d }),

@@ -1,31 +1,21 @@
 //! The state machine in simulated time: who is obeyed, for how long, and what happens in silence.
 #![allow(clippy::cast_possible_truncation)] // random bytes
 
+#[path = "../../tests/machine/mod.rs"]
+mod machine;
+
 use super::{Controller, ControllerConfig, LimitConfig, Reply, Sample};
 use crate::{Pace, controller_config};
-use flotor_hal::{Axes, Capabilities, DQuat, DVec3, Pose, Twist, Wrench};
+use flotor_hal::{DQuat, DVec3, Pose, Twist, Wrench};
 use flotor_maglev::protocol::{Condition, Mode, Request, RequestFrame};
+use machine::CAPABILITIES;
 
 const CYCLE_US: u64 = 1000;
 const WATCHDOG_US: u32 = 8000;
 const SESSION: u32 = 0xbeef;
 
 fn config() -> ControllerConfig {
-    let capabilities = Capabilities {
-        sensed: Axes::ALL,
-        actuated: Axes::ALL,
-        range_m: [0.012; 3],
-        range_rad: [0.12; 3],
-        resolution_m: 2.0e-6,
-        max_force_n: [55.0, 55.0, 140.0],
-        max_torque_nm: [6.3, 6.3, 12.2],
-        max_force_slew_n_per_s: 55.0e3,
-        max_torque_slew_nm_per_s: 6.3e3,
-        max_stiffness_n_per_m: 25.0e3,
-        rate_hz: [100.0, 1.0e4],
-        latency_s: 0.0,
-    };
-    controller_config(&capabilities, Pace::RealTime, "test")
+    controller_config(&CAPABILITIES, Pace::RealTime, "test")
 }
 
 /// A controller with a clock and a host that numbers its frames.

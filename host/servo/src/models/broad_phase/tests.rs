@@ -1,17 +1,8 @@
 use super::*;
+use crate::random::Random;
 
-/// SplitMix64 (Steele, Lea, Flood 2014) as numbers in -1..1.
-fn random(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut word = *state;
-    word = (word ^ (word >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    word = (word ^ (word >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    let part = (word ^ (word >> 31)) as f64 / u64::MAX as f64;
-    2.0 * part - 1.0
-}
-
-fn random_point(state: &mut u64) -> DVec3 {
-    DVec3::new(random(state), random(state), random(state))
+fn random_point(random: &mut Random) -> DVec3 {
+    DVec3::new(random.symmetric(), random.symmetric(), random.symmetric())
 }
 
 fn near(phase: &BroadPhase, position_m: DVec3) -> Vec<usize> {
@@ -24,18 +15,18 @@ fn near(phase: &BroadPhase, position_m: DVec3) -> Vec<usize> {
 /// Boxes of all sizes, some objects without one, and what comparing with each of them finds.
 #[test]
 fn it_finds_what_comparing_with_every_box_finds_in_order() {
-    let mut state = 7;
+    let mut random = Random(7);
     for (objects, size) in [(0, 0.1), (1, 0.1), (3, 2.0), (500, 0.01), (500, 0.3), (2000, 0.0)] {
         let bounds: Vec<Option<Bounds>> = (0..objects)
             .map(|object| {
-                let half = DVec3::splat(size) * random_point(&mut state).abs();
-                (object % 97 != 5).then(|| Bounds::about(random_point(&mut state), half))
+                let half = DVec3::splat(size) * random_point(&mut random).abs();
+                (object % 97 != 5).then(|| Bounds::about(random_point(&mut random), half))
             })
             .collect();
         let phase = BroadPhase::new(bounds.clone());
         let mut any = 0;
         for _ in 0..2000 {
-            let at = 1.3 * random_point(&mut state);
+            let at = 1.3 * random_point(&mut random);
             let inside = |(_, bounds): &(usize, &Option<Bounds>)| bounds.is_none_or(|b| b.contains(at));
             let expected: Vec<usize> =
                 bounds.iter().enumerate().filter(inside).map(|(object, _)| object).collect();
@@ -48,9 +39,9 @@ fn it_finds_what_comparing_with_every_box_finds_in_order() {
 
 #[test]
 fn a_box_is_rounded_outwards() {
-    let mut state = 3;
+    let mut random = Random(3);
     for _ in 0..1000 {
-        let (center, half) = (random_point(&mut state), random_point(&mut state).abs());
+        let (center, half) = (random_point(&mut random), random_point(&mut random).abs());
         let bounds = Bounds::about(center, half);
         assert!(bounds.contains(center - half) && bounds.contains(center + half));
     }

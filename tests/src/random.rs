@@ -1,0 +1,40 @@
+//! Random numbers of tests: the same for a seed on every machine.
+//!
+//! Needs nothing of this crate: crates that cannot depend on it include this file with `#[path]`.
+
+#![allow(dead_code, unreachable_pub)] // each test program uses its part
+
+/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014): short, fast, the same everywhere.
+pub struct Random(pub u64);
+
+impl Random {
+    /// Returns 64 random bits.
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut mixed = self.0;
+        mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        mixed ^ (mixed >> 31)
+    }
+
+    /// Returns a whole number below a bound; 0 if the bound is 0.
+    #[allow(clippy::cast_possible_truncation)] // less than the bound
+    pub fn below(&mut self, bound: usize) -> usize {
+        (self.bits() % bound.max(1) as u64) as usize
+    }
+
+    /// Returns a number from 0 to 1, both included.
+    pub fn share(&mut self) -> f64 {
+        self.bits() as f64 / u64::MAX as f64
+    }
+
+    /// Returns a number from -1 to 1, both included.
+    pub fn symmetric(&mut self) -> f64 {
+        2.0 * self.share() - 1.0
+    }
+
+    /// Returns one of the 2^53 evenly spaced numbers from 0 to below 1.
+    pub fn uniform(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
