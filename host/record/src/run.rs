@@ -93,7 +93,8 @@ impl RunDescription {
                 run.format
             )));
         }
-        Self::from_message(run).map_err(|Missing(field)| InvalidRun(format!("the field `{field}` is missing")))
+        Self::from_message(run)
+            .map_err(|Missing(field)| InvalidRun(format!("the field `{field}` is missing")))
     }
 
     pub(crate) fn to_message(&self) -> Run {

@@ -3,7 +3,7 @@
 use crate::guest::is_guest;
 use crate::platform::Duty;
 use crate::platform::scheduling::{
-    self, CORE_ADVICE, MEMORY_ADVICE, MAX_CORES, NoSuchCore, THREAD_ADVICE, priority_advice,
+    self, CORE_ADVICE, MAX_CORES, MEMORY_ADVICE, NoSuchCore, THREAD_ADVICE, priority_advice,
 };
 
 /// Core of the machine, by its number in the system.

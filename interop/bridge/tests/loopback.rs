@@ -155,7 +155,10 @@ fn an_emergency_stop_stays_until_its_owner_releases_it() {
     assert_eq!(requests.run(Request::EmergencyStop), Ok(()));
     assert_eq!(state(), State::EmergencyStopped);
     assert!(
-        requests.run(Request::Start).unwrap_err().contains("its owner has to release the emergency stop first")
+        requests
+            .run(Request::Start)
+            .unwrap_err()
+            .contains("its owner has to release the emergency stop first")
     );
     assert_eq!(requests.run(Request::Release), Ok(()));
     assert_eq!(state(), State::Running);

@@ -329,7 +329,10 @@ fn write(path: &Path, text: String) -> bool {
     }
     let written = std::fs::write(path, text);
     if let Err(error) = &written {
-        report_line(&format!("cannot write `{}`: {error}; choose a folder where you may write", path.display()));
+        report_line(&format!(
+            "cannot write `{}`: {error}; choose a folder where you may write",
+            path.display()
+        ));
     }
     written.is_ok()
 }

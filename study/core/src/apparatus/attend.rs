@@ -1,9 +1,9 @@
 //! Runs the sitting of a person: shows screens, presents stimuli and logs each answer before the next trial begins.
 
 use super::real_time_rig::RealTimeRig;
-use crate::conduct::{Ending, ApparatusOrFrontEndError};
+use crate::conduct::{ApparatusOrFrontEndError, Ending};
 use crate::log::{Event, Incident, LogWriter, digest};
-use crate::screen::{ScreenStateMachine, StimulusExploration, Input, May, Screen, Step};
+use crate::screen::{Input, May, Screen, ScreenStateMachine, Step, StimulusExploration};
 use crate::trial::Trial;
 use std::time::Instant;
 

@@ -81,9 +81,10 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Outcome> {
         }
     }
     match (before, transfers(&folder)) {
-        (Some(before), Some(after)) if after > before => {
-            Err(Outcome::Violation(format!("the model read or wrote {} times in {STEPS} steps", after - before)))
-        }
+        (Some(before), Some(after)) if after > before => Err(Outcome::Violation(format!(
+            "the model read or wrote {} times in {STEPS} steps",
+            after - before
+        ))),
         _ => Ok(()),
     }
 }
