@@ -20,7 +20,7 @@ pub(crate) fn described(name: &str, role: Role) -> PluginDescription {
         blend: if is_device { Blend::default() } else { Blend { weight: 0.5, priority: 3, fade_s: 0.25 } },
         field: (!is_device).then_some(FieldTiming { rate_hz: 200.0, latency_s: 0.0025 }),
         latency_s: if is_device { 0.001 } else { 0.0 },
-        felt: Demand::WRENCH,
+        at_hand: Demand::WRENCH,
         settings: vec![pair("preset", "plain")],
         parameters: vec![pair("preset", "plain"), pair("mass_kg", "0.58")],
         device: 0,

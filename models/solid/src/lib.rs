@@ -8,7 +8,7 @@
 //! - [`half_space`]: field of forces on an elastic half-space, the singular part of every contact.
 //! - [`remainder`], [`table`]: difference between a block and a half-space, by finite elements.
 //! - [`gmsh`], [`cylinder`], [`mesh`], [`cells`], [`facet`]: bodies of any shape, their elements and surface; [`body`]:
-//! difference between such a body and a half-space; [`recovery`]: error estimate of a mesh.
+//!   difference between such a body and a half-space; [`recovery`]: error estimate of a mesh.
 //! - [`sphere`]: contact of a sphere in contact space. [`punch`], [`plate`]: rigid patches bonded to a surface.
 //! - [`prepare`], [`law`], [`cache`]: from a description to a law.
 //! - [`atlas`], [`several`], [`rigid`], [`friction`]: the laws, as a tick evaluates them; [`jet`], [`spline`] under them.

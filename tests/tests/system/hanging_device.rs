@@ -57,7 +57,7 @@ fn stopped_in_time(transport: &str, address: &str, frames: &Receiver<Frame>) {
         &frames[..returned]
     );
     let hung_for_ns = frames[returned].called_ns - frames[stop - 1].called_ns;
-    assert!(hung_for_ns >= HANG.as_nanos() as u64, "{hung_for_ns} ns");
+    assert!(u128::from(hung_for_ns) >= HANG.as_nanos(), "{hung_for_ns} ns");
     let took_ns = frames[stop].arrived_ns - frames[stop].called_ns;
     println!(
         "{transport}: zero force {:.3} ms after the call of the stop, in a read of 1 s",

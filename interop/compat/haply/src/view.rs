@@ -107,7 +107,7 @@ impl Transform {
     }
 
     /// Encodes the transform like the service, without parts at their defaults.
-    pub(crate) fn to_json(&self) -> Value {
+    pub(crate) fn to_json(self) -> Value {
         let mut encoded = json!({});
         if let Value::Object(parts) = &mut encoded {
             if self.position_m != DVec3::ZERO {

@@ -8,10 +8,10 @@
 //! Four goals, each from several starts with their own seeds:
 //! - *step*: irregularity along a short line, in pieces of 1, 0.1 and 0.01 mm; then refined as in M1, to 1e-8 mm;
 //! - *energy*: work of a small closed ellipse in any two of all directions, relative to the most that forces of its
-//! size could have done, at rest in each of its poses;
+//!   size could have done, at rest in each of its poses;
 //! - *energy in motion*: work of a triangle, relative to all work exchanged: out along the force and sideways in one
-//! fast motion, sideways back, and in again slowly. Energy that friction, damping or a clamp removes from a yielding
-//! force must be gone when the handle is back;
+//!   fast motion, sideways back, and in again slowly. Energy that friction, damping or a clamp removes from a yielding
+//!   force must be gone when the handle is back;
 //! - *size*: the largest wrench, near which numbers stop being finite.
 //!
 //! The search stays in the workspace and inside the model's declared bounds: answers beyond them are not judged.

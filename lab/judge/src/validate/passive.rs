@@ -3,9 +3,9 @@
 //! A law of pose and velocity alone is checked in two ways:
 //!
 //! - *On a closed path at rest* the work must be zero: traversed in reverse, it has the other sign. The circles lie in
-//! all fifteen planes of the three directions and three rotations.
+//!   all fifteen planes of the three directions and three rotations.
 //! - *Forward and back* through one pose, at the same speed, the part that depends on the pose cancels. The rest is the
-//! work of the damping, which must dissipate energy.
+//!   work of the damping, which must dissipate energy.
 //!
 //! Both are exact but for rounding and for the law between two points of the circle, which its change from one to the
 //! next bounds.

@@ -7,7 +7,7 @@
 //! the same model, computed in this run, not a table.
 //!
 //! - `path`: motions. `times`: timing. `split`: times of two kinds of calls. `error`: distance from the reference.
-//! `front`: Pareto front of the cases over the workspace.
+//!   `front`: Pareto front of the cases over the workspace.
 //! - `reach_hand`: error of the force on a hand, through sampling and delay of the whole loop.
 //! - `tables`: table, CSV and picture.
 //! - `whole_tick`: cost of the loop around a model, on a [`scripted`] device and on the simulated flotor.

@@ -2,8 +2,8 @@
 //!
 //! Three limits, from exact to simple:
 //! - [`exact_limit_n_per_m`]: the sampled-data system itself. Mass and damper under a zero-order hold are discretised
-//! without error, spring, damper and delay are added in `z`, and the characteristic polynomial must have all roots
-//! inside the unit circle. Valid for the stability of this device alone.
+//!   without error, spring, damper and delay are added in `z`, and the characteristic polynomial must have all roots
+//!   inside the unit circle. Valid for the stability of this device alone.
 //! - [`passive_limit_n_per_m`]: Colgate and Schenkel (1997, J. Robotic Systems 14:37): the device stays stable
 //!   in *any* passive hand if its own damping exceeds what sampling feeds back at every frequency.
 //! - [`gil_limit_n_per_m`]: Gil, Sanchez, Hulin, Preusche and Hirzinger (2009, J. Comput. Inf. Sci. Eng.
