@@ -61,6 +61,6 @@ mod tests {
         for text in ["7.01", "0", "-1", "inf", "NaN"] {
             assert_eq!(within(text, 0.1, 7.0, "mm"), Err("must be 0.1 to 7 mm".to_owned()), "{text}");
         }
-        assert_eq!(within("1 mm", 0.1, 7.0, "mm"), Err("`1 mm` is no number".to_owned()));
+        assert_eq!(within("1 mm", 0.1, 7.0, "mm"), Err("`1 mm` is not a number".to_owned()));
     }
 }

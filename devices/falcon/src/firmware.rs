@@ -81,7 +81,7 @@ mod tests {
         let known = "ba7816bf8f01cfea414140de5dae2223";
         assert_eq!(read(&name, Some(known)), Ok(b"abc".to_vec()));
         for (expected, words) in [
-            (None, "known are nvent (8492 bytes"),
+            (None, "known firmware: nvent (8492 bytes"),
             (Some("ba78"), "16 or more digits"),
             (Some(&known[1..]), "give the first"),
         ] {

@@ -191,7 +191,7 @@ mod tests {
         near(wall.begins_m[2], 0.006);
         near(wall.holds_n, 7500.0 / 7.0 * 0.006 / 2.0);
         let told = wall.notice().expect("3.2 of 5 N");
-        assert!(told.contains("takes 3.2 N instead of 5.0 N"), "{told}");
+        assert!(told.contains("withstands 3.2 N instead of 5.0 N"), "{told}");
     }
 
     #[test]

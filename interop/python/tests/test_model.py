@@ -257,7 +257,7 @@ def test_a_live_parameter_changes_the_force():
         (dict(id="spring", gamma_n=-1), "must be"),
         (dict(id="spring", variant="exact"), "must be"),
         (dict(id="simulated"), "device"),
-        (dict(id="spring", variant=True), "no value of a parameter"),
+        (dict(id="spring", variant=True), "is not a value of a parameter"),
     ],
 )
 def test_what_is_wrong_is_said(arguments, words):

@@ -251,7 +251,7 @@ mod tests {
             ("z_mm,fz_n\n1,1", "unknown column `z_mm`"),
             ("z_m,fz_n\n1,1\n2", "c:3: 1 cell for 2"),
             ("z_m,fz_n\n1,x", "c:2: `fz_n` must be a number, not `x`"),
-            ("z_m,fz_n\n", "no point"),
+            ("z_m,fz_n\n", "the table has no row"),
         ] {
             let told = Points::parse(text).unwrap_err().in_file("c");
             assert!(told.contains(says), "{told}");

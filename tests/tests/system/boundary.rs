@@ -54,7 +54,7 @@ fn a_weight_laid_on_the_boundary_comes_to_rest() {
             let text = scene(preset, latency_ticks, rate_hz, -wall.begins_m[2] * 1.0e3, load_n);
             let notices = prepared(Clock::Virtual, &text).notices();
             let says_the_force =
-                notices.iter().any(|notice| notice.contains(&format!("takes {load_n:.1} N instead")));
+                notices.iter().any(|notice| notice.contains(&format!("withstands {load_n:.1} N instead")));
             assert_eq!(says_the_force, load_n < 4.999, "{what}: {notices:?}");
             let run = watch(&text);
             assert_eq!(run.outcome.end, RunEnd::Finished, "{what}");

@@ -423,7 +423,7 @@ fn a_service_is_lent_beside_a_program_and_what_cannot_be_is_said_in_one_line() {
         (vec!["--api", "haply", "--listen", &taken.0], "cannot listen at", exit_code::CONFIGURATION),
         (vec!["--api", "ml-api", "--listen", &taken.0], "cannot listen at", exit_code::PLUGIN_REFUSED),
         (vec!["--listen", "127.0.0.1:0"], "--listen is for", exit_code::CONFIGURATION),
-        (vec!["--api", "haply", "no-such.toml"], "`no-such.toml` is no scene", exit_code::CONFIGURATION),
+        (vec!["--api", "haply", "no-such.toml"], "`no-such.toml` is not a scene", exit_code::CONFIGURATION),
         (vec!["--api", "ml-api", "--pace", "lockstep"], "flotor emulate maglev", exit_code::CONFIGURATION),
         (vec!["--api", "hd"], "haply and ml-api", exit_code::CONFIGURATION),
     ];

@@ -49,7 +49,7 @@ fn warnings_say_what_and_what_to_do_and_stay_in_sight_a_while() {
     host.run_ticks(1, Events::FORCE_LIMITED);
     host.run_ticks(300, Events::NONE);
     until(&mut window, |window| window.query_by_label_contains("Excess force").is_some());
-    window.get_by_label_contains("ease off");
+    window.get_by_label_contains("push less");
     host.run_ticks(1500, Events::NONE);
     until(&mut window, |window| window.query_by_label_contains("Excess force").is_none());
     window.get_by_label("force limited"); // counted

@@ -141,7 +141,7 @@ fn a_cold_device_is_loaded_with_the_users_file_and_homed() {
     std::fs::write(&path, [7; 300]).expect("a folder for such files");
     let (name, digest) = (path.display().to_string(), flotor_falcon::firmware::digest(&[7; 300]));
     let refused = open(&address, &[("firmware", &name)]).err().unwrap_or_default();
-    assert!(refused.contains("300 bytes") && refused.contains("known are nvent"), "{refused}");
+    assert!(refused.contains("300 bytes") && refused.contains("known firmware: nvent"), "{refused}");
     let with_file = [("firmware", name.as_str()), ("firmware_sha256", digest.as_str())];
     let opened = open(&address, &with_file).expect("it is loaded");
     // The hand that homes it needs 50 commands.

@@ -88,7 +88,7 @@ mod tests {
         let doc = Str::of_raw(b"x".as_ptr(), 1 << 40);
         assert_eq!(
             told(&Parameter { doc, ..HONEST }),
-            "parameter 0: `doc` has 1099511627776 bytes, and 65536 is the most"
+            "parameter 0: `doc` has 1099511627776 bytes, above the limit of 65536"
         );
     }
 

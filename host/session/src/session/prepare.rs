@@ -636,7 +636,7 @@ mod tests {
     #[test]
     fn a_device_without_force_says_what_works_and_takes_its_word() {
         let said = mismatch([f64::INFINITY; 3], Axes::NONE, [0.0; 3]).expect("nothing could be felt");
-        assert!(said.contains("gives no force") && said.contains("force_n = [0, 0, 0]"), "{said}");
+        assert!(said.contains("exerts no force") && said.contains("force_n = [0, 0, 0]"), "{said}");
         assert_eq!(mismatch([0.0; 3], Axes::NONE, [0.0; 3]), None);
         assert_eq!(mismatch([f64::INFINITY; 3], Axes::ALL, [3.0; 3]), None);
     }

@@ -333,7 +333,7 @@ mod tests {
         let told = fixture.told(|_| true);
         let (what, grade, words) = one(&told);
         assert_eq!((what, grade), ("on USB", Grade::Bad));
-        assert!(words.starts_with("no device 1451:* or 2988:0302 or 2988:* -> connect it"), "{words}");
+        assert!(words.starts_with("no device 1451:* or 2988:0302 or 2988:* -> connect the device"), "{words}");
     }
 
     #[test]
@@ -415,7 +415,7 @@ mod tests {
         let told = fixture.told(|_| true);
         let (what, _, words) = one(&told);
         assert_eq!(what, "driver");
-        assert!(words.contains("no serial port -> as root: `modprobe cdc_acm`"), "{words}");
+        assert!(words.contains("no serial port for the device -> as root: `modprobe cdc_acm`"), "{words}");
     }
 
     #[test]

@@ -356,7 +356,7 @@ mod tests {
         assert_eq!(planned.choices.options().estimator, flotor_analysis::Estimator::Map);
         let wrong = text.replace("\"map\"", "\"mpa\"");
         let error = words(Path::new("a.study.toml"), &wrong, Vec::new()).expect_err("no such estimator");
-        let said = "a.study.toml: analyse.estimator: `mpa` is none of procedure, map";
+        let said = "a.study.toml: analyse.estimator: `mpa` is not valid; use one of procedure, map";
         assert_eq!(error.to_string(), said);
     }
 
