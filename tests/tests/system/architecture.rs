@@ -116,7 +116,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     // Neither the session nor the loader: everything it runs is a process of its own.
     ("lab/scene-test", SceneTest, &[Contract, Core, Plot, Command]),
     ("study/core", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics]),
-    ("study/analysis", Analysis, &[Statistics, Study]),
+    ("study/analysis", Analysis, &[Core, Statistics, Study]),
     (
         "study/program",
         StudyProgram,
