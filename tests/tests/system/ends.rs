@@ -438,7 +438,7 @@ fn variables_that_a_plugin_changes_are_named() {
     let habit = "IN_CREATE=setenv(\"TZ\", \"Pacific/Kiritimati\", 1); umask(0777);";
     let ran = run(&scratch, &scene_of(&scratch, HONEST, habit, ""), "virtual");
     let told = "note: `jelly` changed the mode mask of new files of the host; restored by the host; it also changed environment variables \
-                of the host (TZ), which stay\n";
+                of the host (TZ), which the host does not restore\n";
     assert!(ran.stderr.starts_with(told), "{ran:?}");
 }
 

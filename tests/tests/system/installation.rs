@@ -117,7 +117,7 @@ fn a_folder_of_somebody_else_is_not_searched_and_the_reason_is_reported() {
     assert!(listed().contains("foreign/libflotor_spring.so"), "{}", listed());
     chown(&foreign, Some(NOBODY), None).expect("root may");
     let listed = listed();
-    assert!(listed.contains("not searched: user 65534 owns it"), "{listed}");
+    assert!(listed.contains("not searched: user 65534 owns the folder"), "{listed}");
     assert!(!listed.contains("foreign/libflotor_spring.so"), "{listed}");
 }
 

@@ -643,7 +643,7 @@ fn a_misplaced_log_is_refused() {
     std::fs::copy(log_of(&out, 1), log_of(&out, 2)).unwrap();
     let ran = Flotor::with(["analyse", out.to_str().unwrap()]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
-    assert!(ran.error().contains("sub-02") && ran.error().contains("is a log of sub-01"), "{ran:?}");
+    assert!(ran.error().contains("sub-02") && ran.error().contains("the log is of sub-01"), "{ran:?}");
 }
 
 /// What macOS puts beside each file that it copies to a stick or a share.

@@ -191,7 +191,8 @@ fn an_analysis_says_whether_it_was_planned() {
     let ran = flotor(folder, &["study", "run", "b.study.toml"]);
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
     assert!(
-        ran.error().contains("b.study.toml: analyse.estimator: `mean` is not valid; use one of procedure, map"),
+        ran.error()
+            .contains("b.study.toml: analyse.estimator: `mean` is not valid; use one of procedure, map"),
         "{ran:?}"
     );
 }

@@ -333,7 +333,10 @@ mod tests {
         let told = fixture.told(|_| true);
         let (what, grade, words) = one(&told);
         assert_eq!((what, grade), ("on USB", Grade::Bad));
-        assert!(words.starts_with("no device 1451:* or 2988:0302 or 2988:* -> connect the device"), "{words}");
+        assert!(
+            words.starts_with("no device 1451:* or 2988:0302 or 2988:* -> connect the device"),
+            "{words}"
+        );
     }
 
     #[test]
