@@ -14,25 +14,25 @@
 #include <stdint.h>
 #include <stddef.h>
 
-// Bytes a [`Message`] holds.
+// Capacity of a [`Message`], bytes.
 #define FLOTOR_MESSAGE_BYTES 508
 
-// Major version of the contract. Another one is another contract.
+// Major version of the contract; contracts of different major versions are incompatible.
 #define FLOTOR_ABI_MAJOR 1
 
-// Minor version of the contract. A later one only adds.
+// Minor version of the contract; a later minor version only adds.
 #define FLOTOR_ABI_MINOR 0
 
-// 1 for the release candidate of that version, 0 once it is released.
+// 1 in a release candidate of the version, 0 after its release.
 #define FLOTOR_ABI_CANDIDATE 1
 
 // [`Host::flags`] bit: the plugin has its own Rust runtime and may silence its panic hook.
 #define FLOTOR_HOST_QUIET_PANICS 1
 
-// Number of coefficients a calibration has room for: a polynomial of degree seven.
+// Maximum number of coefficients of a calibration: a polynomial of degree seven.
 #define FLOTOR_CALIBRATION_COEFFICIENTS 8
 
-// Bytes a message may have at most.
+// Capacity of a stop message, bytes.
 #define FLOTOR_STOP_MESSAGE_BYTES 64
 
 // Status of one call through a table.
@@ -41,15 +41,15 @@ enum FlotorCallStatus
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // Done.
+    // Success.
     FlotorCallStatus_Ok = 0,
-    // The plugin panicked, now or earlier; the instance answers nothing any more.
+    // The plugin panicked, now or earlier; the instance is disabled.
     FlotorCallStatus_Panicked = 1,
     // The call is not allowed in this phase (real-time call on a device that is not active).
     FlotorCallStatus_WrongPhase = 2,
     // A value is out of range.
     FlotorCallStatus_OutOfRange = 3,
-    // The plugin does not offer this.
+    // The plugin does not offer this function.
     FlotorCallStatus_Unsupported = 4,
 };
 #ifndef __cplusplus
@@ -60,7 +60,7 @@ typedef uint32_t FlotorCallStatus;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// What a plugin mainly is.
+// Kind of a plugin, by its main interface.
 enum FlotorPluginKind
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -79,7 +79,7 @@ typedef uint32_t FlotorPluginKind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// What to do about a refusal: the closed set a host maps to exit codes and advice.
+// Kind of a refusal: a closed set that a host maps to exit codes and advice.
 enum FlotorRefusalKind
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -102,7 +102,7 @@ typedef uint32_t FlotorRefusalKind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// How a parameter's number is to be read.
+// Kind of a parameter: the meaning of its number.
 enum FlotorParameterKind
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -114,8 +114,8 @@ enum FlotorParameterKind
     FlotorParameterKind_Choice = 2,
     // Free text (a serial number); only at creation.
     FlotorParameterKind_Text = 3,
-    // A file, or one of `choices`, which are built in; only at creation. A host gives the path of a file that can
-    // be opened from where it runs: what a scene calls `tap.toml` lies beside the scene.
+    // File, or one of `choices`, which are built in; only at creation. A host passes a path that can be opened from
+    // its working directory: a scene's `tap.toml` is relative to the scene.
     FlotorParameterKind_File = 4,
 };
 #ifndef __cplusplus
@@ -126,7 +126,7 @@ typedef uint32_t FlotorParameterKind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// When a parameter may change.
+// Mutability of a parameter.
 enum FlotorMutability
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -145,15 +145,15 @@ typedef uint32_t FlotorMutability;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// What a model says about the answer it gave.
+// Status of a model's output.
 enum FlotorStepStatus
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // The law holds here.
+    // The law is valid at this input.
     FlotorStepStatus_Ok = 0,
-    // The answer was saturated to stay finite and safe.
+    // The output was saturated to stay finite and safe.
     FlotorStepStatus_Clamped = 1,
     // The pose is outside the model's domain; the wrench is the best safe continuation.
     FlotorStepStatus_OutOfDomain = 2,
@@ -170,7 +170,7 @@ typedef uint32_t FlotorStepStatus;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Whether the force is path-dependent: the model has an internal state.
+// Path dependence of the force: a path-dependent model has an internal state.
 enum FlotorMemory
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -189,7 +189,7 @@ typedef uint32_t FlotorMemory;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// What is wrong with a device, as a closed set that says what to do.
+// Fault of a device, as a closed set with a remedy for each.
 enum FlotorFault
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -203,13 +203,13 @@ enum FlotorFault
     FlotorFault_OverCurrent = 3,
     // The handle moved faster than the device allows.
     FlotorFault_OverSpeed = 4,
-    // The device is gone: check cable and power.
+    // The device is disconnected: check cable and power.
     FlotorFault_Disconnected = 5,
-    // The device did not answer in time.
+    // The device did not respond in time.
     FlotorFault_Timeout = 6,
-    // The device answered something that makes no sense.
+    // The device sent malformed data.
     FlotorFault_Protocol = 7,
-    // Somebody pressed the emergency stop of the device.
+    // The emergency stop of the device is pressed.
     FlotorFault_EmergencyStop = 8,
     // The plugin broke (panic, or a code outside the contract).
     FlotorFault_Broken = 9,
@@ -222,15 +222,15 @@ typedef uint32_t FlotorFault;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// What a device moves when it is commanded, as a closed set.
+// Embodiment of a device: a physical handle, or a simulation only; a closed set.
 enum FlotorEmbodiment
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // Something that a hand can hold. What says nothing is this.
+    // Handle that a hand can hold; the default.
     FlotorEmbodiment_Physical = 0,
-    // Numbers only: no command ever reaches anything that could push a hand.
+    // Simulation: no command ever reaches an actuator that could push a hand.
     FlotorEmbodiment_Simulated = 1,
 };
 #ifndef __cplusplus
@@ -241,17 +241,17 @@ typedef uint32_t FlotorEmbodiment;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Through what a device on USB is used, as a closed set. In C as a number of this value.
+// Access path to a USB device, as a closed set. In C, a number of this value.
 enum FlotorUsbAccess
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // The bus itself, without a driver of the kernel.
+    // USB bus, without a kernel driver.
     FlotorUsbAccess_Raw = 0,
-    // A serial port of the kernel's.
+    // Serial port of the kernel.
     FlotorUsbAccess_Serial = 1,
-    // The kernel's raw HID.
+    // Raw HID interface of the kernel.
     FlotorUsbAccess_Hid = 2,
 };
 #ifndef __cplusplus
@@ -262,7 +262,7 @@ typedef uint32_t FlotorUsbAccess;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// What a device exerts once it is stopped. In C as a number of this value.
+// Final state of a stopped device. In C, a number of this value.
 enum FlotorStoppedState
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -270,7 +270,7 @@ enum FlotorStoppedState
  {
     // No force.
     FlotorStoppedState_Zero = 0,
-    // It sets the handle down by itself, and then exerts none.
+    // No force, after a controlled landing of the handle.
     FlotorStoppedState_Landed = 1,
 };
 #ifndef __cplusplus
@@ -281,13 +281,13 @@ typedef uint32_t FlotorStoppedState;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// The form of a [`Primitive`]. In C as a number of this value.
+// Form of a [`Primitive`]. In C, a number of this value.
 enum FlotorForm
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // A rectangle across z at the pose; the solid is below it.
+    // Rectangle across z at the pose; the solid is below the rectangle.
     FlotorForm_Plane = 0,
     // A ball.
     FlotorForm_Sphere = 1,
@@ -304,15 +304,15 @@ typedef uint32_t FlotorForm;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// What a [`Primitive`] is to the hand. In C as a number of this value.
+// Role of a [`Primitive`]: touched body or tool. In C, a number of this value.
 enum FlotorPart
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // What is touched.
+    // Body that the tool touches.
     FlotorPart_Body = 0,
-    // What touches: the hand holds it.
+    // Tool in the hand.
     FlotorPart_Tool = 1,
 };
 #ifndef __cplusplus
@@ -323,15 +323,15 @@ typedef uint32_t FlotorPart;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// From where a surface is seen. In C as a number of this value.
+// Visible sides of a surface. In C, a number of this value.
 enum FlotorSides
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // From outside: it encloses a body.
+    // Outside only: the surface encloses a body.
     FlotorSides_Outer = 0,
-    // From both sides: a sheet.
+    // Both sides: a sheet.
     FlotorSides_Both = 1,
 };
 #ifndef __cplusplus
@@ -342,23 +342,23 @@ typedef uint32_t FlotorSides;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// One row of the layout table: a field, or a struct as a whole.
+// Row of the layout table: a field, or a whole struct.
 typedef struct FlotorFieldLayout {
-    // `Struct.field`, or `Struct` for the whole of it; filled up with zeros.
+    // `Struct.field`, or `Struct` for the whole struct; padded with zeros.
     uint8_t name[48];
-    // Where the field begins in its struct, bytes; 0 for a struct.
+    // Offset of the field in its struct, bytes; 0 for a struct.
     uint32_t offset;
-    // Its size, bytes.
+    // Size of the field or struct, bytes.
     uint32_t size;
 } FlotorFieldLayout;
 
-// What a host tells a plugin once, before anything else.
+// Host information that a plugin receives once, before any other call.
 typedef struct FlotorHost {
-    // Bytes of this struct as the host knows it.
+    // Size of this struct in the host's build, bytes.
     uint32_t size;
-    // Contract the host speaks.
+    // Major version of the host's contract.
     uint16_t abi_major;
-    // Contract the host speaks.
+    // Minor version of the host's contract.
     uint16_t abi_minor;
     // [`HOST_QUIET_PANICS`] or 0.
     uint32_t flags;
@@ -366,8 +366,8 @@ typedef struct FlotorHost {
     uint32_t reserved;
 } FlotorHost;
 
-// Borrowed UTF-8 text. In a schema or an info struct it lives as long as the process (plugins are never
-// unloaded); as an argument it lives for the call.
+// Borrowed UTF-8 text. A text in a schema or an info struct lives as long as the process (plugins are never unloaded);
+// a text in an argument lives for the call.
 typedef struct FlotorStr {
     const uint8_t *ptr;
     size_t len;
@@ -379,9 +379,9 @@ typedef struct FlotorLayoutProof {
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // `abi_stable::library::AbiHeader`: says whether the layouts below can be read at all.
+    // `abi_stable::library::AbiHeader`; the layouts below are readable only if the header is valid.
     const void *abi_stable_header;
-    // Name of a contract type to its `abi_stable::type_layout::TypeLayout`, or null.
+    // Returns the `abi_stable::type_layout::TypeLayout` of a contract type by name, or null.
     const void *(*layout_of)(struct FlotorStr name);
 } FlotorLayoutProof;
 
@@ -389,25 +389,25 @@ typedef struct FlotorLayoutProof {
 typedef struct FlotorEntry {
     // [`MAGIC`].
     uint8_t magic[8];
-    // Bytes of this struct as the plugin knows it.
+    // Size of this struct in the plugin's build, bytes.
     uint32_t size;
-    // Contract the plugin was built for.
+    // Major version of the plugin's contract.
     uint16_t abi_major;
-    // Contract the plugin was built for.
+    // Minor version of the plugin's contract.
     uint16_t abi_minor;
-    // [`PluginKind`].
+    // Code of a [`PluginKind`].
     uint32_t kind;
     // [`ABI_CANDIDATE`] of the contract the plugin was built for.
     uint32_t abi_candidate;
     // The layout table of the plugin's build.
     const struct FlotorFieldLayout *layouts;
-    // Number of its rows.
+    // Number of rows of `layouts`.
     uint32_t layout_count;
     // Reserved, 0.
     uint32_t reserved;
     // Called once after loading. May be null.
     void (*init)(const struct FlotorHost *host);
-    // Interface id to its table, or null if not offered.
+    // Returns the table of an interface id, or null if not offered.
     const void *(*get_interface)(struct FlotorStr id);
     // A second proof of the layouts, or null.
     const struct FlotorLayoutProof *layout_proof;
@@ -419,7 +419,7 @@ typedef struct FlotorChoices {
     size_t len;
 } FlotorChoices;
 
-// One entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`].
+// Entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`].
 typedef struct FlotorParameter {
     struct FlotorStr id;
     struct FlotorStr unit;
@@ -432,14 +432,14 @@ typedef struct FlotorParameter {
     double default_;
 } FlotorParameter;
 
-// Which outputs a scene needs from a step; what is not demanded need not be computed.
+// Outputs that a scene needs from a step; other outputs need not be computed.
 //
-// Shape is not among them: it is an extension ([`crate::extension::centerline`], [`crate::extension::shape`]) that observers call off the loop.
+// The shape is an extension ([`crate::extension::centerline`], [`crate::extension::shape`]) that observers call off the loop.
 typedef struct FlotorDemand {
     uint32_t bits;
 } FlotorDemand;
 
-// What a force model says about itself; constant, readable without creating it.
+// Declaration of a force model; constant, readable without creating an instance.
 typedef struct FlotorModelInfo {
     struct FlotorStr id;
     struct FlotorStr name;
@@ -448,7 +448,7 @@ typedef struct FlotorModelInfo {
     uint32_t memory;
 } FlotorModelInfo;
 
-// One value as it crosses the boundary: index into the schema, number, text (of texts and files).
+// Value at the plugin boundary: index into the schema, number, text (of texts and files).
 typedef struct FlotorParameterValue {
     uint32_t index;
     uint32_t reserved;
@@ -456,16 +456,16 @@ typedef struct FlotorParameterValue {
     struct FlotorStr text;
 } FlotorParameterValue;
 
-// A sentence for people, written by the callee into memory of the caller: nothing to allocate or to free.
+// Message text for people, written by the callee to memory of the caller: nothing to allocate or to free.
 typedef struct FlotorMessage {
     uint32_t len;
     uint8_t text[FLOTOR_MESSAGE_BYTES];
 } FlotorMessage;
 
-// An opaque instance made and owned by a plugin.
+// Opaque instance, created and owned by a plugin.
 typedef void *FlotorInstance;
 
-// What the loop promises a plugin before it starts. 16 bytes.
+// Loop settings that a plugin receives before the start. 16 bytes.
 typedef struct FlotorLoopConfig {
     // Nominal time between ticks, ns.
     uint64_t period_ns;
@@ -489,7 +489,7 @@ typedef struct FlotorTwist {
     double angular_rad_per_s[3];
 } FlotorTwist;
 
-// Everything a force model gets for one step. 136 bytes, in the **model frame**.
+// Input of a force model for one step. 136 bytes, in the **model frame**.
 typedef struct FlotorInput {
     // Pose of the handle relative to the model's home, m and unit quaternion.
     struct FlotorPose pose;
@@ -499,11 +499,11 @@ typedef struct FlotorInput {
     uint64_t time_ns;
     // Time since the previous step, ns (0 on the first).
     uint64_t dt_ns;
-    // Which tick this is.
+    // Number of the tick, from 0.
     uint64_t tick;
     // Buttons of the device, one bit each.
     uint32_t buttons;
-    // Which outputs are needed.
+    // Outputs needed.
     struct FlotorDemand demand;
 } FlotorInput;
 
@@ -517,7 +517,7 @@ typedef struct FlotorWrench {
     double torque_nm[3];
 } FlotorWrench;
 
-// The answer of one step. 64 bytes, in the model frame.
+// Output of one step. 64 bytes, in the model frame.
 typedef struct FlotorOutput {
     // Force and torque on the hand, N and N·m.
     struct FlotorWrench wrench;
@@ -527,46 +527,46 @@ typedef struct FlotorOutput {
     uint32_t reserved;
 } FlotorOutput;
 
-// `flotor.force/1`. Statuses are [`super::CallStatus`] codes; `create` and `prepare` return 0 or a
-// [`crate::RefusalKind`] and say why in the message.
+// Function table `flotor.force/1`. Statuses are [`super::CallStatus`] codes; `create` and `prepare` return 0, or a
+// [`crate::RefusalKind`] with the reason in the message.
 typedef struct FlotorForceTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Number of parameters.
     uint32_t parameter_count;
-    // The schema, constant.
+    // Parameter schema, constant.
     const struct FlotorParameter *parameters;
-    // What the model says about itself.
+    // Declaration of the model: id, texts, and demands and memory over all settings; constant.
     struct FlotorModelInfo info;
-    // Makes an instance from explicitly set values. Not real-time.
+    // Creates an instance from explicitly set values. Not real-time.
     uint32_t (*create)(const struct FlotorParameterValue *values,
                        uint32_t count,
                        struct FlotorMessage *message,
                        FlotorInstance *out);
     // Frees an instance. Not real-time.
     void (*destroy)(FlotorInstance instance);
-    // Last chance to allocate. Not real-time. May be null.
+    // Prepares an instance for the loop: its last opportunity to allocate. Not real-time. May be null.
     uint32_t (*prepare)(FlotorInstance instance,
                         const struct FlotorLoopConfig *config,
                         struct FlotorMessage *message);
-    // The wrench for a pose. Real-time: no allocation, lock, system call or unwinding.
+    // Computes the wrench for a pose. Real-time: no allocation, lock, system call or unwinding.
     uint32_t (*step)(FlotorInstance instance, const struct FlotorInput *input, struct FlotorOutput *output);
-    // `count` poses in order. Real-time per pose. May be null: the host then calls `step`.
+    // Computes the wrenches for `count` poses in order. Real-time per pose. May be null: the host then calls `step`.
     uint32_t (*step_batch)(FlotorInstance instance,
                            uint64_t count,
                            const struct FlotorInput *inputs,
                            struct FlotorOutput *outputs);
     // Changes a live parameter at a tick boundary. Real-time. May be null.
     uint32_t (*set_parameter)(FlotorInstance instance, uint32_t index, double value);
-    // The value in force. Real-time. May be null.
+    // Returns the current value of a parameter. Real-time. May be null.
     double (*parameter)(FlotorInstance instance, uint32_t index);
-    // Forgets history. Real-time. May be null.
+    // Clears the history. Real-time. May be null.
     uint32_t (*reset)(FlotorInstance instance);
-    // Why the last call failed. Not real-time. May be null.
+    // Writes the reason of the last failure. Not real-time. May be null.
     void (*last_message)(FlotorInstance instance, struct FlotorMessage *message);
 } FlotorForceTable;
 
-// What a device says about itself; constant, readable without opening it.
+// Declaration of a device; constant, readable without opening the device.
 typedef struct FlotorDeviceInfo {
     struct FlotorStr id;
     struct FlotorStr name;
@@ -577,16 +577,16 @@ typedef struct FlotorDeviceInfo {
     uint32_t reserved;
 } FlotorDeviceInfo;
 
-// Which of the six axes a device senses or actuates: x, y, z, then rotation about x, y, z.
+// Set of axes that a device senses or actuates: x, y, z, then rotation about x, y, z.
 typedef struct FlotorAxes {
     uint32_t bits;
 } FlotorAxes;
 
-// What a device can do, as numbers a host compares with a model and enforces. 200 bytes, device frame.
+// Capabilities of a device, as numbers that a host compares with a model and enforces. 200 bytes, device frame.
 //
-// Every number is finite, none is negative, and they are the same from `open` on: a host refuses others before anything
-// is energised. An axis that is driven has a limit and, where it is sensed, a range; what is driven has a slew. Only the
-// slew of what is not driven may be infinite.
+// Every number is finite and not negative, and constant from `open` on: a host refuses others before anything is
+// energised. An actuated axis has a limit and, if sensed, a range; actuated axes have a slew. Only the slew without an
+// actuated axis may be infinite.
 typedef struct FlotorCapabilities {
     // Axes whose position is measured.
     struct FlotorAxes sensed;
@@ -611,18 +611,18 @@ typedef struct FlotorCapabilities {
     double max_stiffness_n_per_m;
     // Slowest and fastest loop the device runs at, Hz.
     double rate_hz[2];
-    // Time from taking a sample to the force that answers it, beyond one period, s.
+    // Time from taking a sample to the resulting force, beyond one period, s.
     double latency_s;
 } FlotorCapabilities;
 
-// Result of `read` and `write` as it crosses the boundary: a type of its own, so that no other code of the contract is taken for
-// one. 4 bytes.
+// Result of `read` and `write` at the boundary, 4 bytes. A separate type, so that no other code of the contract can be
+// mistaken for a result.
 typedef struct FlotorCycleCode {
-    // 0 fresh, 1 stale, 256 + a fault.
+    // 0: fresh; 1: stale; 256 + code of a fault.
     uint32_t code;
 } FlotorCycleCode;
 
-// One tick as a device and a host see it. 24 bytes.
+// Number and scheduled time of a tick. 24 bytes.
 typedef struct FlotorTick {
     // Number of the tick, from 0.
     uint64_t index;
@@ -632,95 +632,95 @@ typedef struct FlotorTick {
     uint64_t dt_ns;
 } FlotorTick;
 
-// What a device says of a sample beside pose and faults, as a bit set: nothing that ends a run.
+// Conditions of a sample beside pose and faults, as a bit set; none ends a run.
 typedef struct FlotorConditions {
     uint32_t bits;
 } FlotorConditions;
 
-// What a device reports each tick. 168 bytes, in the device frame.
+// Sample that a device reports each tick. 168 bytes, in the device frame.
 typedef struct FlotorDeviceState {
     // Pose of the handle, m and unit quaternion.
     struct FlotorPose pose;
     // Velocity of the handle, m/s and rad/s.
     struct FlotorTwist twist;
-    // Wrench the device says it delivered to the hand since the previous tick, N and N·m.
+    // Wrench delivered to the hand since the previous tick, as reported by the device, N and N·m.
     struct FlotorWrench delivered;
-    // When the sample was taken, ns on the loop's clock.
+    // Time of the sample, ns on the loop's clock.
     uint64_t sampled_ns;
     // Buttons, one bit each.
     uint32_t buttons;
-    // What else is to be known of this sample.
+    // Further conditions of this sample.
     struct FlotorConditions conditions;
 } FlotorDeviceState;
 
-// `flotor.device/1`. `open` and `activate` return 0 or a [`crate::RefusalKind`] and say why in the message;
-// `read` and `write` return a [`CycleCode`]; the others a [`super::CallStatus`] code.
+// Function table `flotor.device/1`. `open` and `activate` return 0, or a [`crate::RefusalKind`] with the reason in the
+// message; `read` and `write` return a [`CycleCode`]; the others a [`super::CallStatus`] code.
 typedef struct FlotorDeviceTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Number of parameters.
     uint32_t parameter_count;
-    // The schema, constant.
+    // Parameter schema, constant.
     const struct FlotorParameter *parameters;
-    // What the device says about itself.
+    // Id, name and description of the device, constant.
     struct FlotorDeviceInfo info;
     // Opens a device. May block. Not real-time.
     uint32_t (*open)(const struct FlotorParameterValue *values,
                      uint32_t count,
                      struct FlotorMessage *message,
                      FlotorInstance *out);
-    // Closes it; deactivates first if needed. Not real-time.
+    // Closes the device; deactivates an active device first. Not real-time.
     void (*close)(FlotorInstance instance);
-    // What it can do. Not real-time.
+    // Writes the capabilities of the device. Not real-time.
     uint32_t (*capabilities)(FlotorInstance instance, struct FlotorCapabilities *out);
-    // Energises it at zero wrench. Not real-time.
+    // Energises the device at zero wrench. Not real-time.
     uint32_t (*activate)(FlotorInstance instance,
                          const struct FlotorLoopConfig *config,
                          struct FlotorMessage *message);
-    // Zero wrench, then opened again. Not real-time.
+    // Commands zero wrench and returns to the opened phase. Not real-time.
     uint32_t (*deactivate)(FlotorInstance instance);
-    // Newest sample. Real-time.
+    // Reads the newest sample. Real-time.
     struct FlotorCycleCode (*read)(FlotorInstance instance,
                                    const struct FlotorTick *tick,
                                    struct FlotorDeviceState *state);
-    // Wrench on the hand until the next write. Real-time.
+    // Commands the wrench on the hand until the next write. Real-time.
     struct FlotorCycleCode (*write)(FlotorInstance instance,
                                     const struct FlotorTick *tick,
                                     const struct FlotorWrench *wrench);
-    // Actuators safe, now. Any thread, any time, also during `read` and `write`.
+    // Makes the actuators safe at once. Any thread, any time, also during `read` and `write`.
     void (*safe_stop)(FlotorInstance instance);
     // Changes a live parameter at a tick boundary. Real-time. May be null.
     uint32_t (*set_parameter)(FlotorInstance instance, uint32_t index, double value);
-    // The value in force. May be null.
+    // Returns the current value of a parameter. May be null.
     double (*parameter)(FlotorInstance instance, uint32_t index);
-    // Why the last call failed. Not real-time. May be null.
+    // Writes the reason of the last failure. Not real-time. May be null.
     void (*last_message)(FlotorInstance instance, struct FlotorMessage *message);
 } FlotorDeviceTable;
 
-// How to draw the body around its centreline: a tube, or a wire wound about it. 40 bytes.
+// Drawing style of the body around its centreline: a tube, or a wire wound about it. 40 bytes.
 typedef struct FlotorCenterlineInfo {
     // Radius of the drawn tube or wire, m.
     double tube_radius_m;
-    // Radius of the helix the wire follows about the centreline, m; 0 draws a plain tube.
+    // Radius of the wire's helix about the centreline, m; 0 draws a plain tube.
     double helix_radius_m;
     // Turns of the helix over the whole length; 0 for a plain tube.
     double helix_turns;
     // Radius of the end plates, m; 0 for none.
     double plate_radius_m;
-    // How many points describe the centreline well.
+    // Recommended number of points on the centreline.
     uint32_t suggested_points;
     uint32_t reserved;
 } FlotorCenterlineInfo;
 
-// `flotor.centerline/1`: see [`CenterlineModel`]. Not real-time.
+// Function table `flotor.centerline/1`: see [`CenterlineModel`]. Not real-time.
 typedef struct FlotorCenterlineTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // How to draw the body.
+    // Writes the drawing style of the body.
     uint32_t (*info)(FlotorInstance instance, struct FlotorCenterlineInfo *out);
-    // Fills up to `capacity` points; how many are valid goes to `count`.
+    // Fills up to `capacity` points; writes the number of valid points to `count`.
     uint32_t (*centerline)(FlotorInstance instance,
                            const struct FlotorInput *input,
                            struct FlotorPose *points,
@@ -728,65 +728,65 @@ typedef struct FlotorCenterlineTable {
                            uint32_t *count);
 } FlotorCenterlineTable;
 
-// A body of a simple form. 88 bytes.
+// Body of a simple form. 88 bytes.
 typedef struct FlotorPrimitive {
-    // A value of [`Form`].
+    // Code of a [`Form`].
     uint32_t form;
-    // A value of [`Part`].
+    // Code of a [`Part`].
     uint32_t part;
-    // Its centre (m, model frame) and how it is turned.
+    // Centre (m, model frame) and orientation.
     struct FlotorPose pose;
-    // Half its sides along the axes of the pose, m.
+    // Half sides along the axes of the pose, m.
     double half_sides_m[3];
 } FlotorPrimitive;
 
-// A corner of the surface. 56 bytes.
+// Vertex of the surface. 56 bytes.
 typedef struct FlotorSurfaceVertex {
-    // Where it is, m, model frame.
+    // Position, m, model frame.
     double position_m[3];
     // Outward unit normal.
     double normal[3];
-    // The field there, in its unit; 0 without a field.
+    // Value of the field at this vertex, in its unit; 0 without a field.
     double value;
 } FlotorSurfaceVertex;
 
-// What the numbers of a surface are. 32 bytes.
+// Name and unit of the vertex values of a surface. 32 bytes.
 typedef struct FlotorScalarField {
     struct FlotorStr name;
     struct FlotorStr unit;
 } FlotorScalarField;
 
-// A [`Shape`] as it crosses the boundary: the plugin's own memory, valid until the next call of the instance. 88 bytes.
+// View of a [`Shape`] at the plugin boundary: the plugin's own memory, valid until the next call of the instance. 88 bytes.
 typedef struct FlotorShapeView {
-    // Bodies of simple form, and the tool; may be null if there are none, as the two below.
+    // Bodies of simple form, and the tool; like the two lists below, may be null if empty.
     const struct FlotorPrimitive *primitives;
-    // Corners of the surface.
+    // Vertices of the surface.
     const struct FlotorSurfaceVertex *vertices;
-    // Its triangles: indices of corners, counter-clockwise seen from outside.
+    // Triangles of the surface: indices of vertices, counter-clockwise seen from outside.
     const uint32_t (*triangles)[3];
     // Number of primitives.
     uint32_t primitive_count;
-    // Number of corners.
+    // Number of vertices.
     uint32_t vertex_count;
     // Number of triangles.
     uint32_t triangle_count;
-    // A value of [`Sides`].
+    // Code of [`Sides`].
     uint32_t sides;
-    // What the values are; texts are constant.
+    // Name and unit of the vertex values; the texts are constant.
     struct FlotorScalarField field;
 } FlotorShapeView;
 
-// `flotor.shape/1`: see [`ShapeModel`]. Not real-time.
+// Function table `flotor.shape/1`: see [`ShapeModel`]. Not real-time.
 typedef struct FlotorShapeTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // The shape at an input; a [`crate::abi::CallStatus`] code.
+    // Writes the shape at an input; returns a [`crate::abi::CallStatus`] code.
     uint32_t (*shape)(FlotorInstance instance, const struct FlotorInput *input, struct FlotorShapeView *out);
 } FlotorShapeTable;
 
-// The soft range of one parameter, in its unit. 40 bytes.
+// Soft range of one parameter, in its unit. 40 bytes.
 typedef struct FlotorSoftRange {
     struct FlotorStr id;
     double min;
@@ -794,33 +794,33 @@ typedef struct FlotorSoftRange {
     double step;
 } FlotorSoftRange;
 
-// `flotor.soft-range/1`: see [`SoftRangeModel`].
+// Function table `flotor.soft-range/1`: see [`SoftRangeModel`].
 typedef struct FlotorSoftRangeTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Number of ranges.
     uint32_t range_count;
-    // The ranges, constant.
+    // Soft ranges, constant.
     const struct FlotorSoftRange *ranges;
 } FlotorSoftRangeTable;
 
-// What one instance serves and whether it remembers; the same for its whole life. 8 bytes.
+// Demands and memory of one instance; constant over its life. 8 bytes.
 typedef struct FlotorVariantInfo {
     struct FlotorDemand serves;
     uint32_t memory;
 } FlotorVariantInfo;
 
-// `flotor.variant/1`: see [`VariantModel`]. Not real-time.
+// Function table `flotor.variant/1`: see [`VariantModel`]. Not real-time.
 typedef struct FlotorVariantTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // About an instance, with the settings it was created with; a [`crate::abi::CallStatus`] code.
+    // Writes demands and memory of an instance, with the settings it was created with; returns a [`crate::abi::CallStatus`] code.
     uint32_t (*info)(FlotorInstance instance, struct FlotorVariantInfo *out);
 } FlotorVariantTable;
 
-// The positions of the handle, in the model frame, at which a model may act. 56 bytes.
+// Positions of the handle, in the model frame, at which a model may act. 56 bytes.
 //
 // Outside the region wrench and stored energy are **zero at every orientation and velocity**, and the model has
 // **no history**: the first step inside is as after [`ForceModel::reset`]. The region may be larger than
@@ -832,17 +832,17 @@ typedef struct FlotorActiveRegion {
     double half_sides_m[3];
 } FlotorActiveRegion;
 
-// `flotor.active-region/1`: see [`ActiveRegionModel`]. Real-time.
+// Function table `flotor.active-region/1`: see [`ActiveRegionModel`]. Real-time.
 typedef struct FlotorActiveRegionTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // Where the instance can act, with the parameters now in force; a [`crate::abi::CallStatus`] code.
+    // Writes the active region with the current parameters; returns a [`crate::abi::CallStatus`] code.
     uint32_t (*region)(FlotorInstance instance, struct FlotorActiveRegion *out);
 } FlotorActiveRegionTable;
 
-// One number about an answer. Built with [`Detail::number`], [`Detail::word`] or [`Detail::flag`].
+// Diagnostic number of a step. Built with [`Detail::number`], [`Detail::word`] or [`Detail::flag`].
 typedef struct FlotorDetail {
     struct FlotorStr id;
     struct FlotorStr unit;
@@ -850,15 +850,15 @@ typedef struct FlotorDetail {
     struct FlotorChoices words;
 } FlotorDetail;
 
-// `flotor.details/1`: see [`DetailsModel`].
+// Function table `flotor.details/1`: see [`DetailsModel`].
 typedef struct FlotorDetailsTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Number of details.
     uint32_t detail_count;
-    // What there is to know, constant.
+    // Diagnostic numbers, constant.
     const struct FlotorDetail *details;
-    // Writes the numbers of the last step into `capacity` places, `detail_count` at most; NaN where there is none.
+    // Writes the values of the last step to `capacity` places, `detail_count` at most; NaN for a missing value.
     // Real-time: no allocation, lock, system call or unwinding.
     uint32_t (*values)(FlotorInstance instance, double *values, uint32_t capacity);
 } FlotorDetailsTable;
@@ -868,46 +868,46 @@ typedef struct FlotorDetailsTable {
 // `d` is the displacement from the anchor: position in m, then the rotation vector of the turn from the anchor's
 // orientation, in rad. `K` is a stiffness: positive where the model pushes back.
 typedef struct FlotorLinearField {
-    // Where it holds exactly.
+    // Pose at which the field is exact.
     struct FlotorPose anchor;
-    // Wrench on the hand there.
+    // Wrench on the hand at the anchor, N and N·m.
     struct FlotorWrench wrench;
     // Rows: force x, y, z (N), torque x, y, z (N·m); columns: position x, y, z (m), rotation x, y, z (rad).
     double stiffness[6][6];
-    // How far from the anchor it may be believed, m. Beyond, a host holds what it is at that distance.
+    // Range of validity about the anchor, m. Beyond, a host uses the wrench at that distance.
     double valid_m;
-    // The same of rotation, rad.
+    // Range of validity in rotation, rad.
     double valid_rad;
-    // Time of the loop it was computed for, ns.
+    // Loop time for which the field was computed, ns.
     uint64_t time_ns;
 } FlotorLinearField;
 
-// `flotor.linear-field/1`: see [`LinearFieldModel`].
+// Function table `flotor.linear-field/1`: see [`LinearFieldModel`].
 typedef struct FlotorLinearFieldTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // The field at an input, the time since the call before having passed; a [`crate::abi::CallStatus`] code. Not
-    // real-time, but bounded.
+    // Writes the field at an input, after the time since the previous call; returns a [`crate::abi::CallStatus`] code.
+    // Not real-time, but bounded.
     uint32_t (*linear_field)(FlotorInstance instance,
                              const struct FlotorInput *input,
                              struct FlotorLinearField *field);
 } FlotorLinearFieldTable;
 
-// The positions of the handle, in the model frame, that a model is made for: a box along its axes. 48 bytes.
+// Positions of the handle, in the model frame, for which a model is valid: a box along the axes. 48 bytes.
 typedef struct FlotorWorkspaceBounds {
     double lower_m[3];
     double upper_m[3];
 } FlotorWorkspaceBounds;
 
-// `flotor.workspace-bounds/1`: see [`WorkspaceBoundsModel`]. Real-time.
+// Function table `flotor.workspace-bounds/1`: see [`WorkspaceBoundsModel`]. Real-time.
 typedef struct FlotorWorkspaceBoundsTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // Where the instance ends, with the parameters now in force; a [`crate::abi::CallStatus`] code.
+    // Writes the limits with the current parameters; returns a [`crate::abi::CallStatus`] code.
     uint32_t (*bounds)(FlotorInstance instance, struct FlotorWorkspaceBounds *out);
 } FlotorWorkspaceBoundsTable;
 
@@ -932,38 +932,38 @@ typedef struct FlotorEnergyLedger {
     double peak_j;
 } FlotorEnergyLedger;
 
-// `flotor.energy-ledger/1`: see [`EnergyLedgerDevice`].
+// Function table `flotor.energy-ledger/1`: see [`EnergyLedgerDevice`].
 typedef struct FlotorEnergyLedgerTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // The energy balance since activation; a [`crate::abi::CallStatus`] code. Real-time.
+    // Writes the energy balance since activation; returns a [`crate::abi::CallStatus`] code. Real-time.
     uint32_t (*ledger)(FlotorInstance instance, struct FlotorEnergyLedger *out);
 } FlotorEnergyLedgerTable;
 
-// Delivered over commanded vertical force as a polynomial of the height. 80 bytes.
+// Ratio of delivered to commanded vertical force, as a polynomial of the height. 80 bytes.
 typedef struct FlotorVerticalCalibration {
     double range_m[2];
     double coefficients[FLOTOR_CALIBRATION_COEFFICIENTS];
 } FlotorVerticalCalibration;
 
-// `flotor.calibration/1`: see [`CalibrationDevice`]. Both calls belong to the opened phase.
+// Function table `flotor.calibration/1`: see [`CalibrationDevice`]. Both calls are valid in the opened phase only.
 typedef struct FlotorCalibrationTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // Serial number of the piece of hardware, empty if it has none; a [`crate::abi::CallStatus`] code. Not real-time.
+    // Writes the serial number of the hardware, empty if none; returns a [`crate::abi::CallStatus`] code. Not real-time.
     uint32_t (*serial)(FlotorInstance instance, struct FlotorMessage *serial);
-    // Corrects the total vertical command from the next activation on; 0 or a [`crate::RefusalKind`] with the
+    // Corrects the total vertical command from the next activation on; returns 0, or a [`crate::RefusalKind`] with the
     // reason in the message. Not real-time.
     uint32_t (*calibrate_vertical)(FlotorInstance instance,
                                    const struct FlotorVerticalCalibration *calibration,
                                    struct FlotorMessage *message);
 } FlotorCalibrationTable;
 
-// A kind of device on USB. 8 bytes.
+// USB identity of a device: vendor, product and access path. 8 bytes.
 typedef struct FlotorUsbKind {
     uint16_t vendor;
     uint16_t product;
@@ -971,53 +971,53 @@ typedef struct FlotorUsbKind {
     uint32_t access;
 } FlotorUsbKind;
 
-// `flotor.connection/1`: see [`ConnectionDevice`].
+// Function table `flotor.connection/1`: see [`ConnectionDevice`].
 typedef struct FlotorConnectionTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
-    // Number of kinds.
+    // Number of USB identities.
     uint32_t usb_count;
-    // What it is on USB, constant.
+    // USB identities of the device, constant.
     const struct FlotorUsbKind *usb;
 } FlotorConnectionTable;
 
-// How a device is stopped without its host. 88 bytes.
+// Independent stop of a device, without its host. 88 bytes.
 typedef struct FlotorIndependentStop {
-    // Time from the end of the host's commands, or from the message, until the device is in its safe state, ns; with descriptor -1
-    // the largest number for a device that nothing stops.
+    // Time from the end of the host's commands, or from the message, until the device is in its safe state, ns; with
+    // descriptor -1 the largest number for a device without an independent stop.
     uint64_t within_ns;
-    // A file descriptor of the host's process, open for writing until the device is closed; the host duplicates it. On Windows
-    // the lower 32 bits of a handle. -1: the device stops by itself when no command comes.
+    // File descriptor of the host's process, open for writing until the device is closed; the host duplicates the
+    // descriptor. On Windows the lower 32 bits of a handle. -1: the device stops by itself when no command comes.
     int32_t descriptor;
-    // Bytes of the message, 1 to 64; 0 with descriptor -1.
+    // Length of the message, bytes, 1 to 64; 0 with descriptor -1.
     uint32_t length;
-    // What is written to the descriptor, up to three times: the same bytes at any time, also after half a command.
+    // Message written to the descriptor, up to three times: the same bytes at any time, also after half a command.
     uint8_t message[FLOTOR_STOP_MESSAGE_BYTES];
-    // A value of [`StoppedState`].
+    // Code of a [`StoppedState`].
     uint32_t state;
     // Reserved, 0.
     uint32_t reserved;
 } FlotorIndependentStop;
 
-// `flotor.independent-stop/1`: see [`IndependentStopDevice`]. Belongs to the opened phase.
+// Function table `flotor.independent-stop/1`: see [`IndependentStopDevice`]. Valid in the opened phase only.
 typedef struct FlotorIndependentStopTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // How the device is stopped without its host; a [`crate::abi::CallStatus`] code. Not real-time.
+    // Writes the independent stop of the device; returns a [`crate::abi::CallStatus`] code. Not real-time.
     uint32_t (*independent_stop)(FlotorInstance instance, struct FlotorIndependentStop *stop);
 } FlotorIndependentStopTable;
 
-// `flotor.pacing/1`: see [`PacingDevice`].
+// Function table `flotor.pacing/1`: see [`PacingDevice`].
 typedef struct FlotorPacingTable {
-    // Bytes of this table as the plugin knows it.
+    // Size of this table in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // Blocks until the device has a sample that no earlier wait has told of, or until `timeout_ns` have passed;
-    // writes the number of samples taken since the last wait that found any, 0 after a wait in vain. Returns a
-    // [`crate::abi::CallStatus`] code. Real-time but for the waiting: no allocation.
+    // Waits for a sample that no earlier wait has reported, for `timeout_ns` at most; writes the number of samples
+    // taken since the last successful wait, 0 after a timeout. Returns a [`crate::abi::CallStatus`] code. Real-time
+    // but for the waiting: no allocation.
     uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
 } FlotorPacingTable;
 

@@ -8,7 +8,7 @@
 //! use std::time::Duration;
 //!
 //! let mut client = Client::find(&Directory::of_this_user())?;
-//! client.asker().ask(Ask::Watch { every: 10 })?; // one record in ten; of the others, what happened in them
+//! client.request_client().ask(Ask::Watch { every: 10 })?; // one record in ten; of the others, what happened in them
 //! while let Some(event) = client.next(Duration::from_secs(1))? {
 //!     if let Event::Ticks { records, .. } = event {
 //!         println!("{} ticks, up to {:?}", records.len(), records.last().map(|record| record.time_ns));
