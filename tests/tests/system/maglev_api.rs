@@ -375,7 +375,8 @@ fn a_flotor_that_somebody_left_in_the_air_is_taken_over() {
         assert!(!matches!(active.read(&tick, &mut state), Cycle::Fault(_)), "tick {index}");
         assert!(!matches!(active.write(&tick, &Wrench::ZERO), Cycle::Fault(_)), "tick {index}");
     }
-    assert!(state.pose.position().z > -3.0e-3, "{:?} with {gravity:?}", state.pose);
+    // Nearer to home than to the floor 9.5 mm below: until a busy machine takes it over, the found force lets it sink slowly.
+    assert!(state.pose.position().z > -9.5e-3 / 2.0, "{:?} with {gravity:?}", state.pose);
 }
 
 #[test]
