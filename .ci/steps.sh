@@ -9,10 +9,17 @@ left_out=()
 logs=target/ci
 mkdir -p "$logs"
 
-# step NAME COMMAND...: says what runs, runs it, says how long it took. What it printed is kept in target/ci/NAME.log.
+# Names of the steps to run, from the command line; all steps where there are none.
+wanted=("$@")
+
+# step NAME COMMAND...: prints the command, runs it and prints its duration. Its output goes to target/ci/NAME.log, too.
 step() {
     local name=$1 started=$SECONDS code log=$logs/$1.log
     shift
+    if [ ${#wanted[@]} -gt 0 ] && [[ " ${wanted[*]} " != *" $name "* ]]; then
+        left_out+=("$name: this step was not asked for")
+        return
+    fi
     printf '\n[%s] %s\n' "$name" "$*"
     # Not as a condition: within one, `set -e` is ignored, and a function of many commands is what its last one says.
     set +e
@@ -33,8 +40,9 @@ step() {
     fi
 }
 
-# Prints what ran so far, a line a step, and what was left out of it.
+# Prints what ran so far, a line a step, and what was left out of it; fails without a single step.
 summary() {
+    [ ${#report[@]} -gt 0 ] || { echo "no step is called: ${wanted[*]}"; return 1; }
     printf '\n'
     printf '%s\n' "${report[@]}"
     printf 'in all %11d s\n' "$SECONDS"
