@@ -119,9 +119,9 @@ pub struct Simple<D: SimpleDevice> {
 
 /// A [`SimpleDevice`] as an [`ActiveDevice`].
 pub struct ActiveSimple<D: SimpleDevice> {
-    simple: Simple<D>,
-    /// Stops the device when this value is dropped.
+    /// Dropped first: the force is zero before code of the device runs in its `drop`.
     _stop: StopOnDrop<D::Stop>,
+    simple: Simple<D>,
 }
 
 struct StopOnDrop<S: SafeStop>(SimpleStop<S>);
@@ -193,5 +193,90 @@ impl<D: SimpleDevice> ActiveDevice for ActiveSimple<D> {
 
     fn deactivate(self) -> Simple<D> {
         self.simple
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Axes;
+    use std::sync::Mutex;
+
+    /// Calls in order: stops, drops of the device, and forces written along z, N.
+    static CALLS: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+    fn note(call: impl Into<String>) {
+        CALLS.lock().unwrap().push(call.into());
+    }
+
+    struct Noting {
+        refuses: bool,
+    }
+
+    struct NotingStop;
+
+    impl SafeStop for NotingStop {
+        fn safe_stop(&self) {
+            note("stop");
+        }
+
+        fn arm(&self) {
+            note("arm");
+        }
+    }
+
+    impl Drop for Noting {
+        fn drop(&mut self) {
+            note("drop");
+        }
+    }
+
+    impl SimpleDevice for Noting {
+        const INFO: DeviceInfo = DeviceInfo::new("noting", "Noting", "Notes its calls");
+        type Stop = NotingStop;
+
+        fn open(_: &Settings<'_>) -> Result<Opened<Self>, Refusal> {
+            let capabilities = Capabilities::driving(Axes::Z).with_range(0.01, 0.2).with_limits(5.0, 0.5);
+            Ok(Opened { device: Self { refuses: true }, capabilities, stop: NotingStop })
+        }
+
+        fn activate(&mut self, _: &LoopConfig) -> Result<(), Refusal> {
+            if std::mem::take(&mut self.refuses) { Err(Refusal::resource("not yet")) } else { Ok(()) }
+        }
+
+        fn read(&mut self, _: &Tick, _: &mut DeviceState) -> Cycle {
+            Cycle::Fresh
+        }
+
+        fn write(&mut self, _: &Tick, wrench: &Wrench) -> Cycle {
+            note(format!("write {}", wrench.force().z));
+            Cycle::Fresh
+        }
+    }
+
+    #[test]
+    fn a_stop_holds_until_the_next_activation_and_comes_before_every_drop() {
+        let config = LoopConfig { period_ns: 1_000_000, seed: 0 };
+        let opened = Simple::<Noting>::open(&Settings::defaults(Noting::PARAMETERS)).unwrap();
+        let Capabilities { range_m, range_rad, max_force_n, max_torque_nm, .. } = opened.capabilities();
+        assert_eq!((range_m, range_rad), ([0.0, 0.0, 0.01], [0.0; 3]), "of the sensed axes alone");
+        assert_eq!((max_force_n, max_torque_nm), ([0.0, 0.0, 5.0], [0.0; 3]), "of the driven axes alone");
+        let stopper = opened.stopper();
+        // A refused activation leaves the device stopped and open.
+        let Err((opened, _)) = opened.activate(&config) else { panic!("the first activation is refused") };
+        let Ok(mut active) = opened.activate(&config) else { panic!("the second is not") };
+        let push = |active: &mut ActiveSimple<Noting>| {
+            assert_eq!(active.write(&Tick::default(), &Wrench::from_force(crate::DVec3::Z)), Cycle::Fresh);
+        };
+        push(&mut active);
+        stopper.safe_stop();
+        push(&mut active);
+        let Ok(mut active) = active.deactivate().activate(&config) else { panic!("it activates again") };
+        push(&mut active);
+        drop(active);
+        let calls = std::mem::take(&mut *CALLS.lock().unwrap());
+        let expected =
+            ["arm", "stop", "arm", "write 1", "stop", "write 0", "stop", "arm", "write 1", "stop", "drop"];
+        assert_eq!(calls, expected);
     }
 }

@@ -9,7 +9,7 @@ const WORDS: &str = "/told/heard/errand/ear/letter/remains/blame/blaming/heart/l
                      borne/nonsense/";
 /// With fewer public items the search is broken.
 const LEAST_ITEMS: usize = 5_000;
-/// Folders whose names tell of a case.
+/// Folders of tests.
 const FOLDERS_OF_TESTS: [&str; 4] = ["tests", "benches", "fixtures", "fuzz"];
 /// Keywords before the name of an item.
 const KINDS: [&str; 8] = ["fn", "struct", "enum", "trait", "type", "static", "const", "mod"];

@@ -24,7 +24,7 @@ const TURNED: [f64; 2] = [0.02, 0.5];
 /// Timeout of arrival after the plan of a motion, ns: a hand may hold the handle.
 const PATIENCE_NS: u64 = 2_000_000_000;
 
-/// Progress of a motion, ordered: the largest of several is that of all.
+/// Progress of a motion, in order: several motions together have the largest of theirs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Progress {
     /// The handle has arrived.
