@@ -163,11 +163,11 @@ impl MlDevice {
     /// Takes off; reopens a session that was lost since (unplugged, plugged in again).
     fn take_off(&mut self, options: &Options, plan: &Plan) -> Result<TakenOff, Refusal> {
         let address = &*options.address;
+        self.stop.rearm();
         if self.session.is_lost() {
             self.session = Session::open(address).map_err(Refusal::resource)?;
             self.stop.reopen(address).map_err(Refusal::resource)?;
         }
-        self.stop.rearm();
         let taken_off = match self.session.take_off(plan) {
             Err(Failed::At(_, NoResults::Lost)) => {
                 self.session = Session::open(address).map_err(Refusal::resource)?;

@@ -15,7 +15,9 @@ const LANDING_NS: u64 = 30_000_000_000;
 /// State shared by the loop and the stopping threads.
 pub(crate) struct Stop {
     is_stopped: AtomicBool,
-    /// Locked while stopping or reopening; a stop does not wait for the lock.
+    /// True between a stop and its Land frame.
+    is_frame_due: AtomicBool,
+    /// A stop does not wait for the lock: who holds it sends the due frame after unlocking.
     line: Mutex<Line>,
     frame: Frame,
 }
@@ -23,40 +25,59 @@ pub(crate) struct Stop {
 impl Stop {
     /// Opens the connection. Not real-time.
     pub(crate) fn open(address: &str) -> Result<Self, OpenError> {
-        let frame = Request::Plain(Function::Land).encode();
-        Ok(Self { is_stopped: AtomicBool::new(false), line: Mutex::new(Line::open(address)?), frame })
+        Ok(Self {
+            is_stopped: AtomicBool::new(false),
+            is_frame_due: AtomicBool::new(false),
+            line: Mutex::new(Line::open(address)?),
+            frame: Request::Plain(Function::Land).encode(),
+        })
     }
 
     /// Returns true after a stop. Real-time: bounded, no allocation.
     pub(crate) fn is_stopped(&self) -> bool {
-        self.is_stopped.load(Ordering::Acquire)
+        self.is_stopped.load(Ordering::SeqCst)
     }
 
-    /// Clears the stop and discards replies to earlier stops. Not real-time.
+    /// Clears earlier stops and discards the replies to them; a stop from now on lands the flotor. Not real-time.
     pub(crate) fn rearm(&self) {
+        self.is_frame_due.store(false, Ordering::SeqCst);
+        self.is_stopped.store(false, Ordering::SeqCst);
         if let Ok(line) = self.line.lock() {
             let mut replies = [0; 64];
             while line.stream().read(&mut replies).is_ok_and(|length| length > 0) {}
         }
-        self.is_stopped.store(false, Ordering::Release);
+        self.send_due_frame();
     }
 
-    /// Reconnects to the controller. Not real-time.
+    /// Reconnects to the controller, and repeats a stop since the last `rearm`. Not real-time.
     pub(crate) fn reopen(&self, address: &str) -> Result<(), OpenError> {
         let anew = Line::open(address)?;
         if let Ok(mut line) = self.line.lock() {
             *line = anew;
         }
+        if self.is_stopped() {
+            self.is_frame_due.store(true, Ordering::SeqCst);
+        }
+        self.send_due_frame();
         Ok(())
     }
 
     /// Sends the Land frame once, without waiting for a reply.
     fn stop(&self) {
-        if self.is_stopped.swap(true, Ordering::AcqRel) {
-            return;
+        if !self.is_stopped.swap(true, Ordering::SeqCst) {
+            self.is_frame_due.store(true, Ordering::SeqCst);
+            self.send_due_frame();
         }
-        if let Ok(line) = self.line.try_lock() {
-            let _ = line.stream().write(self.frame.bytes());
+    }
+
+    /// Sends the Land frame if it is due, unless another thread holds the connection and will send it.
+    fn send_due_frame(&self) {
+        // Checked again after unlocking: meanwhile another thread may have found the lock taken.
+        while self.is_frame_due.load(Ordering::SeqCst) {
+            let Ok(line) = self.line.try_lock() else { return };
+            if self.is_frame_due.swap(false, Ordering::SeqCst) {
+                let _ = line.stream().write(self.frame.bytes());
+            }
         }
     }
 
@@ -73,5 +94,68 @@ pub struct LandSwitch(pub(crate) Arc<Stop>);
 impl SafeStop for LandSwitch {
     fn safe_stop(&self) {
         self.0.stop();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::net::{TcpListener, TcpStream};
+
+    fn opened() -> (TcpListener, String, Stop, TcpStream) {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let address = listener.local_addr().expect("an address").to_string();
+        let stop = Stop::open(&address).expect("a connection");
+        let (controller, _) = listener.accept().expect("the connection");
+        (listener, address, stop, controller)
+    }
+
+    /// Returns the bytes that the controller receives until the connection ends.
+    fn received(stop: Stop, mut controller: TcpStream) -> Vec<u8> {
+        stop.line.lock().expect("the line").stream().shutdown(std::net::Shutdown::Write).expect("shut down");
+        let mut bytes = Vec::new();
+        controller.read_to_end(&mut bytes).expect("the frames");
+        bytes
+    }
+
+    #[test]
+    fn a_stop_during_rearming_sends_one_land_frame() {
+        let (_listener, _, stop, controller) = opened();
+        stop.is_stopped.store(true, Ordering::SeqCst);
+        let frame = stop.frame;
+        std::thread::scope(|scope| {
+            let line = stop.line.lock().expect("the line");
+            let rearming = scope.spawn(|| stop.rearm());
+            while stop.is_stopped() {
+                std::thread::yield_now();
+            }
+            stop.stop();
+            stop.stop();
+            drop(line);
+            rearming.join().expect("no panic");
+        });
+        assert!(stop.is_stopped());
+        assert_eq!(received(stop, controller), frame.bytes());
+    }
+
+    #[test]
+    fn a_stop_on_a_lost_connection_is_repeated_on_the_next() {
+        let (listener, address, stop, controller) = opened();
+        drop(controller);
+        stop.stop();
+        let frame = stop.frame;
+        stop.reopen(&address).expect("a connection");
+        let (controller, _) = listener.accept().expect("the connection");
+        assert_eq!(received(stop, controller), frame.bytes());
+    }
+
+    #[test]
+    fn an_earlier_stop_is_not_repeated_after_rearming() {
+        let (listener, address, stop, _controller) = opened();
+        stop.stop();
+        stop.rearm();
+        stop.reopen(&address).expect("a connection");
+        let (controller, _) = listener.accept().expect("the connection");
+        assert_eq!(received(stop, controller), []);
     }
 }
