@@ -18,6 +18,11 @@ const CHAPTER: &str = "bench.md";
 const EVERY_OF_THE_HAND: usize = 50;
 const EVERY_OF_THE_WORKSPACE: usize = 2;
 
+/// Accuracy of force and torque in the table: rods are solved for the shape to some 1e-13 of its length; the force follows with
+/// some 700 N/m, the torque with a lever of 0.1 m.
+const EXACT_N: f64 = 2.0e-12;
+const EXACT_NM: f64 = 2.0e-13;
+
 /// Laws of a spring as the tables of the chapter name them. None of them has a memory.
 const LAWS: [(&str, &[&str]); 7] = [
     ("thesis", &["variant=thesis"]),
@@ -111,18 +116,32 @@ fn the_book_prints_errors_and_losses_along_the_hand() {
         let all_n = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
         assert_chapter_prints(CHAPTER, &printed(name, &[errors[1], hold_n, delay_n, sensor_n, all_n]));
     }
+    // The rod continues from its last shape: it needs the ticks between.
+    let servo = answers(&["variant=rod"], &path);
+    let servo: Vec<_> = rows.iter().map(|row| servo[tick(row)]).collect();
+    let errors = distances(&rows, EVERY_OF_THE_HAND, &servo);
+    let printed = printed_row("Errors against rod tight", "rod servo");
+    for ((printed, found), accuracy) in printed.iter().zip(errors).zip([EXACT_N, EXACT_N, EXACT_NM, EXACT_NM])
+    {
+        let printed: f64 = printed.parse().expect("a number");
+        // Two printed digits, and the accuracy of the table.
+        assert!((printed - found).abs() <= 0.005 * printed + accuracy, "{printed:e}, not {found:e}");
+    }
 }
 
-/// Returns the error columns of a row in the chapter's table of the workspace: largest and mean error of the force, largest error of
-/// the torque.
-fn printed_of_the_workspace(name: &str) -> String {
+/// Returns the columns of a case in the chapter's table below a heading.
+fn printed_row(heading: &str, name: &str) -> Vec<String> {
     let chapter = std::fs::read_to_string(workspace_root().join("docs/src").join(CHAPTER));
     let chapter = chapter.expect("the chapter is there");
-    let (_, text) = chapter.split_once("The whole workspace, a ball").expect("the table is there");
+    let (_, text) = chapter.split_once(heading).expect("the table is there");
     let beginning = format!("  {name}  ");
     let row = text.lines().find(|line| line.starts_with(&beginning)).expect("a row of the case");
-    let columns: Vec<&str> = row[beginning.len()..].split_whitespace().skip(2).take(3).collect();
-    columns.join(" ")
+    row[beginning.len()..].split_whitespace().map(str::to_owned).collect()
+}
+
+/// Returns largest and mean error of the force, and largest error of the torque, in the chapter's table of the workspace.
+fn printed_of_the_workspace(name: &str) -> String {
+    printed_row("The whole workspace, a ball", name)[2..5].join(" ")
 }
 
 #[test]
@@ -169,9 +188,8 @@ fn the_reference_of_the_errors_is_the_exact_rod() {
     let tight: Vec<_> =
         answers(&["variant=rod", "accuracy=tight"], &poses).into_iter().skip(4).step_by(5).collect();
     let [force_n, _, torque_nm, _] = distances(&rows, EVERY_OF_THE_HAND, &tight);
-    // Both solve for the shape to some 1e-13 of its length; the force follows with some 700 N/m, the torque with a lever of 0.1 m.
     assert!(
-        tight.iter().all(Option::is_some) && force_n < 2.0e-12 && torque_nm < 2.0e-13,
+        tight.iter().all(Option::is_some) && force_n < EXACT_N && torque_nm < EXACT_NM,
         "{force_n} {torque_nm}"
     );
 }
