@@ -121,15 +121,15 @@ format() {
     cargo fmt --all --manifest-path examples/Cargo.toml --check
 }
 
-# The checks of every change, cheapest first.
-every_change() {
+# The checks of every change beside the tests, cheapest first: those that build nothing, and those that do.
+before_tests() {
     step machine machine
     step format format
     step size .ci/lines
     step deny deny
-    # The README's `cargo test`; the viewer, whose GPU stack that leaves out; and what needs tools that take long to build. One
-    # command: of two, the second builds half of what both use again, with other features.
-    step test cargo test --workspace --features flotor-tests/formats,flotor-tests/drop-ins --no-fail-fast
+}
+
+after_tests() {
     step lint cargo clippy --workspace --all-targets --all-features -- -D warnings
     # With the features and examples of `lint`: else what wgpu and serde depend on is checked a second time, with fewer features.
     # The named program is the only one without a library beside it.
@@ -224,7 +224,7 @@ wheel() {
     PYTHONMALLOC=malloc valgrind --error-limit=no --num-callers=40 --log-file=target/wheel-memory.log target/venv/bin/python -m pytest \
         -q -p no:cacheprovider interop/python/tests/test_model.py -k "whatever_lies or share_memory or not_aligned"
     if grep "_flotor\|libflotor" target/wheel-memory.log; then return 1; fi
-    FLOTOR_TEST_SIZE=full FLOTOR_PYTHON=$PWD/target/venv/bin/python cargo test --release -p flotor-tests --test system -- book:: examples::
+    FLOTOR_TEST_SIZE=daily FLOTOR_PYTHON=$PWD/target/venv/bin/python cargo test --release -p flotor-tests --test system -- book:: examples::
     PATH=$PWD/target/venv/bin:$PATH FLOTOR_PYTHON=$PWD/target/venv/bin/python book_blocks wheel
 }
 
