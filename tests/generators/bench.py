@@ -150,4 +150,4 @@ FOLDER = sys.argv[1]
 shares()
 steepest()
 through_the_workspace(chosen(2, 2000, [767, 773, 785, 927]))
-along_the_hand(chosen(EVERY, 30_000, [1292, 4603, 7462, 7481, 7489, 29738]))
+along_the_hand(chosen(EVERY, 30_000, [1292, 4603, 7462, 7481, 7489, 13643, 29738]))
