@@ -39,7 +39,7 @@ const SETTLED: f64 = 1.0e-12;
 /// Number of samples of a lap in motion.
 const MOVING_SAMPLES: usize = 1024;
 /// Number of steps that a lap may cross: a motion of three harmonics meets a plane six times, and there may be two planes.
-const MOST_STEPS: f64 = 12.0;
+pub(super) const MOST_STEPS: f64 = 12.0;
 
 /// Tolerated difference of stored energy and work, relative to the energy stored on a lap.
 const SAME_ENERGY: f64 = 1.0e-3;

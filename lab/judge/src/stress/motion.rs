@@ -3,7 +3,7 @@
 //! A hand moves fast on one part of a lap and slowly on another: energy lost on the fast part of a law with friction
 //! and damping need not return on the slow one, and a faulty law may confuse the two.
 
-use super::energy::{Dissipation, Lap};
+use super::energy::{CONSERVATIVE, Dissipation, Lap, MOST_STEPS};
 use crate::sampling::Random;
 use crate::subject::Subject;
 use crate::trajectory::Trajectory;
@@ -15,8 +15,8 @@ const SHORTEST_LAP_S: f64 = 0.05;
 const LAP_RATIO: f64 = 20.0;
 /// Largest unevenness: 39 times faster at one end of the lap than at the other.
 const MOST_UNEVEN: f64 = 0.95;
-/// Number of laps after the first, which starts with another history.
-const LATER_LAPS: usize = 2;
+/// Maximum number of laps after the first, which starts with another history.
+const MOST_LATER_LAPS: usize = 64;
 
 /// Closed path with its speed profile.
 pub(super) struct Motion {
@@ -69,14 +69,19 @@ impl Motion {
     }
 }
 
-/// Returns the later lap that generates least: a model in motion may return in one lap energy stored in an earlier one.
+/// Returns the later lap that generates least: a model in motion may return in one lap energy stored in an earlier one, or,
+/// where friction holds it, a part of it in each of many. So laps follow until one generates no less than the one before.
 fn least_of_later_laps(mut lap: impl FnMut() -> Option<Lap>) -> Option<Lap> {
     lap()?;
     let mut least = lap()?;
-    for _ in 1..LATER_LAPS {
+    for _ in 1..MOST_LATER_LAPS {
         let other = lap()?;
-        if other.net_j < least.net_j {
+        let less_j = least.net_j - other.net_j;
+        if less_j > 0.0 {
             least = other;
+        }
+        if less_j <= CONSERVATIVE * other.gross_j {
+            break;
         }
     }
     Some(least)
@@ -91,31 +96,37 @@ pub(super) struct Triangle {
 }
 
 impl Triangle {
-    /// Measures the work of a lap, with half of the samples of each edge and with all: the difference bounds the error.
+    /// Measures the work of a lap, with half of the samples of each edge and with all: the difference bounds the error of a
+    /// smooth force.
     pub(super) fn lap(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
         let coarse = self.sampled(subject, samples / 2)?;
         let fine = self.sampled(subject, samples)?;
-        Some(Lap { uncertain_j: 2.0 * (fine.net_j - coarse.net_j).abs(), ..fine })
+        let change_j = (fine.net_j - coarse.net_j).abs();
+        Some(Lap { uncertain_j: fine.uncertain_j.max(2.0 * change_j), ..fine })
     }
 
+    /// Returns the work of a lap, uncertain by [`MOST_STEPS`] steps of the force between two samples.
     fn sampled(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
         subject.restart();
         if subject.memory() == Memory::PathDependent {
             subject.answer_at(self.start).ok()?;
         }
         least_of_later_laps(|| {
-            let (mut corner_m, mut net_j, mut gross_j) = (self.start.position(), 0.0, 0.0);
+            let (mut corner_m, mut net_j, mut gross_j, mut highest_j) =
+                (self.start.position(), 0.0, 0.0, 0.0);
             for (way_m, speed_m_per_s) in self.ways_m.into_iter().zip(self.speeds_m_per_s) {
-                for work_j in self.edge(subject, corner_m, way_m, speed_m_per_s, samples)? {
-                    (net_j, gross_j) = (net_j + work_j, gross_j + work_j.abs());
+                for [work_j, step_j] in self.edge(subject, corner_m, way_m, speed_m_per_s, samples)? {
+                    (net_j, gross_j, highest_j) =
+                        (net_j + work_j, gross_j + work_j.abs(), f64::max(highest_j, step_j));
                 }
                 corner_m += way_m;
             }
-            Some(Lap { net_j, gross_j, uncertain_j: 0.0, mismatch: 0.0 })
+            Some(Lap { net_j, gross_j, uncertain_j: MOST_STEPS * highest_j, mismatch: 0.0 })
         })
     }
 
-    /// Returns the work on the hand between the samples of an edge, by the trapezoidal rule, J.
+    /// Returns the work on the hand between the samples of an edge by the trapezoidal rule, and its largest error where the force has
+    /// a step there, J.
     fn edge(
         &self,
         subject: &mut Subject<'_>,
@@ -123,7 +134,7 @@ impl Triangle {
         way_m: DVec3,
         speed_m_per_s: f64,
         samples: usize,
-    ) -> Option<Vec<f64>> {
+    ) -> Option<Vec<[f64; 2]>> {
         let duration_s = way_m.length() / speed_m_per_s;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a second
         let dt_ns = (duration_s * 1.0e9 / samples as f64).round() as u64;
@@ -137,8 +148,8 @@ impl Triangle {
         let step_m = way_m / samples as f64;
         let work_j = |index: usize| {
             let here_n = force_n(index)?;
-            let mean_n = (std::mem::replace(&mut before_n, here_n) + here_n) * 0.5;
-            Some(mean_n.dot(step_m))
+            let there_n = std::mem::replace(&mut before_n, here_n);
+            Some([(there_n + here_n).dot(step_m) * 0.5, (here_n - there_n).dot(step_m).abs() * 0.5])
         };
         (1..=samples).map(work_j).collect()
     }
