@@ -1,7 +1,7 @@
 //! Loaded device, in two types: [`OpenedDevice`] (answers queries) and [`ActiveDevice`] (energised).
 
 use super::capabilities::{check, check_unchanged};
-use super::guarded::GuardedInstance;
+use super::guarded::{GuardedInstance, INCOMPLETE};
 use super::setting::Setting;
 use crate::abi::{CallStatus, CycleCode, DeviceTable, Instance};
 use crate::extension::DeviceExtensions;
@@ -77,9 +77,7 @@ impl OpenedDevice {
         settings: &[Setting],
     ) -> Result<Self, Refusal> {
         let Some(open) = table.open else {
-            return Err(Refusal::broken(
-                "a required entry of the function table is null; set every required entry",
-            ));
+            return Err(Refusal::broken(INCOMPLETE));
         };
         let nothing = "the plugin reported success but opened no device";
         let calls = GuardedInstance::create(open, parameters, settings, nothing)?;
@@ -126,10 +124,7 @@ impl OpenedDevice {
     pub fn activate(self, config: &LoopConfig) -> Result<ActiveDevice, (Self, Refusal)> {
         let table = self.handle.table;
         let (Some(activate), Some(read), Some(write)) = (table.activate, table.read, table.write) else {
-            return Err((
-                self,
-                Refusal::broken("a required entry of the function table is null; set every required entry"),
-            ));
+            return Err((self, Refusal::broken(INCOMPLETE)));
         };
         // Before activation nothing depends on the floating-point environment: a change is restored but not reported.
         let mut calls = GuardedInstance::new(self.handle.instance);
@@ -157,8 +152,8 @@ impl ActiveDevice {
     /// Takes the newest sample. Real-time: bounded by the device, no allocation.
     #[inline]
     pub fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        // SAFETY: a live, active instance used by this thread only (`&mut`), pointers valid for the call.
         let read = self.read;
+        // SAFETY: a live, active instance used by this thread only (`&mut`), pointers valid for the call.
         let code = self.calls.call(|instance| unsafe { read(instance, tick, state) });
         self.known("read", code)
     }
@@ -190,8 +185,8 @@ impl ActiveDevice {
     /// Commands the wrench on the hand until the next write. Real-time: bounded by the device, no allocation.
     #[inline]
     pub fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
-        // SAFETY: as in `read`.
         let write = self.write;
+        // SAFETY: as in `read`.
         let code = self.calls.call(|instance| unsafe { write(instance, tick, wrench) });
         self.known("write", code)
     }

@@ -5,6 +5,10 @@ use super::setting::{Setting, index_of, live_index, to_raw};
 use crate::abi::{CallStatus, Instance, Message};
 use crate::{Parameter, ParameterValue, Refusal, RefusalKind};
 
+/// Reason of a refusal without a function that every table has.
+pub(super) const INCOMPLETE: &str =
+    "a required entry of the function table is null; set every required entry";
+
 /// Table function that creates an instance: `create` of models, `open` of devices.
 pub(super) type CreateFn =
     unsafe extern "C" fn(*const ParameterValue, u32, *mut Message, *mut Instance) -> u32;
@@ -41,9 +45,10 @@ impl GuardedInstance {
         let count = u32::try_from(values.len()).unwrap_or(u32::MAX);
         let mut created = Self::new(std::ptr::null_mut());
         let mut instance = std::ptr::null_mut();
-        // SAFETY: all pointers are valid for the call, as the contract of `create` and `open` asks.
-        created
-            .refusable(|_, message| unsafe { create(values.as_ptr(), count, message, &raw mut instance) })?;
+        created.refusable(|_, message| {
+            // SAFETY: all pointers are valid for the call, as the contract of `create` and `open` asks.
+            unsafe { create(values.as_ptr(), count, message, &raw mut instance) }
+        })?;
         if instance.is_null() {
             return Err(Refusal::broken(nothing));
         }

@@ -1,6 +1,6 @@
 //! Loaded force model: an instance and its function table.
 
-use super::guarded::GuardedInstance;
+use super::guarded::{GuardedInstance, INCOMPLETE};
 use super::setting::Setting;
 use crate::abi::{CallStatus, ForceTable, Instance};
 use crate::extension::ModelExtensions;
@@ -35,9 +35,7 @@ impl Model {
     ) -> Result<Self, Refusal> {
         let ModelTables { force: table, extensions } = tables;
         let (Some(create), Some(step)) = (table.create, table.step) else {
-            return Err(Refusal::broken(
-                "a required entry of the function table is null; set every required entry",
-            ));
+            return Err(Refusal::broken(INCOMPLETE));
         };
         let nothing = "the plugin reported success but created no model";
         let mut calls = GuardedInstance::create(create, parameters, settings, nothing)?;
