@@ -43,6 +43,7 @@ mod simple_device;
 mod table;
 pub mod terminal;
 mod text_file;
+mod velocity_filter;
 
 pub use abi::Choices;
 pub use device::{
@@ -82,3 +83,4 @@ pub use sampled_loop::{Damper, SampledLoop};
 pub use simple_device::{ActiveSimple, Opened, Simple, SimpleDevice, SimpleStop, StopFlag};
 pub use table::{HashLines, Row, Table};
 pub use text_file::{TextProblem, open_file, read_file, read_text, text_from_bytes};
+pub use velocity_filter::VelocityFilter;

@@ -306,6 +306,19 @@ impl<'a> Settings<'a> {
         self.number_or_default(id) as usize
     }
 
+    /// Returns the number of each parameter, set or default, in the sequence of the schema.
+    #[must_use]
+    pub fn values(&self) -> Vec<f64> {
+        self.schema.iter().map(|parameter| self.number_or_default(parameter.id())).collect()
+    }
+
+    /// Returns the element of `all` for a choice, set or default; `all` has the sequence of the choices.
+    #[must_use]
+    pub fn one_of<T: Copy, const N: usize>(&self, id: &str, all: [T; N]) -> T {
+        const { assert!(N > 0, "a choice has at least one element") };
+        all[self.choice_or_default(id).min(N - 1)]
+    }
+
     /// Returns the text set for a text or the path set for a file, if any.
     #[must_use]
     pub fn text(&self, id: &str) -> Option<&'a str> {

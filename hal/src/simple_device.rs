@@ -4,8 +4,9 @@
 //! [`Simple`] makes a [`Device`] of it: `export_device!(Simple<Crank>);`. The contract beneath is the same.
 
 use crate::{
-    ActiveDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, LoopConfig, Parameter, Refusal,
-    SafeStop, SetParameterError, Settings, Tick, Wrench,
+    ActiveDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, IndependentStop,
+    IndependentStopDevice, LoopConfig, Parameter, Refusal, SafeStop, SetParameterError, Settings, Tick,
+    Wrench,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -140,9 +141,8 @@ impl<D: SimpleDevice> Device for Simple<D> {
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let Opened { device, capabilities, stop } = D::open(settings)?;
-        let values =
-            D::PARAMETERS.iter().map(|parameter| settings.number_or_default(parameter.id())).collect();
-        Ok(Self { device, capabilities, stop: SimpleStop(Arc::new((StopFlag::default(), stop))), values })
+        let stop = SimpleStop(Arc::new((StopFlag::default(), stop)));
+        Ok(Self { device, capabilities, stop, values: settings.values() })
     }
 
     fn capabilities(&self) -> Capabilities {
@@ -166,6 +166,12 @@ impl<D: SimpleDevice> Device for Simple<D> {
 
     fn parameter(&self, index: usize) -> f64 {
         self.values.get(index).copied().unwrap_or(f64::NAN)
+    }
+}
+
+impl<D: SimpleDevice + IndependentStopDevice> IndependentStopDevice for Simple<D> {
+    fn independent_stop(&self) -> IndependentStop {
+        self.device.independent_stop()
     }
 }
 

@@ -12,10 +12,9 @@ use crate::usb;
 use flotor_hal::{
     ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, ConnectionDevice, Cycle, DQuat, DVec3,
     Device, DeviceInfo, DeviceState, IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose,
-    Refusal, Settings, Tick, Twist, UsbAccess, UsbKind, VerticalCalibration, Wrench, choices, export_device,
-    math,
+    Refusal, Settings, Tick, Twist, UsbAccess, UsbKind, VelocityFilter, VerticalCalibration, Wrench, choices,
+    export_device,
 };
-use std::f64::consts::TAU;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -91,7 +90,7 @@ struct Options {
     homing: Duration,
     cutoff_hz: f64,
     timeout: Duration,
-    parameters: [f64; SCHEMA.len()],
+    values: Vec<f64>,
 }
 
 /// Opened Falcon: its firmware runs, its motors are at rest.
@@ -111,8 +110,7 @@ pub struct DrivenDevice {
     /// First report, for the first read.
     first: Option<Report>,
     state: DeviceState,
-    /// Time of the last sample, ns.
-    sampled_ns: Option<u64>,
+    velocity: VelocityFilter,
     /// Last motor command as a force on the hand, and whether the words were clipped.
     force_n: DVec3,
     is_clipped: bool,
@@ -122,10 +120,6 @@ pub struct DrivenDevice {
 
 impl Options {
     fn new(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let mut parameters = [0.0; SCHEMA.len()];
-        for (value, parameter) in parameters.iter_mut().zip(SCHEMA) {
-            *value = settings.number_or_default(parameter.id());
-        }
         let expected = settings.text("firmware_sha256");
         let firmware = settings.text("firmware").map(|path| firmware::read(path, expected));
         let seconds = |key| Duration::from_secs_f64(settings.number_or_default(key));
@@ -137,7 +131,7 @@ impl Options {
             homing: seconds("homing_s"),
             cutoff_hz: settings.number_or_default("velocity_cutoff_hz"),
             timeout: seconds("timeout_ms") / 1000,
-            parameters,
+            values: settings.values(),
         })
     }
 
@@ -210,12 +204,12 @@ impl Device for FalconDevice {
     fn activate(mut self, _config: &LoopConfig) -> Result<DrivenDevice, (Self, Refusal)> {
         match self.start() {
             Ok((exchange, report, posture)) => Ok(DrivenDevice {
+                velocity: VelocityFilter::new(self.options.cutoff_hz),
                 opened: self,
                 exchange,
                 posture,
                 first: Some(report),
                 state: DeviceState::HOME,
-                sampled_ns: None,
                 force_n: DVec3::ZERO,
                 is_clipped: false,
                 error: None,
@@ -225,7 +219,7 @@ impl Device for FalconDevice {
     }
 
     fn parameter(&self, index: usize) -> f64 {
-        self.options.parameters.get(index).copied().unwrap_or(f64::NAN)
+        self.options.values.get(index).copied().unwrap_or(f64::NAN)
     }
 }
 
@@ -359,17 +353,7 @@ impl DrivenDevice {
     /// Updates the sample from the posture.
     fn sample(&mut self, buttons: u32, time_ns: u64) {
         let position_m = to_host(self.posture.position_m() - CENTRE_M);
-        let before_m = self.state.pose.position();
-        let velocity = match self.sampled_ns {
-            Some(before_ns) if time_ns > before_ns => {
-                let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
-                // First-order low pass, exact for a difference that is constant over the interval.
-                let share = 1.0 - math::exp(-TAU * self.opened.options.cutoff_hz * dt_s);
-                self.state.twist.linear().lerp((position_m - before_m) / dt_s, share)
-            }
-            _ => DVec3::ZERO,
-        };
-        self.sampled_ns = Some(time_ns);
+        let velocity = self.velocity.update(position_m - self.state.pose.position(), time_ns);
         self.state = DeviceState {
             pose: Pose::new(position_m, DQuat::IDENTITY),
             twist: Twist::new(velocity, DVec3::ZERO),

@@ -5,8 +5,8 @@
 //! local of the function here that calls it, so that none outlives the call.
 #![allow(unsafe_code)] // calls into the SDK; listed in tests/tests/system/architecture.rs
 
-use flotor_vendor_sdk::sdk_functions;
-use std::ffi::{CStr, c_char, c_double, c_int, c_uint, c_ushort};
+use flotor_vendor_sdk::{sdk_functions, static_text};
+use std::ffi::{c_char, c_double, c_int, c_uint, c_ushort};
 
 /// C++ `bool` of the SDK, passed as a byte: any value but 0 is true.
 type Truth = u8;
@@ -17,21 +17,16 @@ sdk_functions! {
         fn dhdGetSDKVersion(*mut c_int, *mut c_int, *mut c_int, *mut c_int);
         fn dhdErrorGetLast() -> c_int;
         fn dhdErrorGetLastStr() -> *const c_char;
-        fn dhdGetDeviceCount() -> c_int;
         fn dhdOpenID(i8) -> c_int;
         fn dhdClose(i8) -> c_int;
-        fn dhdGetSystemType(i8) -> c_int;
         fn dhdGetSystemName(i8) -> *const c_char;
         fn dhdGetSerialNumber(*mut c_ushort, i8) -> c_int;
         fn dhdHasWrist(i8) -> Truth;
         fn dhdHasActiveWrist(i8) -> Truth;
         fn dhdGetStatus(*mut c_int, i8) -> c_int;
         fn dhdEnableForce(u8, i8) -> c_int;
-        fn dhdStop(i8) -> c_int;
         fn dhdSetBrakes(c_int, i8) -> c_int;
         fn dhdSetGravityCompensation(c_int, i8) -> c_int;
-        fn dhdSetMaxForce(c_double, i8) -> c_int;
-        fn dhdSetMaxTorque(c_double, i8) -> c_int;
         fn dhdConfigLinearVelocity(c_int, c_int, i8) -> c_int;
         fn dhdConfigAngularVelocity(c_int, c_int, i8) -> c_int;
         fn dhdEnableExpertMode() -> c_int;
@@ -43,10 +38,15 @@ sdk_functions! {
         fn dhdGetForceAndTorque(
             *mut c_double, *mut c_double, *mut c_double, *mut c_double, *mut c_double, *mut c_double, i8
         ) -> c_int;
-        fn dhdGetButtonMask(i8) -> c_uint;
         fn dhdSetForceAndTorqueAndGripperForce(
             c_double, c_double, c_double, c_double, c_double, c_double, c_double, i8
         ) -> c_int;
+        safe fn device_count = dhdGetDeviceCount() -> c_int;
+        safe fn system_type = dhdGetSystemType(id: i8) -> c_int;
+        safe fn stop = dhdStop(id: i8) -> c_int;
+        safe fn set_most_force = dhdSetMaxForce(most_n: c_double, id: i8) -> c_int;
+        safe fn set_most_torque = dhdSetMaxTorque(most_nm: c_double, id: i8) -> c_int;
+        safe fn buttons = dhdGetButtonMask(id: i8) -> c_uint;
         optional fn drdOpenID(i8) -> c_int;
         optional fn drdClose(i8) -> c_int;
         optional fn drdIsInitialized(i8) -> Truth;
@@ -74,12 +74,7 @@ impl Functions {
     /// Returns number and text of the last error of this thread.
     pub(crate) fn last_error(&self) -> (c_int, String) {
         // SAFETY: functions without preconditions; the words are a static text, or null.
-        unsafe { ((self.dhdErrorGetLast)(), text((self.dhdErrorGetLastStr)())) }
-    }
-
-    pub(crate) fn device_count(&self) -> c_int {
-        // SAFETY: a function without preconditions.
-        unsafe { (self.dhdGetDeviceCount)() }
+        unsafe { ((self.dhdErrorGetLast)(), static_text((self.dhdErrorGetLastStr)())) }
     }
 
     pub(crate) fn open(&self, index: i8) -> c_int {
@@ -92,14 +87,9 @@ impl Functions {
         unsafe { (self.drdClose.unwrap_or(self.dhdClose))(id) }
     }
 
-    pub(crate) fn system_type(&self, id: i8) -> c_int {
-        // SAFETY: any id is legal.
-        unsafe { (self.dhdGetSystemType)(id) }
-    }
-
     pub(crate) fn system_name(&self, id: i8) -> String {
         // SAFETY: any id is legal; the name is a static text, or null.
-        text(unsafe { (self.dhdGetSystemName)(id) })
+        unsafe { static_text((self.dhdGetSystemName)(id)) }
     }
 
     pub(crate) fn serial_number(&self, id: i8) -> (c_int, u16) {
@@ -147,11 +137,6 @@ impl Functions {
         unsafe { (self.dhdEnableForce)(u8::from(on), id) }
     }
 
-    pub(crate) fn stop(&self, id: i8) -> c_int {
-        // SAFETY: any id is legal.
-        unsafe { (self.dhdStop)(id) }
-    }
-
     pub(crate) fn set_brakes(&self, on: bool, id: i8) -> c_int {
         // SAFETY: any id is legal.
         unsafe { (self.dhdSetBrakes)(c_int::from(on), id) }
@@ -160,16 +145,6 @@ impl Functions {
     pub(crate) fn set_gravity_compensation(&self, on: bool, id: i8) -> c_int {
         // SAFETY: any id is legal.
         unsafe { (self.dhdSetGravityCompensation)(c_int::from(on), id) }
-    }
-
-    pub(crate) fn set_most_force(&self, most_n: f64, id: i8) -> c_int {
-        // SAFETY: any id is legal.
-        unsafe { (self.dhdSetMaxForce)(most_n, id) }
-    }
-
-    pub(crate) fn set_most_torque(&self, most_nm: f64, id: i8) -> c_int {
-        // SAFETY: any id is legal.
-        unsafe { (self.dhdSetMaxTorque)(most_nm, id) }
     }
 
     /// Sets the window of the velocity, ms.
@@ -226,23 +201,9 @@ impl Functions {
         (unsafe { (self.dhdGetForceAndTorque)(x, y, z, a, b, g, id) }, force, torque)
     }
 
-    pub(crate) fn buttons(&self, id: i8) -> u32 {
-        // SAFETY: any id is legal.
-        unsafe { (self.dhdGetButtonMask)(id) }
-    }
-
     /// Sends force, N, and torque, N·m, with zero gripper force; waits for the exchange with the device.
     pub(crate) fn set_wrench(&self, [x, y, z]: [f64; 3], [a, b, g]: [f64; 3], id: i8) -> c_int {
         // SAFETY: any id is legal.
         unsafe { (self.dhdSetForceAndTorqueAndGripperForce)(x, y, z, a, b, g, 0.0, id) }
     }
-}
-
-/// Copies a static text of the SDK; empty for a null pointer.
-fn text(place: *const c_char) -> String {
-    if place.is_null() {
-        return String::new();
-    }
-    // SAFETY: not null: a static text that ends in a null byte, as the SDK documents.
-    unsafe { CStr::from_ptr(place) }.to_string_lossy().into_owned()
 }

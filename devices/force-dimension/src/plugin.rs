@@ -8,13 +8,12 @@ use flotor_hal::{
     IndependentStop, IndependentStopDevice, LoopConfig, PacingDevice, Parameter, Refusal, SampleWait,
     Settings, StoppedState, Tick, UsbAccess, UsbKind, Wrench, choices, export_device,
 };
+use flotor_vendor_sdk::parameters::{PACE, STAND_IN, TIMEOUT, max_force, max_torque};
 use flotor_vendor_sdk::{DropInPolicy, Exchange, LoopEnd, Pace, StopSwitch};
 use std::sync::Arc;
 use std::time::Duration;
 
-const NO_YES: Choices = choices!["false", "true"];
 const INITIALISE: Choices = choices!["never", "automatic"];
-const PACES: Choices = choices!["real", "lockstep"];
 
 /// Highest exchange rate of the devices, Hz.
 const FASTEST_HZ: f64 = 4000.0;
@@ -29,7 +28,7 @@ const SCHEMA: &[Parameter] = &[
         choices![],
         "Library of the SDK, libdrd.so.3 (default: searched in $FDSDK and in the library folders of the system)",
     ),
-    Parameter::choice("stand_in", NO_YES, 0, "Accept Flotor's own drop-in library, which simulates a device"),
+    STAND_IN,
     Parameter::real("serial", "1", 0.0, 65_535.0, 0.0, "Serial number of the device; 0: the first one"),
     Parameter::choice(
         "initialise",
@@ -37,22 +36,8 @@ const SCHEMA: &[Parameter] = &[
         0,
         "automatic: when energised, a device without a reference position moves its arm to find the reference",
     ),
-    Parameter::real(
-        "max_force_n",
-        "N",
-        0.0,
-        100.0,
-        0.0,
-        "Largest force on the hand; 0: the limit of the device",
-    ),
-    Parameter::real(
-        "max_torque_nm",
-        "N·m",
-        0.0,
-        10.0,
-        0.0,
-        "Largest torque on the hand; 0: the limit of the device",
-    ),
+    max_force(100.0),
+    max_torque(10.0),
     Parameter::real("velocity_window_ms", "ms", 1.0, 100.0, 20.0, "Window of the SDK's velocity estimate"),
     Parameter::real(
         "watchdog_ms",
@@ -62,13 +47,8 @@ const SCHEMA: &[Parameter] = &[
         20.0,
         "Time without a command after which the watchdog of the device removes the force",
     ),
-    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Timeout for samples of the device"),
-    Parameter::choice(
-        "pace",
-        PACES,
-        0,
-        "real: each tick uses the newest sample; lockstep: each tick waits for its sample (virtual clock, simulated device)",
-    ),
+    TIMEOUT,
+    PACE,
 ];
 
 /// Opened device of Force Dimension: identified, without force.
@@ -81,7 +61,7 @@ pub struct ForceDimensionDevice {
     initialises: bool,
     setup: Setup,
     timeout: Duration,
-    parameters: [f64; SCHEMA.len()],
+    values: Vec<f64>,
 }
 
 /// Active device, energised.
@@ -102,9 +82,7 @@ impl Device for ForceDimensionDevice {
     type Stop = StopSwitch;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let policy = [DropInPolicy::Refuse, DropInPolicy::Accept];
-        let policy =
-            policy.get(settings.choice_or_default("stand_in")).copied().unwrap_or(DropInPolicy::Refuse);
+        let policy = settings.one_of(STAND_IN.id(), [DropInPolicy::Refuse, DropInPolicy::Accept]);
         let dhd = Dhd::open(settings.text("library"), policy, which(settings.number_or_default("serial"))?)?;
         let initialises = settings.choice_or_default("initialise") == 1;
         if !initialises && !dhd.is_initialized() {
@@ -131,12 +109,7 @@ impl Device for ForceDimensionDevice {
                 dhd.name()
             )));
         }
-        let mut parameters = [0.0; SCHEMA.len()];
-        for (value, parameter) in parameters.iter_mut().zip(SCHEMA) {
-            *value = settings.number_or_default(parameter.id());
-        }
-        let pace = [Pace::Real, Pace::Lockstep];
-        let pace = pace.get(settings.choice_or_default("pace")).copied().unwrap_or(Pace::Real);
+        let pace = settings.one_of(PACE.id(), [Pace::Real, Pace::Lockstep]);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // in the ranges of the schema
         let setup = Setup {
             most: [kind.force_n, kind.torque_nm],
@@ -150,8 +123,8 @@ impl Device for ForceDimensionDevice {
             wrist,
             initialises,
             setup,
-            timeout: Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3),
-            parameters,
+            timeout: Duration::from_secs_f64(settings.number_or_default(TIMEOUT.id()) * 1.0e-3),
+            values: settings.values(),
         })
     }
 
@@ -221,7 +194,7 @@ impl Device for ForceDimensionDevice {
     }
 
     fn parameter(&self, index: usize) -> f64 {
-        self.parameters.get(index).copied().unwrap_or(f64::NAN)
+        self.values.get(index).copied().unwrap_or(f64::NAN)
     }
 }
 

@@ -5,15 +5,14 @@ use crate::pantograph::{Pantograph, Posture};
 use crate::protocol::{Arm, Direction, torques};
 use flotor_hal::glam::DVec2;
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Choices, Conditions, Cycle, DQuat, DVec3, Device, DeviceInfo,
-    DeviceState, Fault, IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose, Refusal,
-    SafeStop, Settings, StoppedState, Tick, Twist, Wrench, choices, export_device, math,
+    Axes, Capabilities, Choices, Conditions, Cycle, DQuat, DVec3, DeviceInfo, DeviceState, Fault,
+    IndependentStop, IndependentStopDevice, LoopConfig, Opened, Parameter, Pose, Refusal, SafeStop, Settings,
+    Simple, SimpleDevice, StoppedState, Tick, Twist, VelocityFilter, Wrench, choices, export_device,
 };
 use flotor_serial::{PORT_EXAMPLE, PORT_HELP, Port};
 use std::f64::consts::TAU;
 use std::io::Write;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 use std::time::Duration;
 
 /// Timeout of the first reply: a board that resets when its port opens is back within a second or two.
@@ -86,69 +85,54 @@ impl Hardware {
     }
 }
 
-/// Opened pantograph: its port is open, its motors are not driven.
+/// Pantograph whose motors follow the host while it is active.
 pub struct HaplyDevice {
     board: Board,
     hardware: Hardware,
     max_force_n: f64,
     cutoff_hz: f64,
     timeout: Duration,
-    parameters: [f64; SCHEMA.len()],
-    /// Descriptor of the port of `stop`.
+    /// Descriptor of the port of the stop.
     descriptor: i32,
-    stop: Arc<Stop>,
-}
-
-/// Active pantograph whose motors follow the host.
-pub struct DrivenDevice {
-    opened: HaplyDevice,
-    posture: Posture,
+    /// Posture of the newest angles; `None` before the first activation.
+    posture: Option<Posture>,
     /// True for a posture that was not read yet.
     is_fresh: bool,
     state: DeviceState,
-    /// Time of the last sample, ns.
-    sampled_ns: Option<u64>,
+    velocity: VelocityFilter,
     force_n: DVec2,
 }
 
-/// State shared by the loop and the threads that stop it.
-struct Stop {
-    is_stopped: AtomicBool,
-    /// Second handle of the port: the board holds the last torque indefinitely, so that zero must be sent even if the loop has
-    /// stopped.
-    port: Mutex<Port>,
-}
+/// Stop of the torques, usable from any thread, with a second handle of the port: the board holds the last torque indefinitely, so
+/// that zero must be sent even if the loop has stopped.
+pub struct TorqueStop(Mutex<Port>);
 
-impl Stop {
+impl SafeStop for TorqueStop {
     /// Sends zero torque, also while a request is pending. Never waits: the holder of the lock is sending zero as well.
-    fn let_go(&self) {
-        if let Ok(mut port) = self.port.try_lock() {
+    fn safe_stop(&self) {
+        if let Ok(mut port) = self.0.try_lock() {
             let _ = port.write_all(&torques([0.0; 2]));
         }
     }
 }
 
-/// Stop of the torques, usable from any thread.
-pub struct TorqueSwitch(Arc<Stop>);
-
-impl SafeStop for TorqueSwitch {
-    fn safe_stop(&self) {
-        self.0.is_stopped.store(true, Ordering::Release);
-        self.0.let_go();
+impl Drop for TorqueStop {
+    /// Sends zero torque also for a board that was never activated: it may hold a torque of an earlier program.
+    fn drop(&mut self) {
+        self.safe_stop();
     }
 }
 
-impl Device for HaplyDevice {
+impl SimpleDevice for HaplyDevice {
     const INFO: DeviceInfo = DeviceInfo::new(
         "haply",
         "Haply 2DIY",
         "A planar pantograph with two motors, over its maker's open serial protocol",
     );
     const PARAMETERS: &'static [Parameter] = SCHEMA;
-    type Active = DrivenDevice;
-    type Stop = TorqueSwitch;
+    type Stop = TorqueStop;
 
-    fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
+    fn open(settings: &Settings<'_>) -> Result<Opened<Self>, Refusal> {
         let path = settings.text("port").ok_or_else(|| {
             Refusal::resource(format!(
                 "no `port` for the board; set the port, as in {PORT_EXAMPLE}; without hardware start the emulator \
@@ -157,68 +141,77 @@ impl Device for HaplyDevice {
         })?;
         let board = Board::open(path).map_err(Refusal::resource)?;
         let port = board.second_port().map_err(Refusal::resource)?;
-        let mut parameters = [0.0; SCHEMA.len()];
-        for (value, parameter) in parameters.iter_mut().zip(SCHEMA) {
-            *value = settings.number_or_default(parameter.id());
-        }
-        let version = settings.choice_or_default("hardware");
-        Ok(Self {
+        let hardware = settings.one_of("hardware", HARDWARE);
+        let max_force_n = settings.number_or_default("max_force_n");
+        let cutoff_hz = settings.number_or_default("velocity_cutoff_hz");
+        let device = Self {
             board,
-            hardware: HARDWARE.get(version).copied().unwrap_or(HARDWARE[1]),
-            max_force_n: settings.number_or_default("max_force_n"),
-            cutoff_hz: settings.number_or_default("velocity_cutoff_hz"),
+            hardware,
+            max_force_n,
+            cutoff_hz,
             timeout: Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3),
-            parameters,
             descriptor: port.descriptor(),
-            stop: Arc::new(Stop { is_stopped: AtomicBool::new(false), port: Mutex::new(port) }),
-        })
-    }
-
-    fn capabilities(&self) -> Capabilities {
-        let counts_per_turn = f64::from(self.hardware.arms[0].counts_per_turn);
-        let max_force_n = self.max_force_n;
-        Capabilities {
-            sensed: Axes::PLANE,
-            actuated: Axes::PLANE,
+            posture: None,
+            is_fresh: false,
+            state: DeviceState::HOME,
+            velocity: VelocityFilter::new(cutoff_hz),
+            force_n: DVec2::ZERO,
+        };
+        let counts_per_turn = f64::from(hardware.arms[0].counts_per_turn);
+        let capabilities = Capabilities {
             range_m: RANGE_M,
-            range_rad: [0.0; 3],
             // An encoder count at the end of a stretched arm.
             resolution_m: TAU / counts_per_turn * (INNER_M + OUTER_M),
-            max_force_n: [max_force_n, max_force_n, 0.0],
-            max_torque_nm: [0.0; 3],
             // Slew: from zero to the default limit in a millisecond, as the motors are driven directly.
             max_force_slew_n_per_s: 3000.0,
             max_torque_slew_nm_per_s: f64::INFINITY, // of nothing
-            max_stiffness_n_per_m: MAX_STIFFNESS_N_PER_M,
             rate_hz: [100.0, 1000.0],
-            // A request and its reply over USB, a frame each.
-            latency_s: 2.0e-3,
+            ..Capabilities::driving(Axes::PLANE)
+                .with_limits(max_force_n, 0.0)
+                .with_stiffness(MAX_STIFFNESS_N_PER_M)
+                // A request and its reply over USB, a frame each.
+                .with_latency(2.0e-3)
+        };
+        Ok(Opened { device, capabilities, stop: TorqueStop(Mutex::new(port)) })
+    }
+
+    fn activate(&mut self, _config: &LoopConfig) -> Result<(), Refusal> {
+        (self.posture, self.is_fresh) = (Some(self.start()?), true);
+        (self.state, self.force_n) = (DeviceState::HOME, DVec2::ZERO);
+        self.velocity = VelocityFilter::new(self.cutoff_hz);
+        Ok(())
+    }
+
+    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        let Ok(polled) = self.board.poll() else { return Cycle::Fault(Fault::Disconnected) };
+        // Angles outside the linkage's geometry are malformed data: the next reply will be right.
+        if let Some(posture) = polled.and_then(|angles_deg| self.posture(angles_deg)) {
+            (self.posture, self.is_fresh) = (Some(posture), true);
         }
-    }
-
-    fn stopper(&self) -> TorqueSwitch {
-        TorqueSwitch(Arc::clone(&self.stop))
-    }
-
-    fn activate(mut self, _config: &LoopConfig) -> Result<DrivenDevice, (Self, Refusal)> {
-        match self.start() {
-            Ok(posture) => {
-                self.stop.is_stopped.store(false, Ordering::Release);
-                Ok(DrivenDevice {
-                    opened: self,
-                    posture,
-                    is_fresh: true,
-                    state: DeviceState::HOME,
-                    sampled_ns: None,
-                    force_n: DVec2::ZERO,
-                })
+        let cycle = match self.posture {
+            Some(posture) if std::mem::take(&mut self.is_fresh) => {
+                self.sample(&posture, tick.time_ns);
+                Cycle::Fresh
             }
-            Err(refusal) => Err((self, refusal)),
-        }
+            _ if self.board.silence() > self.timeout => Cycle::Fault(Fault::Timeout),
+            _ => Cycle::Stale,
+        };
+        *state = self.state;
+        cycle
     }
 
-    fn parameter(&self, index: usize) -> f64 {
-        self.parameters.get(index).copied().unwrap_or(f64::NAN)
+    fn write(&mut self, _tick: &Tick, wrench: &Wrench) -> Cycle {
+        let asked_n = DVec2::new(wrench.force_n[0], wrench.force_n[1]);
+        self.force_n = match asked_n.is_finite() {
+            true => asked_n.clamp_length_max(self.max_force_n),
+            false => DVec2::ZERO,
+        };
+        // The board's x and y are the host's, rotated by half a turn.
+        let torques_nm = self.posture.map_or([0.0; 2], |posture| posture.torques_nm(-self.force_n));
+        match self.board.request(torques_nm) {
+            Ok(()) => Cycle::Fresh,
+            Err(LinkLost) => Cycle::Fault(Fault::Disconnected),
+        }
     }
 }
 
@@ -244,68 +237,11 @@ impl HaplyDevice {
     fn posture(&self, angles_deg: [f64; 2]) -> Option<Posture> {
         self.hardware.linkage.posture(angles_deg.map(f64::to_radians))
     }
-}
 
-impl ActiveDevice for DrivenDevice {
-    type Opened = HaplyDevice;
-
-    fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        let polled = match self.opened.board.poll() {
-            Ok(polled) => polled,
-            Err(LinkLost) => return Cycle::Fault(Fault::Disconnected),
-        };
-        // Angles outside the linkage's geometry are malformed data: the next reply will be right.
-        if let Some(posture) = polled.and_then(|angles_deg| self.opened.posture(angles_deg)) {
-            (self.posture, self.is_fresh) = (posture, true);
-        }
-        let cycle = if std::mem::take(&mut self.is_fresh) {
-            self.sample(tick.time_ns);
-            Cycle::Fresh
-        } else if self.opened.board.silence() > self.opened.timeout {
-            Cycle::Fault(Fault::Timeout)
-        } else {
-            Cycle::Stale
-        };
-        *state = self.state;
-        cycle
-    }
-
-    fn write(&mut self, _tick: &Tick, wrench: &Wrench) -> Cycle {
-        let asked_n = DVec2::new(wrench.force_n[0], wrench.force_n[1]);
-        let is_stopped = self.opened.stop.is_stopped.load(Ordering::Acquire);
-        self.force_n = match asked_n.is_finite() && !is_stopped {
-            true => asked_n.clamp_length_max(self.opened.max_force_n),
-            false => DVec2::ZERO,
-        };
-        // The board's x and y are the host's, rotated by half a turn.
-        let torques_nm = self.posture.torques_nm(-self.force_n);
-        match self.opened.board.request(torques_nm) {
-            Ok(()) => Cycle::Fresh,
-            Err(LinkLost) => Cycle::Fault(Fault::Disconnected),
-        }
-    }
-
-    fn deactivate(self) -> HaplyDevice {
-        self.opened.stop.let_go();
-        self.opened
-    }
-}
-
-impl DrivenDevice {
     /// Updates the sample from the posture.
-    fn sample(&mut self, time_ns: u64) {
-        let position_m = self.opened.hardware.to_host_m(self.posture.handle_m()).extend(0.0);
-        let before_m = self.state.pose.position();
-        let velocity = match self.sampled_ns {
-            Some(before_ns) if time_ns > before_ns => {
-                let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
-                // First-order low pass, exact for a difference that is constant over the interval.
-                let share = 1.0 - math::exp(-TAU * self.opened.cutoff_hz * dt_s);
-                self.state.twist.linear().lerp((position_m - before_m) / dt_s, share)
-            }
-            _ => DVec3::ZERO,
-        };
-        self.sampled_ns = Some(time_ns);
+    fn sample(&mut self, posture: &Posture, time_ns: u64) {
+        let position_m = self.hardware.to_host_m(posture.handle_m()).extend(0.0);
+        let velocity = self.velocity.update(position_m - self.state.pose.position(), time_ns);
         self.state = DeviceState {
             pose: Pose::new(position_m, DQuat::IDENTITY),
             twist: Twist::new(velocity, DVec3::ZERO),
@@ -318,12 +254,6 @@ impl DrivenDevice {
     }
 }
 
-impl Drop for HaplyDevice {
-    fn drop(&mut self) {
-        self.stop.let_go();
-    }
-}
-
 impl IndependentStopDevice for HaplyDevice {
     /// Declares a message of zero torque, as the board holds the last torque indefinitely. A partial request before the message
     /// resynchronises with the bytes that follow.
@@ -332,4 +262,4 @@ impl IndependentStopDevice for HaplyDevice {
     }
 }
 
-export_device!(HaplyDevice, independent_stop);
+export_device!(Simple<HaplyDevice>, independent_stop);

@@ -7,9 +7,9 @@ use flotor_force_switch::ForceSwitch;
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Conditions, ConnectionDevice, Cycle, DVec3, Device, DeviceInfo,
     DeviceState, IndependentStop, IndependentStopDevice, LoopConfig, Parameter, Pose, Refusal, Settings,
-    StoppedState, Tick, Twist, UsbAccess, UsbKind, Wrench, export_device, math, rotation_vector,
+    StoppedState, Tick, Twist, UsbAccess, UsbKind, VelocityFilter, Wrench, export_device, rotation_vector,
 };
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use std::time::{Duration, Instant};
 
 /// Default address of the service.
@@ -69,15 +69,11 @@ struct Options {
     max_force_n: f64,
     range_m: f64,
     spin_cutoff_hz: f64,
-    parameters: [f64; SCHEMA.len()],
+    values: Vec<f64>,
 }
 
 impl Options {
     fn new(settings: &Settings<'_>) -> Self {
-        let mut parameters = [0.0; SCHEMA.len()];
-        for (value, parameter) in parameters.iter_mut().zip(SCHEMA) {
-            *value = settings.number_or_default(parameter.id());
-        }
         let grip = match settings.text("grip") {
             None => GripRequest::OnlyOne,
             Some(NO_GRIP) => GripRequest::None,
@@ -96,7 +92,7 @@ impl Options {
             max_force_n: settings.number_or_default("max_force_n"),
             range_m: settings.number_or_default("range_mm") * 1.0e-3,
             spin_cutoff_hz: settings.number_or_default("spin_cutoff_hz"),
-            parameters,
+            values: settings.values(),
         }
     }
 
@@ -143,8 +139,7 @@ pub struct DrivenDevice {
     /// Sample of the activation, until it is read.
     first: Option<Sample>,
     state: DeviceState,
-    /// Time of the last sample, ns.
-    sampled_ns: Option<u64>,
+    spin: VelocityFilter,
 }
 
 impl Device for Inverse3Device {
@@ -191,18 +186,18 @@ impl Device for Inverse3Device {
     fn activate(mut self, _config: &LoopConfig) -> Result<DrivenDevice, (Self, Refusal)> {
         match self.start() {
             Ok((exchange, sample)) => Ok(DrivenDevice {
+                spin: VelocityFilter::new(self.options.spin_cutoff_hz),
                 opened: self,
                 exchange,
                 first: Some(sample),
                 state: DeviceState::HOME,
-                sampled_ns: None,
             }),
             Err(refusal) => Err((self, refusal)),
         }
     }
 
     fn parameter(&self, index: usize) -> f64 {
-        self.options.parameters.get(index).copied().unwrap_or(f64::NAN)
+        self.options.values.get(index).copied().unwrap_or(f64::NAN)
     }
 }
 
@@ -259,18 +254,8 @@ impl DrivenDevice {
     /// Updates the sample from a state of the service.
     fn sample(&mut self, sample: &Sample, time_ns: u64) {
         let pose = Pose::new(sample.position_m, sample.orientation);
-        let angular = match self.sampled_ns {
-            Some(before_ns) if time_ns > before_ns => {
-                let dt_s = (time_ns - before_ns) as f64 * 1.0e-9;
-                let before = self.state.pose.orientation();
-                let turned_rad = rotation_vector(sample.orientation * before.conjugate());
-                // First-order low pass, exact for a difference that is constant over the interval.
-                let share = 1.0 - math::exp(-TAU * self.opened.options.spin_cutoff_hz * dt_s);
-                self.state.twist.angular().lerp(turned_rad / dt_s, share)
-            }
-            _ => DVec3::ZERO,
-        };
-        self.sampled_ns = Some(time_ns);
+        let turned_rad = rotation_vector(sample.orientation * self.state.pose.orientation().conjugate());
+        let angular = self.spin.update(turned_rad, time_ns);
         self.state = DeviceState {
             pose,
             twist: Twist::new(sample.velocity_m_per_s, angular),

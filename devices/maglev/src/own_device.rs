@@ -8,10 +8,8 @@ use crate::shaping::Shaping;
 use crate::transport::{self, Kind, LinkLost};
 use flotor_hal::{
     Axes, Capabilities, Conditions, Cycle, DQuat, DVec3, DeviceState, Fault, IndependentStop, LoopConfig,
-    Pose, Refusal, SafeStop, StoppedState, Tick, Twist, VerticalCalibration, Wrench,
+    Pose, Refusal, SafeStop, StopFlag, StoppedState, Tick, Twist, VerticalCalibration, Wrench,
 };
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// Timeout of the description, of arming, of take-off and of switching off.
@@ -30,7 +28,8 @@ pub(crate) struct OwnDevice {
     link: HostLink,
     description: Description,
     pub(crate) calibration: VerticalCalibration,
-    stopped: Arc<AtomicBool>,
+    /// Requests that the device switch off at its next tick; without a next tick the controller's watchdog switches it off.
+    stop: StopFlag,
 }
 
 /// The device, levitating.
@@ -48,15 +47,6 @@ pub(crate) struct OwnActive {
     heard_ns: u64,
 }
 
-/// Requests that the device switch off at its next tick; without a next tick the controller's watchdog switches it off.
-pub struct CoilSwitch(Arc<AtomicBool>);
-
-impl SafeStop for CoilSwitch {
-    fn safe_stop(&self) {
-        self.0.store(true, Ordering::Release);
-    }
-}
-
 impl OwnDevice {
     pub(crate) fn open(options: &Options) -> Result<Self, Refusal> {
         let (link, description) = connect(options)?;
@@ -65,34 +55,34 @@ impl OwnDevice {
             link,
             description,
             calibration: VerticalCalibration::NONE,
-            stopped: Arc::new(AtomicBool::new(false)),
+            stop: StopFlag::default(),
         })
     }
 
     pub(crate) fn capabilities(&self) -> Capabilities {
-        let Description { range_m, range_rad, max_force_n, max_torque_nm, rate_hz, .. } = self.description;
+        let Description { axes: sensing, ranges, limits } = self.description;
         Capabilities {
-            sensed: axes(self.description.sensed),
-            actuated: axes(self.description.actuated),
-            range_m: range_m.map(f64::from),
-            range_rad: range_rad.map(f64::from),
-            resolution_m: f64::from(self.description.resolution_m),
-            max_force_n: max_force_n.map(f64::from),
-            max_torque_nm: max_torque_nm.map(f64::from),
-            max_force_slew_n_per_s: f64::from(self.description.force_slew_n_per_s),
-            max_torque_slew_nm_per_s: f64::from(self.description.torque_slew_nm_per_s),
-            max_stiffness_n_per_m: f64::from(self.description.max_stiffness_n_per_m),
-            rate_hz: rate_hz.map(f64::from),
+            sensed: axes(sensing.sensed),
+            actuated: axes(sensing.actuated),
+            range_m: ranges.range_m.map(f64::from),
+            range_rad: ranges.range_rad.map(f64::from),
+            resolution_m: f64::from(sensing.resolution_m),
+            max_force_n: limits.max_force_n.map(f64::from),
+            max_torque_nm: limits.max_torque_nm.map(f64::from),
+            max_force_slew_n_per_s: f64::from(ranges.force_slew_n_per_s),
+            max_torque_slew_nm_per_s: f64::from(ranges.torque_slew_nm_per_s),
+            max_stiffness_n_per_m: f64::from(ranges.max_stiffness_n_per_m),
+            rate_hz: sensing.rate_hz.map(f64::from),
             latency_s: self.latency_s(),
         }
     }
 
     pub(crate) fn latency_s(&self) -> f64 {
-        f64::from(self.description.latency_us) * 1.0e-6
+        f64::from(self.description.axes.latency_us) * 1.0e-6
     }
 
-    pub(crate) fn stopper(&self) -> CoilSwitch {
-        CoilSwitch(Arc::clone(&self.stopped))
+    pub(crate) fn stopper(&self) -> StopFlag {
+        self.stop.clone()
     }
 
     pub(crate) fn serial(&self) -> String {
@@ -102,7 +92,7 @@ impl OwnDevice {
     /// Describes the controller's own stop: three periods after a command it only damps, and after its watchdog it lands. A
     /// stop message from another process would be rejected for its session and sequence number.
     pub(crate) fn independent_stop(&self) -> IndependentStop {
-        let watchdog_us = self.options.watchdog_us.min(self.description.longest_watchdog_us);
+        let watchdog_us = self.options.watchdog_us.min(self.description.limits.longest_watchdog_us);
         IndependentStop::by_itself(StoppedState::Landed, u64::from(watchdog_us) * 1000)
     }
 
@@ -147,7 +137,7 @@ impl OwnDevice {
             other => other,
         };
         let status = taken_off.map_err(|unanswered| refused(&self.options, unanswered))?;
-        self.stopped.store(false, Ordering::Release);
+        self.stop.arm();
         if self.options.take_off.is_zero() {
             return Ok((status, 0.0));
         }
@@ -229,14 +219,14 @@ impl OwnActive {
         *state = self.state;
         match fault(&status) {
             // Switched off on request: the pose is still valid.
-            _ if self.is_stopped() => Cycle::Fresh,
+            _ if self.opened.stop.is_set() => Cycle::Fresh,
             Some(fault) => Cycle::Fault(fault),
             None => Cycle::Fresh,
         }
     }
 
     pub(crate) fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
-        let request = if self.is_stopped() {
+        let request = if self.opened.stop.is_set() {
             // Stopped: no force from now on, whatever the next status contains.
             self.shaping.commanded = Wrench::ZERO;
             self.state.delivered = Wrench::ZERO;
@@ -256,7 +246,10 @@ impl OwnActive {
     }
 
     pub(crate) fn deactivate(mut self) -> Box<OwnDevice> {
-        if !self.opened.options.landing.is_zero() && !self.is_stopped() && fault(&self.newest).is_none() {
+        if !self.opened.options.landing.is_zero()
+            && !self.opened.stop.is_set()
+            && fault(&self.newest).is_none()
+        {
             let holder = self.opened.holder(u32::try_from(self.period_us).unwrap_or(u32::MAX));
             let (landing, weight_n) = (self.opened.options.landing, self.shaping.weight.force().z);
             // On any error: the device is switched off next.
@@ -274,10 +267,6 @@ impl OwnActive {
 
     pub(crate) fn latency_s(&self) -> f64 {
         self.opened.latency_s()
-    }
-
-    fn is_stopped(&self) -> bool {
-        self.opened.stopped.load(Ordering::Acquire)
     }
 
     /// Reads the newest status, if any; in lockstep, waits for the status that answers the last command.

@@ -200,16 +200,8 @@ pub(crate) struct Options {
 impl Options {
     pub(crate) fn new(settings: &Settings<'_>, values: &Values) -> Result<Self, Refusal> {
         let milliseconds = |id| Duration::from_secs_f64(values.value(id) * 1.0e-3);
-        let protocol = match settings.choice_or_default("protocol") {
-            1 => Protocol::MlApi,
-            _ => Protocol::Flotor,
-        };
-        let kind = match settings.choice_or_default("transport") {
-            1 => Kind::Serial,
-            2 => Kind::Usb,
-            3 => Kind::Hid,
-            _ => Kind::Tcp,
-        };
+        let protocol = settings.one_of("protocol", [Protocol::Flotor, Protocol::MlApi]);
+        let kind = settings.one_of("transport", [Kind::Tcp, Kind::Serial, Kind::Usb, Kind::Hid]);
         let port = match (protocol, kind) {
             (Protocol::Flotor, _) => tcp::PORT,
             (Protocol::MlApi, Kind::Tcp) => ml_api::PORT,
@@ -229,11 +221,7 @@ impl Options {
             feedforward_n: values.value("feedforward_n"),
             take_off: milliseconds("takeoff_ms"),
             landing: milliseconds("landing_ms"),
-            gravity: match settings.choice_or_default("gravity") {
-                1 => Gravity::Off,
-                2 => Gravity::Defy,
-                _ => Gravity::Auto,
-            },
+            gravity: settings.one_of("gravity", [Gravity::Auto, Gravity::Off, Gravity::Defy]),
             fade: milliseconds("fade_ms"),
         })
     }

@@ -2,14 +2,14 @@
 
 use crate::ml_client::stop::LandSwitch;
 use crate::ml_device::{MlActive, MlDevice};
-use crate::own_device::{CoilSwitch, OwnActive, OwnDevice};
+use crate::own_device::{OwnActive, OwnDevice};
 use crate::parameters::{Options, Protocol, SCHEMA, Values};
 use crate::protocol::Rejections;
 use crate::shaping::Shaping;
 use flotor_hal::{
     ActiveDevice, CalibrationDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, IndependentStop,
     IndependentStopDevice, LoopConfig, PacingDevice, Parameter, Refusal, SafeStop, SampleWait, SampledLoop,
-    SetParameterError, Settings, Tick, VerticalCalibration, Wrench, export_device,
+    SetParameterError, Settings, StopFlag, Tick, VerticalCalibration, Wrench, export_device,
 };
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ enum Active {
 /// Stop handle of the device, usable from any thread.
 pub enum Switch {
     /// Switches the coils off at the next tick.
-    Coils(CoilSwitch),
+    Coils(StopFlag),
     /// Sends a Land frame at once.
     Land(LandSwitch),
 }

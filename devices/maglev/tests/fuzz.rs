@@ -5,6 +5,7 @@
 #[path = "../../../tests/src/random.rs"]
 mod random;
 
+use flotor_maglev::protocol::description::{AxesPage, LimitsPage, RangesPage};
 use flotor_maglev::protocol::stream::{CODED_BYTES, Received, StreamDecoder, coded};
 use flotor_maglev::protocol::{
     Answer, AnswerFrame, Condition, Description, FRAME_BYTES, Intake, Mode, Rejection, Request, RequestFrame,
@@ -29,20 +30,26 @@ fn request(random: &mut Random) -> [u8; FRAME_BYTES] {
 }
 
 const DESCRIPTION: Description = Description {
-    sensed: 0b11_1111,
-    actuated: 0b11_1111,
-    resolution_m: 2.0e-6,
-    rate_hz: [100.0, 1.0e4],
-    latency_us: 1000,
-    serial: *b"fuzz\0\0\0\0\0\0\0\0\0\0\0\0",
-    range_m: [0.012; 3],
-    range_rad: [0.12; 3],
-    max_stiffness_n_per_m: 25.0e3,
-    force_slew_n_per_s: 55.0e3,
-    torque_slew_nm_per_s: 6.3e3,
-    max_force_n: [55.0, 55.0, 140.0],
-    max_torque_nm: [6.3, 6.3, 12.2],
-    longest_watchdog_us: 1_000_000,
+    axes: AxesPage {
+        sensed: 0b11_1111,
+        actuated: 0b11_1111,
+        resolution_m: 2.0e-6,
+        rate_hz: [100.0, 1.0e4],
+        latency_us: 1000,
+        serial: *b"fuzz\0\0\0\0\0\0\0\0\0\0\0\0",
+    },
+    ranges: RangesPage {
+        range_m: [0.012; 3],
+        range_rad: [0.12; 3],
+        max_stiffness_n_per_m: 25.0e3,
+        force_slew_n_per_s: 55.0e3,
+        torque_slew_nm_per_s: 6.3e3,
+    },
+    limits: LimitsPage {
+        max_force_n: [55.0, 55.0, 140.0],
+        max_torque_nm: [6.3, 6.3, 12.2],
+        longest_watchdog_us: 1_000_000,
+    },
 };
 
 fn answer(random: &mut Random) -> [u8; FRAME_BYTES] {
@@ -147,15 +154,15 @@ fn wounded_frames_are_frames_or_reasons() {
         "{executions} frames: {taken} taken, the rest refused; on a stream {packets} packets, {malformed} malformed"
     );
     let reasons = refused.rejections();
-    for (count, what) in [
-        (reasons.length, "length"),
-        (reasons.checksum, "checksum"),
-        (reasons.magic, "magic"),
-        (reasons.version, "version"),
-        (reasons.kind, "kind"),
-        (reasons.not_finite, "not finite"),
+    for (reason, what) in [
+        (Rejection::Length, "length"),
+        (Rejection::Checksum, "checksum"),
+        (Rejection::Magic, "magic"),
+        (Rejection::Version, "version"),
+        (Rejection::Kind, "kind"),
+        (Rejection::NotFinite, "not finite"),
     ] {
-        assert!(count > 0, "no frame was refused for its {what}");
+        assert!(reasons.of(reason) > 0, "no frame was refused for its {what}");
     }
     // Neither everything nor nothing gets through: the wounds reach behind the checksum.
     assert!(taken > executions / 8 && taken < executions, "{taken} of {executions}");

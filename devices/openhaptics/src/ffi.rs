@@ -5,8 +5,7 @@
 //! outlives the call.
 #![allow(unsafe_code)] // calls into the SDK; listed in tests/tests/system/architecture.rs
 
-use crate::scheduler::Client;
-use flotor_vendor_sdk::sdk_functions;
+use flotor_vendor_sdk::{sdk_functions, static_text};
 use std::ffi::{CStr, CString, c_char, c_double, c_int, c_uint, c_ulong, c_ushort, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -17,6 +16,15 @@ pub(crate) struct ErrorInfo {
     code: c_uint,
     internal: c_int,
     device: c_uint,
+}
+
+/// Client of the scheduler, which calls it once per tick.
+pub(crate) trait Client: Send + 'static {
+    /// Runs a tick; returns whether to be called again.
+    fn step(&mut self) -> bool;
+
+    /// Reports a panic of [`Self::step`]; returns whether to be called again.
+    fn break_off(&mut self) -> bool;
 }
 
 /// Callback of the scheduler: returns 1 to be called again, 0 to end.
@@ -30,23 +38,23 @@ sdk_functions! {
     pub(crate) struct Functions needs "OpenHaptics 3.0" {
         fn hdGetString(c_uint) -> *const c_char;
         fn hdInitDevice(*const c_char) -> c_uint;
-        fn hdDisableDevice(c_uint);
-        fn hdMakeCurrentDevice(c_uint);
-        fn hdBeginFrame(c_uint);
-        fn hdEndFrame(c_uint);
         fn hdGetDoublev(c_uint, *mut c_double);
         fn hdGetIntegerv(c_uint, *mut c_int);
         fn hdSetDoublev(c_uint, *const c_double);
-        fn hdEnable(c_uint);
-        fn hdDisable(c_uint);
         fn hdGetError() -> ErrorInfo;
         fn hdGetErrorString(c_uint) -> *const c_char;
-        fn hdCheckCalibration() -> c_uint;
-        fn hdUpdateCalibration(c_uint);
-        fn hdStartScheduler();
         fn hdStopScheduler();
         fn hdScheduleAsynchronous(Callback, *mut c_void, c_ushort) -> c_ulong;
         fn hdUnschedule(c_ulong);
+        safe fn close = hdDisableDevice(handle: c_uint);
+        safe fn make_current = hdMakeCurrentDevice(handle: c_uint);
+        safe fn begin_frame = hdBeginFrame(handle: c_uint);
+        safe fn end_frame = hdEndFrame(handle: c_uint);
+        safe fn enable = hdEnable(capability: c_uint);
+        safe fn disable = hdDisable(capability: c_uint);
+        safe fn check_calibration = hdCheckCalibration() -> c_uint;
+        safe fn update_calibration = hdUpdateCalibration(style: c_uint);
+        safe fn start_scheduler = hdStartScheduler();
     }
 }
 
@@ -55,33 +63,13 @@ impl Functions {
     /// Returns a text of the interface or of the current device.
     pub(crate) fn text(&self, parameter: c_uint) -> String {
         // SAFETY: any number is legal; the text is static, or null.
-        text(unsafe { (self.hdGetString)(parameter) })
+        unsafe { static_text((self.hdGetString)(parameter)) }
     }
 
     /// Opens the device with a name, or the default device, and makes it the current one.
     pub(crate) fn init(&self, name: Option<&CStr>) -> c_uint {
         // SAFETY: null, or a text that lives for the call.
         unsafe { (self.hdInitDevice)(name.map_or(std::ptr::null(), CStr::as_ptr)) }
-    }
-
-    pub(crate) fn close(&self, handle: c_uint) {
-        // SAFETY: any handle is legal; nobody uses the device any more.
-        unsafe { (self.hdDisableDevice)(handle) }
-    }
-
-    pub(crate) fn make_current(&self, handle: c_uint) {
-        // SAFETY: any handle is legal.
-        unsafe { (self.hdMakeCurrentDevice)(handle) }
-    }
-
-    pub(crate) fn begin_frame(&self, handle: c_uint) {
-        // SAFETY: any handle is legal.
-        unsafe { (self.hdBeginFrame)(handle) }
-    }
-
-    pub(crate) fn end_frame(&self, handle: c_uint) {
-        // SAFETY: any handle is legal.
-        unsafe { (self.hdEndFrame)(handle) }
     }
 
     /// Reads the `N` values of a parameter of the current device.
@@ -105,16 +93,6 @@ impl Functions {
         unsafe { (self.hdSetDoublev)(parameter.0, numbers.as_ptr()) }
     }
 
-    pub(crate) fn enable(&self, capability: c_uint) {
-        // SAFETY: any number is legal.
-        unsafe { (self.hdEnable)(capability) }
-    }
-
-    pub(crate) fn disable(&self, capability: c_uint) {
-        // SAFETY: any number is legal.
-        unsafe { (self.hdDisable)(capability) }
-    }
-
     /// Pops the last error of this thread; 0 if there is none.
     pub(crate) fn take_error(&self) -> c_uint {
         // SAFETY: a function without preconditions.
@@ -123,22 +101,7 @@ impl Functions {
 
     pub(crate) fn words(&self, code: c_uint) -> String {
         // SAFETY: any number is legal; the words are a static text, or null.
-        text(unsafe { (self.hdGetErrorString)(code) })
-    }
-
-    pub(crate) fn check_calibration(&self) -> c_uint {
-        // SAFETY: a function without preconditions.
-        unsafe { (self.hdCheckCalibration)() }
-    }
-
-    pub(crate) fn update_calibration(&self, style: c_uint) {
-        // SAFETY: any number is legal.
-        unsafe { (self.hdUpdateCalibration)(style) }
-    }
-
-    pub(crate) fn start_scheduler(&self) {
-        // SAFETY: a function without preconditions; whatever is scheduled lives until it is taken out.
-        unsafe { (self.hdStartScheduler)() }
+        unsafe { static_text((self.hdGetErrorString)(code)) }
     }
 
     pub(crate) fn stop_scheduler(&self) -> Stopped {
@@ -148,15 +111,15 @@ impl Functions {
     }
 
     /// Schedules a client, which is then called once per tick until it is unscheduled.
-    pub(crate) fn schedule(&self, client: Box<Client>) -> Scheduled {
+    pub(crate) fn schedule<C: Client>(&self, client: Box<C>) -> Scheduled<C> {
         let data = Box::into_raw(client);
         // SAFETY: `data` stays valid until `free`, before which the scheduler has ended.
-        let handle = unsafe { (self.hdScheduleAsynchronous)(called, data.cast(), PRIORITY) };
+        let handle = unsafe { (self.hdScheduleAsynchronous)(called::<C>, data.cast(), PRIORITY) };
         Scheduled { handle, data }
     }
 
     /// Unschedules a client. A call of the client may still be in progress.
-    pub(crate) fn unschedule(&self, scheduled: &Scheduled) {
+    pub(crate) fn unschedule<C>(&self, scheduled: &Scheduled<C>) {
         // SAFETY: any handle is legal; one that is not in is an error of the SDK.
         unsafe { (self.hdUnschedule)(scheduled.handle) };
     }
@@ -183,20 +146,18 @@ pub(crate) const MAX_TORQUE: Numbers<1> = Numbers(0x2622);
 pub(crate) struct Stopped(());
 
 /// Scheduled client.
-pub(crate) struct Scheduled {
+pub(crate) struct Scheduled<C> {
     handle: c_ulong,
-    data: *mut Client,
+    data: *mut C,
 }
 
-impl Scheduled {
+impl<C> Scheduled<C> {
     /// Returns whether the SDK accepted the client.
     pub(crate) fn is_in(&self) -> bool {
         // The interface's invalid handle, in 32 or 64 bits.
         self.handle != 0xFFFF_FFFF && self.handle != c_ulong::MAX
     }
-}
 
-impl Scheduled {
     /// Frees a client that was unscheduled before the scheduler ended.
     pub(crate) fn free(self, _stopped: &Stopped) {
         // SAFETY: the box of `schedule`, taken back once: nobody calls it any more.
@@ -204,29 +165,16 @@ impl Scheduled {
     }
 }
 
-// SAFETY: the pointer is only handed to `free`; the client it leads to may be used from any thread (see below).
-unsafe impl Send for Scheduled {}
-const _: fn() = || {
-    fn is_send<T: Send>() {}
-    is_send::<Client>();
-};
+// SAFETY: the pointer is only handed to `free`; the client behind the pointer may be used from any thread.
+unsafe impl<C: Send> Send for Scheduled<C> {}
 
 /// Runs a tick of a client; the callback of every client.
-unsafe extern "C" fn called(data: *mut c_void) -> c_uint {
+unsafe extern "C" fn called<C: Client>(data: *mut c_void) -> c_uint {
     // SAFETY: the data of `schedule`: a client that lives until it is taken out, and that only the scheduler uses.
-    let client = unsafe { &mut *data.cast::<Client>() };
+    let client = unsafe { &mut *data.cast::<C>() };
     // No panic may unwind into the SDK.
     let goes_on = catch_unwind(AssertUnwindSafe(|| client.step()));
     c_uint::from(goes_on.unwrap_or_else(|_| client.break_off()))
-}
-
-/// Copies a static text of the SDK; empty for a null pointer.
-fn text(place: *const c_char) -> String {
-    if place.is_null() {
-        return String::new();
-    }
-    // SAFETY: not null: a static text that ends in a null byte, as the SDK documents.
-    unsafe { CStr::from_ptr(place) }.to_string_lossy().into_owned()
 }
 
 /// Converts a device name to a C string; `None` if it contains a null character.

@@ -83,7 +83,7 @@ pub(crate) struct Hd {
 }
 
 /// Properties reported by a device.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Facts {
     /// Middle of the usable workspace and half its size, m, axes of the contract.
     pub(crate) centre_m: DVec3,
@@ -131,7 +131,7 @@ impl Hd {
             let what = "opening the device";
             return Err(Failed { code, words: functions.words(code), what }.refusal());
         }
-        let mut hd = Self { functions, handle, facts: Facts::NONE };
+        let mut hd = Self { functions, handle, facts: Facts::default() };
         hd.facts = hd.query()?;
         Ok(hd)
     }
@@ -274,18 +274,6 @@ impl Drop for Hd {
 pub(crate) enum Force {
     On,
     Off,
-}
-
-impl Facts {
-    const NONE: Self = Self {
-        centre_m: DVec3::ZERO,
-        range_m: DVec3::ZERO,
-        is_turned: false,
-        gives_torque: false,
-        force_n: 0.0,
-        torque_nm: 0.0,
-        stiffness_n_per_m: 0.0,
-    };
 }
 
 /// Transforms a vector from the SDK's axes (x right, y up, z towards the user) to the host's (x right, y away, z up).

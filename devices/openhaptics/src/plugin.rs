@@ -3,17 +3,15 @@
 use crate::hd::{Facts, Hd};
 use crate::scheduler::Driver;
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Choices, ConnectionDevice, Cycle, Device, DeviceInfo, DeviceState,
-    LoopConfig, PacingDevice, Parameter, Refusal, SampleWait, Settings, Tick, UsbAccess, UsbKind, Wrench,
-    choices, export_device,
+    ActiveDevice, Axes, Capabilities, ConnectionDevice, Cycle, Device, DeviceInfo, DeviceState, LoopConfig,
+    PacingDevice, Parameter, Refusal, SampleWait, Settings, Tick, UsbAccess, UsbKind, Wrench, choices,
+    export_device,
 };
+use flotor_vendor_sdk::parameters::{PACE, STAND_IN, TIMEOUT, max_force, max_torque};
 use flotor_vendor_sdk::{DropInPolicy, Exchange, LoopEnd, Pace, StopSwitch};
 use std::f64::consts::PI;
 use std::sync::Arc;
 use std::time::Duration;
-
-const NO_YES: Choices = choices!["false", "true"];
-const PACES: Choices = choices!["real", "lockstep"];
 
 /// Rate of the scheduler, Hz.
 const RATE_HZ: f64 = 1000.0;
@@ -26,31 +24,12 @@ const SCHEMA: &[Parameter] = &[
         choices![],
         "Library of OpenHaptics, libHD.so (default: searched in the library folders of the SDK and the system)",
     ),
-    Parameter::choice("stand_in", NO_YES, 0, "Accept Flotor's own drop-in library, which simulates a device"),
+    STAND_IN,
     Parameter::text("name", "Name of the device in the maker's setup program (default: its default device)"),
-    Parameter::real(
-        "max_force_n",
-        "N",
-        0.0,
-        40.0,
-        0.0,
-        "Largest force on the hand; 0: the limit of the device",
-    ),
-    Parameter::real(
-        "max_torque_nm",
-        "N·m",
-        0.0,
-        1.0,
-        0.0,
-        "Largest torque on the hand; 0: the limit of the device",
-    ),
-    Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Timeout for samples of the device"),
-    Parameter::choice(
-        "pace",
-        PACES,
-        0,
-        "real: each tick uses the newest sample; lockstep: each tick waits for its sample (virtual clock, simulated device)",
-    ),
+    max_force(40.0),
+    max_torque(1.0),
+    TIMEOUT,
+    PACE,
 ];
 
 /// Opened device of the family: identified, without force.
@@ -60,7 +39,7 @@ pub struct TouchDevice {
     /// Limits of force, N, and torque, N·m.
     most: [f64; 2],
     timeout: Duration,
-    parameters: [f64; SCHEMA.len()],
+    values: Vec<f64>,
 }
 
 /// Active device, driven by the scheduler of the SDK.
@@ -81,9 +60,7 @@ impl Device for TouchDevice {
     type Stop = StopSwitch;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let policy = [DropInPolicy::Refuse, DropInPolicy::Accept];
-        let policy =
-            policy.get(settings.choice_or_default("stand_in")).copied().unwrap_or(DropInPolicy::Refuse);
+        let policy = settings.one_of(STAND_IN.id(), [DropInPolicy::Refuse, DropInPolicy::Accept]);
         let hd = Hd::open(settings.text("library"), policy, settings.text("name"))?;
         hd.calibrate()?;
         let Facts { force_n, torque_nm, gives_torque, .. } = *hd.facts();
@@ -93,18 +70,13 @@ impl Device for TouchDevice {
         };
         let most =
             [told("max_force_n", force_n), if gives_torque { told("max_torque_nm", torque_nm) } else { 0.0 }];
-        let mut parameters = [0.0; SCHEMA.len()];
-        for (value, parameter) in parameters.iter_mut().zip(SCHEMA) {
-            *value = settings.number_or_default(parameter.id());
-        }
-        let pace = [Pace::Real, Pace::Lockstep];
-        let pace = pace.get(settings.choice_or_default("pace")).copied().unwrap_or(Pace::Real);
+        let pace = settings.one_of(PACE.id(), [Pace::Real, Pace::Lockstep]);
         Ok(Self {
             hd: Arc::new(hd),
             exchange: Arc::new(Exchange::new(pace)),
             most,
-            timeout: Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3),
-            parameters,
+            timeout: Duration::from_secs_f64(settings.number_or_default(TIMEOUT.id()) * 1.0e-3),
+            values: settings.values(),
         })
     }
 
@@ -148,7 +120,7 @@ impl Device for TouchDevice {
     }
 
     fn parameter(&self, index: usize) -> f64 {
-        self.parameters.get(index).copied().unwrap_or(f64::NAN)
+        self.values.get(index).copied().unwrap_or(f64::NAN)
     }
 }
 

@@ -3,7 +3,7 @@
 //! The current device of the SDK is a state of the process, and a frame sets it. Force is therefore switched within a frame, on
 //! the thread of the scheduler: no other device can intervene.
 
-use crate::ffi::{Scheduled, Stopped};
+use crate::ffi::{Client, Scheduled, Stopped};
 use crate::hd::{Failed, Force, Hd};
 use flotor_hal::{Fault, Wrench};
 use flotor_vendor_sdk::{CommandCursor, Exchange, without_signals};
@@ -15,7 +15,7 @@ static CLIENTS: Mutex<Clients> = Mutex::new(Clients { running: 0, retired: Vec::
 struct Clients {
     running: usize,
     /// Clients unscheduled while the scheduler ran on for others; freed when it ends.
-    retired: Vec<Scheduled>,
+    retired: Vec<Scheduled<DeviceClient>>,
 }
 
 fn clients() -> MutexGuard<'static, Clients> {
@@ -23,16 +23,16 @@ fn clients() -> MutexGuard<'static, Clients> {
 }
 
 /// Callback data of one device.
-pub(crate) struct Client {
+struct DeviceClient {
     hd: Arc<Hd>,
     exchange: Arc<Exchange>,
     cursor: CommandCursor,
     force: Force,
 }
 
-impl Client {
-    /// Runs a tick: a frame with a sample and a wrench. Returns whether to be called again.
-    pub(crate) fn step(&mut self) -> bool {
+impl Client for DeviceClient {
+    /// Runs a frame with a sample and a wrench.
+    fn step(&mut self) -> bool {
         match self.frame() {
             Ok(()) if self.exchange.is_over() => self.give_up(),
             Ok(()) => true,
@@ -43,6 +43,13 @@ impl Client {
         }
     }
 
+    fn break_off(&mut self) -> bool {
+        self.exchange.fail(Fault::Broken);
+        self.give_up()
+    }
+}
+
+impl DeviceClient {
     fn frame(&mut self) -> Result<(), Fault> {
         let sample = self.hd.begin()?;
         if self.force == Force::Off {
@@ -57,7 +64,7 @@ impl Client {
     }
 
     /// Disables the force; returns false to end the calls.
-    pub(crate) fn give_up(&mut self) -> bool {
+    fn give_up(&mut self) -> bool {
         // Errors of the SDK no longer matter here; an open frame is ended.
         let _ = self.hd.finish(&Wrench::ZERO);
         let _ = self.hd.begin();
@@ -66,19 +73,13 @@ impl Client {
         self.exchange.note_silence();
         false
     }
-
-    /// Reports a panic as a fault, and disables the force; returns false to end the calls.
-    pub(crate) fn break_off(&mut self) -> bool {
-        self.exchange.fail(Fault::Broken);
-        self.give_up()
-    }
 }
 
 /// Running registration of a device with the scheduler, until dropped.
 pub(crate) struct Driver {
     hd: Arc<Hd>,
     exchange: Arc<Exchange>,
-    scheduled: Option<Scheduled>,
+    scheduled: Option<Scheduled<DeviceClient>>,
 }
 
 impl Driver {
@@ -87,7 +88,7 @@ impl Driver {
         let (hd, exchange) = (Arc::clone(hd), Arc::clone(exchange));
         let cursor = exchange.begin();
         let client =
-            Client { hd: Arc::clone(&hd), exchange: Arc::clone(&exchange), cursor, force: Force::Off };
+            DeviceClient { hd: Arc::clone(&hd), exchange: Arc::clone(&exchange), cursor, force: Force::Off };
         let mut clients = clients();
         let scheduled = hd.functions().schedule(Box::new(client));
         if !scheduled.is_in() {

@@ -24,7 +24,7 @@ pub mod thermal;
 
 use crate::lag::Lag;
 use crate::plant::Wrench;
-use crate::validation::{Check, Domain, InvalidParameter, number};
+use crate::validation::{Domain, InvalidParameter, number};
 use coils::{COILS, CoilGeometry, Coils, Currents};
 use field::FieldError;
 use flotor_hal::Fault;
@@ -52,12 +52,6 @@ impl ActuationParameters {
         field: FieldError::THESIS,
         thermal: ThermalParameters::MAGLEV,
     };
-
-    fn check(&self) -> Check {
-        number("amplifier_bandwidth_hz", self.amplifier_bandwidth_hz, Domain::Positive)?;
-        self.field.check()?;
-        self.thermal.check()
-    }
 }
 
 /// State of the wiring: whether every coil conducts.
@@ -78,7 +72,6 @@ pub struct Actuation {
     thermal: Thermal,
     currents_a: Currents,
     is_saturated: bool,
-    saturated_ticks: u64,
 }
 
 impl Actuation {
@@ -87,7 +80,9 @@ impl Actuation {
     /// # Errors
     /// If a number is not physical, or the coils cannot push in all six directions.
     pub fn new(parameters: &ActuationParameters) -> Result<Self, InvalidParameter> {
-        parameters.check()?;
+        number("amplifier_bandwidth_hz", parameters.amplifier_bandwidth_hz, Domain::Positive)?;
+        parameters.field.check()?;
+        parameters.thermal.check()?;
         Ok(Self {
             coils: Coils::new(&parameters.geometry)?,
             lag: Lag::of_bandwidth(parameters.amplifier_bandwidth_hz),
@@ -95,7 +90,6 @@ impl Actuation {
             thermal: Thermal::new(parameters.thermal),
             currents_a: [0.0; COILS],
             is_saturated: false,
-            saturated_ticks: 0,
         })
     }
 
@@ -106,7 +100,6 @@ impl Actuation {
     pub fn drive(&mut self, commanded: &Wrench, wiring: Wiring, z_m: f64, dt_s: f64) -> Wrench {
         let (mut asked_a, share) = self.coils.currents(commanded);
         self.is_saturated = share < 1.0;
-        self.saturated_ticks += u64::from(self.is_saturated);
         if let Wiring::Open(coil) = wiring
             && let Some(current) = asked_a.get_mut(coil)
         {
@@ -147,12 +140,6 @@ impl Actuation {
     #[must_use]
     pub fn is_saturated(&self) -> bool {
         self.is_saturated
-    }
-
-    /// Returns the number of ticks with a wrench scaled down to the current limit. Real-time: bounded, no allocation.
-    #[must_use]
-    pub fn saturated_ticks(&self) -> u64 {
-        self.saturated_ticks
     }
 }
 

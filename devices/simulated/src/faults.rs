@@ -5,7 +5,7 @@
 //! equal runs have equal faults.
 
 use crate::noise::{Noise, Stream};
-use crate::validation::{Check, Domain, InvalidParameter, number};
+use crate::validation::{Domain, InvalidParameter, number};
 use flotor_hal::math;
 
 /// Kind of a fault.
@@ -44,12 +44,6 @@ pub struct FaultPlan {
     pub rate_per_s: f64,
 }
 
-impl FaultPlan {
-    fn check(&self) -> Check {
-        number("fault_rate_per_s", self.rate_per_s, Domain::NotNegative)
-    }
-}
-
 /// Schedule of the faults in a run.
 #[derive(Clone, Debug)]
 pub struct Faults {
@@ -65,7 +59,7 @@ impl Faults {
     /// # Errors
     /// If the plan contains a number that is not physical.
     pub fn new(plan: Option<FaultPlan>, seed: u64) -> Result<Self, InvalidParameter> {
-        plan.map_or(Ok(()), |plan| plan.check())?;
+        number("fault_rate_per_s", plan.map_or(0.0, |plan| plan.rate_per_s), Domain::NotNegative)?;
         Ok(Self { plan, noise: Noise::new(seed, Stream::Faults), until_ns: 0 })
     }
 

@@ -16,6 +16,7 @@
 //! - [`Unsteadiness`]: tremor, and noise of the intended force.
 //! - [`guidance`]: motion of the hand by a client of the run, in place of the trajectory.
 
+mod aim;
 pub mod guidance;
 mod impedance;
 mod recording;
@@ -23,11 +24,12 @@ mod script;
 mod trajectory;
 mod unsteadiness;
 
+pub use aim::{Aim, Intention, Pose, minimum_jerk};
 pub(crate) use guidance::{Follower, Guidance};
 pub use impedance::{Grip, Impedance};
 pub use recording::{Recording, RecordingError};
 pub use script::{Script, ScriptError};
-pub use trajectory::{Aim, Intention, Pose, Trajectory, minimum_jerk};
+pub use trajectory::Trajectory;
 pub use unsteadiness::Unsteadiness;
 
 use crate::validation::InvalidParameter;

@@ -27,6 +27,7 @@ mod plugin;
 mod sample_clock;
 pub mod sensing;
 pub mod simulation;
+mod units;
 pub mod validation;
 pub mod workspace;
 

@@ -11,13 +11,10 @@ pub(crate) use schema::SCHEMA;
 use crate::hand::{Grip, Hand, Impedance, Pose, Recording, Script, Trajectory, Unsteadiness};
 use crate::plant::{FeedForward, FlotorParameters, State};
 use crate::simulation::Setup;
+use crate::units::{MM, PERCENT, UM, nanoseconds};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{Refusal, Settings};
 use std::path::Path;
-
-const MM: f64 = 1.0e-3;
-const UM: f64 = 1.0e-6;
-const PERCENT: f64 = 1.0e-2;
 
 /// Prefix of the documentation of parameters used only by preset `full`.
 const OF_FULL: &str = "Full:";
@@ -58,10 +55,7 @@ pub(crate) fn setup(settings: &Settings<'_>) -> Result<Setup, Refusal> {
 }
 
 fn flotor(settings: &Settings<'_>) -> FlotorParameters {
-    let base = match settings.choice_or_default("flotor") {
-        1 => FlotorParameters::UTAH,
-        _ => FlotorParameters::THESIS,
-    };
+    let base = settings.one_of("flotor", [FlotorParameters::THESIS, FlotorParameters::UTAH]);
     let mut flotor = FlotorParameters {
         mass_kg: settings.number("mass_kg").unwrap_or(base.mass_kg),
         inertia_kg_m2: three(
@@ -91,9 +85,8 @@ fn impedance(settings: &Settings<'_>, trajectory: &Trajectory) -> Impedance {
         Trajectory::Scripted(script) => script.grip(),
         _ => None,
     };
-    let of_settings = settings
-        .number("hand_grip")
-        .map(|_| if settings.choice_or_default("hand_grip") == 1 { Grip::Relaxed } else { Grip::Firm });
+    let of_settings =
+        settings.number("hand_grip").map(|_| settings.one_of("hand_grip", [Grip::Firm, Grip::Relaxed]));
     let grip = of_settings.or(of_script).unwrap_or(Grip::Firm).impedance();
     let splat = |id, value: DVec3| settings.number(id).map_or(value, DVec3::splat);
     Impedance {
@@ -140,11 +133,6 @@ fn simple_trajectory(settings: &Settings<'_>) -> Trajectory {
 fn three(settings: &Settings<'_>, ids: [&str; 3], base: DVec3, scale: f64) -> DVec3 {
     let [x, y, z] = ids.map(|id| settings.number(id).map(|value| value * scale));
     DVec3::new(x.unwrap_or(base.x), y.unwrap_or(base.y), z.unwrap_or(base.z))
-}
-
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the schema keeps it between 0 and an hour
-fn nanoseconds(seconds: f64) -> u64 {
-    (seconds * 1.0e9).round() as u64
 }
 
 /// Returns the effective value of the parameter at `index` of the schema, in the units of the schema.

@@ -14,10 +14,8 @@ use flotor_hal::{
     ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, Damper, Device, DeviceInfo,
     DeviceState, EnergyLedger, EnergyLedgerDevice, Fault, IndependentStop, IndependentStopDevice, LoopConfig,
     PacingDevice, Parameter, Pose, Refusal, SafeStop, SampleWait, SampledLoop, SetParameterError, Settings,
-    StoppedState, Tick, Twist, VerticalCalibration, export_device,
+    StopFlag, StoppedState, Tick, Twist, VerticalCalibration, export_device,
 };
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// The opened simulated flotor: parameters are checked, nothing moves.
@@ -29,7 +27,7 @@ pub struct SimulatedFlotor {
     values: Vec<f64>,
     /// Correction of the vertical force; no correction until measured.
     calibration: VerticalCalibration,
-    stopped: Arc<AtomicBool>,
+    stop: StopFlag,
 }
 
 /// The running simulated flotor.
@@ -45,15 +43,6 @@ pub struct RunningFlotor {
     is_limited: bool,
     /// Height of the latest sample, m, for the correction of the vertical force.
     height_m: f64,
-}
-
-/// Stop handle that cuts the coils from any thread.
-pub struct CoilSwitch(Arc<AtomicBool>);
-
-impl SafeStop for CoilSwitch {
-    fn safe_stop(&self) {
-        self.0.store(true, Ordering::Release);
-    }
 }
 
 /// Fastest change of force, N/s: full scale in a millisecond. An estimate; no figure is published.
@@ -73,17 +62,16 @@ impl Device for SimulatedFlotor {
             .simulated();
     const PARAMETERS: &'static [Parameter] = SCHEMA;
     type Active = RunningFlotor;
-    type Stop = CoilSwitch;
+    type Stop = StopFlag;
 
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal> {
         refuse_idle(settings)?;
-        let values = SCHEMA.iter().map(|parameter| settings.number_or_default(parameter.id())).collect();
         let opened = Self {
             setup: setup(settings)?,
             machine: machine(settings),
-            values,
+            values: settings.values(),
             calibration: VerticalCalibration::NONE,
-            stopped: Arc::new(AtomicBool::new(false)),
+            stop: StopFlag::default(),
         };
         // Conditions that depend on the tick length are checked again at activation.
         opened.start(opened.setup.tick_ns, 0).map_err(Refusal::parameter)?;
@@ -120,14 +108,14 @@ impl Device for SimulatedFlotor {
         }
     }
 
-    fn stopper(&self) -> CoilSwitch {
-        CoilSwitch(Arc::clone(&self.stopped))
+    fn stopper(&self) -> StopFlag {
+        self.stop.clone()
     }
 
     fn activate(self, config: &LoopConfig) -> Result<RunningFlotor, (Self, Refusal)> {
         match self.start(config.period_ns, config.seed) {
             Ok((simulation, machine)) => {
-                self.stopped.store(false, Ordering::Release);
+                self.stop.arm();
                 let samples = SampleClock::new(config.period_ns);
                 Ok(RunningFlotor {
                     simulation,
@@ -191,7 +179,7 @@ impl ActiveDevice for RunningFlotor {
 
     /// Moves the flotor under the wrench of the last write and takes a sample.
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
-        let coils = if self.is_stopped() { &Wrench::ZERO } else { &self.held };
+        let coils = if self.opened.stop.is_set() { &Wrench::ZERO } else { &self.held };
         if let Some(machine) = &mut self.machine {
             let cycle = machine.cycle(&mut self.simulation, tick, coils, state);
             self.height_m = state.pose.position().z;
@@ -261,12 +249,6 @@ impl EnergyLedgerDevice for RunningFlotor {
             dissipated_j: work.dissipated_j,
             peak_j: ledger.peak_j(),
         }
-    }
-}
-
-impl RunningFlotor {
-    fn is_stopped(&self) -> bool {
-        self.opened.stopped.load(Ordering::Acquire)
     }
 }
 

@@ -9,6 +9,7 @@ use crate::hand::guidance::NotGuiding;
 use crate::hand::{Aim, Follower, Guidance, Hand, Intention, Pose, Trajectory, Wavering};
 use crate::ledger::Ledger;
 use crate::plant::{FlotorParameters, MAX_PIECE_NS, Outcome, Plant, State, Wrench};
+use crate::units::seconds;
 use crate::validation::InvalidParameter;
 use crate::workspace::SensorRange;
 use flotor_hal::glam::DVec3;
@@ -298,7 +299,7 @@ impl Stroke {
             || Follower::of(state),
             |meant| {
                 let pose = Pose { position_m: meant.position_m, orientation: meant.orientation };
-                Follower::moving(pose, meant.velocity_m_per_s)
+                Follower { pose, velocity_m_per_s: meant.velocity_m_per_s }
             },
         )
     }
@@ -338,11 +339,6 @@ impl Stroke {
 fn wavered(aim: &Aim, wavering: &Wavering, time_s: f64) -> Aim {
     let pose = Pose { position_m: aim.pose.position_m + wavering.offset_m(time_s), ..aim.pose };
     Aim { pose, force_n: wavering.force_n(aim.force_n, time_s), ..*aim }
-}
-
-#[inline]
-fn seconds(time_ns: u64) -> f64 {
-    time_ns as f64 * 1.0e-9
 }
 
 #[cfg(test)]

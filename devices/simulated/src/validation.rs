@@ -59,37 +59,27 @@ impl fmt::Display for InvalidParameter {
             Self::NotFinite { name } => write!(f, "{name} is not a finite number"),
             Self::NotPositive { name, value } => write!(f, "{name} is {value}, but must be above zero"),
             Self::Negative { name, value } => write!(f, "{name} is {value}, but must not be negative"),
-            Self::ImpossibleInertia { principal_kg_m2: i } => {
-                write!(f, "no body has the moments of inertia {}, {}, {} kg m^2: ", i.x, i.y, i.z)?;
-                write!(f, "each may be at most the sum of the other two")
-            }
+            Self::ImpossibleInertia { principal_kg_m2: i } => write!(
+                f,
+                "no body has the moments of inertia {}, {}, {} kg m^2: each may be at most the sum of the other two",
+                i.x, i.y, i.z
+            ),
             Self::NotARotation { name, length } => {
                 write!(f, "{name} has length {length}, but a rotation is a quaternion of length 1")
             }
-            Self::DependentCoils => {
-                write!(
-                    f,
-                    "the six coils cannot push and turn in all directions: their wrenches depend on each "
-                )?;
-                write!(
-                    f,
-                    "other; set coil_ring_a_deg and coil_ring_b_deg apart from each other and off the pole"
-                )
-            }
-            Self::DiodesInALine => {
-                write!(
-                    f,
-                    "the three LEDs stand in a line, so the cells cannot see all six coordinates; set "
-                )?;
-                write!(f, "led_2_deg and led_3_deg apart from each other and from 0")
-            }
-            Self::TooStiff { steps_per_ms, limit } => {
-                write!(
-                    f,
-                    "flotor and hand would need {steps_per_ms:.0} steps a millisecond, at most {limit:.0} "
-                )?;
-                write!(f, "are taken: lower stiffness or damping, or raise mass and inertia")
-            }
+            Self::DependentCoils => f.write_str(
+                "the six coils cannot push and turn in all directions: their wrenches depend on each other; set \
+                 coil_ring_a_deg and coil_ring_b_deg apart from each other and off the pole",
+            ),
+            Self::DiodesInALine => f.write_str(
+                "the three LEDs stand in a line, so the cells cannot see all six coordinates; set led_2_deg and \
+                 led_3_deg apart from each other and from 0",
+            ),
+            Self::TooStiff { steps_per_ms, limit } => write!(
+                f,
+                "flotor and hand would need {steps_per_ms:.0} steps a millisecond, at most {limit:.0} are taken: lower \
+                 stiffness or damping, or raise mass and inertia"
+            ),
         }
     }
 }

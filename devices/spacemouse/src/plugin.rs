@@ -43,11 +43,7 @@ struct Values([f64; SCHEMA.len()]);
 
 impl Values {
     fn new(settings: &Settings<'_>) -> Self {
-        let mut values = [0.0; SCHEMA.len()];
-        for (value, parameter) in values.iter_mut().zip(SCHEMA) {
-            *value = settings.number_or_default(parameter.id());
-        }
-        Self(values)
+        Self(settings.values().try_into().unwrap_or([0.0; SCHEMA.len()]))
     }
 
     fn gains(&self) -> Gains {

@@ -3,7 +3,6 @@
 use std::io::{self, ErrorKind};
 use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixStream;
-use std::path::Path;
 
 const FOLDER: &str = "/sys/devices/platform/vhci_hcd.0";
 /// USB speed of a device, as the kernel numbers it.
@@ -19,12 +18,6 @@ pub enum Speed {
 const FREE: &str = "004";
 /// Bus number of the device's far end; an arbitrary value.
 const FAR_BUS: u32 = 1 << 16;
-
-/// Returns true if the module `vhci_hcd` is loaded.
-#[must_use]
-pub fn is_available() -> bool {
-    Path::new(FOLDER).join("attach").exists()
-}
 
 /// Attaches the USB/IP device at the other end of the stream to a free port, at this speed.
 ///

@@ -10,18 +10,20 @@
 //! - [`Library`]: finds, checks and opens the file, looks up functions; [`LibraryProblem`] names the failed step and remedy.
 //! - [`Exchange`]: newest sample one way, newest wrench the other, and removal of the force if either side fails.
 //! - [`LoopEnd`]: the loop's side of an exchange, for the contract.
+//! - [`parameters`]: parameters that the plugins have in common.
 //! - [`without_signals`]: keeps signals of the host away from the threads of a library.
 
 mod exchange;
 mod latest;
 mod library;
 mod loop_end;
+pub mod parameters;
 mod platform;
 mod problem;
 mod search;
 
 pub use exchange::{CommandCursor, Exchange, Pace, Sample, VALID};
-pub use library::{DropInPolicy, Library};
+pub use library::{DropInPolicy, Library, static_text};
 pub use loop_end::{LoopEnd, StopSwitch};
 pub use platform::without_signals;
 pub use problem::LibraryProblem;

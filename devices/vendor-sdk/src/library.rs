@@ -4,6 +4,7 @@
 use crate::platform::{self, Loaded};
 use crate::problem::LibraryProblem;
 use crate::search::{Sdk, looked_at};
+use std::ffi::{CStr, c_char};
 use std::mem::ManuallyDrop;
 use std::path::{Path, PathBuf};
 
@@ -86,7 +87,21 @@ impl Library {
     }
 }
 
-/// Declares functions of an SDK: a struct with a pointer for each, and `load`, which looks all of them up. Functions marked
+/// Copies a static text of an SDK; empty for a null pointer.
+///
+/// # Safety
+/// `text` is null, or a text that ends in a null byte and stays for ever.
+#[must_use]
+pub unsafe fn static_text(text: *const c_char) -> String {
+    if text.is_null() {
+        return String::new();
+    }
+    // SAFETY: not null; the rest by the contract of this function.
+    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
+}
+
+/// Declares functions of an SDK: a struct with a pointer for each, and `load`, which looks all of them up. A function marked
+/// `safe` has no precondition and takes any numbers: it gets a safe method, by the name before the equals sign. Functions marked
 /// `optional` may be missing. For use in an FFI module with the declarations that the SDK documents: the caller of
 /// a function guarantees its arguments.
 #[macro_export]
@@ -94,6 +109,7 @@ macro_rules! sdk_functions {
     (
         $(#[$meta:meta])* $visibility:vis struct $table:ident needs $needed:literal {
             $(fn $name:ident($($argument:ty),* $(,)?) $(-> $result:ty)?;)+
+            $(safe fn $method:ident = $plain:ident($($place:ident: $number:ty),* $(,)?) $(-> $code:ty)?;)*
             $(optional fn $perhaps:ident($($given:ty),* $(,)?) $(-> $answer:ty)?;)*
         }
     ) => {
@@ -102,6 +118,7 @@ macro_rules! sdk_functions {
         #[derive(Clone, Copy, Debug)]
         $visibility struct $table {
             $($visibility $name: unsafe extern "C" fn($($argument),*) $(-> $result)?,)+
+            $($visibility $plain: unsafe extern "C" fn($($number),*) $(-> $code)?,)*
             $($visibility $perhaps: Option<unsafe extern "C" fn($($given),*) $(-> $answer)?>,)*
         }
 
@@ -118,9 +135,17 @@ macro_rules! sdk_functions {
                     $($name: unsafe { library.optional(concat!(stringify!($name), "\0").as_bytes()) }
                         .ok_or_else(|| missing(stringify!($name)))?,)+
                     // SAFETY: as above.
+                    $($plain: unsafe { library.optional(concat!(stringify!($plain), "\0").as_bytes()) }
+                        .ok_or_else(|| missing(stringify!($plain)))?,)*
+                    // SAFETY: as above.
                     $($perhaps: unsafe { library.optional(concat!(stringify!($perhaps), "\0").as_bytes()) },)*
                 })
             }
+
+            $($visibility fn $method(&self, $($place: $number),*) $(-> $code)? {
+                // SAFETY: by its mark `safe` the function takes any numbers.
+                unsafe { (self.$plain)($($place),*) }
+            })*
         }
     };
 }

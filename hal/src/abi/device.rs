@@ -1,15 +1,14 @@
 //! `flotor.device/1`: function table of a device, and its implementation for a [`Device`], whose phases are types.
 
-use super::entry::{CallStatus, Entry, Instance, PluginKind};
+use super::Message;
+use super::entry::{CallStatus, Instance};
 use super::instance::{self, PluginAdapter, call, fill, from_any_thread, refusable};
-use super::interface::{Extensions, find, table};
+use super::interface::table;
 use super::layout::layout;
-use super::{Message, Str};
 use crate::{
     ActiveDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, Fault, LoopConfig, Parameter,
     ParameterValue, Refusal, SafeStop, Settings, Tick, Wrench,
 };
-use std::ffi::c_void;
 use std::marker::PhantomData;
 
 /// Result of `read` and `write` at the boundary, 4 bytes. A separate type, so that no other code of the contract can be
@@ -268,28 +267,3 @@ table!(DeviceTable: "flotor.device/1", D: [Device] {
     parameter: Some(parameter::<D>),
     last_message: Some(instance::last_message::<DeviceAdapter<D>>),
 });
-
-unsafe extern "C" fn get_interface<D: Device, E: Extensions<D>>(id: Str) -> *const c_void {
-    find::<D, E>(&offer::<D>(), id)
-}
-
-/// Returns the entry of a device plugin without extensions.
-#[must_use]
-pub const fn device_entry<D: Device>() -> Entry {
-    device_entry_with::<D, ()>()
-}
-
-/// Returns the entry of a device plugin with extensions; used by [`crate::export_device!`].
-#[must_use]
-pub const fn device_entry_with<D: Device, E: Extensions<D>>() -> Entry {
-    Entry::of(PluginKind::Device, get_interface::<D, E>)
-}
-
-/// Exports a [`crate::Device`] as a plugin: `export_device!(SpaceMouse);`. The extensions that the type implements follow by
-/// their names in [`crate::extension`]: `export_device!(SimulatedFlotor, calibration, pacing);`. One per crate.
-#[macro_export]
-macro_rules! export_device {
-    ($device:ty $(, $extension:ident)* $(,)?) => {
-        $crate::export_plugin!($device, Device, Device, device_entry_with $(, $extension)*);
-    };
-}

@@ -1,6 +1,6 @@
 //! Entry of a plugin, the one exported symbol: kind, contract version, layouts and interface lookup.
 
-use super::layout::{LAYOUTS, layout};
+use super::layout::layout;
 use super::{FieldLayout, Str};
 use std::ffi::c_void;
 
@@ -153,30 +153,3 @@ pub struct Entry {
 
 // SAFETY: an `Entry` is an immutable static; its pointers lead to immutable statics.
 unsafe impl Sync for Entry {}
-
-impl Entry {
-    /// Returns the entry of a Rust plugin built with this crate.
-    #[allow(clippy::cast_possible_truncation)] // a hundred bytes, some hundred rows
-    pub(super) const fn of(
-        kind: PluginKind,
-        get_interface: unsafe extern "C" fn(id: Str) -> *const c_void,
-    ) -> Self {
-        Self {
-            magic: MAGIC,
-            size: size_of::<Entry>() as u32,
-            abi_major: ABI_MAJOR,
-            abi_minor: ABI_MINOR,
-            kind: kind as u32,
-            abi_candidate: ABI_CANDIDATE,
-            layouts: LAYOUTS.as_ptr(),
-            layout_count: LAYOUTS.len() as u32,
-            reserved: 0,
-            init: Some(super::panics::init),
-            get_interface: Some(get_interface),
-            #[cfg(feature = "layout-proof")]
-            layout_proof: &raw const super::layout::proof::PROOF,
-            #[cfg(not(feature = "layout-proof"))]
-            layout_proof: std::ptr::null(),
-        }
-    }
-}

@@ -18,9 +18,11 @@
 
 mod device;
 mod entry;
+mod export;
 pub(crate) mod instance;
 pub(crate) mod interface;
 pub(crate) mod layout;
+mod layout_table;
 pub mod metadata;
 mod model;
 mod panics;
@@ -29,16 +31,18 @@ mod text;
 #[cfg(feature = "loader")]
 pub mod loader;
 
-pub use device::{CycleCode, DeviceTable, device_entry, device_entry_with};
+pub use device::{CycleCode, DeviceTable};
 pub(crate) use device::{DeviceAdapter, not_opened};
 pub use entry::{
     ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, CallStatus, Entry, HOST_QUIET_PANICS, Host, Instance,
     LayoutProof, MAGIC, PluginKind,
 };
+pub use export::{device_entry, device_entry_with, model_entry, model_entry_with};
 pub use interface::{Extensions, Interface};
-pub use layout::{FieldLayout, LAYOUTS};
+pub use layout::FieldLayout;
+pub use layout_table::LAYOUTS;
+pub use model::ForceTable;
 pub(crate) use model::ModelAdapter;
-pub use model::{ForceTable, model_entry, model_entry_with};
 pub use text::{Choices, MESSAGE_BYTES, Message, Str};
 
 /// The contract for C: the text of `include/flotor.h`.

@@ -1,12 +1,11 @@
 //! `flotor.force/1`: function table of a force model, and its implementation for a [`ForceModel`].
 
-use super::entry::{CallStatus, Entry, Instance, PluginKind};
+use super::Message;
+use super::entry::{CallStatus, Instance};
 use super::instance::{self, PluginAdapter, call, refusable};
-use super::interface::{Extensions, find, table};
+use super::interface::table;
 use super::layout::layout;
-use super::{Message, Str};
 use crate::{ForceModel, Input, LoopConfig, ModelInfo, Output, Parameter, ParameterValue, Refusal, Settings};
-use std::ffi::c_void;
 use std::marker::PhantomData;
 
 /// Function table `flotor.force/1`. Statuses are [`super::CallStatus`] codes; `create` and `prepare` return 0, or a
@@ -161,34 +160,3 @@ table!(ForceTable: "flotor.force/1", M: [ForceModel] {
     reset: Some(reset::<M>),
     last_message: Some(instance::last_message::<ModelAdapter<M>>),
 });
-
-unsafe extern "C" fn get_interface<M: ForceModel, E: Extensions<M>>(id: Str) -> *const c_void {
-    find::<M, E>(&offer::<M>(), id)
-}
-
-/// Returns the entry of a model plugin without extensions. In Rust, only this function, [`super::device_entry`] and
-/// their `_with` forms construct an entry, so that every entry of a safe program fulfils the contract:
-///
-/// ```compile_fail,E0451
-/// use flotor_hal::abi::{Entry, MAGIC};
-/// let forged = Entry { magic: MAGIC, kind: 1, ..unreachable!() };
-/// ```
-#[must_use]
-pub const fn model_entry<M: ForceModel>() -> Entry {
-    model_entry_with::<M, ()>()
-}
-
-/// Returns the entry of a model plugin with extensions; used by [`crate::export_model!`].
-#[must_use]
-pub const fn model_entry_with<M: ForceModel, E: Extensions<M>>() -> Entry {
-    Entry::of(PluginKind::Model, get_interface::<M, E>)
-}
-
-/// Exports a [`crate::ForceModel`] as a plugin: `export_model!(Spring);`. The extensions that the type implements follow by their
-/// names in [`crate::extension`]: `export_model!(Spring, centerline, variant, details);`. One per crate.
-#[macro_export]
-macro_rules! export_model {
-    ($model:ty $(, $extension:ident)* $(,)?) => {
-        $crate::export_plugin!($model, ForceModel, Model, model_entry_with $(, $extension)*);
-    };
-}

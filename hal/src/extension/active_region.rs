@@ -152,7 +152,7 @@ impl Model {
     #[must_use]
     pub fn active_region(&mut self) -> ActiveRegion {
         let ask = self.extensions.active_region.and_then(|table| table.region);
-        self.asked(ask, ActiveRegion::EVERYWHERE).unwrap_or(ActiveRegion::EVERYWHERE)
+        self.calls.query(ask, ActiveRegion::EVERYWHERE).unwrap_or(ActiveRegion::EVERYWHERE)
     }
 }
 

@@ -8,7 +8,7 @@ use crate::abi::instance::{fill, refusable};
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
-use crate::abi::loader::{OpenedDevice, refusal_from};
+use crate::abi::loader::OpenedDevice;
 use crate::abi::{DeviceAdapter, Instance, Message, not_opened};
 use crate::{Device, Refusal};
 
@@ -249,7 +249,7 @@ impl OpenedDevice {
     #[must_use]
     pub fn serial(&mut self) -> String {
         let ask = self.extensions().calibration.and_then(|table| table.serial);
-        self.asked(ask, Message::default()).map_or(String::new(), |serial| serial.as_str().to_owned())
+        self.calls.query(ask, Message::default()).map_or(String::new(), |serial| serial.as_str().to_owned())
     }
 
     /// Corrects the total vertical command from the next activation on.
@@ -264,9 +264,8 @@ impl OpenedDevice {
             `calibration` from the scene",
             ));
         };
-        let mut message = Message::default();
         // SAFETY: a live instance, used by this thread only (`&mut`), pointers valid for the call.
-        refusal_from(unsafe { calibrate(self.instance(), calibration, &raw mut message) }, &message)
+        self.calls.refusable(|instance, message| unsafe { calibrate(instance, calibration, message) })
     }
 }
 

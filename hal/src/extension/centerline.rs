@@ -167,7 +167,7 @@ impl Centerline<'_> {
     /// Returns the drawing style of the body; `None` if the model failed.
     #[must_use]
     pub fn info(&mut self) -> Option<CenterlineInfo> {
-        self.model.asked(self.table.info, CenterlineInfo::default())
+        self.model.calls.query(self.table.info, CenterlineInfo::default())
     }
 
     /// Returns the centreline at an input, in at most `capacity` points; `None` if the model failed.
@@ -176,7 +176,10 @@ impl Centerline<'_> {
         let (ask, room) = (self.table.centerline?, u32::try_from(capacity).ok()?);
         let (mut points, mut count) = (vec![Pose::HOME; capacity], 0);
         // SAFETY: a live instance used by this thread only, room for `capacity` poses, pointers valid for the call.
-        let code = unsafe { ask(self.model.instance, input, points.as_mut_ptr(), room, &raw mut count) };
+        let code = self
+            .model
+            .calls
+            .call(|instance| unsafe { ask(instance, input, points.as_mut_ptr(), room, &raw mut count) });
         points.truncate(count as usize);
         (code == CallStatus::Ok as u32).then_some(points)
     }

@@ -5,7 +5,7 @@ use crate::Device;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
-use crate::abi::loader::Plugin;
+use crate::abi::loader::{Plugin, static_list};
 
 /// Access path to a USB device, as a closed set. In C, a number of this value.
 #[repr(u32)]
@@ -136,12 +136,8 @@ impl Plugin {
     /// Returns the USB identities of a device; empty without a declaration and for a model.
     #[must_use]
     pub fn usb_kinds(&self) -> &'static [UsbKind] {
-        match self.device_extensions().and_then(|extensions| extensions.connection) {
-            Some(table) if !table.usb.is_null() && table.usb_count > 0 => {
-                // SAFETY: a table's list is a static array of `usb_count` kinds of the checked layout.
-                unsafe { std::slice::from_raw_parts(table.usb, table.usb_count as usize) }
-            }
-            _ => &[],
-        }
+        let table = self.device_extensions().and_then(|extensions| extensions.connection);
+        // SAFETY: a table's list is a static array of `usb_count` kinds of the checked layout.
+        table.map_or(&[], |table| unsafe { static_list(table.usb, table.usb_count) })
     }
 }

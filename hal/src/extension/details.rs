@@ -8,7 +8,7 @@ use crate::abi::instance::call;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
-use crate::abi::loader::Model;
+use crate::abi::loader::{Model, static_list};
 use crate::abi::{CallStatus, Choices, Instance, ModelAdapter, Str};
 use crate::{ForceModel, choices};
 
@@ -150,13 +150,9 @@ impl Model {
     /// Returns the diagnostic numbers of the model; empty for a model without details.
     #[must_use]
     pub fn details(&self) -> &'static [Detail] {
-        match self.extensions.details {
-            Some(table) if !table.details.is_null() && table.detail_count > 0 => {
-                // SAFETY: a table's list is a static array of `detail_count` details of the checked layout.
-                unsafe { std::slice::from_raw_parts(table.details, table.detail_count as usize) }
-            }
-            _ => &[],
-        }
+        let table = self.extensions.details;
+        // SAFETY: a table's list is a static array of `detail_count` details of the checked layout.
+        table.map_or(&[], |table| unsafe { static_list(table.details, table.detail_count) })
     }
 
     /// Writes the values of the last step, one for each of [`Self::details`]; NaN for a missing value. Real-time:
@@ -167,6 +163,8 @@ impl Model {
         };
         let capacity = u32::try_from(values.len()).unwrap_or(u32::MAX);
         // SAFETY: a live instance used by this thread only (`&mut`), room for `capacity` numbers.
-        CallStatus::from_code(unsafe { read(self.instance, values.as_mut_ptr(), capacity) })
+        CallStatus::from_code(
+            self.calls.call(|instance| unsafe { read(instance, values.as_mut_ptr(), capacity) }),
+        )
     }
 }

@@ -113,6 +113,6 @@ impl loader::ActiveDevice {
     #[must_use]
     pub fn energy_ledger(&mut self) -> Option<EnergyLedger> {
         let ask = self.extensions()?.energy_ledger?.ledger;
-        self.asked(ask, EnergyLedger::default())
+        self.calls.query(ask, EnergyLedger::default())
     }
 }

@@ -76,7 +76,7 @@ impl IndependentStop {
     }
 }
 
-/// Device with a stop that does not depend on the host's process.
+/// Device with a stop that does not depend on the host's process: a [`Device`], or a [`SimpleDevice`](crate::SimpleDevice).
 ///
 /// ```
 /// # use flotor_hal::*;
@@ -105,7 +105,7 @@ impl IndependentStop {
 ///     }
 /// }
 /// ```
-pub trait IndependentStopDevice: Device {
+pub trait IndependentStopDevice {
     /// Returns the independent stop. Called once, after opening; valid until the device is closed. Not real-time.
     fn independent_stop(&self) -> IndependentStop;
 }
@@ -127,7 +127,7 @@ layout! {
     IndependentStop { within_ns, descriptor, length, message, state, reserved }
     IndependentStopTable { size, reserved, independent_stop }
 }
-unsafe extern "C" fn independent_stop<D: IndependentStopDevice>(
+unsafe extern "C" fn independent_stop<D: Device + IndependentStopDevice>(
     instance: Instance,
     stop: *mut IndependentStop,
 ) -> u32 {
@@ -135,7 +135,7 @@ unsafe extern "C" fn independent_stop<D: IndependentStopDevice>(
     unsafe { fill::<DeviceAdapter<D>, _>(instance, stop, |phase| Ok(phase.opened()?.independent_stop())) }
 }
 
-table!(IndependentStopTable: "flotor.independent-stop/1", D: [IndependentStopDevice] {
+table!(IndependentStopTable: "flotor.independent-stop/1", D: [Device + IndependentStopDevice] {
     reserved: 0,
     independent_stop: Some(independent_stop::<D>),
 });
@@ -209,7 +209,7 @@ impl OpenedDevice {
         }
         // Invalid initial value: rejected below unless the plugin writes it.
         let unfilled = IndependentStop::by_message(BY_ITSELF, &[0], StoppedState::Zero, 0);
-        let Some(declared) = self.asked(ask, unfilled) else {
+        let Some(declared) = self.calls.query(ask, unfilled) else {
             return Err(Refusal::broken(
                 "the device plugin offers `flotor.independent-stop/1` but declares no stop; \
             declare a stop or remove the extension",

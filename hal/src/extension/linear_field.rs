@@ -188,8 +188,7 @@ impl Model {
             return CallStatus::Unsupported;
         };
         // SAFETY: a live instance used by this thread only (`&mut`), pointers valid for the call.
-        let asked = || unsafe { ask(self.instance, input, field) };
-        CallStatus::from_code(crate::abi::loader::preserving_float_control(&mut self.float_changes, asked))
+        CallStatus::from_code(self.calls.call(|instance| unsafe { ask(instance, input, field) }))
     }
 }
 

@@ -134,10 +134,8 @@ impl loader::ActiveDevice {
         let pacing = self.extensions().and_then(|extensions| extensions.pacing);
         let Some(wait) = pacing.and_then(|table| table.wait_for_sample) else { return SampleWait::NotPaced };
         let mut samples = 0;
-        let instance = self.instance();
         // SAFETY: a live, active instance used by this thread only (`&mut`), an out pointer valid for the call.
-        let waited = || unsafe { wait(instance, timeout_ns, &raw mut samples) };
-        let code = loader::preserving_float_control(&mut self.float_changes, waited);
+        let code = self.calls.call(|instance| unsafe { wait(instance, timeout_ns, &raw mut samples) });
         match CallStatus::from_code(code) {
             CallStatus::Ok if samples > 0 => SampleWait::Arrived { samples },
             CallStatus::Unsupported => SampleWait::NotPaced,

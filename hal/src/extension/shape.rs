@@ -419,7 +419,7 @@ impl Model {
         let ask = self.extensions.shape.and_then(|table| table.shape).ok_or(InvalidShape::Failed)?;
         let mut view = ShapeView::EMPTY;
         // SAFETY: a live instance used by this thread only (`&mut`), pointers valid for the call.
-        let code = unsafe { ask(self.instance, input, &raw mut view) };
+        let code = self.calls.call(|instance| unsafe { ask(instance, input, &raw mut view) });
         if code != crate::abi::CallStatus::Ok as u32 {
             return Err(InvalidShape::Failed);
         }

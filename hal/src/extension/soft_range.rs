@@ -10,7 +10,7 @@ use crate::abi::Str;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
-use crate::abi::loader::Plugin;
+use crate::abi::loader::{Plugin, static_list};
 use crate::{ForceModel, Parameter, ParameterKind};
 
 /// Soft range of one parameter, in its unit. 40 bytes.
@@ -126,13 +126,9 @@ impl Plugin {
     /// Returns the soft ranges that a model declares; empty without the extension and for a device.
     #[must_use]
     pub fn soft_ranges(&self) -> &'static [SoftRange] {
-        match self.model_extensions().and_then(|extensions| extensions.soft_range) {
-            Some(table) if !table.ranges.is_null() && table.range_count > 0 => {
-                // SAFETY: a table's list is a static array of `range_count` ranges of the checked layout.
-                unsafe { std::slice::from_raw_parts(table.ranges, table.range_count as usize) }
-            }
-            _ => &[],
-        }
+        let table = self.model_extensions().and_then(|extensions| extensions.soft_range);
+        // SAFETY: a table's list is a static array of `range_count` ranges of the checked layout.
+        table.map_or(&[], |table| unsafe { static_list(table.ranges, table.range_count) })
     }
 
     /// Returns the soft range of a parameter, declared or [around](SoftRange::around) the current value; `None` for a

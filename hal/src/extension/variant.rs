@@ -6,8 +6,6 @@
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader::Model;
 use crate::abi::{Instance, ModelAdapter};
 use crate::{Demand, ForceModel, Memory};
 
@@ -37,6 +35,12 @@ impl VariantInfo {
     #[must_use]
     pub const fn memory(&self) -> Memory {
         Memory::from_code(self.memory)
+    }
+
+    /// Returns this variant, with at most the demands of another one.
+    #[cfg(feature = "loader")]
+    pub(crate) fn limited_to(&self, most: &Self) -> Self {
+        Self::new(self.serves().limited_to(most.serves()), self.memory())
     }
 }
 
@@ -92,16 +96,3 @@ table!(VariantTable: "flotor.variant/1", M: [VariantModel] {
     reserved: 0,
     info: Some(info::<M>),
 });
-
-#[cfg(feature = "loader")]
-impl Model {
-    /// Returns the variant that the instance declares, or else that of its type.
-    pub(crate) fn ask_variant(&mut self) -> VariantInfo {
-        let of_type = self.variant;
-        let ask = self.extensions.variant.and_then(|table| table.info);
-        let told = |variant: VariantInfo| {
-            VariantInfo::new(variant.serves().limited_to(of_type.serves()), variant.memory())
-        };
-        self.asked(ask, of_type).map_or(of_type, told)
-    }
-}

@@ -114,7 +114,7 @@ impl Model {
     #[must_use]
     pub fn workspace_bounds(&mut self) -> WorkspaceBounds {
         let ask = self.extensions.workspace_bounds.and_then(|table| table.bounds);
-        self.asked(ask, WorkspaceBounds::UNBOUNDED).unwrap_or(WorkspaceBounds::UNBOUNDED)
+        self.calls.query(ask, WorkspaceBounds::UNBOUNDED).unwrap_or(WorkspaceBounds::UNBOUNDED)
     }
 }
 

@@ -1,5 +1,6 @@
 //! State machine of the device behind its USB endpoints: replies to requests and bytes, and due packets.
 
+use clap::ValueEnum;
 use flotor_emulation::rig::Stand;
 use flotor_falcon::boot::{AGREED, LOAD_DIVISOR, PROMPT, PROMPT_ANSWER, PROMPT_DIVISOR, RUN_DIVISOR};
 use flotor_falcon::chip::{PAYLOAD_BYTES, Request};
@@ -19,11 +20,13 @@ const HOMING_COMMANDS: u32 = 50;
 const WORDS_PER_NM: f64 = 10_000.0;
 
 /// Power history of a device that was just plugged in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Power {
     /// Power was off: the boot loader waits, the arms are not homed.
+    #[value(help = "After power-off: the boot loader waits for a firmware and accepts any bytes")]
     Off,
     /// Firmware runs since an earlier program; the arms are homed.
+    #[value(help = "The firmware runs, and the arms are homed")]
     On,
 }
 

@@ -31,7 +31,7 @@ struct Arguments {
     reach: ReachArguments,
     /// Power state at the start: with or without running firmware
     #[arg(long, value_enum, default_value = "on")]
-    power: PowerOption,
+    power: Power,
     /// Amplitude, from the middle of the motion to its ends, in mm
     #[arg(long, default_value_t = 15.0, value_name = "MM", value_parser = amplitude_mm)]
     amplitude_mm: f64,
@@ -66,14 +66,6 @@ enum TransportOption {
     Usb,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum PowerOption {
-    /// After power-off: the boot loader waits for a firmware and accepts any bytes
-    Off,
-    /// The firmware runs, and the arms are homed
-    On,
-}
-
 fn amplitude_mm(text: &str) -> Result<f64, String> {
     within(text, 0.0, 40.0, "mm")
 }
@@ -93,10 +85,7 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
-    let power = match arguments.power {
-        PowerOption::Off => Power::Off,
-        PowerOption::On => Power::On,
-    };
+    let power = arguments.power;
     let device = match arguments.rig.rig() {
         Some((link, stand)) => {
             let (device, sensor) = rig::device_on(stand, link, power)?;

@@ -4,8 +4,9 @@
 //! other plugins can use this module directly: a link, a plant, and [`Emulator::serve`].
 
 use crate::controller::{Controller, ControllerConfig, LimitConfig, Reply, Sample};
+use clap::ValueEnum;
 use flotor_hal::{Capabilities, Wrench};
-use flotor_maglev::protocol::description::serial_bytes;
+use flotor_maglev::protocol::description::{AxesPage, LimitsPage, RangesPage, serial_bytes};
 use flotor_maglev::protocol::{Condition, Description, Mode, Rejections};
 use flotor_maglev::transport::{Incoming, LinkLost, Transport};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,11 +22,13 @@ pub trait Plant {
 }
 
 /// Clock of the cycles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Pace {
     /// The machine's clock: a cycle each period, independent of the host, as on hardware.
+    #[value(name = "real", help = "Cycles by the machine's clock")]
     RealTime,
     /// The host's commands: a cycle for each, so that a host on a virtual clock gets bit-identical runs.
+    #[value(help = "A cycle for each command of the host, for a host on a virtual clock")]
     Lockstep,
 }
 
@@ -234,25 +237,31 @@ pub fn controller_config(capabilities: &Capabilities, pace: Pace, serial: &str) 
     };
     ControllerConfig {
         description: Description {
-            sensed: 0b11_1111,
-            actuated: 0b11_1111,
-            resolution_m: capabilities.resolution_m as f32,
-            rate_hz: capabilities.rate_hz.map(|rate| rate as f32),
-            latency_us: (capabilities.latency_s * 1.0e6) as u32
-                + match pace {
-                    // A command waits for the next cycle at most.
-                    Pace::RealTime => CYCLE_US as u32,
-                    Pace::Lockstep => 0,
-                },
-            serial: serial_bytes(serial),
-            range_m: narrow(capabilities.range_m),
-            range_rad: narrow(capabilities.range_rad),
-            max_stiffness_n_per_m: capabilities.max_stiffness_n_per_m as f32,
-            force_slew_n_per_s: limits.force_slew_n_per_s as f32,
-            torque_slew_nm_per_s: limits.torque_slew_nm_per_s as f32,
-            max_force_n: narrow(limits.max_force_n.to_array()),
-            max_torque_nm: narrow(limits.max_torque_nm.to_array()),
-            longest_watchdog_us: 1_000_000,
+            axes: AxesPage {
+                sensed: 0b11_1111,
+                actuated: 0b11_1111,
+                resolution_m: capabilities.resolution_m as f32,
+                rate_hz: capabilities.rate_hz.map(|rate| rate as f32),
+                latency_us: (capabilities.latency_s * 1.0e6) as u32
+                    + match pace {
+                        // A command waits for the next cycle at most.
+                        Pace::RealTime => CYCLE_US as u32,
+                        Pace::Lockstep => 0,
+                    },
+                serial: serial_bytes(serial),
+            },
+            ranges: RangesPage {
+                range_m: narrow(capabilities.range_m),
+                range_rad: narrow(capabilities.range_rad),
+                max_stiffness_n_per_m: capabilities.max_stiffness_n_per_m as f32,
+                force_slew_n_per_s: limits.force_slew_n_per_s as f32,
+                torque_slew_nm_per_s: limits.torque_slew_nm_per_s as f32,
+            },
+            limits: LimitsPage {
+                max_force_n: narrow(limits.max_force_n.to_array()),
+                max_torque_nm: narrow(limits.max_torque_nm.to_array()),
+                longest_watchdog_us: 1_000_000,
+            },
         },
         limits,
         hold_us: 50_000,

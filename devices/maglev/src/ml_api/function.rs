@@ -167,6 +167,15 @@ functions! {
     MapToken = 73,
 }
 
+/// Events, with the functions that register for them and unregister from them.
+const REGISTRATIONS: [(EventKind, Function, Function); 5] = [
+    (EventKind::Button, Function::RegisterButton, Function::UnregisterButton),
+    (EventKind::Boundary, Function::RegisterBoundary, Function::UnregisterBoundary),
+    (EventKind::Overtemp, Function::RegisterOvertemp, Function::UnregisterOvertemp),
+    (EventKind::Fault, Function::RegisterFault, Function::UnregisterFault),
+    (EventKind::Tick, Function::RegisterTick, Function::UnregisterTick),
+];
+
 impl Function {
     /// Returns the number of the function on the wire.
     #[must_use]
@@ -182,28 +191,14 @@ impl Function {
 
     /// Returns the events that the function registers for; `None` for other functions.
     #[must_use]
-    pub const fn registers(self) -> Option<EventKind> {
-        Some(match self {
-            Self::RegisterButton => EventKind::Button,
-            Self::RegisterFault => EventKind::Fault,
-            Self::RegisterBoundary => EventKind::Boundary,
-            Self::RegisterOvertemp => EventKind::Overtemp,
-            Self::RegisterTick => EventKind::Tick,
-            _ => return None,
-        })
+    pub fn registers(self) -> Option<EventKind> {
+        REGISTRATIONS.iter().find(|(_, on, _)| *on == self).map(|(kind, ..)| *kind)
     }
 
     /// Returns the events that the function unregisters from; `None` for other functions.
     #[must_use]
-    pub const fn unregisters(self) -> Option<EventKind> {
-        Some(match self {
-            Self::UnregisterButton => EventKind::Button,
-            Self::UnregisterFault => EventKind::Fault,
-            Self::UnregisterBoundary => EventKind::Boundary,
-            Self::UnregisterOvertemp => EventKind::Overtemp,
-            Self::UnregisterTick => EventKind::Tick,
-            _ => return None,
-        })
+    pub fn unregisters(self) -> Option<EventKind> {
+        REGISTRATIONS.iter().find(|(.., off)| *off == self).map(|(kind, ..)| *kind)
     }
 
     /// Returns true if only the commanding client may call the function. Reading and landing are free to all clients.

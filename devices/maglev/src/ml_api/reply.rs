@@ -4,7 +4,7 @@
 use super::frame::{Fields, Frame};
 use super::function::Function;
 use super::values::{
-    AxisMode, AxisValues, Buttons, Cell, CellOffset, FaultBits, Pid, Status, Version, WirePose,
+    AxisMode, AxisValues, Buttons, Cell, CellOffset, FaultBits, Pid, Status, Version, WirePose, of_code,
 };
 
 /// Results of a function. Units of [`super`].
@@ -131,7 +131,7 @@ impl Results {
             Self::Pose(_) => Self::Pose(WirePose { out_of_range: fields.int()? != 0, at: fields.floats()? }),
             Self::Modes(mut modes) => {
                 for mode in &mut modes {
-                    *mode = AxisMode::of(fields.int()?)?;
+                    *mode = of_code(&AxisMode::ALL, fields.int()?)?;
                 }
                 Self::Modes(modes)
             }

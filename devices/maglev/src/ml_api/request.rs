@@ -3,7 +3,7 @@
 use super::event::EventKind;
 use super::frame::{Fields, Frame};
 use super::function::Function;
-use super::values::{Axis, AxisValues, CellOffset, Gain, GainSet, Pid, Status, WirePose};
+use super::values::{Axis, AxisValues, CellOffset, Gain, GainSet, Pid, Status, WirePose, of_code};
 
 /// Request of a client. Units of [`super`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -234,15 +234,15 @@ impl Arguments<'_> {
     }
 
     fn axis(&mut self) -> Result<Axis, InvalidRequest> {
-        Axis::of(self.int()?).ok_or(self.invalid(Status::AXIS))
+        of_code(&Axis::ALL, self.int()?).ok_or(self.invalid(Status::AXIS))
     }
 
     fn set(&mut self) -> Result<GainSet, InvalidRequest> {
-        GainSet::of(self.int()?).ok_or(self.invalid(Status::GAIN_TYPE))
+        of_code(&GainSet::ALL, self.int()?).ok_or(self.invalid(Status::GAIN_TYPE))
     }
 
     fn gain(&mut self) -> Result<Gain, InvalidRequest> {
-        Gain::of(self.int()?).ok_or(self.invalid(Status::GAIN_TYPE))
+        of_code(&Gain::ALL, self.int()?).ok_or(self.invalid(Status::GAIN_TYPE))
     }
 }
 

@@ -5,6 +5,11 @@ use std::fmt;
 /// A number for each axis: x, y, z, then the rotations about x, y, z.
 pub type AxisValues = [f32; 6];
 
+/// Returns the value of a code; `None` beyond the list, such as for the seventh axis, the grasp of other devices.
+pub(super) fn of_code<T: Copy>(all: &[T], code: i32) -> Option<T> {
+    all.get(usize::try_from(code).ok()?).copied()
+}
+
 /// Axis of translation or rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
@@ -25,11 +30,6 @@ pub enum Axis {
 impl Axis {
     /// All axes, in the order of the wire.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
-
-    /// Returns the axis of a code; `None` for the seventh, the grasp of other devices.
-    pub(super) fn of(code: i32) -> Option<Self> {
-        Self::ALL.into_iter().find(|axis| *axis as i32 == code)
-    }
 }
 
 /// Gain set, by the state of the axis.
@@ -48,10 +48,6 @@ pub enum GainSet {
 impl GainSet {
     /// All gain sets, in the order of the wire.
     pub const ALL: [Self; 4] = [Self::Normal, Self::Locked, Self::Constrained, Self::Boundary];
-
-    pub(super) fn of(code: i32) -> Option<Self> {
-        Self::ALL.into_iter().find(|set| *set as i32 == code)
-    }
 }
 
 /// Gain of an axis.
@@ -70,10 +66,6 @@ pub enum Gain {
 impl Gain {
     /// All gains, in the order of the wire.
     pub const ALL: [Self; 4] = [Self::P, Self::I, Self::D, Self::Ff];
-
-    pub(super) fn of(code: i32) -> Option<Self> {
-        Self::ALL.into_iter().find(|gain| *gain as i32 == code)
-    }
 }
 
 /// Gains of an axis: N/m, N/(m s), N s/m, N; of a rotation N·m/rad, N·m/(rad s), N·m s/rad, N·m.
@@ -128,11 +120,8 @@ pub enum AxisMode {
 }
 
 impl AxisMode {
-    pub(super) fn of(code: i32) -> Option<Self> {
-        [Self::Normal, Self::Locked, Self::Constrained, Self::Boundary]
-            .into_iter()
-            .find(|mode| *mode as i32 == code)
-    }
+    /// All modes, in the order of the wire.
+    pub const ALL: [Self; 4] = [Self::Normal, Self::Locked, Self::Constrained, Self::Boundary];
 }
 
 /// State of the handle's buttons.

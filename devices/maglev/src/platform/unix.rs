@@ -53,7 +53,8 @@ pub(crate) fn hid_is_offered() -> Result<(), &'static str> {
     Ok(())
 }
 
-#[cfg(all(test, any(feature = "usb", feature = "hid")))]
+#[cfg(test)]
+#[cfg(any(feature = "usb", feature = "hid"))]
 mod tests {
     use super::*;
 

@@ -62,17 +62,9 @@ pub(crate) fn hid_is_offered() -> Result<(), &'static str> {
     )
 }
 
-#[cfg(all(test, any(feature = "usb", feature = "hid")))]
+#[cfg(test)]
+#[cfg(feature = "usb")]
 mod tests {
-    #[cfg(feature = "hid")]
-    #[test]
-    fn hid_is_refused_because_sending_would_wait() {
-        use crate::transport::{Kind, open};
-        let refused = open(Kind::Hid, "1209:f107").err().map(|error| error.to_string());
-        assert!(refused.is_some_and(|said| said.contains("not offered on Windows")));
-    }
-
-    #[cfg(feature = "usb")]
     #[test]
     fn a_device_without_winusb_needs_a_driver() {
         let remedy = super::driver_remedy(0x1209, 0xf107).expect("there is one");

@@ -2,7 +2,7 @@
 //!
 //! After lost bytes a reader resynchronises at the next zero.
 
-use super::frame::FRAME_BYTES;
+use super::codec::FRAME_BYTES;
 
 /// Largest length of a coded frame, its zero included.
 pub const CODED_BYTES: usize = corncobs::max_encoded_len(FRAME_BYTES);

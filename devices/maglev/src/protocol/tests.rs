@@ -1,10 +1,10 @@
 //! The codec: every frame comes back, nothing else comes through. (Wounded frames by the million: `tests/fuzz.rs`.)
 
-use super::description::{Description, PAGES, serial_bytes};
-use super::frame::{
-    Answer, AnswerFrame, Condition, FRAME_BYTES, Mode, Rejection, Request, RequestFrame, Status,
-};
+use super::codec::FRAME_BYTES;
+use super::description::{AxesPage, Description, LimitsPage, PAGES, RangesPage, serial_bytes};
+use super::frame::{Answer, AnswerFrame, Condition, Mode, Request, RequestFrame, Status};
 use super::intake::Intake;
+use super::rejection::Rejection;
 use super::stream::{CODED_BYTES, Received, StreamDecoder, coded};
 use proptest::prelude::*;
 
@@ -32,20 +32,22 @@ fn description() -> impl Strategy<Value = Description> {
     let three = || prop::array::uniform3(0.0_f32..1.0e3);
     (any::<(u8, u8, u32, u32)>(), three(), three(), three(), three(), three(), "[!-~]{0,16}").prop_map(
         |((sensed, actuated, latency_us, longest_watchdog_us), a, b, c, d, [e, f, g], serial)| Description {
-            sensed,
-            actuated,
-            resolution_m: e,
-            rate_hz: [f, g],
-            latency_us,
-            serial: serial_bytes(&serial),
-            range_m: a,
-            range_rad: b,
-            max_stiffness_n_per_m: e,
-            force_slew_n_per_s: f,
-            torque_slew_nm_per_s: g,
-            max_force_n: c,
-            max_torque_nm: d,
-            longest_watchdog_us,
+            axes: AxesPage {
+                sensed,
+                actuated,
+                resolution_m: e,
+                rate_hz: [f, g],
+                latency_us,
+                serial: serial_bytes(&serial),
+            },
+            ranges: RangesPage {
+                range_m: a,
+                range_rad: b,
+                max_stiffness_n_per_m: e,
+                force_slew_n_per_s: f,
+                torque_slew_nm_per_s: g,
+            },
+            limits: LimitsPage { max_force_n: c, max_torque_nm: d, longest_watchdog_us },
         },
     )
 }
@@ -150,7 +152,10 @@ fn each_sequence_number_is_taken_once_and_never_backwards() {
     let mut intake = Intake::default();
     let taken: Vec<bool> = [5, 6, 6, 5, 9, 7, u32::MAX - 1].map(|sequence| intake.accept(sequence)).to_vec();
     assert_eq!(taken, [true, true, false, false, true, false, false]);
-    assert_eq!((intake.rejections().duplicate, intake.rejections().old), (1, 3));
+    assert_eq!(
+        (intake.rejections().of(Rejection::Duplicate), intake.rejections().of(Rejection::Old)),
+        (1, 3)
+    );
     // Wrapping is going up.
     let mut intake = Intake::default();
     assert!(intake.accept(u32::MAX) && intake.accept(0) && intake.accept(1) && !intake.accept(u32::MAX));

@@ -37,7 +37,7 @@ fn within_the_limit_the_delivered_wrench_is_the_commanded_one() {
     // Rounding times the condition of the coil matrix, 17.
     assert!((got.force_n - asked.force_n).length() < 1.0e-5, "amplifiers of 1 GHz: 1e-7 of 33 N");
     assert!((got.torque_nm - asked.torque_nm).length() < 1.0e-6);
-    assert_eq!(ideal.saturated_ticks(), 0);
+    assert!(!ideal.is_saturated());
 }
 
 #[test]
@@ -46,7 +46,7 @@ fn beyond_the_limit_the_wrench_keeps_its_direction() {
     let asked = wrench([100.0, -80.0, 300.0], [5.0, -7.0, 10.0]);
     let got = ideal.drive(&asked, Wiring::Intact, 0.0, TICK_S);
     let share = got.force_n.z / asked.force_n.z;
-    assert!(share < 0.5 && ideal.saturated_ticks() == 1);
+    assert!(share < 0.5 && ideal.is_saturated());
     assert!((got.force_n - asked.force_n * share).length() < 1.0e-10);
     assert!((got.torque_nm - asked.torque_nm * share).length() < 1.0e-10);
     let largest_a = ideal.currents_a.iter().fold(0.0_f64, |a, i| a.max(i.abs()));

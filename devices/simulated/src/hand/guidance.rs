@@ -163,15 +163,10 @@ impl Guidance {
 }
 
 impl Follower {
-    /// Creates a motion through a pose. Real-time: bounded, no allocation.
-    pub(crate) fn moving(pose: Pose, velocity_m_per_s: DVec3) -> Self {
-        Self { pose, velocity_m_per_s }
-    }
-
     /// Returns the motion of the handle. Real-time: bounded, no allocation.
     pub(crate) fn of(state: &State) -> Self {
         let pose = Pose { position_m: state.position_m, orientation: state.orientation };
-        Self::moving(pose, state.velocity_m_per_s)
+        Self { pose, velocity_m_per_s: state.velocity_m_per_s }
     }
 
     /// Moves towards the target for `dt_s` (s, at most 1 ms): a critically damped oscillator, integrated by the
@@ -219,12 +214,12 @@ mod tests {
     }
 
     fn start() -> Follower {
-        Follower::moving(Pose::HOME, DVec3::ZERO)
+        Follower { pose: Pose::HOME, velocity_m_per_s: DVec3::ZERO }
     }
 
     /// Intended heights after each of some milliseconds, from a time on.
     fn heights(guidance: &mut Guidance, from_ms: u64, to_ms: u64, scripted: Option<Aim>) -> Vec<f64> {
-        let handle = Follower::moving(at(-1.0e-3), DVec3::ZERO);
+        let handle = Follower { pose: at(-1.0e-3), velocity_m_per_s: DVec3::ZERO };
         let z_m = |ms: u64| {
             let (aim, _) = guidance.advance(ms * MILLISECOND_NS, 1.0e-3, scripted, &handle);
             aim.map_or(f64::NAN, |aim| aim.pose.position_m.z)

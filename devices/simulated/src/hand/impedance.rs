@@ -2,9 +2,11 @@
 
 use crate::validation::{Check, Domain, number, vector};
 use flotor_hal::glam::{BVec3, DVec3};
+use serde::Deserialize;
 
 /// Named grip of a hand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Grip {
     /// [`Impedance::FIRM`].
     Firm,
@@ -71,12 +73,6 @@ impl Impedance {
     #[must_use]
     pub fn yielding(self, yielding: BVec3) -> Self {
         Self { stiffness_n_per_m: DVec3::select(yielding, DVec3::ZERO, self.stiffness_n_per_m), ..self }
-    }
-
-    /// Returns this impedance without inertia. Real-time: bounded, no allocation.
-    #[must_use]
-    pub const fn massless(self) -> Self {
-        Self { mass_kg: 0.0, ..self }
     }
 
     /// Rejects negative and non-finite numbers. Real-time: bounded, no allocation.

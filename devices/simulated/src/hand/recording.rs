@@ -14,6 +14,7 @@ mod mcap_file;
 mod table;
 
 use super::{Aim, Pose};
+use crate::units::nanoseconds;
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{TextProblem, read_text};
 use std::fmt;
@@ -116,8 +117,7 @@ impl Sample {
                 "({position_m}) m is outside the workspace of {FARTHEST_M} m; give positions in metres, not millimetres"
             )
         };
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked above
-        inside.then_some(Self { time_ns: (time_s * 1.0e9).round() as u64, pose }).ok_or_else(far)
+        inside.then_some(Self { time_ns: nanoseconds(time_s), pose }).ok_or_else(far)
     }
 
     /// Appends the sample; an error unless it is later than the last.

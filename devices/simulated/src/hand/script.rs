@@ -32,6 +32,7 @@ mod reader;
 pub use reader::ScriptError;
 
 use super::{Aim, Grip, Pose, minimum_jerk};
+use crate::units::seconds;
 use flotor_hal::glam::{BVec3, DVec3};
 use flotor_hal::{math, orientation_from_rotation_vector};
 use std::f64::consts::TAU;
@@ -212,10 +213,6 @@ impl Place {
     fn pose(&self) -> Pose {
         Pose { position_m: self.position_m, orientation: orientation_from_rotation_vector(self.rotation_rad) }
     }
-}
-
-fn seconds(time_ns: u64) -> f64 {
-    time_ns as f64 * 1.0e-9
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Parameters that change while the loop runs: the guide of the hand and its target.
 
-use super::{MM, SCHEMA};
+use super::SCHEMA;
 use crate::hand::guidance::NotGuiding;
 use crate::simulation::Simulation;
+use crate::units::MM;
 use flotor_hal::{OutOfRange, SetParameterError};
 
 /// Indices of the coordinates of the target in the schema: x, y, z.

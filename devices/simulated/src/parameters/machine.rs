@@ -1,6 +1,5 @@
 //! Preset `full`: conversion of parameters to coils, cells and faults.
 
-use super::{MM, PERCENT, UM};
 use crate::actuation::ActuationParameters;
 use crate::actuation::coils::CoilGeometry;
 use crate::actuation::field::FieldError;
@@ -10,6 +9,7 @@ use crate::machine::MachineParameters;
 use crate::sensing::SensingParameters;
 use crate::sensing::optics::OpticsGeometry;
 use crate::sensing::velocity::EstimatorKind;
+use crate::units::{MM, PERCENT, UM, nanoseconds};
 use flotor_hal::{Settings, math};
 
 /// Returns the parameters of the machine; `None` with preset `plain`.
@@ -94,8 +94,8 @@ fn fault(settings: &Settings<'_>) -> Option<FaultPlan> {
     };
     Some(FaultPlan {
         kind,
-        start_ns: super::nanoseconds(value("fault_time_s")),
-        duration_ns: super::nanoseconds(value("fault_duration_s")),
+        start_ns: nanoseconds(value("fault_time_s")),
+        duration_ns: nanoseconds(value("fault_duration_s")),
         rate_per_s: value("fault_rate_per_s"),
     })
 }

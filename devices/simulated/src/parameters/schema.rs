@@ -38,6 +38,26 @@ const FAULTS: Choices = choices![
 
 const DEMO: FlotorParameters = FlotorParameters::THESIS;
 
+/// Declares a principal moment of inertia.
+const fn inertia(id: &'static str, default: f64, doc: &'static str) -> Parameter {
+    Parameter::real(id, "kg m²", 1.0e-6, 1.0, default, doc)
+}
+
+/// Declares a coordinate of the guide's target.
+const fn target(id: &'static str, doc: &'static str) -> Parameter {
+    Parameter::real(id, "mm", -50.0, 50.0, 0.0, doc).live()
+}
+
+/// Declares the angle of a ring of coils.
+const fn ring(id: &'static str, default: f64, doc: &'static str) -> Parameter {
+    Parameter::real(id, "°", 0.0, 90.0, default, doc)
+}
+
+/// Declares the azimuth of an LED.
+const fn led(id: &'static str, default: f64, doc: &'static str) -> Parameter {
+    Parameter::real(id, "°", -360.0, 360.0, default, doc)
+}
+
 /// Schema of the parameters. Defaults are those of preset `plain`, flotor `thesis`, an oscillating firm hand.
 pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::choice(
@@ -48,30 +68,9 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     ),
     Parameter::choice("flotor", FLOTORS, 0, "Mass and centre of mass: as in the thesis, or as the Utah device"),
     Parameter::real("mass_kg", "kg", 0.01, 10.0, DEMO.mass_kg, "Mass of the flotor"),
-    Parameter::real(
-        "inertia_x_kg_m2",
-        "kg m²",
-        1.0e-6,
-        1.0,
-        DEMO.inertia_kg_m2.x,
-        "Moment of inertia about the centre of mass, x",
-    ),
-    Parameter::real(
-        "inertia_y_kg_m2",
-        "kg m²",
-        1.0e-6,
-        1.0,
-        DEMO.inertia_kg_m2.y,
-        "Moment of inertia about the centre of mass, y",
-    ),
-    Parameter::real(
-        "inertia_z_kg_m2",
-        "kg m²",
-        1.0e-6,
-        1.0,
-        DEMO.inertia_kg_m2.z,
-        "Moment of inertia about the centre of mass, z",
-    ),
+    inertia("inertia_x_kg_m2", DEMO.inertia_kg_m2.x, "Moment of inertia about the centre of mass, x"),
+    inertia("inertia_y_kg_m2", DEMO.inertia_kg_m2.y, "Moment of inertia about the centre of mass, y"),
+    inertia("inertia_z_kg_m2", DEMO.inertia_kg_m2.z, "Moment of inertia about the centre of mass, z"),
     Parameter::real("com_x_mm", "mm", -100.0, 100.0, 0.0, "Centre of mass in the flotor frame, x"),
     Parameter::real("com_y_mm", "mm", -100.0, 100.0, 0.0, "Centre of mass in the flotor frame, y"),
     Parameter::real("com_z_mm", "mm", -100.0, 100.0, -31.7, "Centre of mass in the flotor frame, z"),
@@ -193,39 +192,15 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Number of the client that guides the hand, chosen by the client; 0: none. Without a message for 1 s the hand is released",
     )
     .live(),
-    Parameter::real(
-        "hand_target_x_mm",
-        "mm",
-        -50.0,
-        50.0,
-        0.0,
-        "Guide: intended position of the handle, x; set with hand_guide",
-    )
-    .live(),
-    Parameter::real("hand_target_y_mm", "mm", -50.0, 50.0, 0.0, "Guide: intended position of the handle, y")
-        .live(),
-    Parameter::real("hand_target_z_mm", "mm", -50.0, 50.0, 0.0, "Guide: intended position of the handle, z")
-        .live(),
+    target("hand_target_x_mm", "Guide: intended position of the handle, x; set with hand_guide"),
+    target("hand_target_y_mm", "Guide: intended position of the handle, y"),
+    target("hand_target_z_mm", "Guide: intended position of the handle, z"),
     Parameter::real("start_x_mm", "mm", -12.0, 12.0, 0.0, "Initial position of the flotor, x"),
     Parameter::real("start_y_mm", "mm", -12.0, 12.0, 0.0, "Initial position of the flotor, y"),
     Parameter::real("start_z_mm", "mm", -12.0, 12.0, 0.0, "Initial position of the flotor, z"),
     Parameter::real("coil_radius_mm", "mm", 10.0, 500.0, 115.0, "Full: radius of the hemisphere of coils"),
-    Parameter::real(
-        "coil_ring_a_deg",
-        "°",
-        0.0,
-        90.0,
-        65.0,
-        "Full: ring A (force along the meridian) from the bottom",
-    ),
-    Parameter::real(
-        "coil_ring_b_deg",
-        "°",
-        0.0,
-        90.0,
-        45.0,
-        "Full: ring B (force along the parallel) from the bottom",
-    ),
+    ring("coil_ring_a_deg", 65.0, "Full: ring A (force along the meridian) from the bottom"),
+    ring("coil_ring_b_deg", 45.0, "Full: ring B (force along the parallel) from the bottom"),
     Parameter::real(
         "coil_force_n",
         "N",
@@ -254,22 +229,8 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     ),
     Parameter::real("coil_lag_s", "s", 0.1, 3600.0, 120.0, "Full: time constant of the heating"),
     Parameter::real("led_radius_mm", "mm", 1.0, 120.0, 60.0, "Full: radius of the circle of LEDs"),
-    Parameter::real(
-        "led_2_deg",
-        "°",
-        -360.0,
-        360.0,
-        120.0,
-        "Full: second LED on its circle, seen from the first",
-    ),
-    Parameter::real(
-        "led_3_deg",
-        "°",
-        -360.0,
-        360.0,
-        240.0,
-        "Full: third LED on its circle, seen from the first",
-    ),
+    led("led_2_deg", 120.0, "Full: second LED on its circle, seen from the first"),
+    led("led_3_deg", 240.0, "Full: third LED on its circle, seen from the first"),
     Parameter::real(
         "sensor_noise_um",
         "µm",

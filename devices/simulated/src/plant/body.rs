@@ -1,8 +1,9 @@
 //! Mass and forces of the moving body: the flotor alone, or with the mass, spring and damper of a hand.
 
+use super::flotor::{Drag, FlotorParameters};
 use super::motion::Motion;
+use super::rotation;
 use super::translation::Oscillator;
-use super::{Drag, FlotorParameters, rotation};
 use crate::hand::Impedance;
 use crate::ledger::MechanicalEnergy;
 use flotor_hal::glam::{DMat3, DVec3};

@@ -1,7 +1,6 @@
-//! State of the integrator between steps: motion of the flotor and intention of the hand.
+//! State of the integrator between steps: motion of the flotor.
 
-use super::State;
-use crate::hand::Intention;
+use super::state::State;
 use flotor_hal::glam::{DMat3, DQuat, DVec3};
 
 /// Largest physical magnitude: m, m/s and rad/s alike.
@@ -128,49 +127,5 @@ impl Swing {
         let arm = attitude * centre_of_mass;
         let turning = attitude * spin;
         Self { attitude, arm, turning, velocity: turning.cross(arm) }
-    }
-}
-
-/// The hand during a step: its intention at the start, with constant velocity.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Contact {
-    /// Intended position at the start, m.
-    pub(super) intended_m: DVec3,
-    /// Velocity of the intended position, m/s.
-    pub(super) pace_m_per_s: DVec3,
-    /// Intended orientation.
-    pub(super) intended_orientation: DQuat,
-    /// Intended angular velocity, device frame, rad/s.
-    pub(super) turning_rad_per_s: DVec3,
-    /// Intended force at the origin, device frame, N.
-    pub(super) force_n: DVec3,
-}
-
-impl Contact {
-    /// Placeholder without a hand (the impedance is zero then).
-    pub(super) const NONE: Self = Self {
-        intended_m: DVec3::ZERO,
-        pace_m_per_s: DVec3::ZERO,
-        intended_orientation: DQuat::IDENTITY,
-        turning_rad_per_s: DVec3::ZERO,
-        force_n: DVec3::ZERO,
-    };
-
-    /// Converts the intention of a hand. Real-time: bounded, no allocation.
-    #[inline]
-    pub(super) fn with(intention: &Intention) -> Self {
-        Self {
-            intended_m: intention.position_m,
-            pace_m_per_s: intention.velocity_m_per_s,
-            intended_orientation: intention.orientation,
-            turning_rad_per_s: intention.angular_velocity_rad_per_s,
-            force_n: intention.force_n,
-        }
-    }
-
-    /// Returns the contact `time_s` later. Real-time: bounded, no allocation.
-    #[inline]
-    pub(super) fn later(&self, time_s: f64) -> Self {
-        Self { intended_m: self.intended_m + self.pace_m_per_s * time_s, ..*self }
     }
 }

@@ -4,12 +4,14 @@
 //! steps, limited by the fastest rate of its rotation and of the forces off its centre of mass.
 
 use super::body::Body;
-use super::motion::{Contact, Motion};
+use super::grid::{Grid, MAX_STEPS};
+use super::motion::Motion;
+use super::state::Wrench;
 use super::step::Step;
-use super::tableau::{END, NODES};
-use super::translation::{Gramian, MAX_STEP_TIMES_RATE, Oscillator, Response};
-use super::{MAX_PIECE_NS, Wrench};
+use super::translation::MAX_STEP_TIMES_RATE;
+use crate::hand::Intention;
 use crate::ledger::Work;
+use crate::units::seconds;
 use crate::validation::InvalidParameter;
 use flotor_hal::glam::DVec3;
 
@@ -18,8 +20,8 @@ use flotor_hal::glam::DVec3;
 /// energy in the hand's springs.
 const MAX_TURNING_STEP: f64 = 0.1;
 
-/// Largest number of steps of a piece.
-const MAX_STEPS: u32 = 128;
+/// Longest piece of one call of [`Plant::advance`](super::Plant::advance), ns. Callers split longer intervals.
+pub const MAX_PIECE_NS: u64 = 1_000_000;
 
 /// A body with the tables of two piece lengths: the nominal and the last other one.
 #[derive(Clone, Debug)]
@@ -37,29 +39,6 @@ struct Table {
     straight: Grid,
     /// Grid for a rotating flotor.
     turning: Grid,
-}
-
-/// Grid of equal steps, with the response of the oscillator in a step.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Grid {
-    steps: u32,
-    /// Length of a step, s.
-    pub(super) step_s: f64,
-    /// Evaluation times of the Runge-Kutta method.
-    nodes: [Node; NODES.len()],
-    /// Integral of velocity squared over a step.
-    pub(super) gramian: Gramian,
-}
-
-/// A time during a step, with the response of the oscillator from the start to it and back.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Node {
-    /// Time since the start of the step, s.
-    pub(super) time_s: f64,
-    /// Response after `time_s`.
-    pub(super) later: Response,
-    /// Response after `-time_s`.
-    pub(super) earlier: Response,
 }
 
 impl Scheme {
@@ -92,13 +71,13 @@ impl Scheme {
         from: &Motion,
         piece_ns: u64,
         coils: &Wrench,
-        contact: &Contact,
+        intention: &Intention,
     ) -> Option<(Motion, Work)> {
         let (body, table) = self.prepared(piece_ns);
         if table.straight.steps > 1 {
             return None;
         }
-        Step::new(body, &table.straight, coils, contact, from).straight()
+        Step::new(body, &table.straight, coils, intention, from).straight()
     }
 
     /// Advances by `piece_ns` in the necessary number of steps, after [`Self::step`] returned `None`; returns the new
@@ -111,12 +90,12 @@ impl Scheme {
         from: &Motion,
         piece_ns: u64,
         coils: &Wrench,
-        contact: Contact,
+        intention: &Intention,
     ) -> (Motion, Work) {
         let (body, table) = self.prepared(piece_ns);
         let straight = || {
-            table.straight.march(from, contact, |contact, motion| {
-                Step::new(body, &table.straight, coils, contact, motion).straight()
+            table.straight.march(from, intention, |intention, motion| {
+                Step::new(body, &table.straight, coils, intention, motion).straight()
             })
         };
         // A failed single step implies rotation.
@@ -124,8 +103,8 @@ impl Scheme {
             .then(straight)
             .flatten()
             .or_else(|| {
-                table.turning.march(from, contact, |contact, motion| {
-                    Some(Step::new(body, &table.turning, coils, contact, motion).turning())
+                table.turning.march(from, intention, |intention, motion| {
+                    Some(Step::new(body, &table.turning, coils, intention, motion).turning())
                 })
             })
             .unwrap_or((*from, Work::default()));
@@ -161,61 +140,6 @@ impl Table {
     }
 }
 
-impl Grid {
-    fn new(body: &Body, piece_ns: u64, at_least: f64) -> Self {
-        let mut steps = 1;
-        while f64::from(steps) < at_least && steps < MAX_STEPS {
-            steps += 1;
-        }
-        let step_s = seconds(piece_ns) / f64::from(steps);
-        Self {
-            steps,
-            step_s,
-            nodes: NODES.map(|share| Node::new(&body.oscillator, share * step_s)),
-            gramian: body.oscillator.gramian(step_s),
-        }
-    }
-
-    /// Returns the node at `index`, clamped to the end of the step.
-    #[inline]
-    pub(super) fn node(&self, index: usize) -> &Node {
-        &self.nodes[index.min(END)]
-    }
-
-    /// Returns the node at the end of the step.
-    #[inline]
-    pub(super) fn end(&self) -> &Node {
-        &self.nodes[END]
-    }
-
-    /// Takes all steps of the grid; `None` as soon as `step` returns `None`. Real-time: bounded, no allocation.
-    #[inline]
-    fn march(
-        &self,
-        from: &Motion,
-        mut contact: Contact,
-        step: impl Fn(&Contact, &Motion) -> Option<(Motion, Work)>,
-    ) -> Option<(Motion, Work)> {
-        let (mut motion, mut work) = (*from, Work::default());
-        // A single call site of `step`, so that it is inlined.
-        for left in (0..self.steps).rev() {
-            let (next, done) = step(&contact, &motion)?;
-            motion = next;
-            work += done;
-            if left > 0 {
-                contact = contact.later(self.step_s);
-            }
-        }
-        Some((motion, work))
-    }
-}
-
-impl Node {
-    fn new(oscillator: &Oscillator, time_s: f64) -> Self {
-        Self { time_s, later: oscillator.response(time_s), earlier: oscillator.response(-time_s) }
-    }
-}
-
 /// Returns the steps of a piece for the series of the oscillator, not rounded up. Real-time: bounded, no allocation.
 fn straight_steps(body: &Body, piece_ns: u64) -> f64 {
     body.oscillator.rate_per_s() * seconds(piece_ns) / MAX_STEP_TIMES_RATE
@@ -226,8 +150,4 @@ fn turning_steps(body: &Body, piece_ns: u64) -> f64 {
     let coupled = body.centre_of_mass_m != DVec3::ZERO;
     let coupled_rate_per_s = if coupled { body.oscillator.rate_per_s() } else { 0.0 };
     body.rotation_rate_per_s.max(coupled_rate_per_s) * seconds(piece_ns) / MAX_TURNING_STEP
-}
-
-fn seconds(time_ns: u64) -> f64 {
-    time_ns as f64 * 1.0e-9
 }

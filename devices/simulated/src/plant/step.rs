@@ -18,11 +18,13 @@
 //! contribution of rotation is integrated numerically, with the weights of the method.
 
 use super::body::Body;
-use super::motion::{Contact, Motion, Swing};
-use super::scheme::{Grid, Node};
+use super::grid::{Grid, Node};
+use super::motion::{Motion, Swing};
+use super::rotation;
+use super::state::Wrench;
 use super::tableau::{END, STAGES, TABLEAU, WEIGHTS};
 use super::translation::Drive;
-use super::{Wrench, rotation};
+use crate::hand::Intention;
 use crate::ledger::Work;
 use flotor_hal::glam::{DQuat, DVec3};
 
@@ -31,7 +33,7 @@ pub(super) struct Step<'a> {
     body: &'a Body,
     grid: &'a Grid,
     coils: &'a Wrench,
-    contact: &'a Contact,
+    intention: &'a Intention,
     start: &'a Motion,
     /// Force of coils and hand at the origin, at the start position and at rest, device frame, N.
     pull: DVec3,
@@ -70,18 +72,18 @@ impl<'a> Step<'a> {
         body: &'a Body,
         grid: &'a Grid,
         coils: &'a Wrench,
-        contact: &'a Contact,
+        intention: &'a Intention,
         start: &'a Motion,
     ) -> Self {
         let hand = &body.hand;
         let pull = coils.force_n
-            + contact.force_n
-            + hand.stiffness_n_per_m * (contact.intended_m - start.position_m)
-            + hand.damping_ns_per_m * contact.pace_m_per_s;
-        let yank = hand.stiffness_n_per_m * contact.pace_m_per_s;
-        let lead_nm = contact.turning_rad_per_s * hand.rotational_damping_nms_per_rad;
+            + intention.force_n
+            + hand.stiffness_n_per_m * (intention.position_m - start.position_m)
+            + hand.damping_ns_per_m * intention.velocity_m_per_s;
+        let yank = hand.stiffness_n_per_m * intention.velocity_m_per_s;
+        let lead_nm = intention.angular_velocity_rad_per_s * hand.rotational_damping_nms_per_rad;
         let twist_nm = coils.torque_nm + lead_nm;
-        Self { body, grid, coils, contact, start, pull, yank, lead_nm, twist_nm }
+        Self { body, grid, coils, intention, start, pull, yank, lead_nm, twist_nm }
     }
 
     /// Returns the motion at the end and the work done by the exact solution of the oscillator, for any step length; `None`
@@ -110,8 +112,10 @@ impl<'a> Step<'a> {
     fn is_balanced(&self, drive: &Drive) -> bool {
         let (body, start) = (self.body, self.start);
         let twisted = body.hand.rotational_stiffness_nm_per_rad != 0.0
-            && start.orientation != self.contact.intended_orientation;
-        if twisted || axes([start.spin_rad_per_s, self.coils.torque_nm, self.contact.turning_rad_per_s]) != 0
+            && start.orientation != self.intention.orientation;
+        if twisted
+            || axes([start.spin_rad_per_s, self.coils.torque_nm, self.intention.angular_velocity_rad_per_s])
+                != 0
         {
             return false;
         }
@@ -162,7 +166,7 @@ impl<'a> Step<'a> {
         Drive {
             velocity,
             acceleration: (self.pull + body.lift_n) * body.inverse_mass_per_kg,
-            jerk: body.oscillator.stiffness_per_s2 * self.contact.pace_m_per_s,
+            jerk: body.oscillator.stiffness_per_s2 * self.intention.velocity_m_per_s,
         }
     }
 
@@ -190,7 +194,7 @@ impl<'a> Step<'a> {
         let force = self.still_force() + self.yank * *time_s
             - body.hand.stiffness_n_per_m * moved
             - body.damping_ns_per_m * velocity;
-        let back = rotation::misalignment_rad(at.orientation, self.contact.intended_orientation)
+        let back = rotation::misalignment_rad(at.orientation, self.intention.orientation)
             * body.hand.rotational_stiffness_nm_per_rad;
         let torque = swing.attitude.transpose() * (self.twist_nm - swing.arm.cross(force)) + back
             - at.spin * body.rotational_damping_nms_per_rad;
@@ -270,8 +274,8 @@ impl<'a> Step<'a> {
     fn hand_work_j(&self, drive: &Drive, end: &Motion, moved: DVec3, velocity2: DVec3) -> f64 {
         let (hand, h) = (&self.body.hand, self.grid.step_s);
         let displacement_integral = self.grid.end().later.displacement_integral(drive);
-        let pace = self.contact.pace_m_per_s;
-        let before = self.contact.intended_m - self.start.position_m;
+        let pace = self.intention.velocity_m_per_s;
+        let before = self.intention.position_m - self.start.position_m;
         let after = before + pace * h - moved;
         let stretch_integral = before * h + pace * (0.5 * h * h) - displacement_integral;
         // Spring: K e x' = K e x_h' - K e e', with e the stretch; the second term is a total differential.
@@ -281,7 +285,7 @@ impl<'a> Step<'a> {
         let inertia_j = 0.5
             * hand.mass_kg
             * (end.velocity_m_per_s.length_squared() - self.start.velocity_m_per_s.length_squared());
-        spring_j + damper_j - inertia_j + self.contact.force_n.dot(moved)
+        spring_j + damper_j - inertia_j + self.intention.force_n.dot(moved)
     }
 }
 

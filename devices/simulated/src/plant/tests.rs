@@ -4,7 +4,7 @@ mod tumbling;
 
 use super::*;
 use crate::hand::Hand;
-use flotor_hal::glam::DMat3;
+use flotor_hal::glam::{DMat3, DQuat, DVec3};
 
 const MILLISECOND_NS: u64 = 1_000_000;
 
@@ -293,7 +293,7 @@ fn held_at_the_origin_the_flotor_swings_like_a_pendulum() {
 fn coupled_run(spin_rad_per_s: DVec3, piece_ns: u64, pieces: u64) -> State {
     let flotor = FlotorParameters { feed_forward: FeedForward::Force(7.7), ..FlotorParameters::UTAH };
     // Soft enough that a millisecond is one step.
-    let impedance = Impedance::RELAXED.massless();
+    let impedance = Impedance { mass_kg: 0.0, ..Impedance::RELAXED };
     let start = State {
         position_m: DVec3::new(1.0e-3, -2.0e-3, 0.5e-3),
         orientation: DQuat::from_scaled_axis(DVec3::new(0.05, -0.04, 0.08)),

@@ -64,7 +64,10 @@ fn energy_balances_in_every_kind_of_run() {
         ("held askew", Setup { hand: hand(Impedance::FIRM, hold), ..Setup::DEMO }),
         (
             "let go by a hand without mass",
-            Setup { hand: hand(Impedance::RELAXED.massless(), release.clone()), ..Setup::DEMO },
+            Setup {
+                hand: hand(Impedance { mass_kg: 0.0, ..Impedance::RELAXED }, release.clone()),
+                ..Setup::DEMO
+            },
         ),
         (
             "let go by a hand with mass",

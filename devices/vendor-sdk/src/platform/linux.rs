@@ -1,8 +1,6 @@
 //! Linux: ELF, `dlopen`, signals.
 #![allow(unsafe_code)] // the mask of a thread, and libloading; listed in tests/tests/system/architecture.rs
 
-use crate::problem::LibraryProblem;
-use crate::search::Sdk;
 use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 use std::mem::MaybeUninit;
 use std::path::{Path, PathBuf};
@@ -23,15 +21,10 @@ pub(crate) fn missing_remedy(path: &Path) -> String {
     format!("`ldd {}` lists the required libraries and the missing ones", path.display())
 }
 
-/// Returns the file names of the library.
-pub(crate) fn files(sdk: &Sdk) -> &'static [&'static str] {
-    sdk.files
-}
-
-/// Returns the folders to search, in order, by the environment.
-pub(crate) fn folders(sdk: &Sdk, said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
+/// Returns the folders to search, in order: those in the variables of an SDK, then those of the system.
+pub(crate) fn folders(variables: &[&str], said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
     let machine = std::env::consts::ARCH;
-    let of_sdk = sdk.variables.iter().filter_map(|variable| said(variable)).flat_map(|folder| {
+    let of_sdk = variables.iter().filter_map(|variable| said(variable)).flat_map(|folder| {
         let folder = PathBuf::from(folder);
         [folder.join(format!("lib/release/lin-{machine}-gcc")), folder.join("lib"), folder]
     });
@@ -43,28 +36,15 @@ pub(crate) fn folders(sdk: &Sdk, said: impl Fn(&str) -> Option<String>) -> Vec<P
     of_sdk.chain(loader).chain(own).chain(system).chain([of_machine]).collect()
 }
 
-/// Checks by the first bytes of a file that it is a library for this program.
-pub(crate) fn fits(path: &Path, head: &[u8]) -> Result<(), LibraryProblem> {
-    let Some([0x7f, b'E', b'L', b'F', class, _, .., low, high]) = head.get(..HEAD) else {
-        return Err(LibraryProblem::NotALibrary { path: path.to_path_buf() });
-    };
+/// Returns bits and processor of a library by its first bytes; `None` for another kind of file.
+pub(crate) fn processor(head: &[u8]) -> Option<String> {
+    let [0x7f, b'E', b'L', b'F', class, _, .., low, high] = head.get(..HEAD)? else { return None };
     let bits = if *class == 1 { 32 } else { 64 };
-    let machine = u16::from_le_bytes([*low, *high]);
-    let found = match (bits, machine) {
-        (64, 62) => Some((bits, "x86")),
-        (64, 183) => Some((bits, "ARM")),
-        _ => None,
-    };
-    super::compared(path, found, processor(bits, machine))
-}
-
-/// Returns the name of a processor, for an error.
-fn processor(bits: u32, machine: u16) -> String {
-    match machine {
-        3 | 62 => format!("{bits}-bit x86"),
-        40 | 183 => format!("{bits}-bit ARM"),
-        other => format!("a {bits}-bit processor of number {other}"),
-    }
+    Some(match (bits, u16::from_le_bytes([*low, *high])) {
+        (32, 3) | (_, 62) => format!("{bits}-bit x86"),
+        (32, 40) | (_, 183) => format!("{bits}-bit ARM"),
+        (_, other) => format!("a {bits}-bit processor of number {other}"),
+    })
 }
 
 /// Opens a library with immediate binding and local symbols. Not real-time.
@@ -95,53 +75,4 @@ pub fn without_signals<T>(body: impl FnOnce() -> T) -> T {
         unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, before.as_ptr(), std::ptr::null_mut()) };
     }
     value
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const SDK: Sdk = Sdk {
-        name: "an SDK",
-        files: &["libsome.so.3", "libsome.so"],
-        files_on_windows: &["some64.dll"],
-        variables: &["SOMESDK"],
-    };
-
-    #[test]
-    fn the_folder_of_the_sdk_comes_before_those_of_the_system() {
-        let said = |variable: &str| match variable {
-            "SOMESDK" => Some("/opt/some".to_owned()),
-            "LD_LIBRARY_PATH" => Some("/first::relative:/second".to_owned()),
-            _ => None,
-        };
-        let places: Vec<String> = SDK.places(said).iter().map(|place| place.display().to_string()).collect();
-        let machine = std::env::consts::ARCH;
-        assert_eq!(places[0], format!("/opt/some/lib/release/lin-{machine}-gcc/libsome.so.3"));
-        let here = std::env::current_dir().unwrap().join("relative").display().to_string();
-        let folders = ["/first", &here, "/second"];
-        let files =
-            folders.map(|folder| ["libsome.so.3", "libsome.so"].map(|file| format!("{folder}/{file}")));
-        assert_eq!(places[6..12], files.concat(), "an empty folder is none");
-    }
-
-    #[test]
-    fn a_file_is_told_by_its_head() {
-        const CLASS: u8 = if usize::BITS == 64 { 2 } else { 1 };
-        const MACHINE: u16 = if cfg!(target_arch = "aarch64") { 183 } else { 62 };
-        let path = Path::new("/a/lib.so");
-        let head = |class: u8, machine: u16| {
-            let mut head = [0_u8; HEAD];
-            head[..5].copy_from_slice(&[0x7f, b'E', b'L', b'F', class]);
-            head[18..].copy_from_slice(&machine.to_le_bytes());
-            head
-        };
-        assert_eq!(fits(path, &head(CLASS, MACHINE)), Ok(()));
-        let told = |head: &[u8]| fits(path, head).expect_err("it does not fit").to_string();
-        assert!(told(&head(1, 3)).contains("is for 32-bit x86 and this program for 64-bit"));
-        assert!(told(&head(1, 40)).contains("is for 32-bit ARM"));
-        assert!(told(&head(2, 243)).contains("a 64-bit processor of number 243"));
-        assert!(told(b"#!/bin/sh\n").contains("not a shared library"));
-        assert!(told(&head(2, 62)[..19]).contains("not a shared library"), "a head that is cut off");
-    }
 }

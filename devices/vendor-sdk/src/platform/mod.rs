@@ -1,5 +1,5 @@
 //! Parts of an SDK's library that differ between systems. Each system has one module with the same items:
-//! - `files`, `folders`, `HEAD`, `fits`: file names, folders to search, and check of the processor;
+//! - `folders`, `HEAD`, `processor`: folders to search, and processor of a library by its first bytes;
 //! - `Loaded`, `open`, `LIBRARY_ENDING`, `missing_remedy`: an open library, and user texts about files;
 //! - `without_signals`: signal mask for the threads of a library.
 
@@ -14,17 +14,4 @@ use linux as system;
 use windows as system;
 
 pub use system::without_signals;
-pub(crate) use system::{HEAD, LIBRARY_ENDING, Loaded, files, fits, folders, missing_remedy, open};
-
-use crate::problem::LibraryProblem;
-use std::path::Path;
-
-/// Checks bits and processor of a library against this program.
-fn compared(path: &Path, found: Option<(u32, &str)>, told: String) -> Result<(), LibraryProblem> {
-    let needed = (usize::BITS, if cfg!(target_arch = "aarch64") { "ARM" } else { "x86" });
-    if found == Some(needed) {
-        return Ok(());
-    }
-    let needed = format!("{}-bit {}", needed.0, needed.1);
-    Err(LibraryProblem::Architecture { path: path.to_path_buf(), found: told, needed })
-}
+pub(crate) use system::{HEAD, LIBRARY_ENDING, Loaded, folders, missing_remedy, open, processor};

@@ -1,6 +1,6 @@
 //! Comparison of the contract layouts of host and plugin; the first difference is reported in one line.
 
-use crate::abi::layout::CORE_COUNT;
+use crate::abi::layout_table::CORE_COUNT;
 use crate::abi::{Entry, FieldLayout, LAYOUTS};
 
 /// Result of the second layout proof, after the layout tables compared equal.
@@ -66,7 +66,7 @@ unsafe fn second_proof(_: &'static Entry) -> Result<Proof, String> {
 #[cfg(feature = "layout-proof")]
 unsafe fn second_proof(entry: &'static Entry) -> Result<Proof, String> {
     use crate::abi::Str;
-    use crate::abi::layout::proof::types;
+    use crate::abi::layout_table::proof::types;
     use abi_stable::library::AbiHeader;
     use abi_stable::type_layout::TypeLayout;
 

@@ -8,24 +8,29 @@ const MOST_ENTRIES: u32 = 4096;
 
 /// Compares the id in the tables with the id in the metadata; rejects a list at a null pointer or above the limit.
 pub(super) fn check(interface: &Interface, id: &str) -> Result<(), String> {
-    let (own, has_list, count) = match interface {
-        Interface::Model(ModelTables { force, .. }) => {
-            (force.info.id(), !force.parameters.is_null(), force.parameter_count)
-        }
-        Interface::Device { device, .. } => {
-            (device.info.id(), !device.parameters.is_null(), device.parameter_count)
-        }
-    };
+    let ([own, ..], (parameters, count)) = (interface.texts(), interface.parameters());
     if own != id {
         return Err(format!("the id `{own}`, but its metadata have `{id}`"));
     }
-    list("parameters", has_list, count)?;
+    list("parameters", !parameters.is_null(), count)?;
     match interface {
         Interface::Model(ModelTables { extensions, .. }) => extensions
             .details
             .map_or(Ok(()), |table| list("details", !table.details.is_null(), table.detail_count)),
         Interface::Device { .. } => Ok(()),
     }
+}
+
+/// Returns the static list of a table; empty at a null pointer.
+///
+/// # Safety
+/// `first` is null or the address of `count` initialised values that stay for ever.
+pub(crate) unsafe fn static_list<T>(first: *const T, count: u32) -> &'static [T] {
+    if first.is_null() || count == 0 {
+        return &[];
+    }
+    // SAFETY: by the contract of this function.
+    unsafe { std::slice::from_raw_parts(first, count as usize) }
 }
 
 fn list(what: &str, is_there: bool, count: u32) -> Result<(), String> {

@@ -102,7 +102,7 @@ impl FloatControl {
 /// Runs a plugin call, restores the floating-point environment, and increments `changed` if the call modified it.
 /// Real-time: the call plus six instructions.
 #[inline(always)]
-pub(crate) fn preserving_float_control<T>(changed: &mut u64, call: impl FnOnce() -> T) -> T {
+pub(super) fn preserving_float_control<T>(changed: &mut u64, call: impl FnOnce() -> T) -> T {
     let before = FloatControl::now();
     let answer = call();
     if !FloatControl::now().is_as(before) {

@@ -2,6 +2,7 @@
 
 use super::LoadError;
 use super::model::ModelTables;
+use crate::Parameter;
 use crate::abi::interface::Table;
 use crate::abi::{DeviceTable, Entry, ForceTable, PluginKind, Str};
 use crate::extension::{DeviceExtensions, ModelExtensions};
@@ -38,6 +39,22 @@ impl Interface {
         match kind {
             PluginKind::Device => offers.device(),
             PluginKind::Model => offers.model(),
+        }
+    }
+
+    /// Returns id, name and description in the main table.
+    pub(super) fn texts(&self) -> [&'static str; 3] {
+        match self {
+            Self::Model(ModelTables { force, .. }) => [force.info.id(), force.info.name(), force.info.doc()],
+            Self::Device { device, .. } => [device.info.id(), device.info.name(), device.info.doc()],
+        }
+    }
+
+    /// Returns the unchecked list of parameters in the main table, with its length.
+    pub(super) fn parameters(&self) -> (*const Parameter, u32) {
+        match self {
+            Self::Model(ModelTables { force, .. }) => (force.parameters, force.parameter_count),
+            Self::Device { device, .. } => (device.parameters, device.parameter_count),
         }
     }
 }

@@ -86,13 +86,7 @@ impl Plugin {
         // SAFETY: a whole entry, for ever; in safe code it comes from `model_entry` or `device_entry`, which make
         // none that breaks the contract.
         let mut plugin = unsafe { Self::from_entry(metadata, entry, Runtime::Shared) }?;
-        let (id, name, doc) = match plugin.interface {
-            Interface::Model(ModelTables { force, .. }) => {
-                (force.info.id(), force.info.name(), force.info.doc())
-            }
-            Interface::Device { device, .. } => (device.info.id(), device.info.name(), device.info.doc()),
-        };
-        let (id, name, doc) = (id.to_owned(), name.to_owned(), doc.to_owned());
+        let [id, name, doc] = plugin.interface.texts().map(str::to_owned);
         plugin.metadata = Metadata { id, name, doc, ..plugin.metadata };
         Ok(plugin)
     }
@@ -140,10 +134,7 @@ impl Plugin {
         }
         // SAFETY: the plugin keeps the contract, as this function demands.
         let interface = unsafe { Interface::find(path, entry, metadata.kind) }?;
-        let (parameters, count) = match interface {
-            Interface::Model(ModelTables { force, .. }) => (force.parameters, force.parameter_count),
-            Interface::Device { device, .. } => (device.parameters, device.parameter_count),
-        };
+        let (parameters, count) = interface.parameters();
         // SAFETY: a table's schema is a static array of `parameter_count` parameters of the checked layout, unless that
         // number is beyond all reason, when none of it is read.
         let schema = unsafe { schema::checked(parameters, count) };

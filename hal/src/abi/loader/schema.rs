@@ -1,5 +1,6 @@
 //! Validation of a plugin's parameter schema: counts and texts come from a foreign library and are checked before use.
 
+use super::static_list;
 use crate::Parameter;
 use crate::abi::{Choices, Str};
 
@@ -16,15 +17,11 @@ pub(super) unsafe fn checked(
     parameters: *const Parameter,
     count: u32,
 ) -> Result<&'static [Parameter], String> {
-    if parameters.is_null() || count == 0 {
-        return Ok(&[]);
-    }
-    let count = count as usize;
-    if count > MOST_ENTRIES {
+    if !parameters.is_null() && count as usize > MOST_ENTRIES {
         return Err(format!("the plugin has {count} parameters, above the limit of {MOST_ENTRIES}"));
     }
     // SAFETY: as this function demands.
-    let schema = unsafe { std::slice::from_raw_parts(parameters, count) };
+    let schema = unsafe { static_list(parameters, count) };
     schema.iter().enumerate().try_for_each(|(number, parameter)| check(number, parameter))?;
     Ok(schema)
 }

@@ -38,6 +38,12 @@ pub struct Sample {
     pub buttons: u32,
 }
 
+impl Default for Sample {
+    fn default() -> Self {
+        Self::HOME
+    }
+}
+
 impl Sample {
     /// Sample at home and at rest.
     pub const HOME: Self =
@@ -188,7 +194,7 @@ impl Controller {
         self.heard_us = now_us;
         match (frame.request, self.mode) {
             (Request::Arm { period_us, watchdog_us }, Mode::Disarmed) => {
-                let longest_us = self.config.description.longest_watchdog_us;
+                let longest_us = self.config.description.limits.longest_watchdog_us;
                 self.watchdog_us = u64::from(watchdog_us.min(longest_us).max(1));
                 self.period_us = period_us;
                 (self.session, self.last_session) = (frame.session, frame.session);

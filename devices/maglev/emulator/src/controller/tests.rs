@@ -7,7 +7,7 @@ mod machine;
 use super::{Controller, ControllerConfig, LimitConfig, Reply, Sample};
 use crate::{Pace, controller_config};
 use flotor_hal::{DQuat, DVec3, Pose, Twist, Wrench};
-use flotor_maglev::protocol::{Condition, Mode, Request, RequestFrame};
+use flotor_maglev::protocol::{Condition, Mode, Rejection, Request, RequestFrame};
 use machine::CAPABILITIES;
 
 const CYCLE_US: u64 = 1000;
@@ -76,7 +76,11 @@ fn coils_are_off_until_taken_off() {
     let mut bench = Bench::new();
     bench.push(5.0);
     assert_eq!(bench.cycle(), Wrench::ZERO);
-    assert_eq!(bench.controller.intake().rejections().session, 1, "nobody is armed, so nobody has a session");
+    assert_eq!(
+        bench.controller.intake().rejections().of(Rejection::Session),
+        1,
+        "nobody is armed, so nobody has a session"
+    );
     bench.ask(Request::Arm { period_us: 1000, watchdog_us: WATCHDOG_US });
     bench.push(5.0);
     assert_eq!((bench.controller.mode(), bench.cycle()), (Mode::Armed, Wrench::ZERO));
@@ -113,8 +117,9 @@ fn each_wrong_frame_is_counted_and_moves_nothing() {
     }
     bench.controller.receive_malformed();
     let counted = *bench.controller.intake().rejections();
-    let one_each = [counted.checksum, counted.not_finite, counted.session, counted.old, counted.duplicate];
-    assert_eq!((one_each, counted.length, counted.total()), ([1; 5], 4, 9));
+    use Rejection::{Checksum, Duplicate, Length, NotFinite, Old, Session};
+    let one_each = [Checksum, NotFinite, Session, Old, Duplicate].map(|reason| counted.of(reason));
+    assert_eq!((one_each, counted.of(Length), counted.total()), ([1; 5], 4, 9));
     // The next wrench is what it would have been without them.
     let mut untouched = before;
     assert_eq!(bench.controller.drive(bench.now_us, CYCLE_US), untouched.drive(bench.now_us, CYCLE_US));
@@ -133,7 +138,7 @@ fn silence_ends_the_session_by_the_watchdog_and_two_milliseconds() {
     assert!(bench.controller.condition().contains(Condition::WATCHDOG));
     // The host wakes up: its frames, right in every other way, are of a session that is over.
     assert_eq!(bench.push(50.0), None);
-    assert_eq!(bench.controller.intake().rejections().session, 1);
+    assert_eq!(bench.controller.intake().rejections().of(Rejection::Session), 1);
 
     let mut modes = vec![Mode::Holding];
     for _ in 0..2000 {

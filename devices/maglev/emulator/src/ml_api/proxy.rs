@@ -61,7 +61,7 @@ pub struct MlApiModel {
     listen: Option<String>,
     reach: Reach,
     server: Option<Server>,
-    values: [f64; SCHEMA.len()],
+    values: Vec<f64>,
     period_s: f64,
     /// Last output, repeated while a client's call holds the lock: a step never waits.
     wrench: Wrench,
@@ -78,36 +78,20 @@ impl ForceModel for MlApiModel {
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let config = ControllerConfig {
-            force_command: match settings.choice_or_default("force_command") {
-                1 => ForceCommand::Adds,
-                _ => ForceCommand::Replaces,
-            },
-            commanders: match settings.choice_or_default("commanders") {
-                1 => Commanders::All,
-                _ => Commanders::One,
-            },
-            silence: match settings.choice_or_default("on_silence") {
-                1 => Silence::Ignored,
-                _ => Silence::Lands,
-            },
+            force_command: settings.one_of("force_command", [ForceCommand::Replaces, ForceCommand::Adds]),
+            commanders: settings.one_of("commanders", [Commanders::One, Commanders::All]),
+            silence: settings.one_of("on_silence", [Silence::Lands, Silence::Ignored]),
             watchdog_s: settings.number_or_default("watchdog_ms") * 1.0e-3,
             ..ControllerConfig::DEFAULT
         };
-        let mut values = [0.0; SCHEMA.len()];
-        for (value, parameter) in values.iter_mut().zip(SCHEMA) {
-            *value = settings.number_or_default(parameter.id());
-        }
+        let reaches = [Reach::ThisUser, Reach::ThisMachine, Reach::AnyMachine];
         Ok(Self {
             // No log: a tick must not write lines.
             hub: Arc::new(Hub::new(Controller::new(config), Vec::new(), false, Box::new(|_| ()))),
             listen: settings.text("listen").map(str::to_owned),
-            reach: match settings.choice_or_default("reach") {
-                1 => Reach::ThisMachine,
-                2 => Reach::AnyMachine,
-                _ => Reach::ThisUser,
-            },
+            reach: settings.one_of("reach", reaches),
             server: None,
-            values,
+            values: settings.values(),
             period_s: 1.0e-3,
             wrench: Wrench::ZERO,
         })

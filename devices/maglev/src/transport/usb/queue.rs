@@ -12,8 +12,9 @@
 //! ```
 #![allow(unsafe_code)]
 
-use super::{Endpoints, Incoming, LinkLost};
+use super::claim::Endpoints;
 use crate::protocol::FRAME_BYTES;
+use crate::transport::{Incoming, LinkLost};
 use rusb::constants::{
     LIBUSB_TRANSFER_COMPLETED, LIBUSB_TRANSFER_OVERFLOW, LIBUSB_TRANSFER_TIMED_OUT,
     LIBUSB_TRANSFER_TYPE_BULK, LIBUSB_TRANSFER_TYPE_INTERRUPT,

@@ -1,10 +1,12 @@
 //! Parser of scripts: checks every number and reports errors with file, line and key.
 
 use super::{Grip, Leg, Movement, Place, Script};
+use crate::units::{MM, nanoseconds};
 use flotor_hal::glam::DVec3;
 use flotor_hal::{TextProblem, read_text};
-use serde::Deserialize;
-use std::fmt;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer};
+use std::fmt::{self, Display};
 use std::ops::Range;
 use std::path::Path;
 
@@ -56,17 +58,10 @@ impl std::error::Error for ScriptError {}
 struct ScriptText {
     #[serde(default, rename = "title")]
     _title: String,
-    grip: Option<GripText>,
+    grip: Option<Grip>,
     #[serde(default)]
     repeat: Repeat,
     step: Vec<StepText>,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum GripText {
-    Firm,
-    Relaxed,
 }
 
 #[derive(Clone, Copy, Deserialize)]
@@ -114,10 +109,42 @@ struct PushText {
 #[serde(deny_unknown_fields)]
 struct ReleaseText {}
 
-/// Number of repetitions of the sequence.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(try_from = "i64")]
-struct Repeat(usize);
+/// Defines types whose values are checked when they are read.
+macro_rules! checked {
+    ($($(#[$doc:meta])* $name:ident($inner:ty) from $text:ty: |$value:ident| $check:expr;)+) => {
+        $(
+            $(#[$doc])*
+            #[derive(Clone, Copy)]
+            struct $name($inner);
+
+            impl<'de> Deserialize<'de> for $name {
+                fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+                    let $value = <$text>::deserialize(deserializer)?;
+                    $check.map(Self).map_err(D::Error::custom)
+                }
+            }
+        )+
+    };
+}
+
+checked! {
+    /// Number of repetitions of the sequence.
+    Repeat(usize) from i64: |times| whole(times, MAX_LEGS);
+    /// Number of pulses.
+    Pulses(u32) from i64: |count| whole(count, MOST_PULSES);
+    /// Duration, s.
+    Duration(f64) from f64: |seconds| within(seconds, SHORTEST_S, LONGEST_S, "s");
+    /// Frequency, Hz.
+    Frequency(f64) from f64: |hertz| within(hertz, SLOWEST_HZ, FASTEST_HZ, "Hz");
+    /// Lengths along x, y, z, m; mm in the text.
+    Lengths(DVec3) from [f64; 3]: |millimetres| three(millimetres, FARTHEST_MM, "mm").map(|all| all * MM);
+    /// Rotation vector, rad; degrees in the text.
+    Angles(DVec3) from [f64; 3]: |degrees| {
+        three(degrees, MOST_TURNED_DEG, "degrees").map(|all| all.map(f64::to_radians))
+    };
+    /// Forces along x, y, z in N.
+    Forces(DVec3) from [f64; 3]: |newtons| three(newtons, STRONGEST_N, "N");
+}
 
 impl Default for Repeat {
     fn default() -> Self {
@@ -125,111 +152,10 @@ impl Default for Repeat {
     }
 }
 
-impl TryFrom<i64> for Repeat {
-    type Error = String;
-
-    fn try_from(times: i64) -> Result<Self, String> {
-        let usable = usize::try_from(times).ok().filter(|times| (1..=MAX_LEGS).contains(times));
-        usable.map(Self).ok_or_else(|| format!("{times} is outside 1 to {MAX_LEGS}"))
-    }
-}
-
-/// Duration, s.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(try_from = "f64")]
-struct Duration(f64);
-
-impl TryFrom<f64> for Duration {
-    type Error = String;
-
-    fn try_from(seconds: f64) -> Result<Self, String> {
-        within(seconds, SHORTEST_S, LONGEST_S, "s").map(Self)
-    }
-}
-
-impl Duration {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // between 10 ms and an hour
-    fn nanoseconds(self) -> u64 {
-        (self.0 * 1.0e9).round() as u64
-    }
-}
-
-/// Frequency, Hz.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(try_from = "f64")]
-struct Frequency(f64);
-
-impl TryFrom<f64> for Frequency {
-    type Error = String;
-
-    fn try_from(hertz: f64) -> Result<Self, String> {
-        within(hertz, SLOWEST_HZ, FASTEST_HZ, "Hz").map(Self)
-    }
-}
-
-/// Number of pulses.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(try_from = "i64")]
-struct Pulses(u32);
-
-impl TryFrom<i64> for Pulses {
-    type Error = String;
-
-    fn try_from(count: i64) -> Result<Self, String> {
-        let usable = u32::try_from(count).ok().filter(|count| (1..=MOST_PULSES).contains(count));
-        usable.map(Self).ok_or_else(|| format!("{count} is outside 1 to {MOST_PULSES}"))
-    }
-}
-
-/// Lengths along x, y, z in mm.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(try_from = "[f64; 3]")]
-struct Lengths(DVec3);
-
-impl TryFrom<[f64; 3]> for Lengths {
-    type Error = String;
-
-    fn try_from(millimetres: [f64; 3]) -> Result<Self, String> {
-        three(millimetres, FARTHEST_MM, "mm").map(Self)
-    }
-}
-
-impl Lengths {
-    fn metres(self) -> DVec3 {
-        self.0 * 1.0e-3
-    }
-}
-
-/// A rotation vector in degrees.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(try_from = "[f64; 3]")]
-struct Angles(DVec3);
-
-impl TryFrom<[f64; 3]> for Angles {
-    type Error = String;
-
-    fn try_from(degrees: [f64; 3]) -> Result<Self, String> {
-        three(degrees, MOST_TURNED_DEG, "degrees").map(Self)
-    }
-}
-
-impl Angles {
-    fn radians(self) -> DVec3 {
-        self.0.map(f64::to_radians)
-    }
-}
-
-/// Forces along x, y, z in N.
-#[derive(Clone, Copy, Deserialize)]
-#[serde(try_from = "[f64; 3]")]
-struct Forces(DVec3);
-
-impl TryFrom<[f64; 3]> for Forces {
-    type Error = String;
-
-    fn try_from(newtons: [f64; 3]) -> Result<Self, String> {
-        three(newtons, STRONGEST_N, "N").map(Self)
-    }
+/// Checks a count of 1 to `most`.
+fn whole<T: TryFrom<i64> + PartialOrd + From<u8> + Display>(count: i64, most: T) -> Result<T, String> {
+    let usable = T::try_from(count).ok().filter(|count| *count >= T::from(1) && *count <= most);
+    usable.ok_or_else(|| format!("{count} is outside 1 to {most}"))
 }
 
 fn within(number: f64, least: f64, most: f64, unit: &str) -> Result<f64, String> {
@@ -301,15 +227,11 @@ fn laid_out(script: &ScriptText, count: usize) -> Script {
             release_ns = Some(start_ns);
             break;
         };
-        let leg = Leg { start_ns, duration_ns: duration.nanoseconds(), from, movement };
+        let leg = Leg { start_ns, duration_ns: nanoseconds(duration.0), from, movement };
         (from, start_ns) = (leg.end(), leg.start_ns + leg.duration_ns);
         legs.push(leg);
     }
-    let grip = script.grip.map(|grip| match grip {
-        GripText::Firm => Grip::Firm,
-        GripText::Relaxed => Grip::Relaxed,
-    });
-    Script { grip, legs: legs.into(), release_ns }
+    Script { grip: script.grip, legs: legs.into(), release_ns }
 }
 
 /// Returns the movement of a step from a place, with its duration; `None` for a release.
@@ -318,16 +240,16 @@ fn movement(step: &StepText, from: &Place) -> Option<(Movement, Duration)> {
     Some(match step {
         StepText::Move(MoveText { to_mm, to_deg, duration_s }) => {
             let to = Place {
-                position_m: to_mm.map_or(from.position_m, Lengths::metres),
-                rotation_rad: to_deg.map_or(from.rotation_rad, Angles::radians),
+                position_m: to_mm.map_or(from.position_m, |to| to.0),
+                rotation_rad: to_deg.map_or(from.rotation_rad, |to| to.0),
             };
             (Movement::Move { to }, *duration_s)
         }
         StepText::Hold(HoldText { duration_s }) => (Movement::Hold, *duration_s),
         StepText::Oscillate(OscillateText { amplitude_mm, amplitude_deg, frequency_hz, duration_s }) => {
             let amplitude = Place {
-                position_m: amplitude_mm.map_or(zero, Lengths::metres),
-                rotation_rad: amplitude_deg.map_or(zero, Angles::radians),
+                position_m: amplitude_mm.map_or(zero, |amplitude| amplitude.0),
+                rotation_rad: amplitude_deg.map_or(zero, |amplitude| amplitude.0),
             };
             (Movement::Oscillate { amplitude, frequency_hz: frequency_hz.0 }, *duration_s)
         }

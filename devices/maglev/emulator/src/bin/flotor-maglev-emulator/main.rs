@@ -56,7 +56,7 @@ struct Arguments {
     link: Option<PathBuf>,
     /// Clock of the controller's cycles
     #[arg(long, value_enum, default_value = "real")]
-    pace: PaceOption,
+    pace: Pace,
     /// Set a parameter of the simulated flotor (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
@@ -106,14 +106,6 @@ enum TransportOption {
     Cdc,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum PaceOption {
-    /// Cycles by the machine's clock
-    Real,
-    /// A cycle for each command of the host, for a host on a virtual clock
-    Lockstep,
-}
-
 fn main() -> ExitCode {
     match run(&arguments()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -129,10 +121,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     if let Some(device) = &arguments.ml_api.device {
         return proxy::become_host(device, arguments);
     }
-    let pace = match arguments.pace {
-        PaceOption::Real => Pace::RealTime,
-        PaceOption::Lockstep => Pace::Lockstep,
-    };
+    let pace = arguments.pace;
     let plugin = plant::load(arguments.plant.as_deref())?;
     let parse = |key: &str, value: &str| {
         Setting::parse(plugin.parameters(), key, value)

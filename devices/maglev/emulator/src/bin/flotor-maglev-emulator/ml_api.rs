@@ -41,13 +41,13 @@ pub(crate) struct MlApiArguments {
     hand: HandOption,
     /// Effect of a force command on the gains
     #[arg(long, value_enum, default_value = "replace", value_name = "WHAT")]
-    force_command: ForceOption,
+    force_command: ForceCommand,
     /// Clients that may command: the first client that sends a command, or all
     #[arg(long, value_enum, default_value = "one", value_name = "WHO")]
-    commanders: CommandersOption,
+    commanders: Commanders,
     /// Reaction to the loss of a client, or of its tick acknowledgements, while the flotor is levitating
     #[arg(long, value_enum, default_value = "land", value_name = "WHAT")]
-    on_silence: SilenceOption,
+    on_silence: Silence,
     /// Longest time without an acknowledged tick while a client commands forces and is registered for ticks, in ms
     #[arg(long, default_value_t = 500.0, value_name = "MS", value_parser = watchdog_ms)]
     watchdog_ms: f64,
@@ -69,26 +69,9 @@ enum HandOption {
     Simulated,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum ForceOption {
-    /// The force replaces the gains
-    Replace,
-    /// The force is added to the gains
-    Add,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum CommandersOption {
-    One,
-    All,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum SilenceOption {
-    /// Land the flotor
-    Land,
-    /// Continue without a reaction
-    Ignore,
+/// Returns the name of a value on the command line.
+fn name(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 fn watchdog_ms(text: &str) -> Result<f64, String> {
@@ -106,9 +89,8 @@ impl MlApiArguments {
 
     /// Returns the parameters of the controller model for `--device`, as TOML.
     pub(crate) fn model_parameters(&self) -> String {
-        let force_command = if matches!(self.force_command, ForceOption::Add) { "add" } else { "replace" };
-        let commanders = if matches!(self.commanders, CommandersOption::All) { "all" } else { "one" };
-        let on_silence = if matches!(self.on_silence, SilenceOption::Ignore) { "ignore" } else { "land" };
+        let (force_command, commanders, on_silence) =
+            (name(&self.force_command), name(&self.commanders), name(&self.on_silence));
         let watchdog_ms = self.watchdog_ms;
         format!(
             "force_command = \"{force_command}\"\ncommanders = \"{commanders}\"\non_silence = \"{on_silence}\"\n\
@@ -118,18 +100,9 @@ impl MlApiArguments {
 
     fn config(&self) -> ControllerConfig {
         ControllerConfig {
-            force_command: match self.force_command {
-                ForceOption::Replace => ForceCommand::Replaces,
-                ForceOption::Add => ForceCommand::Adds,
-            },
-            commanders: match self.commanders {
-                CommandersOption::One => Commanders::One,
-                CommandersOption::All => Commanders::All,
-            },
-            silence: match self.on_silence {
-                SilenceOption::Land => Silence::Lands,
-                SilenceOption::Ignore => Silence::Ignored,
-            },
+            force_command: self.force_command,
+            commanders: self.commanders,
+            silence: self.on_silence,
             watchdog_s: self.watchdog_ms * 1.0e-3,
             ..ControllerConfig::DEFAULT
         }

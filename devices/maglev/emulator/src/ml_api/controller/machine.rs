@@ -4,35 +4,42 @@ use super::coils::CoilSet;
 use super::gains::Gains;
 use super::procedure::{GainReset, Procedure, ProcedureId};
 use crate::controller::Sample;
+use clap::ValueEnum;
 use flotor_hal::{DVec3, Wrench};
 use flotor_maglev::ml_api::{
     Axis, AxisMode, AxisValues, Buttons, CellOffset, Event, FaultBits, GainSet, Pid, Reply, Status, angles,
 };
 
 /// Effect of a force command on the gains.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ForceCommand {
     /// The force replaces the gains.
+    #[value(name = "replace")]
     Replaces,
     /// The force is added to the gains.
+    #[value(name = "add")]
     Adds,
 }
 
 /// Reaction to the loss of a client while levitating.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Silence {
     /// The flotor lands.
+    #[value(name = "land", help = "Land the flotor")]
     Lands,
     /// The flotor continues to levitate.
+    #[value(name = "ignore", help = "Continue without a reaction")]
     Ignored,
 }
 
 /// Clients that may command.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Commanders {
     /// The first commanding client, until disconnected; others get [`Status::RECEIVE_ONLY`].
+    #[value(help = None::<&str>)]
     One,
     /// All clients.
+    #[value(help = None::<&str>)]
     All,
 }
 
@@ -51,6 +58,12 @@ pub struct ControllerConfig {
     pub floor_m: f64,
 }
 
+impl Default for ControllerConfig {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
 impl ControllerConfig {
     /// Replacing forces, landing, one commander, half a second, and a floor 9.5 mm below home.
     pub const DEFAULT: Self = Self {
@@ -63,9 +76,10 @@ impl ControllerConfig {
 }
 
 /// State of the flotor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Flight {
     /// On the stator, without force.
+    #[default]
     Landed,
     /// Rising to home.
     TakingOff,
@@ -76,8 +90,9 @@ pub enum Flight {
 }
 
 /// Last command: position, velocity, force and current exclude one another.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) enum Command {
+    #[default]
     Position,
     Velocity(AxisValues),
     Forces(AxisValues),
@@ -98,7 +113,7 @@ pub(super) const KEPT: usize = 64;
 type Sides = [i32; 7];
 
 /// The controller of a Maglev 200.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Controller {
     pub(super) config: ControllerConfig,
     pub(super) gains: Gains,
@@ -155,39 +170,13 @@ impl Controller {
     pub fn new(config: ControllerConfig) -> Self {
         Self {
             config,
-            gains: Gains::default(),
-            coils: CoilSet::default(),
-            flight: Flight::Landed,
-            procedure: None,
             resets: Vec::with_capacity(GainSet::ALL.len()),
             finished: Vec::with_capacity(KEPT),
-            last_procedure_id: ProcedureId::default(),
-            command: Command::Position,
-            modes: [AxisMode::Normal; 6],
-            locked_at: [0.0; 6],
-            ranges: [[0.0; 2]; 6],
-            desired: [0.0; 6],
-            desired_told: [0.0; 6],
-            integral_n: [0.0; 6],
-            trim: [0.0; 6],
-            landing: ([Pid::ZERO; 6], 0.0),
-            faults: FaultBits::NONE,
-            injected: Injected::default(),
-            sample: Sample::HOME,
-            at: [0.0; 6],
-            speed: [0.0; 6],
-            frame: [0.0; 6],
-            gravity: [0.0; 6],
             boundary_radius_m: 0.012,
             speed_limits: [2.0, 2.0, 2.0, 20.0, 20.0, 20.0],
             servo_hz: 1000.0,
-            cell_offsets: [CellOffset::default(); 3],
-            grasp: Grasp::default(),
-            aux_v: 0.0,
-            sides: [0; 7],
-            buttons: Buttons::default(),
-            was_too_hot: false,
             events: Vec::with_capacity(KEPT),
+            ..Self::default()
         }
     }
 

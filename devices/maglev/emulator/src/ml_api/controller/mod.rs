@@ -9,6 +9,7 @@ mod gains;
 mod law;
 mod machine;
 mod procedure;
+mod progress;
 #[cfg(test)]
 mod tests;
 

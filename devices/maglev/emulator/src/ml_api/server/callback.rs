@@ -1,9 +1,9 @@
 //! Callback connection: sends an event and waits for its acknowledgement before the next one.
 
-use super::control::{is_gone, send, token_reply};
-use super::hub::{Hub, Id};
-use super::state::{CallbackEnd, Next};
-use flotor_maglev::ml_api::{Event, Intake, ReadResult};
+use super::connection::{is_gone, send};
+use super::hub::Hub;
+use super::state::{CallbackEnd, Id, Next};
+use flotor_maglev::ml_api::{Event, Frame, Intake, ReadResult, Reply, Results};
 use std::net::{Shutdown, TcpStream};
 use std::time::Duration;
 
@@ -63,4 +63,9 @@ fn tell(stream: &mut TcpStream, hub: &Hub, token: Id) -> CallbackEnd {
             return CallbackEnd::Asked;
         }
     }
+}
+
+/// Returns the reply to a token request.
+fn token_reply(token: Id) -> Frame {
+    Reply::ok(Results::Token(i32::try_from(token).unwrap_or(i32::MAX))).encode()
 }

@@ -1,12 +1,14 @@
 //! Control connection: one reply per request.
 
 use super::callback;
-use super::hub::{Hub, Id};
+use super::connection::{is_gone, send};
+use super::hub::Hub;
+use super::state::Id;
 use crate::ml_api::controller::{Answer, ProcedureId};
 use crate::ml_api::injected_fault::Deed;
 use flotor_emulation::clients::FIRST_MESSAGE;
-use flotor_maglev::ml_api::{Frame, Function, Intake, ReadResult, Reply, Request, Results, Status};
-use std::io::{self, ErrorKind, Read, Write};
+use flotor_maglev::ml_api::{Frame, Function, Intake, ReadResult, Reply, Request};
+use std::io::{self, ErrorKind, Read};
 use std::net::{Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 
@@ -102,21 +104,6 @@ fn wait(stream: &TcpStream, hub: &Hub, procedure_id: ProcedureId) -> Option<Repl
     }
 }
 
-/// Returns true if the connection is closed by the other end, or broken.
-pub(super) fn is_gone(stream: &TcpStream) -> bool {
-    let looked = stream.set_nonblocking(true).and_then(|()| stream.peek(&mut [0]));
-    let gone = match looked {
-        Ok(length) => length == 0,
-        Err(error) => !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted),
-    };
-    gone || stream.set_nonblocking(false).is_err()
-}
-
-/// Sends a frame in one write: a second one would wait for an acknowledgement (Nagle).
-pub(super) fn send(stream: &mut TcpStream, bytes: &[u8]) -> bool {
-    stream.write_all(bytes).is_ok()
-}
-
 /// Returns a frame without its last four bytes, with a matching length field.
 fn shortened(frame: &Frame) -> Vec<u8> {
     let kept = frame.bytes().len().saturating_sub(4);
@@ -125,10 +112,4 @@ fn shortened(frame: &Frame) -> Vec<u8> {
         *head = length.to_le_bytes();
     }
     bytes
-}
-
-/// Returns the reply to a token request.
-pub(super) fn token_reply(token: Id) -> Frame {
-    let token = i32::try_from(token).unwrap_or(i32::MAX);
-    Reply { status: Status::OK, results: Results::Token(token) }.encode()
 }

@@ -1,6 +1,6 @@
 //! State shared by connections and servo loop: the controller, the clients, pending events.
 
-use super::state::{Callback, CallbackEnd, Client, EVENTS, Next, State};
+use super::state::{Callback, CallbackEnd, Client, EVENTS, Id, Log, Next, State};
 use crate::controller::Sample;
 use crate::ml_api::controller::{Answer, Controller, Flight, ProcedureId, Silence};
 use crate::ml_api::injected_fault::{Deed, InjectedFault, Plan};
@@ -12,12 +12,6 @@ use std::time::{Duration, Instant};
 
 /// Age of an unacknowledged tick beyond which the loop no longer waits for it, s.
 const GIVEN_UP_S: f64 = 0.06;
-
-/// Callback for log lines.
-pub type Log = Box<dyn Fn(std::fmt::Arguments<'_>) + Send + Sync>;
-
-/// Number of a connection; for a callback connection, also the token.
-pub(super) type Id = u64;
 
 /// Shared state with its lock.
 pub struct Hub {
@@ -96,12 +90,10 @@ impl Hub {
     /// Waits until all ticks are acknowledged by the clients that respond, or until the timeout.
     #[must_use]
     pub fn wait_for_ticks_taken(&self, patience: Duration) -> TickWait {
-        let until = Instant::now() + patience;
-        let mut state = self.state();
-        loop {
+        let taken = self.wait(patience, |state| {
             let mut wanted = state.clients.iter().filter(|client| client.wants(EventKind::Tick)).peekable();
             if wanted.peek().is_none() {
-                return if state.controller.is_busy() { TickWait::Busy } else { TickWait::Unwanted };
+                return Some(if state.controller.is_busy() { TickWait::Busy } else { TickWait::Unwanted });
             }
             let open = wanted.any(|client| {
                 let callback =
@@ -110,12 +102,20 @@ impl Hub {
                     callback.tick_open_s.map_or(callback.tick.is_some(), |open_s| open_s < GIVEN_UP_S)
                 })
             });
+            (!open).then_some(TickWait::Taken)
+        });
+        taken.unwrap_or(TickWait::Open)
+    }
+
+    /// Waits until `found` returns a value for the state, which is tried again after each change; `None` on timeout.
+    fn wait<T>(&self, patience: Duration, mut found: impl FnMut(&mut State) -> Option<T>) -> Option<T> {
+        let until = Instant::now() + patience;
+        let mut state = self.state();
+        loop {
+            let value = found(&mut state);
             let rest = until.saturating_duration_since(Instant::now());
-            if !open {
-                return TickWait::Taken;
-            }
-            if rest.is_zero() {
-                return TickWait::Open;
+            if value.is_some() || rest.is_zero() {
+                return value;
             }
             state = self.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0;
         }
@@ -188,16 +188,7 @@ impl Hub {
 
     /// Waits for the reply of a procedure; `None` on timeout.
     pub(super) fn wait_for_reply(&self, procedure_id: ProcedureId, patience: Duration) -> Option<Reply> {
-        let until = Instant::now() + patience;
-        let mut state = self.state();
-        loop {
-            let reply = state.controller.reply(procedure_id);
-            let rest = until.saturating_duration_since(Instant::now());
-            if reply.is_some() || rest.is_zero() {
-                return reply;
-            }
-            state = self.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0;
-        }
+        self.wait(patience, |state| state.controller.reply(procedure_id))
     }
 
     // ------------------------------------------------------------ callback connections
@@ -221,18 +212,7 @@ impl Hub {
 
     /// Waits for the next event to send; `None` on timeout.
     pub(super) fn next(&self, token: Id, patience: Duration) -> Option<Next> {
-        let until = Instant::now() + patience;
-        let mut state = self.state();
-        loop {
-            if let Some(next) = state.take_next(token) {
-                return Some(next);
-            }
-            let rest = until.saturating_duration_since(Instant::now());
-            if rest.is_zero() {
-                return None;
-            }
-            state = self.changed.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner).0;
-        }
+        self.wait(patience, |state| state.take_next(token))
     }
 
     /// Marks the last tick as acknowledged.

@@ -7,11 +7,13 @@
 //! Rejected connections are reset: clients do not detect an orderly close and would wait for ever.
 
 mod callback;
+mod connection;
 mod control;
 mod hub;
 mod state;
 
-pub use hub::{Hub, Log, TickWait};
+pub use hub::{Hub, TickWait};
+pub use state::Log;
 
 use flotor_emulation::port::Port;
 use std::io;

@@ -1,6 +1,5 @@
 //! Shared state of clients and callback connections, with their pending events.
 
-use super::hub::{Id, Log};
 use crate::controller::Sample;
 use crate::ml_api::controller::{Answer, Commanders, Controller, Flight, Injected, Silence};
 use crate::ml_api::injected_fault::Plan;
@@ -8,6 +7,12 @@ use flotor_maglev::ml_api::{
     Event, EventKind, FaultBits, Function, Reply, Request, Results, Status, WirePose,
 };
 use std::collections::VecDeque;
+
+/// Callback for log lines.
+pub type Log = Box<dyn Fn(std::fmt::Arguments<'_>) + Send + Sync>;
+
+/// Number of a connection; for a callback connection, also the token.
+pub(super) type Id = u64;
 
 /// Largest number of queued events; a client that reads none loses the oldest.
 pub(super) const EVENTS: usize = 256;

@@ -1,0 +1,103 @@
+//! Search for a device, its pair of endpoints, and the claim of its interface.
+
+use crate::protocol::FRAME_BYTES;
+use crate::transport::address::UsbAddress;
+use rusb::{Context, Device, DeviceHandle, Direction, Error, TransferType, UsbContext};
+use std::time::{Duration, Instant};
+
+/// Timeout of a claim: the kernel may configure a device after its node appears (seen: up to 14 ms; udev rules take
+/// longer).
+const CLAIM_PATIENCE: Duration = Duration::from_secs(2);
+const CLAIM_NAP: Duration = Duration::from_millis(10);
+/// Pair of endpoints, with the interface and setting that select them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Endpoints {
+    pub(super) interface: u8,
+    pub(super) alternate: u8,
+    pub(super) input: u8,
+    pub(super) output: u8,
+    pub(super) transfer: TransferType,
+}
+
+/// Finds and claims the device at an address.
+pub(super) fn find(
+    context: &Context,
+    wanted: &UsbAddress,
+) -> Result<(DeviceHandle<Context>, Endpoints), Error> {
+    let mut problem = Error::NotFound;
+    for device in context.devices()?.iter() {
+        let descriptor = device.device_descriptor()?;
+        if (descriptor.vendor_id(), descriptor.product_id()) != (wanted.vendor, wanted.product) {
+            continue;
+        }
+        match claim(&device, wanted) {
+            Ok(found) => return Ok(found),
+            Err(error) => problem = error,
+        }
+    }
+    Err(problem)
+}
+
+fn claim(device: &Device<Context>, wanted: &UsbAddress) -> Result<(DeviceHandle<Context>, Endpoints), Error> {
+    let started = Instant::now();
+    loop {
+        let tried = try_claim(device, wanted);
+        match tried {
+            // Either not ready yet, or a lasting error: retry until the timeout.
+            Err(Error::NotFound | Error::Busy | Error::Access) if started.elapsed() < CLAIM_PATIENCE => {
+                std::thread::sleep(CLAIM_NAP);
+            }
+            settled => return settled,
+        }
+    }
+}
+
+fn try_claim(
+    device: &Device<Context>,
+    wanted: &UsbAddress,
+) -> Result<(DeviceHandle<Context>, Endpoints), Error> {
+    let handle = device.open()?;
+    if let Some(serial) = &wanted.serial {
+        let found = handle.read_serial_number_string_ascii(&device.device_descriptor()?)?;
+        if found != *serial {
+            return Err(Error::NoDevice);
+        }
+    }
+    let endpoints = endpoints(device)?.ok_or(Error::NotSupported)?;
+    // Detaches a generic driver of the kernel; where detaching is not supported, no such driver exists.
+    let _ = handle.set_auto_detach_kernel_driver(true);
+    handle.claim_interface(endpoints.interface)?;
+    handle.set_alternate_setting(endpoints.interface, endpoints.alternate)?;
+    Ok((handle, endpoints))
+}
+
+/// Returns the best pair of endpoints: interrupt before bulk, alternate settings before setting 0.
+fn endpoints(device: &Device<Context>) -> Result<Option<Endpoints>, Error> {
+    let configuration = device.active_config_descriptor()?;
+    let mut found = Vec::new();
+    for interface in configuration.interfaces() {
+        for setting in interface.descriptors() {
+            for transfer in [TransferType::Interrupt, TransferType::Bulk] {
+                let first = |direction| {
+                    let mut all = setting.endpoint_descriptors();
+                    all.find(|endpoint| {
+                        endpoint.direction() == direction
+                            && endpoint.transfer_type() == transfer
+                            && usize::from(endpoint.max_packet_size()) >= FRAME_BYTES
+                    })
+                };
+                if let (Some(input), Some(output)) = (first(Direction::In), first(Direction::Out)) {
+                    found.push(Endpoints {
+                        interface: interface.number(),
+                        alternate: setting.setting_number(),
+                        input: input.address(),
+                        output: output.address(),
+                        transfer,
+                    });
+                }
+            }
+        }
+    }
+    found.sort_by_key(|pair| (pair.transfer != TransferType::Interrupt, pair.alternate == 0));
+    Ok(found.first().copied())
+}
