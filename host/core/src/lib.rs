@@ -8,7 +8,7 @@
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between its two ends.
 //! - [`guidance`]: the parameters that guide a simulated hand.
 //! - [`Change`]: a change to a plugin while the loop ran.
-//! - [`lock()`]: locks of threads other than the loop.
+//! - [`words`]: words of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
 //!
 //! The crate reads no files, starts no threads and, apart from [`lock()`], makes no system calls.
 #![forbid(unsafe_code)]
@@ -30,6 +30,7 @@ mod random;
 pub mod region;
 pub mod rendered_boundary;
 pub mod trace;
+pub mod words;
 
 pub use change::{Change, ChangeOutcome, ChangeSubject};
 pub use clock::{Clock, period_ns, to_ns};

@@ -3,6 +3,7 @@
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
 use crate::ModelOutputs;
+use crate::words::Decoder;
 use flotor_hal::{Demand, Pose, Twist, Wrench};
 use flotor_sync::Words;
 
@@ -238,29 +239,21 @@ impl Words<RECORD_WORDS> for TickRecord {
 
     #[inline]
     fn from_words(words: &[u64; RECORD_WORDS]) -> Self {
-        let mut rest = words.iter().copied();
-        let mut word = || rest.next().unwrap_or(0);
-        let (number, time_ns, dt_ns) = (word(), word(), word());
+        let mut words = Decoder::of(words);
+        let (number, time_ns, dt_ns) = (words.word(), words.word(), words.word());
         #[allow(clippy::cast_possible_truncation)] // two parts of one word
         let (tick, device) = (number & TICK_MASK, (number >> DEVICE_BIT) as u16);
         let computed = ABSENT.iter().fold(Demand::FORCE, |computed, (output, bit)| {
             if number & bit == 0 { computed.with(*output) } else { computed }
         });
-        let mut number = || f64::from_bits(word());
-        let mut three = || std::array::from_fn(|_| number());
-        let position_m = three();
-        let orientation_xyzw = [number(), number(), number(), number()];
-        let mut three = || std::array::from_fn(|_| number());
-        let twist = Twist { linear_m_per_s: three(), angular_rad_per_s: three() };
-        let mut wrench = || Wrench { force_n: three(), torque_nm: three() };
-        let (model, commanded, delivered) = (wrench(), wrench(), wrench());
-        let (energy_j, port_energy_j) = (number(), number());
+        let (pose, twist) = words.motion();
+        let (model, commanded, delivered) = (words.wrench(), words.wrench(), words.wrench());
+        let [energy_j, port_energy_j] = words.numbers();
         let model = ModelOutputs::new(model, energy_j).limited_to(computed);
-        let flags = word();
+        let flags = words.word();
         #[allow(clippy::cast_possible_truncation)] // two halves of one word
         let (events, buttons) = (Events::from_bits(flags as u32), (flags >> 32) as u32);
-        let (lateness_ns, compute_ns) = (word(), word());
-        let pose = Pose { position_m, orientation_xyzw };
+        let (lateness_ns, compute_ns) = (words.word(), words.word());
         Self {
             tick,
             device,

@@ -1,8 +1,8 @@
 //! Execution of a model: in the loop, asynchronously, or in a worker process.
 
 pub mod asynchronous;
-mod field_words;
 pub mod process;
+mod records;
 
 use asynchronous::AsynchronousModel;
 use flotor_hal::abi::CallStatus;
@@ -37,23 +37,34 @@ pub enum Stepped {
     Gone,
 }
 
+impl From<CallStatus> for Stepped {
+    #[inline]
+    fn from(status: CallStatus) -> Self {
+        if status == CallStatus::Ok { Self::Answered } else { Self::Broken }
+    }
+}
+
+impl<T> Reply<(CallStatus, T)> {
+    /// Stores an answer; returns the result of the step.
+    #[inline]
+    fn into_stepped(self, place: &mut T) -> Stepped {
+        match self {
+            Self::Answered((status, answer)) => {
+                *place = answer;
+                status.into()
+            }
+            Self::Late => Stepped::Late,
+            Self::Gone => Stepped::Gone,
+        }
+    }
+}
+
 impl Engine {
     /// Steps the model; `output` is only valid for [`Stepped::Answered`]. Real-time: bounded by the model or its timeout, no allocation.
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
-        let answered = |status| match status {
-            CallStatus::Ok => Stepped::Answered,
-            _ => Stepped::Broken,
-        };
         match self {
-            Self::Here(model) => answered(model.step(input, output)),
-            Self::Process(worker) => match worker.step(input) {
-                Reply::Answered((status, answer)) => {
-                    *output = answer;
-                    answered(status)
-                }
-                Reply::Late => Stepped::Late,
-                Reply::Gone => Stepped::Gone,
-            },
+            Self::Here(model) => model.step(input, output).into(),
+            Self::Process(worker) => worker.step(input).into_stepped(output),
             Self::Asynchronous(model) => model.step(input, output),
         }
     }
@@ -136,20 +147,9 @@ impl Engine {
 
     /// Computes the linear field at an input; `field` is only valid for [`Stepped::Answered`]. Not real-time.
     pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
-        let answered = |status| match status {
-            CallStatus::Ok => Stepped::Answered,
-            _ => Stepped::Broken,
-        };
         match self {
-            Self::Here(model) => answered(model.linear_field(input, field)),
-            Self::Process(worker) => match worker.linear_field(input) {
-                Reply::Answered((status, answer)) => {
-                    *field = answer;
-                    answered(status)
-                }
-                Reply::Late => Stepped::Late,
-                Reply::Gone => Stepped::Gone,
-            },
+            Self::Here(model) => model.linear_field(input, field).into(),
+            Self::Process(worker) => worker.linear_field(input).into_stepped(field),
             Self::Asynchronous(_) => Stepped::Broken,
         }
     }

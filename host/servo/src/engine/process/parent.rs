@@ -2,11 +2,13 @@
 
 use super::child::WHOLE;
 use super::memory::{SharedMemory, create_file};
-use super::shared_words::{DEMANDS, NO_DEMAND, Operation, wait_for_change};
+use super::shared_words::{Operation, wait_for_change};
 use super::{Greeting, Reply};
+use crate::engine::records::demand_of;
 use crate::last_stop::spawn_unblocked;
 use crate::platform::processes;
 use crate::{THREAD_ADVICE, monotonic_ns};
+use flotor_core::lock;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
     ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind,
@@ -15,9 +17,9 @@ use flotor_hal::{
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
+use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Sender, channel};
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Start-up settings of a worker.
@@ -79,7 +81,7 @@ impl Worker {
             is_gone: false,
             timeout_ns: config.timeout_ns,
             parameters: Vec::new(),
-            serves: NO_DEMAND,
+            serves: Demand::FORCE,
             remembers: Memory::PathDependent,
             has_field: false,
         };
@@ -89,9 +91,7 @@ impl Worker {
                 worker.has_field = has_field;
                 worker.remembers = if remembers { Memory::PathDependent } else { Memory::Stateless };
                 worker.parameters = parameters;
-                let served =
-                    DEMANDS.iter().zip(serves).filter_map(|(demand, served)| served.then_some(*demand));
-                worker.serves = served.fold(NO_DEMAND, Demand::with);
+                worker.serves = demand_of(serves);
                 Ok(worker)
             }
             Ok(Greeting::Refused { kind, reason }) => {
@@ -137,13 +137,8 @@ impl Worker {
     /// Steps the model. Real-time: bounded by the reply timeout, no allocation.
     #[inline]
     pub fn step(&mut self, input: &Input) -> Reply<(CallStatus, Output)> {
-        let timeout_ns = self.timeout_ns;
-        self.request(
-            Operation::Step,
-            timeout_ns,
-            |memory| memory.put_input(input),
-            |memory| (memory.status(), memory.output()),
-        )
+        let put = |memory: &SharedMemory| memory.put_input(input);
+        self.request(Operation::Step, put, |memory| (memory.status(), memory.output()))
     }
 
     /// Returns true if the model has a linear field.
@@ -153,13 +148,8 @@ impl Worker {
 
     /// Computes the linear field at an input. Not real-time: bounded by the reply timeout.
     pub fn linear_field(&mut self, input: &Input) -> Reply<(CallStatus, LinearField)> {
-        let timeout_ns = self.timeout_ns;
-        self.request(
-            Operation::Field,
-            timeout_ns,
-            |memory| memory.put_input(input),
-            |memory| (memory.status(), memory.field()),
-        )
+        let put = |memory: &SharedMemory| memory.put_input(input);
+        self.request(Operation::Field, put, |memory| (memory.status(), memory.field()))
     }
 
     /// Returns the active region of the model; everywhere while a pending request may change it. Real-time: bounded, no allocation.
@@ -178,14 +168,12 @@ impl Worker {
             memory.parameter.store(index as u64, Ordering::Relaxed);
             memory.value.store(value.to_bits(), Ordering::Relaxed);
         };
-        let timeout_ns = self.timeout_ns;
-        self.request(Operation::SetParameter, timeout_ns, put, |memory| memory.status())
+        self.request(Operation::SetParameter, put, |memory| memory.status())
     }
 
     /// Clears the history of the model. Real-time: bounded by the reply timeout, no allocation.
     pub fn reset(&mut self) -> Reply<CallStatus> {
-        let timeout_ns = self.timeout_ns;
-        self.request(Operation::Reset, timeout_ns, |_| (), |memory| memory.status())
+        self.request(Operation::Reset, |_| (), |memory| memory.status())
     }
 
     /// Returns the model's dependence on the path of the handle.
@@ -196,7 +184,6 @@ impl Worker {
     fn request<T>(
         &mut self,
         operation: Operation,
-        timeout_ns: u64,
         put: impl FnOnce(&SharedMemory),
         take: impl FnOnce(&SharedMemory) -> T,
     ) -> Reply<T> {
@@ -211,7 +198,7 @@ impl Worker {
         put(&self.memory);
         self.number = self.number.wrapping_add(1);
         self.memory.ask(self.number, operation);
-        let deadline_ns = monotonic_ns().saturating_add(timeout_ns);
+        let deadline_ns = monotonic_ns().saturating_add(self.timeout_ns);
         while !self.memory.is_answered(self.number) {
             let left_ns = deadline_ns.saturating_sub(monotonic_ns());
             if left_ns == 0 {
@@ -289,7 +276,7 @@ fn spawn(command: Command) -> io::Result<Child> {
     static STARTER: Mutex<Option<Sender<Start>>> = Mutex::new(None);
     let (reply, child) = channel();
     {
-        let mut starter = STARTER.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut starter = lock(&STARTER);
         let starter = match &mut *starter {
             Some(starter) => starter,
             none => none.insert(start_starter()?),
