@@ -12,10 +12,7 @@ mod outbox;
 mod watcher;
 
 use crate::platform::{Listening, Stream, has_left};
-use crate::{
-    Ask, ChangeMessage, Directory, DirectoryError, End, EndKind, Greeting, Kind, Listener, RefusalCause,
-    frame,
-};
+use crate::{Ask, Directory, DirectoryError, End, EndKind, Greeting, Kind, Listener, RefusalCause, frame};
 use flotor_core::Change;
 use flotor_core::demand::ObserverDemand;
 use flotor_core::trace::TickRecord;
@@ -136,12 +133,11 @@ impl Publication {
 
     /// Sends a change to all clients, before the first tick that uses it. Does not wait.
     pub fn change(&self, change: &Change) {
-        let message = ChangeMessage::from(change);
-        self.shared.greeting().keep(&message);
-        let Ok(payload) = serde_json::to_vec(&message) else { return };
-        let (message, bytes) = (Arc::new(message), frame(Kind::Change, &payload));
+        self.shared.greeting().keep(change);
+        let Ok(payload) = serde_json::to_vec(change) else { return };
+        let (change, bytes) = (Arc::new(change.clone()), frame(Kind::Change, &payload));
         for watcher in self.shared.watchers().iter() {
-            watcher.outbox.change(Arc::clone(&message), bytes.clone());
+            watcher.outbox.change(Arc::clone(&change), bytes.clone());
         }
     }
 
