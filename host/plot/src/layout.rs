@@ -9,7 +9,7 @@ use super::labels::{
     HEADING_ROW_PX, Heading, LEGEND_ROW_PX, Legend, MARK_ROW_PX, MarkLabel, side_gutter_px, top_labels,
 };
 use super::mark::Direction;
-use super::path::{Projection, Rect};
+use super::projection::{Projection, Rect};
 use super::series::Shape;
 use super::text;
 use super::theme::font_px;

@@ -6,7 +6,7 @@
 
 use super::Figure;
 use super::axis::{Domain, Scale};
-use super::cover::count_covers;
+use super::drawing::{Drawing, count_covers, draw};
 use super::labels::{
     HEADING_ROW_PX, LEGEND_ROW_PX, Legend, LegendEntry, MARK_ROW_PX, SIDE_LABEL_GAP_PX, baseline, side_labels,
 };
@@ -15,7 +15,8 @@ use super::layout::{
     TITLE_LINE_PX,
 };
 use super::mark::{Direction, MarkLook};
-use super::path::{Drawing, Path, Projection, draw};
+use super::path::Path;
+use super::projection::Projection;
 use super::series::Shape;
 use super::spans::Spans;
 use super::text::{self, escape, px};
