@@ -1,10 +1,11 @@
 //! Host side: a model in a worker process.
 
+use super::Greeting;
 use super::child::WHOLE;
 use super::memory::{SharedMemory, create_file};
 use super::shared_words::{Operation, wait_for_change};
-use super::{Greeting, Reply};
 use crate::engine::records::demand_of;
+use crate::engine::stepped::Stepped;
 use crate::last_stop::spawn_unblocked;
 use crate::platform::processes;
 use crate::{THREAD_ADVICE, monotonic_ns};
@@ -136,9 +137,13 @@ impl Worker {
 
     /// Steps the model. Real-time: bounded by the reply timeout, no allocation.
     #[inline]
-    pub fn step(&mut self, input: &Input) -> Reply<(CallStatus, Output)> {
+    pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
         let put = |memory: &SharedMemory| memory.put_input(input);
-        self.request(Operation::Step, put, |memory| (memory.status(), memory.output()))
+        let reply = self.request(Operation::Step, put, |memory| {
+            *output = memory.output();
+            memory.status()
+        });
+        reply.map_or_else(|missing| missing, Stepped::from)
     }
 
     /// Returns true if the model has a linear field.
@@ -147,9 +152,13 @@ impl Worker {
     }
 
     /// Computes the linear field at an input. Not real-time: bounded by the reply timeout.
-    pub fn linear_field(&mut self, input: &Input) -> Reply<(CallStatus, LinearField)> {
+    pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
         let put = |memory: &SharedMemory| memory.put_input(input);
-        self.request(Operation::Field, put, |memory| (memory.status(), memory.field()))
+        let reply = self.request(Operation::Field, put, |memory| {
+            *field = memory.field();
+            memory.status()
+        });
+        reply.map_or_else(|missing| missing, Stepped::from)
     }
 
     /// Returns the active region of the model; everywhere while a pending request may change it. Real-time: bounded, no allocation.
@@ -163,17 +172,20 @@ impl Worker {
     }
 
     /// Changes a live parameter at a tick boundary. Real-time: bounded by the reply timeout, no allocation.
-    pub fn set_parameter(&mut self, index: usize, value: f64) -> Reply<CallStatus> {
+    pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         let put = |memory: &SharedMemory| {
             memory.parameter.store(index as u64, Ordering::Relaxed);
             memory.value.store(value.to_bits(), Ordering::Relaxed);
         };
+        // Without a reply not applied: the next step reports a late or ended worker.
         self.request(Operation::SetParameter, put, |memory| memory.status())
+            .unwrap_or(CallStatus::Unsupported)
     }
 
     /// Clears the history of the model. Real-time: bounded by the reply timeout, no allocation.
-    pub fn reset(&mut self) -> Reply<CallStatus> {
-        self.request(Operation::Reset, |_| (), |memory| memory.status())
+    pub fn reset(&mut self) -> CallStatus {
+        // The next step reports a late or ended worker.
+        self.request(Operation::Reset, |_| (), |memory| memory.status()).unwrap_or(CallStatus::Ok)
     }
 
     /// Returns the model's dependence on the path of the handle.
@@ -181,18 +193,19 @@ impl Worker {
         self.remembers
     }
 
-    fn request<T>(
+    /// Sends a request and waits for the reply; returns its status, or the result of a step without a reply.
+    fn request(
         &mut self,
         operation: Operation,
         put: impl FnOnce(&SharedMemory),
-        take: impl FnOnce(&SharedMemory) -> T,
-    ) -> Reply<T> {
+        take: impl FnOnce(&SharedMemory) -> CallStatus,
+    ) -> Result<CallStatus, Stepped> {
         if self.is_gone {
-            return Reply::Gone;
+            return Err(Stepped::Gone);
         }
         // No new request while the last one is pending: its data in the memory is still in use.
         if self.is_pending && !self.memory.is_answered(self.number) {
-            return self.late();
+            return Err(self.late());
         }
         self.is_pending = false;
         put(&self.memory);
@@ -203,17 +216,17 @@ impl Worker {
             let left_ns = deadline_ns.saturating_sub(monotonic_ns());
             if left_ns == 0 {
                 self.is_pending = true;
-                return self.late();
+                return Err(self.late());
             }
             wait_for_change(&self.memory.reply, self.number.wrapping_sub(1), left_ns);
         }
-        Reply::Answered(take(&self.memory))
+        Ok(take(&self.memory))
     }
 
     /// Distinguishes a late worker from an ended one, with one system call.
-    fn late<T>(&mut self) -> Reply<T> {
+    fn late(&mut self) -> Stepped {
         self.is_gone = self.child.try_wait().is_ok_and(|end| end.is_some());
-        if self.is_gone { Reply::Gone } else { Reply::Late }
+        if self.is_gone { Stepped::Gone } else { Stepped::Late }
     }
 
     /// Returns the last message of the model, or the exit status of its process. Not real-time.
