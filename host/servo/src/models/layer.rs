@@ -77,6 +77,14 @@ struct Object {
     is_disabled: bool,
 }
 
+/// Tick, state of the device and demanded outputs of a step.
+#[derive(Clone, Copy)]
+pub(super) struct StepContext<'a> {
+    pub(super) tick: &'a Tick,
+    pub(super) state: &'a DeviceState,
+    pub(super) demand: TickDemand,
+}
+
 /// Wrench and energy of one layer in a tick. An output that was not computed is NaN.
 #[derive(Clone, Copy)]
 pub(super) struct Contribution {
@@ -211,17 +219,12 @@ impl Layer {
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
     #[inline(always)] // 3 ns: the result stays in registers
-    pub(super) fn step(
-        &mut self,
-        tick: &Tick,
-        state: &DeviceState,
-        demand: TickDemand,
-        events: &mut Events,
-    ) -> Contribution {
+    pub(super) fn step(&mut self, context: &StepContext<'_>, events: &mut Events) -> Contribution {
+        let tick = context.tick;
         match self.budget.allowed(tick.time_ns) {
             Allowed::Asked => {
                 let (begun_ns, late_answers) = (self.budget.begin(), self.health.late_answers);
-                let share = self.ask(tick, state, demand, events);
+                let share = self.ask(context, events);
                 if let Some(begun_ns) = begun_ns {
                     let is_there = self.health.late_answers == late_answers;
                     let answer = if is_there { Answer::There } else { Answer::Missing };
@@ -246,13 +249,8 @@ impl Layer {
 
     /// Steps all objects that can act at the handle; the others are not called.
     #[inline]
-    fn ask(
-        &mut self,
-        tick: &Tick,
-        state: &DeviceState,
-        demand: TickDemand,
-        events: &mut Events,
-    ) -> Contribution {
+    fn ask(&mut self, context: &StepContext<'_>, events: &mut Events) -> Contribution {
+        let StepContext { tick, state, demand } = *context;
         let Self { objects, broad, serves, memory, health, .. } = self;
         let mut share = Contribution::NONE;
         broad.for_each_near(objects, state.pose.position(), |object| {
