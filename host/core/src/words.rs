@@ -19,14 +19,11 @@ pub struct Encoder<const N: usize> {
 
 impl<const N: usize> Encoder<N> {
     /// Creates an encoder of a record with zeros.
-    #[inline]
-    #[must_use]
     pub const fn of_zeros() -> Self {
         Self { words: [0; N], count: 0 }
     }
 
     /// Appends words; drops those beyond the record.
-    #[inline]
     pub fn words<const M: usize>(&mut self, words: [u64; M]) -> &mut Self {
         let rest = self.words.iter_mut().skip(self.count);
         rest.zip(words).for_each(|(place, word)| *place = word);
@@ -35,41 +32,34 @@ impl<const N: usize> Encoder<N> {
     }
 
     /// Appends numbers.
-    #[inline]
     pub fn numbers<const M: usize>(&mut self, numbers: [f64; M]) -> &mut Self {
         self.words(numbers.map(f64::to_bits))
     }
 
     /// Appends pose and twist, m, unit quaternion, m/s and rad/s.
-    #[inline]
     pub fn motion(&mut self, pose: &Pose, twist: &Twist) -> &mut Self {
         self.pose(pose).numbers(twist.linear_m_per_s).numbers(twist.angular_rad_per_s)
     }
 
     /// Appends a wrench, N and N·m.
-    #[inline]
     pub fn wrench(&mut self, wrench: &Wrench) -> &mut Self {
         self.numbers(wrench.force_n).numbers(wrench.torque_nm)
     }
 
     /// Appends a linear field.
-    #[inline]
     pub fn field(&mut self, field: &LinearField) -> &mut Self {
         self.pose(&field.anchor).wrench(&field.wrench);
-        field.stiffness.iter().for_each(|row| {
-            self.numbers(*row);
-        });
+        for row in field.stiffness {
+            self.numbers(row);
+        }
         self.numbers([field.valid_m, field.valid_rad]).words([field.time_ns])
     }
 
     /// Returns the record.
-    #[inline]
-    #[must_use]
     pub const fn finish(&self) -> [u64; N] {
         self.words
     }
 
-    #[inline]
     fn pose(&mut self, pose: &Pose) -> &mut Self {
         self.numbers(pose.position_m).numbers(pose.orientation_xyzw)
     }
@@ -83,7 +73,6 @@ pub struct Decoder<'a> {
 impl<'a> Decoder<'a> {
     /// Creates a decoder of a record.
     #[inline]
-    #[must_use]
     pub fn of(words: &'a [u64]) -> Self {
         Self { words: words.iter() }
     }
