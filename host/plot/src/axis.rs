@@ -163,6 +163,13 @@ pub(super) struct Extent {
 impl Extent {
     pub(super) const EMPTY: Self = Self { low: f64::INFINITY, high: f64::NEG_INFINITY };
 
+    /// Returns the range of some coordinates.
+    pub(super) fn of(coordinates: impl IntoIterator<Item = f64>) -> Self {
+        let mut extent = Self::EMPTY;
+        coordinates.into_iter().for_each(|coordinate| extent.include(coordinate));
+        extent
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.low > self.high
     }
@@ -172,9 +179,8 @@ impl Extent {
         self.high = self.high.max(coordinate);
     }
 
-    pub(super) fn merge(&mut self, other: Self) {
-        self.low = self.low.min(other.low);
-        self.high = self.high.max(other.high);
+    pub(super) fn with(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 }
 
