@@ -20,7 +20,8 @@ pub struct PeerState {
 pub struct TankState {
     /// Energy available, J; below zero if more has come out than had gone in.
     pub level_j: f64,
-    /// Lowest level so far, J.
+    /// Lowest level so far, J: with the controller on, below zero only by the energy that came out while a force acted for longer
+    /// than a period, in ticks late or missed, or on a handle faster than expected.
     pub lowest_j: f64,
     /// Energy that the hand has put in so far less energy that has come out, J.
     pub gone_in_j: f64,
