@@ -108,9 +108,7 @@ pub(crate) fn take_sent() {
     if program_handles_signals() {
         return;
     }
-    let set = set_of(&SENT);
-    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
-    unsafe { libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const set, std::ptr::null_mut()) };
+    unblock(&SENT);
 }
 
 fn handler() -> libc::sighandler_t {
@@ -179,12 +177,9 @@ pub(crate) fn exit_process(code: i32) -> ! {
 
 /// Sends a signal to the calling thread, which handles it before this function returns.
 fn raise(signal: c_int) {
-    let set = set_of(&[signal]);
-    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
-    unsafe {
-        libc::raise(signal);
-        libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const set, std::ptr::null_mut());
-    }
+    // SAFETY: takes no memory; the handler of the signal may run at any time.
+    unsafe { libc::raise(signal) };
+    unblock(&[signal]);
 }
 
 /// Writes to standard error, once and without error handling: the reader may be closed.
@@ -344,8 +339,7 @@ pub fn ignore_no_signal() {
 /// # Errors
 /// If the system cannot start the process.
 pub fn spawn_unblocked(command: &mut Command) -> io::Result<Child> {
-    let before = blocked();
-    set_blocked(&set_of(&[]));
+    let before = set_blocked(&set_of(&[]));
     let child = command.spawn();
     set_blocked(&before);
     child
@@ -445,7 +439,9 @@ fn set_action(signal: c_int, action: &sigaction) {
     let _ = unsafe { libc::sigaction(signal, action, std::ptr::null_mut()) };
 }
 
-fn set_of(signals: &[c_int]) -> sigset_t {
+/// Returns the set of these signals.
+#[must_use]
+pub fn set_of(signals: &[i32]) -> sigset_t {
     let mut set = MaybeUninit::<sigset_t>::zeroed();
     // SAFETY: memory that is there for the call, which initialises it; plain data.
     let mut set = unsafe {
@@ -459,7 +455,9 @@ fn set_of(signals: &[c_int]) -> sigset_t {
     set
 }
 
-fn all_but(signals: &[c_int]) -> sigset_t {
+/// Returns the set of all signals except these.
+#[must_use]
+pub fn all_but(signals: &[i32]) -> sigset_t {
     let mut set = set_of(&[]);
     // SAFETY: an initialised set, here and below.
     unsafe { libc::sigfillset(&raw mut set) };
@@ -470,16 +468,25 @@ fn all_but(signals: &[c_int]) -> sigset_t {
     set
 }
 
+/// Replaces the set of blocked signals of the calling thread; returns the one before. Not real-time.
+pub fn set_blocked(set: &sigset_t) -> sigset_t {
+    let mut before = set_of(&[]);
+    // SAFETY: initialised sets that are there for the call.
+    unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, set, &raw mut before) };
+    before
+}
+
+fn unblock(signals: &[c_int]) {
+    let set = set_of(signals);
+    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
+    unsafe { libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const set, std::ptr::null_mut()) };
+}
+
 fn blocked() -> sigset_t {
     let mut set = set_of(&[]);
     // SAFETY: nothing is changed, and the system writes to memory that is there for the call.
     unsafe { libc::pthread_sigmask(libc::SIG_BLOCK, std::ptr::null(), &raw mut set) };
     set
-}
-
-fn set_blocked(set: &sigset_t) {
-    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
-    unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, set, std::ptr::null_mut()) };
 }
 
 fn holds(set: &sigset_t, signal: c_int) -> bool {
