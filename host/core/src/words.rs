@@ -83,16 +83,10 @@ impl<'a> Decoder<'a> {
         self.words.next().copied().unwrap_or(0)
     }
 
-    /// Returns the next number.
-    #[inline]
-    pub fn number(&mut self) -> f64 {
-        f64::from_bits(self.word())
-    }
-
     /// Returns the next numbers.
     #[inline]
     pub fn numbers<const M: usize>(&mut self) -> [f64; M] {
-        std::array::from_fn(|_| self.number())
+        std::array::from_fn(|_| f64::from_bits(self.word()))
     }
 
     /// Returns the next pose and twist.
@@ -110,14 +104,10 @@ impl<'a> Decoder<'a> {
     /// Returns the next linear field.
     #[inline]
     pub fn field(&mut self) -> LinearField {
-        LinearField {
-            anchor: self.pose(),
-            wrench: self.wrench(),
-            stiffness: std::array::from_fn(|_| self.numbers()),
-            valid_m: self.number(),
-            valid_rad: self.number(),
-            time_ns: self.word(),
-        }
+        let (anchor, wrench) = (self.pose(), self.wrench());
+        let stiffness = std::array::from_fn(|_| self.numbers());
+        let [valid_m, valid_rad] = self.numbers();
+        LinearField { anchor, wrench, stiffness, valid_m, valid_rad, time_ns: self.word() }
     }
 
     #[inline]

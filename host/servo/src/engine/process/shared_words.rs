@@ -14,6 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Operation that the host requests of a worker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
 pub(super) enum Operation {
     Step,
     SetParameter,
@@ -22,30 +23,13 @@ pub(super) enum Operation {
 }
 
 impl Operation {
-    const fn code(self) -> u32 {
-        match self {
-            Self::Step => 0,
-            Self::SetParameter => 1,
-            Self::Reset => 2,
-            Self::Field => 3,
-        }
-    }
-
-    const fn from_code(code: u32) -> Option<Self> {
-        Some(match code {
-            0 => Self::Step,
-            1 => Self::SetParameter,
-            2 => Self::Reset,
-            3 => Self::Field,
-            _ => return None,
-        })
-    }
+    const ALL: [Self; 4] = [Self::Step, Self::SetParameter, Self::Reset, Self::Field];
 }
 
 impl SharedPage {
     /// Host side: sends a request under a new number. Real-time: one system call.
     pub(super) fn ask(&self, number: u32, operation: Operation) {
-        self.operation.store(operation.code(), Ordering::Relaxed);
+        self.operation.store(operation as u32, Ordering::Relaxed);
         // Release: a worker that reads the number also reads the request.
         self.request.store(number, Ordering::Release);
         wake(&self.request);
@@ -58,7 +42,8 @@ impl SharedPage {
 
     /// Worker side: returns the requested operation; `None` for an unknown code.
     pub(super) fn operation(&self) -> Option<Operation> {
-        Operation::from_code(self.operation.load(Ordering::Relaxed))
+        let code = self.operation.load(Ordering::Relaxed);
+        Operation::ALL.into_iter().find(|operation| *operation as u32 == code)
     }
 
     /// Worker side: sends the reply to a request.
@@ -106,7 +91,7 @@ impl SharedPage {
     pub(super) fn output(&self) -> Output {
         let words = load(&self.output);
         let mut words = Decoder::of(&words);
-        let (wrench, energy_j) = (words.wrench(), words.number());
+        let (wrench, [energy_j]) = (words.wrench(), words.numbers());
         let status = u32::try_from(words.word()).ok().and_then(StepStatus::from_code);
         let (wrench, status) = status.map_or((NOT_USABLE, StepStatus::Ok), |status| (wrench, status));
         Output::new(wrench, energy_j, status)
