@@ -175,7 +175,7 @@ impl RemoteEnd {
     #[inline]
     #[must_use]
     pub fn is_cut(&self) -> bool {
-        self.claims.is_cut()
+        self.claims.is_cut
     }
 
     /// Returns the state of this end's energy tank. Real-time: bounded, no allocation.
@@ -187,7 +187,7 @@ impl RemoteEnd {
     /// Returns the statistics of the partner's messages. Real-time: bounded, no allocation.
     #[must_use]
     pub fn link(&self) -> LinkStatistics {
-        LinkStatistics { accepted_j: self.claims.accepted_j(), cut: self.claims.cut(), ..self.link }
+        LinkStatistics { accepted_j: self.claims.accepted_j, cut: self.claims.cut, ..self.link }
     }
 
     /// Processes a new message, or checks the timeout.
@@ -242,7 +242,7 @@ impl RemoteEnd {
         let mapping = self.end.mapping();
         let accepted = self.claims.accept(&dispatch.state, here, mapping, silent_ns as f64 * 1.0e-9);
         self.end.receive(&accepted);
-        self.link.cut_ticks += u64::from(self.claims.is_cut());
+        self.link.cut_ticks += u64::from(self.claims.is_cut);
         if self.claims.is_too_much() {
             if let Some(place) = self.link.rejected_runs.iter_mut().find(|run| **run == 0) {
                 *place = dispatch.run;
