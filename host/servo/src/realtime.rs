@@ -3,7 +3,7 @@
 use crate::guest::is_guest;
 use crate::platform::Duty;
 use crate::platform::scheduling::{
-    self, CORE_ADVICE, MAX_CORES, MEMORY_ADVICE, NoSuchCore, THREAD_ADVICE, priority_advice,
+    self, CORE_ADVICE, MAX_CORES, MEMORY_ADVICE, THREAD_ADVICE, priority_advice,
 };
 
 /// Core of the machine, by its number in the system.
@@ -98,9 +98,8 @@ pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
 
 /// Pins the calling thread to one core; other threads of the process are not affected.
 fn pin(Core(number): Core) -> Result<(), String> {
-    scheduling::pin(number).map_err(|NoSuchCore| {
-        format!("--core {number}: the machine lacks this core, or this process may not use it")
-    })
+    scheduling::pin(number)
+        .map_err(|_| format!("--core {number}: the machine lacks this core, or this process may not use it"))
 }
 
 /// Requests the priority of a worker for the calling thread. Not real-time; without it the worker is only slower.

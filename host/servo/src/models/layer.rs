@@ -44,20 +44,11 @@ impl ModelHealth {
         *self == Self { late_answers: self.late_answers, ..Self::default() }
     }
 
-    fn reject(&mut self, tick: u64) {
-        self.rejected_ticks += 1;
-        self.first_rejected.get_or_insert(tick);
-    }
-
+    /// Counts a tick with a problem, and stores the first one.
     #[cold]
-    fn change_floats(&mut self, tick: u64) {
-        self.float_changes += 1;
-        self.first_float_change.get_or_insert(tick);
-    }
-
-    fn late(&mut self, tick: u64) {
-        self.late_ticks += 1;
-        self.first_late.get_or_insert(tick);
+    fn count(counter: &mut u64, first: &mut Option<u64>, tick: u64) {
+        *counter += 1;
+        first.get_or_insert(tick);
     }
 }
 
@@ -139,14 +130,15 @@ pub struct Layer {
     objects: Box<[Object]>,
     broad: BroadPhase,
     /// Outputs that the model can compute.
-    serves: Demand,
+    pub(super) serves: Demand,
     memory: Memory,
     budget: TimeBudget,
     /// Last contribution, which fades out after too many overruns.
     last: Contribution,
-    blend: Blend,
+    /// Weight, priority and fade time.
+    pub(super) blend: Blend,
     /// Health of this layer alone; a replacement starts anew.
-    health: ModelHealth,
+    pub(super) health: ModelHealth,
     /// Number of replacements of the model when the layer was put in.
     pub(super) generation: u16,
 }
@@ -197,16 +189,6 @@ impl Layer {
     /// Returns the number of replacements of the model when the layer was put in.
     pub fn generation(&self) -> u16 {
         self.generation
-    }
-
-    /// Returns the outputs that the model can compute.
-    pub(super) fn serves(&self) -> Demand {
-        self.serves
-    }
-
-    /// Returns weight, priority and fade time of the layer.
-    pub(super) fn blend(&self) -> &Blend {
-        &self.blend
     }
 
     /// Returns the box in the device frame in which any object can act; `None` for everywhere. Real-time.
@@ -299,11 +281,6 @@ impl Layer {
         worst
     }
 
-    /// Returns the health counters so far.
-    pub(super) fn health(&self) -> ModelHealth {
-        self.health
-    }
-
     /// Returns a report on the layer as model number `model`. Queries the last message of an unhealthy model only, and calls `on_query`
     /// before. Not real-time.
     pub fn report(&mut self, model: usize, on_query: impl FnOnce()) -> LayerReport {
@@ -360,7 +337,7 @@ impl Object {
         if self.model.float_changes() != self.float_changes {
             self.float_changes = self.model.float_changes();
             events.insert(Events::FLOAT_ENVIRONMENT);
-            health.change_floats(input.tick);
+            ModelHealth::count(&mut health.float_changes, &mut health.first_float_change, input.tick);
         }
         match stepped {
             Stepped::Answered => {
@@ -370,7 +347,11 @@ impl Object {
                     Some(_) => {}
                     None => {
                         self.last = None;
-                        health.reject(input.tick);
+                        ModelHealth::count(
+                            &mut health.rejected_ticks,
+                            &mut health.first_rejected,
+                            input.tick,
+                        );
                     }
                 }
                 usable
@@ -383,7 +364,7 @@ impl Object {
             }
             Stepped::Silent => {
                 events.insert(Events::MODEL_OVERRUN);
-                health.late(input.tick);
+                ModelHealth::count(&mut health.late_ticks, &mut health.first_late, input.tick);
                 self.last.take()
             }
             Stepped::Broken => self.fail(input.tick, health),

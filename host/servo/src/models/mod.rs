@@ -11,8 +11,7 @@ mod layer;
 mod slot;
 
 pub use end_wall::pushes_at_home;
-pub use layer::ModelHealth;
-pub use layer::{Layer, LayerReport};
+pub use layer::{Layer, LayerReport, ModelHealth};
 pub(crate) use slot::Slot;
 
 use super::{Heartbeat, Place};

@@ -31,7 +31,7 @@ pub(crate) struct Slot {
 impl Slot {
     /// Creates a slot with its first layer. Not real-time.
     pub(super) fn new(number: usize, layer: Layer) -> Self {
-        let blend = *layer.blend();
+        let blend = layer.blend;
         Self {
             number,
             current: Box::new(layer),
@@ -90,7 +90,7 @@ impl Slot {
 
     /// Returns true if the current model computes its stored energy.
     pub(super) fn gives_energy(&self) -> bool {
-        self.current.serves().contains(Demand::ENERGY)
+        self.current.serves.contains(Demand::ENERGY)
     }
 
     /// Returns the box in the device frame in which the objects can act; `None` for everywhere. Real-time: bounded by their number,
@@ -131,7 +131,7 @@ impl Slot {
 
     /// Returns health and last message of the current layer. Not real-time.
     pub(crate) fn health(&mut self) -> (ModelHealth, String) {
-        (self.current.health(), self.current.last_message())
+        (self.current.health, self.current.last_message())
     }
 
     /// Returns reports on all layers of the slot. Not real-time.
