@@ -182,15 +182,7 @@ impl Coupled {
             Self::Remote { end, device, pull } => {
                 let Some(port) = ports.get_mut(*device) else { return };
                 port.add(pull);
-                if end.is_alone() {
-                    port.events.insert(Events::PARTNER_SILENT);
-                }
-                if end.is_implausible() {
-                    port.events.insert(Events::IMPLAUSIBLE_SAMPLE);
-                }
-                if end.is_cut() {
-                    port.events.insert(Events::PARTNER_LIMITED);
-                }
+                port.events.insert(end.events());
             }
         }
     }
