@@ -14,6 +14,9 @@ const MAX_TICKS: usize = 4096;
 /// nothing gets no more answers.
 const MAX_FRAMES: usize = 256;
 
+/// Largest number of ticks in a frame.
+const MAX_TICKS_IN_A_FRAME: usize = 1024;
+
 #[derive(Default)]
 pub(super) struct Outbox {
     state: Mutex<State>,
@@ -165,62 +168,26 @@ impl Outbox {
             }
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
-        let mut batch = Batch::new(state.dropped);
+        let dropped = state.dropped;
         // The queue of ticks retains its capacity.
         let ticks: Vec<TickRecord> = state.ticks.drain(..).collect();
         let frames = std::mem::take(&mut state.frames);
         // The caller with the next tick does not wait for the encoding of this one.
         drop(state);
-        let mut ticks = ticks.into_iter();
-        let mut sent = 0;
+        let (mut sent, mut batch) = (0, Vec::new());
+        // Ticks share a frame as long as no other frame is between them.
+        let mut send = |batch: &mut Vec<u8>, until: usize| {
+            for some in ticks.get(sent..until).unwrap_or_default().chunks(MAX_TICKS_IN_A_FRAME) {
+                batch.extend(frame(Kind::Ticks, &ticks_to_payload(dropped, some.iter())));
+            }
+            sent = until;
+        };
         for WaitingFrame { ticks_before, bytes, .. } in frames {
-            ticks.by_ref().take(ticks_before - sent).for_each(|record| batch.tick(record));
-            sent = ticks_before;
-            batch.frame(&bytes);
+            send(&mut batch, ticks_before);
+            batch.extend(bytes);
         }
-        ticks.for_each(|record| batch.tick(record));
-        Some(batch.finish())
-    }
-}
-
-/// Encoder of pending frames: ticks share a frame as long as no other frame is between them.
-struct Batch {
-    bytes: Vec<u8>,
-    ticks: Vec<TickRecord>,
-    dropped: u64,
-}
-
-impl Batch {
-    /// Largest number of ticks in a frame.
-    const MAX_IN_A_FRAME: usize = 1024;
-
-    fn new(dropped: u64) -> Self {
-        Self { bytes: Vec::new(), ticks: Vec::new(), dropped }
-    }
-
-    fn tick(&mut self, record: TickRecord) {
-        self.ticks.push(record);
-        if self.ticks.len() >= Self::MAX_IN_A_FRAME {
-            self.close_frame();
-        }
-    }
-
-    fn frame(&mut self, frame: &[u8]) {
-        self.close_frame();
-        self.bytes.extend(frame);
-    }
-
-    fn close_frame(&mut self) {
-        if !self.ticks.is_empty() {
-            let payload = ticks_to_payload(self.dropped, self.ticks.iter());
-            self.bytes.extend(frame(Kind::Ticks, &payload));
-            self.ticks.clear();
-        }
-    }
-
-    fn finish(mut self) -> Vec<u8> {
-        self.close_frame();
-        self.bytes
+        send(&mut batch, ticks.len());
+        Some(batch)
     }
 }
 
