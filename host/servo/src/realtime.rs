@@ -25,13 +25,14 @@ impl std::fmt::Display for Core {
 }
 
 /// Outcome of a request to the system.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Privilege {
     /// Granted by the system.
     Granted,
     /// Refused, with the system's reason.
     Refused(String),
     /// Not requested.
+    #[default]
     NotRequested,
 }
 
@@ -45,7 +46,7 @@ impl Privilege {
 }
 
 /// Real-time privileges of the loop.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RealTimeReport {
     /// Real-time scheduling, [`PRIORITY_NAME`](crate::PRIORITY_NAME).
     pub fifo: Privilege,
@@ -59,11 +60,7 @@ impl RealTimeReport {
     /// Returns a report on a loop without requests, as on the virtual clock.
     #[must_use]
     pub fn not_requested() -> Self {
-        Self {
-            fifo: Privilege::NotRequested,
-            memory_lock: Privilege::NotRequested,
-            core: Privilege::NotRequested,
-        }
+        Self::default()
     }
 
     /// Returns one line per refusal: privilege, reason and remedy.
