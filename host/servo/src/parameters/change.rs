@@ -1,4 +1,4 @@
-//! Changes of parameters, and the reports on them.
+//! Changes of parameters, and reports on them.
 
 use flotor_core::ChangeOutcome;
 use flotor_hal::Tick;
@@ -51,7 +51,7 @@ pub struct ChangeReport {
 }
 
 impl ChangeReport {
-    /// Creates the report on a change before a tick.
+    /// Creates a report on a change before a tick.
     pub(super) fn at(tick: &Tick, change: ParameterChange, outcome: ChangeOutcome) -> Self {
         Self { tick: tick.index, time_ns: tick.time_ns, change, outcome }
     }
