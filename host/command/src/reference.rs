@@ -42,10 +42,10 @@ fn chapter(command: &Command, above: &str, depth: usize, text: &mut String) {
     let about = command.get_long_about().or(command.get_about()).map(ToString::to_string).unwrap_or_default();
     // Writing to a string cannot fail.
     let _ = write!(text, "{} `{name}`\n\n{}.\n\n", "#".repeat(depth), about.trim_end_matches('.'));
-    let arguments: Vec<&Arg> = command
-        .get_arguments()
-        .filter(|argument| !argument.is_hide_set() && !is_everywhere(argument))
-        .collect();
+    // Every command has the other two.
+    let is_own = |argument: &&Arg| !["help", "version"].contains(&argument.get_id().as_str());
+    let arguments: Vec<&Arg> =
+        command.get_arguments().filter(|argument| !argument.is_hide_set()).filter(is_own).collect();
     if !arguments.is_empty() {
         text.push_str("| Argument | Default | |\n|---|---|---|\n");
         for argument in arguments {
@@ -57,11 +57,6 @@ fn chapter(command: &Command, above: &str, depth: usize, text: &mut String) {
         let _ = write!(text, "```text\n{}\n```\n\n", examples.to_string().trim_end());
     }
     offered(command).for_each(|command| chapter(command, &name, depth + 1, text));
-}
-
-/// Returns true for an argument of every command.
-fn is_everywhere(argument: &Arg) -> bool {
-    ["help", "version"].contains(&argument.get_id().as_str())
 }
 
 fn usage(argument: &Arg) -> String {

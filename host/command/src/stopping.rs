@@ -65,21 +65,17 @@ pub fn outlive_signals() {
 
 fn take_signals(first: First) -> Result<StopSwitch, CommandError> {
     let stop = StopSwitch::default();
-    register(first, &stop).map_err(|cause| {
+    let attended = || {
+        let (requests, exit, stop) = (Requests::listen(&stop)?, Exit::prepare()?, stop.clone());
+        let thread = std::thread::Builder::new().name("flotor-signals".to_owned());
+        thread.spawn(move || attend(&requests, first, &stop, &exit))
+    };
+    attended().map_err(|cause: io::Error| {
         CommandError::Failed(format!(
             "cannot install the signal handlers that stop a run: {cause}; {THREAD_ADVICE}"
         ))
     })?;
     Ok(stop)
-}
-
-fn register(first: First, stop: &StopSwitch) -> io::Result<()> {
-    let requests = Requests::listen(stop)?;
-    let exit = Exit::prepare()?;
-    let stop = stop.clone();
-    let thread = std::thread::Builder::new().name("flotor-signals".to_owned());
-    thread.spawn(move || attend(&requests, first, &stop, &exit))?;
-    Ok(())
 }
 
 /// Processes signals as long as the process lives.
@@ -229,9 +225,9 @@ impl Keys {
         let thread = std::thread::Builder::new().name("flotor-keys".to_owned());
         let listening = thread.spawn(move || {
             for key in stdin().lock().bytes().map_while(Result::ok) {
-                match KeyRequest::of(key) {
-                    Some(KeyRequest::Emergency) => stop.press(EmergencySource::Key),
-                    Some(KeyRequest::Stop) => stop.stop(),
+                match request_of(key) {
+                    Some(Request::Emergency) => stop.press(EmergencySource::Key),
+                    Some(Request::End) => stop.stop(),
                     None => {}
                 }
             }
@@ -241,21 +237,12 @@ impl Keys {
     }
 }
 
-/// Request of a key.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum KeyRequest {
-    Emergency,
-    Stop,
-}
-
-impl KeyRequest {
-    /// Returns the request of a key; the largest key is the emergency stop.
-    fn of(key: u8) -> Option<Self> {
-        match key {
-            b' ' => Some(Self::Emergency),
-            b'q' => Some(Self::Stop),
-            _ => None,
-        }
+/// Returns the request of a key; the largest key is the emergency stop.
+fn request_of(key: u8) -> Option<Request> {
+    match key {
+        b' ' => Some(Request::Emergency),
+        b'q' => Some(Request::End),
+        _ => None,
     }
 }
 
@@ -294,8 +281,8 @@ mod tests {
 
     #[test]
     fn the_space_bar_is_the_emergency_stop() {
-        assert_eq!(KeyRequest::of(b' '), Some(KeyRequest::Emergency));
-        assert_eq!(KeyRequest::of(b'q'), Some(KeyRequest::Stop));
-        assert_eq!(KeyRequest::of(b'x'), None);
+        assert_eq!(request_of(b' '), Some(Request::Emergency));
+        assert_eq!(request_of(b'q'), Some(Request::End));
+        assert_eq!(request_of(b'x'), None);
     }
 }

@@ -64,42 +64,21 @@ pub fn supervised(command: impl FnOnce() -> Result<(), CommandError>) -> ExitCod
 
 /// Returns the exit code of a supervised process, and prints a message if the process ended without a report.
 fn code_of(end: End) -> u8 {
-    let end = match end {
+    let by_plugin = |how: String| {
+        let message = format!(
+            "a plugin ended the process before the command was complete ({how}); `flotor validate FILE` identifies the plugin"
+        );
+        (PLUGIN_FAILED, message)
+    };
+    let (code, message) = match end {
         End::Reported(code) => return code,
         End::Asked(signal) => die_by(signal),
-        End::Left(code) => Silent::Plugin(format!("exit code {code}, by `exit`, `_exit` or `exec`")),
+        End::Left(code) => by_plugin(format!("exit code {code}, by `exit`, `_exit` or `exec`")),
+        End::Killed(signal) if SignalName(signal).is_a_crash() => by_plugin(SignalName(signal).to_string()),
         End::Killed(signal) => {
-            let signal = SignalName(signal);
-            if signal.is_a_crash() { Silent::Plugin(signal.to_string()) } else { Silent::Killed(signal) }
+            (KILLED, format!("{} ended the process before the command was complete", SignalName(signal)))
         }
     };
-    print_error_line(format_args!("{} {end}", style::error("error:")));
-    end.exit_code()
-}
-
-/// End of a supervised process without a message of its own.
-enum Silent {
-    Plugin(String),
-    Killed(SignalName),
-}
-
-impl Silent {
-    fn exit_code(&self) -> u8 {
-        match self {
-            Self::Plugin(_) => PLUGIN_FAILED,
-            Self::Killed(_) => KILLED,
-        }
-    }
-}
-
-impl std::fmt::Display for Silent {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Plugin(how) => write!(
-                f,
-                "a plugin ended the process before the command was complete ({how}); `flotor validate FILE` identifies the plugin"
-            ),
-            Self::Killed(signal) => write!(f, "{signal} ended the process before the command was complete"),
-        }
-    }
+    print_error_line(format_args!("{} {message}", style::error("error:")));
+    code
 }

@@ -1,7 +1,9 @@
 //! Changes to plugins while the loop runs.
 
+use serde::{Deserialize, Serialize};
+
 /// Change of a parameter or weight, or replacement of a plugin, in a run; applied or rejected.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Change {
     /// Tick before which the change took place: the first with the new value.
     pub tick: u64,
@@ -17,14 +19,26 @@ pub struct Change {
     pub value: String,
     /// Value passed to the plugin; for a choice, its index.
     pub number: f64,
-    /// Settings of the new plugin after a replacement, as written.
-    pub settings: Vec<(String, String)>,
     /// Result of the change.
     pub outcome: ChangeOutcome,
+    /// Settings of the new plugin after a replacement, as written.
+    #[serde(default)]
+    pub settings: Vec<(String, String)>,
+}
+
+impl Change {
+    /// Returns true if both changes are about the same parameter and have the same outcome, so that the later one replaces the earlier.
+    /// A rejected value implies nothing about the present one.
+    #[must_use]
+    pub fn is_of_the_same(&self, other: &Self) -> bool {
+        let of = |change: &Self| (change.subject, change.outcome);
+        of(self) == of(other) && self.parameter == other.parameter && self.plugin == other.plugin
+    }
 }
 
 /// Kind of change of a plugin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum ChangeSubject {
     /// A parameter of its schema.
     Parameter,
@@ -35,7 +49,8 @@ pub enum ChangeSubject {
 }
 
 /// Result of a change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum ChangeOutcome {
     /// The value is in force from this tick on.
     Applied,
@@ -43,4 +58,35 @@ pub enum ChangeOutcome {
     Refused,
     /// The plugin panicked on the change.
     Broke,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_changes_are_of_the_same_whatever_their_values() {
+        let change = Change {
+            tick: 1,
+            time_ns: 1_000_000,
+            plugin: "spring".to_owned(),
+            subject: ChangeSubject::Parameter,
+            parameter: "gamma_n".to_owned(),
+            value: "9".to_owned(),
+            number: 9.0,
+            outcome: ChangeOutcome::Applied,
+            settings: Vec::new(),
+        };
+        let later =
+            Change { tick: 2, time_ns: 2_000_000, value: "5".to_owned(), number: 5.0, ..change.clone() };
+        assert!(change.is_of_the_same(&later) && later.is_of_the_same(&change));
+        for other in [
+            Change { plugin: "load".to_owned(), ..change.clone() },
+            Change { subject: ChangeSubject::Weight, ..change.clone() },
+            Change { parameter: "turns".to_owned(), ..change.clone() },
+            Change { outcome: ChangeOutcome::Refused, ..change.clone() },
+        ] {
+            assert!(!change.is_of_the_same(&other), "{other:?}");
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! Clock that drives a loop.
+//! Clock that drives a loop, and times in nanoseconds.
 
 /// Clock that drives the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -7,4 +7,21 @@ pub enum Clock {
     Real,
     /// Simulated time without waiting: the next tick is due when the last one is done. Bit-exact.
     Virtual,
+}
+
+/// Returns a time in nanoseconds, rounded; 0 for a negative time and for NaN.
+#[must_use]
+pub fn to_ns(time_s: f64) -> u64 {
+    rounded(time_s * 1.0e9)
+}
+
+/// Returns the period of a rate in nanoseconds, rounded.
+#[must_use]
+pub fn period_ns(rate_hz: f64) -> u64 {
+    rounded(1.0e9 / rate_hz)
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // `as` limits the number to the range
+fn rounded(time_ns: f64) -> u64 {
+    time_ns.round() as u64
 }

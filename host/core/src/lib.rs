@@ -8,8 +8,9 @@
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between its two ends.
 //! - [`guidance`]: the parameters that guide a simulated hand.
 //! - [`Change`]: a change to a plugin while the loop ran.
+//! - [`words`]: words of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
 //!
-//! The crate reads no files, starts no threads and makes no system calls.
+//! The crate reads no files, starts no threads and, apart from [`lock()`], makes no system calls.
 #![forbid(unsafe_code)]
 
 mod change;
@@ -18,6 +19,7 @@ pub mod coupling;
 pub mod demand;
 pub mod guidance;
 pub mod limits;
+mod lock;
 pub mod mapping;
 pub mod oscillation;
 mod outputs;
@@ -28,9 +30,11 @@ mod random;
 pub mod region;
 pub mod rendered_boundary;
 pub mod trace;
+pub mod words;
 
 pub use change::{Change, ChangeOutcome, ChangeSubject};
-pub use clock::Clock;
+pub use clock::{Clock, period_ns, to_ns};
+pub use lock::lock;
 pub use outputs::ModelOutputs;
 pub use quantile::quantile;
 pub use random::Random;

@@ -1,5 +1,6 @@
 //! Messages between the two ends of a coupling, and their encoding for a network.
 
+use crate::words::{Decoder, Encoder, MOTION_WORDS};
 use flotor_hal::{Pose, Twist};
 use flotor_sync::Words;
 
@@ -19,7 +20,8 @@ pub struct PeerState {
 pub struct TankState {
     /// Energy available, J; below zero if more has come out than had gone in.
     pub level_j: f64,
-    /// Lowest level so far, J.
+    /// Lowest level so far, J: with the controller on, below zero only by the energy that came out while a force acted for longer
+    /// than a period, in ticks late or missed, or on a handle faster than expected.
     pub lowest_j: f64,
     /// Energy that the hand has put in so far less energy that has come out, J.
     pub gone_in_j: f64,
@@ -45,7 +47,7 @@ pub struct Dispatch {
 }
 
 /// 64-bit words of a [`Dispatch`].
-pub const DISPATCH_WORDS: usize = 22;
+pub const DISPATCH_WORDS: usize = 4 + MOTION_WORDS + 5;
 /// Bytes of an encoded [`Dispatch`]: a mark with the version, then [`DISPATCH_WORDS`] words, all little endian.
 pub const DISPATCH_BYTES: usize = 8 * (1 + DISPATCH_WORDS);
 /// First word of an encoded dispatch; the digit is the version.
@@ -121,48 +123,20 @@ impl Words<DISPATCH_WORDS> for Dispatch {
     #[inline]
     fn to_words(&self) -> [u64; DISPATCH_WORDS] {
         let Self { run, partner, since, tick, state: PeerState { pose, twist, passed_on_j }, tank } = self;
-        let Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] } = *pose;
-        let Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] } = *twist;
         let TankState { level_j, lowest_j, gone_in_j, discarded_j } = *tank;
-        let [x, y, z, qx, qy, qz, qw] = [x, y, z, qx, qy, qz, qw].map(f64::to_bits);
-        let [vx, vy, vz, wx, wy, wz] = [vx, vy, vz, wx, wy, wz].map(f64::to_bits);
-        let [told, level, lowest, gone_in, given_up] =
-            [*passed_on_j, level_j, lowest_j, gone_in_j, discarded_j].map(f64::to_bits);
-        #[rustfmt::skip] // a line for each part
-        let words = [
-            *run, *partner, *since, *tick,
-            x, y, z, qx, qy, qz, qw,
-            vx, vy, vz, wx, wy, wz,
-            told, level, lowest, gone_in, given_up,
-        ];
-        words
+        Encoder::of_zeros()
+            .words([*run, *partner, *since, *tick])
+            .motion(pose, twist)
+            .numbers([*passed_on_j, level_j, lowest_j, gone_in_j, discarded_j])
+            .finish()
     }
 
     #[inline]
     fn from_words(words: &[u64; DISPATCH_WORDS]) -> Self {
-        let [run, partner, since, tick, numbers @ ..] = *words;
-        let [
-            x,
-            y,
-            z,
-            qx,
-            qy,
-            qz,
-            qw,
-            vx,
-            vy,
-            vz,
-            wx,
-            wy,
-            wz,
-            passed_on_j,
-            level_j,
-            lowest_j,
-            gone_in_j,
-            discarded_j,
-        ] = numbers.map(f64::from_bits);
-        let pose = Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] };
-        let twist = Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] };
+        let mut words = Decoder::of(words);
+        let (run, partner, since, tick) = (words.word(), words.word(), words.word(), words.word());
+        let (pose, twist) = words.motion();
+        let [passed_on_j, level_j, lowest_j, gone_in_j, discarded_j] = words.numbers();
         let tank = TankState { level_j, lowest_j, gone_in_j, discarded_j };
         Self { run, partner, since, tick, state: PeerState { pose, twist, passed_on_j }, tank }
     }

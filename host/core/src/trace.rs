@@ -3,6 +3,7 @@
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
 use crate::ModelOutputs;
+use crate::words::Decoder;
 use flotor_hal::{Demand, Pose, Twist, Wrench};
 use flotor_sync::Words;
 
@@ -12,60 +13,74 @@ pub struct Events {
     bits: u32,
 }
 
+/// Defines a constant for each event, with its bit and its name, lowest bit first.
+macro_rules! events {
+    ($($(#[$doc:meta])+ $event:ident = $bit:literal $name:literal,)+) => {
+        impl Events {
+            $($(#[$doc])+ pub const $event: Events = Events { bits: 1 << $bit };)+
+
+            /// Names of the bits, lowest first: for reports and recordings.
+            pub const NAMES: [&'static str; [$($bit),+].len()] = [$($name),+];
+        }
+    };
+}
+
+events! {
+    /// The device had no new sample.
+    STALE_SAMPLE = 0 "stale_sample",
+    /// A device or model number was not finite and was replaced by zero.
+    NOT_FINITE = 1 "not_finite",
+    /// The force was limited.
+    FORCE_LIMITED = 2 "force_limited",
+    /// The torque was limited.
+    TORQUE_LIMITED = 3 "torque_limited",
+    /// The change since the last tick was limited.
+    SLEW_LIMITED = 4 "slew_limited",
+    /// The handle was outside the boundary and was pushed back.
+    BOUNDARY = 5 "boundary",
+    /// A model failed and contributes nothing any more.
+    MODEL_FAULT = 6 "model_fault",
+    /// The device reported a fault.
+    DEVICE_FAULT = 7 "device_fault",
+    /// The force was fading in.
+    RAMPING = 8 "ramping",
+    /// The model left its domain, clamped, or did not converge.
+    MODEL_DEGRADED = 9 "model_degraded",
+    /// One or more ticks were missed before this one.
+    MISSED = 10 "missed",
+    /// The device's actuators were at their limit and gave less than was commanded.
+    SATURATED = 11 "saturated",
+    /// No usable sample arrived for a while: no force.
+    HOLDING = 12 "holding",
+    /// The force was fading out, on the way to an orderly end.
+    RELEASING = 13 "releasing",
+    /// The emergency stop was pressed.
+    EMERGENCY_STOP = 14 "emergency_stop",
+    /// The handle was faster than allowed: the force component along the velocity was removed.
+    VELOCITY_LIMITED = 15 "velocity_limited",
+    /// A change to a plugin was applied or rejected before this tick.
+    PARAMETER_CHANGED = 16 "parameter_changed",
+    /// The port would have generated energy; the passivity controller removed it.
+    PASSIVITY_DAMPED = 17 "passivity_damped",
+    /// A model took longer than its budget.
+    MODEL_OVERRUN = 18 "model_overrun",
+    /// The force requested of the device exceeds its recommended force.
+    EXCESS_FORCE = 19 "excess_force",
+    /// No message of the remote end of a coupling arrives: the coupling exerts no force.
+    PARTNER_SILENT = 20 "partner_silent",
+    /// A device or a remote end sent an implausible state, which was not used.
+    IMPLAUSIBLE_SAMPLE = 21 "implausible_sample",
+    /// A plugin changed rounding mode, flush-to-zero or traps of the loop's thread; the host restored them at once.
+    FLOAT_ENVIRONMENT = 22 "float_environment",
+    /// The remote end of a coupling claimed too much motion or energy: the excess was ignored.
+    PARTNER_LIMITED = 23 "partner_limited",
+    /// The force alternated between its limits: it was reduced.
+    OSCILLATION_DAMPED = 24 "oscillation_damped",
+}
+
 impl Events {
     /// No events.
     pub const NONE: Events = Events { bits: 0 };
-    /// The device had no new sample.
-    pub const STALE_SAMPLE: Events = Events { bits: 1 << 0 };
-    /// A device or model number was not finite and was replaced by zero.
-    pub const NOT_FINITE: Events = Events { bits: 1 << 1 };
-    /// The force was limited.
-    pub const FORCE_LIMITED: Events = Events { bits: 1 << 2 };
-    /// The torque was limited.
-    pub const TORQUE_LIMITED: Events = Events { bits: 1 << 3 };
-    /// The change since the last tick was limited.
-    pub const SLEW_LIMITED: Events = Events { bits: 1 << 4 };
-    /// The handle was outside the boundary and was pushed back.
-    pub const BOUNDARY: Events = Events { bits: 1 << 5 };
-    /// A model failed and contributes nothing any more.
-    pub const MODEL_FAULT: Events = Events { bits: 1 << 6 };
-    /// The device reported a fault.
-    pub const DEVICE_FAULT: Events = Events { bits: 1 << 7 };
-    /// The force was fading in.
-    pub const RAMPING: Events = Events { bits: 1 << 8 };
-    /// The model left its domain, clamped, or did not converge.
-    pub const MODEL_DEGRADED: Events = Events { bits: 1 << 9 };
-    /// One or more ticks were missed before this one.
-    pub const MISSED: Events = Events { bits: 1 << 10 };
-    /// The device's actuators were at their limit and gave less than was commanded.
-    pub const SATURATED: Events = Events { bits: 1 << 11 };
-    /// No usable sample arrived for a while: no force.
-    pub const HOLDING: Events = Events { bits: 1 << 12 };
-    /// The force was fading out, on the way to an orderly end.
-    pub const RELEASING: Events = Events { bits: 1 << 13 };
-    /// The emergency stop was pressed.
-    pub const EMERGENCY_STOP: Events = Events { bits: 1 << 14 };
-    /// The handle was faster than allowed: the force component along the velocity was removed.
-    pub const VELOCITY_LIMITED: Events = Events { bits: 1 << 15 };
-    /// A change to a plugin was applied or rejected before this tick.
-    pub const PARAMETER_CHANGED: Events = Events { bits: 1 << 16 };
-    /// The port would have generated energy; the passivity controller removed it.
-    pub const PASSIVITY_DAMPED: Events = Events { bits: 1 << 17 };
-    /// A model took longer than its budget.
-    pub const MODEL_OVERRUN: Events = Events { bits: 1 << 18 };
-    /// The force requested of the device exceeds its recommended force.
-    pub const EXCESS_FORCE: Events = Events { bits: 1 << 19 };
-    /// No message of the remote end of a coupling arrives: the coupling exerts no force.
-    pub const PARTNER_SILENT: Events = Events { bits: 1 << 20 };
-    /// A device or a remote end sent an implausible state, which was not used.
-    pub const IMPLAUSIBLE_SAMPLE: Events = Events { bits: 1 << 21 };
-    /// A plugin changed rounding mode, flush-to-zero or traps of the loop's thread; the host restored them at once.
-    pub const FLOAT_ENVIRONMENT: Events = Events { bits: 1 << 22 };
-    /// The remote end of a coupling claimed too much motion or energy: the excess was ignored.
-    pub const PARTNER_LIMITED: Events = Events { bits: 1 << 23 };
-
-    /// The force alternated between its limits: it was reduced.
-    pub const OSCILLATION_DAMPED: Events = Events { bits: 1 << 24 };
 
     /// Faults: each ends or disables a part of the run.
     pub const FAULTS: Events =
@@ -82,35 +97,6 @@ impl Events {
         .with(Self::IMPLAUSIBLE_SAMPLE)
         .with(Self::MODEL_DEGRADED)
         .with(Self::PARTNER_SILENT);
-
-    /// Names of the bits, lowest first: for reports and recordings.
-    pub const NAMES: [&'static str; 25] = [
-        "stale_sample",
-        "not_finite",
-        "force_limited",
-        "torque_limited",
-        "slew_limited",
-        "boundary",
-        "model_fault",
-        "device_fault",
-        "ramping",
-        "model_degraded",
-        "missed",
-        "saturated",
-        "holding",
-        "releasing",
-        "emergency_stop",
-        "velocity_limited",
-        "parameter_changed",
-        "passivity_damped",
-        "model_overrun",
-        "excess_force",
-        "partner_silent",
-        "implausible_sample",
-        "float_environment",
-        "partner_limited",
-        "oscillation_damped",
-    ];
 
     /// Returns the union of both sets. Real-time: bounded, no allocation.
     #[inline]
@@ -238,29 +224,21 @@ impl Words<RECORD_WORDS> for TickRecord {
 
     #[inline]
     fn from_words(words: &[u64; RECORD_WORDS]) -> Self {
-        let mut rest = words.iter().copied();
-        let mut word = || rest.next().unwrap_or(0);
-        let (number, time_ns, dt_ns) = (word(), word(), word());
+        let mut words = Decoder::of(words);
+        let (number, time_ns, dt_ns) = (words.word(), words.word(), words.word());
         #[allow(clippy::cast_possible_truncation)] // two parts of one word
         let (tick, device) = (number & TICK_MASK, (number >> DEVICE_BIT) as u16);
         let computed = ABSENT.iter().fold(Demand::FORCE, |computed, (output, bit)| {
             if number & bit == 0 { computed.with(*output) } else { computed }
         });
-        let mut number = || f64::from_bits(word());
-        let mut three = || std::array::from_fn(|_| number());
-        let position_m = three();
-        let orientation_xyzw = [number(), number(), number(), number()];
-        let mut three = || std::array::from_fn(|_| number());
-        let twist = Twist { linear_m_per_s: three(), angular_rad_per_s: three() };
-        let mut wrench = || Wrench { force_n: three(), torque_nm: three() };
-        let (model, commanded, delivered) = (wrench(), wrench(), wrench());
-        let (energy_j, port_energy_j) = (number(), number());
+        let (pose, twist) = words.motion();
+        let (model, commanded, delivered) = (words.wrench(), words.wrench(), words.wrench());
+        let [energy_j, port_energy_j] = words.numbers();
         let model = ModelOutputs::new(model, energy_j).limited_to(computed);
-        let flags = word();
+        let flags = words.word();
         #[allow(clippy::cast_possible_truncation)] // two halves of one word
         let (events, buttons) = (Events::from_bits(flags as u32), (flags >> 32) as u32);
-        let (lateness_ns, compute_ns) = (word(), word());
-        let pose = Pose { position_m, orientation_xyzw };
+        let (lateness_ns, compute_ns) = (words.word(), words.word());
         Self {
             tick,
             device,

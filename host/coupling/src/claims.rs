@@ -63,9 +63,10 @@ pub(super) struct Claims {
     period_s: f64,
     /// Last accepted pose of the partner, device frame: position and rotation vector.
     last: Option<[DVec3; 2]>,
-    /// Energy that the partner claims to have passed on, and the accepted part of it, J.
+    /// Energy that the partner claims to have passed on, J.
     claimed_j: f64,
-    accepted_j: f64,
+    /// Total accepted energy of all partners, J: with the energy put in by the hand here, the most that can come out.
+    pub(super) accepted_j: f64,
     /// Energy that the partner may still claim, and energy that its hand may still have put in, J.
     open_j: f64,
     hand_j: f64,
@@ -73,9 +74,11 @@ pub(super) struct Claims {
     passed_on_j: f64,
     /// Remaining allowance of motion, m and rad.
     way: [f64; 2],
-    cut: ClaimExcess,
+    /// Total excess of all partners.
+    pub(super) cut: ClaimExcess,
     recent: ClaimExcess,
-    is_cut: bool,
+    /// True if a claim was cut in this tick.
+    pub(super) is_cut: bool,
 }
 
 impl Claims {
@@ -242,27 +245,11 @@ impl Claims {
         self.accepted_j
     }
 
-    /// Returns true if a claim was cut in this tick. Real-time: bounded, no allocation.
-    #[inline]
-    pub(super) fn is_cut(&self) -> bool {
-        self.is_cut
-    }
-
     /// Returns true if the recent excess is above the limits for a partner. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn is_too_much(&self) -> bool {
         let ClaimExcess { energy_j, path_m, turn_rad } = self.recent;
         energy_j > TOO_MUCH.energy_j || path_m > TOO_MUCH.path_m || turn_rad > TOO_MUCH.turn_rad
-    }
-
-    /// Returns the total excess of all partners.
-    pub(super) fn cut(&self) -> ClaimExcess {
-        self.cut
-    }
-
-    /// Returns the total accepted energy of all partners, J: with the energy put in by the hand here, the most that can come out.
-    pub(super) fn accepted_j(&self) -> f64 {
-        self.accepted_j
     }
 }
 

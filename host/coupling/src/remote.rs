@@ -4,6 +4,7 @@ use super::brake::Brake;
 use super::claims::{ClaimExcess, Claims, Reach};
 use super::{CouplingConfig, CouplingEnd, End, PortSample, Pull};
 use flotor_core::peer::{DISPATCH_WORDS, Dispatch, PeerState, TankState};
+use flotor_core::trace::Events;
 use flotor_hal::{DeviceState, Tick, Wrench};
 use flotor_sync::{Observer, Publisher, latest};
 
@@ -135,14 +136,7 @@ impl RemoteEnd {
             Hold::Released => self.end.call(sample.state),
             Hold::On { .. } => self.end.send_state(sample.state),
         };
-        self.outgoing.publish(&Dispatch {
-            run: 0,
-            partner: 0,
-            since: 0,
-            tick: tick.index,
-            state,
-            tank: self.end.tank().state(),
-        });
+        self.outgoing.publish(&Dispatch { tick: tick.index, state, tank: self.tank(), ..NOBODY });
         match self.hold {
             Hold::Released if self.is_thrown => {
                 let pull = self.end.pull_part(sample.state, 0.0, &self.brake);
@@ -157,25 +151,21 @@ impl RemoteEnd {
         }
     }
 
-    /// Returns true while no messages of the partner arrive. Real-time: bounded, no allocation.
+    /// Returns the events of the connection in this tick. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
-    pub fn is_alone(&self) -> bool {
-        self.hold == Hold::Released
-    }
-
-    /// Returns true if the partner's message of this tick was implausible. Real-time: bounded, no allocation.
-    #[inline]
-    #[must_use]
-    pub fn is_implausible(&self) -> bool {
-        self.is_implausible
-    }
-
-    /// Returns true if a claim of the partner was cut in this tick. Real-time: bounded, no allocation.
-    #[inline]
-    #[must_use]
-    pub fn is_cut(&self) -> bool {
-        self.claims.is_cut()
+    pub fn events(&self) -> Events {
+        let mut events = Events::NONE;
+        if self.hold == Hold::Released {
+            events.insert(Events::PARTNER_SILENT);
+        }
+        if self.is_implausible {
+            events.insert(Events::IMPLAUSIBLE_SAMPLE);
+        }
+        if self.claims.is_cut {
+            events.insert(Events::PARTNER_LIMITED);
+        }
+        events
     }
 
     /// Returns the state of this end's energy tank. Real-time: bounded, no allocation.
@@ -187,7 +177,7 @@ impl RemoteEnd {
     /// Returns the statistics of the partner's messages. Real-time: bounded, no allocation.
     #[must_use]
     pub fn link(&self) -> LinkStatistics {
-        LinkStatistics { accepted_j: self.claims.accepted_j(), cut: self.claims.cut(), ..self.link }
+        LinkStatistics { accepted_j: self.claims.accepted_j, cut: self.claims.cut, ..self.link }
     }
 
     /// Processes a new message, or checks the timeout.
@@ -242,7 +232,7 @@ impl RemoteEnd {
         let mapping = self.end.mapping();
         let accepted = self.claims.accept(&dispatch.state, here, mapping, silent_ns as f64 * 1.0e-9);
         self.end.receive(&accepted);
-        self.link.cut_ticks += u64::from(self.claims.is_cut());
+        self.link.cut_ticks += u64::from(self.claims.is_cut);
         if self.claims.is_too_much() {
             if let Some(place) = self.link.rejected_runs.iter_mut().find(|run| **run == 0) {
                 *place = dispatch.run;

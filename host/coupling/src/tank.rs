@@ -78,28 +78,9 @@ impl Tank {
         self.level_j
     }
 
-    /// Returns the lowest level so far, J: with the controller on, below zero only by the energy that came out while a force acted for
-    /// longer than a period, in ticks late or missed, or on a handle faster than expected.
-    #[must_use]
-    pub fn lowest_j(&self) -> f64 {
-        self.lowest_j
-    }
-
-    /// Returns the energy that the hand has put in so far less the energy that has come out, J.
-    #[must_use]
-    pub fn gone_in_j(&self) -> f64 {
-        self.gone_in_j
-    }
-
-    /// Returns the energy that was put in and then discarded, J.
-    #[must_use]
-    pub fn discarded_j(&self) -> f64 {
-        self.discarded_j
-    }
-
     /// Returns the error of the balance: energy received less energy passed on, discarded and available, J.
-    #[must_use]
-    pub fn imbalance_j(&self) -> f64 {
+    #[cfg(test)]
+    pub(super) fn imbalance_j(&self) -> f64 {
         self.gone_in_j + self.received_j - self.passed_on_j - self.discarded_j - self.level_j
     }
 }

@@ -58,7 +58,7 @@ fn shaken(config: CouplingConfig) -> (f64, f64) {
         let states = sliders.each_ref().map(Slider::state);
         let [first, second] = [0, 1].map(|end| PortSample { state: &states[end], held: sliders[end].held() });
         let pulls = coupling.step([first, second]);
-        let gone_in_j: f64 = coupling.tanks().iter().map(|tank| tank.gone_in_j()).sum();
+        let gone_in_j: f64 = coupling.tanks().iter().map(|tank| tank.state().gone_in_j).sum();
         lowest_j = lowest_j.min(gone_in_j);
         let [first, second] = &mut sliders;
         // A hand that intends to go up and down at 2 Hz and holds with 400 N/m and 4 N s/m; it releases after three
@@ -108,8 +108,8 @@ fn tanks_balance_and_energy_on_its_way_is_in_neither() {
         for tank in tanks {
             assert!(tank.imbalance_j().abs() < 1.0e-12, "tick {tick}: {tank:?}");
         }
-        let there_j: f64 = tanks.iter().map(|tank| tank.level_j() + tank.discarded_j()).sum();
-        let gone_in_j: f64 = tanks.iter().map(|tank| tank.gone_in_j()).sum();
+        let there_j: f64 = tanks.iter().map(|tank| tank.level_j() + tank.state().discarded_j).sum();
+        let gone_in_j: f64 = tanks.iter().map(|tank| tank.state().gone_in_j).sum();
         assert!(there_j <= gone_in_j + 1.0e-12, "tick {tick}: {there_j} J of {gone_in_j} J");
     }
 }
@@ -142,7 +142,7 @@ fn the_pair_generates_no_energy_whatever_becomes_of_the_messages() {
                 way.iter().filter(|(arrives, _)| *arrives == tick).for_each(|(_, peer)| end.receive(peer));
                 way.retain(|(arrives, _)| *arrives > tick);
             }
-            let gone_in_j: f64 = ends.iter().map(|end| end.tank().gone_in_j()).sum();
+            let gone_in_j: f64 = ends.iter().map(|end| end.tank().state().gone_in_j).sum();
             assert!(gone_in_j >= -1.0e-12, "seed {seed}, tick {tick}: {gone_in_j} J");
             for index in [0, 1] {
                 // Hands that push now here, now there, softly held in the middle.

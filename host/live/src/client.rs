@@ -1,15 +1,16 @@
 //! Client of a running host.
 
 use crate::frame::{Frames, Kind, LongFrame, frame, ticks_from_payload};
-use crate::message::{Answer, Ask, ChangeMessage, End, Greeting, Request};
+use crate::message::{Answer, Ask, End, Greeting, Request};
 use crate::platform::{Stream, connect};
 use crate::{Directory, FoundRun, PROTOCOL};
 use flotor_core::trace::TickRecord;
+use flotor_core::{Change, lock};
 use flotor_record::RunDescription;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Timeout of a host's greeting.
@@ -68,7 +69,7 @@ pub enum Event {
         dropped: u64,
     },
     /// A parameter changed.
-    Change(ChangeMessage),
+    Change(Change),
     /// A request was answered.
     Answer(Answer),
     /// The run is over. Nothing follows.
@@ -200,8 +201,7 @@ impl RequestClient {
     pub fn ask(&self, ask: Ask) -> Result<u64, LiveError> {
         let number = self.number.fetch_add(1, Ordering::Relaxed);
         let request = serde_json::to_vec(&Request { number, ask }).map_err(io::Error::from)?;
-        let mut stream = self.stream.lock().unwrap_or_else(PoisonError::into_inner);
-        stream.write_all(&frame(Kind::Request, &request))?;
+        lock(&self.stream).write_all(&frame(Kind::Request, &request))?;
         Ok(number)
     }
 }

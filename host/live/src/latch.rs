@@ -10,11 +10,12 @@
 use crate::Directory;
 use crate::directory::{DirectoryError, unusable};
 use crate::platform::{is_same_file, private_file, read_at, write_all_at};
+use flotor_core::lock;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// File name of the latch.
@@ -123,14 +124,14 @@ impl Latch {
 
     /// Frees the descriptors that were reserved for an emergency stop.
     pub(crate) fn free_descriptors(&self) {
-        self.kept.spare.lock().unwrap_or_else(PoisonError::into_inner).clear();
+        lock(&self.kept.spare).clear();
     }
 
     /// Reserves descriptors for an emergency stop.
     pub(crate) fn reserve_descriptors(&self) {
         let file = self.kept.file.iter().cycle().take(SPARE_DESCRIPTORS);
         let spare = file.flat_map(File::try_clone).collect();
-        *self.kept.spare.lock().unwrap_or_else(PoisonError::into_inner) = spare;
+        *lock(&self.kept.spare) = spare;
     }
 
     /// Returns the folder of the runs that the latch stops.

@@ -66,11 +66,12 @@ mod stop;
 
 pub use client::{Client, Event, LiveError, RequestClient};
 pub use directory::{Directory, DirectoryError, FoundRun, Listener, process_number, set_process_number};
+pub use flotor_core::{Change as ChangeMessage, ChangeOutcome as Outcome, ChangeSubject as Subject};
 pub use frame::{Frames, Kind, LongFrame, MAX_PAYLOAD, frame, ticks_from_payload, ticks_to_payload};
 pub use latch::{Latch, LatchState, Pressed};
 pub use message::{
-    Answer, Ask, ChangeMessage, End, EndKind, Greeting, Outcome, PanelParameter, PanelPlugin, ParameterShape,
-    RefusalCause, Request, SetValue, SoftLimits, Subject, WrenchLimits,
+    Answer, Ask, End, EndKind, Greeting, PanelParameter, PanelPlugin, ParameterShape, RefusalCause, Request,
+    SetValue, SoftLimits, WrenchLimits,
 };
 pub use peer_socket::{CALL_PERIOD, FoundCoupling, PeerSocket};
 pub use server::{Publication, PublishError, Serve};

@@ -122,8 +122,8 @@ pub enum ParameterShape {
 
 impl Greeting {
     /// Updates the stored parameter values, for clients that connect later.
-    pub fn keep(&mut self, change: &ChangeMessage) {
-        if change.outcome != Outcome::Applied || change.subject != Subject::Parameter {
+    pub fn keep(&mut self, change: &Change) {
+        if change.outcome != ChangeOutcome::Applied || change.subject != ChangeSubject::Parameter {
             return;
         }
         let plugin = self.plugins.iter_mut().find(|plugin| plugin.name == change.plugin);
@@ -334,100 +334,6 @@ pub enum EndKind {
     Failed,
 }
 
-/// Message about a change to a plugin, applied or rejected.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ChangeMessage {
-    /// Tick before which the change took place.
-    pub tick: u64,
-    /// Time of this tick, ns.
-    pub time_ns: u64,
-    /// Name of the plugin in the scene.
-    pub plugin: String,
-    /// Kind of change.
-    pub subject: Subject,
-    /// Id of the parameter; `weight` for a weight, the id of the new plugin for a replacement.
-    pub parameter: String,
-    /// The value as a person would type it.
-    pub value: String,
-    /// Value as a number.
-    pub number: f64,
-    /// Result of the change.
-    pub outcome: Outcome,
-    /// Settings of the new plugin after a replacement.
-    #[serde(default)]
-    pub settings: Vec<(String, String)>,
-}
-
-impl ChangeMessage {
-    /// Returns true if both messages are about the same parameter and have the same outcome, so that the later one replaces the earlier.
-    /// A rejected value implies nothing about the present one.
-    #[must_use]
-    pub fn is_of_the_same(&self, other: &Self) -> bool {
-        let of = |message: &Self| (message.subject, message.outcome);
-        of(self) == of(other) && self.parameter == other.parameter && self.plugin == other.plugin
-    }
-}
-
-/// Kind of change to a plugin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Subject {
-    /// A parameter of its schema.
-    Parameter,
-    /// The blend weight of its wrench.
-    Weight,
-    /// The plugin itself, which was replaced.
-    Plugin,
-}
-
-/// Result of a change.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Outcome {
-    /// The new value applies from this tick on.
-    Applied,
-    /// The plugin rejected the value; the old one remains.
-    Refused,
-    /// The plugin panicked on the change.
-    Broke,
-}
-
-impl From<&ChangeMessage> for Change {
-    fn from(message: &ChangeMessage) -> Self {
-        let ChangeMessage { tick, time_ns, plugin, subject, parameter, value, number, outcome, settings } =
-            message.clone();
-        let subject = match subject {
-            Subject::Parameter => ChangeSubject::Parameter,
-            Subject::Weight => ChangeSubject::Weight,
-            Subject::Plugin => ChangeSubject::Plugin,
-        };
-        let outcome = match outcome {
-            Outcome::Applied => ChangeOutcome::Applied,
-            Outcome::Refused => ChangeOutcome::Refused,
-            Outcome::Broke => ChangeOutcome::Broke,
-        };
-        Self { tick, time_ns, plugin, subject, parameter, value, number, settings, outcome }
-    }
-}
-
-impl From<&Change> for ChangeMessage {
-    fn from(change: &Change) -> Self {
-        let Change { tick, time_ns, plugin, subject, parameter, value, number, settings, outcome } =
-            change.clone();
-        let subject = match subject {
-            ChangeSubject::Parameter => Subject::Parameter,
-            ChangeSubject::Weight => Subject::Weight,
-            ChangeSubject::Plugin => Subject::Plugin,
-        };
-        let outcome = match outcome {
-            ChangeOutcome::Applied => Outcome::Applied,
-            ChangeOutcome::Refused => Outcome::Refused,
-            ChangeOutcome::Broke => Outcome::Broke,
-        };
-        Self { tick, time_ns, plugin, subject, parameter, value, number, outcome, settings }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -472,36 +378,5 @@ mod tests {
         assert!(known.is_ok(), "{known:?}");
         let stop = read(r#"{"number":1,"ask":"emergency-stop","why":"later"}"#).unwrap();
         assert_eq!(stop.ask, Ask::EmergencyStop, "a stop too many is safe");
-    }
-
-    #[test]
-    fn two_changes_are_of_the_same_whatever_their_values() {
-        let change = ChangeMessage {
-            tick: 1,
-            time_ns: 1_000_000,
-            plugin: "spring".to_owned(),
-            subject: Subject::Parameter,
-            parameter: "gamma_n".to_owned(),
-            value: "9".to_owned(),
-            number: 9.0,
-            outcome: Outcome::Applied,
-            settings: Vec::new(),
-        };
-        let later = ChangeMessage {
-            tick: 2,
-            time_ns: 2_000_000,
-            value: "5".to_owned(),
-            number: 5.0,
-            ..change.clone()
-        };
-        assert!(change.is_of_the_same(&later) && later.is_of_the_same(&change));
-        for other in [
-            ChangeMessage { plugin: "load".to_owned(), ..change.clone() },
-            ChangeMessage { subject: Subject::Weight, ..change.clone() },
-            ChangeMessage { parameter: "turns".to_owned(), ..change.clone() },
-            ChangeMessage { outcome: Outcome::Refused, ..change.clone() },
-        ] {
-            assert!(!change.is_of_the_same(&other), "{other:?}");
-        }
     }
 }

@@ -9,10 +9,10 @@
 //! that has joined repeats its subscription every [`CALL_PERIOD`]; the host drops subscribers that stay silent. Not real-time.
 
 use crate::Directory;
-use crate::directory::{DirectoryError, private, process_number};
+use crate::directory::{DirectoryError, private, process_number, unusable};
 use crate::platform::{Datagrams, remove_if_dead};
 use flotor_core::peer::{Dispatch, InvalidDispatch};
-use std::io::{self, ErrorKind};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -85,7 +85,7 @@ impl PeerSocket {
     pub fn listen(directory: &Directory, coupling: &str) -> Result<Self, DirectoryError> {
         private(directory.path())?;
         let path = directory.path().join(format!("{}-{coupling}.{HOST}", process_number()));
-        Self::bind(path).map_err(|(path, cause)| DirectoryError::Unusable { path, cause })
+        Self::bind(path)
     }
 
     /// Creates the end of a program that transports the peer state between this host and another.
@@ -97,19 +97,16 @@ impl PeerSocket {
         private(directory.path())?;
         let number = NUMBER.fetch_add(1, Ordering::Relaxed);
         let file = format!("{}-{}-{number}.{JOINED}", process_number(), coupling.name);
-        let joined = Self::bind(directory.path().join(file));
-        let mut joined = joined.map_err(|(path, cause)| DirectoryError::Unusable { path, cause })?;
+        let mut joined = Self::bind(directory.path().join(file))?;
         joined.peers.push(Peer { path: coupling.path.clone(), called: None });
         Ok(joined)
     }
 
-    fn bind(path: PathBuf) -> Result<Self, (PathBuf, io::Error)> {
+    fn bind(path: PathBuf) -> Result<Self, DirectoryError> {
         // A killed process leaves its file.
         remove_if_dead(&path);
-        match Datagrams::bind(&path) {
-            Ok(socket) => Ok(Self { socket, path, peers: Vec::new() }),
-            Err(cause) => Err((path, cause)),
-        }
+        let socket = Datagrams::bind(&path).map_err(unusable(&path))?;
+        Ok(Self { socket, path, peers: Vec::new() })
     }
 
     /// Returns the path of the socket's file.

@@ -4,7 +4,8 @@
 //! all geometry is linear: a log axis is a linear axis of decimal logarithms.
 
 use super::quantity::Quantity;
-use super::{text, ticks};
+use super::step::NiceStep;
+use super::text;
 
 /// Larger magnitudes are treated like infinity, so that the difference of two values never overflows.
 pub(super) const LARGEST_DRAWABLE: f64 = 1e300;
@@ -162,6 +163,13 @@ pub(super) struct Extent {
 impl Extent {
     pub(super) const EMPTY: Self = Self { low: f64::INFINITY, high: f64::NEG_INFINITY };
 
+    /// Returns the range of some coordinates.
+    pub(super) fn of(coordinates: impl IntoIterator<Item = f64>) -> Self {
+        let mut extent = Self::EMPTY;
+        coordinates.into_iter().for_each(|coordinate| extent.include(coordinate));
+        extent
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.low > self.high
     }
@@ -171,9 +179,8 @@ impl Extent {
         self.high = self.high.max(coordinate);
     }
 
-    pub(super) fn merge(&mut self, other: Self) {
-        self.low = self.low.min(other.low);
-        self.high = self.high.max(other.high);
+    pub(super) fn with(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
 }
 
@@ -222,7 +229,7 @@ impl Fit {
 /// Moves each end to the round value just beyond it, if one is near: 0 to 9.999 s is shown as 0 to 10 s.
 fn rounded_outward(low: f64, high: f64) -> (f64, f64) {
     let reach = ROUNDING_REACH * (high - low);
-    let step = ticks::nice_step((high - low) / 10.0);
+    let step = NiceStep::at_least((high - low) / 10.0).size();
     let (round_low, round_high) = ((low / step).floor() * step, (high / step).ceil() * step);
     (
         if low - round_low <= reach { round_low } else { low },

@@ -1,7 +1,7 @@
 //! Clipping of lines at the edges of the plotting area.
 
 use super::decimate::Point;
-use super::path::Rect;
+use super::projection::Rect;
 
 /// Returns the parts of a line within `frame`, in order. A line that stays within it is one part, its points unchanged.
 pub(super) fn clipped(line: &[Point], frame: &Rect) -> Vec<Vec<Point>> {

@@ -1,7 +1,7 @@
 //! Detection of lines that cover one another. A covered line is drawn wider and paler, so that it is visible beside the others.
 
 use super::decimate::Point;
-use super::path::{Drawing, Rect};
+use super::projection::Rect;
 
 /// Distance below which two lines look like one.
 const ONE_LINE_PX: f64 = 1.2;
@@ -10,7 +10,7 @@ const ONE_LINE_PX: f64 = 1.2;
 const COVERING_SHARE: f64 = 0.5;
 
 /// Number of distinct widths of covered lines; more lines over one another share the largest.
-const MAX_COVERS: usize = 3;
+pub(super) const MAX_COVERS: usize = 3;
 
 /// Lowest and highest point of a line in each pixel column of its panel.
 #[derive(Debug, Default)]
@@ -51,7 +51,7 @@ impl Course {
     }
 
     /// Returns true if `upper` covers this line.
-    fn is_under(&self, upper: &Self) -> bool {
+    pub(super) fn is_under(&self, upper: &Self) -> bool {
         let drawn = self.columns.iter().flatten().count();
         let shared = self.columns.iter().zip(&upper.columns).filter(|(lower, upper)| {
             lower.zip(**upper).is_some_and(|(lower, upper)| {
@@ -80,19 +80,6 @@ pub const fn covered_style(covers: usize) -> (f64, f64) {
     /// Visible width of a covered line on both sides together, per covering line, in widths of a line.
     const BESIDE: f64 = 2.125;
     if covers == 0 { (1.0, 1.0) } else { (1.0 + BESIDE * covers as f64, 0.45) }
-}
-
-/// Counts, for each line of a panel, the later lines that cover it.
-pub(super) fn count_covers(drawings: &mut [Option<Drawing>]) {
-    for lower in 0..drawings.len() {
-        let (before, after) = drawings.split_at_mut(lower + 1);
-        let Some(Some(Drawing::Line { course, covers, .. })) = before.last_mut() else { continue };
-        let over = after.iter().flatten().filter(|upper| match upper {
-            Drawing::Line { course: upper, .. } => course.is_under(upper),
-            _ => false,
-        });
-        *covers = over.count().min(MAX_COVERS);
-    }
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 use super::Panel;
 use super::axis::Domain;
 use super::mark::{Direction, Mark};
-use super::path::Projection;
+use super::projection::Projection;
 use super::series::{Series, Shape};
 use super::text;
 use super::theme::font_px;

@@ -9,7 +9,7 @@ use super::labels::{
     HEADING_ROW_PX, Heading, LEGEND_ROW_PX, Legend, MARK_ROW_PX, MarkLabel, side_gutter_px, top_labels,
 };
 use super::mark::Direction;
-use super::path::{Projection, Rect};
+use super::projection::{Projection, Rect};
 use super::series::Shape;
 use super::text;
 use super::theme::font_px;
@@ -119,7 +119,7 @@ fn x_domain<'a>(axis: &Axis, panels: impl IntoIterator<Item = &'a Panel>) -> Dom
     let mut fit = Fit::Tight;
     for panel in panels {
         for series in &panel.series {
-            extent.merge(series.extent_x(axis.scale, panel.y.scale));
+            extent = extent.with(series.extent_x(axis.scale, panel.y.scale));
             if matches!(series.shape, Shape::Points(_)) {
                 fit = Fit::Padded;
             }
@@ -133,10 +133,8 @@ fn x_domain<'a>(axis: &Axis, panels: impl IntoIterator<Item = &'a Panel>) -> Dom
 
 impl<'a> Draft<'a> {
     fn new(panel: &'a Panel, x_axis: &'a Axis, x: Domain, height_px: f64, has_x_labels: bool) -> Self {
-        let mut extent = Extent::EMPTY;
-        for series in &panel.series {
-            extent.merge(series.extent_y(&x, panel.y.scale));
-        }
+        let extents = panel.series.iter().map(|series| series.extent_y(&x, panel.y.scale));
+        let mut extent = extents.fold(Extent::EMPTY, Extent::with);
         let has_data = !extent.is_empty();
         for mark in panel.marks.iter().filter(|mark| mark.direction == Direction::Y) {
             mark.include_in(&mut extent, panel.y.scale);

@@ -16,7 +16,7 @@
 //!   locale or installed fonts.
 //!
 //! Data flows one way: the model (this file, `series`, `mark`, `spans`) -> `axis` and `ticks` (ranges) -> `layout` and
-//! `labels` (places) -> `path` and `svg` (text). `theme` has all matters of taste.
+//! `labels` (places) -> `drawing`, `path` and `svg` (text). `theme` has all matters of taste.
 //!
 //! Not real-time: every function here allocates.
 //!
@@ -37,13 +37,16 @@ mod axis;
 mod clip;
 mod cover;
 mod decimate;
+mod drawing;
 mod labels;
 mod layout;
 mod mark;
 mod path;
+mod projection;
 mod quantity;
 mod series;
 mod spans;
+mod step;
 mod svg;
 mod text;
 mod theme;

@@ -186,63 +186,44 @@ impl Series {
 
     /// Returns the x range of the samples that can be drawn, in the coordinates of the x scale.
     pub(super) fn extent_x(&self, x_scale: Scale, y_scale: Scale) -> Extent {
-        let mut extent = Extent::EMPTY;
-        match &self.shape {
-            Shape::Line(samples) | Shape::Steps(samples) | Shape::Points(samples) => {
-                for &(x, y) in samples {
-                    if let (Some(x), Some(_)) = (x_scale.forward(x), y_scale.forward(y)) {
-                        extent.include(x);
-                    }
-                }
-            }
-            Shape::Histogram(bins) => {
-                for (left, right) in bins.iter().filter_map(|bin| bin.edges(x_scale)) {
-                    extent.include(left);
-                    extent.include(right);
-                }
-            }
-            Shape::Errors(bars) => {
-                for [(x, _), _] in bars.iter().filter_map(|bar| bar.ends(x_scale, y_scale)) {
-                    extent.include(x);
-                }
-            }
-        }
-        extent
+        self.boxes(x_scale, y_scale).map(|(x, _)| x).fold(Extent::EMPTY, Extent::with)
     }
 
     /// Returns the y range of the samples within the x domain, in the coordinates of the y scale.
     pub(super) fn extent_y(&self, x_domain: &Domain, y_scale: Scale) -> Extent {
-        let mut extent = Extent::EMPTY;
+        let is_within = |x: &Extent| match &self.shape {
+            // A bar that only touches the domain is not visible.
+            Shape::Histogram(_) => x.high > x_domain.low && x.low < x_domain.high,
+            _ => (x_domain.low..=x_domain.high).contains(&x.low),
+        };
+        let boxes = self.boxes(x_domain.scale, y_scale);
+        boxes.filter(|(x, _)| is_within(x)).map(|(_, y)| y).fold(Extent::EMPTY, Extent::with)
+    }
+
+    /// Returns the ranges of x and y of each sample or bar that can be drawn; a bar without a height has no range of y.
+    fn boxes(&self, x_scale: Scale, y_scale: Scale) -> Box<dyn Iterator<Item = (Extent, Extent)> + '_> {
         match &self.shape {
             Shape::Line(samples) | Shape::Steps(samples) | Shape::Points(samples) => {
-                for &(x, y) in samples {
-                    if let (Some(x), Some(y)) = (x_domain.scale.forward(x), y_scale.forward(y))
-                        && (x_domain.low..=x_domain.high).contains(&x)
-                    {
-                        extent.include(y);
-                    }
-                }
+                let point = move |&(x, y): &(f64, f64)| {
+                    Some((Extent::of([x_scale.forward(x)?]), Extent::of([y_scale.forward(y)?])))
+                };
+                Box::new(samples.iter().filter_map(point))
             }
             Shape::Histogram(bins) => {
-                for bin in bins {
-                    if let (Some((left, right)), Some(y)) =
-                        (bin.edges(x_domain.scale), y_scale.forward(bin.height))
-                        && right > x_domain.low
-                        && left < x_domain.high
-                    {
-                        extent.include(y);
-                    }
-                }
+                let bar = move |bin: &Bin| {
+                    let (left, right) = bin.edges(x_scale)?;
+                    Some((Extent::of([left, right]), Extent::of(y_scale.forward(bin.height))))
+                };
+                Box::new(bins.iter().filter_map(bar))
             }
             Shape::Errors(bars) => {
-                for (x, y) in bars.iter().filter_map(|bar| bar.ends(x_domain.scale, y_scale)).flatten() {
-                    if (x_domain.low..=x_domain.high).contains(&x) {
-                        extent.include(y);
-                    }
-                }
+                let bar = move |bar: &ErrorBar| {
+                    let [(x, low), (_, high)] = bar.ends(x_scale, y_scale)?;
+                    Some((Extent::of([x]), Extent::of([low, high])))
+                };
+                Box::new(bars.iter().filter_map(bar))
             }
         }
-        extent
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::Figure;
 use super::axis::{Domain, Scale};
-use super::cover::count_covers;
+use super::drawing::{Drawing, count_covers, draw};
 use super::labels::{
     HEADING_ROW_PX, LEGEND_ROW_PX, Legend, LegendEntry, MARK_ROW_PX, SIDE_LABEL_GAP_PX, baseline, side_labels,
 };
@@ -15,7 +15,8 @@ use super::layout::{
     TITLE_LINE_PX,
 };
 use super::mark::{Direction, MarkLook};
-use super::path::{Drawing, Path, Projection, draw};
+use super::path::Path;
+use super::projection::Projection;
 use super::series::Shape;
 use super::spans::Spans;
 use super::text::{self, escape, px};
@@ -229,30 +230,24 @@ impl Writer {
     fn grid(&mut self, cell: &Cell<'_>) {
         let Projection { x, y, frame } = &cell.projection;
         let (mut minor, mut major, mut zero_line) = (Path::default(), Path::default(), Path::default());
+        let (x_ticks, y_ticks) = (&cell.head.x_ticks, &cell.draft.y_ticks);
+        let (upright, level) = (|at| frame.upright(frame.x_at(at)), |at| frame.level(frame.y_at(at)));
         if has_minor_grid(x, frame.width) {
-            cell.head.x_ticks.minor.iter().for_each(|&at| minor.polyline(frame.upright(frame.x_at(at))));
+            x_ticks.minor.iter().for_each(|&at| minor.polyline(upright(at)));
         }
         if has_minor_grid(y, frame.height) {
-            cell.draft.y_ticks.minor.iter().for_each(|&at| minor.polyline(frame.level(frame.y_at(at))));
+            y_ticks.minor.iter().for_each(|&at| minor.polyline(level(at)));
         }
-        cell.head
-            .x_ticks
-            .major
-            .iter()
-            .for_each(|tick| major.polyline(frame.upright(frame.x_at(tick.position))));
-        cell.draft
-            .y_ticks
-            .major
-            .iter()
-            .for_each(|tick| major.polyline(frame.level(frame.y_at(tick.position))));
+        x_ticks.major.iter().for_each(|tick| major.polyline(upright(tick.position)));
+        y_ticks.major.iter().for_each(|tick| major.polyline(level(tick.position)));
         if !cell.draft.has_x_labels {
             major.polyline(frame.level(frame.bottom()));
         }
         let zero = y.scale.forward(0.0).map(|zero| y.fraction(zero)).filter(|zero| (0.0..1.0).contains(zero));
         if let Some(zero) = zero
-            && !cell.draft.y_ticks.major.is_empty()
+            && !y_ticks.major.is_empty()
         {
-            zero_line.polyline(frame.level(frame.y_at(zero)));
+            zero_line.polyline(level(zero));
         }
         self.path("hair grid minor", &minor);
         self.path("hair grid", &major);

@@ -5,6 +5,7 @@
 //! like a linear axis if they cover too little for either.
 
 use super::axis::{Domain, Scale};
+use super::step::{END_TOLERANCE, NiceStep, exponent_of, power_of_ten, to_integer};
 use super::text;
 
 /// Magnitude from which tick labels leave out a power of ten, which the axis label then contains.
@@ -14,9 +15,6 @@ const SMALLEST_PLAIN: f64 = 1e-2;
 
 /// Decades labelled in plain digits (0.001 to 10 000); beyond, all labels of the axis are powers.
 const PLAIN_DECADES: std::ops::RangeInclusive<i32> = -3..=4;
-
-/// Tolerance of ticks at the ends, as a fraction of the span (rounding of `k * step`).
-const END_TOLERANCE: f64 = 1e-9;
 
 /// Ticks of one axis; positions are fractions of its domain.
 #[derive(Debug, Clone, PartialEq)]
@@ -117,40 +115,6 @@ fn linear(low: f64, high: f64, most: f64, fraction: impl Fn(f64) -> f64) -> Tick
     Ticks { major, minor, exponent }
 }
 
-/// Returns the smallest of 1, 2 and 5 times a power of ten that is not below `least`.
-pub(super) fn nice_step(least: f64) -> f64 {
-    NiceStep::at_least(least).size()
-}
-
-/// Step of 1, 2 or 5 times a power of ten.
-#[derive(Debug, Clone, Copy)]
-struct NiceStep {
-    mantissa: f64,
-    exponent: i32,
-}
-
-impl NiceStep {
-    /// Returns the smallest nice step that is not below `least`.
-    fn at_least(least: f64) -> Self {
-        let exponent = exponent_of(least);
-        let leading = least / power_of_ten(exponent);
-        let fits = |mantissa: &f64| leading <= mantissa * (1.0 + END_TOLERANCE);
-        match [1.0, 2.0, 5.0].into_iter().find(fits) {
-            Some(mantissa) => Self { mantissa, exponent },
-            None => Self { mantissa: 1.0, exponent: exponent + 1 },
-        }
-    }
-
-    fn size(self) -> f64 {
-        self.mantissa * power_of_ten(self.exponent)
-    }
-
-    /// Returns the number of minor steps per step, so that minor ticks are nice as well: 0.2 of 1, 0.5 of 2, 1 of 5.
-    fn subdivisions(self) -> f64 {
-        if self.mantissa == 2.0 { 4.0 } else { 5.0 }
-    }
-}
-
 /// Returns the multiples of `step` from `low` to `high`.
 fn multiples(low: f64, high: f64, step: f64) -> impl Iterator<Item = f64> {
     let tolerance = END_TOLERANCE * (high - low);
@@ -221,21 +185,4 @@ fn log_positions(domain: &Domain, digits: &[f64], stride: i32) -> Vec<LogTick> {
         .filter(|(_, _, coordinate)| inside.contains(coordinate))
         .map(|(digit, decade, coordinate)| LogTick { digit, decade, position: domain.fraction(coordinate) })
         .collect()
-}
-
-/// Returns the decimal exponent of a positive number: 2 for 100 and for 999.
-fn exponent_of(value: f64) -> i32 {
-    let estimate = to_integer(value.max(f64::MIN_POSITIVE).log10().floor());
-    // log10 of a number just below a power of ten may round up to it.
-    if power_of_ten(estimate) > value { estimate - 1 } else { estimate }
-}
-
-fn power_of_ten(exponent: i32) -> f64 {
-    10.0_f64.powi(exponent)
-}
-
-/// Converts an integral `f64` to `i32`, clamped to the exponents of `f64`.
-#[expect(clippy::cast_possible_truncation, reason = "held within ±400 first")]
-fn to_integer(value: f64) -> i32 {
-    value.clamp(-400.0, 400.0) as i32
 }

@@ -7,7 +7,7 @@
 //! ignore them.
 
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
@@ -35,17 +35,9 @@ impl NamedFile {
         if !fs::metadata(path)?.is_file() {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
         }
-        let mut file = File::open(path)?;
         let mut hash = Xxh3::new();
-        let mut block = vec![0; BLOCK_BYTES];
-        loop {
-            match file.read(&mut block) {
-                Ok(0) => return Ok(Self { path: std::path::absolute(path)?, hash: hash.digest() }),
-                Ok(length) => hash.update(block.get(..length).unwrap_or_default()),
-                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(error),
-            }
-        }
+        io::copy(&mut BufReader::with_capacity(BLOCK_BYTES, File::open(path)?), &mut hash)?;
+        Ok(Self { path: std::path::absolute(path)?, hash: hash.digest() })
     }
 
     /// Returns the hash as text: `xxh3:` and sixteen hexadecimal digits.

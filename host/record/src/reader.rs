@@ -261,13 +261,9 @@ impl Iterator for Recording {
                 self.last_tick = Some(record.tick);
                 Some(Ok(record))
             }
-            Ok(None) => {
+            end => {
                 self.is_over = true;
-                None
-            }
-            Err(cause) => {
-                self.is_over = true;
-                Some(Err(damaged(&self.path, self.last_tick, cause)))
+                end.err().map(|cause| Err(damaged(&self.path, self.last_tick, cause)))
             }
         }
     }

@@ -459,7 +459,7 @@ fn a_full_disk_is_told_with_the_name_of_the_file() {
     let full = Path::new("/dev/full");
     if full.is_absolute() {
         let file = NewFile::over(File::options().write(true).open(full).unwrap());
-        let Err(error) = Recorder::begin(full, file, &run()) else { panic!("the disk is full") };
+        let Err(error) = Recorder::begin(full, file, &run(), "") else { panic!("the disk is full") };
         let text = error.to_string();
         assert!(text.contains("`/dev/full`") && text.contains("No space left"), "{text}");
     } else {

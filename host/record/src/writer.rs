@@ -91,7 +91,7 @@ impl Recorder {
     /// # Errors
     /// If the file exists, or cannot be created or written to.
     pub fn create(path: &Path, run: &RunDescription) -> Result<Self, RecordError> {
-        Self::begin(path, new_file(path)?, run)
+        Self::begin(path, new_file(path)?, run, "")
     }
 
     /// Creates the file of a repaired recording. Not real-time.
@@ -99,20 +99,17 @@ impl Recorder {
     /// # Errors
     /// Those of [`Self::create`].
     pub(crate) fn create_repaired(path: &Path, run: &RunDescription) -> Result<Self, RecordError> {
-        let library = library(run) + REPAIRED;
-        Self::begin_as(path, new_file(path)?, run, library)
+        Self::begin(path, new_file(path)?, run, REPAIRED)
     }
 
-    pub(crate) fn begin(path: &Path, file: NewFile, run: &RunDescription) -> Result<Self, RecordError> {
-        Self::begin_as(path, file, run, library(run))
-    }
-
-    fn begin_as(
+    /// Begins the file; `suffix` is that of the library's name.
+    pub(crate) fn begin(
         path: &Path,
         file: NewFile,
         run: &RunDescription,
-        library: String,
+        suffix: &str,
     ) -> Result<Self, RecordError> {
+        let library = format!("flotor/{}{suffix}", run.flotor_version);
         let file = write_head(path, file, run, library).map_err(|cause| write_error(path, cause))?;
         let names: Vec<&str> = run.devices().map(|device| device.name.as_str()).collect();
         let poses = match names.as_slice() {
@@ -232,11 +229,6 @@ fn new_file(path: &Path) -> Result<NewFile, RecordError> {
         io::ErrorKind::AlreadyExists => RecordError::Exists { path: path.into() },
         _ => RecordError::Create { path: path.into(), cause },
     })
-}
-
-/// Returns the library name for the recording of a run.
-fn library(run: &RunDescription) -> String {
-    format!("flotor/{}", run.flotor_version)
 }
 
 /// Writes the head of the file: its library, the metadata of the run, and schemas and channels of all messages.

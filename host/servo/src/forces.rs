@@ -3,7 +3,7 @@
 //! Servo and replay run the same code, so that a replay can be bit-exact.
 
 use super::Heartbeat;
-use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement};
+use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement, Slot};
 use flotor_core::ModelOutputs;
 use flotor_core::demand::TickDemand;
 use flotor_core::trace::Events;
@@ -182,15 +182,7 @@ impl Coupled {
             Self::Remote { end, device, pull } => {
                 let Some(port) = ports.get_mut(*device) else { return };
                 port.add(pull);
-                if end.is_alone() {
-                    port.events.insert(Events::PARTNER_SILENT);
-                }
-                if end.is_implausible() {
-                    port.events.insert(Events::IMPLAUSIBLE_SAMPLE);
-                }
-                if end.is_cut() {
-                    port.events.insert(Events::PARTNER_LIMITED);
-                }
+                port.events.insert(end.events());
             }
         }
     }
@@ -263,6 +255,19 @@ impl Forces {
         Some((self.stacks.get_mut(device)?, place))
     }
 
+    /// Returns the slot of a model.
+    #[inline]
+    fn slot_of(&mut self, model: usize) -> Option<&mut Slot> {
+        let (stack, place) = self.stack_of(model)?;
+        stack.slots.get_mut(place)
+    }
+
+    /// Iterates over the slots of all models, by device.
+    #[inline]
+    fn slots(&mut self) -> impl Iterator<Item = &mut Slot> {
+        self.stacks.iter_mut().flat_map(|stack| &mut stack.slots)
+    }
+
     /// Changes a live parameter of the model numbered `model`. Real-time: bounded by its objects, no allocation.
     pub fn set_parameter(&mut self, model: usize, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
         match self.stack_of(model) {
@@ -273,16 +278,15 @@ impl Forces {
 
     /// Moves the weight of the model numbered `model` to a new value, at its rate. Real-time: bounded, no allocation.
     pub fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
-        match self.stack_of(model) {
-            Some((stack, place)) => stack.set_weight(place, tick, weight),
-            None => CallStatus::Unsupported,
-        }
+        let Some(slot) = self.slot_of(model) else { return CallStatus::Unsupported };
+        slot.set_weight(tick, weight);
+        CallStatus::Ok
     }
 
     /// Returns the number of replacements of the model numbered `model`. Real-time: bounded, no allocation.
     #[inline]
     pub fn generation(&mut self, model: usize) -> Option<u16> {
-        self.stack_of(model).and_then(|(stack, place)| stack.generation(place))
+        self.slot_of(model).map(|slot| slot.generation())
     }
 
     /// Replaces a model; the new layer fades in from this tick on. Returns a layer that had to go before it had faded out; the
@@ -300,30 +304,29 @@ impl Forces {
     /// Removes a layer that has faded out; returns it with its model number. Real-time: bounded by the models, no allocation.
     #[inline]
     pub fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
-        self.stacks.iter_mut().find_map(|stack| stack.take_faded(tick))
+        let take = |slot: &mut Slot| Some((u32::try_from(slot.number).ok()?, slot.take_faded(tick)?));
+        self.slots().find_map(take)
     }
 
     /// Returns true while a layer is fading out. Real-time: bounded by the models, no allocation.
     pub(crate) fn is_fading(&self) -> bool {
-        self.stacks.iter().any(ModelStack::is_fading)
+        self.stacks.iter().any(|stack| stack.slots.iter().any(Slot::is_fading))
     }
 
     /// Returns reports on all layers in place or fading out; calls `on_query` with the model number before it queries a model's last
     /// message. Not real-time.
     pub fn reports(&mut self, on_query: impl Fn(usize)) -> Vec<LayerReport> {
-        self.stacks.iter_mut().flat_map(|stack| stack.reports(&on_query)).collect()
+        self.slots().flat_map(|slot| slot.reports(&on_query)).collect()
     }
 
     /// Returns all layers, each with its model number. Not real-time.
     pub fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
-        self.stacks.into_iter().flat_map(ModelStack::into_layers)
+        self.stacks.into_iter().flat_map(|stack| stack.slots).flat_map(Slot::into_layers)
     }
 
     /// Returns health and last message of the current layer of each model, in the scene's order. Not real-time.
     pub fn health(&mut self) -> Vec<(ModelHealth, String)> {
-        let mut stacks: Vec<_> = self.stacks.iter_mut().map(|stack| stack.health().into_iter()).collect();
-        let next = |at: &Whereabouts| stacks.get_mut(at.device).and_then(Iterator::next);
-        self.models.iter().filter_map(next).collect()
+        (0..self.models.len()).filter_map(|model| Some(self.slot_of(model)?.health())).collect()
     }
 
     /// Returns the statistics of each coupling. Not real-time.

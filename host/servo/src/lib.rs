@@ -14,6 +14,7 @@ pub mod engine;
 mod envelope;
 mod forces;
 pub mod guest;
+mod heartbeat;
 mod hot_swap;
 pub mod last_stop;
 mod models;
@@ -36,18 +37,15 @@ mod timing;
 mod watchdog;
 pub mod watchdog_process;
 
-pub use budget::Overrun;
-pub use budget::TimeBudget;
-pub use clock::{Clock, SpinWindow};
-pub use clock::{Due, PaceLost, Schedule, monotonic_ns, sleep_until};
+pub use budget::{Overrun, TimeBudget};
+pub use clock::{Clock, Due, PaceLost, Schedule, SpinWindow, monotonic_ns, sleep_until};
 pub use engine::{Engine, Stepped};
 pub use envelope::{Envelope, EnvelopeEffects, StageEffect};
-pub use forces::CouplingOutcome;
-pub use forces::{Coupled, Forces, Port};
+pub use forces::{Coupled, CouplingOutcome, Forces, Port};
+pub use heartbeat::{Heartbeat, Place, Stuck};
 pub use hot_swap::{HostSwaps, LoopSwaps, swap_queues};
 pub use last_stop::{LastStop, Unwound};
-pub use models::ModelHealth;
-pub use models::{Layer, LayerReport, Replacement, pushes_at_home};
+pub use models::{Layer, LayerReport, ModelHealth, Replacement, pushes_at_home};
 pub use parameters::{
     ChangeReport, ChangeSender, PLUGIN, Pace, ParameterChange, ParameterQueue, ReportReceiver,
     ScheduledChange, WEIGHT,
@@ -63,5 +61,4 @@ pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};
 pub use station::{Reported, Station};
 pub use stop::StopSwitch;
 pub use timing::{Durations, Percentiles, Stage, Timing};
-pub use watchdog::{Heartbeat, start as start_watchdog};
-pub use watchdog::{Place, Stuck};
+pub use watchdog::start as start_watchdog;

@@ -7,9 +7,10 @@
 //! A number may be sent with a rate: it then moves to its new value over many ticks, because a hand feels a jump. Each step is a
 //! change with its own report, so a replay needs no rate.
 
+mod change;
 mod gradual;
 
-pub use gradual::Pace;
+pub use change::{ChangeReport, PLUGIN, Pace, ParameterChange, WEIGHT};
 
 use super::queue::queue;
 use flotor_core::ChangeOutcome;
@@ -20,39 +21,6 @@ use rtrb::{Consumer, Producer};
 
 /// Capacity for pending changes from other threads.
 const WAITING_CHANGES: usize = 256;
-
-/// Parameter number that stands for the weight of a model.
-pub const WEIGHT: u32 = u32::MAX;
-/// Parameter number that stands for the plugin itself.
-pub const PLUGIN: u32 = u32::MAX - 1;
-
-/// New value of a parameter. The numbers come from a schema: see `session::Controls`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ParameterChange {
-    /// Number of the plugin in the run: the devices, then the models, both in the scene's order.
-    pub plugin: u16,
-    /// Generation of the plugin that the change was checked against.
-    pub generation: u16,
-    /// Index into the plugin's schema, [`WEIGHT`], or in a report [`PLUGIN`].
-    pub parameter: u32,
-    /// New value; for a choice, its index.
-    pub value: f64,
-    /// Pace of the change.
-    pub pace: Pace,
-}
-
-/// Outcome of a change.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChangeReport {
-    /// Tick before which the change was applied.
-    pub tick: u64,
-    /// Time of the tick, ns.
-    pub time_ns: u64,
-    /// Reported change.
-    pub change: ParameterChange,
-    /// Result of the plugin's call.
-    pub outcome: ChangeOutcome,
-}
 
 /// Converts the status of a call to the outcome of a change.
 #[inline]
@@ -122,12 +90,7 @@ impl ParameterQueue {
         self.movements.forget_others(plugin, generation);
         let value = f64::from(generation);
         let change = ParameterChange { plugin, generation, parameter: PLUGIN, value, pace: Pace::AtOnce };
-        let _ = self.reports.push(ChangeReport {
-            tick: tick.index,
-            time_ns: tick.time_ns,
-            change,
-            outcome: ChangeOutcome::Applied,
-        });
+        let _ = self.reports.push(ChangeReport::at(tick, change, ChangeOutcome::Applied));
     }
 
     /// Applies the scheduled changes that are due, oldest first, and at most `waiting` of the sent ones, and advances gradual
@@ -147,7 +110,7 @@ impl ParameterQueue {
             any = true;
             let outcome = outcome(apply(&change));
             // There is room: for the whole schedule always, and for sent changes by the check below.
-            let _ = reports.push(ChangeReport { tick: tick.index, time_ns: tick.time_ns, change, outcome });
+            let _ = reports.push(ChangeReport::at(tick, change, outcome));
             outcome
         };
         while let Some(due) = schedule.get(*next).filter(|due| due.time_ns <= tick.time_ns) {
@@ -165,16 +128,14 @@ impl ParameterQueue {
                     continue;
                 };
                 if !movements.begin(&change, from, per_s) {
-                    let (tick, time_ns, outcome) = (tick.index, tick.time_ns, ChangeOutcome::Refused);
-                    let _ = reports.push(ChangeReport { tick, time_ns, change, outcome });
+                    let _ = reports.push(ChangeReport::at(tick, change, ChangeOutcome::Refused));
                 }
             }
         }
         if reports.slots() >= left + movements.moving() {
             let report = |change, outcome| {
                 any = true;
-                let _ =
-                    reports.push(ChangeReport { tick: tick.index, time_ns: tick.time_ns, change, outcome });
+                let _ = reports.push(ChangeReport::at(tick, change, outcome));
             };
             movements.advance(tick, |change| outcome(apply(change)), report);
         }

@@ -3,7 +3,7 @@
 use crate::guest::is_guest;
 use crate::platform::Duty;
 use crate::platform::scheduling::{
-    self, CORE_ADVICE, MAX_CORES, MEMORY_ADVICE, NoSuchCore, THREAD_ADVICE, priority_advice,
+    self, CORE_ADVICE, MAX_CORES, MEMORY_ADVICE, THREAD_ADVICE, priority_advice,
 };
 
 /// Core of the machine, by its number in the system.
@@ -25,13 +25,14 @@ impl std::fmt::Display for Core {
 }
 
 /// Outcome of a request to the system.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Privilege {
     /// Granted by the system.
     Granted,
     /// Refused, with the system's reason.
     Refused(String),
     /// Not requested.
+    #[default]
     NotRequested,
 }
 
@@ -45,7 +46,7 @@ impl Privilege {
 }
 
 /// Real-time privileges of the loop.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RealTimeReport {
     /// Real-time scheduling, [`PRIORITY_NAME`](crate::PRIORITY_NAME).
     pub fifo: Privilege,
@@ -59,11 +60,7 @@ impl RealTimeReport {
     /// Returns a report on a loop without requests, as on the virtual clock.
     #[must_use]
     pub fn not_requested() -> Self {
-        Self {
-            fifo: Privilege::NotRequested,
-            memory_lock: Privilege::NotRequested,
-            core: Privilege::NotRequested,
-        }
+        Self::default()
     }
 
     /// Returns one line per refusal: privilege, reason and remedy.
@@ -98,9 +95,8 @@ pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
 
 /// Pins the calling thread to one core; other threads of the process are not affected.
 fn pin(Core(number): Core) -> Result<(), String> {
-    scheduling::pin(number).map_err(|NoSuchCore| {
-        format!("--core {number}: the machine lacks this core, or this process may not use it")
-    })
+    scheduling::pin(number)
+        .map_err(|_| format!("--core {number}: the machine lacks this core, or this process may not use it"))
 }
 
 /// Requests the priority of a worker for the calling thread. Not real-time; without it the worker is only slower.

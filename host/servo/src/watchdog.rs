@@ -1,200 +1,21 @@
 //! The watchdog: a thread that stops all devices when the loop no longer ticks, and reports the place where the loop is stuck.
 //!
-//! The loop writes a heartbeat, one word with the tick and the running code. The watchdog polls the word several times per limit. A word
-//! unchanged for longer than the limit means that a call does not return; the watchdog then stops the devices without the loop's help.
+//! It polls the [heartbeat](Heartbeat) several times per limit. A beat unchanged for longer than the limit means that a call does not
+//! return; the watchdog then stops the devices without the loop's help.
 
 use super::clock::{monotonic_ns, sleep_until};
-use super::last_stop::{SignalGuard, TakenSignals, end_dying, is_dying, take_sent};
+use super::heartbeat::Heartbeat;
+use super::last_stop::{SignalGuard, end_dying, is_dying, take_sent};
 use super::realtime::enter_guard_priority;
 use super::stop::StopSwitch;
 use super::watchdog_process::HeartbeatSender;
-use flotor_core::MAX_DEVICES;
 use flotor_hal::abi::loader::Stopper;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
 use std::thread::JoinHandle;
-
-/// Code that the loop is running.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// Between two ticks.
-    Waiting,
-    /// Wait for the next sample of a device that sets the pace, by device number.
-    DeviceWait(u16),
-    /// `read` of a device, by device number.
-    DeviceRead(u16),
-    /// `step` of a model, by its place in the scene.
-    Model(usize),
-    /// Code of the host.
-    Host,
-    /// `write` of a device, by device number.
-    DeviceWrite(u16),
-}
-
-impl Place {
-    /// Codes: 0 and 1, then the waits for devices, their reads, their writes, the models.
-    const FIRST_WAIT: u64 = 2;
-    const FIRST_READ: u64 = Self::FIRST_WAIT + MAX_DEVICES as u64;
-    const FIRST_WRITE: u64 = Self::FIRST_READ + MAX_DEVICES as u64;
-    const FIRST_MODEL: u64 = Self::FIRST_WRITE + MAX_DEVICES as u64;
-
-    /// Returns the running call as text for users.
-    #[must_use]
-    pub const fn call(self) -> &'static str {
-        match self {
-            Self::Waiting => "waiting",
-            Self::DeviceWait(_) => "`wait_for_sample`",
-            Self::DeviceRead(_) => "`read`",
-            Self::Model(_) => "`step`",
-            Self::Host => "the tick",
-            Self::DeviceWrite(_) => "`write`",
-        }
-    }
-
-    /// Returns true if the code belongs to a plugin.
-    pub(crate) const fn is_a_plugins(self) -> bool {
-        !matches!(self, Self::Waiting | Self::Host)
-    }
-
-    #[inline]
-    const fn code(self) -> u64 {
-        match self {
-            Self::Waiting => 0,
-            Self::Host => 1,
-            Self::DeviceWait(device) => Self::FIRST_WAIT + device as u64,
-            Self::DeviceRead(device) => Self::FIRST_READ + device as u64,
-            Self::DeviceWrite(device) => Self::FIRST_WRITE + device as u64,
-            Self::Model(index) => Self::FIRST_MODEL + index as u64,
-        }
-    }
-
-    #[allow(clippy::cast_possible_truncation)] // numbers that fitted before
-    const fn from_code(code: u64) -> Self {
-        match code {
-            0 => Self::Waiting,
-            1 => Self::Host,
-            wait @ Self::FIRST_WAIT..Self::FIRST_READ => Self::DeviceWait((wait - Self::FIRST_WAIT) as u16),
-            read @ Self::FIRST_READ..Self::FIRST_WRITE => Self::DeviceRead((read - Self::FIRST_READ) as u16),
-            write @ Self::FIRST_WRITE..Self::FIRST_MODEL => {
-                Self::DeviceWrite((write - Self::FIRST_WRITE) as u16)
-            }
-            model => Self::Model((model - Self::FIRST_MODEL) as usize),
-        }
-    }
-}
-
-/// Heartbeat of the loop, read by the watchdog. Clones share their state.
-#[derive(Clone, Debug, Default)]
-pub struct Heartbeat {
-    shared: Arc<Shared>,
-}
-
-#[derive(Debug, Default)]
-struct Shared {
-    /// Low 48 bits of the tick above 16 bits of the place.
-    beat: AtomicU64,
-    /// True once the loop is over: no more beats are due.
-    done: AtomicBool,
-    /// Beat at which the watchdog stopped the device, plus one; 0: not stopped.
-    fired: AtomicU64,
-    /// Signals of the host that a plugin took while the loop ran, one bit each.
-    taken: AtomicU64,
-    /// True once another thread stops the devices: the loop sends no more commands.
-    silenced: AtomicBool,
-}
-
-/// Number of bits of a beat for the place.
-const PLACE_BITS: u32 = 16;
-const PLACE_MASK: u64 = (1 << PLACE_BITS) - 1;
-
-impl Heartbeat {
-    /// Records the code that runs next. Real-time: bounded, no allocation.
-    #[inline]
-    pub fn enter(&self, tick: u64, place: Place) {
-        self.shared.beat.store(tick << PLACE_BITS | place.code() & PLACE_MASK, Ordering::Release);
-    }
-
-    /// Returns the place of the loop when the watchdog stopped the device; `None` if it has not. Real-time: bounded, no allocation.
-    #[inline]
-    pub fn fired_at(&self) -> Option<Stuck> {
-        match self.shared.fired.load(Ordering::Acquire) {
-            0 => None,
-            beat => Some(Stuck::at(beat - 1)),
-        }
-    }
-
-    /// Reports the end of the loop to the watchdog.
-    pub fn finish(&self) {
-        self.shared.done.store(true, Ordering::Release);
-    }
-
-    /// Ends the commands of the loop before another thread stops the devices, so that no force follows a stop. Waits for a command
-    /// in progress, but not for one that hangs. Safe in a signal handler.
-    pub(crate) fn silence(&self) {
-        self.shared.silenced.store(true, Ordering::Relaxed);
-        // The loop records its command, then reads the flag; here it is the other way round, so that one of both sees the other.
-        fence(Ordering::SeqCst);
-        let (beat, until_ns) = (self.beat(), monotonic_ns() + LONGEST_COMMAND_NS);
-        let commands = matches!(Stuck::at(beat).place, Place::DeviceWrite(_));
-        while commands && self.beat() == beat && monotonic_ns() < until_ns {
-            sleep_until(monotonic_ns() + COMMAND_LOOK_NS);
-        }
-    }
-
-    /// Returns true if the loop, which has just recorded a command, may not send it. Real-time: bounded, no allocation.
-    #[inline]
-    pub(crate) fn is_silenced(&self) -> bool {
-        fence(Ordering::SeqCst);
-        self.shared.silenced.load(Ordering::Relaxed)
-    }
-
-    /// Returns the current place of the loop. Real-time: bounded, no allocation.
-    #[must_use]
-    pub fn now(&self) -> Stuck {
-        Stuck::at(self.beat())
-    }
-
-    /// Returns the signals of the host that a plugin took while the loop ran, and that the watchdog has restored.
-    #[must_use]
-    pub fn signals_taken(&self) -> TakenSignals {
-        TakenSignals::from_bits(self.shared.taken.load(Ordering::Relaxed))
-    }
-
-    pub(crate) fn is_done(&self) -> bool {
-        self.shared.done.load(Ordering::Acquire)
-    }
-
-    fn beat(&self) -> u64 {
-        self.shared.beat.load(Ordering::Acquire)
-    }
-
-    fn fire(&self, beat: u64) {
-        self.shared.fired.store(beat + 1, Ordering::Release);
-    }
-}
-
-/// Place where a loop got stuck.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Stuck {
-    /// Index of the tick.
-    pub tick: u64,
-    /// Running code.
-    pub place: Place,
-}
-
-impl Stuck {
-    const fn at(beat: u64) -> Self {
-        Self { tick: beat >> PLACE_BITS, place: Place::from_code(beat & PLACE_MASK) }
-    }
-}
 
 /// Polls of the watchdog per limit.
 const LOOKS: u64 = 8;
 /// Longest poll interval, ns: the delay of an emergency stop while the loop is stuck.
 const LONGEST_LOOK_NS: u64 = 1_000_000;
-/// Longest duration of a command to a device that does not hang, and the interval between two polls of it, ns.
-const LONGEST_COMMAND_NS: u64 = 1_000_000;
-const COMMAND_LOOK_NS: u64 = 20_000;
 /// Polls for which a process may be dying: half a second.
 const DYING_LOOKS: u32 = 500;
 /// Heartbeats for the watchdog process per limit; its timeout expires when one is late by the limit.
@@ -233,7 +54,7 @@ pub fn start(
                 return;
             }
             if look.is_multiple_of(SIGNAL_LOOKS) {
-                heartbeat.shared.taken.fetch_or(signals.put_back().bits(), Ordering::Relaxed);
+                heartbeat.add_taken(signals.put_back());
             }
             sleep_until(monotonic_ns() + look_ns);
             if is_dying() {
@@ -266,6 +87,3 @@ pub fn start(
         }
     })
 }
-
-#[cfg(test)]
-mod tests;

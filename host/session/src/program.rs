@@ -12,6 +12,7 @@
 
 use crate::scene::{ModelUse, Scene};
 use flotor_core::mapping::Mapping;
+use flotor_core::words::{Decoder, Encoder};
 use flotor_hal::abi::{Entry, model_entry};
 use flotor_hal::{
     Demand, ForceModel, Input, Memory, ModelInfo, Output, Parameter, Refusal, Settings, StepStatus, Wrench,
@@ -47,16 +48,13 @@ struct Command {
 impl Words<9> for Command {
     #[inline]
     fn to_words(&self) -> [u64; 9] {
-        let Wrench { force_n: [fx, fy, fz], torque_nm: [tx, ty, tz] } = self.wrench;
-        let [fx, fy, fz, tx, ty, tz] = [fx, fy, fz, tx, ty, tz].map(f64::to_bits);
-        [fx, fy, fz, tx, ty, tz, self.commands, self.gate, self.valid_ns]
+        Encoder::of_zeros().wrench(&self.wrench).words([self.commands, self.gate, self.valid_ns]).finish()
     }
 
     #[inline]
-    fn from_words(&[fx, fy, fz, tx, ty, tz, commands, gate, valid_ns]: &[u64; 9]) -> Self {
-        let [fx, fy, fz, tx, ty, tz] = [fx, fy, fz, tx, ty, tz].map(f64::from_bits);
-        let wrench = Wrench { force_n: [fx, fy, fz], torque_nm: [tx, ty, tz] };
-        Self { wrench, commands, gate, valid_ns }
+    fn from_words(words: &[u64; 9]) -> Self {
+        let mut words = Decoder::of(words);
+        Self { wrench: words.wrench(), commands: words.word(), gate: words.word(), valid_ns: words.word() }
     }
 }
 

@@ -5,7 +5,6 @@ use clap::Args;
 use flotor_command::options::mcap_file;
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, first_error, report_line, style};
-use flotor_core::Change;
 use flotor_live::{Answer, Ask, Client, Directory, Event, LiveError};
 use flotor_record::{Note, Recorder, Severity};
 use flotor_servo::StopSwitch;
@@ -111,7 +110,7 @@ fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, Comma
                     kept.ticks += 1;
                 }
             }
-            Ok(Some(Event::Change(change))) => recorder.change(&Change::from(&change))?,
+            Ok(Some(Event::Change(change))) => recorder.change(&change)?,
             Ok(Some(Event::End(end))) => {
                 kept.end = RecordingEnd::Complete(end.words);
                 break;

@@ -2,6 +2,7 @@
 //!
 //! Each system has one module with the same items.
 
+mod request;
 #[cfg(not(windows))]
 mod unix;
 #[cfg(windows)]
@@ -12,17 +13,9 @@ use unix as system;
 #[cfg(windows)]
 use windows as system;
 
+pub(crate) use request::Request;
 pub use system::INTERRUPTED;
 pub(crate) use system::{
     KeyTerminal, Requests, accept_interrupts, ask_to_end, become_program, die_by, divide, is_orphaned,
     outlive_requests, results_apart, stack_limit_bytes,
 };
-
-/// Request to end a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Request {
-    /// Orderly end; repeated, an emergency stop.
-    End,
-    /// Emergency stop.
-    Emergency,
-}

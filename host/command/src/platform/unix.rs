@@ -2,7 +2,7 @@
 
 mod supervision;
 
-use super::Request;
+use super::request::Request;
 use flotor_servo::StopSwitch;
 use flotor_servo::platform::{block_sent_signals, block_signals, wait_for_signal};
 use rustix::process::{Pid, Resource, Signal, getpgrp, getrlimit, kill_process};

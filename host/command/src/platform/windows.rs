@@ -1,15 +1,16 @@
 //! Windows: events of the console, its modes, handles.
 #![allow(unsafe_code)] // calls of the console, and a function that it calls; tests/tests/system/architecture.rs lists it
 
-use super::Request;
+use super::request::Request;
 use crate::supervision::Side;
+use flotor_core::lock;
 use flotor_servo::StopSwitch;
 use std::fs::File;
 use std::io::{self, IsTerminal, stdin};
 use std::os::windows::io::AsHandle;
 use std::process::{Child, Command};
+use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 use windows_sys::Win32::System::Console::{
     CONSOLE_MODE, CTRL_BREAK_EVENT, CTRL_C_EVENT, ENABLE_ECHO_INPUT, ENABLE_LINE_INPUT, GetConsoleMode,
@@ -66,7 +67,7 @@ impl Requests {
     /// Errors of the system.
     pub(crate) fn listen(_: &StopSwitch) -> io::Result<Self> {
         let (tell, events) = channel();
-        *TOLD.lock().unwrap_or_else(PoisonError::into_inner) = Some(tell);
+        *lock(&TOLD) = Some(tell);
         handle(on_event)?;
         Ok(Self { events })
     }
@@ -90,7 +91,7 @@ fn handle(handler: Handler) -> io::Result<()> {
 /// Handles a console event, in a thread of its own; returns 1, so that no other handler runs.
 unsafe extern "system" fn on_event(event: u32) -> i32 {
     let request = if event == CTRL_BREAK_EVENT { Request::Emergency } else { Request::End };
-    if let Some(tell) = &*TOLD.lock().unwrap_or_else(PoisonError::into_inner) {
+    if let Some(tell) = &*lock(&TOLD) {
         let _ = tell.send(request);
     }
     if ![CTRL_C_EVENT, CTRL_BREAK_EVENT].contains(&event) {

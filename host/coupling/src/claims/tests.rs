@@ -44,7 +44,7 @@ fn an_honest_partner_is_believed_to_the_bit() {
         assert!((accepted.passed_on_j - told.passed_on_j).abs() < 1.0e-12, "tick {tick}: {accepted:?}");
         heard = tick;
     }
-    assert_eq!((claims.cut(), claims.is_too_much()), (ClaimExcess::default(), false));
+    assert_eq!((claims.cut, claims.is_too_much()), (ClaimExcess::default(), false));
 }
 
 #[test]

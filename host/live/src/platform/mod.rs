@@ -8,13 +8,11 @@ mod unix;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use unix::{
-    Datagrams, Listening, Stream, connect, connect_now, has_left, is_ours, is_ours_alone,
-    is_out_of_descriptors, is_same_file, make_folder, private_file, read_at, remove_if_dead, run_folder,
-    write_all_at,
-};
+use unix as system;
 #[cfg(windows)]
-pub(crate) use windows::{
+use windows as system;
+
+pub(crate) use system::{
     Datagrams, Listening, Stream, connect, connect_now, has_left, is_ours, is_ours_alone,
     is_out_of_descriptors, is_same_file, make_folder, private_file, read_at, remove_if_dead, run_folder,
     write_all_at,

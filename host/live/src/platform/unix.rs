@@ -1,5 +1,6 @@
 //! Unix: sockets that are files, and permissions.
 
+use flotor_core::lock;
 use rustix::event::{PollFd, PollFlags, poll};
 use rustix::io::Errno;
 use rustix::net::{AddressFamily, RecvFlags, SocketAddrUnix, SocketType, recv};
@@ -10,7 +11,7 @@ use std::net::Shutdown;
 use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt, OpenOptionsExt};
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 /// Sender of a datagram.
 pub(crate) use std::os::unix::net::SocketAddr as Address;
@@ -119,7 +120,7 @@ impl Listening {
 
     /// Waits for the next client; `None` once closed.
     pub(crate) fn accept(&self) -> io::Result<Option<Stream>> {
-        let mut spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut spare = lock(&self.spare);
         if spare.is_none() {
             *spare = self.socket.try_clone().ok();
         }

@@ -9,26 +9,28 @@
 //! each parameter. Without clients, a tick costs one load of a number. Not real-time.
 
 mod outbox;
+mod threads;
 mod watcher;
 
 use crate::platform::{Listening, Stream, has_left};
 use crate::{
-    Ask, ChangeMessage, Directory, DirectoryError, End, EndKind, Greeting, Kind, Listener, RefusalCause,
+    Answer, Ask, Directory, DirectoryError, End, EndKind, Greeting, Kind, Listener, RefusalCause, Request,
     frame,
 };
-use flotor_core::Change;
 use flotor_core::demand::ObserverDemand;
 use flotor_core::trace::TickRecord;
+use flotor_core::{Change, lock};
 use flotor_hal::Demand;
 use flotor_record::RunDescription;
 use outbox::Outbox;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use watcher::Watcher;
+use threads::{join_until, thread};
+use watcher::{Handler, PATIENCE, Watcher};
 
 /// Largest number of programs that watch one run: each costs two threads and a queue.
 const MAX_WATCHERS: usize = 16;
@@ -37,10 +39,6 @@ const MAX_WATCHERS: usize = 16;
 const MAX_CONNECTIONS: usize = MAX_WATCHERS + 4;
 /// Largest number of further connections whose threads are ending.
 const MAX_CLOSING: usize = MAX_CONNECTIONS / 2;
-/// Stack size of the threads of the server, bytes: small, because locked memory makes every page of it resident.
-const STACK_BYTES: usize = 256 * 1024;
-/// Grace period for a client to read the end of a run, and for its requests to be answered.
-const PATIENCE: Duration = Duration::from_millis(500);
 /// Timeout of the end of all connections together, beyond the grace period of the clients.
 const END_WAIT: Duration = Duration::from_millis(1000);
 /// Pause after a connection that failed for want of resources (mostly descriptors), and longest wait for threads to end.
@@ -136,12 +134,11 @@ impl Publication {
 
     /// Sends a change to all clients, before the first tick that uses it. Does not wait.
     pub fn change(&self, change: &Change) {
-        let message = ChangeMessage::from(change);
-        self.shared.greeting().keep(&message);
-        let Ok(payload) = serde_json::to_vec(&message) else { return };
-        let (message, bytes) = (Arc::new(message), frame(Kind::Change, &payload));
+        lock(&self.shared.greeting).keep(change);
+        let Ok(payload) = serde_json::to_vec(change) else { return };
+        let (change, bytes) = (Arc::new(change.clone()), frame(Kind::Change, &payload));
         for watcher in self.shared.watchers().iter() {
-            watcher.outbox.change(Arc::clone(&message), bytes.clone());
+            watcher.outbox.change(Arc::clone(&change), bytes.clone());
         }
     }
 
@@ -168,23 +165,14 @@ impl Drop for Publication {
 
 impl Shared {
     fn watchers(&self) -> MutexGuard<'_, Vec<Watcher>> {
-        self.watchers.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn greeting(&self) -> MutexGuard<'_, Greeting> {
-        self.greeting.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Returns the time since the publication began, ms.
-    fn now_ms(&self) -> u64 {
-        u64::try_from(self.started.elapsed().as_millis()).unwrap_or(u64::MAX)
+        lock(&self.watchers)
     }
 
     /// Joins the threads that have ended; waits for some at most [`BREATH`] where too many are ending. Returns whether one more
     /// connection may close.
     fn has_room_to_close(&self) -> bool {
         let until = Instant::now() + BREATH;
-        let mut closing = self.closing.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut closing = lock(&self.closing);
         loop {
             closing.extract_if(.., |watcher| watcher.has_ended()).for_each(Watcher::join);
             if closing.len() < MAX_CLOSING || Instant::now() >= until {
@@ -196,7 +184,7 @@ impl Shared {
 
     /// Stores a client until its threads have ended.
     fn close(&self, watcher: Watcher) {
-        self.closing.lock().unwrap_or_else(PoisonError::into_inner).push(watcher);
+        lock(&self.closing).push(watcher);
     }
 
     /// Starts sending ticks to one more client, unless too many watch.
@@ -212,10 +200,41 @@ impl Shared {
         Ok(())
     }
 
+    fn carry_out(&self, ask: Ask, outbox: &Outbox) -> Result<(), (RefusalCause, String)> {
+        match ask {
+            Ask::Watch { every } => {
+                self.admit(outbox, every).map_err(|refused| (RefusalCause::Other, refused))?;
+            }
+            Ask::Unwatch => {
+                outbox.want_no_ticks();
+                self.count(&self.watchers());
+            }
+            asked => self.host.serve(asked)?,
+        }
+        Ok(())
+    }
+
     /// Updates the number of watching clients, after one has started, stopped or disconnected.
     fn count(&self, watchers: &[Watcher]) {
         let watching = watchers.iter().filter(|watcher| watcher.outbox.wants_ticks()).count();
         self.watching.store(watching, Ordering::Relaxed);
+    }
+}
+
+impl Handler for Shared {
+    fn answer(&self, payload: &[u8], outbox: &Outbox) -> Answer {
+        let (number, done) = match Request::read(payload) {
+            Ok(Request { number, ask }) => (number, self.carry_out(ask, outbox)),
+            Err((number, error)) => {
+                (number, Err((RefusalCause::Request, format!("unknown or malformed request: {error}"))))
+            }
+        };
+        let (cause, refused) = done.err().map(|(cause, words)| (cause, Some(words))).unwrap_or_default();
+        Answer { number, refused, cause }
+    }
+
+    fn on_end(&self) {
+        self.count(&self.watchers());
     }
 }
 
@@ -249,11 +268,11 @@ fn welcome(stream: Stream, shared: &Arc<Shared>) {
         return;
     }
     let outbox = Arc::new(Outbox::default());
-    let Ok(greeting) = serde_json::to_vec(&*shared.greeting()) else { return };
+    let Ok(greeting) = serde_json::to_vec(&*lock(&shared.greeting)) else { return };
     outbox.push(frame(Kind::Greeting, &greeting));
     outbox.push(frame(Kind::Run, &shared.run));
     // With the list locked, so that no change is sent between greeting and list.
-    watchers.extend(Watcher::start(stream, outbox, shared));
+    watchers.extend(Watcher::start(stream, outbox, Arc::clone(shared), shared.started));
 }
 
 /// Closes the connection of the client that watches nothing and was silent for longest; false if there is none.
@@ -262,21 +281,6 @@ fn evict_longest_silent(watchers: &mut Vec<Watcher>, shared: &Shared) -> bool {
     let longest = idle.min_by_key(|(_, watcher)| watcher.last_request_ms()).map(|(place, _)| place);
     let evicted = longest.map(|place| watchers.remove(place));
     evicted.inspect(Watcher::evict).map(|watcher| shared.close(watcher)).is_some()
-}
-
-/// Waits for the end of a thread until the deadline, then detaches it.
-fn join_until(thread: JoinHandle<()>, until: Instant) {
-    while !thread.is_finished() && Instant::now() < until {
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    if thread.is_finished() {
-        let _ = thread.join();
-    }
-}
-
-/// Returns a builder for a thread of the server.
-fn thread(name: &str) -> std::thread::Builder {
-    std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_BYTES)
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Outbox of one client: a queue of fixed length that drops and counts.
 
-use crate::{ChangeMessage, Kind, frame, ticks_to_payload};
+use crate::{Kind, frame, ticks_to_payload};
 use flotor_core::demand::DemandRequest;
 use flotor_core::trace::{Events, TickRecord};
+use flotor_core::{Change, lock};
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -12,6 +13,9 @@ const MAX_TICKS: usize = 4096;
 /// Largest number of other pending frames, except the newest change of each parameter. A client that sends this many requests and reads
 /// nothing gets no more answers.
 const MAX_FRAMES: usize = 256;
+
+/// Largest number of ticks in a frame.
+const MAX_TICKS_IN_A_FRAME: usize = 1024;
 
 #[derive(Default)]
 pub(super) struct Outbox {
@@ -24,7 +28,7 @@ struct WaitingFrame {
     /// Number of pending ticks that are sent before it.
     ticks_before: usize,
     /// Content, if it is a change.
-    change: Option<Arc<ChangeMessage>>,
+    change: Option<Arc<Change>>,
     bytes: Vec<u8>,
 }
 
@@ -49,7 +53,7 @@ struct State {
 
 impl State {
     /// Appends a frame after all pending ones.
-    fn append(&mut self, change: Option<Arc<ChangeMessage>>, bytes: Vec<u8>) {
+    fn append(&mut self, change: Option<Arc<Change>>, bytes: Vec<u8>) {
         let ticks_before = self.ticks.len();
         self.frames.push_back(WaitingFrame { ticks_before, change, bytes });
     }
@@ -57,7 +61,7 @@ impl State {
 
 impl Outbox {
     fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 
     /// Sends one tick in `every` from now on, and holds the `request` for outputs of models.
@@ -99,48 +103,49 @@ impl Outbox {
 
     /// Appends a change; without room, in place of the earliest pending one of the same parameter. One of each is never dropped, so
     /// that a client which reads nothing for a while knows the present values afterwards.
-    pub(super) fn change(&self, message: Arc<ChangeMessage>, frame: Vec<u8>) {
-        let mut state = self.lock();
-        if state.is_closed {
-            return;
-        }
-        if state.frames.len() >= MAX_FRAMES {
-            let is_same = |waiting: &WaitingFrame| {
-                waiting.change.as_ref().is_some_and(|earlier| earlier.is_of_the_same(&message))
-            };
-            if let Some(earliest) = state.frames.iter().position(is_same) {
-                state.frames.remove(earliest);
+    pub(super) fn change(&self, change: Arc<Change>, frame: Vec<u8>) {
+        self.update(|state| {
+            if state.is_closed {
+                return;
             }
-        }
-        state.append(Some(message), frame);
-        drop(state);
-        self.changed.notify_one();
+            if state.frames.len() >= MAX_FRAMES {
+                let is_same = |waiting: &WaitingFrame| {
+                    waiting.change.as_ref().is_some_and(|earlier| earlier.is_of_the_same(&change))
+                };
+                if let Some(earliest) = state.frames.iter().position(is_same) {
+                    state.frames.remove(earliest);
+                }
+            }
+            state.append(Some(change), frame);
+        });
     }
 
     /// Appends a frame that is neither tick nor change, if there is room.
     pub(super) fn push(&self, frame: Vec<u8>) {
-        let mut state = self.lock();
-        if state.frames.len() < MAX_FRAMES && !state.is_closed {
-            state.append(None, frame);
-        }
-        drop(state);
-        self.changed.notify_one();
+        self.update(|state| {
+            if state.frames.len() < MAX_FRAMES && !state.is_closed {
+                state.append(None, frame);
+            }
+        });
     }
 
     /// Appends the last frame of all and closes the outbox.
     pub(super) fn last(&self, frame: Vec<u8>) {
-        let mut state = self.lock();
-        if !state.is_closed {
-            state.last = Some(frame);
-            state.is_closed = true;
-        }
-        drop(state);
-        self.changed.notify_one();
+        self.update(|state| {
+            if !state.is_closed {
+                (state.last, state.is_closed) = (Some(frame), true);
+            }
+        });
     }
 
     /// Rejects all further frames; pending ones may still be sent.
     pub(super) fn close(&self) {
-        self.lock().is_closed = true;
+        self.update(|state| state.is_closed = true);
+    }
+
+    /// Changes the state and wakes the writer.
+    fn update(&self, change: impl FnOnce(&mut State)) {
+        change(&mut self.lock());
         self.changed.notify_one();
     }
 
@@ -163,71 +168,36 @@ impl Outbox {
             }
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
-        let mut batch = Batch::new(state.dropped);
+        let dropped = state.dropped;
         // The queue of ticks retains its capacity.
         let ticks: Vec<TickRecord> = state.ticks.drain(..).collect();
         let frames = std::mem::take(&mut state.frames);
         // The caller with the next tick does not wait for the encoding of this one.
         drop(state);
-        let mut ticks = ticks.into_iter();
-        let mut sent = 0;
+        let (mut sent, mut batch) = (0, Vec::new());
+        // Ticks share a frame as long as no other frame is between them.
+        let mut send = |batch: &mut Vec<u8>, until: usize| {
+            for some in ticks.get(sent..until).unwrap_or_default().chunks(MAX_TICKS_IN_A_FRAME) {
+                batch.extend(frame(Kind::Ticks, &ticks_to_payload(dropped, some.iter())));
+            }
+            sent = until;
+        };
         for WaitingFrame { ticks_before, bytes, .. } in frames {
-            ticks.by_ref().take(ticks_before - sent).for_each(|record| batch.tick(record));
-            sent = ticks_before;
-            batch.frame(&bytes);
+            send(&mut batch, ticks_before);
+            batch.extend(bytes);
         }
-        ticks.for_each(|record| batch.tick(record));
-        Some(batch.finish())
-    }
-}
-
-/// Encoder of pending frames: ticks share a frame as long as no other frame is between them.
-struct Batch {
-    bytes: Vec<u8>,
-    ticks: Vec<TickRecord>,
-    dropped: u64,
-}
-
-impl Batch {
-    /// Largest number of ticks in a frame.
-    const MAX_IN_A_FRAME: usize = 1024;
-
-    fn new(dropped: u64) -> Self {
-        Self { bytes: Vec::new(), ticks: Vec::new(), dropped }
-    }
-
-    fn tick(&mut self, record: TickRecord) {
-        self.ticks.push(record);
-        if self.ticks.len() >= Self::MAX_IN_A_FRAME {
-            self.close_frame();
-        }
-    }
-
-    fn frame(&mut self, frame: &[u8]) {
-        self.close_frame();
-        self.bytes.extend(frame);
-    }
-
-    fn close_frame(&mut self) {
-        if !self.ticks.is_empty() {
-            let payload = ticks_to_payload(self.dropped, self.ticks.iter());
-            self.bytes.extend(frame(Kind::Ticks, &payload));
-            self.ticks.clear();
-        }
-    }
-
-    fn finish(mut self) -> Vec<u8> {
-        self.close_frame();
-        self.bytes
+        send(&mut batch, ticks.len());
+        Some(batch)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Frames, Outcome, Subject, ticks_from_payload};
+    use crate::{Frames, ticks_from_payload};
     use flotor_core::demand::ObserverDemand;
     use flotor_core::trace::RECORD_WORDS;
+    use flotor_core::{ChangeOutcome, ChangeSubject};
     use flotor_hal::Demand;
     use flotor_sync::Words;
     use std::time::Instant;
@@ -283,12 +253,12 @@ mod tests {
         assert_eq!(seen, [(0, Events::NONE), (10, Events::BOUNDARY)]);
     }
 
-    fn changed(parameter: &str, outcome: Outcome) -> Arc<ChangeMessage> {
-        Arc::new(ChangeMessage {
+    fn changed(parameter: &str, outcome: ChangeOutcome) -> Arc<Change> {
+        Arc::new(Change {
             tick: 0,
             time_ns: 0,
             plugin: "spring".to_owned(),
-            subject: Subject::Parameter,
+            subject: ChangeSubject::Parameter,
             parameter: parameter.to_owned(),
             value: String::new(),
             number: 0.0,
@@ -301,15 +271,15 @@ mod tests {
     fn the_newest_change_of_each_parameter_is_never_dropped() {
         let outbox = Outbox::default();
         let number = |number: u32| frame(Kind::Change, &number.to_le_bytes());
-        outbox.change(changed("turns", Outcome::Applied), number(1_000_000));
+        outbox.change(changed("turns", ChangeOutcome::Applied), number(1_000_000));
         for value in 0..10_000 {
-            outbox.change(changed("gamma_n", Outcome::Applied), number(value));
+            outbox.change(changed("gamma_n", ChangeOutcome::Applied), number(value));
         }
-        outbox.change(changed("gamma_n", Outcome::Refused), number(2_000_000));
+        outbox.change(changed("gamma_n", ChangeOutcome::Refused), number(2_000_000));
         for _ in 0..1000 {
             outbox.push(frame(Kind::Answer, b"{}"));
         }
-        outbox.change(changed("wire_mm", Outcome::Applied), number(3_000_000));
+        outbox.change(changed("wire_mm", ChangeOutcome::Applied), number(3_000_000));
         let mut frames = Frames::default();
         frames.push(&outbox.take().expect("something waits"));
         let mut seen = Vec::new();
@@ -328,7 +298,7 @@ mod tests {
         outbox.want_ticks(1, nothing());
         outbox.tick(&record(0, Events::NONE));
         outbox.tick(&record(1, Events::NONE));
-        outbox.change(changed("gamma_n", Outcome::Applied), frame(Kind::Change, b"{}"));
+        outbox.change(changed("gamma_n", ChangeOutcome::Applied), frame(Kind::Change, b"{}"));
         outbox.tick(&record(2, Events::NONE));
         let mut frames = Frames::default();
         frames.push(&outbox.take().expect("something waits"));
@@ -345,7 +315,7 @@ mod tests {
         let outbox = Outbox::default();
         outbox.want_ticks(1, nothing());
         for tick in 0..1000 {
-            outbox.change(changed("gamma_n", Outcome::Applied), frame(Kind::Change, b"{}"));
+            outbox.change(changed("gamma_n", ChangeOutcome::Applied), frame(Kind::Change, b"{}"));
             outbox.tick(&record(tick, Events::NONE));
         }
         let mut frames = Frames::default();
@@ -367,7 +337,7 @@ mod tests {
                 let outbox = Outbox::default();
                 outbox.want_ticks(every, nothing());
                 (0..MAX_TICKS as u64).for_each(|tick| outbox.tick(&record(tick, Events::NONE)));
-                let message = changed("gamma_n", Outcome::Applied);
+                let message = changed("gamma_n", ChangeOutcome::Applied);
                 let since = Instant::now();
                 for _ in 0..1000 {
                     outbox.change(Arc::clone(&message), Vec::new());

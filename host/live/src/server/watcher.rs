@@ -1,9 +1,9 @@
 //! Connection of one client: a thread that writes pending frames, and a thread that reads requests.
 
 use super::outbox::Outbox;
-use super::{PATIENCE, Shared, join_until, thread};
+use super::threads::{join_until, thread};
 use crate::platform::Stream;
-use crate::{Answer, Ask, Frames, Kind, RefusalCause, Request, frame};
+use crate::{Answer, Frames, Kind, frame};
 use std::io::{ErrorKind, Write};
 use std::net::Shutdown;
 use std::sync::Arc;
@@ -18,6 +18,18 @@ const WRITE_WAIT: Duration = Duration::from_millis(100);
 /// Pause after each request: limits a flood to a thousand a second, and delays only its sender.
 const REQUEST_PERIOD: Duration = Duration::from_millis(1);
 
+/// Grace period for a client to read the end of a run, and for its requests to be answered.
+pub(super) const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Handler of the requests of all clients, called in their threads.
+pub(super) trait Handler: Send + Sync + 'static {
+    /// Carries out the request in a payload.
+    fn answer(&self, payload: &[u8], outbox: &Outbox) -> Answer;
+
+    /// Notes that a client sends no further request.
+    fn on_end(&self);
+}
+
 pub(super) struct Watcher {
     pub(super) outbox: Arc<Outbox>,
     /// Connection, shared with its threads: one descriptor for each client.
@@ -29,21 +41,26 @@ pub(super) struct Watcher {
 }
 
 impl Watcher {
-    /// Serves a connection; `None` if the system refuses a thread.
-    pub(super) fn start(stream: Stream, outbox: Arc<Outbox>, shared: &Arc<Shared>) -> Option<Self> {
+    /// Serves a connection of a publication that began at `since`; `None` if the system refuses a thread.
+    pub(super) fn start(
+        stream: Stream,
+        outbox: Arc<Outbox>,
+        handler: Arc<impl Handler>,
+        since: Instant,
+    ) -> Option<Self> {
         stream.set_write_timeout(Some(WRITE_WAIT)).ok()?;
         let stream = Arc::new(stream);
         let (to_write, to_read) = (Arc::clone(&stream), Arc::clone(&stream));
-        let (for_writer, for_reader, of_run) = (Arc::clone(&outbox), Arc::clone(&outbox), Arc::clone(shared));
+        let (for_writer, for_reader) = (Arc::clone(&outbox), Arc::clone(&outbox));
         let writer = thread("flotor-live-out").spawn(move || write(&to_write, &for_writer)).ok()?;
-        let last_request_ms = Arc::new(AtomicU64::new(shared.now_ms()));
+        let last_request_ms = Arc::new(AtomicU64::new(elapsed_ms(since)));
         let last_request = Arc::clone(&last_request_ms);
         let reader = thread("flotor-live-in").spawn(move || {
-            read(&to_read, &for_reader, &of_run, &last_request);
+            read(&to_read, &for_reader, &*handler, since, &last_request);
             // The client has closed the connection or sends malformed frames: the writer ends, too.
             for_reader.want_no_ticks();
             for_reader.close();
-            of_run.count(&of_run.watchers());
+            handler.on_end();
         });
         match reader {
             Ok(reader) => Some(Self { outbox, stream, writer, reader, last_request_ms }),
@@ -121,7 +138,13 @@ fn write_whole(mut stream: &Stream, mut bytes: &[u8], outbox: &Outbox) -> bool {
 }
 
 /// Answers requests until the client closes the connection.
-fn read(mut stream: &Stream, outbox: &Outbox, shared: &Shared, last_request_ms: &AtomicU64) {
+fn read(
+    mut stream: &Stream,
+    outbox: &Outbox,
+    handler: &impl Handler,
+    since: Instant,
+    last_request_ms: &AtomicU64,
+) {
     let mut frames = Frames::default();
     loop {
         match frames.fill(&mut stream) {
@@ -133,8 +156,8 @@ fn read(mut stream: &Stream, outbox: &Outbox, shared: &Shared, last_request_ms: 
         loop {
             match frames.take() {
                 Ok(Some((Kind::Request, payload))) => {
-                    last_request_ms.store(shared.now_ms(), Ordering::Relaxed);
-                    let answer = answer(payload, outbox, shared);
+                    last_request_ms.store(elapsed_ms(since), Ordering::Relaxed);
+                    let answer = handler.answer(payload, outbox);
                     if let Ok(payload) = serde_json::to_vec(&answer) {
                         outbox.push(frame(Kind::Answer, &payload));
                     }
@@ -148,27 +171,6 @@ fn read(mut stream: &Stream, outbox: &Outbox, shared: &Shared, last_request_ms: 
     }
 }
 
-fn answer(payload: &[u8], outbox: &Outbox, shared: &Shared) -> Answer {
-    let (number, done) = match Request::read(payload) {
-        Ok(Request { number, ask }) => (number, carry_out(ask, outbox, shared)),
-        Err((number, error)) => {
-            (number, Err((RefusalCause::Request, format!("unknown or malformed request: {error}"))))
-        }
-    };
-    let (cause, refused) = done.err().map(|(cause, words)| (cause, Some(words))).unwrap_or_default();
-    Answer { number, refused, cause }
-}
-
-fn carry_out(ask: Ask, outbox: &Outbox, shared: &Shared) -> Result<(), (RefusalCause, String)> {
-    match ask {
-        Ask::Watch { every } => {
-            shared.admit(outbox, every).map_err(|refused| (RefusalCause::Other, refused))?
-        }
-        Ask::Unwatch => {
-            outbox.want_no_ticks();
-            shared.count(&shared.watchers());
-        }
-        asked => shared.host.serve(asked)?,
-    }
-    Ok(())
+fn elapsed_ms(since: Instant) -> u64 {
+    u64::try_from(since.elapsed().as_millis()).unwrap_or(u64::MAX)
 }

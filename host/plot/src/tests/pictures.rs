@@ -1,8 +1,9 @@
 //! Outlines, labels and whole documents.
 
 use super::super::axis::Extent;
+use super::super::drawing::{Drawing, draw};
 use super::super::labels::{side_labels, top_labels};
-use super::super::path::{Drawing, Projection, Rect, draw};
+use super::super::projection::{Projection, Rect};
 use super::super::theme::Slot;
 use super::super::{Axis, Bin, ErrorBar, Figure, Mark, Panel, Quantity, Series, Spans, text};
 use super::{Domain, Point, Scale, linear, ten_minutes};

@@ -1,8 +1,11 @@
 //! Execution of a model: in the loop, asynchronously, or in a worker process.
 
 pub mod asynchronous;
-mod field_words;
 pub mod process;
+mod records;
+mod stepped;
+
+pub use stepped::Stepped;
 
 use asynchronous::AsynchronousModel;
 use flotor_hal::abi::CallStatus;
@@ -10,7 +13,7 @@ use flotor_hal::abi::loader::Model;
 use flotor_hal::{
     ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
 };
-use process::{Reply, Worker};
+use process::Worker;
 
 /// Model with its kind of execution.
 pub enum Engine {
@@ -22,38 +25,23 @@ pub enum Engine {
     Asynchronous(Box<AsynchronousModel>),
 }
 
-/// Result of a step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Stepped {
-    /// Answered; the output is not validated yet.
-    Answered,
-    /// No answer in time; one may come in a later tick.
-    Late,
-    /// No answer for longer than the last one stays valid.
-    Silent,
-    /// The model panicked or violated the contract.
-    Broken,
-    /// The worker process has ended.
-    Gone,
+/// Calls the same function of the model, whatever executes it.
+macro_rules! each {
+    ($engine:expr, $model:ident => $call:expr) => {
+        match $engine {
+            Engine::Here($model) => $call,
+            Engine::Process($model) => $call,
+            Engine::Asynchronous($model) => $call,
+        }
+    };
 }
 
 impl Engine {
     /// Steps the model; `output` is only valid for [`Stepped::Answered`]. Real-time: bounded by the model or its timeout, no allocation.
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
-        let answered = |status| match status {
-            CallStatus::Ok => Stepped::Answered,
-            _ => Stepped::Broken,
-        };
         match self {
-            Self::Here(model) => answered(model.step(input, output)),
-            Self::Process(worker) => match worker.step(input) {
-                Reply::Answered((status, answer)) => {
-                    *output = answer;
-                    answered(status)
-                }
-                Reply::Late => Stepped::Late,
-                Reply::Gone => Stepped::Gone,
-            },
+            Self::Here(model) => model.step(input, output).into(),
+            Self::Process(worker) => worker.step(input, output),
             Self::Asynchronous(model) => model.step(input, output),
         }
     }
@@ -65,46 +53,22 @@ impl Engine {
 
     /// Changes a live parameter at a tick boundary. Real-time: bounded by the model or its timeout, no allocation.
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
-        match self {
-            Self::Here(model) => model.set_parameter(index, value),
-            Self::Process(worker) => match worker.set_parameter(index, value) {
-                Reply::Answered(status) => status,
-                // Not applied: the next step reports a late or ended worker.
-                Reply::Late | Reply::Gone => CallStatus::Unsupported,
-            },
-            Self::Asynchronous(model) => model.set_parameter(index, value),
-        }
+        each!(self, model => model.set_parameter(index, value))
     }
 
     /// Returns the value of a parameter before the loop starts; NaN for a parameter without one. Not real-time.
     pub fn parameter(&mut self, index: usize) -> f64 {
-        match self {
-            Self::Here(model) => model.parameter(index),
-            Self::Process(worker) => worker.parameter(index),
-            Self::Asynchronous(model) => model.parameter(index),
-        }
+        each!(self, model => model.parameter(index))
     }
 
     /// Returns the outputs that the model can compute.
     pub fn serves(&self) -> Demand {
-        match self {
-            Self::Here(model) => model.serves(),
-            Self::Process(worker) => worker.serves(),
-            Self::Asynchronous(model) => model.serves(),
-        }
+        each!(self, model => model.serves())
     }
 
     /// Clears the history of the model. Real-time: bounded by the model or its timeout, no allocation.
     pub fn reset(&mut self) -> CallStatus {
-        match self {
-            Self::Here(model) => model.reset(),
-            Self::Process(worker) => match worker.reset() {
-                Reply::Answered(status) => status,
-                // The next step reports a late or ended worker.
-                Reply::Late | Reply::Gone => CallStatus::Ok,
-            },
-            Self::Asynchronous(model) => model.reset(),
-        }
+        each!(self, model => model.reset())
     }
 
     /// Returns the active region of the model; everywhere for an asynchronous model. Real-time: bounded, no allocation.
@@ -136,20 +100,9 @@ impl Engine {
 
     /// Computes the linear field at an input; `field` is only valid for [`Stepped::Answered`]. Not real-time.
     pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
-        let answered = |status| match status {
-            CallStatus::Ok => Stepped::Answered,
-            _ => Stepped::Broken,
-        };
         match self {
-            Self::Here(model) => answered(model.linear_field(input, field)),
-            Self::Process(worker) => match worker.linear_field(input) {
-                Reply::Answered((status, answer)) => {
-                    *field = answer;
-                    answered(status)
-                }
-                Reply::Late => Stepped::Late,
-                Reply::Gone => Stepped::Gone,
-            },
+            Self::Here(model) => model.linear_field(input, field).into(),
+            Self::Process(worker) => worker.linear_field(input, field),
             Self::Asynchronous(_) => Stepped::Broken,
         }
     }
@@ -167,11 +120,7 @@ impl Engine {
 
     /// Returns the model's dependence on the path of the handle.
     pub fn memory(&self) -> Memory {
-        match self {
-            Self::Here(model) => model.memory(),
-            Self::Process(worker) => worker.memory(),
-            Self::Asynchronous(model) => model.memory(),
-        }
+        each!(self, model => model.memory())
     }
 
     /// Returns the number of calls that changed the floating-point environment of the loop thread; 0 for a model elsewhere.
@@ -186,10 +135,6 @@ impl Engine {
 
     /// Returns the last message of the model. Not real-time.
     pub fn last_message(&mut self) -> String {
-        match self {
-            Self::Here(model) => model.last_message(),
-            Self::Process(worker) => worker.last_message(),
-            Self::Asynchronous(model) => model.last_message(),
-        }
+        each!(self, model => model.last_message())
     }
 }

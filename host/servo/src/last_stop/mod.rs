@@ -20,11 +20,12 @@ pub use end_report::{ReportedEnd, report_end, report_end_to};
 
 use crate::platform::last_stop as system;
 use crate::{Heartbeat, Place, Stuck};
+use flotor_core::lock;
 use flotor_hal::abi::loader::Stopper;
 use line::Line;
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
 /// Exit code after the devices were stopped here: the one of a failed plugin.
 const ENDED: i32 = 3;
@@ -105,10 +106,6 @@ fn glance(run: &Mutex<Option<Arc<Armed>>>) -> Option<MutexGuard<'_, Option<Arc<A
         Err(TryLockError::Poisoned(run)) => Some(run.into_inner()),
         Err(TryLockError::WouldBlock) => None,
     }
-}
-
-fn lock(run: &Mutex<Option<Arc<Armed>>>) -> MutexGuard<'_, Option<Arc<Armed>>> {
-    run.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Guard that arms a run until its devices are closed and its models freed.

@@ -44,20 +44,11 @@ impl ModelHealth {
         *self == Self { late_answers: self.late_answers, ..Self::default() }
     }
 
-    fn reject(&mut self, tick: u64) {
-        self.rejected_ticks += 1;
-        self.first_rejected.get_or_insert(tick);
-    }
-
+    /// Counts a tick with a problem, and stores the first one.
     #[cold]
-    fn change_floats(&mut self, tick: u64) {
-        self.float_changes += 1;
-        self.first_float_change.get_or_insert(tick);
-    }
-
-    fn late(&mut self, tick: u64) {
-        self.late_ticks += 1;
-        self.first_late.get_or_insert(tick);
+    fn count(counter: &mut u64, first: &mut Option<u64>, tick: u64) {
+        *counter += 1;
+        first.get_or_insert(tick);
     }
 }
 
@@ -75,6 +66,14 @@ struct Object {
     float_changes: u64,
     /// True after a panic or process exit: the model is not called any more.
     is_disabled: bool,
+}
+
+/// Tick, state of the device and demanded outputs of a step.
+#[derive(Clone, Copy)]
+pub(super) struct StepContext<'a> {
+    pub(super) tick: &'a Tick,
+    pub(super) state: &'a DeviceState,
+    pub(super) demand: TickDemand,
 }
 
 /// Wrench and energy of one layer in a tick. An output that was not computed is NaN.
@@ -131,14 +130,15 @@ pub struct Layer {
     objects: Box<[Object]>,
     broad: BroadPhase,
     /// Outputs that the model can compute.
-    serves: Demand,
+    pub(super) serves: Demand,
     memory: Memory,
     budget: TimeBudget,
     /// Last contribution, which fades out after too many overruns.
     last: Contribution,
-    blend: Blend,
+    /// Weight, priority and fade time.
+    pub(super) blend: Blend,
     /// Health of this layer alone; a replacement starts anew.
-    health: ModelHealth,
+    pub(super) health: ModelHealth,
     /// Number of replacements of the model when the layer was put in.
     pub(super) generation: u16,
 }
@@ -191,16 +191,6 @@ impl Layer {
         self.generation
     }
 
-    /// Returns the outputs that the model can compute.
-    pub(super) fn serves(&self) -> Demand {
-        self.serves
-    }
-
-    /// Returns weight, priority and fade time of the layer.
-    pub(super) fn blend(&self) -> &Blend {
-        &self.blend
-    }
-
     /// Returns the box in the device frame in which any object can act; `None` for everywhere. Real-time.
     pub(super) fn bounds(&self) -> Option<Bounds> {
         self.broad.hull()
@@ -211,17 +201,12 @@ impl Layer {
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
     #[inline(always)] // 3 ns: the result stays in registers
-    pub(super) fn step(
-        &mut self,
-        tick: &Tick,
-        state: &DeviceState,
-        demand: TickDemand,
-        events: &mut Events,
-    ) -> Contribution {
+    pub(super) fn step(&mut self, context: &StepContext<'_>, events: &mut Events) -> Contribution {
+        let tick = context.tick;
         match self.budget.allowed(tick.time_ns) {
             Allowed::Asked => {
                 let (begun_ns, late_answers) = (self.budget.begin(), self.health.late_answers);
-                let share = self.ask(tick, state, demand, events);
+                let share = self.ask(context, events);
                 if let Some(begun_ns) = begun_ns {
                     let is_there = self.health.late_answers == late_answers;
                     let answer = if is_there { Answer::There } else { Answer::Missing };
@@ -246,13 +231,8 @@ impl Layer {
 
     /// Steps all objects that can act at the handle; the others are not called.
     #[inline]
-    fn ask(
-        &mut self,
-        tick: &Tick,
-        state: &DeviceState,
-        demand: TickDemand,
-        events: &mut Events,
-    ) -> Contribution {
+    fn ask(&mut self, context: &StepContext<'_>, events: &mut Events) -> Contribution {
+        let StepContext { tick, state, demand } = *context;
         let Self { objects, broad, serves, memory, health, .. } = self;
         let mut share = Contribution::NONE;
         broad.for_each_near(objects, state.pose.position(), |object| {
@@ -299,11 +279,6 @@ impl Layer {
             }
         }
         worst
-    }
-
-    /// Returns the health counters so far.
-    pub(super) fn health(&self) -> ModelHealth {
-        self.health
     }
 
     /// Returns a report on the layer as model number `model`. Queries the last message of an unhealthy model only, and calls `on_query`
@@ -362,7 +337,7 @@ impl Object {
         if self.model.float_changes() != self.float_changes {
             self.float_changes = self.model.float_changes();
             events.insert(Events::FLOAT_ENVIRONMENT);
-            health.change_floats(input.tick);
+            ModelHealth::count(&mut health.float_changes, &mut health.first_float_change, input.tick);
         }
         match stepped {
             Stepped::Answered => {
@@ -372,7 +347,11 @@ impl Object {
                     Some(_) => {}
                     None => {
                         self.last = None;
-                        health.reject(input.tick);
+                        ModelHealth::count(
+                            &mut health.rejected_ticks,
+                            &mut health.first_rejected,
+                            input.tick,
+                        );
                     }
                 }
                 usable
@@ -385,7 +364,7 @@ impl Object {
             }
             Stepped::Silent => {
                 events.insert(Events::MODEL_OVERRUN);
-                health.late(input.tick);
+                ModelHealth::count(&mut health.late_ticks, &mut health.first_late, input.tick);
                 self.last.take()
             }
             Stepped::Broken => self.fail(input.tick, health),

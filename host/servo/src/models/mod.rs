@@ -11,8 +11,8 @@ mod layer;
 mod slot;
 
 pub use end_wall::pushes_at_home;
-pub use layer::ModelHealth;
-pub use layer::{Layer, LayerReport};
+pub use layer::{Layer, LayerReport, ModelHealth};
+pub(crate) use slot::Slot;
 
 use super::{Heartbeat, Place};
 use broad_phase::BroadPhase;
@@ -21,8 +21,7 @@ use flotor_core::demand::TickDemand;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
-use layer::Contribution;
-use slot::Slot;
+use layer::{Contribution, StepContext};
 
 /// Time in which a layer of higher priority silences the others, s: shorter than a hand's reaction, and long enough that the slew
 /// limit need not act.
@@ -30,7 +29,8 @@ const SILENCE_S: f64 = 0.02;
 
 /// Models of a device.
 pub(crate) struct ModelStack {
-    slots: Box<[Slot]>,
+    /// Slots of the models, in the scene's order.
+    pub(crate) slots: Box<[Slot]>,
     broad: BroadPhase,
     /// Levels by ascending priority; none if all layers have one priority: then no layer is silenced.
     levels: Box<[Level]>,
@@ -97,6 +97,7 @@ impl ModelStack {
     ) -> (Wrench, f64) {
         let Self { slots, broad, levels, .. } = self;
         levels.iter_mut().for_each(|level| level.pushes = false);
+        let context = StepContext { tick, state, demand };
         let mut sum = Contribution::NONE;
         broad.for_each_near(slots, state.pose.position(), |slot| {
             let level = levels.iter_mut().find(|level| level.priority == slot.priority);
@@ -105,7 +106,7 @@ impl ModelStack {
                 return;
             }
             heartbeat.enter(tick.index, Place::Model(slot.number));
-            let share = slot.step(tick, state, demand, events);
+            let share = slot.step(&context, events);
             let mut weight = slot.weight.at(tick.time_ns);
             if let Some(level) = level {
                 level.pushes |= weight > 0.0 && reaches_hand(&share.wrench, demand.at_hand());
@@ -137,19 +138,6 @@ impl ModelStack {
         status
     }
 
-    /// Moves the weight of the model in place `model` to a new value, at its rate. Real-time: bounded, no allocation.
-    pub(crate) fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
-        let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
-        slot.weight.set_target(weight, tick.time_ns);
-        CallStatus::Ok
-    }
-
-    /// Returns the number of replacements of the model in place `model`. Real-time: bounded, no allocation.
-    #[inline]
-    pub(crate) fn generation(&self, model: usize) -> Option<u16> {
-        self.slots.get(model).map(Slot::generation)
-    }
-
     /// Replaces a model; the new layer fades in from this tick on. Returns a layer that had to go before it had faded out; the
     /// caller drops it outside the loop.
     ///
@@ -168,39 +156,12 @@ impl ModelStack {
         pushed_out
     }
 
-    /// Removes a layer that has faded out; returns it with its model number. Real-time: bounded by the models, no allocation.
-    #[inline]
-    pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
-        let take = |slot: &mut Slot| Some((u32::try_from(slot.number).ok()?, slot.take_faded(tick)?));
-        self.slots.iter_mut().find_map(take)
-    }
-
-    /// Returns true while a layer is fading out. Real-time: bounded by the models, no allocation.
-    pub(crate) fn is_fading(&self) -> bool {
-        self.slots.iter().any(Slot::is_fading)
-    }
-
     /// Updates the bounds of a layer in the broad phase.
     fn rebound(&mut self, model: usize) {
         let bounds = self.slots.get(model).and_then(Slot::bounds);
         if bounds != self.broad.bounds(model) {
             self.broad.watch_always(model, bounds);
         }
-    }
-
-    /// Returns health and last message of the current layer of each model. Not real-time.
-    pub(crate) fn health(&mut self) -> Vec<(ModelHealth, String)> {
-        self.slots.iter_mut().map(Slot::health).collect()
-    }
-
-    /// Returns reports on all layers; calls `on_query` before it queries a model's last message. Not real-time.
-    pub(crate) fn reports(&mut self, on_query: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
-        self.slots.iter_mut().flat_map(|slot| slot.reports(on_query))
-    }
-
-    /// Returns all layers, each with its model number. Not real-time.
-    pub(crate) fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
-        self.slots.into_iter().flat_map(Slot::into_layers)
     }
 }
 

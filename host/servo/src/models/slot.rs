@@ -6,15 +6,14 @@
 
 use super::broad_phase::Bounds;
 use super::fade::Fade;
-use super::layer::{Contribution, Layer, LayerReport, ModelHealth};
-use flotor_core::demand::TickDemand;
+use super::layer::{Contribution, Layer, LayerReport, ModelHealth, StepContext};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{Demand, DeviceState, Tick};
+use flotor_hal::{Demand, Tick};
 
-pub(super) struct Slot {
+pub(crate) struct Slot {
     /// Number of the model in the scene.
-    pub(super) number: usize,
+    pub(crate) number: usize,
     current: Box<Layer>,
     /// Weight of the current layer while the old one fades out.
     presence: Fade,
@@ -32,7 +31,7 @@ pub(super) struct Slot {
 impl Slot {
     /// Creates a slot with its first layer. Not real-time.
     pub(super) fn new(number: usize, layer: Layer) -> Self {
-        let blend = *layer.blend();
+        let blend = layer.blend;
         Self {
             number,
             current: Box::new(layer),
@@ -48,7 +47,7 @@ impl Slot {
 
     /// Returns the generation of the current layer, named in changes of its parameters. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn generation(&self) -> u16 {
+    pub(crate) fn generation(&self) -> u16 {
         self.current.generation
     }
 
@@ -75,13 +74,13 @@ impl Slot {
     }
 
     /// Returns true while a layer is fading out. Real-time: bounded, no allocation.
-    pub(super) fn is_fading(&self) -> bool {
+    pub(crate) fn is_fading(&self) -> bool {
         self.leaving.is_some()
     }
 
     /// Removes the layer that has faded out, if there is one. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn take_faded(&mut self, tick: &Tick) -> Option<Box<Layer>> {
+    pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<Box<Layer>> {
         if self.leaving.is_none() || self.presence.at(tick.time_ns) < 1.0 {
             return None;
         }
@@ -91,7 +90,7 @@ impl Slot {
 
     /// Returns true if the current model computes its stored energy.
     pub(super) fn gives_energy(&self) -> bool {
-        self.current.serves().contains(Demand::ENERGY)
+        self.current.serves.contains(Demand::ENERGY)
     }
 
     /// Returns the box in the device frame in which the objects can act; `None` for everywhere. Real-time: bounded by their number,
@@ -107,23 +106,22 @@ impl Slot {
 
     /// Returns the contribution at a state of the device. Real-time: bounded by the objects that are near, no allocation.
     #[inline]
-    pub(super) fn step(
-        &mut self,
-        tick: &Tick,
-        state: &DeviceState,
-        demand: TickDemand,
-        events: &mut Events,
-    ) -> Contribution {
-        let share = self.current.step(tick, state, demand, events);
+    pub(super) fn step(&mut self, context: &StepContext<'_>, events: &mut Events) -> Contribution {
+        let share = self.current.step(context, events);
         let Some(leaving) = &mut self.leaving else { return share };
         // Mix of the current layer and the leaving one.
-        let presence = self.presence.at(tick.time_ns);
-        let mut before = leaving.step(tick, state, demand, events);
+        let presence = self.presence.at(context.tick.time_ns);
+        let mut before = leaving.step(context, events);
         if let Some(rest) = self.rest {
             before = before.plus(rest);
         }
-        self.gap = Some((tick.index, before.plus(share.times(-1.0))));
+        self.gap = Some((context.tick.index, before.plus(share.times(-1.0))));
         share.times(presence).plus(before.times(1.0 - presence))
+    }
+
+    /// Moves the weight to a new value, at its rate. Real-time: bounded, no allocation.
+    pub(crate) fn set_weight(&mut self, tick: &Tick, weight: f64) {
+        self.weight.set_target(weight, tick.time_ns);
     }
 
     /// Changes a live parameter of the current layer. Real-time: bounded by its objects, no allocation.
@@ -132,12 +130,12 @@ impl Slot {
     }
 
     /// Returns health and last message of the current layer. Not real-time.
-    pub(super) fn health(&mut self) -> (ModelHealth, String) {
-        (self.current.health(), self.current.last_message())
+    pub(crate) fn health(&mut self) -> (ModelHealth, String) {
+        (self.current.health, self.current.last_message())
     }
 
     /// Returns reports on all layers of the slot. Not real-time.
-    pub(super) fn reports(&mut self, on_query: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
+    pub(crate) fn reports(&mut self, on_query: &impl Fn(usize)) -> impl Iterator<Item = LayerReport> {
         let Self { number, current, leaving, .. } = self;
         let number = *number;
         let layers = leaving.iter_mut().chain(std::iter::once(current));
@@ -145,7 +143,7 @@ impl Slot {
     }
 
     /// Returns all layers of the slot, each with the model's number. Not real-time.
-    pub(super) fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
+    pub(crate) fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
         let Self { number, current, leaving, .. } = self;
         leaving.into_iter().chain(std::iter::once(current)).map(move |layer| (number, layer))
     }

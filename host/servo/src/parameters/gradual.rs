@@ -1,6 +1,6 @@
 //! Numbers that move to a new value at a rate, so that a user's slider does not make the force jump.
 
-use super::ParameterChange;
+use super::change::{Pace, ParameterChange};
 use flotor_core::ChangeOutcome;
 use flotor_hal::Tick;
 
@@ -9,20 +9,6 @@ const LONGEST_STEP_NS: u64 = 10_000_000;
 /// Time for which a plugin may refuse the next value before the movement ends, ns: the queue of an asynchronous model may be full
 /// for a while, and two numbers may have to move together.
 const PATIENCE_NS: u64 = 1_000_000_000;
-
-/// Pace of a change.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Pace {
-    /// Before the next tick.
-    AtOnce,
-    /// At a rate, from the current value.
-    Gradual {
-        /// Value when the plugin was created, in the parameter's unit: start of a number that has not changed since.
-        from: f64,
-        /// Rate in the parameter's unit per second.
-        per_s: f64,
-    },
-}
 
 /// Number with its value and movement.
 #[derive(Clone, Copy, Debug)]

@@ -22,7 +22,7 @@ pub use linux::group_limits::{GroupLimit, LimitValue, Use, group_limits};
 #[cfg(not(windows))]
 pub use linux::scheduling::real_time_budget_advice;
 #[cfg(not(windows))]
-pub use linux::{block_sent_signals, block_signals, wait_for_signal};
+pub use linux::{all_but, block_sent_signals, block_signals, set_blocked, set_of, wait_for_signal};
 pub use system::scheduling::{PRIORITY_NAME, THREAD_ADVICE};
 pub(crate) use system::{clock, last_stop, processes, scheduling, shared_memory, watchdog_process};
 

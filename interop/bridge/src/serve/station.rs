@@ -6,7 +6,7 @@ use crate::link::LinkError;
 use crate::status::Status;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
-use flotor_live::{ChangeMessage, End};
+use flotor_live::End;
 use flotor_record::TickMessages;
 use serde::Serialize;
 use std::sync::Mutex;
@@ -58,10 +58,9 @@ impl Station {
     }
 
     /// Publishes a change with its time.
-    pub(super) fn change(&self, change: &ChangeMessage) -> Result<(), LinkError> {
-        let change = Change::from(change);
+    pub(super) fn change(&self, change: &Change) -> Result<(), LinkError> {
         self.change
-            .put(flotor_record::change_to_bytes(&change))
+            .put(flotor_record::change_to_bytes(change))
             .attachment(change.time_ns.to_le_bytes())
             .wait_now()
     }

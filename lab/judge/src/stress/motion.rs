@@ -58,8 +58,7 @@ impl Motion {
     fn powers(&self, subject: &mut Subject<'_>, parts: &[f64]) -> Option<Vec<f64>> {
         let mut before = parts.last()? - 1.0;
         let power = |part: &f64| {
-            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most two seconds
-            let dt_ns = ((part - std::mem::replace(&mut before, *part)) * self.lap_s * 1.0e9).round() as u64;
+            let dt_ns = flotor_core::to_ns((part - std::mem::replace(&mut before, *part)) * self.lap_s);
             let (pose, motion_m, turn_rad) = self.at(*part);
             let twist = Twist::new(motion_m / self.lap_s, turn_rad / self.lap_s);
             let wrench = subject.advance(pose, twist, dt_ns).ok()?.wrench;

@@ -100,8 +100,7 @@ fn cases(arguments: &StabilityArguments) -> Vec<Case> {
     }
     let mut cases = Vec::new();
     for rate_hz in given_or(rate, 1000.0) {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
-        let period_ns = (1.0e9 / rate_hz).round() as u64;
+        let period_ns = flotor_core::period_ns(rate_hz);
         for delay_ticks in given_or(delay, 0) {
             for plant_damping_ns_per_m in given_or(damping, 0.5) {
                 cases.extend(given_or(virtual_damping, 0.0).map(|virtual_damping_ns_per_m| Case {

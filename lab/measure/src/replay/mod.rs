@@ -15,7 +15,7 @@ use files::as_recorded;
 use flotor_core::coupling::{CouplingDescription, CouplingEnds};
 use flotor_core::plausibility::{ImplausibleSamples, PlausibilityCheck};
 use flotor_core::trace::{Events, TickRecord};
-use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs};
+use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs, period_ns};
 use flotor_coupling::{LinkTimeouts, Reach};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{Axes, Capabilities, Demand, DeviceState, LoopConfig, Tick};
@@ -145,8 +145,7 @@ impl<'r> Replay<'r> {
             return Err(ReplayError::Program { model: lent.name.clone() });
         }
         use_recorded_files(&mut uses, &held, path, recording.run())?;
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // 100 Hz to 10 kHz
-        let period_ns = (1.0e9 / recording.run().rate_hz).round() as u64;
+        let period_ns = period_ns(recording.run().rate_hz);
         let config = LoopConfig { period_ns, seed: recording.run().seed };
         let mut layers = Vec::new();
         let mut plugins = Vec::new();

@@ -4,7 +4,8 @@
 use crate::supervision::{End, Side};
 use flotor_servo::enter_guard_priority;
 use flotor_servo::last_stop::ReportedEnd;
-use libc::{c_int, siginfo_t, sigset_t};
+use flotor_servo::platform::{all_but, set_blocked, set_of};
+use libc::{c_int, siginfo_t};
 use rustix::mm::{MapFlags, ProtFlags, mmap_anonymous};
 use rustix::process::{
     Pid, Signal, WaitOptions, WaitStatus, getpid, getppid, kill_process, set_parent_process_death_signal,
@@ -54,7 +55,7 @@ pub(crate) fn divide() -> io::Result<Side> {
     // SAFETY: the default action.
     unsafe { libc::signal(libc::SIGCHLD, libc::SIG_DFL) };
     // Signals wait until there is a child to forward them to.
-    let before = set_blocked(&every_signal());
+    let before = set_blocked(&all_but(&[]));
     // SAFETY: this process has one thread, so that no lock is held in the child.
     let child = unsafe { libc::fork() };
     if child < 0 {
@@ -91,7 +92,7 @@ pub(crate) fn die_by(signal: c_int) -> ! {
         libc::signal(signal, libc::SIG_DFL);
         libc::raise(signal);
     }
-    set_blocked(&no_signal());
+    set_blocked(&set_of(&[]));
     std::process::exit(128 + signal)
 }
 
@@ -197,34 +198,10 @@ fn shared_word() -> io::Result<&'static AtomicU32> {
 
 /// Waits for a signal; `None` after the timeout.
 fn next_signal(timeout: libc::timespec) -> Option<siginfo_t> {
-    let every = every_signal();
+    let every = all_but(&[]);
     let mut info = MaybeUninit::<siginfo_t>::zeroed();
     // SAFETY: an initialised set and time, and memory that is there for the call.
     let signal = unsafe { libc::sigtimedwait(&raw const every, info.as_mut_ptr(), &raw const timeout) };
     // SAFETY: plain data, all of whose bits may be zero, and written where there was a signal.
     (signal > 0).then(|| unsafe { info.assume_init() })
-}
-
-fn every_signal() -> sigset_t {
-    let mut set = no_signal();
-    // SAFETY: an initialised set.
-    unsafe { libc::sigfillset(&raw mut set) };
-    set
-}
-
-fn no_signal() -> sigset_t {
-    let mut set = MaybeUninit::<sigset_t>::zeroed();
-    // SAFETY: memory that is there for the call, which initialises it.
-    unsafe {
-        libc::sigemptyset(set.as_mut_ptr());
-        set.assume_init()
-    }
-}
-
-/// Replaces the set of blocked signals; returns the one before.
-fn set_blocked(set: &sigset_t) -> sigset_t {
-    let mut before = no_signal();
-    // SAFETY: initialised sets that are there for the call.
-    unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, set, &raw mut before) };
-    before
 }

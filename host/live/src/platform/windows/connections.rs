@@ -4,12 +4,13 @@
 //! the time limit, and the end of a run waits for no client.
 
 use super::announced::{Announced, SECRET_BYTES};
+use flotor_core::lock;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::Path;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Connection between client and host.
@@ -70,7 +71,7 @@ impl Listening {
 
     /// Waits for the next client that sends the secret; `None` once closed, `Interrupted` when a client was rejected.
     pub(crate) fn accept(&self) -> io::Result<Option<Stream>> {
-        let mut pending = self.pending.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut pending = lock(&self.pending);
         loop {
             // Without a pending client, wait for one.
             self.socket.set_nonblocking(!pending.is_empty())?;

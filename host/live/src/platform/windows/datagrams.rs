@@ -1,11 +1,12 @@
 //! Datagrams between two programs of this user.
 
 use super::announced::Announced;
+use flotor_core::lock;
 use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::net::{Ipv4Addr, UdpSocket};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 /// Sender of a datagram.
@@ -66,7 +67,7 @@ impl Datagrams {
 
     /// Sends a datagram to the socket with this path.
     pub(crate) fn send_to(&self, bytes: &[u8], path: &Path) -> io::Result<usize> {
-        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut known = lock(&self.known);
         let place = known.iter().position(|known| known.path == path);
         // A call checks that the other socket exists; states are sent often, and reading a file takes time.
         let is_trusted = |known: &Known| !bytes.is_empty() && known.seen.elapsed() < LOOK_PERIOD;
@@ -96,7 +97,7 @@ impl Datagrams {
                 Err(error) if error.raw_os_error() == Some(TOO_LONG) => continue,
                 // An earlier datagram did not arrive: its socket is closed, or was recreated.
                 Err(error) if error.kind() == ErrorKind::ConnectionReset => {
-                    self.known.lock().unwrap_or_else(PoisonError::into_inner).clear();
+                    lock(&self.known).clear();
                     continue;
                 }
                 Err(error) => return Err(error),

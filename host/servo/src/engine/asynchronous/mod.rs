@@ -11,13 +11,16 @@
 //! field is delayed by the latency in the scene: every run is the same, bit for bit.
 
 mod cross_fade;
+mod source;
 mod thread;
 
 use crate::{Clock, Engine, Stepped};
 use cross_fade::CrossFade;
 use flotor_core::mapping::FieldTiming;
+use flotor_core::{period_ns, to_ns};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, StepStatus};
+use source::FieldSource;
 use thread::ModelThread;
 
 /// Age in periods at which the last field is discarded: the handle has moved meanwhile.
@@ -45,24 +48,11 @@ enum Computing {
     Thread(ModelThread),
 }
 
-/// Result of a query for a new field.
-#[allow(clippy::large_enum_variant)] // read where it is returned; a box would allocate in the loop
-pub enum Arrival {
-    /// A new field.
-    Field(LinearField),
-    /// No new field yet.
-    Nothing,
-    /// The model panicked or violated the contract.
-    Broken,
-}
-
 impl AsynchronousModel {
     /// Returns the loop settings to prepare the model for: its period is at least the loop's.
     #[must_use]
     pub fn config(timing: &FieldTiming, config: &LoopConfig) -> LoopConfig {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: 0.1 ms to 1 s
-        let period_ns = (1.0e9 / timing.rate_hz).round() as u64;
-        LoopConfig { period_ns: period_ns.max(config.period_ns), ..*config }
+        LoopConfig { period_ns: period_ns(timing.rate_hz).max(config.period_ns), ..*config }
     }
 
     /// Prepares the model for its own rate ([`Self::config`]) and starts it, inline or on a thread. Not real-time.
@@ -76,8 +66,7 @@ impl AsynchronousModel {
         config: &LoopConfig,
         clock: Clock,
     ) -> Result<Self, Refusal> {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: 0.1 ms to 1 s
-        let latency_ns = (timing.latency_s * 1.0e9).round() as u64;
+        let latency_ns = to_ns(timing.latency_s);
         let config = Self::config(timing, config);
         let period_ns = config.period_ns;
         model.prepare(&config)?;
@@ -102,22 +91,23 @@ impl AsynchronousModel {
     /// Evaluates the newest fields at the handle; `output` is only valid for [`Stepped::Answered`]. Real-time on a real clock:
     /// bounded, no allocation.
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
-        let arrival = match &mut self.computing {
-            Computing::Inline(inline) => inline.poll(input),
-            Computing::Thread(thread) => thread.poll(input),
+        let mut field = LinearField::NONE;
+        let polled = match &mut self.computing {
+            Computing::Inline(inline) => inline.poll(input, &mut field),
+            Computing::Thread(thread) => thread.poll(input, &mut field),
         };
-        match arrival {
-            Arrival::Field(field) if field.is_finite() => {
+        match polled {
+            Stepped::Answered if field.is_finite() => {
                 self.fields.take(field, &input.pose, input.time_ns);
                 self.newest_ns = Some(field.time_ns);
             }
             // Passed on, to be rejected as a non-finite answer.
-            Arrival::Field(field) => {
+            Stepped::Answered => {
                 *output = field.wrench.into();
                 return Stepped::Answered;
             }
-            Arrival::Nothing => {}
-            Arrival::Broken => return Stepped::Broken,
+            Stepped::Late | Stepped::Silent => {}
+            Stepped::Broken | Stepped::Gone => return Stepped::Broken,
         }
         let since_ns = *self.since_ns.get_or_insert(input.time_ns);
         if input.time_ns.saturating_sub(self.newest_ns.unwrap_or(since_ns)) > self.oldest_ns {
@@ -132,7 +122,7 @@ impl AsynchronousModel {
     /// Changes a live parameter before the next field. Real-time: bounded, no allocation.
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         match &mut self.computing {
-            Computing::Inline(inline) => inline.model.set_parameter(index, value),
+            Computing::Inline(inline) => inline.source.model.set_parameter(index, value),
             Computing::Thread(thread) => thread.set_parameter(index, value),
         }
     }
@@ -165,7 +155,7 @@ impl AsynchronousModel {
     /// Returns the last message of the model. Not real-time.
     pub fn last_message(&mut self) -> String {
         match &mut self.computing {
-            Computing::Inline(inline) => inline.model.last_message(),
+            Computing::Inline(inline) => inline.source.model.last_message(),
             Computing::Thread(thread) => thread.last_message(),
         }
     }
@@ -173,44 +163,40 @@ impl AsynchronousModel {
 
 /// Model computed in the loop at multiples of its period, with delayed fields.
 struct Inline {
-    model: Engine,
+    source: FieldSource,
     period_ns: u64,
     latency_ns: u64,
     /// Time of the next computation, ns.
     next_ns: u64,
-    looked_ns: Option<u64>,
     /// Computed field with its release time, ns. A latency is at most a period, so there is at most one field.
     held_back: Option<(u64, LinearField)>,
 }
 
 impl Inline {
     fn new(model: Engine, period_ns: u64, latency_ns: u64) -> Self {
-        Self { model, period_ns, latency_ns, next_ns: 0, looked_ns: None, held_back: None }
+        Self { source: FieldSource::new(model), period_ns, latency_ns, next_ns: 0, held_back: None }
     }
 
-    fn poll(&mut self, input: &Input) -> Arrival {
+    /// Computes a field if one is due, and takes the field whose latency is over; late if there is none.
+    fn poll(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
         let due = self.held_back.take_if(|(ready_ns, _)| input.time_ns >= *ready_ns);
         if input.time_ns >= self.next_ns {
             self.next_ns = (input.time_ns / self.period_ns + 1) * self.period_ns;
-            let dt_ns = self.looked_ns.map_or(0, |before_ns| input.time_ns - before_ns);
-            self.looked_ns = Some(input.time_ns);
-            let mut field = LinearField::NONE;
-            let demand = self.model.serves().limited_to(Demand::WRENCH);
-            match self.model.linear_field(&Input { dt_ns, demand, ..*input }, &mut field) {
-                Stepped::Answered => {
-                    field.time_ns = input.time_ns;
-                    self.held_back = Some((input.time_ns + self.latency_ns, field));
-                }
+            let mut next = LinearField::NONE;
+            match self.source.compute(input, &mut next) {
+                Stepped::Answered => self.held_back = Some((input.time_ns + self.latency_ns, next)),
                 // The field may come the next time.
                 Stepped::Late | Stepped::Silent => {}
-                Stepped::Broken | Stepped::Gone => return Arrival::Broken,
+                Stepped::Broken | Stepped::Gone => return Stepped::Broken,
             }
         }
-        due.map_or(Arrival::Nothing, |(_, field)| Arrival::Field(field))
+        let Some((_, due)) = due else { return Stepped::Late };
+        *field = due;
+        Stepped::Answered
     }
 
     fn reset(&mut self) -> CallStatus {
-        (self.held_back, self.looked_ns) = (None, None);
-        self.model.reset()
+        self.held_back = None;
+        self.source.reset()
     }
 }

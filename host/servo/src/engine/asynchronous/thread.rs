@@ -2,12 +2,13 @@
 //!
 //! Loop and thread share two latest-value cells, a queue of commands and two flags; neither waits for the other.
 
-use super::Arrival;
-use crate::engine::field_words::{FIELD_WORDS, Sent};
+use super::source::FieldSource;
+use crate::engine::records::{INPUT_WORDS, SentField, SentInput};
 use crate::{Engine, Stepped, THREAD_ADVICE, enter_worker_priority};
+use flotor_core::words::FIELD_WORDS;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{Demand, Input, LinearField, Pose, Refusal, Twist};
-use flotor_sync::{Observer, Publisher, Words, latest};
+use flotor_hal::{Input, LinearField, Pose, Refusal};
+use flotor_sync::{Observer, Publisher, latest};
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -15,44 +16,6 @@ use std::time::{Duration, Instant};
 
 /// Capacity of the command queue between two fields.
 const OPERATIONS: usize = 64;
-
-/// Handle sample sent to the model thread.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct HandleSample {
-    pose: Pose,
-    twist: Twist,
-    time_ns: u64,
-    tick: u64,
-    buttons: u32,
-}
-
-const SAMPLE_WORDS: usize = 7 + 6 + 3;
-
-impl Words<SAMPLE_WORDS> for HandleSample {
-    fn to_words(&self) -> [u64; SAMPLE_WORDS] {
-        let [px, py, pz] = self.pose.position_m.map(f64::to_bits);
-        let [qx, qy, qz, qw] = self.pose.orientation_xyzw.map(f64::to_bits);
-        let [vx, vy, vz] = self.twist.linear_m_per_s.map(f64::to_bits);
-        let [wx, wy, wz] = self.twist.angular_rad_per_s.map(f64::to_bits);
-        [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, self.time_ns, self.tick, self.buttons.into()]
-    }
-
-    fn from_words(words: &[u64; SAMPLE_WORDS]) -> Self {
-        let [px, py, pz, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, time_ns, tick, buttons] = *words;
-        let three = |numbers: [u64; 3]| numbers.map(f64::from_bits);
-        Self {
-            pose: Pose {
-                position_m: three([px, py, pz]),
-                orientation_xyzw: [qx, qy, qz, qw].map(f64::from_bits),
-            },
-            twist: Twist { linear_m_per_s: three([vx, vy, vz]), angular_rad_per_s: three([wx, wy, wz]) },
-            time_ns,
-            tick,
-            #[allow(clippy::cast_possible_truncation)] // the 32 bits written
-            buttons: buttons as u32,
-        }
-    }
-}
 
 /// Command that the model executes before its next field.
 #[derive(Clone, Copy, Debug)]
@@ -71,8 +34,8 @@ struct Flags {
 
 /// Loop side of the model thread.
 pub(super) struct ModelThread {
-    samples: Publisher<HandleSample, SAMPLE_WORDS>,
-    fields: Observer<Sent, FIELD_WORDS>,
+    samples: Publisher<SentInput, INPUT_WORDS>,
+    fields: Observer<SentField, FIELD_WORDS>,
     operations: Producer<Operation>,
     flags: Arc<Flags>,
     /// Version of the newest field taken.
@@ -88,19 +51,16 @@ impl ModelThread {
     /// # Errors
     /// If the system cannot start a thread.
     pub(super) fn start(model: Engine, period_ns: u64) -> Result<Self, Refusal> {
-        let at_home = HandleSample { pose: Pose::HOME, twist: Twist::ZERO, time_ns: 0, tick: 0, buttons: 0 };
-        let (samples, seen) = latest(at_home);
-        let (sent, fields) = latest(Sent(LinearField::NONE));
+        let (samples, seen) = latest(SentInput(Input::at_rest(Pose::HOME)));
+        let (sent, fields) = latest(SentField(LinearField::NONE));
         let (operations, pending) = RingBuffer::new(OPERATIONS);
         let flags = Arc::new(Flags::default());
         let computer = Computer {
-            demand: model.serves().limited_to(Demand::WRENCH),
-            model,
+            source: FieldSource::new(model),
             samples: seen,
             fields: sent,
             operations: pending,
             flags: Arc::clone(&flags),
-            looked_ns: None,
         };
         let thread = std::thread::Builder::new().name("flotor-field".to_owned());
         // Never joined: a model that hangs must not delay its owner.
@@ -113,21 +73,21 @@ impl ModelThread {
         Ok(Self { samples, fields, operations, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
     }
 
-    /// Publishes the handle sample and takes a new field, if there is one. Real-time: bounded, no allocation.
+    /// Publishes the input and takes a new field; late if there is none. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn poll(&mut self, input: &Input) -> Arrival {
-        let Input { pose, twist, time_ns, tick, buttons, .. } = *input;
-        self.samples.publish(&HandleSample { pose, twist, time_ns, tick, buttons });
-        self.now_ns = time_ns;
+    pub(super) fn poll(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
+        self.samples.publish(&SentInput(*input));
+        self.now_ns = input.time_ns;
         if self.flags.is_broken.load(Ordering::Acquire) {
-            return Arrival::Broken;
+            return Stepped::Broken;
         }
         match self.fields.read() {
-            Some((version, Sent(field))) if version > self.taken => {
+            Some((version, SentField(newest))) if version > self.taken => {
                 self.taken = version;
-                if field.time_ns < self.forgotten_ns { Arrival::Nothing } else { Arrival::Field(field) }
+                *field = newest;
+                if newest.time_ns < self.forgotten_ns { Stepped::Late } else { Stepped::Answered }
             }
-            _ => Arrival::Nothing,
+            _ => Stepped::Late,
         }
     }
 
@@ -163,13 +123,11 @@ impl Drop for ModelThread {
 
 /// Thread side, which computes the fields.
 struct Computer {
-    model: Engine,
-    demand: Demand,
-    samples: Observer<HandleSample, SAMPLE_WORDS>,
-    fields: Publisher<Sent, FIELD_WORDS>,
+    source: FieldSource,
+    samples: Observer<SentInput, INPUT_WORDS>,
+    fields: Publisher<SentField, FIELD_WORDS>,
     operations: Consumer<Operation>,
     flags: Arc<Flags>,
-    looked_ns: Option<u64>,
 }
 
 impl Computer {
@@ -179,14 +137,14 @@ impl Computer {
         while !self.flags.is_over.load(Ordering::Acquire) {
             let executed = self.execute();
             let answered = match self.samples.read() {
-                Some((version, sample)) if version > seen => {
+                Some((version, SentInput(input))) if version > seen => {
                     seen = version;
-                    self.answer(&sample)
+                    self.answer(&input)
                 }
                 _ => CallStatus::Ok,
             };
             if executed == CallStatus::Panicked || answered != CallStatus::Ok {
-                let _ = self.flags.last_words.set(self.model.last_message());
+                let _ = self.flags.last_words.set(self.source.model.last_message());
                 self.flags.is_broken.store(true, Ordering::Release);
                 return;
             }
@@ -201,11 +159,8 @@ impl Computer {
         let mut worst = CallStatus::Ok;
         while let Ok(operation) = self.operations.pop() {
             let status = match operation {
-                Operation::Set { index, value } => self.model.set_parameter(index, value),
-                Operation::Reset => {
-                    self.looked_ns = None;
-                    self.model.reset()
-                }
+                Operation::Set { index, value } => self.source.model.set_parameter(index, value),
+                Operation::Reset => self.source.reset(),
             };
             if status == CallStatus::Panicked {
                 worst = status;
@@ -214,58 +169,16 @@ impl Computer {
         worst
     }
 
-    fn answer(&mut self, sample: &HandleSample) -> CallStatus {
-        let HandleSample { pose, twist, time_ns, tick, buttons } = *sample;
-        let dt_ns = self.looked_ns.map_or(0, |before_ns| time_ns.saturating_sub(before_ns));
-        self.looked_ns = Some(time_ns);
-        let input = Input { pose, twist, time_ns, dt_ns, tick, buttons, demand: self.demand };
+    fn answer(&mut self, input: &Input) -> CallStatus {
         let mut field = LinearField::NONE;
-        match self.model.linear_field(&input, &mut field) {
+        match self.source.compute(input, &mut field) {
             Stepped::Answered => {
-                field.time_ns = time_ns;
-                self.fields.publish(&Sent(field));
+                self.fields.publish(&SentField(field));
                 CallStatus::Ok
             }
             // The field may come the next time.
             Stepped::Late | Stepped::Silent => CallStatus::Ok,
             Stepped::Broken | Stepped::Gone => CallStatus::Panicked,
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use flotor_hal::Wrench;
-
-    #[test]
-    fn looks_and_fields_cross_bit_for_bit() {
-        let mut number = 0.0;
-        let mut next = || {
-            number += 0.1;
-            number
-        };
-        let pose = Pose {
-            position_m: std::array::from_fn(|_| next()),
-            orientation_xyzw: std::array::from_fn(|_| next()),
-        };
-        let twist = Twist {
-            linear_m_per_s: std::array::from_fn(|_| next()),
-            angular_rad_per_s: std::array::from_fn(|_| next()),
-        };
-        let sample = HandleSample { pose, twist, time_ns: u64::MAX, tick: 7, buttons: u32::MAX };
-        assert_eq!(HandleSample::from_words(&sample.to_words()), sample);
-        let field = LinearField {
-            anchor: pose,
-            wrench: Wrench {
-                force_n: std::array::from_fn(|_| next()),
-                torque_nm: std::array::from_fn(|_| next()),
-            },
-            stiffness: std::array::from_fn(|_| std::array::from_fn(|_| next())),
-            valid_m: f64::INFINITY,
-            valid_rad: next(),
-            time_ns: 12_345,
-        };
-        assert_eq!(Sent::from_words(&Sent(field).to_words()), Sent(field));
     }
 }

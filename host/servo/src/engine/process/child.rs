@@ -2,7 +2,8 @@
 
 use super::Greeting;
 use super::memory::{MESSAGE_BYTES, SharedMemory};
-use super::shared_words::{self, Operation, wait_for_change};
+use super::shared_words::{Operation, wait_for_change};
+use crate::engine::records::DEMANDS;
 use crate::enter_worker_priority;
 use crate::last_stop::ignore_no_signal;
 use crate::platform::processes::HostProcess;
@@ -52,7 +53,7 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
     let (greeting, model) = match prepare(arguments, load) {
         Ok((mut model, parameters)) => {
             put_extent(&mut model, &memory);
-            let serves = shared_words::DEMANDS.map(|demand| model.serves().contains(demand));
+            let serves = DEMANDS.map(|demand| model.serves().contains(demand));
             let remembers = model.memory() == Memory::PathDependent;
             let has_field = model.has_linear_field();
             (Greeting::Ready { parameters, serves, remembers, has_field }, Some(model))

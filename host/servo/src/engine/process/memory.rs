@@ -2,18 +2,17 @@
 //!
 //! All fields are atomics, and every bit pattern is a valid value: neither process can make the other read invalid data.
 
-use crate::engine::field_words::FIELD_WORDS;
+use crate::engine::records::INPUT_WORDS;
 pub(super) use crate::platform::shared_memory::{SharedMemory, create_file};
+use flotor_core::words::FIELD_WORDS;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64};
 
-/// Words of a step's input: pose (7), twist (6), time, period, tick, and one for buttons and demand.
-pub(super) const INPUT_WORDS: usize = 17;
 /// Words of a step's reply: wrench (6), energy, status.
-pub(super) const OUTPUT_WORDS: usize = 8;
+const OUTPUT_WORDS: usize = 8;
 /// Words of an active region: shape, centre, half sides.
-pub(super) const REGION_WORDS: usize = 7;
+const REGION_WORDS: usize = 7;
 /// Words of workspace bounds: lower and upper corner.
-pub(super) const BOUNDS_WORDS: usize = 6;
+const BOUNDS_WORDS: usize = 6;
 /// Capacity of a message, bytes.
 pub(super) const MESSAGE_BYTES: usize = 508;
 

@@ -40,14 +40,3 @@ enum Greeting {
         reason: String,
     },
 }
-
-/// Result of a request to a worker.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reply<T> {
-    /// Reply in time.
-    Answered(T),
-    /// No reply yet.
-    Late,
-    /// The worker process has ended.
-    Gone,
-}

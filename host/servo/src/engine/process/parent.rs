@@ -1,12 +1,15 @@
 //! Host side: a model in a worker process.
 
+use super::Greeting;
 use super::child::WHOLE;
 use super::memory::{SharedMemory, create_file};
-use super::shared_words::{DEMANDS, NO_DEMAND, Operation, wait_for_change};
-use super::{Greeting, Reply};
+use super::shared_words::{Operation, wait_for_change};
+use crate::engine::records::demand_of;
+use crate::engine::stepped::Stepped;
 use crate::last_stop::spawn_unblocked;
 use crate::platform::processes;
 use crate::{THREAD_ADVICE, monotonic_ns};
+use flotor_core::lock;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
     ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind,
@@ -15,9 +18,9 @@ use flotor_hal::{
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
+use std::sync::Mutex;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Sender, channel};
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Start-up settings of a worker.
@@ -79,7 +82,7 @@ impl Worker {
             is_gone: false,
             timeout_ns: config.timeout_ns,
             parameters: Vec::new(),
-            serves: NO_DEMAND,
+            serves: Demand::FORCE,
             remembers: Memory::PathDependent,
             has_field: false,
         };
@@ -89,9 +92,7 @@ impl Worker {
                 worker.has_field = has_field;
                 worker.remembers = if remembers { Memory::PathDependent } else { Memory::Stateless };
                 worker.parameters = parameters;
-                let served =
-                    DEMANDS.iter().zip(serves).filter_map(|(demand, served)| served.then_some(*demand));
-                worker.serves = served.fold(NO_DEMAND, Demand::with);
+                worker.serves = demand_of(serves);
                 Ok(worker)
             }
             Ok(Greeting::Refused { kind, reason }) => {
@@ -136,14 +137,13 @@ impl Worker {
 
     /// Steps the model. Real-time: bounded by the reply timeout, no allocation.
     #[inline]
-    pub fn step(&mut self, input: &Input) -> Reply<(CallStatus, Output)> {
-        let timeout_ns = self.timeout_ns;
-        self.request(
-            Operation::Step,
-            timeout_ns,
-            |memory| memory.put_input(input),
-            |memory| (memory.status(), memory.output()),
-        )
+    pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
+        let put = |memory: &SharedMemory| memory.put_input(input);
+        let reply = self.request(Operation::Step, put, |memory| {
+            *output = memory.output();
+            memory.status()
+        });
+        reply.map_or_else(|missing| missing, Stepped::from)
     }
 
     /// Returns true if the model has a linear field.
@@ -152,14 +152,13 @@ impl Worker {
     }
 
     /// Computes the linear field at an input. Not real-time: bounded by the reply timeout.
-    pub fn linear_field(&mut self, input: &Input) -> Reply<(CallStatus, LinearField)> {
-        let timeout_ns = self.timeout_ns;
-        self.request(
-            Operation::Field,
-            timeout_ns,
-            |memory| memory.put_input(input),
-            |memory| (memory.status(), memory.field()),
-        )
+    pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
+        let put = |memory: &SharedMemory| memory.put_input(input);
+        let reply = self.request(Operation::Field, put, |memory| {
+            *field = memory.field();
+            memory.status()
+        });
+        reply.map_or_else(|missing| missing, Stepped::from)
     }
 
     /// Returns the active region of the model; everywhere while a pending request may change it. Real-time: bounded, no allocation.
@@ -173,19 +172,20 @@ impl Worker {
     }
 
     /// Changes a live parameter at a tick boundary. Real-time: bounded by the reply timeout, no allocation.
-    pub fn set_parameter(&mut self, index: usize, value: f64) -> Reply<CallStatus> {
+    pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         let put = |memory: &SharedMemory| {
             memory.parameter.store(index as u64, Ordering::Relaxed);
             memory.value.store(value.to_bits(), Ordering::Relaxed);
         };
-        let timeout_ns = self.timeout_ns;
-        self.request(Operation::SetParameter, timeout_ns, put, |memory| memory.status())
+        // Without a reply not applied: the next step reports a late or ended worker.
+        self.request(Operation::SetParameter, put, |memory| memory.status())
+            .unwrap_or(CallStatus::Unsupported)
     }
 
     /// Clears the history of the model. Real-time: bounded by the reply timeout, no allocation.
-    pub fn reset(&mut self) -> Reply<CallStatus> {
-        let timeout_ns = self.timeout_ns;
-        self.request(Operation::Reset, timeout_ns, |_| (), |memory| memory.status())
+    pub fn reset(&mut self) -> CallStatus {
+        // The next step reports a late or ended worker.
+        self.request(Operation::Reset, |_| (), |memory| memory.status()).unwrap_or(CallStatus::Ok)
     }
 
     /// Returns the model's dependence on the path of the handle.
@@ -193,40 +193,40 @@ impl Worker {
         self.remembers
     }
 
-    fn request<T>(
+    /// Sends a request and waits for the reply; returns its status, or the result of a step without a reply.
+    fn request(
         &mut self,
         operation: Operation,
-        timeout_ns: u64,
         put: impl FnOnce(&SharedMemory),
-        take: impl FnOnce(&SharedMemory) -> T,
-    ) -> Reply<T> {
+        take: impl FnOnce(&SharedMemory) -> CallStatus,
+    ) -> Result<CallStatus, Stepped> {
         if self.is_gone {
-            return Reply::Gone;
+            return Err(Stepped::Gone);
         }
         // No new request while the last one is pending: its data in the memory is still in use.
         if self.is_pending && !self.memory.is_answered(self.number) {
-            return self.late();
+            return Err(self.late());
         }
         self.is_pending = false;
         put(&self.memory);
         self.number = self.number.wrapping_add(1);
         self.memory.ask(self.number, operation);
-        let deadline_ns = monotonic_ns().saturating_add(timeout_ns);
+        let deadline_ns = monotonic_ns().saturating_add(self.timeout_ns);
         while !self.memory.is_answered(self.number) {
             let left_ns = deadline_ns.saturating_sub(monotonic_ns());
             if left_ns == 0 {
                 self.is_pending = true;
-                return self.late();
+                return Err(self.late());
             }
             wait_for_change(&self.memory.reply, self.number.wrapping_sub(1), left_ns);
         }
-        Reply::Answered(take(&self.memory))
+        Ok(take(&self.memory))
     }
 
     /// Distinguishes a late worker from an ended one, with one system call.
-    fn late<T>(&mut self) -> Reply<T> {
+    fn late(&mut self) -> Stepped {
         self.is_gone = self.child.try_wait().is_ok_and(|end| end.is_some());
-        if self.is_gone { Reply::Gone } else { Reply::Late }
+        if self.is_gone { Stepped::Gone } else { Stepped::Late }
     }
 
     /// Returns the last message of the model, or the exit status of its process. Not real-time.
@@ -289,7 +289,7 @@ fn spawn(command: Command) -> io::Result<Child> {
     static STARTER: Mutex<Option<Sender<Start>>> = Mutex::new(None);
     let (reply, child) = channel();
     {
-        let mut starter = STARTER.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut starter = lock(&STARTER);
         let starter = match &mut *starter {
             Some(starter) => starter,
             none => none.insert(start_starter()?),

@@ -5,51 +5,33 @@
 
 use crate::guest::{is_guest, program_handles_signals};
 use crate::last_stop::{Death, end_if_armed, end_if_in_call, is_armed, is_in_call};
+use flotor_core::lock;
+use libc::{
+    SIGABRT, SIGALRM, SIGBUS, SIGCHLD, SIGCONT, SIGFPE, SIGHUP, SIGILL, SIGINT, SIGIO, SIGKILL, SIGPIPE,
+    SIGPROF, SIGPWR, SIGQUIT, SIGSEGV, SIGSTOP, SIGSYS, SIGTERM, SIGTRAP, SIGTSTP, SIGTTIN, SIGTTOU, SIGURG,
+    SIGUSR1, SIGUSR2, SIGVTALRM, SIGWINCH, SIGXCPU, SIGXFSZ,
+};
 use libc::{c_int, c_void, sigaction, siginfo_t, sigset_t};
 use std::io;
 use std::mem::MaybeUninit;
 use std::process::{Child, Command};
 use std::sync::atomic::{AtomicI32, Ordering};
-use std::sync::{Mutex, Once, OnceLock, PoisonError};
+use std::sync::{Mutex, Once, OnceLock};
 use std::time::Duration;
 
 /// Signals of failed instructions and of `abort`, raised by the process itself.
-const RAISED: [c_int; 7] =
-    [libc::SIGSEGV, libc::SIGBUS, libc::SIGFPE, libc::SIGILL, libc::SIGABRT, libc::SIGSYS, libc::SIGTRAP];
+const RAISED: [c_int; 7] = [SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP];
 /// Signals that request the end of a process; a process without handlers ends by them, as the sender expects.
-const ASKING: [c_int; 5] = [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT, libc::SIGPIPE];
+const ASKING: [c_int; 5] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE];
 /// Signals that end no process by themselves, or cannot be caught.
-const HARMLESS: [c_int; 9] = [
-    libc::SIGKILL,
-    libc::SIGSTOP,
-    libc::SIGTSTP,
-    libc::SIGTTIN,
-    libc::SIGTTOU,
-    libc::SIGCHLD,
-    libc::SIGCONT,
-    libc::SIGURG,
-    libc::SIGWINCH,
-];
+const HARMLESS: [c_int; 9] =
+    [SIGKILL, SIGSTOP, SIGTSTP, SIGTTIN, SIGTTOU, SIGCHLD, SIGCONT, SIGURG, SIGWINCH];
 /// Signals that a timer, a limit or another program sends to the process as a whole.
-const SENT: [c_int; 7] =
-    [libc::SIGUSR2, libc::SIGALRM, libc::SIGVTALRM, libc::SIGPROF, libc::SIGXCPU, libc::SIGIO, libc::SIGPWR];
+const SENT: [c_int; 7] = [SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO, SIGPWR];
 /// Signals reserved for the host: those of crashes, requests to end or suspend a run, the emergency stop.
 const KEPT: [c_int; 15] = [
-    libc::SIGSEGV,
-    libc::SIGBUS,
-    libc::SIGFPE,
-    libc::SIGILL,
-    libc::SIGABRT,
-    libc::SIGSYS,
-    libc::SIGTRAP,
-    libc::SIGINT,
-    libc::SIGTERM,
-    libc::SIGHUP,
-    libc::SIGQUIT,
-    libc::SIGTSTP,
-    libc::SIGTTIN,
-    libc::SIGTTOU,
-    libc::SIGUSR1,
+    SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP, SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP,
+    SIGTTIN, SIGTTOU, SIGUSR1,
 ];
 /// Numbers of signals, 1 to 64; two of them are reserved by the C library.
 const SIGNALS: usize = 65;
@@ -84,7 +66,7 @@ pub(crate) fn install_for_crashes() {
 fn install_for(is_wanted: impl Fn(c_int) -> bool) {
     static AT_EXIT: Once = Once::new();
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-    let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let _turn = lock(&ONE_AT_A_TIME);
     OWN_PROCESS.store(process_number(), Ordering::Release);
     AT_EXIT.call_once(|| {
         // SAFETY: a function without arguments that may be called at the end of the process.
@@ -126,9 +108,7 @@ pub(crate) fn take_sent() {
     if program_handles_signals() {
         return;
     }
-    let set = set_of(&SENT);
-    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
-    unsafe { libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const set, std::ptr::null_mut()) };
+    unblock(&SENT);
 }
 
 fn handler() -> libc::sighandler_t {
@@ -197,12 +177,9 @@ pub(crate) fn exit_process(code: i32) -> ! {
 
 /// Sends a signal to the calling thread, which handles it before this function returns.
 fn raise(signal: c_int) {
-    let set = set_of(&[signal]);
-    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
-    unsafe {
-        libc::raise(signal);
-        libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const set, std::ptr::null_mut());
-    }
+    // SAFETY: takes no memory; the handler of the signal may run at any time.
+    unsafe { libc::raise(signal) };
+    unblock(&[signal]);
 }
 
 /// Writes to standard error, once and without error handling: the reader may be closed.
@@ -244,50 +221,44 @@ impl SignalName {
 impl std::fmt::Display for SignalName {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self(signal) = *self;
-        write!(f, "signal {signal} ({})", signal_words(signal))
+        match named(signal) {
+            Some((name, "")) => write!(f, "signal {signal} ({name})"),
+            Some((name, cause)) => write!(f, "signal {signal} ({name}: {cause})"),
+            None => write!(f, "signal {signal} (an unhandled signal)"),
+        }
     }
 }
 
-fn signal_words(signal: c_int) -> &'static str {
-    match signal {
-        libc::SIGSEGV => "SIGSEGV: invalid memory access, or stack overflow",
-        libc::SIGBUS => "SIGBUS: memory access error",
-        libc::SIGFPE => "SIGFPE: arithmetic error",
-        libc::SIGILL => "SIGILL: illegal instruction",
-        libc::SIGABRT => "SIGABRT: abort, as after an uncaught exception",
-        libc::SIGSYS => "SIGSYS: forbidden system call",
-        libc::SIGTRAP => "SIGTRAP: breakpoint",
-        libc::SIGKILL => "SIGKILL: killed by another process, as the out-of-memory killer does",
-        libc::SIGXCPU => "SIGXCPU: processor time limit",
-        libc::SIGXFSZ => "SIGXFSZ: file size limit",
-        libc::SIGUSR2 => "SIGUSR2",
-        libc::SIGALRM => "SIGALRM: a timer",
-        libc::SIGVTALRM => "SIGVTALRM: a timer",
-        libc::SIGPROF => "SIGPROF: a timer",
-        _ => name_of(signal).unwrap_or("an unhandled signal"),
-    }
-}
+/// Signals with their names and, where known, causes.
+const NAMES: [(c_int, &str, &str); 23] = [
+    (SIGSEGV, "SIGSEGV", "invalid memory access, or stack overflow"),
+    (SIGBUS, "SIGBUS", "memory access error"),
+    (SIGFPE, "SIGFPE", "arithmetic error"),
+    (SIGILL, "SIGILL", "illegal instruction"),
+    (SIGABRT, "SIGABRT", "abort, as after an uncaught exception"),
+    (SIGSYS, "SIGSYS", "forbidden system call"),
+    (SIGTRAP, "SIGTRAP", "breakpoint"),
+    (SIGKILL, "SIGKILL", "killed by another process, as the out-of-memory killer does"),
+    (SIGXCPU, "SIGXCPU", "processor time limit"),
+    (SIGXFSZ, "SIGXFSZ", "file size limit"),
+    (SIGALRM, "SIGALRM", "a timer"),
+    (SIGVTALRM, "SIGVTALRM", "a timer"),
+    (SIGPROF, "SIGPROF", "a timer"),
+    (SIGINT, "SIGINT", ""),
+    (SIGTERM, "SIGTERM", ""),
+    (SIGHUP, "SIGHUP", ""),
+    (SIGQUIT, "SIGQUIT", ""),
+    (SIGTSTP, "SIGTSTP", ""),
+    (SIGTTIN, "SIGTTIN", ""),
+    (SIGTTOU, "SIGTTOU", ""),
+    (SIGUSR1, "SIGUSR1", ""),
+    (SIGUSR2, "SIGUSR2", ""),
+    (SIGPIPE, "SIGPIPE", ""),
+];
 
-fn name_of(signal: c_int) -> Option<&'static str> {
-    Some(match signal {
-        libc::SIGSEGV => "SIGSEGV",
-        libc::SIGBUS => "SIGBUS",
-        libc::SIGFPE => "SIGFPE",
-        libc::SIGILL => "SIGILL",
-        libc::SIGABRT => "SIGABRT",
-        libc::SIGSYS => "SIGSYS",
-        libc::SIGTRAP => "SIGTRAP",
-        libc::SIGINT => "SIGINT",
-        libc::SIGTERM => "SIGTERM",
-        libc::SIGHUP => "SIGHUP",
-        libc::SIGQUIT => "SIGQUIT",
-        libc::SIGTSTP => "SIGTSTP",
-        libc::SIGTTIN => "SIGTTIN",
-        libc::SIGTTOU => "SIGTTOU",
-        libc::SIGUSR1 => "SIGUSR1",
-        libc::SIGPIPE => "SIGPIPE",
-        _ => return None,
-    })
+/// Returns name and cause of a signal; the cause may be empty.
+fn named(signal: c_int) -> Option<(&'static str, &'static str)> {
+    NAMES.iter().find(|(known, ..)| *known == signal).map(|(_, name, cause)| (*name, *cause))
 }
 
 // ---------------------------------------------------------------- the stack
@@ -353,7 +324,7 @@ pub fn wait_for_signal(signals: &[i32], patience: Duration) -> Option<i32> {
 /// Restores the default action of every signal that this process has inherited as ignored, as in the background of a shell: for a
 /// process that runs nothing but a plugin, which a signal of the plugin then ends. Not real-time.
 pub fn ignore_no_signal() {
-    let ends = |signal: &c_int| !HARMLESS.contains(signal) && *signal != libc::SIGPIPE; // which Rust programs ignore
+    let ends = |signal: &c_int| !HARMLESS.contains(signal) && *signal != SIGPIPE; // which Rust programs ignore
     for signal in (1..).take(SIGNALS - 1).filter(ends) {
         let Some(mut found) = action(signal) else { continue };
         if found.sa_sigaction == libc::SIG_IGN {
@@ -368,8 +339,7 @@ pub fn ignore_no_signal() {
 /// # Errors
 /// If the system cannot start the process.
 pub fn spawn_unblocked(command: &mut Command) -> io::Result<Child> {
-    let before = blocked();
-    set_blocked(&set_of(&[]));
+    let before = set_blocked(&set_of(&[]));
     let child = command.spawn();
     set_blocked(&before);
     child
@@ -446,7 +416,7 @@ impl TakenSignals {
 impl std::fmt::Display for TakenSignals {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let taken = KEPT.into_iter().filter(|signal| self.bits >> (signal - 1) & 1 == 1);
-        let names: Vec<&str> = taken.filter_map(name_of).collect();
+        let names: Vec<&str> = taken.filter_map(named).map(|(name, _)| name).collect();
         f.write_str(&names.join(", "))
     }
 }
@@ -469,7 +439,9 @@ fn set_action(signal: c_int, action: &sigaction) {
     let _ = unsafe { libc::sigaction(signal, action, std::ptr::null_mut()) };
 }
 
-fn set_of(signals: &[c_int]) -> sigset_t {
+/// Returns the set of these signals.
+#[must_use]
+pub fn set_of(signals: &[i32]) -> sigset_t {
     let mut set = MaybeUninit::<sigset_t>::zeroed();
     // SAFETY: memory that is there for the call, which initialises it; plain data.
     let mut set = unsafe {
@@ -483,7 +455,9 @@ fn set_of(signals: &[c_int]) -> sigset_t {
     set
 }
 
-fn all_but(signals: &[c_int]) -> sigset_t {
+/// Returns the set of all signals except these.
+#[must_use]
+pub fn all_but(signals: &[i32]) -> sigset_t {
     let mut set = set_of(&[]);
     // SAFETY: an initialised set, here and below.
     unsafe { libc::sigfillset(&raw mut set) };
@@ -494,16 +468,25 @@ fn all_but(signals: &[c_int]) -> sigset_t {
     set
 }
 
+/// Replaces the set of blocked signals of the calling thread; returns the one before. Not real-time.
+pub fn set_blocked(set: &sigset_t) -> sigset_t {
+    let mut before = set_of(&[]);
+    // SAFETY: initialised sets that are there for the call.
+    unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, set, &raw mut before) };
+    before
+}
+
+fn unblock(signals: &[c_int]) {
+    let set = set_of(signals);
+    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
+    unsafe { libc::pthread_sigmask(libc::SIG_UNBLOCK, &raw const set, std::ptr::null_mut()) };
+}
+
 fn blocked() -> sigset_t {
     let mut set = set_of(&[]);
     // SAFETY: nothing is changed, and the system writes to memory that is there for the call.
     unsafe { libc::pthread_sigmask(libc::SIG_BLOCK, std::ptr::null(), &raw mut set) };
     set
-}
-
-fn set_blocked(set: &sigset_t) {
-    // SAFETY: an initialised set, and a null pointer where nothing is to be written.
-    unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, set, std::ptr::null_mut()) };
 }
 
 fn holds(set: &sigset_t, signal: c_int) -> bool {

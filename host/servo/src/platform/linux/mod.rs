@@ -9,4 +9,4 @@ pub(crate) mod scheduling;
 pub(crate) mod shared_memory;
 pub(crate) mod watchdog_process;
 
-pub use last_stop::{block_sent_signals, block_signals, wait_for_signal};
+pub use last_stop::{all_but, block_sent_signals, block_signals, set_blocked, set_of, wait_for_signal};

@@ -38,18 +38,15 @@ pub(crate) fn unlock_memory() {}
 ///
 /// # Errors
 /// If there is no such core, or the process may not use it.
-pub(crate) fn pin(core: usize) -> Result<(), NoSuchCore> {
-    let mask = u32::try_from(core).ok().and_then(|core| 1_usize.checked_shl(core)).ok_or(NoSuchCore)?;
+pub(crate) fn pin(core: usize) -> io::Result<()> {
+    let mask = u32::try_from(core).ok().and_then(|core| 1_usize.checked_shl(core));
+    let mask = mask.ok_or(io::ErrorKind::InvalidInput)?;
     // SAFETY: the handle that means the calling thread is always there.
     match unsafe { SetThreadAffinityMask(GetCurrentThread(), mask) } {
-        0 => Err(NoSuchCore),
+        0 => Err(io::Error::last_os_error()),
         _ => Ok(()),
     }
 }
-
-/// The machine has no such core, or the process may not use it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct NoSuchCore;
 
 /// Requests the priority of a role for the calling thread. Not real-time.
 ///

@@ -1,6 +1,6 @@
 use super::super::memory::mapped;
 use super::*;
-use flotor_hal::{DQuat, DVec3};
+use flotor_hal::{DQuat, DVec3, Demand, Pose, Twist};
 
 #[test]
 fn input_and_output_cross_bit_for_bit() {

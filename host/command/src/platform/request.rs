@@ -1,0 +1,10 @@
+//! Requests to end a run.
+
+/// Request to end a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Request {
+    /// Orderly end; repeated, an emergency stop.
+    End,
+    /// Emergency stop.
+    Emergency,
+}

@@ -1,0 +1,58 @@
+//! Changes of parameters, and reports on them.
+
+use flotor_core::ChangeOutcome;
+use flotor_hal::Tick;
+
+/// Parameter number that stands for the weight of a model.
+pub const WEIGHT: u32 = u32::MAX;
+/// Parameter number that stands for the plugin itself.
+pub const PLUGIN: u32 = u32::MAX - 1;
+
+/// New value of a parameter. The numbers come from a schema: see `session::Controls`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ParameterChange {
+    /// Number of the plugin in the run: the devices, then the models, both in the scene's order.
+    pub plugin: u16,
+    /// Generation of the plugin that the change was checked against.
+    pub generation: u16,
+    /// Index into the plugin's schema, [`WEIGHT`], or in a report [`PLUGIN`].
+    pub parameter: u32,
+    /// New value; for a choice, its index.
+    pub value: f64,
+    /// Pace of the change.
+    pub pace: Pace,
+}
+
+/// Pace of a change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pace {
+    /// Before the next tick.
+    AtOnce,
+    /// At a rate, from the current value.
+    Gradual {
+        /// Value when the plugin was created, in the parameter's unit: start of a number that has not changed since.
+        from: f64,
+        /// Rate in the parameter's unit per second.
+        per_s: f64,
+    },
+}
+
+/// Outcome of a change.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ChangeReport {
+    /// Tick before which the change was applied.
+    pub tick: u64,
+    /// Time of the tick, ns.
+    pub time_ns: u64,
+    /// Reported change.
+    pub change: ParameterChange,
+    /// Result of the plugin's call.
+    pub outcome: ChangeOutcome,
+}
+
+impl ChangeReport {
+    /// Creates a report on a change before a tick.
+    pub(super) fn at(tick: &Tick, change: ParameterChange, outcome: ChangeOutcome) -> Self {
+        Self { tick: tick.index, time_ns: tick.time_ns, change, outcome }
+    }
+}
