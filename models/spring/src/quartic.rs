@@ -41,9 +41,8 @@ use std::f64::consts::PI;
 use flotor_hal::glam::DVec4;
 
 use crate::beam_column::Column;
-use crate::bending::{KNEE, REACH};
 use crate::rigidity::{Rigidities, Spring};
-use crate::shape::Shape;
+use crate::shape::{KNEE, REACH, Shape};
 use flotor_lanes::chebyshev::interpolated;
 use flotor_lanes::entire::EntireFunctions;
 use flotor_lanes::saturation::{Saturated, saturate_above, saturate_below};

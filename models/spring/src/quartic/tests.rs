@@ -1,10 +1,10 @@
 use flotor_hal::glam::{DMat3, DVec2, DVec3, DVec4};
 
 use super::{Quartic, coefficients, relative_length};
-use crate::bending::{Bending, saturated_argument};
+use crate::bending::Bending;
 use crate::preset::Preset;
 use crate::rigidity::Spring;
-use crate::shape::Shape;
+use crate::shape::{Shape, saturated_argument};
 use flotor_lanes::angle::measures;
 
 /// Normal of a section that leans from the chord (third axis) by the given vector.
