@@ -225,10 +225,7 @@ impl RodWeight {
     /// Prepares the weight function for a tolerance of the force.
     pub(crate) fn new(spring: &Spring, tolerance_n: f64, law: Law) -> Self {
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
-        let load = Load {
-            ratio: rigidities.gamma_n / rigidities.beta_n,
-            unit_per_m2: 0.25 * rigidities.gamma_n / rigidities.alpha_n_m2,
-        };
+        let load = Load::new(rigidities);
         // z = total p (1 - excess p) with the compression p = 1 - L/L0, at most 1.
         let (total, excess) = (load.unit_per_m2 * free_length_m * free_length_m, 1.0 - load.ratio);
         let crest = if excess > 0.5 { 0.5 / excess } else { 1.0 };

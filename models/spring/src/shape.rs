@@ -32,6 +32,14 @@ pub(crate) fn saturated_argument<R: Real>(z: R) -> Saturated<R> {
     saturate_above(z, KNEE, REACH)
 }
 
+/// Returns the relative length at which the argument is `z`, the longer one of two; `None` if there is none. `load` is
+/// `gamma L0²/(4 alpha)`, `excess` is `1 - gamma/beta`.
+pub(crate) fn relative_length(load: f64, excess: f64, z: f64) -> Option<f64> {
+    // z = load p (1 - excess p) with p = 1 - L / L0, solved for the smaller p without cancellation.
+    let discriminant = load * (load - 4.0 * excess * z);
+    (discriminant >= 0.0).then(|| 1.0 - 2.0 * z / (load + discriminant.sqrt()))
+}
+
 /// Lean of a section from the chord, per radian of `S` or `D`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Lean {
