@@ -59,6 +59,11 @@ impl Elastic {
         })
     }
 
+    /// Returns the law for evaluation.
+    pub(crate) fn held(&mut self) -> &mut dyn HeldSpring {
+        each!(self, held => held)
+    }
+
     /// Applies a change of parameters. Real-time: bounded, no allocation.
     pub(crate) fn retune(&mut self, from: &Choice, to: &Choice) {
         match self {
@@ -114,37 +119,6 @@ impl Elastic {
             rod.sections(sections);
         }
         arrived
-    }
-}
-
-impl HeldSpring for Elastic {
-    #[inline]
-    fn respond(&mut self, pose: &Pose, demand: Demand) -> Response {
-        each!(self, held => held.respond(pose, demand))
-    }
-
-    fn stay(&mut self, pose: &Pose, demand: Demand) -> Response {
-        each!(self, held => held.stay(pose, demand))
-    }
-
-    fn noise_rad(&self) -> f64 {
-        each!(self, held => held.noise_rad())
-    }
-
-    fn cost(&self) -> u32 {
-        each!(self, held => held.cost())
-    }
-
-    fn mark(&mut self) {
-        each!(self, held => held.mark());
-    }
-
-    fn go_back(&mut self) {
-        each!(self, held => held.go_back());
-    }
-
-    fn unload(&mut self) {
-        each!(self, held => held.unload());
     }
 }
 

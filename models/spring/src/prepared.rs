@@ -8,7 +8,6 @@ use crate::closed_form::{ClosedForm, Form};
 use crate::contract;
 use crate::directions::Directions;
 use crate::elastic::{Elastic, arrive, draw_line};
-use crate::held::HeldSpring;
 use crate::pace::{Advance, Pace};
 use crate::parameters::{Choice, SeatChoice, Variant};
 use crate::pose::Pose;
@@ -70,7 +69,7 @@ impl Prepared {
     /// Clears the history. Real-time: bounded, no allocation.
     pub(crate) fn reset(&mut self) {
         if let Self::Elastic(law, seat) = self {
-            law.unload();
+            law.held().unload();
             if let Some(seat) = seat {
                 seat.reset();
             }
@@ -97,10 +96,10 @@ impl Prepared {
         match (self, advance) {
             (Self::Thesis(law), _) => law.respond(pose, demand),
             (Self::ClosedForm(law), _) => law.respond(pose, demand),
-            (Self::Elastic(law, None), Advance::Step) => law.respond(pose, demand),
-            (Self::Elastic(law, None), Advance::Stay) => law.stay(pose, demand),
-            (Self::Elastic(law, Some(seat)), Advance::Step) => seat.step(law, pose, demand),
-            (Self::Elastic(law, Some(seat)), Advance::Stay) => seat.stay(law, pose, demand),
+            (Self::Elastic(law, None), Advance::Step) => law.held().respond(pose, demand),
+            (Self::Elastic(law, None), Advance::Stay) => law.held().stay(pose, demand),
+            (Self::Elastic(law, Some(seat)), Advance::Step) => seat.step(law.held(), pose, demand),
+            (Self::Elastic(law, Some(seat)), Advance::Stay) => seat.stay(law.held(), pose, demand),
         }
     }
 
@@ -162,7 +161,7 @@ impl Prepared {
             Self::Thesis(_) | Self::ClosedForm(_) => draw_line(spring, pose, sections),
             Self::Elastic(law, None) => law.draw(spring, pose, sections),
             Self::Elastic(law, Some(seat)) => {
-                arrive(|| seat.step(law, pose, Demand::Wrench))
+                arrive(|| seat.step(law.held(), pose, Demand::Wrench))
                     && seat.draw(pose, sections, |pose, sections| law.draw(spring, pose, sections))
             }
         }

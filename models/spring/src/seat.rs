@@ -96,8 +96,8 @@ pub struct Seat {
 }
 
 /// Call of a tick, with the hanging place of the base and its height above the ground.
-struct Tick<'a, S> {
-    spring: &'a mut S,
+struct Tick<'a> {
+    spring: &'a mut dyn HeldSpring,
     pose: &'a Pose,
     demand: Demand,
     hanging: Standing,
@@ -264,7 +264,7 @@ impl Seat {
     ///
     /// Total where the law is; [`Validity::NotConverged`] while the base is moving, by a bounded tilt per tick.
     /// Real-time: bounded, no allocation; two to three evaluations of the law while the base moves, one while seated.
-    pub fn step<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
+    pub fn step(&mut self, spring: &mut dyn HeldSpring, pose: &Pose, demand: Demand) -> Response {
         if !pose.is_valid() {
             return Response::none(Validity::InvalidInput);
         }
@@ -316,7 +316,7 @@ impl Seat {
     }
 
     /// Evaluates the law on the base at its present place.
-    fn probe<S: HeldSpring>(&self, tick: &mut Tick<'_, S>) -> Probe {
+    fn probe(&self, tick: &mut Tick<'_>) -> Probe {
         let base = self.base();
         let response = base.respond(tick.spring, tick.pose, Demand::WrenchAndEnergy);
         tick.cost.add(tick.spring.cost());
@@ -325,14 +325,14 @@ impl Seat {
     }
 
     /// Moves the base back to the last place at which it stood.
-    fn not_converged<S: HeldSpring>(&mut self, tick: &mut Tick<'_, S>, stood: &Stood) -> Response {
+    fn not_converged(&mut self, tick: &mut Tick<'_>, stood: &Stood) -> Response {
         tick.spring.go_back();
         self.at = stood.at;
         Response { validity: Validity::NotConverged, ..stood.response }
     }
 
     /// Moves a base that lost contact to its hanging place.
-    fn lose_contact<S: HeldSpring>(&mut self, tick: &mut Tick<'_, S>, probe: &Probe) -> Next {
+    fn lose_contact(&mut self, tick: &mut Tick<'_>, probe: &Probe) -> Next {
         let missing_n = self.missing_n(tick, probe);
         let lost = Lost { at: self.at, stored_j: probe.stored_j, missing_n, trial: Trial::Hanging };
         tick.spring.mark();
@@ -342,7 +342,7 @@ impl Seat {
     }
 
     /// Moves a base that lost contact along the straight line to its hanging place, only as far as it needs to stand.
-    fn give_way<S: HeldSpring>(&mut self, tick: &mut Tick<'_, S>, probe: &Probe, lost: Lost) -> Next {
+    fn give_way(&mut self, tick: &mut Tick<'_>, probe: &Probe, lost: Lost) -> Next {
         let Probe { response, stored_j, has_settled, .. } = *probe;
         let may_stand = has_settled && stored_j <= lost.stored_j && response.force_n.z > 0.0;
         match lost.trial {
@@ -374,12 +374,7 @@ impl Seat {
 
     /// Shortens the last step. Every second failure tries the opposite direction: near where the base tips over no
     /// model of the energy gives the downhill direction.
-    fn back_off<S: HeldSpring>(
-        &mut self,
-        tick: &mut Tick<'_, S>,
-        probe: &Probe,
-        mut descent: Descent,
-    ) -> Next {
+    fn back_off(&mut self, tick: &mut Tick<'_>, probe: &Probe, mut descent: Descent) -> Next {
         let last = &descent.last;
         if let (true, Some(before)) = (probe.has_settled, last.slope) {
             let slope = probe.base.slope(tick.pose, &probe.response) - descent.tip_nm * probe.base.direction;
@@ -410,12 +405,7 @@ impl Seat {
     }
 
     /// Rolls or slides the base on from a place at which it stands.
-    fn stand_on<S: HeldSpring>(
-        &mut self,
-        tick: &mut Tick<'_, S>,
-        probe: &Probe,
-        mut descent: Descent,
-    ) -> Next {
+    fn stand_on(&mut self, tick: &mut Tick<'_>, probe: &Probe, mut descent: Descent) -> Next {
         let Probe { base, response, stored_j, .. } = probe;
         if base.angle_rad == 0.0 {
             descent.tip_nm = self.lengths.rim_radius_m * response.force_n.z;
@@ -490,7 +480,7 @@ impl Seat {
 
     /// Returns the wrench on the hand of a moving spring, with base and shape unchanged: the derivatives of one energy.
     /// Real-time: bounded, no allocation.
-    pub(crate) fn stay<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
+    pub(crate) fn stay(&mut self, spring: &mut dyn HeldSpring, pose: &Pose, demand: Demand) -> Response {
         let (_, height_m) = Standing::hanging(pose, &self.lengths, LARGEST_TILT_RAD);
         if height_m > 0.0 || self.lifted || self.hold == 0.0 {
             return self.step(spring, pose, demand);
@@ -508,7 +498,7 @@ impl Seat {
     /// Fades wrench and energy of a falling spring in place, by an equal part per tick: both are a fraction of the
     /// law's, so the lost energy is dissipated.
     #[cold]
-    fn fall<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
+    fn fall(&mut self, spring: &mut dyn HeldSpring, pose: &Pose, demand: Demand) -> Response {
         self.hold = (self.hold - FALL_PER_STEP).max(0.0);
         let response = self.base().respond(spring, pose, Demand::WrenchAndEnergy);
         let stored_j = response.energy_j.unwrap_or_default();
@@ -527,7 +517,7 @@ impl Seat {
     }
 
     /// Returns the forces that a base lacks to stand: onto the ground, and of friction (N); negative if sufficient.
-    fn missing_n<S>(&self, tick: &Tick<'_, S>, probe: &Probe) -> [f64; 2] {
+    fn missing_n(&self, tick: &Tick<'_>, probe: &Probe) -> [f64; 2] {
         let pull_n = probe.base.pull_n(tick.pose, &probe.response).length();
         let pressed_n = probe.response.force_n.z;
         [-pressed_n, pull_n - self.grip.holds_n(pressed_n, tick.height_m)]
