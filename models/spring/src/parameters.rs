@@ -298,17 +298,18 @@ impl Choice {
     /// # Errors
     /// The range consistent with the other values; `Fixed` for a number that follows from others in this mode, or has no effect.
     pub(crate) fn with(&self, index: usize, value: f64) -> Result<Self, SetParameterError> {
-        let is_friction = SCHEMA.get(index).map(Parameter::id) == Some("seat_friction");
-        if SCHEMA.get(index).map(Parameter::id) == Some("tolerance_n") && self.rod_blend == Switch::On {
-            return Ok(Self { tolerance_n: value, ..*self });
-        }
-        // With a clamped plate the friction has no effect: it is rejected below.
-        if is_friction && self.seat == SeatChoice::Free {
-            return Ok(Self { friction: Friction { coefficient: value }, ..*self });
+        let id = SCHEMA.get(index).map_or("", Parameter::id);
+        // Without blending the tolerance has no effect, and with a clamped plate the friction: both are rejected below.
+        match (id, self.rod_blend, self.seat) {
+            ("tolerance_n", Switch::On, _) => return Ok(Self { tolerance_n: value, ..*self }),
+            ("seat_friction", _, SeatChoice::Free) => {
+                return Ok(Self { friction: Friction { coefficient: value }, ..*self });
+            }
+            _ => {}
         }
         let (mut geometry, mut material, mut stiffness) =
             (*self.spring.geometry(), *self.spring.material(), self.stiffness);
-        let (own, unit) = match (SCHEMA.get(index).map_or("", Parameter::id), &mut stiffness) {
+        let (own, unit) = match (id, &mut stiffness) {
             ("free_length_mm", _) => (&mut geometry.free_length_m, MM),
             ("coil_diameter_mm", _) => (&mut geometry.coil_diameter_m, MM),
             ("youngs_modulus_mpa", _) => (&mut material.youngs_modulus_pa, MPA),
