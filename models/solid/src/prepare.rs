@@ -37,13 +37,49 @@ const FACE_PLACES: [f64; 5] = [0.0, 0.35, 0.65, 0.85, 1.0];
 const FACE_ENDS: [[End; 2]; 3] = [[End::Parabola; 2]; 3];
 const CYLINDER_ENDS: [[End; 2]; 3] = [[End::Level, End::Parabola], [End::Parabola; 2], [End::Parabola; 2]];
 
-/// Fineness of the preparation of a sphere's law.
+/// Fineness of a preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Resolution {
-    /// Elements of the remainder.
-    pub fineness: Fineness,
-    /// Cells of a contact from its middle to its rim.
-    pub rings: i32,
+pub enum Resolution {
+    /// Least preparation.
+    Quick,
+    /// Default.
+    Standard,
+    /// Least error.
+    Fine,
+}
+
+impl Resolution {
+    fn pick<T>(self, [quick, standard, fine]: [T; 3]) -> T {
+        match self {
+            Self::Quick => quick,
+            Self::Standard => standard,
+            Self::Fine => fine,
+        }
+    }
+
+    /// Returns the order of the elements.
+    #[must_use]
+    pub fn order(self) -> usize {
+        self.pick([2, 3, 4])
+    }
+
+    /// Returns the elements of the remainder.
+    #[must_use]
+    pub fn fineness(self) -> Fineness {
+        Fineness { across: 4, high: 5, order: self.order() }
+    }
+
+    /// Returns the cells of a contact from its middle to its rim.
+    #[must_use]
+    pub fn rings(self) -> i32 {
+        self.pick([5, 6, 8])
+    }
+
+    /// Returns the bricks along a side of the square in the middle of a cylinder.
+    #[must_use]
+    pub fn bricks(self) -> usize {
+        self.pick([4, 6, 8])
+    }
 }
 
 /// Prepared law of a sphere with its error estimate.
@@ -176,7 +212,7 @@ pub fn sphere_on_block(
     resolution: Resolution,
 ) -> Result<Prepared, NotPositive> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
-    let remainder = Remainder::new(size, solid, resolution.fineness)?;
+    let remainder = Remainder::new(size, solid, resolution.fineness())?;
     let rounding_m = rounding_m(size, radius_m);
     let builder = Builder { solid, size, radius_m, rounding_m, remainder: &remainder, resolution };
     let top = builder.ratios(Face::Top);
@@ -422,7 +458,7 @@ impl Builder<'_> {
     fn ratios(&self, face: Face) -> Volume {
         let [p, q, _] = face.axes();
         let table = self.table(face);
-        let rings = self.resolution.rings;
+        let rings = self.resolution.rings();
         let patch = Patch::new(&self.solid, rings);
         let roots = roots();
         let reference = unbounded(&self.solid, rings, &roots);
@@ -459,7 +495,7 @@ impl Builder<'_> {
     /// Estimates the change of the stiffness under the sphere against coarser elements, in the middle and at a quarter
     /// of the side from an edge: twice the contribution of the remainder, for a contact of half the sphere's radius.
     fn mesh_error(&self) -> Result<f64, NotPositive> {
-        let Fineness { across, high, order } = self.resolution.fineness;
+        let Fineness { across, high, order } = self.resolution.fineness();
         let coarse = Fineness { across: across.div_ceil(2).max(1), high: high.div_ceil(2).max(1), order };
         let other = Remainder::new(self.size, self.solid, coarse)?;
         let nu = self.solid.poisson_ratio;
