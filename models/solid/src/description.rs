@@ -1,6 +1,6 @@
 //! Solid with its tool, from the parameters: valid combinations.
 
-use crate::parameters::{BodyChoice, BondChoice, ElementChoice, ToolChoice};
+use crate::parameters::{BodyChoice, ToolChoice, bond, resolution};
 use crate::plate::PlateBox;
 use crate::prepare::Resolution;
 use crate::punch::{Bond, Outline};
@@ -126,10 +126,7 @@ impl Description {
             BodyChoice::File => Body::File { digest: mesh_digest },
         };
         let radius_m = metres("tool_radius_mm");
-        let bond = match BondChoice::of(settings, "bond") {
-            BondChoice::Bonded => Bond::Bonded,
-            BondChoice::Frictionless => Bond::Frictionless,
-        };
+        let bond = bond(settings);
         let punch = |outline| Tool::Punch { outline, bond };
         let more = settings.choice_or_default("tool_count");
         let mut tool = match ToolChoice::of(settings, "tool") {
@@ -155,15 +152,13 @@ impl Description {
         if bond == Bond::Frictionless && tool == Tool::Plate {
             return Err(Refusal::unsupported("a plate is bonded to its face: set bond = \"bonded\""));
         }
-        let resolution = match ElementChoice::of(settings, "resolution") {
-            ElementChoice::Quick => Resolution::Quick,
-            ElementChoice::Standard => Resolution::Standard,
-            ElementChoice::Fine => Resolution::Fine,
-            ElementChoice::LinearTetrahedra if tool == Tool::Plate && body.plate_box().is_some() => {
+        let resolution = match resolution(settings) {
+            Some(resolution) => resolution,
+            None if tool == Tool::Plate && body.plate_box().is_some() => {
                 tool = Tool::LinearPlate;
-                Resolution::Standard
+                Resolution::STANDARD
             }
-            ElementChoice::LinearTetrahedra => {
+            None => {
                 return Err(Refusal::unsupported(
                     "resolution = \"linear-tetrahedra\" is a comparison for plates on a block or a beam: set tool = \"plate\"",
                 ));

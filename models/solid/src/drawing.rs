@@ -508,7 +508,7 @@ mod tests {
             body: Body::HalfSpace,
             tool: Tool::Sphere { radius_m: 0.01 },
             poisson_ratio: 0.3,
-            resolution: Resolution::Quick,
+            resolution: Resolution::QUICK,
         };
         let mut drawing = Drawing::new(&description, None).expect("nothing to solve");
         for depth_m in [0.0005, 0.002, 0.008, 0.02] {

@@ -132,7 +132,7 @@ impl Description {
         let (patch, mesh_error) = match (body, tool, body.plate_box()) {
             (_, Tool::Spheres { .. }, _) => return self.spheres(&Self::solve, &|_, solve| solve()),
             (Body::Cylinder { radius_m, height_m }, ..) => {
-                let mesh = Mesh::cylinder(radius_m, height_m, resolution.bricks())
+                let mesh = Mesh::cylinder(radius_m, height_m, resolution.bricks)
                     .map_err(|problem| Refusal::parameter(format!("the cylinder: {problem}")))?;
                 return self.solve_on(&mesh);
             }
@@ -153,7 +153,7 @@ impl Description {
                 extrapolated(&solid, Some(&table), outline, bond)?
             }
             (Body::HalfSpace, Tool::Punch { outline, bond }, _) => extrapolated(&solid, None, outline, bond)?,
-            (_, Tool::Plate, Some(under)) => under.solve(lame, resolution.order())?,
+            (_, Tool::Plate, Some(under)) => under.solve(lame, resolution.order)?,
             (_, Tool::LinearPlate, Some(under)) => tetrahedra::plate(&under, lame)?,
             _ => return Err(self.unfit()),
         };
@@ -180,7 +180,7 @@ impl Description {
             )));
         }
         if let Tool::Sphere { radius_m } = self.tool {
-            let rings = self.resolution.rings();
+            let rings = self.resolution.rings;
             let prepared = sphere_on_mesh(mesh, self.body_kind(), self.poisson_ratio, radius_m, rings)?;
             return Ok(sphere(prepared));
         }

@@ -1,5 +1,7 @@
 //! Parameters of the solid: schema, words of the choices, and values.
 
+use crate::prepare::Resolution;
+use crate::punch::Bond;
 use flotor_hal::{Choices, Parameter, Settings, choices};
 
 /// Declares the values of a choice with their words, in the order of the schema.
@@ -22,35 +24,26 @@ macro_rules! choice {
 
 choice! {
     /// Kind of the touched body.
-    BodyChoice {
-        Block = "block",
-        Beam = "beam",
-        Cylinder = "cylinder",
-        HalfSpace = "half-space",
-        File = "file",
-    }
+    BodyChoice { Block = "block", Beam = "beam", Cylinder = "cylinder", HalfSpace = "half-space", File = "file" }
 }
 choice! {
     /// Kind of the tool.
-    ToolChoice {
-        Sphere = "sphere",
-        Plate = "plate",
-        PunchRound = "punch-round",
-        PunchSquare = "punch-square",
-    }
+    ToolChoice { Sphere = "sphere", Plate = "plate", PunchRound = "punch-round", PunchSquare = "punch-square" }
 }
-choice! {
-    /// Contact of a punch with the surface.
-    BondChoice { Bonded = "bonded", Frictionless = "frictionless" }
+
+const BONDS: Choices = choices!["bonded", "frictionless"];
+
+/// Returns the bond of a punch.
+pub(crate) fn bond(settings: &Settings<'_>) -> Bond {
+    [Bond::Bonded, Bond::Frictionless][settings.choice_or_default("bond")]
 }
-choice! {
-    /// Elements and contact cells of the preparation.
-    ElementChoice {
-        Quick = "quick",
-        Standard = "standard",
-        Fine = "fine",
-        LinearTetrahedra = "linear-tetrahedra",
-    }
+
+const RESOLUTIONS: Choices = choices!["quick", "standard", "fine", "linear-tetrahedra"];
+
+/// Returns the resolution; `None` for linear tetrahedra.
+pub(crate) fn resolution(settings: &Settings<'_>) -> Option<Resolution> {
+    [Some(Resolution::QUICK), Some(Resolution::STANDARD), Some(Resolution::FINE), None]
+        [settings.choice_or_default("resolution")]
 }
 
 /// Numbers of spheres, from one.
@@ -109,11 +102,11 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         30.0,
         "Distance between the centres of neighbouring spheres",
     ),
-    Parameter::choice("bond", BondChoice::WORDS, 0, "Contact of a punch with the surface"),
+    Parameter::choice("bond", BONDS, 0, "Contact of a punch with the surface"),
     Parameter::real("friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction of the sphere"),
     Parameter::choice(
         "resolution",
-        ElementChoice::WORDS,
+        RESOLUTIONS,
         1,
         "Elements and contact cells of the preparation, without effect on the time of a tick; linear-tetrahedra: \
          for comparison, under a plate",

@@ -39,46 +39,27 @@ const CYLINDER_ENDS: [[End; 2]; 3] = [[End::Level, End::Parabola], [End::Parabol
 
 /// Fineness of a preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Resolution {
-    /// Least preparation.
-    Quick,
-    /// Default.
-    Standard,
-    /// Least error.
-    Fine,
+pub struct Resolution {
+    /// Order of the elements.
+    pub order: usize,
+    /// Cells of a contact from its middle to its rim.
+    pub rings: i32,
+    /// Bricks along a side of the square in the middle of a cylinder.
+    pub bricks: usize,
 }
 
 impl Resolution {
-    fn pick<T>(self, [quick, standard, fine]: [T; 3]) -> T {
-        match self {
-            Self::Quick => quick,
-            Self::Standard => standard,
-            Self::Fine => fine,
-        }
-    }
-
-    /// Returns the order of the elements.
-    #[must_use]
-    pub fn order(self) -> usize {
-        self.pick([2, 3, 4])
-    }
+    /// Least preparation.
+    pub const QUICK: Self = Self { order: 2, rings: 5, bricks: 4 };
+    /// Default.
+    pub const STANDARD: Self = Self { order: 3, rings: 6, bricks: 6 };
+    /// Least error.
+    pub const FINE: Self = Self { order: 4, rings: 8, bricks: 8 };
 
     /// Returns the elements of the remainder.
     #[must_use]
     pub fn fineness(self) -> Fineness {
-        Fineness { across: 4, high: 5, order: self.order() }
-    }
-
-    /// Returns the cells of a contact from its middle to its rim.
-    #[must_use]
-    pub fn rings(self) -> i32 {
-        self.pick([5, 6, 8])
-    }
-
-    /// Returns the bricks along a side of the square in the middle of a cylinder.
-    #[must_use]
-    pub fn bricks(self) -> usize {
-        self.pick([4, 6, 8])
+        Fineness { across: 4, high: 5, order: self.order }
     }
 }
 
@@ -458,7 +439,7 @@ impl Builder<'_> {
     fn ratios(&self, face: Face) -> Volume {
         let [p, q, _] = face.axes();
         let table = self.table(face);
-        let rings = self.resolution.rings();
+        let rings = self.resolution.rings;
         let patch = Patch::new(&self.solid, rings);
         let roots = roots();
         let reference = unbounded(&self.solid, rings, &roots);

@@ -18,7 +18,7 @@ fn atlas() -> &'static Atlas {
             body: Body::Block(size),
             tool: Tool::Sphere { radius_m: 0.008 },
             poisson_ratio: 0.4,
-            resolution: Resolution::Quick,
+            resolution: Resolution::QUICK,
         };
         match description.solve().expect("a solid").0 {
             Law::Sphere(atlas) => atlas,

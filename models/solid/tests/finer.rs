@@ -104,7 +104,7 @@ fn other_places_depths_and_bodies() {
             body: Body::Block(size),
             tool: Tool::Sphere { radius_m },
             poisson_ratio,
-            resolution: Resolution::Standard,
+            resolution: Resolution::STANDARD,
         };
         let Law::Sphere(atlas) = description.solve().expect("a solid").0 else { panic!("a sphere") };
         let bench = Bench {

@@ -17,7 +17,7 @@ use flotor_solid::remainder::Size;
 use flotor_solid::rigid::RigidPatch;
 use std::fmt::Write as _;
 
-const STANDARD: Resolution = Resolution::Standard;
+const STANDARD: Resolution = Resolution::STANDARD;
 
 /// A box of cells in Gmsh's format: bricks, or six tetrahedra each. `named`: axis, side (0 or 1) and name of a face.
 struct Boxes {
@@ -334,7 +334,7 @@ fn a_sphere_on_a_cylinder_lies_between_two_blocks() {
             body,
             tool: Tool::Sphere { radius_m },
             poisson_ratio,
-            resolution: Resolution::Quick,
+            resolution: Resolution::QUICK,
         };
         let (Law::Sphere(atlas), _) = description.solve().expect("a solid") else { panic!("a sphere") };
         atlas

@@ -12,7 +12,7 @@ use flotor_solid::remainder::{Face, Remainder, Size};
 use flotor_solid::table::Table;
 use std::f64::consts::TAU;
 
-const STANDARD: Resolution = Resolution::Standard;
+const STANDARD: Resolution = Resolution::STANDARD;
 const CUBE: Size = Size { half_x_m: 0.04, half_y_m: 0.04, height_m: 0.08 };
 
 fn block(row: &Row) -> Size {
@@ -238,12 +238,12 @@ fn errors_against_the_finest_beam_are_those_of_an_independent_program() {
         let Ok((Law::Bonded(patch), _)) = description.solve() else { panic!("a rigid patch") };
         patch
     };
-    let (modulus_pa, fine) = (1.0e4, patch(Tool::Plate, Resolution::Fine));
+    let (modulus_pa, fine) = (1.0e4, patch(Tool::Plate, Resolution::FINE));
     let table = rows("solid/bench_beam.csv");
     assert_eq!(table.len(), 3);
     for row in &table {
         let case = match row.text("case") {
-            "quick" => patch(Tool::Plate, Resolution::Quick),
+            "quick" => patch(Tool::Plate, Resolution::QUICK),
             "standard" => patch(Tool::Plate, STANDARD),
             _ => patch(Tool::LinearPlate, STANDARD),
         };

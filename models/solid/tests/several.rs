@@ -20,7 +20,7 @@ const CUBE: Size = Size { half_x_m: 0.04, half_y_m: 0.04, height_m: 0.08 };
 fn spheres(body: Body, count: usize, spacing_m: f64) -> Spheres {
     let solve = || {
         let tool = Tool::Spheres { radius_m: RADIUS_M, count, spacing_m };
-        let description = Description { body, tool, poisson_ratio: NU, resolution: Resolution::Quick };
+        let description = Description { body, tool, poisson_ratio: NU, resolution: Resolution::QUICK };
         let Law::Spheres(spheres) = description.solve().expect("a solid").0 else { panic!("spheres") };
         *spheres
     };
@@ -98,7 +98,7 @@ fn contacts_push_the_surface_down_under_each_other() {
     if crate::leaves_out_long_tests() {
         return;
     }
-    let remainder = Remainder::new(CUBE, SOLID, Resolution::Standard.fineness()).expect("a solid");
+    let remainder = Remainder::new(CUBE, SOLID, Resolution::STANDARD.fineness()).expect("a solid");
     let nodes = [0.0, 0.008, 0.016, 0.024, 0.032];
     let table = Table::new(&remainder, Face::Top, [&nodes, &nodes]);
     for (body, table) in [(Body::HalfSpace, None), (Body::Block(CUBE), Some(&table))] {
