@@ -10,7 +10,7 @@
 //! The thesis names such networks in its introduction as the common way to display a deformable body, and as too simple
 //! to be accurate; here they are the large model with state, as a test of the contract.
 //!
-//! - [`mesh`]: links between masses: a stretched sheet, a hanging chain, the edges of a mesh file.
+//! - [`mesh`]: links between masses: a stretched sheet, the edges of a mesh file.
 //! - `obj`, `topology`: reader of a mesh file, and its connections by position.
 //! - [`network`]: state and time step; [`vectors`]: one array per coordinate.
 //! - `links`: springs in runs of equal distance between their ends, so that a run is a loop over slices.
