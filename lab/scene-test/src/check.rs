@@ -215,12 +215,10 @@ fn golden(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
         arguments.extend(["--plugin-path".to_owned(), folder.display().to_string()]);
     }
     outcome.detail = Some(command_line(&arguments));
-    let asked: Vec<String> = arguments.iter().cloned().chain(["--json".to_owned(), "-".to_owned()]).collect();
-    let answered = flotor.run(asked, "");
-    let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
-    match answered.ok().and_then(|ran| ran.json()) {
-        None => outcome.failures.push(Failure::new("golden", "a replay", error)),
-        Some(json) => {
+    let asked = arguments.iter().cloned().chain(["--json".to_owned(), "-".to_owned()]);
+    match flotor.answer::<Value, _>(asked) {
+        Err(error) => outcome.failures.push(Failure::new("golden", "a replay", error)),
+        Ok(json) => {
             let first =
                 at(&json, "first_tick").map_or(String::new(), |tick| format!(", first at tick {tick}"));
             for (what, path, within) in
@@ -246,12 +244,12 @@ fn validate(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Ou
         _ => models.iter().map(|model| model.file.clone()).collect(),
     };
     for plugin in files {
-        let answered = flotor.run(["validate", &plugin, "--json"], "");
-        let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
-        let findings = answered.ok().and_then(|ran| ran.json());
-        let Some(Value::Array(findings)) = findings else {
-            outcome.failures.push(Failure::new("validate", "an answer", error));
-            continue;
+        let findings: Vec<Value> = match flotor.answer(["validate", &plugin, "--json"]) {
+            Ok(findings) => findings,
+            Err(error) => {
+                outcome.failures.push(Failure::new("validate", "an answer", error));
+                continue;
+            }
         };
         for finding in &findings {
             match RuleFinding::of(finding) {
@@ -280,14 +278,12 @@ fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
         let counted: Vec<&String> = stress.measures.iter().collect();
         // Compute only measures that count.
         let asked = [&score[..], &only(&counted), &["--json".to_owned(), "-".to_owned()]].concat();
-        let answered = flotor.run(asked, "");
-        let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
-        let failed = match answered.ok().and_then(|ran| ran.json()) {
-            None => {
+        let failed = match flotor.answer::<Value, _>(asked) {
+            Err(error) => {
                 outcome.failures.push(Failure::new("stress", "an answer", error));
                 counted
             }
-            Some(json) => {
+            Ok(json) => {
                 let failures =
                     counted.into_iter().filter_map(|id| Some((id, measure(&json, id, stress.demand)?)));
                 let (failed, failures): (Vec<&String>, Vec<Failure>) = failures.unzip();
