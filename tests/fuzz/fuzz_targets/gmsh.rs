@@ -28,7 +28,7 @@ fuzz_target!(|bytes: &[u8]| {
     assert!(mesh.nodes_m.iter().flatten().all(|x| x.is_finite()));
     if mesh.nodes_m.len() <= MOST_SOLVED {
         let body = Body::File { digest: 0 };
-        let resolution = Resolution::Quick;
+        let resolution = Resolution::QUICK;
         let description = Description { body, tool: Tool::Plate, poisson_ratio: 0.3, resolution };
         if let Ok((Law::Bonded(patch), _)) = description.solve_on(&mesh) {
             assert!(patch.stiffness.iter().flatten().all(|x| x.is_finite()));
