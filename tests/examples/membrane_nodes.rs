@@ -5,8 +5,9 @@
 //! twenty runs: a busy machine can only make it slower.
 
 use flotor_hal::DVec3;
+use flotor_membrane::ball::Ball;
 use flotor_membrane::mesh::{Mesh, Sheet};
-use flotor_membrane::network::{Ball, Network, Surroundings};
+use flotor_membrane::network::{Network, Surroundings};
 use std::hint::black_box;
 use std::time::Instant;
 

@@ -8,6 +8,7 @@ use crate::minimise::shortest;
 use crate::numbers::at;
 use crate::process::{Flotor, ProcessResult};
 use crate::rule::RuleFinding;
+use crate::run::{Failure, missed, run, run_arguments};
 use flotor_command::{command_line, note};
 use serde::Serialize;
 use serde_json::Value;
@@ -57,25 +58,6 @@ impl Outcome {
     }
 }
 
-/// Expectation that was not met.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct Failure {
-    pub(crate) what: String,
-    pub(crate) expected: String,
-    pub(crate) got: String,
-}
-
-impl Failure {
-    fn new(what: impl Into<String>, expected: impl Into<String>, got: impl Into<String>) -> Self {
-        Self { what: what.into(), expected: expected.into(), got: got.into() }
-    }
-
-    /// Formats the failure in one line.
-    pub(crate) fn line(&self) -> String {
-        format!("{}: expected {}, got {}", self.what, self.expected, self.got)
-    }
-}
-
 /// Model of a scene.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
@@ -91,30 +73,6 @@ pub(crate) fn models(json: &Value) -> Vec<Model> {
     models
         .filter_map(|model| Some(Model { name: text(model, "name")?, file: text(model, "file")? }))
         .collect()
-}
-
-/// Returns the arguments of a run.
-pub(crate) fn run_arguments(
-    file: &TestFile,
-    seed: u64,
-    set: &[(String, String)],
-    duration: Option<&str>,
-) -> Vec<String> {
-    let scene = file.scene.display().to_string();
-    let mut arguments: Vec<String> =
-        ["run", &scene, "--clock", "virtual", "--seed"].into_iter().map(str::to_owned).collect();
-    arguments.push(seed.to_string());
-    arguments.extend(file.plugin_path.arguments().map(|word| word.to_string_lossy().into_owned()));
-    for (key, value) in set {
-        arguments.extend(["--set".to_owned(), format!("{key}={value}")]);
-    }
-    for output in file.outputs() {
-        arguments.extend(["--compute".to_owned(), output.to_owned()]);
-    }
-    if let Some(duration) = duration {
-        arguments.extend(["--duration".to_owned(), duration.to_owned()]);
-    }
-    arguments
 }
 
 /// Returns the plot arguments for bounds of peak force and peak torque.
@@ -207,81 +165,6 @@ pub(crate) fn picture(folder: &Path, case: &Case<'_>) -> PathBuf {
     folder.join(case.name().chars().map(plain).collect::<String>() + ".svg")
 }
 
-/// Judged run.
-pub(crate) struct JudgedRun {
-    pub(crate) failures: Vec<Failure>,
-    pub(crate) json: Option<Value>,
-}
-
-/// Executes and judges a run of a case, with its settings or fewer.
-pub(crate) fn run(
-    flotor: &Flotor,
-    case: &Case<'_>,
-    seed: u64,
-    set: &[(String, String)],
-    duration: Option<&str>,
-) -> JudgedRun {
-    let summary = |set: &[(String, String)]| {
-        let mut arguments = run_arguments(case.file, seed, set, duration);
-        arguments.extend(["--json".to_owned(), "-".to_owned()]);
-        let ran = flotor.run(arguments, "").map_err(|late| Failure::new("the run", "an end", late))?;
-        match ran.json() {
-            Some(json) => Ok((ran, json)),
-            None => Err(Failure::new("the run", "a summary", ran.error)),
-        }
-    };
-    let (ran, json) = match summary(set) {
-        Ok(answered) => answered,
-        Err(failure) => return JudgedRun { failures: vec![failure], json: None },
-    };
-    let mut failures = judge(case, &ran, &json);
-    if let Some(reference) = &case.file.reference {
-        let is_replaced = |key: &str| reference.set.iter().any(|(other, _)| other == key);
-        let kept = set.iter().filter(|(key, _)| !is_replaced(key)).chain(&reference.set);
-        match summary(&kept.cloned().collect::<Vec<_>>()) {
-            Err(failure) => {
-                failures.push(Failure { what: format!("reference: {}", failure.what), ..failure })
-            }
-            Ok((_, other)) => failures.extend(reference.within.iter().filter_map(|(path, within)| {
-                let value = at(&other, path).and_then(Value::as_f64).unwrap_or(f64::NAN);
-                let bound = Bound::Near { value, within: *within };
-                missed(&format!("{path} against the reference"), &bound, at(&json, path))
-            })),
-        }
-    }
-    JudgedRun { failures, json: Some(json) }
-}
-
-fn judge(case: &Case<'_>, ran: &ProcessResult, json: &Value) -> Vec<Failure> {
-    let Case { file, label, .. } = case;
-    let mut failures = Vec::new();
-    if !file.expect.iter().any(|expectation| expectation.path == "end") {
-        let early = missed("end", &Bound::Word("finished".to_owned()), at(json, "end"));
-        failures.extend(early.map(|early| Failure { got: format!("{}: {}", early.got, ran.error), ..early }));
-        let ended = failures.is_empty() && ran.code != Some(0);
-        failures.extend(ended.then(|| Failure::new("the run", "exit code 0", &ran.error)));
-    }
-    let expected = file.expect.iter();
-    failures.extend(
-        expected.filter_map(|expected| missed(&expected.path, &expected.bound, at(json, &expected.path))),
-    );
-    let digest = file.digests.get(label).map(|digest| Bound::Word(digest.clone()));
-    failures.extend(digest.and_then(|digest| missed("trace_digest", &digest, at(json, "trace_digest"))));
-    failures
-}
-
-fn missed(what: &str, bound: &Bound, value: Option<&Value>) -> Option<Failure> {
-    if bound.is_met_by(value) {
-        return None;
-    }
-    let got = match value {
-        None => "no value".to_owned(),
-        Some(Value::String(word)) => word.clone(),
-        Some(value) => value.to_string(),
-    };
-    Some(Failure::new(what, bound.text(), got))
-}
-
 /// Compares a model with a curve; draws a failure to `picture`, if given.
 fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], picture: Option<&Path>, outcome: &mut Outcome) {
     let Some(curve) = &file.curve else { return };
@@ -332,12 +215,10 @@ fn golden(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
         arguments.extend(["--plugin-path".to_owned(), folder.display().to_string()]);
     }
     outcome.detail = Some(command_line(&arguments));
-    let asked: Vec<String> = arguments.iter().cloned().chain(["--json".to_owned(), "-".to_owned()]).collect();
-    let answered = flotor.run(asked, "");
-    let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
-    match answered.ok().and_then(|ran| ran.json()) {
-        None => outcome.failures.push(Failure::new("golden", "a replay", error)),
-        Some(json) => {
+    let asked = arguments.iter().cloned().chain(["--json".to_owned(), "-".to_owned()]);
+    match flotor.answer::<Value, _>(asked) {
+        Err(error) => outcome.failures.push(Failure::new("golden", "a replay", error)),
+        Ok(json) => {
             let first =
                 at(&json, "first_tick").map_or(String::new(), |tick| format!(", first at tick {tick}"));
             for (what, path, within) in
@@ -363,12 +244,12 @@ fn validate(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Ou
         _ => models.iter().map(|model| model.file.clone()).collect(),
     };
     for plugin in files {
-        let answered = flotor.run(["validate", &plugin, "--json"], "");
-        let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
-        let findings = answered.ok().and_then(|ran| ran.json());
-        let Some(Value::Array(findings)) = findings else {
-            outcome.failures.push(Failure::new("validate", "an answer", error));
-            continue;
+        let findings: Vec<Value> = match flotor.answer(["validate", &plugin, "--json"]) {
+            Ok(findings) => findings,
+            Err(error) => {
+                outcome.failures.push(Failure::new("validate", "an answer", error));
+                continue;
+            }
         };
         for finding in &findings {
             match RuleFinding::of(finding) {
@@ -397,14 +278,12 @@ fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
         let counted: Vec<&String> = stress.measures.iter().collect();
         // Compute only measures that count.
         let asked = [&score[..], &only(&counted), &["--json".to_owned(), "-".to_owned()]].concat();
-        let answered = flotor.run(asked, "");
-        let error = answered.as_ref().map_or_else(Clone::clone, |ran| ran.error.clone());
-        let failed = match answered.ok().and_then(|ran| ran.json()) {
-            None => {
+        let failed = match flotor.answer::<Value, _>(asked) {
+            Err(error) => {
                 outcome.failures.push(Failure::new("stress", "an answer", error));
                 counted
             }
-            Some(json) => {
+            Ok(json) => {
                 let failures =
                     counted.into_iter().filter_map(|id| Some((id, measure(&json, id, stress.demand)?)));
                 let (failed, failures): (Vec<&String>, Vec<Failure>) = failures.unzip();

@@ -2,11 +2,12 @@
 
 use crate::bless::{Blessed, bless};
 use crate::case::{Case, Check, Shard, combinations};
-use crate::check::{Model, check, models, picture, run_arguments};
+use crate::check::{Model, check, models, picture};
 use crate::file::{SUFFIX, TestFile};
 use crate::numbers::misspelt;
 use crate::process::{Flotor, ProcessResult};
 use crate::report::{Report, deliver, is_output, remove};
+use crate::run::run_arguments;
 use clap::{Args, Subcommand};
 use flotor_command::options::{JsonOption, PluginPathOption, count, duration_s, new_file};
 use flotor_command::{CommandError, exit_code_of, options, print_error_line, report_line};

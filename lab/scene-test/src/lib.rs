@@ -1,6 +1,6 @@
 //! Scenes with expectations (`flotor test`): a force model or a device passes or fails in CI without hardware.
 //!
-//! `file` parses a `NAME.test.toml`, `case` lists its cases, `check` executes and judges them, `minimise` finds the
+//! `file` parses a `NAME.test.toml`, `case` lists its cases, `check` and `run` execute and judge them, `minimise` finds the
 //! shortest run that still fails, `report` writes the results, `bless` updates expected numbers. Every run, evaluation,
 //! validation and stress test has its own process (`process`): a plugin that crashes fails only its case. Not real-time
 //! throughout.
@@ -18,3 +18,4 @@ mod platform;
 mod process;
 mod report;
 mod rule;
+mod run;

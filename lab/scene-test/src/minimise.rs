@@ -1,8 +1,8 @@
 //! Search for the shortest run with the same failure.
 
 use crate::case::{Case, Check};
-use crate::check::{Failure, run, run_arguments};
 use crate::process::Flotor;
+use crate::run::{Failure, run, run_arguments};
 use serde_json::Value;
 
 /// Longest run in the search for a crash, ticks: a crashed run has no summary with its length.

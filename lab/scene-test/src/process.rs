@@ -2,6 +2,7 @@
 
 use flotor_command::separate::{Built, SeparateProgram};
 use flotor_command::{CommandError, PluginProcess};
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -56,6 +57,18 @@ impl Flotor {
                 format!("the process had not ended after {} s, and was killed", self.limit.as_secs_f64())
             }
         })
+    }
+
+    /// Runs a command and reads its answer from the JSON on standard output.
+    ///
+    /// # Errors
+    /// The reason without an answer: see [`Flotor::run`], or the process's last error.
+    pub(crate) fn answer<T: DeserializeOwned, I: AsRef<OsStr>>(
+        &self,
+        arguments: impl IntoIterator<Item = I>,
+    ) -> Result<T, String> {
+        let ran = self.run(arguments, "")?;
+        serde_json::from_str(&ran.stdout).map_err(|_| ran.error)
     }
 
     fn try_run<I: AsRef<OsStr>>(

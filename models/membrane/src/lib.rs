@@ -10,14 +10,15 @@
 //! The thesis names such networks in its introduction as the common way to display a deformable body, and as too simple
 //! to be accurate; here they are the large model with state, as a test of the contract.
 //!
-//! - [`mesh`]: links between masses: a stretched sheet, a hanging chain, the edges of a mesh file.
+//! - [`mesh`]: links between masses: a stretched sheet, the edges of a mesh file.
 //! - `obj`, `topology`: reader of a mesh file, and its connections by position.
-//! - [`network`]: state, one array per coordinate, and time step.
+//! - [`network`]: state and time step; [`vectors`]: one array per coordinate.
 //! - `links`: springs in runs of equal distance between their ends, so that a run is a loop over slices.
 //! - `regions`: blocks of masses at rest, skipped until something moves beside them.
-//! - [`touch`]: ball that moves through a network, and its field: force and stiffness for a faster loop.
+//! - [`ball`]: ball that pushes the masses; [`touch`]: ball that moves through a network, and its field: force and stiffness for a faster loop.
 //! - `plugin`: parameters and the contract.
 
+pub mod ball;
 mod links;
 pub mod mesh;
 pub mod network;
@@ -26,5 +27,6 @@ mod plugin;
 mod regions;
 mod topology;
 pub mod touch;
+pub mod vectors;
 
 pub use plugin::{FLOTOR_ENTRY, Membrane};

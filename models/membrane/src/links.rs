@@ -5,8 +5,8 @@
 //! one fixed order and are never contracted, so every instruction set gives the same bits.
 
 use crate::mesh::Link;
-use crate::network::Vectors;
 use crate::regions::{BLOCK, Regions};
+use crate::vectors::Vectors;
 use std::ops::Range;
 
 /// Springs from the masses `first..first + count` to those `distance` further on.
@@ -116,18 +116,6 @@ impl Vectors {
             fx[i] = pull * dx;
             fy[i] = pull * dy;
             fz[i] = pull * dz;
-        }
-    }
-
-    /// Adds the first entries of `other`, times `sign`, to a range.
-    #[inline]
-    fn add(&mut self, range: Range<usize>, other: &Vectors, sign: f64) {
-        let count = range.len();
-        let sums = self.slices_mut(range);
-        for (sum, addend) in sums.into_iter().zip(other.slices(0..count)) {
-            for i in 0..count {
-                sum[i] += sign * addend[i];
-            }
         }
     }
 }

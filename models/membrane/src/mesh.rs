@@ -1,4 +1,4 @@
-//! Masses and their links: sheets, chains, and the edges of a mesh file. Not real-time.
+//! Masses and their links: sheets, and the edges of a mesh file. Not real-time.
 
 use crate::obj::Obj;
 use crate::topology::{Topology, in_mm};
@@ -76,24 +76,6 @@ impl Mesh {
                     rest_m,
                     stiffness_n_per_m: sheet.stiffness_n_per_m,
                 });
-            }
-        }
-        mesh
-    }
-
-    /// Builds a chain of `links` equal springs along x between two fixed ends `span_m` apart, at height 0. `length_m`:
-    /// rest length; `axial_n`: force that would double the length; `mass_kg`: total mass, half a link's at each end.
-    #[must_use]
-    pub fn chain(links: usize, span_m: f64, length_m: f64, axial_n: f64, mass_kg: f64) -> Self {
-        let rest_m = length_m / links as f64;
-        let mut mesh = Self::default();
-        for node in 0..=links {
-            let x_m = span_m * (node as f64 / links as f64 - 0.5);
-            let held = node == 0 || node == links;
-            mesh.positions_m.push(DVec3::X * x_m);
-            mesh.masses_kg.push(if held { 0.0 } else { mass_kg / links as f64 });
-            if node > 0 {
-                mesh.links.push(Link { ends: [node - 1, node], rest_m, stiffness_n_per_m: axial_n / rest_m });
             }
         }
         mesh

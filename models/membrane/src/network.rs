@@ -10,88 +10,12 @@
 //! stable for `h < 2 / omega`, with the highest frequency bounded by Gershgorin: `omega^2 <= 2 sum(k) / m` over the
 //! springs at a mass. [`Network::longest_step_s`] is 0.8 of that limit.
 
+use crate::ball::Ball;
 use crate::links::Links;
 use crate::mesh::Mesh;
 use crate::regions::Regions;
+use crate::vectors::Vectors;
 use flotor_hal::DVec3;
-use std::ops::Range;
-
-/// Vectors stored as one array per coordinate.
-#[derive(Debug)]
-pub struct Vectors {
-    /// Components along x.
-    pub x: Vec<f64>,
-    /// Components along y.
-    pub y: Vec<f64>,
-    /// Components along z.
-    pub z: Vec<f64>,
-}
-
-impl Clone for Vectors {
-    fn clone(&self) -> Self {
-        Self { x: self.x.clone(), y: self.y.clone(), z: self.z.clone() }
-    }
-
-    /// Copies without allocation if the lengths are equal.
-    fn clone_from(&mut self, other: &Self) {
-        self.x.clone_from(&other.x);
-        self.y.clone_from(&other.y);
-        self.z.clone_from(&other.z);
-    }
-}
-
-impl Vectors {
-    /// Returns `count` zero vectors. Not real-time.
-    #[must_use]
-    pub fn zero(count: usize) -> Self {
-        Self { x: vec![0.0; count], y: vec![0.0; count], z: vec![0.0; count] }
-    }
-
-    fn from_points(points: &[DVec3]) -> Self {
-        let component = |pick: fn(&DVec3) -> f64| points.iter().map(pick).collect();
-        Self { x: component(|p| p.x), y: component(|p| p.y), z: component(|p| p.z) }
-    }
-
-    /// Returns the vector at an index. Real-time: bounded, no allocation.
-    ///
-    /// # Panics
-    /// If the index is out of range.
-    #[must_use]
-    pub fn get(&self, index: usize) -> DVec3 {
-        DVec3::new(self.x[index], self.y[index], self.z[index])
-    }
-
-    #[inline]
-    pub(crate) fn slices(&self, range: Range<usize>) -> [&[f64]; 3] {
-        [&self.x[range.clone()], &self.y[range.clone()], &self.z[range]]
-    }
-
-    #[inline]
-    pub(crate) fn slices_mut(&mut self, range: Range<usize>) -> [&mut [f64]; 3] {
-        [&mut self.x[range.clone()], &mut self.y[range.clone()], &mut self.z[range]]
-    }
-
-    #[inline]
-    pub(crate) fn clear(&mut self, range: Range<usize>) {
-        self.slices_mut(range).into_iter().for_each(|component| component.fill(0.0));
-    }
-
-    /// Returns the sum of the squares of all lengths.
-    fn sum_of_squares(&self) -> f64 {
-        [&self.x, &self.y, &self.z].iter().map(|component| component.iter().map(|c| c * c).sum::<f64>()).sum()
-    }
-
-    /// Returns the square of the longest vector of a range.
-    #[inline]
-    pub(crate) fn longest_square(&self, range: Range<usize>) -> f64 {
-        let [x, y, z] = self.slices(range);
-        let mut longest = 0.0_f64;
-        for ((x, y), z) in x.iter().zip(y).zip(z) {
-            longest = longest.max(x * x + y * y + z * z);
-        }
-        longest
-    }
-}
 
 /// Forces on every mass from outside the network.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,15 +26,6 @@ pub struct Surroundings {
     pub damping_per_s: f64,
     /// Stiffness of the contact between ball and mass, N/m.
     pub contact_n_per_m: f64,
-}
-
-/// Ball that touches the network.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ball {
-    /// Centre, m.
-    pub centre_m: DVec3,
-    /// Radius, m.
-    pub radius_m: f64,
 }
 
 /// State that changes from step to step.
@@ -243,7 +158,7 @@ impl Network {
         let mut on_ball_n = DVec3::ZERO;
         if let Some(ball) = ball {
             for range in regions.active() {
-                on_ball_n += push(ball, self.surroundings.contact_n_per_m, positions_m, forces_n, range);
+                on_ball_n += ball.push(self.surroundings.contact_n_per_m, positions_m, forces_n, range);
             }
         }
         let damped = 1.0 / (1.0 + step_s * self.surroundings.damping_per_s);
@@ -334,42 +249,4 @@ fn move_masses(
             }
         }
     }
-}
-
-/// Pushes the masses of a block out of the ball; returns the force on the ball, N.
-#[inline]
-fn push(
-    ball: &Ball,
-    contact_n_per_m: f64,
-    positions_m: &Vectors,
-    forces_n: &mut Vectors,
-    range: Range<usize>,
-) -> DVec3 {
-    /// Floor of a squared distance, m²: a mass at the very centre gets no force.
-    const LEAST_SQUARE: f64 = 1.0e-300;
-    let count = range.len();
-    let [x, y, z] = positions_m.slices(range.clone());
-    let centre_m = ball.centre_m;
-    // Most blocks are far away: reject them in one cheap pass.
-    let near = ball.radius_m * ball.radius_m;
-    let mut inside = 0_u32;
-    for i in 0..count {
-        let (dx, dy, dz) = (x[i] - centre_m.x, y[i] - centre_m.y, z[i] - centre_m.z);
-        inside += u32::from(dx * dx + dy * dy + dz * dz < near);
-    }
-    if inside == 0 {
-        return DVec3::ZERO;
-    }
-    let [fx, fy, fz] = forces_n.slices_mut(range);
-    let mut on_ball_n = DVec3::ZERO;
-    for i in 0..count {
-        let out = DVec3::new(x[i], y[i], z[i]) - centre_m;
-        let distance_m = out.length_squared().max(LEAST_SQUARE).sqrt();
-        let push = out * (contact_n_per_m * (ball.radius_m - distance_m).max(0.0) / distance_m);
-        fx[i] += push.x;
-        fy[i] += push.y;
-        fz[i] += push.z;
-        on_ball_n -= push;
-    }
-    on_ball_n
 }

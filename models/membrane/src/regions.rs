@@ -4,7 +4,8 @@
 //! the ball comes near or a mass of a linked block is no longer slow. The masses of an inactive block stand still: the
 //! omitted motion is slower than [`QUIET_M_PER_S`].
 
-use crate::network::{Ball, Vectors};
+use crate::ball::Ball;
+use crate::vectors::Vectors;
 use flotor_hal::DVec3;
 use std::ops::Range;
 use std::sync::Arc;

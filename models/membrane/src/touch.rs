@@ -1,6 +1,7 @@
 //! Ball of a hand that moves through a network, and its force field for a faster loop.
 
-use crate::network::{Ball, Network, State};
+use crate::ball::Ball;
+use crate::network::{Network, State};
 use flotor_hal::DVec3;
 
 /// Network with the ball that touches it.

@@ -2,8 +2,9 @@
 
 use flotor_hal::abi::loader::{Model, Plugin};
 use flotor_hal::{DQuat, DVec3, Input, Output, Pose};
+use flotor_membrane::ball::Ball;
 use flotor_membrane::mesh::{Link, Mesh, Sheet};
-use flotor_membrane::network::{Ball, Network, Surroundings};
+use flotor_membrane::network::{Network, Surroundings};
 use flotor_membrane::touch::Touch;
 use std::f64::consts::TAU;
 

@@ -95,6 +95,13 @@ pub struct Answer {
     pub is_extrapolated: bool,
 }
 
+impl Answer {
+    /// Returns the answer at a depth without contact.
+    fn none(depth_m: f64) -> Self {
+        Self { energy: Jet::default(), depth_m, is_extrapolated: false }
+    }
+}
+
 impl Atlas {
     /// Returns the energy of a sphere whose centre is at `centre_m` (finite). Real-time: bounded, no allocation.
     #[must_use]
@@ -114,12 +121,10 @@ impl Atlas {
             }
             TouchedBody::Face { outline_m, ratio } => self.touch_face(centre, *outline_m, ratio),
         };
-        let Some(touch) = touch else {
-            return Answer { energy: Jet::default(), depth_m: -1.0, is_extrapolated: false };
-        };
+        let Some(touch) = touch else { return Answer::none(-1.0) };
         let (depth_m, is_extrapolated) = (touch.depth_m.value, touch.is_extrapolated);
         if depth_m <= 0.0 {
-            return Answer { energy: Jet::default(), depth_m, is_extrapolated: false };
+            return Answer::none(depth_m);
         }
         Answer { energy: self.unbounded(touch.depth_m) * touch.ratio, depth_m, is_extrapolated }
     }
@@ -138,7 +143,7 @@ impl Atlas {
         let half_m = [size.half_x_m, size.half_y_m];
         let inside = [0, 1].map(|k| (-centre[k].abs() + half_m[k]) * (1.0 / width_m));
         if depth_m.value <= 0.0 || inside.iter().any(|s| s.value <= 0.0) {
-            return Answer { energy: Jet::default(), depth_m: depth_m.value, is_extrapolated: false };
+            return Answer::none(depth_m.value);
         }
         let ratio = ratios[0].at(self.place_on_top(centre, depth_m, &ratios[0], *rounding_m));
         let energy = self.unbounded(depth_m) * ratio * step(inside[0]) * step(inside[1]);

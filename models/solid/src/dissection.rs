@@ -146,12 +146,6 @@ impl Stiffness {
         Ok(Self { fronts, unknowns: 3 * nodes, fixed })
     }
 
-    /// Returns the count of numbers in the factor; a solve reads each twice.
-    #[must_use]
-    pub fn factor_size(&self) -> usize {
-        self.fronts.iter().map(|front| front.panel.len()).sum()
-    }
-
     /// Solves for `columns` right sides at once, in place: force in, displacement out, all columns of an unknown side
     /// by side. Fixed unknowns return as zero. Not real-time.
     pub fn solve(&self, values: &mut [f64], columns: usize) {

@@ -8,11 +8,10 @@
 
 use crate::atlas::{Answer, Atlas};
 use crate::body;
-use crate::dense::NotPositive;
-use crate::grid::{Grid, Lame};
+use crate::description::{Body, Description, Tool};
+use crate::grid::Lame;
 use crate::half_space::HalfSpace;
 use crate::jet::Jet;
-use crate::law::{Body, Description, Tool};
 use crate::mesh::Mesh;
 use crate::plate::plate;
 use crate::punch::{Bond, Loads, Outline, punch_loads};
@@ -75,10 +74,9 @@ pub struct Drawing {
 
 impl Drawing {
     /// Solves for the fields of a picture: none under a sphere, up to a second of work under a punch or a plate.
-    ///
-    /// # Errors
-    /// [`NotPositive`] if the numbers do not describe a solid.
-    pub fn new(description: &Description, mesh: Option<&Mesh>) -> Result<Self, NotPositive> {
+    /// `None` if the numbers do not describe a solid.
+    #[must_use]
+    pub fn new(description: &Description, mesh: Option<&Mesh>) -> Option<Self> {
         let round = match (description.body, description.tool) {
             (Body::Cylinder { radius_m, height_m }, Tool::Plate) => {
                 Mesh::cylinder(radius_m, height_m, BRICKS).ok()
@@ -90,13 +88,16 @@ impl Drawing {
             Tool::Sphere { .. } | Tool::Spheres { .. } => {
                 Look::Sphere(mesh.map(|mesh| Skin::of_mesh(mesh).0))
             }
-            Tool::Plate => Look::Bonded(Box::new(plate_modes(description, mesh)?)),
+            Tool::Plate | Tool::LinearPlate => match mesh {
+                Some(mesh) => Look::Bonded(Box::new(plate_on_mesh(description, mesh)?)),
+                None => Look::Bonded(Box::new(plate_on_boxes(description)?)),
+            },
             Tool::Punch { outline, bond } => {
                 Look::Bonded(Box::new(punch_modes(description, mesh, outline, bond)?))
             }
         };
         let height_m = height_m(description.body, mesh);
-        Ok(Self { body: description.body, height_m, look, shape: Shape::default() })
+        Some(Self { body: description.body, height_m, look, shape: Shape::default() })
     }
 
     /// Draws the solid under a plate or a punch at a pose (finite).
@@ -316,27 +317,28 @@ fn columns(displacement: &[f64], node: usize) -> [DVec3; MODES] {
     std::array::from_fn(|mode| DVec3::new(at(0, mode), at(1, mode), at(2, mode)))
 }
 
-/// Solves for the picture of a plate: elements of second order, independent of the law's.
-fn plate_modes(description: &Description, mesh: Option<&Mesh>) -> Result<Modal, NotPositive> {
-    let lame = Lame::new(1.0, description.poisson_ratio);
-    if let Some(mesh) = mesh {
-        let (_, displacement) = body::plate_modes(mesh, lame)?;
-        let (skin, nodes) = Skin::of_mesh(mesh);
-        let [[left, right], [front, back]] = body::outline_m(mesh);
-        let half_m = [0.5 * (right - left), 0.5 * (back - front)];
-        let thick_m = THICKNESS * half_m[0].min(half_m[1]);
-        let form = if matches!(description.body, Body::Cylinder { .. }) { Form::Cylinder } else { Form::Box };
-        return Ok(Modal {
-            skin,
-            displacement: nodes.iter().map(|&node| columns(&displacement, node)).collect(),
-            pressure: Vec::new(),
-            tool: (form, [half_m[0], half_m[1], 0.5 * thick_m]),
-            tool_centre_m: DVec3::new(0.5 * (left + right), 0.5 * (front + back), 0.5 * thick_m),
-        });
-    }
-    let (borders, axis) = Description::plate_borders(description.body);
-    let grid = Grid::new(borders, ORDER);
-    let (_, displacement) = plate(&grid, lame, axis)?;
+/// Solves for the picture of a plate on a mesh.
+fn plate_on_mesh(description: &Description, mesh: &Mesh) -> Option<Modal> {
+    let (_, displacement) = body::plate_modes(mesh, Lame::new(1.0, description.poisson_ratio)).ok()?;
+    let (skin, nodes) = Skin::of_mesh(mesh);
+    let [[left, right], [front, back]] = body::outline_m(mesh);
+    let half_m = [0.5 * (right - left), 0.5 * (back - front)];
+    let thick_m = THICKNESS * half_m[0].min(half_m[1]);
+    let form = if matches!(description.body, Body::Cylinder { .. }) { Form::Cylinder } else { Form::Box };
+    Some(Modal {
+        skin,
+        displacement: nodes.iter().map(|&node| columns(&displacement, node)).collect(),
+        pressure: Vec::new(),
+        tool: (form, [half_m[0], half_m[1], 0.5 * thick_m]),
+        tool_centre_m: DVec3::new(0.5 * (left + right), 0.5 * (front + back), 0.5 * thick_m),
+    })
+}
+
+/// Solves for the picture of a plate on boxes: elements of second order, independent of the law's.
+fn plate_on_boxes(description: &Description) -> Option<Modal> {
+    let under = description.body.plate_box()?;
+    let (grid, axis) = (under.grid(ORDER), under.axis);
+    let (_, displacement) = plate(&grid, Lame::new(1.0, description.poisson_ratio), axis).ok()?;
     let [x, y, z] = [0, 1, 2].map(|k| &grid.axes[k].nodes_m[..]);
     // The clamped end of a beam and the bottom of a block are hidden, and so is the face under the plate.
     let faces: &[Face] = match axis {
@@ -350,7 +352,7 @@ fn plate_modes(description: &Description, mesh: Option<&Mesh>) -> Result<Modal, 
     tool_half_m[axis] = 0.5 * thick_m;
     let nearest = |nodes: &[f64], at: f64| nodes.partition_point(|node| *node < at - 1.0e-12);
     let node_at = |at: DVec3| grid.node([nearest(x, at.x), nearest(y, at.y), nearest(z, at.z)]);
-    Ok(Modal {
+    Some(Modal {
         displacement: skin.places_m.iter().map(|at| columns(&displacement, node_at(*at))).collect(),
         skin,
         pressure: Vec::new(),
@@ -365,9 +367,9 @@ fn punch_modes(
     mesh: Option<&Mesh>,
     outline: Outline,
     bond: Bond,
-) -> Result<Modal, NotPositive> {
+) -> Option<Modal> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio: description.poisson_ratio };
-    let (_, loads) = punch_loads(&solid, None, outline, bond, FINENESS)?;
+    let (_, loads) = punch_loads(&solid, None, outline, bond, FINENESS).ok()?;
     let extent_m = outline.extent_m();
     let focus = Focus { at_m: DVec3::ZERO, width_m: 0.7 * extent_m };
     let skin = match (description.body, mesh) {
@@ -382,7 +384,7 @@ fn punch_modes(
         skin.places_m.iter().map(|at| field.at(*at, free_share(height_m, at.z))).unzip();
     let thick_m = THICKNESS * extent_m;
     let form = if matches!(outline, Outline::Round { .. }) { Form::Cylinder } else { Form::Box };
-    Ok(Modal {
+    Some(Modal {
         skin,
         displacement,
         pressure,
@@ -469,7 +471,7 @@ impl<'a> Loaded<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::prepare::sphere_on_half_space;
+    use crate::prepare::{Resolution, sphere_on_half_space};
     use crate::sphere::{Patch, Problem};
 
     #[test]
@@ -506,7 +508,7 @@ mod tests {
             body: Body::HalfSpace,
             tool: Tool::Sphere { radius_m: 0.01 },
             poisson_ratio: 0.3,
-            resolution: 0,
+            resolution: Resolution::QUICK,
         };
         let mut drawing = Drawing::new(&description, None).expect("nothing to solve");
         for depth_m in [0.0005, 0.002, 0.008, 0.02] {

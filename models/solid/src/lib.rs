@@ -10,11 +10,11 @@
 //! - [`gmsh`], [`cylinder`], [`mesh`], [`cells`], [`facet`]: bodies of any shape, their elements and surface; [`body`]:
 //!   difference between such a body and a half-space; [`recovery`]: error estimate of a mesh.
 //! - [`sphere`]: contact of a sphere in contact space. [`punch`], [`plate`]: rigid patches bonded to a surface.
-//! - [`prepare`], [`law`], [`cache`]: from a description to a law.
+//! - [`description`], [`prepare`], [`law`], [`cache`]: from a description to a law.
 //! - [`atlas`], [`several`], [`rigid`], [`friction`]: the laws, as a tick evaluates them; [`jet`], [`spline`] under them.
 //! - [`drawing`], [`skin`]: pictures of the deformed solid.
 //! - [`tetrahedra`]: linear elements, for comparison.
-//! - `plugin`: parameters and the contract.
+//! - `parameters`: schema; `plugin`: the contract.
 
 // Loop indices name components of vectors and tensors, in several arrays at once.
 #![allow(clippy::needless_range_loop)]
@@ -26,6 +26,7 @@ pub mod cache;
 pub mod cells;
 pub mod cylinder;
 pub mod dense;
+pub mod description;
 pub mod dissection;
 pub mod drawing;
 pub mod facet;
@@ -36,6 +37,7 @@ pub mod half_space;
 pub mod jet;
 pub mod law;
 pub mod mesh;
+mod parameters;
 pub mod plate;
 mod plugin;
 pub mod prepare;

@@ -2,8 +2,50 @@
 
 use crate::dense::NotPositive;
 use crate::dissection::{Assembly, GridStiffness, Stiffness, subtract_forces};
-use crate::grid::{Grid, Lame};
+use crate::grid::{Grid, Lame, graded};
 use crate::rigid::{MODES, RigidPatch};
+
+/// Boxes under a plate: the upper face of an axis is touched, the lower one clamped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PlateBox {
+    /// Lower and upper end of each axis, m.
+    pub(crate) ends_m: [[f64; 2]; 3],
+    pub(crate) axis: usize,
+    /// Elements along half of each axis, finer towards both ends.
+    pub(crate) halves: [usize; 3],
+    /// Even cells along each axis, for linear tetrahedra.
+    pub(crate) cells: [usize; 3],
+}
+
+impl PlateBox {
+    /// Returns the grid of an order.
+    pub(crate) fn grid(&self, order: usize) -> Grid {
+        let borders = [0, 1, 2].map(|k| {
+            let ([near, far], half) = (self.ends_m[k], self.halves[k]);
+            let middle = 0.5 * (near + far);
+            let mut borders = graded(near, middle, half, 1.5);
+            borders.extend(graded(far, middle, half, 1.5).into_iter().skip(1));
+            borders
+        });
+        Grid::new(borders, order)
+    }
+
+    /// Solves with two element orders on one grid; returns the better result, and its [`difference`]. Not real-time.
+    pub(crate) fn solve(&self, lame: Lame, order: usize) -> Result<(RigidPatch, f64), NotPositive> {
+        let solve = |order| plate(&self.grid(order), lame, self.axis);
+        let ((fine, _), (coarse, _)) = (solve(order)?, solve(order - 1)?);
+        let error = difference(&coarse, &fine);
+        Ok((fine, error))
+    }
+}
+
+/// Returns the largest relative difference of a stiffness from a better one.
+pub(crate) fn difference(coarse: &RigidPatch, fine: &RigidPatch) -> f64 {
+    (0..MODES)
+        .filter(|&i| fine.stiffness[i][i] > 0.0)
+        .map(|i| (coarse.stiffness[i][i] / fine.stiffness[i][i] - 1.0).abs())
+        .fold(0.0, f64::max)
+}
 
 /// Solves for a plate on the upper face of an axis, with the face at the lower end clamped; returns also the
 /// displacement of all nodes under each mode. `X` is relative to the face's centre. Not real-time.

@@ -1,100 +1,25 @@
 //! Plugin of the solid: parameters, the selected law, and the friction of one handle.
 
+use crate::description::{Description, Tool};
 use crate::drawing::Drawing;
 use crate::friction::Friction;
-use crate::law::{Description, Law, Tool};
+use crate::law::Law;
 use crate::mesh::Mesh;
+use crate::parameters::{BodyChoice, SCHEMA, YOUNGS_MODULUS, resolve};
 use crate::several::{self, MAX_SPHERES};
 use crate::{cache, gmsh};
 use flotor_hal::{
-    Choices, DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, Output, Parameter,
-    Pose, Refusal, SetParameterError, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel,
-    Wrench, choices, read_file, text_from_bytes,
+    DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, Output, Parameter, Pose,
+    Refusal, SetParameterError, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel, Wrench,
+    read_file, text_from_bytes,
 };
 use std::path::Path;
 
 /// Workspace limit along each axis, m; beyond it the wrench is that at the edge, with status `Clamped`.
 const REACH_M: f64 = 10.0;
 
-const BODIES: Choices = choices!["block", "beam", "cylinder", "half-space", "file"];
-const TOOLS: Choices = choices!["sphere", "plate", "punch-round", "punch-square"];
-const COUNTS: Choices = choices!["1", "2", "3", "4"];
-const BONDS: Choices = choices!["bonded", "frictionless"];
-const RESOLUTIONS: Choices = choices!["quick", "standard", "fine", "linear-tetrahedra"];
-
 /// Tolerance of an orientation's squared length; equals that of the spring.
 const UNIT_NORM_TOLERANCE: f64 = 1.0e-6;
-
-/// Index of the only live parameter.
-const YOUNGS_MODULUS: usize = 4;
-
-const SCHEMA: &[Parameter] = &[
-    Parameter::choice(
-        "body",
-        BODIES,
-        0,
-        "Touched body; block, cylinder: bottom clamped; beam: clamped at -x",
-    ),
-    Parameter::real(
-        "size_x_mm",
-        "mm",
-        1.0,
-        2000.0,
-        80.0,
-        "Side along x of a block or a beam (200 by default), diameter of a cylinder",
-    ),
-    Parameter::real(
-        "size_y_mm",
-        "mm",
-        1.0,
-        2000.0,
-        80.0,
-        "Side along y of a block or a beam (40 by default)",
-    ),
-    Parameter::real(
-        "size_z_mm",
-        "mm",
-        1.0,
-        2000.0,
-        80.0,
-        "Side along z of a block or a beam (40 by default), height of a cylinder",
-    ),
-    Parameter::real("youngs_modulus_pa", "Pa", 1.0, 1.0e9, 1.0e4, "Young's modulus").live(),
-    Parameter::real("poisson_ratio", "1", 0.0, 0.49, 0.3, "Poisson's ratio"),
-    Parameter::choice("tool", TOOLS, 0, "Tool: a sphere, or a punch or plate on a face"),
-    Parameter::real("tool_radius_mm", "mm", 0.1, 500.0, 12.7, "Radius of the sphere or of the round punch"),
-    Parameter::real("tool_side_mm", "mm", 0.1, 1000.0, 20.0, "Side of the square punch"),
-    Parameter::choice(
-        "tool_count",
-        COUNTS,
-        0,
-        "Number of spheres on the handle: two along x, or the corners of a triangle or square",
-    ),
-    Parameter::real(
-        "tool_spacing_mm",
-        "mm",
-        0.2,
-        1000.0,
-        30.0,
-        "Distance between the centres of neighbouring spheres",
-    ),
-    Parameter::choice("bond", BONDS, 0, "Contact of a punch with the surface"),
-    Parameter::real("friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction of the sphere"),
-    Parameter::choice(
-        "resolution",
-        RESOLUTIONS,
-        1,
-        "Elements and contact cells of the preparation, without effect on the time of a tick; linear-tetrahedra: \
-         for comparison, under a plate",
-    ),
-    Parameter::file(
-        "file",
-        choices![],
-        "The mesh of body `file`: Gmsh 4.1 text, metres, tetrahedra of 10 nodes, bricks of 20",
-    ),
-    Parameter::text("fixed_face", "Fixed physical surface of the mesh; `fixed`, if empty"),
-    Parameter::text("touched_face", "Touched physical surface of the mesh; `touched`, if empty"),
-];
 
 const DETAILS: &[Detail] = &[
     Detail::number("depth_m", "m", "Penetration depth of the sphere"),
@@ -119,22 +44,6 @@ pub struct Solid {
     nothing: Shape,
 }
 
-/// Returns the current parameter values; a beam has its own default sizes.
-fn resolve(settings: &Settings<'_>) -> [f64; SCHEMA.len()] {
-    let mut values = [0.0; SCHEMA.len()];
-    let beam = BODIES.as_slice()[settings.choice_or_default("body")].as_str() == "beam";
-    for (value, parameter) in values.iter_mut().zip(SCHEMA) {
-        let id = parameter.id();
-        let own = match id {
-            "size_x_mm" if beam => Some(200.0),
-            "size_y_mm" | "size_z_mm" if beam => Some(40.0),
-            _ => None,
-        };
-        *value = settings.number(id).or(own).unwrap_or(parameter.default());
-    }
-    values
-}
-
 /// Maximum size of a mesh file, bytes: beyond any body that can be solved for.
 const MOST_MESH_BYTES: u64 = 1 << 30;
 
@@ -145,7 +54,7 @@ const MOST_MESH_BYTES: u64 = 1 << 30;
 fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     let file = settings.text("file");
     let faces = ["fixed_face", "touched_face"].map(|id| settings.text(id));
-    if BODIES.as_slice()[settings.choice_or_default("body")].as_str() != "file" {
+    if BodyChoice::of(settings, "body") != BodyChoice::File {
         let stray = [file, faces[0], faces[1]].iter().any(Option::is_some);
         let refusal = "`file`, `fixed_face` and `touched_face` are only for a mesh: set body = \"file\"";
         return if stray { Err(Refusal::parameter(refusal)) } else { Ok(None) };
@@ -310,14 +219,10 @@ impl ShapeModel for Solid {
     fn shape(&mut self, input: &Input) -> &Shape {
         let pose = if input.pose.is_finite() { input.pose } else { Pose::HOME };
         let mesh = self.mesh.as_ref();
-        let drawing = match self.drawing.take() {
-            Some(drawing) => drawing,
-            None => match Drawing::new(&self.description, mesh) {
-                Ok(drawing) => drawing,
-                Err(_) => return &self.nothing,
-            },
-        };
-        let drawing = self.drawing.insert(drawing);
+        if self.drawing.is_none() {
+            self.drawing = Drawing::new(&self.description, mesh);
+        }
+        let Some(drawing) = &mut self.drawing else { return &self.nothing };
         let reached_m = pose.position().clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
         match &self.law {
             Law::Bonded(_) => {

@@ -37,13 +37,30 @@ const FACE_PLACES: [f64; 5] = [0.0, 0.35, 0.65, 0.85, 1.0];
 const FACE_ENDS: [[End; 2]; 3] = [[End::Parabola; 2]; 3];
 const CYLINDER_ENDS: [[End; 2]; 3] = [[End::Level, End::Parabola], [End::Parabola; 2], [End::Parabola; 2]];
 
-/// Fineness of the preparation of a sphere's law.
+/// Fineness of a preparation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Resolution {
-    /// Elements of the remainder.
-    pub fineness: Fineness,
+    /// Order of the elements.
+    pub order: usize,
     /// Cells of a contact from its middle to its rim.
     pub rings: i32,
+    /// Bricks along a side of the square in the middle of a cylinder.
+    pub bricks: usize,
+}
+
+impl Resolution {
+    /// Least preparation.
+    pub const QUICK: Self = Self { order: 2, rings: 5, bricks: 4 };
+    /// Default.
+    pub const STANDARD: Self = Self { order: 3, rings: 6, bricks: 6 };
+    /// Least error.
+    pub const FINE: Self = Self { order: 4, rings: 8, bricks: 8 };
+
+    /// Returns the elements of the remainder.
+    #[must_use]
+    pub fn fineness(self) -> Fineness {
+        Fineness { across: 4, high: 5, order: self.order }
+    }
 }
 
 /// Prepared law of a sphere with its error estimate.
@@ -176,7 +193,7 @@ pub fn sphere_on_block(
     resolution: Resolution,
 ) -> Result<Prepared, NotPositive> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
-    let remainder = Remainder::new(size, solid, resolution.fineness)?;
+    let remainder = Remainder::new(size, solid, resolution.fineness())?;
     let rounding_m = rounding_m(size, radius_m);
     let builder = Builder { solid, size, radius_m, rounding_m, remainder: &remainder, resolution };
     let top = builder.ratios(Face::Top);
@@ -459,7 +476,7 @@ impl Builder<'_> {
     /// Estimates the change of the stiffness under the sphere against coarser elements, in the middle and at a quarter
     /// of the side from an edge: twice the contribution of the remainder, for a contact of half the sphere's radius.
     fn mesh_error(&self) -> Result<f64, NotPositive> {
-        let Fineness { across, high, order } = self.resolution.fineness;
+        let Fineness { across, high, order } = self.resolution.fineness();
         let coarse = Fineness { across: across.div_ceil(2).max(1), high: high.div_ceil(2).max(1), order };
         let other = Remainder::new(self.size, self.solid, coarse)?;
         let nu = self.solid.poisson_ratio;

@@ -1,7 +1,38 @@
 //! Linear tetrahedra, common in deformable models: for comparison only, because they lock in bending.
 
+use crate::dense::NotPositive;
 use crate::dissection::{Assembly, GridStiffness};
 use crate::grid::{Grid, Lame};
+use crate::plate::{Hold, PlateBox, difference, plate_on};
+use crate::rigid::RigidPatch;
+
+/// Solves for a plate on the even cells of a body, six tetrahedra each; returns also the difference from cells of half the side.
+/// Not real-time.
+///
+/// # Errors
+/// [`NotPositive`] if the numbers do not describe a solid.
+pub(crate) fn plate(under: &PlateBox, lame: Lame) -> Result<(RigidPatch, f64), NotPositive> {
+    let PlateBox { ends_m, axis, cells, .. } = *under;
+    let even = |[from, to]: [f64; 2], count: usize| -> Vec<f64> {
+        (0..=count).map(|i| from + (to - from) * i as f64 / count as f64).collect()
+    };
+    let centre = [0, 1, 2].map(|k| if k == axis { 0.0 } else { 0.5 * (ends_m[k][0] + ends_m[k][1]) });
+    let solve = |finer: usize| {
+        let grid = Grid::new([0, 1, 2].map(|k| even(ends_m[k], finer * cells[k])), 1);
+        let hold = |node: usize| {
+            let at = grid.position_m(node);
+            match grid.index(node)[axis] {
+                0 => Hold::Fixed,
+                last if last == finer * cells[axis] => Hold::Plate([0, 1, 2].map(|k| at[k] - centre[k])),
+                _ => Hold::Free,
+            }
+        };
+        plate_on(&Tetrahedra::new(&grid, lame), hold).map(|(patch, _)| patch)
+    };
+    let (own, finer) = (solve(1)?, solve(2)?);
+    let error = difference(&own, &finer);
+    Ok((own, error))
+}
 
 /// Grid of order one whose cells are six tetrahedra each, about one diagonal.
 #[derive(Clone, Debug)]

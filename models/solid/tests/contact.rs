@@ -3,7 +3,9 @@
 use flotor_hal::abi::loader::{Model, Plugin, Setting};
 use flotor_hal::{DQuat, DVec3, Input, Output, Pose, StepStatus, Wrench};
 use flotor_solid::atlas::Atlas;
-use flotor_solid::law::{Body, Description, Law, Tool};
+use flotor_solid::description::{Body, Description, Tool};
+use flotor_solid::law::Law;
+use flotor_solid::prepare::Resolution;
 use flotor_solid::remainder::Size;
 use std::sync::OnceLock;
 
@@ -16,7 +18,7 @@ fn atlas() -> &'static Atlas {
             body: Body::Block(size),
             tool: Tool::Sphere { radius_m: 0.008 },
             poisson_ratio: 0.4,
-            resolution: 0,
+            resolution: Resolution::QUICK,
         };
         match description.solve().expect("a solid").0 {
             Law::Sphere(atlas) => atlas,

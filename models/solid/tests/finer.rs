@@ -3,13 +3,14 @@
 
 use crate::contact::Numbers;
 use flotor_hal::DVec3;
+use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::half_space::HalfSpace;
-use flotor_solid::law::{Body, Description, Law, Tool};
+use flotor_solid::law::Law;
+use flotor_solid::prepare::Resolution;
 use flotor_solid::remainder::{Face, Fineness, Remainder, Size};
 use flotor_solid::sphere::{Contact, Patch, Problem};
 use flotor_solid::table::Table;
 
-const STANDARD: usize = 1;
 /// Finer than any resolution of the plugin.
 const FINENESS: Fineness = Fineness { across: 5, high: 6, order: 4 };
 const RINGS: i32 = 10;
@@ -103,7 +104,7 @@ fn other_places_depths_and_bodies() {
             body: Body::Block(size),
             tool: Tool::Sphere { radius_m },
             poisson_ratio,
-            resolution: STANDARD,
+            resolution: Resolution::STANDARD,
         };
         let Law::Sphere(atlas) = description.solve().expect("a solid").0 else { panic!("a sphere") };
         let bench = Bench {

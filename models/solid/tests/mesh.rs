@@ -5,17 +5,19 @@ use crate::table::rows;
 use flotor_hal::{DVec3, Demand, orientation_from_rotation_vector};
 use flotor_solid::atlas::Atlas;
 use flotor_solid::cells::Kind;
+use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::dissection::{Stiffness, subtract_forces};
 use flotor_solid::gmsh;
 use flotor_solid::grid::Lame;
-use flotor_solid::law::{Body, Description, Law, Tool};
+use flotor_solid::law::Law;
 use flotor_solid::mesh::{Mesh, MeshStiffness};
+use flotor_solid::prepare::Resolution;
 use flotor_solid::punch::{Bond, Outline};
 use flotor_solid::remainder::Size;
 use flotor_solid::rigid::RigidPatch;
 use std::fmt::Write as _;
 
-const STANDARD: usize = 1;
+const STANDARD: Resolution = Resolution::STANDARD;
 
 /// A box of cells in Gmsh's format: bricks, or six tetrahedra each. `named`: axis, side (0 or 1) and name of a face.
 struct Boxes {
@@ -328,7 +330,12 @@ fn a_sphere_on_a_cylinder_lies_between_two_blocks() {
     }
     let (radius_m, poisson_ratio) = (0.0127, 0.3);
     let solve = |body| {
-        let description = Description { body, tool: Tool::Sphere { radius_m }, poisson_ratio, resolution: 0 };
+        let description = Description {
+            body,
+            tool: Tool::Sphere { radius_m },
+            poisson_ratio,
+            resolution: Resolution::QUICK,
+        };
         let (Law::Sphere(atlas), _) = description.solve().expect("a solid") else { panic!("a sphere") };
         atlas
     };

@@ -3,14 +3,16 @@
 use crate::printed::assert_chapter_prints;
 use crate::table::{Row, rows};
 use flotor_hal::{DQuat, DVec3, Demand, Wrench, orientation_from_rotation_vector};
+use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::half_space::HalfSpace;
-use flotor_solid::law::{Body, Description, LINEAR_TETRAHEDRA, Law, RESOLUTIONS, Tool};
+use flotor_solid::law::Law;
+use flotor_solid::prepare::Resolution;
 use flotor_solid::punch::{Bond, Outline};
 use flotor_solid::remainder::{Face, Remainder, Size};
 use flotor_solid::table::Table;
 use std::f64::consts::TAU;
 
-const STANDARD: usize = 1;
+const STANDARD: Resolution = Resolution::STANDARD;
 const CUBE: Size = Size { half_x_m: 0.04, half_y_m: 0.04, height_m: 0.08 };
 
 fn block(row: &Row) -> Size {
@@ -170,7 +172,7 @@ fn a_loaded_disc_on_a_block() {
         let seen: Vec<[f64; 2]> = corners.iter().map(|c| [c[0] - at[0], c[1] - at[1]]).collect();
         let size = block(row);
         if !solved.as_ref().is_some_and(|(s, h, _)| *s == size && *h == solid) {
-            let remainder = Remainder::new(size, solid, RESOLUTIONS[STANDARD].fineness).expect("a solid");
+            let remainder = Remainder::new(size, solid, STANDARD.fineness()).expect("a solid");
             solved = Some((size, solid, remainder));
         }
         let remainder = &solved.as_ref().expect("just solved").2;
@@ -192,9 +194,9 @@ fn a_loaded_disc_on_a_block() {
 #[test]
 fn linear_tetrahedra_are_half_as_soft() {
     let body = Body::Beam { size_m: [0.2, 0.04, 0.04] };
-    let description = |resolution| Description { body, tool: Tool::Plate, poisson_ratio: 0.3, resolution };
-    let tip = |resolution| {
-        let (Law::Bonded(patch), error) = description(resolution).solve().expect("a solid") else {
+    let description = |tool| Description { body, tool, poisson_ratio: 0.3, resolution: STANDARD };
+    let tip = |tool| {
+        let (Law::Bonded(patch), error) = description(tool).solve().expect("a solid") else {
             panic!("a rigid patch")
         };
         // Force and torque of a deflection along z and of a small rotation about y; no torque on the tip.
@@ -205,7 +207,7 @@ fn linear_tetrahedra_are_half_as_soft() {
         let softened = turned.force().z * moved.torque().y / turned.torque().y;
         (small / (softened - moved.force().z), error)
     };
-    let ((linear, error), (quadratic, _)) = (tip(LINEAR_TETRAHEDRA), tip(STANDARD));
+    let ((linear, error), (quadratic, _)) = (tip(Tool::LinearPlate), tip(Tool::Plate));
     println!("tip: {:.3} of the quadratic one's, estimated {error:.3}", linear / quadratic);
     // -49.3 % for six tetrahedra a cell, by another program on the same grid with an even load; the plate stiffens it a little.
     assert!((linear / quadratic - 0.507).abs() < 0.03, "{linear} {quadratic}");
@@ -231,21 +233,21 @@ fn errors_against_the_finest_beam_are_those_of_an_independent_program() {
         return;
     }
     let body = Body::Beam { size_m: [0.2, 0.04, 0.04] };
-    let patch = |resolution| {
-        let description = Description { body, tool: Tool::Plate, poisson_ratio: 0.3, resolution };
+    let patch = |tool, resolution| {
+        let description = Description { body, tool, poisson_ratio: 0.3, resolution };
         let Ok((Law::Bonded(patch), _)) = description.solve() else { panic!("a rigid patch") };
         patch
     };
-    let (modulus_pa, fine) = (1.0e4, patch(2));
+    let (modulus_pa, fine) = (1.0e4, patch(Tool::Plate, Resolution::FINE));
     let table = rows("solid/bench_beam.csv");
     assert_eq!(table.len(), 3);
     for row in &table {
-        let resolution = match row.text("case") {
-            "quick" => 0,
-            "standard" => STANDARD,
-            _ => LINEAR_TETRAHEDRA,
+        let case = match row.text("case") {
+            "quick" => patch(Tool::Plate, Resolution::QUICK),
+            "standard" => patch(Tool::Plate, STANDARD),
+            _ => patch(Tool::LinearPlate, STANDARD),
         };
-        let (case, mut largest, mut squares) = (patch(resolution), [0.0_f64; 2], [0.0; 2]);
+        let (mut largest, mut squares) = ([0.0_f64; 2], [0.0; 2]);
         for (position_m, orientation) in poses_of_the_bench() {
             let [own, best] =
                 [&case, &fine].map(|patch| patch.answer(position_m, orientation, Demand::ALL).0);

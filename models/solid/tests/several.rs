@@ -3,8 +3,10 @@
 use crate::contact::{Numbers, assert_refused, largest_stiffness, model, step};
 use flotor_hal::{DQuat, DVec3, Pose, StepStatus};
 use flotor_solid::dense;
+use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::half_space::HalfSpace;
-use flotor_solid::law::{Body, Description, Law, RESOLUTIONS, Tool};
+use flotor_solid::law::Law;
+use flotor_solid::prepare::Resolution;
 use flotor_solid::remainder::{Face, Remainder, Size};
 use flotor_solid::several::Spheres;
 use flotor_solid::table::Table;
@@ -18,7 +20,7 @@ const CUBE: Size = Size { half_x_m: 0.04, half_y_m: 0.04, height_m: 0.08 };
 fn spheres(body: Body, count: usize, spacing_m: f64) -> Spheres {
     let solve = || {
         let tool = Tool::Spheres { radius_m: RADIUS_M, count, spacing_m };
-        let description = Description { body, tool, poisson_ratio: NU, resolution: 0 };
+        let description = Description { body, tool, poisson_ratio: NU, resolution: Resolution::QUICK };
         let Law::Spheres(spheres) = description.solve().expect("a solid").0 else { panic!("spheres") };
         *spheres
     };
@@ -96,7 +98,7 @@ fn contacts_push_the_surface_down_under_each_other() {
     if crate::leaves_out_long_tests() {
         return;
     }
-    let remainder = Remainder::new(CUBE, SOLID, RESOLUTIONS[1].fineness).expect("a solid");
+    let remainder = Remainder::new(CUBE, SOLID, Resolution::STANDARD.fineness()).expect("a solid");
     let nodes = [0.0, 0.008, 0.016, 0.024, 0.032];
     let table = Table::new(&remainder, Face::Top, [&nodes, &nodes]);
     for (body, table) in [(Body::HalfSpace, None), (Body::Block(CUBE), Some(&table))] {

@@ -17,23 +17,10 @@
 
 use crate::quartic::{Quartic, QuarticEnergy};
 use crate::rigidity::Spring;
+use crate::shape::saturated_argument;
 use flotor_lanes::Real;
 use flotor_lanes::angle::SquaredAngle;
-use flotor_lanes::saturation::{Saturated, saturate_above};
 use flotor_lanes::stability::StabilityFunctions;
-
-/// Argument `z` at which its saturation begins, below the pole at 9.87, where the column buckles. Here `G0 = 0.062` and
-/// the bow stiffness is -16 times that of the unloaded rod.
-pub const KNEE: f64 = 8.75;
-
-/// Largest excess of the saturated `z`, which stays below 9.25 (`G0 = 0.033`, bow stiffness -30 times).
-pub const REACH: f64 = 0.5;
-
-/// Saturates the argument short of the pole.
-#[inline(always)]
-pub(crate) fn saturated_argument<R: Real>(z: R) -> Saturated<R> {
-    saturate_above(z, KNEE, REACH)
-}
 
 /// Prepared constants of the bending of one spring.
 #[derive(Clone, Copy, Debug, PartialEq)]

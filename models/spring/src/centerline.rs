@@ -10,10 +10,9 @@
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::math;
 
-use crate::bending::saturated_argument;
 use crate::pose::{Pose, quaternion};
 use crate::rigidity::{Geometry, Spring};
-use crate::shape::Shape;
+use crate::shape::{Shape, saturated_argument};
 use flotor_lanes::entire::EntireFunctions;
 
 /// The coil wound around the centerline, for drawing.

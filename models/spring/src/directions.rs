@@ -14,6 +14,7 @@ use std::f64::consts::PI;
 use flotor_hal::glam::{DQuat, DVec3};
 
 use crate::pose::Chord;
+use crate::rigidity::Rigidities;
 
 /// Argument at which the straight rod buckles.
 pub(crate) const BUCKLING_ARGUMENT: f64 = PI * PI;
@@ -56,6 +57,13 @@ pub(crate) struct Load {
 }
 
 impl Load {
+    pub(crate) fn new(rigidities: &Rigidities) -> Self {
+        Self {
+            ratio: rigidities.gamma_n / rigidities.beta_n,
+            unit_per_m2: 0.25 * rigidities.gamma_n / rigidities.alpha_n_m2,
+        }
+    }
+
     /// Returns `z`.
     #[inline(always)]
     pub(crate) fn argument(&self, chord: &Chord) -> f64 {

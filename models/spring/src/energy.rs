@@ -24,7 +24,7 @@
 //! well.
 //!
 //! Near buckling (`G0` towards zero, see [`flotor_lanes::entire`]) the bow stiffness runs to minus infinity. Short of
-//! the pole its argument saturates, see [`KNEE`](crate::bending::KNEE): from there on the spring behaves like one about
+//! the pole its argument saturates, see [`KNEE`](crate::shape::KNEE): from there on the spring behaves like one about
 //! to buckle that never does. `W` stays a smooth function of the pose.
 //!
 //! Derivation: the end stiffnesses are those of Haringx; the invariant form and the fourth order are this
@@ -84,7 +84,7 @@ impl EnergyForm {
     ///
     /// Total over all poses:
     /// - past the solid length the law continues, without coil contact;
-    /// - beyond [`KNEE`](crate::bending::KNEE) (close to buckling and past it), or where an angle between normals
+    /// - beyond [`KNEE`](crate::shape::KNEE) (close to buckling and past it), or where an angle between normals
     ///   and chord or the twist exceeds 60 degrees, up to an upper plate below the lower one: still the
     ///   derivative of the same smooth `W`, but `W` is a continuation, [`Validity::Clamped`](crate::validity::Validity::Clamped);
     /// - upper plate upside down to within 2.6 degrees, plates closer than a thousandth or farther than a

@@ -29,6 +29,7 @@ pub mod closed_form;
 pub mod contact;
 pub mod contract;
 mod directions;
+mod elastic;
 pub mod energy;
 pub mod held;
 mod pace;

@@ -190,17 +190,41 @@ impl Choice {
             Preset::ALL.get(settings.choice_or_default("preset")).copied().unwrap_or(Preset::Thesis1);
         let variant =
             Variant::ALL.get(settings.choice_or_default("variant")).copied().unwrap_or(Variant::Energy);
-        let precision = precision(settings, variant)?;
-        let accuracy = accuracy(settings, variant)?;
-        let seat = seat(settings, variant)?;
+        let set = (settings, variant);
+        let precision = second_only_for(
+            &[Variant::Thesis, Variant::ClosedForm],
+            set,
+            "precision",
+            [Precision::Double, Precision::Single],
+            "f32 is only for the variants `thesis` and `closed-form`; the other variants need f64",
+        )?;
+        let accuracy = second_only_for(
+            &[Variant::Rod],
+            set,
+            "accuracy",
+            [Accuracy::Servo, Accuracy::Tight],
+            "tight is only for variant `rod`; the other laws have closed forms",
+        )?;
+        // A free plate minimises an energy, and a property of real coils adds one.
+        let with_energy = [Variant::Energy, Variant::Rod];
+        let seat = second_only_for(
+            &with_energy,
+            set,
+            "seat",
+            [SeatChoice::Fixed, SeatChoice::Free],
+            "free needs a law with a stored energy; set `variant` to `energy` or `rod`",
+        )?;
         let rod_blend = rod_blend(settings, variant)?;
         if rod_blend == Switch::Off && settings.number("tolerance_n").is_some() {
             return Err(Refusal::parameter(
                 "`tolerance_n` needs a law that blends into the rod; set `variant` to `energy` and `hand_over` to `on` as well",
             ));
         }
-        let coil_contact = coil("coil_contact", settings, variant)?;
-        let wire = coil("wire", settings, variant)?;
+        let coil = |id| {
+            let refusal = "on needs a law with a stored energy; set `variant` to `energy` or `rod`";
+            second_only_for(&with_energy, set, id, [Switch::Off, Switch::On], refusal)
+        };
+        let (coil_contact, wire) = (coil("coil_contact")?, coil("wire")?);
         let (geometry, material, stiffness) = preset.parameters();
         let mode = mode(settings, stiffness);
         refuse_derived(settings, mode)?;
@@ -274,17 +298,18 @@ impl Choice {
     /// # Errors
     /// The range consistent with the other values; `Fixed` for a number that follows from others in this mode, or has no effect.
     pub(crate) fn with(&self, index: usize, value: f64) -> Result<Self, SetParameterError> {
-        let is_friction = SCHEMA.get(index).map(Parameter::id) == Some("seat_friction");
-        if SCHEMA.get(index).map(Parameter::id) == Some("tolerance_n") && self.rod_blend == Switch::On {
-            return Ok(Self { tolerance_n: value, ..*self });
-        }
-        // With a clamped plate the friction has no effect: it is rejected below.
-        if is_friction && self.seat == SeatChoice::Free {
-            return Ok(Self { friction: Friction { coefficient: value }, ..*self });
+        let id = SCHEMA.get(index).map_or("", Parameter::id);
+        // Without blending the tolerance has no effect, and with a clamped plate the friction: both are rejected below.
+        match (id, self.rod_blend, self.seat) {
+            ("tolerance_n", Switch::On, _) => return Ok(Self { tolerance_n: value, ..*self }),
+            ("seat_friction", _, SeatChoice::Free) => {
+                return Ok(Self { friction: Friction { coefficient: value }, ..*self });
+            }
+            _ => {}
         }
         let (mut geometry, mut material, mut stiffness) =
             (*self.spring.geometry(), *self.spring.material(), self.stiffness);
-        let (own, unit) = match (SCHEMA.get(index).map_or("", Parameter::id), &mut stiffness) {
+        let (own, unit) = match (id, &mut stiffness) {
             ("free_length_mm", _) => (&mut geometry.free_length_m, MM),
             ("coil_diameter_mm", _) => (&mut geometry.coil_diameter_m, MM),
             ("youngs_modulus_mpa", _) => (&mut material.youngs_modulus_pa, MPA),
@@ -335,17 +360,17 @@ impl Choice {
         let (geometry, material, rigidities) =
             (self.spring.geometry(), self.spring.material(), self.spring.rigidities());
         match SCHEMA.get(index).map_or("", Parameter::id) {
-            "preset" => position(&Preset::ALL, &self.preset),
-            "variant" => position(&Variant::ALL, &self.variant),
-            "precision" => position(&[Precision::Double, Precision::Single], &self.precision),
-            "accuracy" => position(&[Accuracy::Servo, Accuracy::Tight], &self.accuracy),
-            "seat" => position(&[SeatChoice::Fixed, SeatChoice::Free], &self.seat),
+            "preset" => f64::from(self.preset as u8),
+            "variant" => f64::from(self.variant as u8),
+            "precision" => f64::from(self.precision as u8),
+            "accuracy" => f64::from(self.accuracy as u8),
+            "seat" => f64::from(self.seat as u8),
             "seat_friction" => self.friction.coefficient,
-            "hand_over" => position(&[Switch::Off, Switch::On], &self.rod_blend),
+            "hand_over" => f64::from(self.rod_blend as u8),
             "tolerance_n" => self.tolerance_n,
-            "coil_contact" => position(&[Switch::Off, Switch::On], &self.coil_contact),
-            "wire" => position(&[Switch::Off, Switch::On], &self.wire),
-            "mode" => position(&Mode::ALL, &Mode::of(self.stiffness)),
+            "coil_contact" => f64::from(self.coil_contact as u8),
+            "wire" => f64::from(self.wire as u8),
+            "mode" => f64::from(Mode::of(self.stiffness) as u8),
             "free_length_mm" => geometry.free_length_m / MM,
             "coil_diameter_mm" => geometry.coil_diameter_m / MM,
             "youngs_modulus_mpa" => material.youngs_modulus_pa / MPA,
@@ -360,38 +385,18 @@ impl Choice {
     }
 }
 
-/// Returns the precision set; rejects single precision for a law without it.
-fn precision(settings: &Settings<'_>, variant: Variant) -> Result<Precision, Refusal> {
-    match (settings.choice_or_default("precision"), variant) {
-        (1, Variant::Thesis | Variant::ClosedForm) => Ok(Precision::Single),
-        (1, Variant::CurrentLength | Variant::Energy | Variant::Rod) => Err(Refusal::parameter(
-            "`precision` f32 is only for the variants `thesis` and `closed-form`; the other variants need f64",
-        )),
-        _ => Ok(Precision::Double),
-    }
-}
-
-/// Returns the accuracy set; only the rod has two.
-fn accuracy(settings: &Settings<'_>, variant: Variant) -> Result<Accuracy, Refusal> {
-    match (settings.choice_or_default("accuracy"), variant) {
-        (1, Variant::Rod) => Ok(Accuracy::Tight),
-        (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength | Variant::Energy) => {
-            Err(Refusal::parameter(
-                "`accuracy` tight is only for variant `rod`; the other laws have closed forms",
-            ))
-        }
-        _ => Ok(Accuracy::Servo),
-    }
-}
-
-/// Returns the seat set; a free plate minimises an energy, so it needs a law with a stored energy.
-fn seat(settings: &Settings<'_>, variant: Variant) -> Result<SeatChoice, Refusal> {
-    match (settings.choice_or_default("seat"), variant) {
-        (1, Variant::Energy | Variant::Rod) => Ok(SeatChoice::Free),
-        (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength) => Err(Refusal::parameter(
-            "`seat` free needs a law with a stored energy; set `variant` to `energy` or `rod`",
-        )),
-        _ => Ok(SeatChoice::Fixed),
+/// Returns the value set of a choice of two; refuses the second one for any other law than `laws`.
+fn second_only_for<T>(
+    laws: &[Variant],
+    (settings, variant): (&Settings<'_>, Variant),
+    id: &'static str,
+    [first, second]: [T; 2],
+    refusal: &str,
+) -> Result<T, Refusal> {
+    match settings.choice_or_default(id) {
+        1 if laws.contains(&variant) => Ok(second),
+        1 => Err(Refusal::parameter(format!("`{id}` {refusal}"))),
+        _ => Ok(first),
     }
 }
 
@@ -411,17 +416,6 @@ fn rod_blend(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusa
     }
 }
 
-/// Returns the switch of a property of real coils; the property adds an energy, so it needs a law with a stored energy.
-fn coil(id: &'static str, settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusal> {
-    match (settings.choice_or_default(id), variant) {
-        (1, Variant::Energy | Variant::Rod) => Ok(Switch::On),
-        (1, Variant::Thesis | Variant::ClosedForm | Variant::CurrentLength) => Err(Refusal::parameter(
-            format!("`{id}` on needs a law with a stored energy; set `variant` to `energy` or `rod`"),
-        )),
-        _ => Ok(Switch::Off),
-    }
-}
-
 /// Returns the mode set, or else that of the preset.
 fn mode(settings: &Settings<'_>, preset: Stiffness) -> Mode {
     let set = settings.number("mode").and_then(|_| Mode::ALL.get(settings.choice_or_default("mode")));
@@ -430,28 +424,19 @@ fn mode(settings: &Settings<'_>, preset: Stiffness) -> Mode {
 
 /// Refuses a value that the mode derives from others.
 fn refuse_derived(settings: &Settings<'_>, mode: Mode) -> Result<(), Refusal> {
-    const RULED: [(&str, Mode, &str); 5] = [
-        ("gamma_n", Mode::Gamma, "gamma"),
-        ("alpha_n_mm2", Mode::Alpha, "alpha"),
-        ("beta_n", Mode::Beta, "beta"),
-        ("wire_diameter_mm", Mode::Physical, "physical"),
-        ("active_coils", Mode::Physical, "physical"),
+    const RULED: [(&str, Mode); 5] = [
+        ("gamma_n", Mode::Gamma),
+        ("alpha_n_mm2", Mode::Alpha),
+        ("beta_n", Mode::Beta),
+        ("wire_diameter_mm", Mode::Physical),
+        ("active_coils", Mode::Physical),
     ];
-    let derived = RULED.iter().find(|(id, own, _)| *own != mode && settings.number(id).is_some());
-    let Some((id, _, own)) = derived else { return Ok(()) };
-    let now = match mode {
-        Mode::Gamma => "gamma",
-        Mode::Alpha => "alpha",
-        Mode::Beta => "beta",
-        Mode::Physical => "physical",
-    };
+    let derived = RULED.iter().find(|(id, own)| *own != mode && settings.number(id).is_some());
+    let Some((id, own)) = derived else { return Ok(()) };
+    let [now, own] = [mode, *own].map(|mode| MODES.as_slice()[mode as usize].as_str());
     Err(Refusal::parameter(format!(
         "`{id}` has no effect in mode `{now}`, which computes it from other parameters; set `mode` to `{own}` as well"
     )))
-}
-
-fn position<T: PartialEq>(choices: &[T], value: &T) -> f64 {
-    choices.iter().position(|choice| choice == value).map_or(f64::NAN, |index| index as f64)
 }
 
 #[cfg(test)]

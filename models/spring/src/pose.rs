@@ -23,7 +23,7 @@ const UNIT_NORM_TOLERANCE: f64 = 1e-6;
 
 /// Threshold below which a coordinate is set to zero, in m and as a quaternion component: powers of smaller numbers are
 /// too small for full precision, and a hundred times slower. A stiffness of 1e10 N/m turns this length into 1e-40 N.
-pub(crate) const NEGLIGIBLE: f64 = 1e-50;
+const NEGLIGIBLE: f64 = 1e-50;
 
 /// Pose of the upper plate in the model frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -165,8 +165,9 @@ pub(crate) struct Span<R: Real> {
     pub(crate) usable: R::Mask,
 }
 
+/// Returns the number, or zero if negligible, see [`NEGLIGIBLE`]. Real-time: bounded, no allocation.
 #[inline(always)]
-fn or_zero<R: Real>(number: R) -> R {
+pub(crate) fn or_zero<R: Real>(number: R) -> R {
     R::select(number.abs().below(NEGLIGIBLE), number.like(0.0), number)
 }
 

@@ -37,12 +37,6 @@ impl Preset {
         }
     }
 
-    /// Returns the preset of a name; `None` if unknown.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|preset| preset.name() == name)
-    }
-
     /// Returns the parameters, which can be changed one by one before [`Spring::new`] checks them.
     #[must_use]
     pub fn parameters(self) -> (Geometry, Material, Stiffness) {
@@ -72,14 +66,6 @@ impl Preset {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn names_are_found_again() {
-        for preset in Preset::ALL {
-            assert_eq!(Preset::from_name(preset.name()), Some(preset));
-        }
-        assert_eq!(Preset::from_name("thesis-4"), None);
-    }
 
     #[test]
     fn presets_pass_the_checks() {

@@ -41,9 +41,8 @@ use std::f64::consts::PI;
 use flotor_hal::glam::DVec4;
 
 use crate::beam_column::Column;
-use crate::bending::{KNEE, REACH};
 use crate::rigidity::{Rigidities, Spring};
-use crate::shape::Shape;
+use crate::shape::{KNEE, REACH, Shape, relative_length};
 use flotor_lanes::chebyshev::interpolated;
 use flotor_lanes::entire::EntireFunctions;
 use flotor_lanes::saturation::{Saturated, saturate_above, saturate_below};
@@ -122,11 +121,13 @@ impl Quartic {
     pub(crate) fn new(spring: &Spring) -> Self {
         let free_length_m = spring.geometry().free_length_m;
         let rigidities = &spring.rigidities_per_gamma();
-        let at_argument = |z| relative_length(rigidities, free_length_m, z);
+        let load = rigidities.gamma_n * free_length_m * free_length_m / (4.0 * rigidities.alpha_n_m2);
+        let excess = 1.0 - rigidities.gamma_n / rigidities.beta_n;
+        let at_argument = |z| relative_length(load, excess, z);
         let shortest = at_argument(KNEE + REACH).unwrap_or(0.0).max(SHORTEST);
         let knee = at_argument(KNEE).unwrap_or(0.0).max(SHORTEST + MARGIN);
         let longest = at_argument(EntireFunctions::MIN_ARGUMENT).unwrap_or(LONGEST);
-        let longest = longest.min(LONGEST).min(longest_with_shape(rigidities));
+        let longest = longest.min(LONGEST).min(longest_with_shape(excess));
         let margin = MARGIN.min(0.5 * (longest - 1.0));
         // Lengths from `shortest` to `longest` are mapped to -1 to 1, where the polynomials are fitted.
         let (middle, half_width) = (0.5 * (longest + shortest), 0.5 * (longest - shortest));
@@ -213,19 +214,9 @@ impl Quartic {
     }
 }
 
-/// Returns the relative length at which the argument is `z`, the longer one of two; `None` if there is none.
-fn relative_length(rigidities: &Rigidities, free_length_m: f64, z: f64) -> Option<f64> {
-    // z = load p (1 - excess p) with p = 1 - L / L0, solved for the smaller p without cancellation.
-    let load = rigidities.gamma_n * free_length_m * free_length_m / (4.0 * rigidities.alpha_n_m2);
-    let excess = 1.0 - rigidities.gamma_n / rigidities.beta_n;
-    let discriminant = load * (load - 4.0 * excess * z);
-    (discriminant >= 0.0).then(|| 1.0 - 2.0 * z / (load + discriminant.sqrt()))
-}
-
 /// Returns the relative length half way to the loss of shear stiffness of a rod with `G > E`; infinity for other rods,
 /// which have shear stiffness at all lengths.
-fn longest_with_shape(rigidities: &Rigidities) -> f64 {
-    let excess = 1.0 - rigidities.gamma_n / rigidities.beta_n;
+fn longest_with_shape(excess: f64) -> f64 {
     if excess < 0.0 { 1.0 - 0.5 / excess } else { f64::INFINITY }
 }
 

@@ -27,6 +27,7 @@ use crate::pose::Pose;
 use crate::response::Demand;
 use crate::rigidity::Spring;
 use crate::rod::Rod;
+use crate::shape::relative_length;
 use flotor_lanes::chebyshev::interpolated;
 
 /// `S²` above which there is a remainder: 14 degrees.
@@ -105,13 +106,12 @@ impl Remainder {
     /// one of the poses. Real-time: bounded, no allocation; 38 searches of the rod.
     pub(crate) fn new(spring: &Spring, energy: &EnergyForm, rod: &mut Rod) -> Option<Self> {
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
-        let ratio = rigidities.gamma_n / rigidities.beta_n;
-        let load = Load { ratio, unit_per_m2: 0.25 * rigidities.gamma_n / rigidities.alpha_n_m2 };
+        let load = Load::new(rigidities);
         let total = load.unit_per_m2 * free_length_m * free_length_m;
         if total > MOST_LOAD {
             return None;
         }
-        let shortest = shortest(total, 1.0 - ratio);
+        let shortest = relative_length(total, 1.0 - load.ratio, LAST_ARGUMENT).unwrap_or(0.0).max(SHORTEST);
         let (middle, half_width) = (0.5 * (LONGEST + shortest), 0.5 * (LONGEST - shortest));
         let unit_j = rigidities.alpha_n_m2 / free_length_m;
         let mut difference = |mapped: f64, sway_rad: f64, rotation_rad: DVec3| {
@@ -221,16 +221,6 @@ impl Remainder {
             gradient: at.gradient(&slopes).combined(factor, fall, energy_j),
         })
     }
-}
-
-/// Returns the relative length of the first node: that of [`LAST_ARGUMENT`], or [`SHORTEST`].
-fn shortest(total: f64, excess: f64) -> f64 {
-    // z = total p (1 - excess p), solved for the smaller p without cancellation.
-    let discriminant = total * (total - 4.0 * excess * LAST_ARGUMENT);
-    if discriminant < 0.0 {
-        return SHORTEST;
-    }
-    (1.0 - 2.0 * LAST_ARGUMENT / (total + discriminant.sqrt())).max(SHORTEST)
 }
 
 /// Returns the coefficients of the parabola through three points.

@@ -37,6 +37,15 @@ impl Response {
         Self { force_n: DVec3::ZERO, torque_nm: DVec3::ZERO, energy_j: None, validity }
     }
 
+    /// Returns the demanded parts of a complete response.
+    pub(crate) fn limited_to(self, demand: Demand) -> Self {
+        match demand {
+            Demand::Force => Self { torque_nm: DVec3::ZERO, energy_j: None, ..self },
+            Demand::Wrench => Self { energy_j: None, ..self },
+            Demand::WrenchAndEnergy => self,
+        }
+    }
+
     /// Returns the response if finite, otherwise no wrench: overflow beside a pole is no answer.
     pub(crate) fn if_finite(self) -> Self {
         // One sum instead of six tests: the sum is finite only if every term is.

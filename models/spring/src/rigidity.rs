@@ -121,16 +121,16 @@ impl Spring {
     /// # Errors
     /// The first invalid parameter, see [`ParameterError`].
     pub fn new(geometry: Geometry, material: Material, stiffness: Stiffness) -> Result<Self, ParameterError> {
-        positive(Quantity::FreeLength, geometry.free_length_m)?;
-        positive(Quantity::WireDiameter, geometry.wire_diameter_m)?;
-        positive(Quantity::CoilDiameter, geometry.coil_diameter_m)?;
-        positive(Quantity::ActiveCoils, geometry.active_coils)?;
-        positive(Quantity::YoungsModulus, material.youngs_modulus_pa)?;
-        positive(Quantity::ShearModulus, material.shear_modulus_pa)?;
+        positive("free length", geometry.free_length_m)?;
+        positive("wire diameter", geometry.wire_diameter_m)?;
+        positive("coil diameter", geometry.coil_diameter_m)?;
+        positive("number of active coils", geometry.active_coils)?;
+        positive("Young's modulus", material.youngs_modulus_pa)?;
+        positive("shear modulus", material.shear_modulus_pa)?;
         match stiffness {
-            Stiffness::Gamma(value) => positive(Quantity::Gamma, value)?,
-            Stiffness::Alpha(value) => positive(Quantity::Alpha, value)?,
-            Stiffness::Beta(value) => positive(Quantity::Beta, value)?,
+            Stiffness::Gamma(value) => positive("compression rigidity gamma", value)?,
+            Stiffness::Alpha(value) => positive("bending rigidity alpha", value)?,
+            Stiffness::Beta(value) => positive("shear rigidity beta", value)?,
             Stiffness::Physical => {}
         }
         check_shape(&geometry)?;
@@ -140,10 +140,10 @@ impl Spring {
         }
         let spring = Self::unchecked(geometry, material, stiffness);
         // Extreme but positive parameters can still overflow or underflow in the products of the rigidities.
-        positive(Quantity::Alpha, spring.rigidities.alpha_n_m2)?;
-        positive(Quantity::Beta, spring.rigidities.beta_n)?;
-        positive(Quantity::Gamma, spring.rigidities.gamma_n)?;
-        positive(Quantity::Tau, spring.rigidities.tau_n_m2)?;
+        positive("bending rigidity alpha", spring.rigidities.alpha_n_m2)?;
+        positive("shear rigidity beta", spring.rigidities.beta_n)?;
+        positive("compression rigidity gamma", spring.rigidities.gamma_n)?;
+        positive("torsion rigidity tau", spring.rigidities.tau_n_m2)?;
         Ok(spring)
     }
 
@@ -201,7 +201,7 @@ impl Spring {
 
 /// # Errors
 /// If the value is not a positive, finite number.
-fn positive(quantity: Quantity, value: f64) -> Result<(), ParameterError> {
+fn positive(quantity: &'static str, value: f64) -> Result<(), ParameterError> {
     if !value.is_finite() {
         Err(ParameterError::NotFinite { quantity })
     } else if value <= 0.0 {
@@ -225,60 +225,18 @@ fn check_shape(geometry: &Geometry) -> Result<(), ParameterError> {
     Ok(())
 }
 
-/// Quantity of the spring, named in errors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// `L0`
-    FreeLength,
-    /// `d`
-    WireDiameter,
-    /// `D`
-    CoilDiameter,
-    /// `n`
-    ActiveCoils,
-    /// `E`
-    YoungsModulus,
-    /// `G`
-    ShearModulus,
-    /// Bending rigidity.
-    Alpha,
-    /// Shear rigidity.
-    Beta,
-    /// Compression rigidity.
-    Gamma,
-    /// Torsion rigidity.
-    Tau,
-}
-
-impl fmt::Display for Quantity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::FreeLength => "free length",
-            Self::WireDiameter => "wire diameter",
-            Self::CoilDiameter => "coil diameter",
-            Self::ActiveCoils => "number of active coils",
-            Self::YoungsModulus => "Young's modulus",
-            Self::ShearModulus => "shear modulus",
-            Self::Alpha => "bending rigidity alpha",
-            Self::Beta => "shear rigidity beta",
-            Self::Gamma => "compression rigidity gamma",
-            Self::Tau => "torsion rigidity tau",
-        })
-    }
-}
-
 /// Reason why a set of parameters is invalid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ParameterError {
     /// Given or derived quantity that is NaN or infinite.
     NotFinite {
-        /// Invalid quantity.
-        quantity: Quantity,
+        /// Name of the quantity.
+        quantity: &'static str,
     },
     /// Given or derived quantity that is zero or negative.
     NotPositive {
-        /// Invalid quantity.
-        quantity: Quantity,
+        /// Name of the quantity.
+        quantity: &'static str,
         /// Value in SI units.
         value: f64,
     },
@@ -390,17 +348,17 @@ mod tests {
         for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             assert_eq!(
                 refuse(Geometry { free_length_m: value, ..geometry }, material, stiffness),
-                ParameterError::NotFinite { quantity: Quantity::FreeLength }
+                ParameterError::NotFinite { quantity: "free length" }
             );
         }
         for value in [0.0, -0.0, -1.0] {
             assert_eq!(
                 refuse(Geometry { active_coils: value, ..geometry }, material, stiffness),
-                ParameterError::NotPositive { quantity: Quantity::ActiveCoils, value }
+                ParameterError::NotPositive { quantity: "number of active coils", value }
             );
             assert_eq!(
                 refuse(geometry, material, Stiffness::Beta(value)),
-                ParameterError::NotPositive { quantity: Quantity::Beta, value }
+                ParameterError::NotPositive { quantity: "shear rigidity beta", value }
             );
         }
         let thin = Geometry { coil_diameter_m: geometry.wire_diameter_m, ..geometry };

@@ -36,10 +36,11 @@ use crate::pose::Pose;
 use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
 use crate::validity::Validity;
+pub use contact::Coils;
 use descent::Descent;
 pub use equilibrium::Work;
-use equilibrium::{Effort, Equilibrium, Outcome, Reading};
-use functional::Ratios;
+use equilibrium::{Effort, Equilibrium, Outcome};
+use functional::{Ratios, Reading};
 use plate::Plate;
 use search_energy::{BUBBLES, COEFFICIENTS, STATIONS};
 
@@ -64,15 +65,6 @@ pub enum Accuracy {
     /// For reference: force to 1e-13 N before buckling and to 1e-10 N past it, in about a hundred
     /// microseconds.
     Tight,
-}
-
-/// Contact between the coils.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Coils {
-    /// Coils pass through each other.
-    Pass,
-    /// Coils touch and press on each other.
-    Touch,
 }
 
 /// Branch of the rod's equilibria, by the distance of the plates.

@@ -204,7 +204,7 @@ impl RodBlend {
             self.ask_rod(pose, share.is_buckled, rod_demand)
         };
         let Some(law) = law else { return rod };
-        let (Some(rod_j), Some(law_j)) = (rod.energy_j, law.energy_j) else { return demanded(law, demand) };
+        let (Some(rod_j), Some(law_j)) = (rod.energy_j, law.energy_j) else { return law.limited_to(demand) };
         // F = (1 - s) F_law + s F_rod - (W_rod - W_law) ds/dr of the module documentation, and the torque alike.
         let difference_j = rod_j - law_j;
         let Gradient { by_position_per_m, by_rotation_per_rad } = share.gradient;
@@ -212,16 +212,7 @@ impl RodBlend {
         let torque_nm = law.torque_nm.lerp(rod.torque_nm, share.value) - by_rotation_per_rad * difference_j;
         let energy_j = Some(law_j + share.value * difference_j);
         let validity = if rod.validity == Validity::NotConverged { rod.validity } else { law.validity };
-        demanded(Response { force_n, torque_nm, energy_j, validity }, demand)
-    }
-}
-
-/// Returns the demanded parts of a full response.
-fn demanded(response: Response, demand: Demand) -> Response {
-    Response {
-        torque_nm: if demand >= Demand::Wrench { response.torque_nm } else { DVec3::ZERO },
-        energy_j: response.energy_j.filter(|_| demand >= Demand::WrenchAndEnergy),
-        ..response
+        Response { force_n, torque_nm, energy_j, validity }.limited_to(demand)
     }
 }
 

@@ -225,10 +225,7 @@ impl RodWeight {
     /// Prepares the weight function for a tolerance of the force.
     pub(crate) fn new(spring: &Spring, tolerance_n: f64, law: Law) -> Self {
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
-        let load = Load {
-            ratio: rigidities.gamma_n / rigidities.beta_n,
-            unit_per_m2: 0.25 * rigidities.gamma_n / rigidities.alpha_n_m2,
-        };
+        let load = Load::new(rigidities);
         // z = total p (1 - excess p) with the compression p = 1 - L/L0, at most 1.
         let (total, excess) = (load.unit_per_m2 * free_length_m * free_length_m, 1.0 - load.ratio);
         let crest = if excess > 0.5 { 0.5 / excess } else { 1.0 };
@@ -274,9 +271,9 @@ impl RodWeight {
             return Share { value: 0.0, gradient: Gradient::ZERO, is_buckled };
         }
         let by_error = by_error(bound);
-        let (by_argument, argument_slope) = nearness(at.argument);
+        let by_argument = nearness(at.argument);
         // 1 minus the product of the weights that error and argument leave to the law.
-        let left = [1.0 - by_error.value, 1.0 - by_argument];
+        let left = [1.0 - by_error.value, 1.0 - by_argument.value];
         let wanted = 1.0 - left[0] * left[1];
         let m = at.magnification;
         let slopes = self.law.slopes(&measures);
@@ -287,7 +284,7 @@ impl RodWeight {
             by_bow: at.bow * (2.0 * by_bound * slopes.by_bow * (m * m)),
             by_twist: 2.0 * by_bound * slopes.by_twist * at.twist[1],
             by_magnification: by_bound * by_magnification,
-            by_argument: argument_slope * left[0],
+            by_argument: by_argument.slope * left[0],
             by_length_per_m: by_bound * slopes.by_length / self.free_length_m,
         };
         let (factor, fall) = upright;
@@ -345,15 +342,15 @@ fn by_error(bound: f64) -> Passage {
 }
 
 /// Returns the weight by the argument alone, with its derivative by the argument.
-fn nearness(argument: f64) -> (f64, f64) {
+fn nearness(argument: f64) -> Passage {
     if argument <= FIRST_ARGUMENT {
-        return (0.0, 0.0);
+        return Passage::NOT_BEGUN;
     }
     if argument >= DEEP_ARGUMENT {
-        return (Passage::DONE.value, Passage::DONE.slope);
+        return Passage::DONE;
     }
     let EntireFunctions { g0, g1, .. } = EntireFunctions::at(argument);
-    let passage = Passage::at(g0, FIRST, LAST);
+    let Passage { value, slope } = Passage::at(g0, FIRST, LAST);
     // dG0/dz = -G1/6
-    (passage.value, -passage.slope * g1 / 6.0)
+    Passage { value, slope: -slope * g1 / 6.0 }
 }

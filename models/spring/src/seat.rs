@@ -34,6 +34,8 @@
 //! Derivation: the book, chapter "The spring"; the step with a tip is the proximal Newton step of Lee, Sun
 //! and Saunders (2014); one bound for force and torque of friction: Howe and Cutkosky (1996), a limit surface.
 
+use std::ops::ControlFlow::{self, Break, Continue};
+
 use flotor_hal::glam::{DVec2, DVec3};
 
 use crate::centerline::Section;
@@ -93,6 +95,68 @@ pub struct Seat {
     stride_rad: f64,
 }
 
+/// Call of a tick, with the hanging place of the base and its height above the ground.
+struct Tick<'a> {
+    spring: &'a mut dyn HeldSpring,
+    pose: &'a Pose,
+    demand: Demand,
+    hanging: Standing,
+    height_m: f64,
+    /// Uncertainty of the slope, as a tilt.
+    noise_rad: f64,
+    /// Tilt at the start of the tick.
+    started_rad: DVec2,
+    cost: Cost,
+}
+
+/// Response of the spring on its base at the present place.
+struct Probe {
+    base: Base,
+    response: Response,
+    stored_j: f64,
+    has_settled: bool,
+}
+
+/// Phase of the search in a tick.
+enum Phase {
+    /// No place was probed.
+    Start,
+    /// The base has lost contact with the ground, and has not stood since.
+    Lost(Lost),
+    /// The base has stood: it rolls and slides in turns.
+    Standing(Descent),
+}
+
+/// Base that lost contact with the ground. It may stand at its hanging place, or between both places, with less energy.
+struct Lost {
+    at: Standing,
+    stored_j: f64,
+    missing_n: [f64; 2],
+    trial: Trial,
+}
+
+/// Place tried next for a base that lost contact.
+#[derive(Clone, Copy)]
+enum Trial {
+    Hanging,
+    OnTheWay,
+    /// Hanging place, with any response.
+    Last,
+}
+
+/// Descent of a standing base to the tilt of least energy, at a pull within the friction limit.
+struct Descent {
+    last: Stood,
+    /// Cost of lifting to first order. The rest of the energy has no tip. Off the tip any other constant would do: the
+    /// rest is then a smooth function, and its curvature can be observed.
+    tip_nm: f64,
+    slide: Option<Slide>,
+    /// Place of the last slide if rolling had converged there, with the excess of the pull (N).
+    settled: Option<(Standing, f64)>,
+    has_rolled: bool,
+    failures: u32,
+}
+
 /// Place of a base that stood in a tick, with its response, and the slope of the energy without its tip.
 struct Stood {
     at: Standing,
@@ -108,13 +172,8 @@ struct Slide {
     along: Option<(DVec3, f64)>,
 }
 
-/// Base that lost contact with the ground. It may stand at its hanging place, or between both places, with less energy.
-struct Lost {
-    at: Standing,
-    stored_j: f64,
-    missing_n: [f64; 2],
-    trial: Trial,
-}
+/// Response of the tick, or phase of the next probe.
+type Next = ControlFlow<Response, Phase>;
 
 /// Cost of the evaluations of a tick so far, in evaluations of an energy.
 #[derive(Default)]
@@ -133,15 +192,6 @@ impl Cost {
     fn is_spent(&self) -> bool {
         self.whole + self.last > MOST_COST
     }
-}
-
-/// Place tried next for a base that lost contact.
-#[derive(Clone, Copy)]
-enum Trial {
-    Hanging,
-    OnTheWay,
-    /// Hanging place, with any response.
-    Last,
 }
 
 /// Returns the fraction of a distance at which no force is missing, from the missing forces at both ends.
@@ -214,7 +264,7 @@ impl Seat {
     ///
     /// Total where the law is; [`Validity::NotConverged`] while the base is moving, by a bounded tilt per tick.
     /// Real-time: bounded, no allocation; two to three evaluations of the law while the base moves, one while seated.
-    pub fn step<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
+    pub fn step(&mut self, spring: &mut dyn HeldSpring, pose: &Pose, demand: Demand) -> Response {
         if !pose.is_valid() {
             return Response::none(Validity::InvalidInput);
         }
@@ -232,167 +282,205 @@ impl Seat {
             return self.fall(spring, pose, demand);
         }
         let (noise_rad, started_rad) = (spring.noise_rad(), self.at.tilt_rad);
-        // Last place in this tick at which the base stood, with its response.
-        let mut last: Option<Stood> = None;
-        let mut slid: Option<Slide> = None;
-        let mut slid_from: Option<(Standing, f64)> = None;
-        let mut tip_nm = None;
-        let mut lost: Option<Lost> = None;
-        let (mut failures, mut has_rolled) = (0, false);
-        let mut cost = Cost::default();
+        let cost = Cost::default();
+        let mut tick = Tick { spring, pose, demand, hanging, height_m, noise_rad, started_rad, cost };
+        let mut phase = Phase::Start;
         for _ in 0..MOST_EVALUATIONS {
-            if cost.is_spent() && last.is_some() {
-                let shorter = (0..failures).fold(self.stride_rad, |stride_rad, _| stride_rad * SHORTER);
+            if let Phase::Standing(descent) = &phase
+                && tick.cost.is_spent()
+            {
+                let shorter =
+                    (0..descent.failures).fold(self.stride_rad, |stride_rad, _| stride_rad * SHORTER);
                 self.stride_rad = shorter.max(LEAST_STRIDE_RAD);
                 break;
             }
-            let base = self.base();
-            let response = base.respond(spring, pose, Demand::WrenchAndEnergy);
-            cost.add(spring.cost());
-            let has_settled = matches!(response.validity, Validity::Ok | Validity::Clamped);
-            if !has_settled && last.is_none() && lost.is_none() {
+            let probe = self.probe(&mut tick);
+            let next = match phase {
                 // The spring snaps between its plates: the base waits.
-                return only(response, demand);
-            }
-            let stored_j = response.energy_j.unwrap_or_default();
-            if let Some(stood) = &last {
-                // Too far: the spring would snap, lose contact, or gain energy.
-                let most_j = stood.stored_j + ENERGY_TOLERANCE * self.quadratic.stiffness_nm_per_rad;
-                if !has_settled || response.force_n.z <= 0.0 || stored_j > most_j {
-                    if let (true, Some(before), Some(tip_nm)) = (has_settled, stood.slope, tip_nm) {
-                        let slope = base.slope(pose, &response) - tip_nm * base.direction;
-                        self.quadratic.observe(
-                            self.at.tilt_rad - stood.at.tilt_rad,
-                            slope - before,
-                            noise_rad,
-                        );
-                    }
-                    failures += 1;
-                    // Backtrack; on alternate failures try the opposite direction: near where the base tips over no
-                    // model of the energy gives the downhill direction.
-                    let part = match (slid.take(), failures) {
-                        (Some(_), _) | (None, 1) => SHORTER,
-                        (None, even) if even % 2 == 0 => -1.0,
-                        _ => -SHORTER,
-                    };
-                    self.at = stood.at.toward(&self.at, part);
-                    spring.go_back();
-                    continue;
+                Phase::Start if !probe.has_settled => Break(probe.response),
+                Phase::Start if probe.response.force_n.z <= 0.0 => self.lose_contact(&mut tick, &probe),
+                Phase::Start => self.stand_on(&mut tick, &probe, self.begin(&probe)),
+                Phase::Lost(lost) => self.give_way(&mut tick, &probe, lost),
+                Phase::Standing(descent) if self.is_too_far(&probe, &descent.last) => {
+                    self.back_off(&mut tick, &probe, descent)
                 }
-            } else if let Some(Lost { at, stored_j: most_j, missing_n, trial }) = &mut lost {
-                let may_stand = has_settled && stored_j <= *most_j && response.force_n.z > 0.0;
-                match trial {
-                    Trial::Hanging if !has_settled || stored_j > *most_j => {
-                        self.at = *at;
-                        spring.go_back();
-                        return self.fall(spring, pose, demand);
-                    }
-                    // The base touches the ground without load.
-                    Trial::Hanging if !may_stand => return without_load(demand),
-                    Trial::Hanging if !cost.is_spent() => {
-                        let there_n = self.missing_n(&base, pose, &response, height_m);
-                        self.at = at.toward(&hanging, part_of_the_way(*missing_n, there_n));
-                        *trial = Trial::OnTheWay;
-                        continue;
-                    }
-                    Trial::OnTheWay if !may_stand => {
-                        self.at = hanging;
-                        *trial = Trial::Last;
-                        continue;
-                    }
-                    Trial::Hanging | Trial::OnTheWay | Trial::Last => {}
-                }
-            } else if response.force_n.z <= 0.0 {
-                // The base has lost contact: it gives way towards its hanging place.
-                let missing_n = self.missing_n(&base, pose, &response, height_m);
-                lost = Some(Lost { at: self.at, stored_j, missing_n, trial: Trial::Hanging });
-                spring.mark();
-                spring.unload();
-                self.stand(hanging);
-                continue;
-            }
-            // Cost of lifting to first order; the rest of the energy has no tip. Off the tip any other constant would
-            // do: the rest is then a smooth function, and its curvature can be observed.
-            if base.angle_rad == 0.0 || tip_nm.is_none() {
-                tip_nm = Some(self.lengths.rim_radius_m * response.force_n.z);
-                last = last.map(|stood| Stood { slope: None, ..stood });
-            }
-            let tip_nm = tip_nm.unwrap_or_default();
-            let slope = base.slope(pose, &response) - tip_nm * base.direction;
-            if let Some(Stood { slope: Some(before), at, .. }) = &last {
-                self.quadratic.observe(self.at.tilt_rad - at.tilt_rad, slope - *before, noise_rad);
-            }
-            let goal = self.quadratic.least(self.at.tilt_rad, slope, tip_nm, LARGEST_TILT_RAD);
-            let mut step = (goal - self.at.tilt_rad).clamp_length_max(self.stride_rad);
-            let whole_slope = slope + tip_nm * base.direction;
-            if base.angle_rad > 0.0 && step.dot(whole_slope) > 0.0 {
-                // With an indefinite curvature the model's minimum is not downhill.
-                step = (whole_slope / -self.quadratic.stiffness_nm_per_rad).clamp_length_max(self.stride_rad);
-            }
-            let pull_n = base.pull_n(pose, &response);
-            let friction_n = self.grip.holds_n(response.force_n.z, height_m);
-            let excess_n = pull_n.length() - friction_n;
-            let tolerance_n = friction::TOLERANCE * friction_n;
-            if let (Some(Slide { excess_n: before_n, along }), Some(stood)) = (slid.take(), &last) {
-                if let Some((way, distance_m)) = along {
-                    self.grip.observe(before_n - excess_n, distance_m, way);
-                }
-                if excess_n < -tolerance_n {
-                    // Friction stops the base before this place: interpolate linearly.
-                    let part = before_n / (before_n - excess_n);
-                    self.at = stood.at.toward(&self.at, part);
-                    spring.go_back();
-                    let along = along.map(|(way, distance_m)| (way, distance_m * part));
-                    slid = Some(Slide { excess_n: before_n, along });
-                    continue;
-                }
-            }
-            let at = self.at;
-            has_rolled |= step.length() <= ROLLED_RAD;
-            let slides = has_rolled && excess_n > tolerance_n;
-            // A slide changes the slope at the same tilt: no curvature to observe.
-            last = Some(Stood { at, response, stored_j, slope: (!slides).then_some(slope) });
-            spring.mark();
-            if slides {
-                let from = slid_from.take();
-                if step.length() < SETTLED_RAD {
-                    slid_from = Some((at, excess_n));
-                }
-                slid = Some(match (from, slid_from) {
-                    // Rolling raises the pull again, in the same ratio each time: extrapolate the series.
-                    (Some((from, before_n)), Some(_)) if excess_n < MOST_RATIO * before_n => {
-                        self.at = from.toward(&at, before_n / (before_n - excess_n));
-                        Slide { excess_n, along: None }
-                    }
-                    _ => self.slide(pull_n, excess_n),
-                });
-                continue;
-            }
-            if step.length() <= noise_rad.max(TOLERANCE_RAD) {
-                return only(response, demand);
-            }
-            if (self.at.tilt_rad + step).length() >= LARGEST_TILT_RAD {
-                return self.fall(spring, pose, demand);
-            }
-            if (self.at.tilt_rad + step).distance(started_rad) > LONGEST_WAY_RAD {
-                break;
-            }
-            if failures == 0 {
-                self.stride_rad = (2.0 * self.stride_rad).min(LONGEST_STEP_RAD);
-            }
-            failures = 0;
-            self.at.tilt_rad += step;
+                Phase::Standing(descent) => self.stand_on(&mut tick, &probe, descent),
+            };
+            phase = match next {
+                Continue(phase) => phase,
+                Break(response) => return response.limited_to(demand),
+            };
         }
-        // Not converged: the base stays where it last stood.
-        let Some(Stood { at, response, .. }) = last else { return Response::none(Validity::NotConverged) };
-        spring.go_back();
-        self.at = at;
-        only(Response { validity: Validity::NotConverged, ..response }, demand)
+        let Phase::Standing(descent) = phase else { return Response::none(Validity::NotConverged) };
+        self.not_converged(&mut tick, &descent.last).limited_to(demand)
+    }
+
+    /// Evaluates the law on the base at its present place.
+    fn probe(&self, tick: &mut Tick<'_>) -> Probe {
+        let base = self.base();
+        let response = base.respond(tick.spring, tick.pose, Demand::WrenchAndEnergy);
+        tick.cost.add(tick.spring.cost());
+        let has_settled = matches!(response.validity, Validity::Ok | Validity::Clamped);
+        Probe { base, response, stored_j: response.energy_j.unwrap_or_default(), has_settled }
+    }
+
+    /// Moves the base back to the last place at which it stood.
+    fn not_converged(&mut self, tick: &mut Tick<'_>, stood: &Stood) -> Response {
+        tick.spring.go_back();
+        self.at = stood.at;
+        Response { validity: Validity::NotConverged, ..stood.response }
+    }
+
+    /// Moves a base that lost contact to its hanging place.
+    fn lose_contact(&mut self, tick: &mut Tick<'_>, probe: &Probe) -> Next {
+        let missing_n = self.missing_n(tick, probe);
+        let lost = Lost { at: self.at, stored_j: probe.stored_j, missing_n, trial: Trial::Hanging };
+        tick.spring.mark();
+        tick.spring.unload();
+        self.stand(tick.hanging);
+        Continue(Phase::Lost(lost))
+    }
+
+    /// Moves a base that lost contact along the straight line to its hanging place, only as far as it needs to stand.
+    fn give_way(&mut self, tick: &mut Tick<'_>, probe: &Probe, lost: Lost) -> Next {
+        let Probe { response, stored_j, has_settled, .. } = *probe;
+        let may_stand = has_settled && stored_j <= lost.stored_j && response.force_n.z > 0.0;
+        match lost.trial {
+            Trial::Hanging if !has_settled || stored_j > lost.stored_j => {
+                self.at = lost.at;
+                tick.spring.go_back();
+                Break(self.fall(tick.spring, tick.pose, tick.demand))
+            }
+            // The base touches the ground without load.
+            Trial::Hanging if !may_stand => Break(without_load(tick.demand)),
+            Trial::Hanging if !tick.cost.is_spent() => {
+                let there_n = self.missing_n(tick, probe);
+                self.at = lost.at.toward(&tick.hanging, part_of_the_way(lost.missing_n, there_n));
+                Continue(Phase::Lost(Lost { trial: Trial::OnTheWay, ..lost }))
+            }
+            Trial::OnTheWay if !may_stand => {
+                self.at = tick.hanging;
+                Continue(Phase::Lost(Lost { trial: Trial::Last, ..lost }))
+            }
+            Trial::Hanging | Trial::OnTheWay | Trial::Last => self.stand_on(tick, probe, self.begin(probe)),
+        }
+    }
+
+    /// Returns true if the spring would snap, lose contact, or gain energy at the present place.
+    fn is_too_far(&self, probe: &Probe, last: &Stood) -> bool {
+        let most_j = last.stored_j + ENERGY_TOLERANCE * self.quadratic.stiffness_nm_per_rad;
+        !probe.has_settled || probe.response.force_n.z <= 0.0 || probe.stored_j > most_j
+    }
+
+    /// Shortens the last step. Every second failure tries the opposite direction: near where the base tips over no
+    /// model of the energy gives the downhill direction.
+    fn back_off(&mut self, tick: &mut Tick<'_>, probe: &Probe, mut descent: Descent) -> Next {
+        let last = &descent.last;
+        if let (true, Some(before)) = (probe.has_settled, last.slope) {
+            let slope = probe.base.slope(tick.pose, &probe.response) - descent.tip_nm * probe.base.direction;
+            self.quadratic.observe(self.at.tilt_rad - last.at.tilt_rad, slope - before, tick.noise_rad);
+        }
+        descent.failures += 1;
+        let part = match (descent.slide.take(), descent.failures) {
+            (Some(_), _) | (None, 1) => SHORTER,
+            (None, even) if even % 2 == 0 => -1.0,
+            _ => -SHORTER,
+        };
+        self.at = last.at.toward(&self.at, part);
+        tick.spring.go_back();
+        Continue(Phase::Standing(descent))
+    }
+
+    /// Returns the start of a descent from the present place.
+    fn begin(&self, probe: &Probe) -> Descent {
+        let Probe { response, stored_j, .. } = *probe;
+        Descent {
+            last: Stood { at: self.at, response, stored_j, slope: None },
+            tip_nm: self.lengths.rim_radius_m * response.force_n.z,
+            slide: None,
+            settled: None,
+            has_rolled: false,
+            failures: 0,
+        }
+    }
+
+    /// Rolls or slides the base on from a place at which it stands.
+    fn stand_on(&mut self, tick: &mut Tick<'_>, probe: &Probe, mut descent: Descent) -> Next {
+        let Probe { base, response, stored_j, .. } = probe;
+        if base.angle_rad == 0.0 {
+            descent.tip_nm = self.lengths.rim_radius_m * response.force_n.z;
+            descent.last.slope = None;
+        }
+        let (at, tip_nm) = (self.at, descent.tip_nm);
+        let slope = base.slope(tick.pose, response) - tip_nm * base.direction;
+        if let Stood { slope: Some(before), at: from, .. } = &descent.last {
+            self.quadratic.observe(at.tilt_rad - from.tilt_rad, slope - *before, tick.noise_rad);
+        }
+        let goal = self.quadratic.least(at.tilt_rad, slope, tip_nm, LARGEST_TILT_RAD);
+        let mut step = (goal - at.tilt_rad).clamp_length_max(self.stride_rad);
+        let whole_slope = slope + tip_nm * base.direction;
+        if base.angle_rad > 0.0 && step.dot(whole_slope) > 0.0 {
+            // With an indefinite curvature the model's minimum is not downhill.
+            step = (whole_slope / -self.quadratic.stiffness_nm_per_rad).clamp_length_max(self.stride_rad);
+        }
+        let pull_n = base.pull_n(tick.pose, response);
+        let friction_n = self.grip.holds_n(response.force_n.z, tick.height_m);
+        let excess_n = pull_n.length() - friction_n;
+        let tolerance_n = friction::TOLERANCE * friction_n;
+        if let Some(Slide { excess_n: before_n, along }) = descent.slide.take() {
+            if let Some((way, distance_m)) = along {
+                self.grip.observe(before_n - excess_n, distance_m, way);
+            }
+            if excess_n < -tolerance_n {
+                // Friction stops the base before this place: interpolate linearly.
+                let part = before_n / (before_n - excess_n);
+                self.at = descent.last.at.toward(&at, part);
+                tick.spring.go_back();
+                let along = along.map(|(way, distance_m)| (way, distance_m * part));
+                descent.slide = Some(Slide { excess_n: before_n, along });
+                return Continue(Phase::Standing(descent));
+            }
+        }
+        descent.has_rolled |= step.length() <= ROLLED_RAD;
+        let slides = descent.has_rolled && excess_n > tolerance_n;
+        // A slide changes the slope at the same tilt: no curvature to observe.
+        let slope = (!slides).then_some(slope);
+        descent.last = Stood { at, response: *response, stored_j: *stored_j, slope };
+        tick.spring.mark();
+        if slides {
+            let settled = (step.length() < SETTLED_RAD).then_some((at, excess_n));
+            let before = std::mem::replace(&mut descent.settled, settled);
+            descent.slide = Some(match (before, settled) {
+                // Rolling raises the pull again, in the same ratio each time: extrapolate the series.
+                (Some((from, before_n)), Some(_)) if excess_n < MOST_RATIO * before_n => {
+                    self.at = from.toward(&at, before_n / (before_n - excess_n));
+                    Slide { excess_n, along: None }
+                }
+                _ => self.slide(pull_n, excess_n),
+            });
+            return Continue(Phase::Standing(descent));
+        }
+        let tilt_rad = at.tilt_rad + step;
+        if step.length() <= tick.noise_rad.max(TOLERANCE_RAD) {
+            return Break(*response);
+        }
+        if tilt_rad.length() >= LARGEST_TILT_RAD {
+            return Break(self.fall(tick.spring, tick.pose, tick.demand));
+        }
+        if tilt_rad.distance(tick.started_rad) > LONGEST_WAY_RAD {
+            return Break(self.not_converged(tick, &descent.last));
+        }
+        if descent.failures == 0 {
+            self.stride_rad = (2.0 * self.stride_rad).min(LONGEST_STEP_RAD);
+        }
+        descent.failures = 0;
+        self.at.tilt_rad = tilt_rad;
+        Continue(Phase::Standing(descent))
     }
 
     /// Returns the wrench on the hand of a moving spring, with base and shape unchanged: the derivatives of one energy.
     /// Real-time: bounded, no allocation.
-    pub(crate) fn stay<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
+    pub(crate) fn stay(&mut self, spring: &mut dyn HeldSpring, pose: &Pose, demand: Demand) -> Response {
         let (_, height_m) = Standing::hanging(pose, &self.lengths, LARGEST_TILT_RAD);
         if height_m > 0.0 || self.lifted || self.hold == 0.0 {
             return self.step(spring, pose, demand);
@@ -404,13 +492,13 @@ impl Seat {
             energy_j: response.energy_j.map(|stored_j| stored_j * self.hold),
             validity: Validity::NotConverged,
         };
-        only(response, demand)
+        response.limited_to(demand)
     }
 
     /// Fades wrench and energy of a falling spring in place, by an equal part per tick: both are a fraction of the
     /// law's, so the lost energy is dissipated.
     #[cold]
-    fn fall<S: HeldSpring>(&mut self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
+    fn fall(&mut self, spring: &mut dyn HeldSpring, pose: &Pose, demand: Demand) -> Response {
         self.hold = (self.hold - FALL_PER_STEP).max(0.0);
         let response = self.base().respond(spring, pose, Demand::WrenchAndEnergy);
         let stored_j = response.energy_j.unwrap_or_default();
@@ -425,13 +513,14 @@ impl Seat {
             energy_j: Some(stored_j * self.hold),
             validity: Validity::NotConverged,
         };
-        only(response, demand)
+        response.limited_to(demand)
     }
 
     /// Returns the forces that a base lacks to stand: onto the ground, and of friction (N); negative if sufficient.
-    fn missing_n(&self, base: &Base, pose: &Pose, response: &Response, height_m: f64) -> [f64; 2] {
-        let pressed_n = response.force_n.z;
-        [-pressed_n, base.pull_n(pose, response).length() - self.grip.holds_n(pressed_n, height_m)]
+    fn missing_n(&self, tick: &Tick<'_>, probe: &Probe) -> [f64; 2] {
+        let pull_n = probe.base.pull_n(tick.pose, &probe.response).length();
+        let pressed_n = probe.response.force_n.z;
+        [-pressed_n, pull_n - self.grip.holds_n(pressed_n, tick.height_m)]
     }
 
     /// Returns the base at its present place.
@@ -481,13 +570,4 @@ impl Seat {
 fn without_load(demand: Demand) -> Response {
     let energy_j = (demand >= Demand::WrenchAndEnergy).then_some(0.0);
     Response { energy_j, ..Response::none(Validity::Ok) }
-}
-
-/// Returns the demanded parts of a complete response.
-fn only(response: Response, demand: Demand) -> Response {
-    match demand {
-        Demand::Force => Response { torque_nm: DVec3::ZERO, energy_j: None, ..response },
-        Demand::Wrench => Response { energy_j: None, ..response },
-        Demand::WrenchAndEnergy => response,
-    }
 }

@@ -15,7 +15,30 @@
 //! follow from `theta = S` and `y = 0` at both ends.
 
 use crate::rigidity::Rigidities;
+use flotor_lanes::Real;
 use flotor_lanes::entire::EntireFunctions;
+use flotor_lanes::saturation::{Saturated, saturate_above};
+
+/// Argument `z` at which its saturation begins, below the pole at 9.87, where the column buckles. Here `G0 = 0.062` and
+/// the bow stiffness is -16 times that of the unloaded rod.
+pub const KNEE: f64 = 8.75;
+
+/// Largest excess of the saturated `z`, which stays below 9.25 (`G0 = 0.033`, bow stiffness -30 times).
+pub const REACH: f64 = 0.5;
+
+/// Saturates the argument short of the pole.
+#[inline(always)]
+pub(crate) fn saturated_argument<R: Real>(z: R) -> Saturated<R> {
+    saturate_above(z, KNEE, REACH)
+}
+
+/// Returns the relative length at which the argument is `z`, the longer one of two; `None` if there is none. `load` is
+/// `gamma L0²/(4 alpha)`, `excess` is `1 - gamma/beta`.
+pub(crate) fn relative_length(load: f64, excess: f64, z: f64) -> Option<f64> {
+    // z = load p (1 - excess p) with p = 1 - L / L0, solved for the smaller p without cancellation.
+    let discriminant = load * (load - 4.0 * excess * z);
+    (discriminant >= 0.0).then(|| 1.0 - 2.0 * z / (load + discriminant.sqrt()))
+}
 
 /// Lean of a section from the chord, per radian of `S` or `D`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -91,10 +91,10 @@ impl Thesis {
         }
         let at = Handle { position_mm: pose.position_m * MM_PER_M, rotation_rad: pose.rotation_vector_rad() };
         let outputs = match &self.constants {
-            Constants::Single(law) => law.control(&at, demand).map(Outputs::widened),
-            Constants::Double(law) => law.control(&at, demand).map(Outputs::widened),
+            Constants::Single(law) => law.control(&at, demand).map(Outputs::response),
+            Constants::Double(law) => law.control(&at, demand).map(Outputs::response),
         };
-        outputs.map_or(Response::none(Validity::OutOfDomain), Outputs::response)
+        outputs.unwrap_or(Response::none(Validity::OutOfDomain))
     }
 }
 
@@ -344,24 +344,11 @@ impl<T: CFloat> Reaction<T> {
 }
 
 impl<T: CFloat> Outputs<T> {
-    fn widened(self) -> Outputs<f64> {
-        let Self { force_x, force_y, force_z, moment_x, moment_z } = self;
-        Outputs {
-            force_x: force_x.wide(),
-            force_y: force_y.wide(),
-            force_z: force_z.wide(),
-            moment_x: moment_x.wide(),
-            moment_z: moment_z.wide(),
-        }
-    }
-}
-
-impl Outputs<f64> {
     /// Converts to the model frame, with zero for numbers that are not finite.
     #[inline]
     fn response(self) -> Response {
-        let force_n = DVec3::new(self.force_x, self.force_z, self.force_y);
-        let torque_nm = DVec3::new(self.moment_x, self.moment_z, 0.0) * -NM_PER_NMM;
+        let force_n = DVec3::new(self.force_x.wide(), self.force_z.wide(), self.force_y.wide());
+        let torque_nm = DVec3::new(self.moment_x.wide(), self.moment_z.wide(), 0.0) * -NM_PER_NMM;
         if force_n.is_finite() && torque_nm.is_finite() {
             return Response { force_n, torque_nm, energy_j: None, validity: Validity::Ok };
         }

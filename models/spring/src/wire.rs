@@ -149,7 +149,8 @@ impl Compliance {
         let mut sum = Self::of_arc(&section, TAU * rest);
         for index in 0..whole as u32 {
             let coils_above = geometry.active_coils - f64::from(index + 1);
-            sum = sum.plus(&coil.lowered(TAU * coils_above * section.climb_m_per_rad));
+            let height_m = TAU * coils_above * section.climb_m_per_rad;
+            sum = sum.plus(&coil.seen_from(DVec3::new(0.0, 0.0, height_m)));
         }
         sum
     }
@@ -191,10 +192,6 @@ impl Compliance {
             fm: self.fm + cross.transpose() * self.mm,
             mm: self.mm,
         }
-    }
-
-    fn lowered(&self, height_m: f64) -> Self {
-        self.seen_from(DVec3::new(0.0, 0.0, height_m))
     }
 
     fn plus(&self, other: &Self) -> Self {

@@ -2,9 +2,11 @@
 //! refused too. Starts from the files in `seeds/gmsh`.
 #![no_main]
 
+use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::gmsh;
-use flotor_solid::law::{Body, Description, Law, Tool};
+use flotor_solid::law::Law;
 use flotor_solid::mesh::Mesh;
+use flotor_solid::prepare::Resolution;
 use libfuzzer_sys::fuzz_target;
 
 /// Larger bodies are read and not solved: a case takes milliseconds.
@@ -26,7 +28,8 @@ fuzz_target!(|bytes: &[u8]| {
     assert!(mesh.nodes_m.iter().flatten().all(|x| x.is_finite()));
     if mesh.nodes_m.len() <= MOST_SOLVED {
         let body = Body::File { digest: 0 };
-        let description = Description { body, tool: Tool::Plate, poisson_ratio: 0.3, resolution: 0 };
+        let resolution = Resolution::QUICK;
+        let description = Description { body, tool: Tool::Plate, poisson_ratio: 0.3, resolution };
         if let Ok((Law::Bonded(patch), _)) = description.solve_on(&mesh) {
             assert!(patch.stiffness.iter().flatten().all(|x| x.is_finite()));
         }

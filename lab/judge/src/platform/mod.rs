@@ -7,6 +7,7 @@
 
 #[cfg(not(windows))]
 mod linux;
+mod process;
 #[cfg(windows)]
 mod windows;
 
@@ -15,16 +16,7 @@ use linux as system;
 #[cfg(windows)]
 use windows as system;
 
+pub(crate) use process::{May, Part};
 pub(crate) use system::{
     anonymous_file, end_at_once, ending_signal, locked, processor_time, standard_input, state, used,
 };
-
-use std::time::Duration;
-
-/// Processor time of a process, with its readiness to run.
-pub(crate) struct Used {
-    /// Processor time so far.
-    pub(crate) ran: Duration,
-    /// True if the process could run and waits only for its turn.
-    pub(crate) wants: bool,
-}

@@ -1,6 +1,6 @@
 //! Windows: temporary files that are deleted on close. Checks that need a Linux kernel are omitted.
 
-use super::Used;
+use super::process::Used;
 use std::fs::{File, OpenOptions};
 use std::io;
 use std::os::windows::fs::OpenOptionsExt;
@@ -50,8 +50,8 @@ pub(crate) fn used(_: u32) -> Used {
 
 /// State of this process and thread: not read on Windows.
 pub(crate) mod state {
+    use crate::platform::process::Part;
     use crate::validate::Outcome;
-    use crate::validate::untouched::Part;
 
     /// Reports that the state is unknown.
     pub(crate) fn of_the_system() -> Result<Vec<Part>, Outcome> {

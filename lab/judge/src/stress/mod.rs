@@ -28,6 +28,7 @@ mod cost;
 mod determinism;
 mod energy;
 mod jacobian;
+mod lap;
 mod measure;
 mod motion;
 mod parts;

@@ -3,7 +3,7 @@
 //! A hand moves fast on one part of a lap and slowly on another: energy lost on the fast part of a law with friction
 //! and damping need not return on the slow one, and a faulty law may confuse the two.
 
-use super::energy::{CONSERVATIVE, Dissipation, Lap, MOST_STEPS};
+use super::lap::{CONSERVATIVE, Dissipation, Lap, MOST_STEPS};
 use crate::sampling::Random;
 use crate::subject::Subject;
 use crate::trajectory::Trajectory;

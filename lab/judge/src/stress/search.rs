@@ -19,7 +19,8 @@
 //! An isolated fault in a flat field, such as a hole of a tenth of a millimetre, cannot be found faster than by chance.
 
 use super::continuity::{FELT_N, FELT_NM, HARMLESS, Jumps, Line, PIECES_MM, changes, close_in, standing_out};
-use super::energy::{CONSERVATIVE, Dissipation, Lap, samples};
+use super::energy::samples;
+use super::lap::{CONSERVATIVE, Dissipation, Lap};
 use super::measure::{Measure, PoseRecord, Verdict};
 use super::motion::Triangle;
 use super::poses::Reach;

@@ -559,10 +559,10 @@ fn a_force_that_is_clamped_where_its_state_is_not_generates_energy_in_motion_onl
     assert!(made > 0.01 && measure(&pumps, "M9").verdict == Verdict::Fail, "{}", pumps.to_text());
     // Each to rounding: the bound of M4.
     let at_rest = value(&pumps, "M9", "largest energy of a lap, of what its forces could do");
-    assert!(at_rest <= super::energy::CONSERVATIVE, "{}", pumps.to_text());
+    assert!(at_rest <= super::lap::CONSERVATIVE, "{}", pumps.to_text());
     let rubs = stress_with::<Rubbing<2_000, 0>>(StressOptions::default(), &[Part::Search]);
     let made = value(&rubs, "M9", "largest energy of a lap in motion, of all work exchanged");
-    assert!(made <= super::energy::CONSERVATIVE, "{}", rubs.to_text());
+    assert!(made <= super::lap::CONSERVATIVE, "{}", rubs.to_text());
 }
 
 struct Slow;

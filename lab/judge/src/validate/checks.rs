@@ -1,16 +1,14 @@
 //! Check of one rule in this process.
 
-use super::path::CONFIG;
+use super::outcome::{Figures, Outcome};
 use super::rule::Check;
+use super::subject::Subject;
 use super::untouched::{Host, untouched};
-use super::{Figures, Outcome, device, guarded, life, live_parameters, model, passive};
+use super::{device, guarded, life, live_parameters, model, passive};
 use crate::platform::locked;
-use crate::subject::prepared;
-use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{LoadError, Model, OpenedDevice, Plugin, Setting, read_metadata};
+use flotor_hal::abi::loader::{LoadError, Model, Setting, read_metadata};
 use flotor_hal::conformance::Rule;
-use flotor_hal::{Parameter, ParameterKind, RefusalKind};
-use flotor_session::THREAD_ADVICE;
+use flotor_hal::{Parameter, ParameterKind};
 use flotor_session::registry::load_file;
 use flotor_session::scene::KeyValue;
 use std::path::Path;
@@ -66,68 +64,6 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
         },
     }
     Ok(None)
-}
-
-impl Outcome {
-    /// Returns the finding for a check whose thread could not be started.
-    pub(crate) fn no_thread(cause: &std::io::Error) -> Self {
-        Self::Missing(format!("cannot start a thread for the check: {cause}; {THREAD_ADVICE}"))
-    }
-
-    /// Returns the finding that the rule does not apply, for this reason.
-    pub(super) fn nothing_to_judge(why: &str) -> Self {
-        Self::NothingToJudge(why.to_owned())
-    }
-}
-
-impl From<String> for Outcome {
-    fn from(violation: String) -> Self {
-        Self::Violation(violation)
-    }
-}
-
-/// Converts a load error; a missing, busy or forbidden resource is no violation.
-impl From<LoadError> for Outcome {
-    fn from(error: LoadError) -> Self {
-        match error {
-            LoadError::Refused { refusal, .. }
-                if refusal.kind == RefusalKind::Resource && is_told(&refusal.reason) =>
-            {
-                Self::Missing(refusal.reason)
-            }
-            other => Self::Violation(other.to_string()),
-        }
-    }
-}
-
-/// Returns true if a refusal names a reason; the loader replaces a missing one, or invalid text.
-fn is_told(reason: &str) -> bool {
-    !reason.starts_with("no reason given") && !reason.contains(char::REPLACEMENT_CHARACTER)
-}
-
-/// Checked plugin with the settings of its instances.
-pub(super) struct Subject {
-    pub(super) plugin: Plugin,
-    settings: Vec<Setting>,
-}
-
-impl Subject {
-    /// Creates and prepares an instance, as for a loop.
-    pub(super) fn prepared_model(&self) -> Result<Model, String> {
-        prepared(&self.plugin, &self.settings, CONFIG.seed).map_err(|error| error.to_string())
-    }
-
-    pub(super) fn is_device(&self) -> bool {
-        self.plugin.metadata().kind == PluginKind::Device
-    }
-
-    pub(super) fn settings(&self) -> &[Setting] {
-        &self.settings
-    }
-
-    pub(super) fn device(&self) -> Result<OpenedDevice, LoadError> {
-        self.plugin.open_device(&self.settings)
-    }
 }
 
 fn schema(parameters: &[Parameter]) -> Result<(), String> {

@@ -1,6 +1,6 @@
 //! Rules of a device: description, life cycle, stop.
 
-use super::Outcome;
+use super::outcome::Outcome;
 use super::path::CONFIG;
 use crate::wording;
 use flotor_core::plausibility::{PoseBounds, is_rotation};

@@ -4,9 +4,9 @@
 //! inaccessible page: a read or write past its end ends the process there, and a damaged edge is found when the block
 //! is freed. Input and output of a call are blocks too.
 
-use super::Outcome;
-use super::checks::Subject;
 use super::life::live;
+use super::outcome::Outcome;
+use super::subject::Subject;
 use crate::platform::state;
 use std::path::{Path, PathBuf};
 use std::process::Command;

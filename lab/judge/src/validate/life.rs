@@ -1,10 +1,10 @@
 //! Complete life of an instance: all calls of a host, in a host's order, including extensions. Three rules share it;
 //! each checks something else between the calls.
 
-use super::Outcome;
-use super::checks::Subject;
 use super::device::Running;
+use super::outcome::Outcome;
 use super::path::{CONFIG, finite, walk};
+use super::subject::Subject;
 use crate::watch::enter_call;
 use crate::wording;
 use flotor_hal::abi::CallStatus;

@@ -1,8 +1,8 @@
 //! Live parameters: range, effect and duration of changes.
 
-use super::Outcome;
-use super::checks::Subject;
+use super::outcome::Outcome;
 use super::path::{CONFIG, finite, walk};
+use super::subject::Subject;
 use crate::platform::processor_time;
 use crate::wording;
 use flotor_hal::abi::CallStatus;

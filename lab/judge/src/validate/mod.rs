@@ -1,8 +1,8 @@
 //! Checks a plugin against the rules of the contract, from outside as a host: each rule in its own process, so that a
 //! plugin that crashes or hangs costs one rule.
 //!
-//! - `rule`: list of rules; `checks`: check of one, in this process; `patience`: its timeout.
-//! - `life`: all calls of an instance; `untouched` and `guarded` check their side effects.
+//! - `rule`: list of rules; `checks`: check of one, in this process; `outcome`: its result; `patience`: its timeout.
+//! - `subject`: checked plugin; `life`: all calls of an instance; `untouched` and `guarded` check their side effects.
 //! - `path`: poses of the checks; `model`, `live_parameters`, `passive`, `locked`: checks of a model.
 //! - `device`: checks of a device.
 
@@ -12,13 +12,16 @@ mod guarded;
 mod life;
 mod live_parameters;
 mod model;
+mod outcome;
 mod passive;
 pub(crate) mod path;
 pub(crate) mod patience;
 mod rule;
-pub(crate) mod untouched;
+mod subject;
+mod untouched;
 
 pub use checks::check;
+pub use outcome::{Figures, Finding, Obstacle, Outcome, Verdict};
 pub use rule::Check;
 
 use crate::platform::{anonymous_file, end_at_once, ending_signal, locked, standard_input};
@@ -28,117 +31,10 @@ use flotor_hal::conformance::Rule;
 use flotor_session::PluginProcess;
 use flotor_session::scene::KeyValue;
 use patience::Ended;
-use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Seek, Write};
 use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
-
-/// Outcome of one rule.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Finding {
-    /// Short name of the rule.
-    pub rule: &'static str,
-    /// Requirement of the rule.
-    pub text: &'static str,
-    /// Violation that was found.
-    pub violation: Option<String>,
-    /// Reason why the rule could not be checked here.
-    pub unchecked: Option<String>,
-    /// Kind of that reason.
-    pub obstacle: Option<Obstacle>,
-    /// Figures measured by the check.
-    pub figures: Option<Figures>,
-}
-
-/// Reason category of a rule that could not be checked.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Obstacle {
-    /// This system cannot check the rule for any plugin.
-    System,
-    /// Something that the plugin or the check needs is missing.
-    Requirement,
-    /// The plugin has nothing that the rule applies to.
-    Subject,
-}
-
-/// Measurements of a stateless model near home. No contract limits them; they reveal a confusion of newtons per metre
-/// with newtons per millimetre.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Figures {
-    /// Largest stiffness, N/m.
-    pub stiffness_n_per_m: f64,
-    /// Largest damping, N·s/m.
-    pub damping_ns_per_m: f64,
-}
-
-impl Finding {
-    /// Returns true if the rule does not apply to this plugin.
-    #[must_use]
-    pub fn has_nothing_to_judge(&self) -> bool {
-        self.obstacle == Some(Obstacle::Subject)
-    }
-
-    fn new(check: Check, verdict: Verdict) -> Self {
-        let Verdict { seen, figures } = verdict;
-        let (violation, unchecked, obstacle) = match seen {
-            None => (None, None, None),
-            Some(Outcome::Violation(seen) | Outcome::Stuck(seen)) => (Some(seen), None, None),
-            Some(Outcome::Missing(what)) => (None, Some(what), Some(Obstacle::Requirement)),
-            Some(Outcome::UnsupportedSystem(why)) => (None, Some(why), Some(Obstacle::System)),
-            Some(Outcome::NothingToJudge(why)) => (None, Some(why), Some(Obstacle::Subject)),
-        };
-        Self { rule: check.id(), text: check.text(), violation, unchecked, obstacle, figures }
-    }
-}
-
-/// Outcome of a rule that is not known to hold.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Outcome {
-    /// The rule is violated.
-    Violation(String),
-    /// A step did not return, so the outcome is unknown.
-    Stuck(String),
-    /// The plugin needs something that is missing (a device, a permission): no violation, no proof.
-    Missing(String),
-    /// This system cannot check the rule for any plugin.
-    #[serde(rename = "notonthissystem")]
-    UnsupportedSystem(String),
-    /// The rule does not apply to this plugin, or nothing in the sample could violate it.
-    NothingToJudge(String),
-}
-
-/// Result of the process that checks one rule.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Verdict {
-    /// Outcome; `None` if the rule holds.
-    pub seen: Option<Outcome>,
-    /// Figures measured by the check.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub figures: Option<Figures>,
-}
-
-impl Verdict {
-    /// Converts the result of a check.
-    pub fn of(checked: Result<Option<Figures>, Outcome>) -> Self {
-        match checked {
-            Ok(figures) => Self { seen: None, figures },
-            Err(seen) => Self { seen: Some(seen), figures: None },
-        }
-    }
-
-    fn violated(seen: String) -> Self {
-        Self { seen: Some(Outcome::Violation(seen)), figures: None }
-    }
-
-    /// Writes the verdict into the file on standard input, where the parent process reads it, apart from the plugin's
-    /// output.
-    fn deliver(&self) -> io::Result<()> {
-        standard_input()?.write_all(&serde_json::to_vec(self)?)
-    }
-}
 
 /// Checks one rule on instances with these settings in this process, which was started for it, and writes the verdict
 /// into the file on standard input. A step that exceeds `limit` of processor time, or ten times that in waiting, ends
@@ -149,10 +45,15 @@ impl Verdict {
 pub fn deliver(path: &Path, settings: &[KeyValue], wanted: Check, limit: Duration) -> io::Result<()> {
     watch::start(limit, |stuck| {
         // End the process even if the write fails: nothing else ends a call that does not return.
-        let _ = Verdict::of(Err(Outcome::Stuck(stuck.to_string()))).deliver();
+        let _ = write(&Verdict::of(Err(Outcome::Stuck(stuck.to_string()))));
         end_at_once();
     })?;
-    Verdict::of(check(path, settings, wanted)).deliver()
+    write(&Verdict::of(check(path, settings, wanted)))
+}
+
+/// Writes a verdict into the file on standard input, where the parent process reads it, apart from the plugin's output.
+fn write(verdict: &Verdict) -> io::Result<()> {
+    standard_input()?.write_all(&serde_json::to_vec(verdict)?)
 }
 
 /// Checks a plugin file against every rule that applies; stops at the first failure that makes the rest pointless. Not

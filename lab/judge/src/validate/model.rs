@@ -1,10 +1,9 @@
 //! Rules of a force model: finite numbers, repeatability, time, threads, energy, active region.
 
-use super::Outcome;
-use super::checks::Subject;
+use super::outcome::Outcome;
 use super::path::{CONFIG, FAST, directions, finite, grid, step, walk, walk_at};
-use super::untouched::threads;
-use crate::platform::processor_time;
+use super::subject::Subject;
+use crate::platform::{processor_time, state};
 use crate::subject::input_of;
 use crate::wording;
 use flotor_hal::abi::CallStatus;
@@ -178,7 +177,7 @@ pub(super) fn independent(subject: &Subject) -> Result<(), Outcome> {
 
 /// Compares the number of threads with that before the library was loaded.
 pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), Outcome> {
-    let more = |when: &str| match threads()?.saturating_sub(before) {
+    let more = |when: &str| match state::threads()?.saturating_sub(before) {
         0 => Ok(()),
         more => Err(Outcome::Violation(format!("the process has {more} more threads after {when}"))),
     };

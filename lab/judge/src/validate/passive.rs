@@ -10,8 +10,8 @@
 //! Both are exact but for rounding and for the law between two points of the circle, which its change from one to the
 //! next bounds.
 
+use super::outcome::{Figures, Outcome};
 use super::path::{FAST, finite, walk_at};
-use super::{Figures, Outcome};
 use crate::wording;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{

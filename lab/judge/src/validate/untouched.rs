@@ -2,28 +2,15 @@
 //!
 //! A few sums reveal a change of the floating-point mode by loading; changes by calls are counted by the loader.
 
-use super::Outcome;
-use super::checks::Subject;
 use super::life::live;
-use crate::platform::state;
+use super::outcome::Outcome;
+use super::subject::Subject;
+use crate::platform::{May, Part, state};
 use std::hint::black_box;
 use std::time::Duration;
 
 /// Waiting time at the end, in which a leftover timer or signal would fire.
 const REST: Duration = Duration::from_millis(300);
-
-/// Permitted change of a part of the state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(dead_code)] // a system that tells of no files has none that grows
-pub(crate) enum May {
-    /// No change.
-    Stay,
-    /// New lines, but none removed.
-    Grow,
-}
-
-/// Part of the state: name, permitted change, and descriptive lines.
-pub(crate) type Part = (&'static str, May, Vec<String>);
 
 /// State of this process and thread.
 pub(super) struct Host {
@@ -91,11 +78,6 @@ impl Host {
             has_changed.then(|| format!("{what}: `{gone}` became `{new}`"))
         })
     }
-}
-
-/// Returns the number of threads of this process, if known.
-pub(super) fn threads() -> Result<usize, Outcome> {
-    state::threads()
 }
 
 /// Describes the floating-point mode of this thread by a few sums.

@@ -32,6 +32,14 @@ const ALWAYS: [&str; 4] = ["free_length_mm", "coil_diameter_mm", "youngs_modulus
 const RIGIDITIES: [&str; 5] = ["gamma_n", "alpha_n_mm2", "beta_n", "wire_diameter_mm", "active_coils"];
 
 #[test]
+fn presets_have_their_names_in_the_schema() {
+    for (preset, word) in Preset::ALL.into_iter().zip(PRESETS.as_slice()) {
+        assert_eq!(preset.name(), word.as_str());
+    }
+    assert_eq!(PRESETS.as_slice().len(), Preset::ALL.len());
+}
+
+#[test]
 fn numbers_are_live_and_choices_are_not() {
     for parameter in SCHEMA {
         let live = parameter.mutability() == flotor_hal::Mutability::Live;

@@ -1,10 +1,10 @@
 use flotor_hal::glam::{DMat3, DVec2, DVec3, DVec4};
 
-use super::{Quartic, coefficients, relative_length};
-use crate::bending::{Bending, saturated_argument};
+use super::{Quartic, coefficients};
+use crate::bending::Bending;
 use crate::preset::Preset;
 use crate::rigidity::Spring;
-use crate::shape::Shape;
+use crate::shape::{Shape, relative_length, saturated_argument};
 use flotor_lanes::angle::measures;
 
 /// Normal of a section that leans from the chord (third axis) by the given vector.
@@ -156,7 +156,9 @@ fn lengths_are_inverse_to_arguments() {
         let spring = preset.spring();
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
         for z in [-60.0, -3.0, 0.0, 1.0, 8.75] {
-            let Some(relative) = relative_length(rigidities, free_length_m, z) else {
+            let load = rigidities.gamma_n * free_length_m * free_length_m / (4.0 * rigidities.alpha_n_m2);
+            let excess = 1.0 - rigidities.gamma_n / rigidities.beta_n;
+            let Some(relative) = relative_length(load, excess, z) else {
                 assert!(z > 3.0, "only compression has a largest argument");
                 continue;
             };

@@ -27,6 +27,15 @@ const ROUNDING: f64 = 0.05;
 /// Maximum number of steps of [`solve`]: each updates the set of touching sections, from the ends of the stretch inwards.
 const MOST_STEPS: u32 = 12;
 
+/// Contact between the coils.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Coils {
+    /// Coils pass through each other.
+    Pass,
+    /// Coils touch and press on each other.
+    Touch,
+}
+
 /// Contact of one spring, lengths in `L0`, forces in `alpha/L0²`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Contact {

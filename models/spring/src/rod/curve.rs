@@ -6,8 +6,7 @@
 
 use flotor_hal::glam::{DQuat, DVec2, DVec3};
 
-use super::contact::Contact;
-use super::functional::{Functional, Shape};
+use super::functional::{Functional, Ratios, Shape};
 use super::plate::Plate;
 use super::section::{Load, Sections};
 use crate::centerline::Section;
@@ -23,9 +22,7 @@ pub(crate) struct Curve<const K: usize> {
     end: DVec2,
     /// Internal force.
     force: DVec3,
-    shear_compliance: f64,
-    softening: f64,
-    contact: Option<Contact>,
+    ratios: Ratios,
     /// Evenly distributed twist (rad).
     twist_rad: f64,
 }
@@ -49,15 +46,8 @@ impl<const K: usize> Curve<K> {
             *coefficient = *value;
         }
         let ratios = functional.ratios;
-        Self {
-            lean,
-            end: plate.lean,
-            force: load.force,
-            shear_compliance: ratios.shear_compliance,
-            softening: ratios.softening,
-            contact: ratios.contact,
-            twist_rad: load.torsion / ratios.torsion,
-        }
+        let twist_rad = load.torsion / ratios.torsion;
+        Self { lean, end: plate.lean, force: load.force, ratios, twist_rad }
     }
 
     /// Computes sections evenly in arc length, the first in the lower plate, the last in the upper. Not real-time.
@@ -98,12 +88,13 @@ impl<const K: usize> Curve<K> {
         let section = Sections::<1>::new([[lean.x], [lean.y]], [[rate.x], [rate.y]]);
         let scale = 2.0 / (1.0 + lean.length_squared());
         let normal = (scale * lean).extend(scale - 1.0);
-        let load = Load { force: self.force, torsion: 0.0, softening: self.softening };
-        let pressed = self.contact.map_or(0.0, |contact| section.pressed(&contact, &load, 0));
-        let stretch = 1.0 + self.softening * self.force.dot(normal) + pressed;
+        let Ratios { softening, shear_compliance, contact, .. } = self.ratios;
+        let load = Load { force: self.force, torsion: 0.0, softening };
+        let pressed = contact.map_or(0.0, |contact| section.pressed(&contact, &load, 0));
+        let stretch = 1.0 + softening * self.force.dot(normal) + pressed;
         Step {
             lean,
-            tangent: stretch * normal + self.shear_compliance * self.force,
+            tangent: stretch * normal + shear_compliance * self.force,
             turn_rate_rad: self.twist_rad + scale * lean.perp_dot(rate),
         }
     }

@@ -11,8 +11,7 @@
 use pulp::{Scalar256b, Simd, WithSimd};
 
 use super::column::{Column, Products};
-use super::equilibrium::Reading;
-use super::functional::{Ratios, Shape};
+use super::functional::{Ratios, Reading, Shape};
 use super::plate::Plate;
 use super::search_energy::{COEFFICIENTS, FOURS, Four, Fours, SearchEnergy, dot, four, in_order, numbers};
 
@@ -178,7 +177,7 @@ fn added<S: Simd>(sum: &Fours<S>, factor: f64, vector: &Fours<S>) -> Fours<S> {
 mod tests {
     use super::*;
     use crate::preset::Preset;
-    use crate::rod::Coils;
+    use crate::rod::contact::Coils;
     use flotor_hal::glam::{DVec2, DVec3};
 
     #[test]

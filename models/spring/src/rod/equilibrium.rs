@@ -13,11 +13,11 @@ use flotor_hal::glam::{DVec2, DVec3};
 use super::contact::Touching;
 use super::curve::Curve;
 use super::descent::Found;
-use super::functional::{Curvature, Functional, Ratios, Reaction, Shape, Value, joined};
-use super::plate::{Plate, or_zero};
+use super::functional::{Curvature, Functional, Ratios, Reaction, Reading, Shape, Value, joined};
+use super::plate::Plate;
 use super::predictor::History;
 use super::start;
-use crate::pose::Pose;
+use crate::pose::{Pose, or_zero};
 use crate::response::Demand;
 use crate::rigidity::Spring;
 use flotor_lanes::matrix::{Factored, added, dot, length, product};
@@ -89,18 +89,6 @@ impl Stride {
     const FELT: Self = Self { step: LONGEST_WAY, way: LONGEST_WAY };
     /// Limits of a search of which only the result is felt.
     const UNFELT: Self = Self { step: LONGEST_UNFELT_STEP, way: f64::INFINITY };
-}
-
-/// Energy and its derivatives by the plate, in units of the bending rigidity and the free length.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Reading {
-    pub(crate) energy: f64,
-    /// Derivative of the energy by the displacement of the upper plate.
-    pub(crate) force: DVec3,
-    /// Derivative by the lean of the plate.
-    pub(crate) by_lean: DVec2,
-    /// Derivative by the turn of the plate.
-    pub(crate) torsion: f64,
 }
 
 /// Outcome of a tick.

@@ -21,9 +21,7 @@ use std::f64::consts::PI;
 
 use flotor_hal::glam::{DMat3, DVec2, DVec3};
 
-use super::Coils;
-use super::contact::{self, Contact, Touching};
-use super::equilibrium::Reading;
+use super::contact::{self, Coils, Contact, Touching};
 use super::plate::Plate;
 use super::section::{Along, Curvatures, Load, Sections};
 use crate::rigidity::Spring;
@@ -84,6 +82,18 @@ pub(crate) struct Value<const N: usize, const Q: usize> {
     pub(crate) touching: Touching,
     contact: Option<Contact>,
     sections: Sections<Q>,
+}
+
+/// Energy and its derivatives by the plate, in units of the bending rigidity and the free length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Reading {
+    pub(crate) energy: f64,
+    /// Derivative of the energy by the displacement of the upper plate.
+    pub(crate) force: DVec3,
+    /// Derivative by the lean of the plate.
+    pub(crate) by_lean: DVec2,
+    /// Derivative by the turn of the plate.
+    pub(crate) torsion: f64,
 }
 
 /// Second derivatives of the energy.

@@ -8,16 +8,10 @@
 use flotor_hal::glam::{DVec2, DVec3};
 use flotor_hal::math;
 
-use crate::pose::{NEGLIGIBLE, Pose};
+use crate::pose::{Pose, or_zero};
 
 /// Smallest `1 + d_z`: 177.4 degrees. There is no shortest turn to upside down.
 const LEAST_OVERTURN: f64 = 1e-3;
-
-/// Returns the number, or zero if negligible, see [`NEGLIGIBLE`]. Real-time: bounded, no allocation.
-#[inline]
-pub(crate) fn or_zero(number: f64) -> f64 {
-    if number.abs() < NEGLIGIBLE { 0.0 } else { number }
-}
 
 /// Pose of the upper plate, lengths in free lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,8 +8,7 @@
 use flotor_hal::glam::{DMat3, DVec2, DVec3};
 use pulp::{Simd, cast};
 
-use super::equilibrium::Reading;
-use super::functional::{Ratios, Shape, solve_symmetric};
+use super::functional::{Ratios, Reading, Shape, solve_symmetric};
 use super::plate::Plate;
 use super::section::Load;
 use flotor_lanes::basis::Basis;
@@ -341,7 +340,7 @@ pub(super) fn in_order<S: Simd>(shape: &Fours<S>) -> Shape<COEFFICIENTS> {
 mod tests {
     use super::*;
     use crate::preset::Preset;
-    use crate::rod::Coils;
+    use crate::rod::contact::Coils;
     use crate::rod::functional::Functional;
     use pulp::Scalar256b;
 

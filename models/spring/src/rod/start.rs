@@ -5,10 +5,9 @@
 
 use flotor_hal::glam::{DVec2, DVec3};
 
-use crate::bending::saturated_argument;
 use crate::pose::Pose;
 use crate::rigidity::Spring;
-use crate::shape::Shape;
+use crate::shape::{Shape, saturated_argument};
 use flotor_lanes::basis::Basis;
 
 /// Largest lean of an initial shape from the chord (rad). Close to buckling the linear shape has no bound, but the

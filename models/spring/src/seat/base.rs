@@ -102,7 +102,7 @@ impl Base {
     }
 
     /// Returns the law's response on this base, in the model frame. Real-time: bounded, no allocation.
-    pub(super) fn respond<S: HeldSpring>(&self, spring: &mut S, pose: &Pose, demand: Demand) -> Response {
+    pub(super) fn respond(&self, spring: &mut dyn HeldSpring, pose: &Pose, demand: Demand) -> Response {
         self.answer(pose, |relative| spring.respond(relative, demand))
     }
 

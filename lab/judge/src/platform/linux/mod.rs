@@ -3,7 +3,7 @@
 pub(crate) mod locked;
 pub(crate) mod state;
 
-use super::Used;
+use super::process::Used;
 use rustix::fs::{MemfdFlags, memfd_create};
 use rustix::process::{Signal, getpid, kill_process};
 use rustix::time::{ClockId, clock_gettime};

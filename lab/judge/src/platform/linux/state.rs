@@ -1,7 +1,7 @@
 //! State of this process and thread, from the files under `/proc`.
 
+use crate::platform::process::{May, Part};
 use crate::validate::Outcome;
-use crate::validate::untouched::{May, Part};
 use rustix::io::Errno;
 use rustix::process::{WaitOptions, waitpid};
 use std::fs;
