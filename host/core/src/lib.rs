@@ -7,7 +7,7 @@
 //! - [`plausibility`]: checks of device samples.
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between its two ends.
 //! - [`guidance`]: the parameters that guide a simulated hand.
-//! - [`Change`]: a change to a plugin while the loop ran.
+//! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: its number in the run.
 //!
 //! The crate reads no files, starts no threads and makes no system calls.
 #![forbid(unsafe_code)]
@@ -23,6 +23,7 @@ pub mod oscillation;
 mod outputs;
 pub mod peer;
 pub mod plausibility;
+mod plugin_index;
 mod quantile;
 mod random;
 pub mod region;
@@ -32,6 +33,7 @@ pub mod trace;
 pub use change::{Change, ChangeOutcome, ChangeSubject};
 pub use clock::Clock;
 pub use outputs::ModelOutputs;
+pub use plugin_index::PluginIndex;
 pub use quantile::quantile;
 pub use random::Random;
 

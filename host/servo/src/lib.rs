@@ -26,6 +26,7 @@ mod queue;
 mod random;
 mod realtime;
 mod run;
+
 mod servo;
 mod stage_timer;
 mod standby;
@@ -53,7 +54,7 @@ pub use parameters::{
     ScheduledChange, WEIGHT,
 };
 pub use platform::{PRIORITY_NAME, THREAD_ADVICE};
-pub use queue::{Consumer, drain, queue};
+pub use queue::{Consumer, Producer, drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};
 pub use realtime::{enter_guard_priority, enter_real_time, enter_worker_priority, probe_real_time};
 pub use run::{Loop, RunEnd};

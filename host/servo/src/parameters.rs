@@ -12,7 +12,7 @@ mod gradual;
 pub use gradual::Pace;
 
 use super::queue::queue;
-use flotor_core::ChangeOutcome;
+use flotor_core::{ChangeOutcome, PluginIndex};
 use flotor_hal::Tick;
 use flotor_hal::abi::CallStatus;
 use gradual::Movements;
@@ -29,8 +29,8 @@ pub const PLUGIN: u32 = u32::MAX - 1;
 /// New value of a parameter. The numbers come from a schema: see `session::Controls`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterChange {
-    /// Number of the plugin in the run: the devices, then the models, both in the scene's order.
-    pub plugin: u16,
+    /// Number of the plugin in the run.
+    pub plugin: PluginIndex,
     /// Generation of the plugin that the change was checked against.
     pub generation: u16,
     /// Index into the plugin's schema, [`WEIGHT`], or in a report [`PLUGIN`].
@@ -118,7 +118,7 @@ impl ParameterQueue {
     }
 
     /// Reports that a plugin was replaced. Real-time: bounded, no allocation.
-    pub fn report_replaced(&mut self, tick: &Tick, plugin: u16, generation: u16) {
+    pub fn report_replaced(&mut self, tick: &Tick, plugin: PluginIndex, generation: u16) {
         self.movements.forget_others(plugin, generation);
         let value = f64::from(generation);
         let change = ParameterChange { plugin, generation, parameter: PLUGIN, value, pace: Pace::AtOnce };

@@ -8,7 +8,7 @@ use super::last_stop::{SignalGuard, TakenSignals, end_dying, is_dying, take_sent
 use super::realtime::enter_guard_priority;
 use super::stop::StopSwitch;
 use super::watchdog_process::HeartbeatSender;
-use flotor_core::MAX_DEVICES;
+use flotor_core::{MAX_DEVICES, PluginIndex};
 use flotor_hal::abi::loader::Stopper;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
@@ -48,6 +48,18 @@ impl Place {
             Self::Model(_) => "`step`",
             Self::Host => "the tick",
             Self::DeviceWrite(_) => "`write`",
+        }
+    }
+
+    /// Returns the plugin whose code runs, in a run with this many devices; `None` for code of the host.
+    #[must_use]
+    pub const fn plugin(self, devices: usize) -> Option<PluginIndex> {
+        match self {
+            Self::Waiting | Self::Host => None,
+            Self::DeviceWait(device) | Self::DeviceRead(device) | Self::DeviceWrite(device) => {
+                Some(PluginIndex::of_device(device))
+            }
+            Self::Model(model) => Some(PluginIndex::of_model(devices, model)),
         }
     }
 

@@ -20,6 +20,7 @@ mod estimates;
 mod feel;
 pub mod headless;
 mod long_call;
+mod nanoseconds;
 mod platform;
 mod plugin_process;
 pub mod program;

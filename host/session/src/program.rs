@@ -10,6 +10,7 @@
 //! stated time after the first tick that reads it; then it fades to zero, which is counted. Force fades in when the program enables
 //! it. Neither side waits for the other.
 
+use crate::nanoseconds::whole_ns;
 use crate::scene::{ModelUse, Scene};
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::{Entry, model_entry};
@@ -232,8 +233,8 @@ pub fn connect(scene: &mut Scene) -> Vec<Connected> {
         });
         Connected { port, device, mapping, ramp_ns }
     };
-    let devices = u16::try_from(scene.devices.len()).unwrap_or(u16::MAX);
-    (0..devices).map(connect).collect()
+    let devices: Vec<u16> = (0..).zip(&scene.devices).map(|(device, _)| device).collect();
+    devices.into_iter().map(connect).collect()
 }
 
 /// Returns the fade-in time of a model `program`, ns, as set in the scene. A value that is no number is rejected with the scene.
@@ -242,10 +243,9 @@ fn ramp_ns(model: &ModelUse) -> u64 {
     set.and_then(|parameter| parameter.value.parse().ok()).map_or(nanoseconds(RAMP_MS), nanoseconds)
 }
 
-/// Converts ms of a parameter, at most a minute, to ns.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+/// Converts ms of a parameter to ns.
 fn nanoseconds(time_ms: f64) -> u64 {
-    (time_ms * 1.0e6).round() as u64
+    whole_ns(time_ms * 1.0e6)
 }
 
 /// Force model with the wrench of a program. Times are those of ticks, so that a run on the virtual clock can be repeated.
@@ -262,6 +262,11 @@ struct ProgramModel {
     since_ns: u64,
     rise_ns: u64,
     has_lapsed: bool,
+}
+
+/// Returns the parameter of a time, ms, at most a minute.
+const fn time(id: &'static str, least: f64, default: f64, doc: &'static str) -> Parameter {
+    Parameter::real(id, "ms", least, 60_000.0, default, doc)
 }
 
 impl ForceModel for ProgramModel {
@@ -282,30 +287,9 @@ impl ForceModel for ProgramModel {
             0.0,
             "Number of the program that commands the model: set by `flotor lend` and the drop-in libraries",
         ),
-        Parameter::real(
-            "valid_ms",
-            "ms",
-            1.0,
-            60_000.0,
-            50.0,
-            "Time for which a wrench is valid without a newer one",
-        ),
-        Parameter::real(
-            "fade_ms",
-            "ms",
-            0.0,
-            60_000.0,
-            50.0,
-            "Time in which an expired wrench fades to zero",
-        ),
-        Parameter::real(
-            "ramp_ms",
-            "ms",
-            0.0,
-            60_000.0,
-            RAMP_MS,
-            "Time in which force fades in once it is enabled",
-        ),
+        time("valid_ms", 1.0, 50.0, "Time for which a wrench is valid without a newer one"),
+        time("fade_ms", 0.0, 50.0, "Time in which an expired wrench fades to zero"),
+        time("ramp_ms", 0.0, RAMP_MS, "Time in which force fades in once it is enabled"),
     ];
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {

@@ -40,7 +40,7 @@ pub(crate) struct ModelStack {
 /// Replacement of a model in a running loop.
 pub struct Replacement {
     /// Number of the model to replace.
-    pub model: u32,
+    pub model: usize,
     /// Generation of the new layer, named in changes of its parameters.
     pub generation: u16,
     /// New layer.
@@ -170,8 +170,8 @@ impl ModelStack {
 
     /// Removes a layer that has faded out; returns it with its model number. Real-time: bounded by the models, no allocation.
     #[inline]
-    pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
-        let take = |slot: &mut Slot| Some((u32::try_from(slot.number).ok()?, slot.take_faded(tick)?));
+    pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<(usize, Box<Layer>)> {
+        let take = |slot: &mut Slot| Some((slot.number, slot.take_faded(tick)?));
         self.slots.iter_mut().find_map(take)
     }
 

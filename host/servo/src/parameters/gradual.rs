@@ -1,7 +1,7 @@
 //! Numbers that move to a new value at a rate, so that a user's slider does not make the force jump.
 
 use super::ParameterChange;
-use flotor_core::ChangeOutcome;
+use flotor_core::{ChangeOutcome, PluginIndex};
 use flotor_hal::Tick;
 
 /// Longest time step of a movement in a tick, ns: missed ticks are not caught up.
@@ -27,7 +27,7 @@ pub enum Pace {
 /// Number with its value and movement.
 #[derive(Clone, Copy, Debug)]
 struct Known {
-    plugin: u16,
+    plugin: PluginIndex,
     generation: u16,
     parameter: u32,
     value: f64,
@@ -130,7 +130,7 @@ impl Movements {
     }
 
     /// Drops the numbers of a plugin's other generations after a replacement. Real-time: bounded, no allocation.
-    pub(super) fn forget_others(&mut self, plugin: u16, generation: u16) {
+    pub(super) fn forget_others(&mut self, plugin: PluginIndex, generation: u16) {
         self.known.retain(|known| known.plugin != plugin || known.generation == generation);
         self.count();
     }

@@ -5,7 +5,7 @@
 mod stamp;
 
 use self::stamp::{FileStamp, hash_of};
-use crate::calls::{self, Call, CallError, attended_while};
+use crate::calls::{self, Call, CallError, CallThread};
 pub use crate::platform::is_same_file;
 use crate::platform::{UNKNOWN_PROGRAM, distrust, user_folder};
 use crate::scene::nearest;
@@ -332,7 +332,7 @@ pub(crate) fn is_installed(plugin: &Path) -> bool {
 /// Loads a plugin file, with a time limit for its initialisers.
 fn load_in_time(path: &Path) -> Result<Plugin, LookupError> {
     let path = path.to_path_buf();
-    let loaded = attended_while(calls::limit(), calls::is_to_begin, move |progress| {
+    let loaded = CallThread::default().run_while(calls::limit(), calls::is_to_begin, move |progress| {
         progress.enter(&path.display().to_string(), Call::Load);
         load_file(&path)
     });

@@ -1,18 +1,43 @@
 //! End of a run: de-energises the devices, queries the last messages of the models, and creates the outcome.
 
-use super::controls::Settled;
-use super::{Controls, DeviceOutcome, Finished, Outcome, UnfreedPlugins};
-use crate::calls::{Call, CallError, EndCalls, EndReserve, Progress, Unresponsive, end_limit};
+use super::controls::{Controls, Settled};
+use super::outcome::{DeviceOutcome, Outcome};
+use super::plugin_report::PluginNames;
+use super::stop_time::StopTime;
+use super::unfreed_plugins::UnfreedPlugins;
+use crate::calls::{Call, CallError, CallThread, EndReserve, Progress, Unresponsive, end_limit};
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
-use flotor_servo::{Dismantled, Forces, Heartbeat, Layer, LayerReport, Reported};
+use flotor_servo::{
+    Dismantled, Forces, Heartbeat, Layer, LayerReport, Loop, RealTimeReport, Reported, RunEnd, Servo,
+};
 use std::time::Instant;
+
+/// Loop that has ended, with its devices stopped.
+pub(super) struct Finished {
+    pub(super) servo: Servo,
+    pub(super) end: RunEnd,
+    pub(super) elapsed_ns: u64,
+    pub(super) dropped_records: u64,
+    pub(super) real_time: RealTimeReport,
+    /// `None` without an emergency stop on the real clock.
+    pub(super) stop_time: Option<StopTime>,
+    /// Warning for users, which was shown already.
+    pub(super) warning: Option<String>,
+}
+
+impl Finished {
+    pub(super) fn of(ended: Loop, dropped_records: u64, real_time: RealTimeReport) -> Self {
+        let (servo, end, elapsed_ns) = ended.finish();
+        Self { servo, end, elapsed_ns, dropped_records, real_time, stop_time: None, warning: None }
+    }
+}
 
 /// Data from the beginning of a run that its end needs.
 pub(super) struct Epilogue {
     pub(super) started: Instant,
     pub(super) warnings: Vec<String>,
     pub(super) heartbeat: Heartbeat,
-    pub(super) names: Vec<String>,
+    pub(super) names: PluginNames,
     pub(super) controls: Controls,
     pub(super) reserve: EndReserve,
 }
@@ -27,28 +52,27 @@ impl Epilogue {
         let known_before = warnings.len();
         let Dismantled { devices, last_stop, forces, swaps, timing } = servo.dismantle();
         let mut unresponsive = None;
-        let (mut told, mut closing) = (Vec::new(), Vec::new());
-        let model_names = names.get(devices.len()..).unwrap_or_default();
-        for (name, (device, reported)) in names.iter().zip(devices) {
-            let (outcome, opened) = deactivate(&mut calls, name, (device, reported), &mut unresponsive);
-            told.push(outcome);
+        let (mut outcomes, mut closing) = (Vec::new(), Vec::new());
+        for (name, device) in names.all().iter().zip(devices) {
+            let (outcome, opened) = deactivate(&mut calls, name, device, &mut unresponsive);
+            outcomes.push(outcome);
             closing.extend(opened.map(|opened| (name.clone(), opened)));
         }
         let couplings = forces.coupling_outcomes();
         // Replacements that no tick will apply any more.
         let waiting = swaps.into_layers().into_iter();
         let (layers, reports) =
-            last_words(&mut calls, model_names, (forces, controls.take_retired()), &mut unresponsive);
+            last_words(&mut calls, &names, (forces, controls.take_retired()), &mut unresponsive);
         let Settled { first: health, faulty_plugins, replacements, hung } = controls.settle(reports);
         unresponsive = unresponsive.or(hung);
-        let models = model_names.iter().cloned().zip(health);
+        let models = names.models().iter().cloned().zip(health);
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
-        let name = |number: usize| model_names.get(number).cloned().unwrap_or_default();
-        let layers = layers.into_iter().chain(waiting).map(|(number, layer)| (name(number), layer)).collect();
+        let layers = layers.into_iter().chain(waiting);
+        let layers = layers.map(|(model, layer)| (names.model(model), layer)).collect();
         let unfreed_plugins = UnfreedPlugins::new(closing, layers, last_stop, calls);
         let wall_s = started.elapsed().as_secs_f64();
         warnings.extend(controls.warnings());
-        warnings.extend(stop_time.as_ref().and_then(|time| time.warning(&names)));
+        warnings.extend(stop_time.as_ref().and_then(|time| time.warning(names.all())));
         let taken = heartbeat.signals_taken();
         if !taken.is_none() {
             warnings.push(format!(
@@ -65,7 +89,7 @@ impl Epilogue {
             dropped_records,
             real_time,
             stop_time,
-            devices: told,
+            devices: outcomes,
             couplings,
             models,
             faulty_plugins,
@@ -78,18 +102,22 @@ impl Epilogue {
 
 /// De-energises a stopped device; returns its outcome, and the device unless its plugin failed or hangs.
 fn deactivate(
-    calls: &mut EndCalls,
+    calls: &mut CallThread,
     name: &str,
     (mut device, reported): (ActiveDevice, Reported),
     unresponsive: &mut Option<Unresponsive>,
 ) -> (DeviceOutcome, Option<OpenedDevice>) {
     let (who, float_changes) = (name.to_owned(), device.float_changes());
-    let told = calls.attended(end_limit(), move |progress| {
-        progress.enter(&who, Call::Deactivate);
-        let ledger = device.energy_ledger();
-        let words = device.last_message();
-        (ledger, words, device.deactivate())
-    });
+    let told = calls.run_while(
+        end_limit(),
+        || true,
+        move |progress| {
+            progress.enter(&who, Call::Deactivate);
+            let ledger = device.energy_ledger();
+            let words = device.last_message();
+            (ledger, words, device.deactivate())
+        },
+    );
     let (ledger, words, opened) = told.unwrap_or_else(|error| {
         note(error, unresponsive);
         (None, String::new(), None)
@@ -107,20 +135,23 @@ type Layers = Vec<(usize, Box<Layer>)>;
 /// Returns reports on the layers in the loop and on those that it returned, with the last messages of unhealthy ones; and the
 /// layers, unless a call hangs.
 fn last_words(
-    calls: &mut EndCalls,
-    names: &[String],
+    calls: &mut CallThread,
+    names: &PluginNames,
     (mut forces, mut retired): (Forces, Layers),
     unresponsive: &mut Option<Unresponsive>,
 ) -> (Layers, Vec<LayerReport>) {
-    let names = names.to_vec();
-    let told = calls.attended(end_limit(), move |progress: &Progress| {
-        let on_query =
-            |model: usize| progress.enter(names.get(model).map_or("", String::as_str), Call::LastMessage);
-        let mut reports: Vec<LayerReport> =
-            retired.iter_mut().map(|(model, layer)| layer.report(*model, || on_query(*model))).collect();
-        reports.extend(forces.reports(on_query));
-        (forces.into_layers().chain(retired).collect(), reports)
-    });
+    let names = names.clone();
+    let told = calls.run_while(
+        end_limit(),
+        || true,
+        move |progress: &Progress| {
+            let on_query = |model: usize| progress.enter(&names.model(model), Call::LastMessage);
+            let mut reports: Vec<LayerReport> =
+                retired.iter_mut().map(|(model, layer)| layer.report(*model, || on_query(*model))).collect();
+            reports.extend(forces.reports(on_query));
+            (forces.into_layers().chain(retired).collect(), reports)
+        },
+    );
     told.unwrap_or_else(|error| {
         note(error, unresponsive);
         (Vec::new(), Vec::new())

@@ -1,8 +1,8 @@
 //! Latch of the machine during a run: nothing is energised while the latch is pressed, a press ends the run, and an emergency stop
 //! of the run presses the latch.
 
-use super::RunError;
-use flotor_live::{Directory, Latch, LatchState, Pressed, process_number};
+use super::error::RunError;
+use flotor_live::{Directory, Latch, LatchState, process_number};
 use flotor_servo::{EmergencySource, StopSwitch, enter_guard_priority};
 use std::fmt::{self, Display, Formatter};
 use std::io;
@@ -198,17 +198,6 @@ impl Drop for LatchWatch {
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
-    }
-}
-
-/// Returns the reason why nothing may be energised, as text.
-pub(super) fn latched_words(pressed: Option<&Pressed>) -> String {
-    match pressed {
-        Some(pressed) => format!(
-            "the emergency stop of this machine is pressed ({pressed}): nothing is energised; `flotor release` releases it"
-        ),
-        None => "the emergency stop of this machine was pressed while the run started: start the run again"
-            .to_owned(),
     }
 }
 

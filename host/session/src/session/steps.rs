@@ -1,7 +1,10 @@
 //! Run on the virtual clock that the caller advances: for experiments, which decide between ticks how to continue.
 
+use super::controls::Controls;
+use super::error::RunError;
+use super::observer::Observer;
 use super::virtual_loop::VirtualLoop;
-use super::{Controls, Observer, RunError, RunOptions, Session};
+use super::{RunOptions, Session};
 use crate::registry::Registry;
 use crate::scene::Scene;
 use flotor_coupling::Line;
@@ -26,8 +29,9 @@ impl Steps {
         stop: &StopSwitch,
     ) -> Result<Self, RunError> {
         let mut session = Session::prepare(scene, registry, &RunOptions { clock: Clock::Virtual, seed })?;
-        let (controls, lines) = (session.controls(), session.take_lines());
-        Ok(Self { ticks: VirtualLoop::start(session, stop)?, controls, lines })
+        let lines = session.take_lines();
+        let Session { prepared, changes, controls, .. } = session;
+        Ok(Self { ticks: VirtualLoop::start(prepared, changes, stop)?, controls, lines })
     }
 
     /// Returns the handle to change parameters, weights and models of the run.

@@ -182,26 +182,22 @@ pub fn machine_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) {
 impl Serve for Host {
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         let Self { controls, stop, latch, .. } = self;
-        match ask {
-            Ask::Watch { .. } | Ask::Unwatch => {} // handled by the publication
+        let changed = match ask {
             Ask::Set { values } => {
-                let values: Vec<NewValue<'_>> = values
-                    .iter()
-                    .map(|new| NewValue { plugin: &new.plugin, parameter: &new.parameter, value: &new.value })
-                    .collect();
-                controls.set_parameters(&values).map_err(|error| refused(&error))?;
+                let new = values.iter().map(|new| NewValue {
+                    plugin: &new.plugin,
+                    parameter: &new.parameter,
+                    value: &new.value,
+                });
+                controls.set_parameters(&new.collect::<Vec<_>>())
             }
-            Ask::Weight { model, weight } => {
-                controls.set_weight(&model, weight).map_err(|error| refused(&error))?;
-            }
-            Ask::Swap { model, plugin, settings } => {
-                let swapped = self.swap(&model, plugin.as_deref(), &settings);
-                swapped.map_err(|error| refused(&error))?;
-            }
-            Ask::Stop => stop.stop(),
+            Ask::Weight { model, weight } => controls.set_weight(&model, weight),
+            Ask::Swap { model, plugin, settings } => self.swap(&model, plugin.as_deref(), &settings),
             Ask::EmergencyStop => return emergency_stop(stop, latch.as_ref()),
-            Ask::MachineStop => machine_stop(stop, latch.as_ref()),
-        }
-        Ok(())
+            Ask::Watch { .. } | Ask::Unwatch => Ok(()), // handled by the publication
+            Ask::Stop => Ok(stop.stop()),
+            Ask::MachineStop => Ok(machine_stop(stop, latch.as_ref())),
+        };
+        changed.map_err(|error| refused(&error))
     }
 }

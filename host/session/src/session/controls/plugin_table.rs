@@ -1,15 +1,27 @@
 //! Table of the plugins of a run with their replacements: checks new values before they enter the loop, and describes its reports.
 
-use super::super::PluginReport;
+use super::super::plugin_report::PluginReport;
+use super::error::ControlError;
 use super::versions::{ChosenBy, Versions};
-use super::{ControlError, NewValue};
 use crate::scene::{is_named, nearest};
-use flotor_core::{Change, ChangeSubject};
+use flotor_core::{Change, ChangeSubject, PluginIndex};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Mutability, Parameter};
 use flotor_servo::{ChangeReport, PLUGIN, Pace, ParameterChange, WEIGHT};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// New value for a parameter of a plugin of the run, as text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NewValue<'a> {
+    /// Name of a device or model in the scene (a model on several devices: `NAME@DEVICE` for one of them, `NAME` for all), or id of
+    /// a plugin.
+    pub plugin: &'a str,
+    /// Id of the parameter.
+    pub parameter: &'a str,
+    /// Value in the notation of users.
+    pub value: &'a str,
+}
 
 /// Parses a new value of a live parameter.
 ///
@@ -55,13 +67,13 @@ impl PluginTable {
     /// Adds the replacement of a model and returns its generation; new values are checked against it from now on.
     pub(in super::super) fn add(&self, model: usize, report: PluginReport, chosen_by: ChosenBy) -> u16 {
         let mut places = self.lock();
-        let devices = devices(&places);
-        places.get_mut(devices + model).map_or(0, |versions| versions.add(report, chosen_by))
+        let plugin = plugin_of(model, &places);
+        places.get_mut(plugin.position()).map_or(0, |versions| versions.add(report, chosen_by))
     }
 
     /// Records that the loop has put a generation in place; new values are checked against it from now on.
-    pub(super) fn set_current(&self, plugin: u16, generation: u16) {
-        if let Some(versions) = self.lock().get_mut(usize::from(plugin)) {
+    pub(super) fn set_current(&self, plugin: PluginIndex, generation: u16) {
+        if let Some(versions) = self.lock().get_mut(plugin.position()) {
             (versions.current, versions.in_place) = (generation, generation);
             versions.forget();
         }
@@ -70,7 +82,16 @@ impl PluginTable {
     /// Returns the plugin of a model and generation.
     pub(super) fn plugin(&self, model: usize, generation: u16) -> Option<PluginReport> {
         let places = self.lock();
-        places.get(devices(&places) + model).map(|versions| versions.get(generation).clone())
+        let versions = places.get(plugin_of(model, &places).position());
+        versions.map(|versions| versions.get(generation).clone())
+    }
+
+    /// Returns the name of a model; its number, if the run has fewer models.
+    pub(super) fn name(&self, model: usize) -> String {
+        let places = self.lock();
+        let plugin = plugin_of(model, &places);
+        let versions = places.get(plugin.position());
+        versions.map_or_else(|| plugin.to_string(), |versions| versions.first.name.clone())
     }
 
     /// Returns the replacements in place, except those that the seed chose.
@@ -86,8 +107,8 @@ impl PluginTable {
     /// Records that the loop has returned a generation of a model, which may be dropped.
     pub(super) fn retire(&self, model: usize, generation: u16) {
         let mut places = self.lock();
-        let devices = devices(&places);
-        let Some(versions) = places.get_mut(devices + model) else { return };
+        let plugin = plugin_of(model, &places);
+        let Some(versions) = places.get_mut(plugin.position()) else { return };
         let retired = versions.later.iter_mut().find(|version| version.generation == generation);
         if let Some(version) = retired {
             version.is_retired = true;
@@ -101,16 +122,19 @@ impl PluginTable {
     }
 
     /// Returns the numbers of the plugins with a name (a model has one on each of its devices), or of the first plugin with this id.
-    fn numbers(&self, name: &str) -> Result<Vec<u16>, ControlError> {
+    fn numbers(&self, name: &str) -> Result<Vec<PluginIndex>, ControlError> {
         let places = self.lock();
-        let named = |versions: &Versions| is_named(&versions.now().name, name);
-        let found: Vec<u16> =
-            (0..).zip(&*places).filter(|(_, versions)| named(versions)).map(|(number, _)| number).collect();
+        let named = places.iter().map(|versions| is_named(&versions.now().name, name));
+        let found: Vec<PluginIndex> = named
+            .enumerate()
+            .filter(|(_, is_named)| *is_named)
+            .map(|(place, _)| PluginIndex::at(place))
+            .collect();
         if !found.is_empty() {
             return Ok(found);
         }
-        let of_id = (0..).zip(&*places).find(|(_, versions)| versions.now().metadata.id == name);
-        of_id.map(|(number, _)| vec![number]).ok_or_else(|| {
+        let of_id = places.iter().position(|versions| versions.now().metadata.id == name);
+        of_id.map(|place| vec![PluginIndex::at(place)]).ok_or_else(|| {
             let names = || places.iter().map(|versions| versions.now().name.as_str());
             ControlError::UnknownPlugin {
                 name: name.to_owned(),
@@ -123,7 +147,7 @@ impl PluginTable {
     /// Returns the numbers, among the models, of the models with a name.
     pub(in super::super) fn models(&self, name: &str) -> Result<Vec<usize>, ControlError> {
         let devices = devices(&self.lock());
-        let model = |number: u16| usize::from(number).checked_sub(devices).ok_or(ControlError::NoWeight);
+        let model = |plugin: PluginIndex| plugin.among_models(devices).ok_or(ControlError::NoWeight);
         self.numbers(name)?.into_iter().map(model).collect()
     }
 
@@ -145,9 +169,9 @@ impl PluginTable {
         self.numbers(new.plugin)?.into_iter().map(|plugin| self.check_one(plugin, new)).collect()
     }
 
-    fn check_one(&self, plugin: u16, new: &NewValue<'_>) -> Result<ParameterChange, ControlError> {
+    fn check_one(&self, plugin: PluginIndex, new: &NewValue<'_>) -> Result<ParameterChange, ControlError> {
         let places = self.lock();
-        let versions = places.get(usize::from(plugin)).ok_or(ControlError::Ended)?;
+        let versions = places.get(plugin.position()).ok_or(ControlError::Ended)?;
         let (part, generation) = (versions.now(), versions.current);
         let setting = live_setting(part, new)?;
         let parameter = u32::try_from(setting.index()).unwrap_or(u32::MAX); // schemas have tens of entries
@@ -157,7 +181,7 @@ impl PluginTable {
     /// Returns the rate at which a user's request moves a number: a tenth of its soft range in 50 ms.
     pub(super) fn pace(&self, change: &ParameterChange) -> Pace {
         let places = self.lock();
-        let part = places.get(usize::from(change.plugin)).map(|versions| versions.get(change.generation));
+        let part = places.get(change.plugin.position()).map(|versions| versions.get(change.generation));
         let index = change.parameter as usize;
         part.and_then(|part| {
             let range = part.soft_ranges.get(index)?.as_ref()?;
@@ -172,7 +196,7 @@ impl PluginTable {
     pub(super) fn describe(&self, report: &ChangeReport) -> Change {
         let ChangeReport { tick, time_ns, change, outcome } = *report;
         let places = self.lock();
-        let part = places.get(usize::from(change.plugin)).map(|versions| versions.get(change.generation));
+        let part = places.get(change.plugin.position()).map(|versions| versions.get(change.generation));
         let (subject, parameter, value) = match (part, change.parameter) {
             (_, WEIGHT) => (ChangeSubject::Weight, "weight".to_owned(), change.value.to_string()),
             (Some(part), PLUGIN) => {
@@ -190,7 +214,7 @@ impl PluginTable {
         Change {
             tick,
             time_ns,
-            plugin: part.map_or_else(String::new, |part| part.name.clone()),
+            plugin: part.map_or_else(|| change.plugin.to_string(), |part| part.name.clone()),
             subject,
             parameter,
             value,
@@ -199,6 +223,11 @@ impl PluginTable {
             outcome,
         }
     }
+}
+
+/// Returns the number of a model among all plugins.
+fn plugin_of(model: usize, plugins: &[Versions]) -> PluginIndex {
+    PluginIndex::of_model(devices(plugins), model)
 }
 
 /// Returns the number of devices, which come first.

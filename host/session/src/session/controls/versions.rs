@@ -1,6 +1,6 @@
 //! Versions of a plugin in a run: the first one and its replacements, by generation.
 
-use super::super::PluginReport;
+use super::super::plugin_report::PluginReport;
 use std::collections::VecDeque;
 
 /// Capacity that stays allocated: for the version in place, the one before, one that fades in, one that fades out.
