@@ -8,3 +8,14 @@ pub enum Clock {
     /// Simulated time without waiting: the next tick is due when the last one is done. Bit-exact.
     Virtual,
 }
+
+impl Clock {
+    /// Returns the word for the clock in summaries.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Real => "real",
+            Self::Virtual => "virtual",
+        }
+    }
+}

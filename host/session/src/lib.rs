@@ -20,6 +20,7 @@ mod estimates;
 mod feel;
 pub mod headless;
 mod long_call;
+mod measurements;
 mod nanoseconds;
 mod platform;
 mod plugin_process;
@@ -39,6 +40,7 @@ pub use calls::{
 pub use estimates::estimates;
 pub use flotor_servo::THREAD_ADVICE;
 pub use long_call::{Exceeded, LongCall, step_limit};
+pub use measurements::Measurements;
 pub use platform::{ThreadClock, end_with_this_thread};
 pub use plugin_process::PluginProcess;
 pub use run_recording::RunRecording;

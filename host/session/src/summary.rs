@@ -1,9 +1,9 @@
 //! Summary of a run: numbers for machines, a page for users.
 
 use crate::feel::Feel;
-use crate::scene::Isolation;
+use crate::scene::{Isolation, Scene};
 use crate::telemetry::LinkCounts;
-use crate::{FaultyPlugin, Observer, Outcome, PluginReport};
+use crate::{FaultyPlugin, Observer, Outcome, PluginReport, RunOptions};
 use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;
 use flotor_core::trace::{Events, TickRecord};
@@ -13,7 +13,7 @@ use flotor_servo::RunEnd;
 use flotor_servo::{
     CouplingOutcome, EnvelopeEffects, ModelHealth, Overrun, Percentiles, Stage, StageEffect, Timing,
 };
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Observer that collects the tick statistics of a run.
 #[derive(Default)]
@@ -167,8 +167,9 @@ impl NotComputed {
 pub struct RunSummary {
     /// Title of the scene.
     pub title: String,
-    /// End: "finished", "stopped", "device_fault", "emergency_stop", "too_fast", "not_paced", "watchdog", "oscillation" or "unguarded".
-    pub end: &'static str,
+    /// End, in JSON its [word](RunEnd::word).
+    #[serde(serialize_with = "write_word")]
+    pub end: RunEnd,
     /// "real" or "virtual".
     pub clock: &'static str,
     /// Seed of the run.
@@ -406,20 +407,14 @@ pub struct PluginSummary {
 
 /// Inputs of a summary, beyond the outcome.
 pub struct RunFacts<'a> {
-    /// Title of the scene.
-    pub title: &'a str,
-    /// "real" or "virtual".
-    pub clock: &'static str,
-    /// Seed of the run.
-    pub seed: u64,
-    /// Requested rate, Hz.
-    pub rate_hz: f64,
+    /// Scene of the run.
+    pub scene: &'a Scene,
+    /// Options of the run.
+    pub options: &'a RunOptions,
     /// Plugins of the run.
     pub plugins: &'a [PluginReport],
     /// Model outputs that the run's own observer requested, without those of clients.
     pub requested: Demand,
-    /// Couplings between devices.
-    pub couplings: &'a [CouplingDescription],
     /// Counts of messages between hosts, by name of the coupling.
     pub carried: &'a [(String, LinkCounts)],
     /// Digest of the trace.
@@ -467,21 +462,8 @@ impl LinkSummary {
     }
 }
 
-/// Returns the cause of the end of a run, as text for users.
-#[must_use]
-pub fn end_cause(end: &RunEnd) -> String {
-    match end {
-        RunEnd::DeviceFault(fault) => format!("device fault, {}", fault.advice()),
-        RunEnd::EmergencyStop(source) => format!("emergency stop ({})", source.word()),
-        RunEnd::TooFast(samples_per_s) => {
-            format!("the device sends {samples_per_s} samples a second, too many")
-        }
-        RunEnd::NotPaced => "the device does not set the pace".to_owned(),
-        RunEnd::Oscillation => "the force oscillated between its limits".to_owned(),
-        RunEnd::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
-        RunEnd::Unguarded => "the watchdog process had ended".to_owned(),
-        RunEnd::Finished | RunEnd::Stopped => "the run was stopped".to_owned(),
-    }
+fn write_word<S: Serializer>(end: &RunEnd, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(end.word())
 }
 
 impl RunSummary {
@@ -498,21 +480,11 @@ impl RunSummary {
             .fold(Demand::ALL, |all, (device, _)| all.limited_to(device.at_hand.with(facts.requested)));
         let not_computed = tally.not_computed.beyond(needed).names();
         Self {
-            title: facts.title.to_owned(),
-            end: match outcome.end {
-                RunEnd::Finished => "finished",
-                RunEnd::Stopped => "stopped",
-                RunEnd::DeviceFault(_) => "device_fault",
-                RunEnd::EmergencyStop(_) => "emergency_stop",
-                RunEnd::TooFast(_) => "too_fast",
-                RunEnd::NotPaced => "not_paced",
-                RunEnd::Watchdog(_) => "watchdog",
-                RunEnd::Oscillation => "oscillation",
-                RunEnd::Unguarded => "unguarded",
-            },
-            clock: facts.clock,
-            seed: facts.seed,
-            rate_hz: facts.rate_hz,
+            title: facts.scene.title.clone(),
+            end: outcome.end,
+            clock: facts.options.clock.word(),
+            seed: facts.options.seed,
+            rate_hz: facts.scene.rate_hz,
             ticks: *ticks,
             late_ticks: *late,
             missed_ticks: *missed,
@@ -546,7 +518,7 @@ impl RunSummary {
             devices: (facts.plugins.iter().zip(&tally.devices).enumerate())
                 .map(|(number, device)| device_summary(device, number, outcome))
                 .collect(),
-            couplings: (facts.couplings.iter().zip(&outcome.couplings))
+            couplings: (facts.scene.couplings.iter().zip(&outcome.couplings))
                 .map(|(coupling, outcome)| coupling_summary(coupling, outcome, facts.carried))
                 .collect(),
             events: events.filter(|(_, count)| *count > 0).collect(),
