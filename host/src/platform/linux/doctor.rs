@@ -1,6 +1,6 @@
 //! Findings of `flotor doctor` from files of the kernel.
 
-use crate::cli::doctor::Diagnosis;
+use crate::diagnosis::Diagnosis;
 use flotor_servo::platform::{GroupLimit, LimitValue, Use, group_limits, real_time_budget_advice};
 use flotor_servo::watchdog_process::probe_shared_group;
 use std::fs::read_to_string;

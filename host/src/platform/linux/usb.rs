@@ -1,6 +1,6 @@
 //! Diagnosis of a device's USB connection from sysfs: presence, hub, driver, permission.
 
-use crate::cli::doctor::Diagnosis;
+use crate::diagnosis::Diagnosis;
 use flotor_hal::{UsbAccess, UsbKind};
 use rustix::fs::{Access, access};
 use std::fs::{read_dir, read_link, read_to_string};
@@ -262,7 +262,7 @@ fn text_of(folder: &Path, file: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::doctor::Grade;
+    use crate::diagnosis::Grade;
     use std::fs::{create_dir_all, write};
     use std::os::unix::fs::symlink;
 
