@@ -25,8 +25,8 @@ pub struct Tally {
     events: Events,
     generated_peak_j: f64,
     port_lowest_j: f64,
-    /// Outputs of the models that were not computed in every tick.
-    not_computed: NotComputed,
+    /// Outputs of the models that were computed in every tick at every device; `None` before the first tick.
+    computed: Option<Demand>,
 }
 
 /// Tick statistics of one device.
@@ -119,7 +119,8 @@ impl Observer for Tally {
             self.events = Events::NONE;
         }
         self.events.insert(record.events);
-        self.not_computed.observe(record);
+        let computed = record.model.computed();
+        self.computed = Some(self.computed.map_or(computed, |all| all.limited_to(computed)));
         let device = usize::from(record.device);
         if self.devices.len() <= device {
             self.devices.resize_with(device + 1, DeviceTally::default);
@@ -131,34 +132,6 @@ impl Observer for Tally {
             let port_j = self.devices.iter().map(DeviceTally::port_energy_j).sum();
             self.port_lowest_j = self.port_lowest_j.min(port_j);
         }
-    }
-}
-
-/// Outputs of the models that were absent in some tick at some device.
-#[derive(Default)]
-struct NotComputed {
-    torque: bool,
-    energy: bool,
-}
-
-impl NotComputed {
-    fn observe(&mut self, record: &TickRecord) {
-        self.torque |= record.model.torque().is_none();
-        self.energy |= record.model.energy_j().is_none();
-    }
-
-    /// Adds the outputs that only clients requested: the summary does not depend on clients.
-    fn beyond(&self, needed: Demand) -> Self {
-        let is_absent = |absent: bool, output| absent || !needed.contains(output);
-        Self {
-            torque: is_absent(self.torque, Demand::TORQUE),
-            energy: is_absent(self.energy, Demand::ENERGY),
-        }
-    }
-
-    fn names(&self) -> Vec<&'static str> {
-        let all = [(self.torque, "torque"), (self.energy, "energy")];
-        all.into_iter().filter_map(|(is_absent, name)| is_absent.then_some(name)).collect()
     }
 }
 
@@ -478,7 +451,11 @@ impl RunSummary {
         let elapsed_s = outcome.elapsed_ns as f64 * 1.0e-9;
         let needed = (facts.plugins.iter().zip(&tally.devices))
             .fold(Demand::ALL, |all, (device, _)| all.limited_to(device.at_hand.with(facts.requested)));
-        let not_computed = tally.not_computed.beyond(needed).names();
+        // Without the outputs that only clients requested: the summary does not depend on clients.
+        let computed = tally.computed.map_or(needed, |computed| computed.limited_to(needed));
+        let outputs = [(Demand::TORQUE, "torque"), (Demand::ENERGY, "energy")];
+        let absent = outputs.into_iter().filter(|(output, _)| !computed.contains(*output));
+        let not_computed: Vec<&str> = absent.map(|(_, name)| name).collect();
         Self {
             title: facts.scene.title.clone(),
             end: outcome.end,

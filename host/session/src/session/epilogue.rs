@@ -1,10 +1,8 @@
 //! End of a run: de-energises the devices, queries the last messages of the models, and creates the outcome.
 
-use super::controls::{Controls, Settled};
-use super::outcome::{DeviceOutcome, Outcome};
+use super::controls::Settled;
 use super::plugin_report::PluginNames;
-use super::stop_time::StopTime;
-use super::unfreed_plugins::UnfreedPlugins;
+use super::{Controls, DeviceOutcome, Outcome, StopTime, UnfreedPlugins};
 use crate::calls::{Call, CallError, CallThread, EndReserve, Progress, Unresponsive, end_limit};
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
 use flotor_servo::{

@@ -1,12 +1,10 @@
 //! Run on the virtual clock that the caller advances, tick by tick, and that ends with the usual outcome.
 
-use super::Session;
-use super::controls::{ChangeLog, Controls};
+use super::controls::ChangeLog;
 use super::epilogue::{Epilogue, Finished};
-use super::error::RunError;
-use super::observer::{Observer, Taps};
-use super::outcome::Outcome;
+use super::observer::Taps;
 use super::prepared_loop::{PreparedLoop, activate};
+use super::{Controls, Observer, Outcome, RunError, Session};
 use crate::calls::EndReserve;
 use flotor_core::demand::DemandRequest;
 use flotor_hal::Demand;

@@ -1,9 +1,6 @@
 //! Outcome of a run.
 
-use super::controls::FaultyPlugin;
-use super::plugin_report::PluginReport;
-use super::stop_time::StopTime;
-use super::unfreed_plugins::UnfreedPlugins;
+use super::{FaultyPlugin, PluginReport, StopTime, UnfreedPlugins};
 use crate::calls::Unresponsive;
 use flotor_core::plausibility::ImplausibleSamples;
 use flotor_hal::{EnergyLedger, Fault};

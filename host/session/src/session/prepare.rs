@@ -1,8 +1,6 @@
 //! Devices and models of a scene: loads their plugins, checks their settings, opens the devices and creates the models.
 
-use super::error::RunError;
-use super::plugin_report::PluginReport;
-use super::stop_without_host::StopWithoutHost;
+use super::{PluginReport, RunError, StopWithoutHost};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
 use crate::calls::{Call, CallThread, Progress, is_to_begin, keeping_machine, limit};
 use crate::estimates;
@@ -104,18 +102,13 @@ fn open_device(registry: &Registry, device: &DeviceUse) -> Result<(Opened, Plugi
     };
     let (mut device, capabilities, stop, values) =
         keeping_machine(name, || CallThread::default().run_while(limit(), is_to_begin, open))??;
-    let mut report = report(&plugin, name, used, &settings, |index| value_at(&values, index));
+    let mut report = report(&plugin, name, used, &settings, &values);
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
     }
     report.signals_taken = signals.put_back();
     report.latency_s = capabilities.latency_s;
     Ok((Opened { device, capabilities, embodiment, stop }, report))
-}
-
-/// Returns the value of a parameter; NaN without one.
-fn value_at(values: &[f64], index: usize) -> f64 {
-    values.get(index).copied().unwrap_or(f64::NAN)
 }
 
 /// Loads one model of a scene and creates it in all its places. Not real-time.
@@ -159,7 +152,7 @@ pub(super) fn prepare_model_while(
     let make = move |progress: &Progress| builder.layer(progress);
     let (layer, values, estimates) =
         keeping_machine(&model.name, || CallThread::default().run_while(most, is_wanted, make))??;
-    let mut report = report(&plugin, &model.name, &model.plugin, &settings, |index| value_at(&values, index));
+    let mut report = report(&plugin, &model.name, &model.plugin, &settings, &values);
     report.signals_taken = signals.put_back();
     report.estimates = estimates;
     report.isolation = Some(isolation);
@@ -361,16 +354,16 @@ fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, 
     }
 }
 
-/// Creates a report on a plugin with these settings; `value` reads a parameter of the plugin.
+/// Creates a report on a plugin with these settings and the values of its parameters.
 fn report(
     plugin: &Plugin,
     name: &str,
     used: &PluginUse,
     settings: &[Setting],
-    value: impl FnMut(usize) -> f64,
+    values: &[f64],
 ) -> PluginReport {
     let written = used.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone()));
-    let parameters = in_force(plugin, settings, value);
+    let parameters = in_force(plugin, settings, values);
     PluginReport {
         name: name.to_owned(),
         metadata: plugin.metadata().clone(),
@@ -398,11 +391,7 @@ fn soft_ranges(plugin: &Plugin, values: &[(String, String)]) -> Vec<Option<SoftR
 }
 
 /// Returns every parameter with its value, as text.
-fn in_force(
-    plugin: &Plugin,
-    settings: &[Setting],
-    mut value: impl FnMut(usize) -> f64,
-) -> Vec<(String, String)> {
+fn in_force(plugin: &Plugin, settings: &[Setting], values: &[f64]) -> Vec<(String, String)> {
     let schema = plugin.parameters();
     let show = |(index, parameter): (usize, &Parameter)| {
         let text = match parameter.kind() {
@@ -412,7 +401,8 @@ fn in_force(
                 set.map_or_else(String::new, |setting| setting.display())
             }
             ParameterKind::Real | ParameterKind::Choice => {
-                let setting = Setting::number(schema, parameter.id(), value(index));
+                let value = values.get(index).copied().unwrap_or(f64::NAN);
+                let setting = Setting::number(schema, parameter.id(), value);
                 setting.map_or_else(|_| String::new(), |setting| setting.display())
             }
         };

@@ -1,8 +1,8 @@
 //! Loop of a run before its devices are energised.
 
-use super::error::RunError;
 use super::observer::Taps;
-use super::plugin_report::{PluginNames, PluginReport};
+use super::plugin_report::PluginNames;
+use super::{PluginReport, RunError};
 use crate::calls::{Call, CallThread, Progress, is_to_begin, limit};
 use flotor_core::PluginIndex;
 use flotor_hal::abi::loader::Stopper;

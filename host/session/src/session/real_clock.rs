@@ -1,14 +1,13 @@
 //! Loop on the real clock, on a thread of its own; the caller's thread serves the observers and watches the loop.
 
-use super::controls::{ChangeLog, Controls};
+use super::controls::ChangeLog;
 use super::epilogue::Finished;
-use super::error::RunError;
-use super::latch::{self, LatchGuard};
-use super::observer::{Observer, Taps};
+use super::latch;
+use super::observer::Taps;
 use super::plugin_report::PluginNames;
 use super::prepared_loop::{PreparedLoop, activate_here};
 use super::stop_time::StopTimer;
-use super::unguarded::Guardian;
+use super::{Controls, Guardian, LatchGuard, Observer, RunError};
 use crate::calls::{Call, CallError, Progress, Unresponsive, abandon, end_limit, limit};
 use crate::long_call::Exceeded;
 use crate::scene::Pacing;
@@ -57,16 +56,19 @@ pub(super) fn run(
     observer: &mut dyn Observer,
     stop: &StopSwitch,
 ) -> Result<Finished, RunError> {
-    let (records, mut received) = queue(RING_RECORDS);
+    let (mut records, mut received) = queue(RING_RECORDS);
     let mut guardian = Guardian::of(clock.watchdog_process.as_ref(), clock.requires_independent_stop);
     // Watch before the final check of the latch, so that no press is missed.
     let latch = clock.latch.as_ref().map(|latch| latch.watch(stop)).transpose();
     let _latch = latch.map_err(|_| RunError::NoThread(latch::WATCH))?;
     let mut requested = prepared.standby.observers().request(observer.demand());
     let mut watch = LoopWatch::of(&prepared, clock.watchdog_ns);
-    let (progress, stopping) = (watch.progress.clone(), watch.stopping.clone());
+    let (progress, stopping, loop_stop) = (watch.progress.clone(), watch.stopping.clone(), stop.clone());
+    // Not scoped: a thread that is stuck in a plugin has to be abandoned.
+    let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
     let servo_thread =
-        LoopThread { prepared, clock, stop: stop.clone(), records, progress, stopping }.start()?;
+        thread.spawn(move || run_loop(prepared, clock, &loop_stop, &mut records, &progress, &stopping));
+    let servo_thread = servo_thread.map_err(|_| RunError::NoThread("the loop"))?;
     while !servo_thread.is_finished() {
         requested.change_to(observer.demand());
         drain(&mut received, |record| changes.deliver(&record, observer));
@@ -100,60 +102,48 @@ impl Stopping {
     }
 }
 
-/// Everything that the loop's thread owns.
-struct LoopThread {
+/// Energises the devices, runs the loop to its end, and stops the devices, on the loop's thread.
+fn run_loop(
     prepared: PreparedLoop,
     clock: RealClock,
-    stop: StopSwitch,
-    records: Producer<TickRecord>,
-    progress: Progress,
-    stopping: Stopping,
-}
-
-impl LoopThread {
-    /// Starts the thread, not scoped: a thread that is stuck in a plugin has to be abandoned.
-    fn start(self) -> Result<JoinHandle<Result<Finished, RunError>>, RunError> {
-        let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
-        thread.spawn(|| self.run()).map_err(|_| RunError::NoThread("the loop"))
-    }
-
-    /// Energises the devices, runs the loop to its end, and stops the devices.
-    fn run(self) -> Result<Finished, RunError> {
-        let Self { prepared, clock, stop, mut records, progress, stopping } = self;
-        let PreparedLoop { standby, plugins, mut taps, period_ns, duration_ns } = prepared;
-        let RealClock { pacing, core, watchdog_ns, watchdog_process, latch, .. } = clock;
-        let real_time = enter_real_time(core);
-        // The polling thread notices the end of the process.
-        let signs = watchdog_process.as_ref().and_then(|process| {
-            let _ = process.follow_this_thread();
-            process.heartbeat_sender().ok()
-        });
-        let spin = (pacing == Pacing::Host).then(|| SpinWindow::measure(period_ns));
-        let (stoppers, heartbeat) = (standby.stoppers(), standby.heartbeat());
-        // After all other steps that take time.
-        latch.as_ref().map_or(Ok(()), LatchGuard::check)?;
-        let servo = activate_here(standby, &plugins, &progress)?;
-        let schedule = match spin {
-            Some(window) => Schedule::start_real(period_ns, window),
-            None => Schedule::start_paced(period_ns),
-        };
-        let watchdog = start_watchdog(heartbeat, stoppers.clone(), stop.clone(), watchdog_ns, signs);
-        let mut runner = Loop::new(servo, schedule, duration_ns).releasing();
-        // Without a watchdog nothing is moved.
-        let (dropped_records, last_tick) = match &watchdog {
-            Ok(_) => tick(&mut runner, &stop, &mut taps, &mut records),
-            Err(_) => (0, Duration::ZERO),
-        };
-        let timer = stop_devices(runner.end(), last_tick, &stop, &stoppers, &stopping);
-        runner.servo().heartbeat().finish();
-        // From here on nothing is energised.
-        drop(watchdog_process);
-        wait_for_end_of(&watchdog.map_err(|_| RunError::NoThread("the watchdog"))?);
-        let finished = Finished::of(runner, dropped_records, real_time);
-        let is_emergency = matches!(finished.end, RunEnd::EmergencyStop(_));
-        let stop_time = is_emergency.then(|| timer.since_request(&stop, latch.as_ref()));
-        Ok(Finished { stop_time, ..finished })
-    }
+    stop: &StopSwitch,
+    records: &mut Producer<TickRecord>,
+    progress: &Progress,
+    stopping: &Stopping,
+) -> Result<Finished, RunError> {
+    let PreparedLoop { standby, plugins, mut taps, period_ns, duration_ns } = prepared;
+    let RealClock { pacing, core, watchdog_ns, watchdog_process, latch, .. } = clock;
+    let real_time = enter_real_time(core);
+    // The polling thread notices the end of the process.
+    let signs = watchdog_process.as_ref().and_then(|process| {
+        let _ = process.follow_this_thread();
+        process.heartbeat_sender().ok()
+    });
+    let spin = (pacing == Pacing::Host).then(|| SpinWindow::measure(period_ns));
+    let (stoppers, heartbeat) = (standby.stoppers(), standby.heartbeat());
+    // After all other steps that take time.
+    latch.as_ref().map_or(Ok(()), LatchGuard::check)?;
+    let servo = activate_here(standby, &plugins, progress)?;
+    let schedule = match spin {
+        Some(window) => Schedule::start_real(period_ns, window),
+        None => Schedule::start_paced(period_ns),
+    };
+    let watchdog = start_watchdog(heartbeat, stoppers.clone(), stop.clone(), watchdog_ns, signs);
+    let mut runner = Loop::new(servo, schedule, duration_ns).releasing();
+    // Without a watchdog nothing is moved.
+    let (dropped_records, last_tick) = match &watchdog {
+        Ok(_) => tick(&mut runner, stop, &mut taps, records),
+        Err(_) => (0, Duration::ZERO),
+    };
+    let timer = stop_devices(runner.end(), last_tick, stop, &stoppers, stopping);
+    runner.servo().heartbeat().finish();
+    // From here on nothing is energised.
+    drop(watchdog_process);
+    wait_for_end_of(&watchdog.map_err(|_| RunError::NoThread("the watchdog"))?);
+    let finished = Finished::of(runner, dropped_records, real_time);
+    let is_emergency = matches!(finished.end, RunEnd::EmergencyStop(_));
+    let stop_time = is_emergency.then(|| timer.since_request(stop, latch.as_ref()));
+    Ok(Finished { stop_time, ..finished })
 }
 
 /// Runs the loop to its end; returns the number of dropped records, and the time of the last tick. A full queue drops records:

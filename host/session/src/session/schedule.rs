@@ -1,10 +1,8 @@
 //! Scheduled changes of a scene, checked, with the models for replacements.
 
 use super::choice::chosen;
-use super::controls::{ChosenBy, ControlError, NewValue, PluginTable, understands};
-use super::error::RunError;
-use super::plugin_report::PluginReport;
-use super::prepare::prepare_model;
+use super::controls::{ChosenBy, PluginTable, understands};
+use super::{ControlError, NewValue, PluginReport, RunError, prepare_model};
 use crate::nanoseconds::whole_ns;
 use crate::registry::Registry;
 use crate::scene::{Alternative, ChangeUse, ChangeWhat, ParameterText, Scene};

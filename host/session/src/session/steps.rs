@@ -1,10 +1,7 @@
 //! Run on the virtual clock that the caller advances: for experiments, which decide between ticks how to continue.
 
-use super::controls::Controls;
-use super::error::RunError;
-use super::observer::Observer;
 use super::virtual_loop::VirtualLoop;
-use super::{RunOptions, Session};
+use super::{Controls, Observer, RunError, RunOptions, Session};
 use crate::registry::Registry;
 use crate::scene::Scene;
 use flotor_coupling::Line;

@@ -1,11 +1,11 @@
 //! Loop on the virtual clock, on a thread of its own: a plugin call that does not return is reported, and the thread abandoned.
 
-use super::controls::{ChangeLog, Controls};
+use super::controls::ChangeLog;
 use super::epilogue::Finished;
-use super::error::RunError;
-use super::observer::{Observer, Taps};
+use super::observer::Taps;
 use super::plugin_report::PluginNames;
 use super::prepared_loop::{PreparedLoop, activate};
+use super::{Controls, Observer, RunError};
 use crate::calls::abandon;
 use crate::long_call::{Exceeded, LongCall, step_limit};
 use crate::platform::ThreadClock;

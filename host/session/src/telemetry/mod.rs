@@ -195,8 +195,14 @@ impl Serve for Host {
             Ask::Swap { model, plugin, settings } => self.swap(&model, plugin.as_deref(), &settings),
             Ask::EmergencyStop => return emergency_stop(stop, latch.as_ref()),
             Ask::Watch { .. } | Ask::Unwatch => Ok(()), // handled by the publication
-            Ask::Stop => Ok(stop.stop()),
-            Ask::MachineStop => Ok(machine_stop(stop, latch.as_ref())),
+            Ask::Stop => {
+                stop.stop();
+                Ok(())
+            }
+            Ask::MachineStop => {
+                machine_stop(stop, latch.as_ref());
+                Ok(())
+            }
         };
         changed.map_err(|error| refused(&error))
     }

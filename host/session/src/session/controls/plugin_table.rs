@@ -52,23 +52,29 @@ pub(in super::super) fn understands(part: &PluginReport, new: &NewValue<'_>) -> 
 #[derive(Clone)]
 pub(in super::super) struct PluginTable {
     places: Arc<Mutex<Vec<Versions>>>,
+    devices: usize,
 }
 
 impl PluginTable {
     /// Creates the table of the plugins that a run begins with.
     pub(in super::super) fn new(plugins: &[PluginReport]) -> Self {
-        Self { places: Arc::new(Mutex::new(plugins.iter().map(Versions::new).collect())) }
+        let is_device = |plugin: &&PluginReport| plugin.metadata.kind == PluginKind::Device;
+        let devices = plugins.iter().filter(is_device).count();
+        Self { places: Arc::new(Mutex::new(plugins.iter().map(Versions::new).collect())), devices }
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Vec<Versions>> {
         self.places.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// Calls `on_model` with the versions of a model; returns `None` if the run has fewer models.
+    fn model<T>(&self, model: usize, on_model: impl FnOnce(&mut Versions) -> T) -> Option<T> {
+        self.lock().get_mut(PluginIndex::of_model(self.devices, model).position()).map(on_model)
+    }
+
     /// Adds the replacement of a model and returns its generation; new values are checked against it from now on.
     pub(in super::super) fn add(&self, model: usize, report: PluginReport, chosen_by: ChosenBy) -> u16 {
-        let mut places = self.lock();
-        let plugin = plugin_of(model, &places);
-        places.get_mut(plugin.position()).map_or(0, |versions| versions.add(report, chosen_by))
+        self.model(model, |versions| versions.add(report, chosen_by)).unwrap_or(0)
     }
 
     /// Records that the loop has put a generation in place; new values are checked against it from now on.
@@ -81,17 +87,13 @@ impl PluginTable {
 
     /// Returns the plugin of a model and generation.
     pub(super) fn plugin(&self, model: usize, generation: u16) -> Option<PluginReport> {
-        let places = self.lock();
-        let versions = places.get(plugin_of(model, &places).position());
-        versions.map(|versions| versions.get(generation).clone())
+        self.model(model, |versions| versions.get(generation).clone())
     }
 
     /// Returns the name of a model; its number, if the run has fewer models.
     pub(super) fn name(&self, model: usize) -> String {
-        let places = self.lock();
-        let plugin = plugin_of(model, &places);
-        let versions = places.get(plugin.position());
-        versions.map_or_else(|| plugin.to_string(), |versions| versions.first.name.clone())
+        let name = self.model(model, |versions| versions.first.name.clone());
+        name.unwrap_or_else(|| PluginIndex::of_model(self.devices, model).to_string())
     }
 
     /// Returns the replacements in place, except those that the seed chose.
@@ -106,14 +108,7 @@ impl PluginTable {
 
     /// Records that the loop has returned a generation of a model, which may be dropped.
     pub(super) fn retire(&self, model: usize, generation: u16) {
-        let mut places = self.lock();
-        let plugin = plugin_of(model, &places);
-        let Some(versions) = places.get_mut(plugin.position()) else { return };
-        let retired = versions.later.iter_mut().find(|version| version.generation == generation);
-        if let Some(version) = retired {
-            version.is_retired = true;
-        }
-        versions.forget();
+        self.model(model, |versions| versions.retire(generation));
     }
 
     /// Checks new values against the plugins that a run begins with.
@@ -124,17 +119,14 @@ impl PluginTable {
     /// Returns the numbers of the plugins with a name (a model has one on each of its devices), or of the first plugin with this id.
     fn numbers(&self, name: &str) -> Result<Vec<PluginIndex>, ControlError> {
         let places = self.lock();
-        let named = places.iter().map(|versions| is_named(&versions.now().name, name));
-        let found: Vec<PluginIndex> = named
-            .enumerate()
-            .filter(|(_, is_named)| *is_named)
-            .map(|(place, _)| PluginIndex::at(place))
-            .collect();
+        let numbered = || (0..).map(PluginIndex::at).zip(&*places);
+        let named = numbered().filter(|(_, versions)| is_named(&versions.now().name, name));
+        let found: Vec<PluginIndex> = named.map(|(number, _)| number).collect();
         if !found.is_empty() {
             return Ok(found);
         }
-        let of_id = places.iter().position(|versions| versions.now().metadata.id == name);
-        of_id.map(|place| vec![PluginIndex::at(place)]).ok_or_else(|| {
+        let of_id = numbered().find(|(_, versions)| versions.now().metadata.id == name);
+        of_id.map(|(number, _)| vec![number]).ok_or_else(|| {
             let names = || places.iter().map(|versions| versions.now().name.as_str());
             ControlError::UnknownPlugin {
                 name: name.to_owned(),
@@ -146,8 +138,7 @@ impl PluginTable {
 
     /// Returns the numbers, among the models, of the models with a name.
     pub(in super::super) fn models(&self, name: &str) -> Result<Vec<usize>, ControlError> {
-        let devices = devices(&self.lock());
-        let model = |plugin: PluginIndex| plugin.among_models(devices).ok_or(ControlError::NoWeight);
+        let model = |plugin: PluginIndex| plugin.among_models(self.devices).ok_or(ControlError::NoWeight);
         self.numbers(name)?.into_iter().map(model).collect()
     }
 
@@ -223,14 +214,4 @@ impl PluginTable {
             outcome,
         }
     }
-}
-
-/// Returns the number of a model among all plugins.
-fn plugin_of(model: usize, plugins: &[Versions]) -> PluginIndex {
-    PluginIndex::of_model(devices(plugins), model)
-}
-
-/// Returns the number of devices, which come first.
-fn devices(plugins: &[Versions]) -> usize {
-    plugins.iter().take_while(|versions| versions.now().metadata.kind == PluginKind::Device).count()
 }

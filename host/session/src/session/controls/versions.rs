@@ -58,6 +58,15 @@ impl Versions {
         self.newest
     }
 
+    /// Records that the loop has returned a generation, which may be dropped.
+    pub(super) fn retire(&mut self, generation: u16) {
+        let mut later = self.later.iter_mut();
+        if let Some(version) = later.find(|version| version.generation == generation) {
+            version.is_retired = true;
+        }
+        self.forget();
+    }
+
     /// Drops replacements that no report can refer to any more, so that memory stays bounded. A pending change may refer to the
     /// version before the one in place, and the loop to an older one until its return.
     pub(super) fn forget(&mut self) {
