@@ -1,8 +1,8 @@
 //! Run on the virtual clock that the caller advances, tick by tick, and that ends with the usual outcome.
 
 use super::controls::ChangeLog;
-use super::epilogue::{Epilogue, Finished};
 use super::observer::Taps;
+use super::outcome::{Epilogue, Finished};
 use super::prepared_loop::{PreparedLoop, activate};
 use super::{Controls, Observer, Outcome, RunError, Session};
 use crate::calls::EndReserve;

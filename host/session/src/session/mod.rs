@@ -1,12 +1,9 @@
 //! Session: loads the plugins of a scene, pairs them, runs the loop, and gives observers and controls access.
 
 mod ceiling;
-mod choice;
 mod controls;
-mod epilogue;
 mod error;
 mod fit;
-mod guards;
 mod latch;
 mod lockstep;
 mod observer;
@@ -42,8 +39,8 @@ use crate::calls::EndReserve;
 use crate::nanoseconds::whole_ns;
 use crate::registry::Registry;
 use crate::scene::Scene;
+use ceiling::Guards;
 use controls::{ChangeLog, PluginTable};
-use epilogue::Epilogue;
 use fit::check_fit;
 use flotor_core::demand::ObserverDemand;
 use flotor_coupling::{Line, LinkTimeouts, Reach};
@@ -54,8 +51,8 @@ use flotor_servo::{
     Clock, Core, Coupled, Envelope, Forces, ParameterQueue, RunConfig, Servo, Standby, StopSwitch,
     swap_queues,
 };
-use guards::Guards;
 use observer::Taps;
+use outcome::Epilogue;
 use plugin_report::PluginNames;
 use prepare::{open_devices, prepare_models, settled};
 use prepared_loop::{PreparedLoop, activate};

@@ -1,9 +1,9 @@
 //! Loop on the real clock, on a thread of its own; the caller's thread serves the observers and watches the loop.
 
 use super::controls::ChangeLog;
-use super::epilogue::Finished;
 use super::latch;
 use super::observer::Taps;
+use super::outcome::Finished;
 use super::plugin_report::PluginNames;
 use super::prepared_loop::{PreparedLoop, activate_here};
 use super::stop_time::StopTimer;

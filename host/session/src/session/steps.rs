@@ -55,7 +55,10 @@ impl Steps {
     /// # Errors
     /// [`RunError::Hung`] if a plugin call does not return: there are no ticks any more.
     pub fn advance(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<Option<RunEnd>, RunError> {
-        self.ticks.advance(ticks, observer)?;
+        let mut left = ticks;
+        while left > 0 && self.ticks.end().is_none() {
+            left = self.ticks.batch(left, observer)?;
+        }
         Ok(self.ticks.end())
     }
 }

@@ -1,8 +1,8 @@
 //! Loop on the virtual clock, on a thread of its own: a plugin call that does not return is reported, and the thread abandoned.
 
 use super::controls::ChangeLog;
-use super::epilogue::Finished;
 use super::observer::Taps;
+use super::outcome::Finished;
 use super::plugin_report::PluginNames;
 use super::prepared_loop::{PreparedLoop, activate};
 use super::{Controls, Observer, RunError};
@@ -103,20 +103,12 @@ impl VirtualLoop {
         self.batch.as_ref().and_then(|batch| batch.runner.end())
     }
 
-    /// Runs `ticks` ticks, or until the run ends; passes the changes before each and its records to the observer. Not real-time.
+    /// Runs `ticks` ticks, or until the batch is full or the run ends; returns the remaining ticks. Passes the changes before each
+    /// tick and the tick's records to the observer. Not real-time.
     ///
     /// # Errors
     /// [`RunError::Hung`] if a call does not return; then there are no ticks any more.
-    pub(super) fn advance(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<(), RunError> {
-        let mut left = ticks;
-        while left > 0 && self.end().is_none() {
-            left = self.batch(left, observer)?;
-        }
-        Ok(())
-    }
-
-    /// Runs `ticks` ticks, or until the batch is full or the run ends; returns the remaining ticks.
-    fn batch(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<u64, RunError> {
+    pub(super) fn batch(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<u64, RunError> {
         let batch = self.batch.take().ok_or(RunError::Thread("did not return its state"))?;
         self.requested.change_to(observer.demand());
         let ticked = self.thread.tick(Batch { ticks, ..batch }, &self.heartbeat, &self.stop);
