@@ -4,15 +4,11 @@
 //! longer than a limit, then abandons the thread and names the plugin. In the loop the watchdog does the same. Not real-time.
 
 mod call;
-mod limits;
-mod machine;
 mod process;
 mod thread;
 
-pub use call::{Call, CallError, Unresponsive};
-pub use limits::{LIMIT_VARIABLE, STEP_LIMIT_VARIABLE};
-pub(crate) use limits::{end_limit, limit, limit_of};
-pub(crate) use machine::keeping_machine;
+pub use call::{Call, CallError, LIMIT_VARIABLE, STEP_LIMIT_VARIABLE, Unresponsive};
+pub(crate) use call::{end_limit, limit, limit_of};
 pub use process::{Notice, is_abandoned, on_notice, stop_waits_with};
-pub(crate) use process::{abandon, is_to_begin, notify};
+pub(crate) use process::{abandon, is_to_begin, keeping_machine, notify};
 pub(crate) use thread::{CallThread, EndReserve, PendingCall, Progress};

@@ -10,6 +10,7 @@
 //! stated time after the first tick that reads it; then it fades to zero, which is counted. Force fades in when the program enables
 //! it. Neither side waits for the other.
 
+use crate::lock::lock;
 use crate::nanoseconds::whole_ns;
 use crate::scene::{ModelUse, Scene};
 use flotor_core::mapping::Mapping;
@@ -19,7 +20,7 @@ use flotor_hal::{
 };
 use flotor_sync::{Observer, Publisher, Words, latest};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Plugin id of the model in scenes.
 pub const ID: &str = "program";
@@ -91,10 +92,6 @@ struct ModelEnd {
 /// Ports that no model has taken yet.
 static FREE: Mutex<Vec<(u32, ModelEnd)>> = Mutex::new(Vec::new());
 static NEXT: AtomicU32 = AtomicU32::new(1);
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// A wrench with a number that is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

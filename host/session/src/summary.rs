@@ -270,17 +270,11 @@ impl EnvelopeSummary {
         let Self { passivity_active_s, passivity_removed_j, slew_active_s, slew_generated_j } = *self;
         let removed_mj = passivity_removed_j * 1.0e3;
         let generated_mj = slew_generated_j * 1.0e3;
-        [
-            (
-                "passivity",
-                passivity_active_s,
-                format!("removed {removed_mj:.3} mJ in {passivity_active_s:.3} s"),
-            ),
-            ("slew limit", slew_active_s, format!("generated {generated_mj:+.3} mJ in {slew_active_s:.3} s")),
-        ]
-        .into_iter()
-        .filter(|(_, active_s, _)| *active_s > 0.0)
-        .map(|(stage, _, text)| (stage, text))
+        let passivity = format!("removed {removed_mj:.3} mJ in {passivity_active_s:.3} s");
+        let slew = format!("generated {generated_mj:+.3} mJ in {slew_active_s:.3} s");
+        let rows = [("passivity", passivity, passivity_active_s), ("slew limit", slew, slew_active_s)];
+        let active = rows.into_iter().filter(|(.., active_s)| *active_s > 0.0);
+        active.map(|(stage, text, _)| (stage, text))
     }
 }
 
@@ -403,27 +397,20 @@ impl LinkSummary {
             0 => format!("longest wait for a message {longest_wait_ms:.0} ms"),
             silences => format!("force removed {silences} times for lack of messages"),
         };
-        let impossible = match implausible {
+        let unless_none = |count: u64, text: &dyn Fn(u64) -> String| match count {
             0 => String::new(),
-            count => format!(", {count} implausible"),
+            count => text(count),
         };
+        let impossible = unless_none(*implausible, &|count| format!(", {count} implausible"));
         let partner = match self.partner.as_str() {
             "" => "no partner".to_owned(),
             run => format!("partner: run {run}"),
         };
-        let others = match others {
-            0 => String::new(),
-            others => format!(", {others} of other runs ignored"),
-        };
-        let cut = match self.cut_ticks {
-            0 => String::new(),
-            ticks => format!(
-                "; claims rejected in {ticks} ticks: {:.3} mJ, {:.1} mm, {:.3} rad",
-                self.cut_j * 1.0e3,
-                self.cut_path_m * 1.0e3,
-                self.cut_turn_rad
-            ),
-        };
+        let others = unless_none(*others, &|others| format!(", {others} of other runs ignored"));
+        let (cut_mj, cut_mm, cut_rad) = (self.cut_j * 1.0e3, self.cut_path_m * 1.0e3, self.cut_turn_rad);
+        let cut = unless_none(self.cut_ticks, &|ticks| {
+            format!("; claims rejected in {ticks} ticks: {cut_mj:.3} mJ, {cut_mm:.1} mm, {cut_rad:.3} rad")
+        });
         let rejected_runs = match self.rejected_runs.as_slice() {
             [] => String::new(),
             runs => format!("; disconnected because of its claims: run {}", runs.join(", run ")),

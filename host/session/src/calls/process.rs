@@ -1,7 +1,10 @@
 //! State of the process that all plugin calls share, and notices about it.
 
 use super::call::Call;
+use crate::platform::MachineState;
 use flotor_servo::StopSwitch;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsString;
 use std::fmt;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -104,4 +107,30 @@ pub fn is_abandoned() -> bool {
 /// Records that a thread with plugin code is abandoned.
 pub(crate) fn abandon() {
     CALLS.has_abandoned.store(true, Ordering::Relaxed);
+}
+
+/// Runs plugin code, `make`, and restores the state of the process afterwards.
+pub(crate) fn keeping_machine<T>(who: &str, make: impl FnOnce() -> T) -> T {
+    let (before, variables) = (MachineState::now(), environment());
+    let made = make();
+    let (restored, variables) = (before.restore(), changed_variables(&variables, &environment()));
+    if !(restored.is_empty() && variables.is_empty()) {
+        notify(&Notice::Changed { who: who.to_owned(), restored, variables });
+    }
+    made
+}
+
+/// Returns the environment variables by name.
+fn environment() -> BTreeMap<OsString, OsString> {
+    std::env::vars_os().collect()
+}
+
+/// Returns the names of variables that were added, changed or removed.
+fn changed_variables(
+    before: &BTreeMap<OsString, OsString>,
+    after: &BTreeMap<OsString, OsString>,
+) -> Vec<String> {
+    let names: BTreeSet<&OsString> = before.keys().chain(after.keys()).collect();
+    let changed = names.into_iter().filter(|name| before.get(*name) != after.get(*name));
+    changed.map(|name| name.display().to_string()).collect()
 }

@@ -2,10 +2,11 @@
 
 use super::call::{Call, CallError, Unresponsive};
 use super::process::{Notice, abandon, notify};
+use crate::lock::lock;
 use flotor_servo::last_stop::{enter_call, exit_call, prepare_for_calls};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Delay before a "still waiting" notice, at most half of the limit.
@@ -32,25 +33,21 @@ struct Now {
 }
 
 impl Progress {
-    fn lock(&self) -> MutexGuard<'_, Option<Now>> {
-        self.now.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Marks the start of a plugin call.
     pub(crate) fn enter(&self, who: &str, call: Call) {
         enter_call(who, call);
-        *self.lock() = Some(Now { who: who.to_owned(), call, since: Instant::now(), is_reported: false });
+        *lock(&self.now) = Some(Now { who: who.to_owned(), call, since: Instant::now(), is_reported: false });
     }
 
     /// Marks the end of the plugin call.
     pub(crate) fn exit(&self) {
-        *self.lock() = None;
+        *lock(&self.now) = None;
         exit_call();
     }
 
     /// Sends a notice about a call that takes long; returns an error for a call beyond the limit.
     pub(crate) fn check(&self, limit: Duration) -> Result<(), Unresponsive> {
-        let mut now = self.lock();
+        let mut now = lock(&self.now);
         let Some(Now { who, call, since, is_reported }) = &mut *now else { return Ok(()) };
         let waited = since.elapsed();
         if waited >= limit {

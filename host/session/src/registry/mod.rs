@@ -6,13 +6,14 @@ mod stamp;
 
 use self::stamp::{FileStamp, hash_of};
 use crate::calls::{self, Call, CallError, CallThread};
+use crate::lock::lock;
 pub use crate::platform::is_same_file;
 use crate::platform::{UNKNOWN_PROGRAM, distrust, user_folder};
 use crate::scene::nearest;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 /// Environment variable with further plugin folders, separated like `PATH`.
 pub const PATH_VARIABLE: &str = "FLOTOR_PLUGIN_PATH";
@@ -279,7 +280,7 @@ impl Registry {
     fn open(&self, path: &Path) -> Result<Plugin, LookupError> {
         // Taken before the bytes are read: a write meanwhile is noticed the next time.
         let Ok(stamp) = FileStamp::of(path) else { return load_in_time(path) }; // reports the error
-        let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut loaded = lock(&self.loaded);
         if let Some(known) = loaded.iter().find(|known| known.path == path && known.stamp.is_same_as(&stamp))
         {
             return Ok(known.plugin.clone());

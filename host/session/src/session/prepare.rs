@@ -203,13 +203,11 @@ fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolat
     match model.isolation {
         Isolation::ByOrigin if is_outside && model.places_m.len() > MAX_PROCESSES => {
             let objects = model.places_m.len();
-            Err(complain(
-                model,
-                &format!(
-                    "the plugin is from outside the installation, and each of its {objects} objects would have a process \
-                     of its own; set `isolation = \"process\"` or `isolation = \"none\"`"
-                ),
-            ))
+            let problem = format!(
+                "the plugin is from outside the installation, and each of its {objects} objects would have a process \
+                 of its own; set `isolation = \"process\"` or `isolation = \"none\"`"
+            );
+            Err(complain(model, &problem))
         }
         Isolation::ByOrigin if is_outside => Ok(Isolation::Process),
         Isolation::ByOrigin => Ok(Isolation::None),
@@ -276,14 +274,12 @@ impl ModelBuilder {
             Isolation::Process => {
                 let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
                 let values = settings.iter().map(|setting| setting.display());
-                let in_the_loop = model.field.is_none().then_some(budget_ns).flatten();
+                let field = model.field.as_ref();
+                let in_the_loop = budget_ns.filter(|_| field.is_none());
                 let worker_config = WorkerConfig {
                     plugin: &plugin.metadata().path,
                     sets: keys.zip(values).collect(),
-                    config: model
-                        .field
-                        .as_ref()
-                        .map_or(*config, |field| AsynchronousModel::config(field, config)),
+                    config: field.map_or(*config, |field| AsynchronousModel::config(field, config)),
                     // The loop does not wait for a field.
                     timeout_ns: in_the_loop.unwrap_or(PATIENCE_NS),
                     create_timeout: limit(),

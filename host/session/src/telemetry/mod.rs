@@ -16,6 +16,7 @@ mod peer_link;
 pub use pairing::{LinkCounts, Pairing};
 pub use peer_link::{PeerLink, start_peer_link};
 
+use crate::lock::lock;
 use crate::registry::Registry;
 use crate::scene::Scene;
 use crate::{ControlError, Controls, LatchGuard, NewValue, Observer, PluginReport, Session};
@@ -29,7 +30,7 @@ use flotor_live::{
 use flotor_record::RunDescription;
 use flotor_servo::{EmergencySource, StopSwitch};
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Publishes a prepared run, to be found, observed and changed.
 ///
@@ -138,7 +139,7 @@ impl Host {
         let refused = |problem: String| ControlError::Refused { model: model.to_owned(), problem, cause };
         let settings: Vec<(&str, &str)> = settings.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
         let make = || {
-            let mut registry = self.registry.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut registry = lock(&self.registry);
             let registry = registry.get_or_insert_with(|| Registry::search(&self.folders));
             self.controls.swap(registry, model, plugin, &settings)
         };

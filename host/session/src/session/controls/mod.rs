@@ -19,12 +19,13 @@ pub(super) use versions::ChosenBy;
 use super::error::RunError;
 use super::prepare::prepare_model_while;
 use crate::calls::is_to_begin;
+use crate::lock::lock;
 use crate::registry::Registry;
 use crate::scene::{Location, ModelUse};
 use flotor_hal::{LoopConfig, Parameter};
 use flotor_live::RefusalCause;
 use flotor_servo::{ChangeSender, Clock, HostSwaps, Layer, LayerReport, ParameterChange, Replacement};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use swaps::Swaps;
 
 /// Handle to a running loop, for any thread, with cheap clones. No method makes the loop wait.
@@ -42,12 +43,6 @@ struct Shared {
     config: LoopConfig,
     clock: Clock,
     swaps: Mutex<Swaps>,
-}
-
-impl Shared {
-    fn changes(&self) -> MutexGuard<'_, ChangeSender> {
-        self.changes.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl Controls {
@@ -113,7 +108,7 @@ impl Controls {
     }
 
     fn send(&self, checked: &[ParameterChange]) -> Result<(), ControlError> {
-        let mut changes = self.shared.changes();
+        let mut changes = lock(&self.shared.changes);
         if changes.is_abandoned() {
             return Err(ControlError::Ended);
         }
@@ -138,7 +133,7 @@ impl Controls {
     ) -> Result<(), ControlError> {
         let Shared { plugins, models, config, clock, .. } = &*self.shared;
         let numbers = plugins.models(model)?;
-        if self.shared.changes().is_abandoned() {
+        if lock(&self.shared.changes).is_abandoned() {
             return Err(ControlError::Ended);
         }
         self.swaps().reserve(plugins, &numbers)?;
@@ -153,7 +148,7 @@ impl Controls {
                 other.plugin.location = Location { file: "--plugin".into(), line: 0 };
             }
             // After the end of a run, or a request for it, no thread waits for plugin code.
-            let is_wanted = || !self.shared.changes().is_abandoned() && is_to_begin();
+            let is_wanted = || !lock(&self.shared.changes).is_abandoned() && is_to_begin();
             prepare_model_while(registry, &other, config, *clock, is_wanted).map_err(refused)
         };
         // Without the lock: the run goes on meanwhile, and may end.
@@ -174,7 +169,7 @@ impl Controls {
     }
 
     fn swaps(&self) -> MutexGuard<'_, Swaps> {
-        self.shared.swaps.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.shared.swaps)
     }
 
     /// Frees models that the loop has returned, unless another thread does. Not real-time.

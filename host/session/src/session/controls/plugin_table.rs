@@ -3,13 +3,14 @@
 use super::super::plugin_report::PluginReport;
 use super::error::ControlError;
 use super::versions::{ChosenBy, Versions};
+use crate::lock::lock;
 use crate::scene::{is_named, nearest};
 use flotor_core::{Change, ChangeSubject, PluginIndex};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Mutability, Parameter};
 use flotor_servo::{ChangeReport, PLUGIN, Pace, ParameterChange, WEIGHT};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// New value for a parameter of a plugin of the run, as text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,7 +65,7 @@ impl PluginTable {
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Vec<Versions>> {
-        self.places.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.places)
     }
 
     /// Calls `on_model` with the versions of a model; returns `None` if the run has fewer models.
