@@ -10,10 +10,9 @@
 //!
 //! A replacement for a model is loaded and created here, on a thread of its own, and sent to the loop when it is ready.
 
-mod pairing;
 mod peer_link;
 
-pub use pairing::{LinkCounts, Pairing};
+pub use flotor_live::{LinkCounts, Pairing};
 pub use peer_link::{PeerLink, start_peer_link};
 
 use crate::lock::lock;
