@@ -419,16 +419,11 @@ fn live_line(record: &TickRecord) -> String {
     let force_n = record.commanded.force().z;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to a few columns
     let column = ((z_mm + 10.0) / 20.0 * COLUMNS as f64).clamp(0.0, (COLUMNS - 1) as f64) as usize;
-    let bar: String = (0..COLUMNS)
-        .map(|i| {
-            if i == column {
-                '█'
-            } else if i == COLUMNS / 2 {
-                '┊'
-            } else {
-                '·'
-            }
-        })
-        .collect();
+    let mark = |place: usize| match place {
+        place if place == column => '█',
+        place if place == COLUMNS / 2 => '┊',
+        _ => '·',
+    };
+    let bar: String = (0..COLUMNS).map(mark).collect();
     format!("-10 mm {bar} +10   z {z_mm:+6.2} mm   Fz {force_n:+6.2} N")
 }

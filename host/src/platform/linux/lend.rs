@@ -128,9 +128,8 @@ fn folder_of_libraries(api: Option<Api>, program: &Program, own: &Path) -> Resul
     if !folder.0.join("lib").exists() && !beside.exists() {
         let missing = Api::Dhd.find(own).err();
         return Err(missing.unwrap_or_else(|| {
-            CommandError::Failed(
-                "no drop-in library was found; build the libraries or reinstall Flotor".to_owned(),
-            )
+            let missing = "no drop-in library was found; build the libraries or reinstall Flotor";
+            CommandError::Failed(missing.to_owned())
         }));
     }
     Ok(folder)
