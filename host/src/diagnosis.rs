@@ -26,7 +26,7 @@ impl Diagnosis {
     }
 
     pub(crate) fn note(what: &'static str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { what, grade: Grade::Note, found: found.into(), remedy: Some(remedy.into()) }
+        Self::problem(Grade::Note, what, found, remedy)
     }
 
     /// Creates a bad finding whose text contains the remedy.
@@ -35,6 +35,16 @@ impl Diagnosis {
     }
 
     pub(crate) fn bad(what: &'static str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { what, grade: Grade::Bad, found: found.into(), remedy: Some(remedy.into()) }
+        Self::problem(Grade::Bad, what, found, remedy)
+    }
+
+    /// Creates a finding with a remedy, of this grade.
+    pub(crate) fn problem(
+        grade: Grade,
+        what: &'static str,
+        found: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self { what, grade, found: found.into(), remedy: Some(remedy.into()) }
     }
 }

@@ -28,7 +28,7 @@ use service::{Service, ServiceEnd};
 use std::ffi::OsString;
 use std::os::unix::fs::symlink;
 use std::os::unix::process::ExitStatusExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus};
 use stop_request::{Early, Stage, StopRequest, has_ended};
 
@@ -74,39 +74,119 @@ fn lend(arguments: &LendArguments) -> Result<i32, Early> {
         let usage = "the program is missing; write `flotor lend [SCENE] -- PROGRAM ARGUMENTS`".to_owned();
         return Err(CommandError::Usage(usage).into());
     };
-    let api = arguments.api.as_deref().map(Interface::of_word).transpose()?;
+    let interface = arguments.api.as_deref().map(Interface::of_word).transpose()?;
     check_scene(arguments)?;
     let program = Program::find(name)?;
     let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
-    let api = match api {
-        Some(Interface::Service(service)) => return serve(arguments, service, &program, rest, &own, &stop),
-        Some(Interface::Library(api)) => Some(api),
-        None => None,
-    };
-    if arguments.listen.is_some() {
-        let usage = "--listen is for `--api haply` and `--api ml-api`".to_owned();
-        return Err(CommandError::Usage(usage).into());
+    let lending = Lending { arguments, program, rest, own, stop };
+    match interface {
+        Some(Interface::Service(service)) => lending.with_service(service),
+        Some(Interface::Library(api)) => lending.with_library(Some(api)),
+        None => lending.with_library(None),
     }
-    program.check(api)?;
-    let folder = folder_of_libraries(api, &program, &own)?;
-    let mut command = guarded(&program, rest, &folder, &own);
-    environment(&mut command, arguments, &folder.0, &own)?;
-    let end = carry_out(&mut command, &program, &folder, &stop)?;
-    let runs = Runs::read(&folder.0, &end);
-    if !runs.tell(&program.path, arguments.options.record.as_deref()) {
-        let which = api.map_or_else(
-            || "none of dhd, openhaptics and chai3d".to_owned(),
-            |api| format!("nothing of `--api {}`", api.word()),
-        );
-        note(format_args!(
-            "`{}` opened no device: it called {which}, was linked statically with the maker's library (link it with \
-             the library of `flotor lend`), or lost `LD_LIBRARY_PATH` (a script that sets the variable has to \
-             append the old value; `env -i` removes the variable)",
-            program.path.display()
-        ));
+}
+
+/// Program that is run on a device, and the request to stop it.
+struct Lending<'a> {
+    arguments: &'a LendArguments,
+    program: Program,
+    /// Arguments of the program.
+    rest: &'a [OsString],
+    /// Path of this command.
+    own: PathBuf,
+    stop: StopRequest,
+}
+
+impl Lending<'_> {
+    /// Runs the program with the libraries of one interface, or of all; returns the exit code of the program or its runs.
+    fn with_library(&self, api: Option<Api>) -> Result<i32, Early> {
+        let Self { arguments, program, own, .. } = self;
+        if arguments.listen.is_some() {
+            let usage = "--listen is for `--api haply` and `--api ml-api`".to_owned();
+            return Err(CommandError::Usage(usage).into());
+        }
+        program.check(api)?;
+        let folder = folder_of_libraries(api, program, own)?;
+        let mut command = self.guarded(&folder);
+        self.set_environment(&mut command, &folder.0)?;
+        let end = self.carry_out(&mut command, &folder)?;
+        let runs = Runs::read(&folder.0, &end);
+        if !runs.tell(&program.path, arguments.options.record.as_deref()) {
+            let which = api.map_or_else(
+                || "none of dhd, openhaptics and chai3d".to_owned(),
+                |api| format!("nothing of `--api {}`", api.word()),
+            );
+            note(format_args!(
+                "`{}` opened no device: it called {which}, was linked statically with the maker's library (link it with \
+                 the library of `flotor lend`), or lost `LD_LIBRARY_PATH` (a script that sets the variable has to \
+                 append the old value; `env -i` removes the variable)",
+                program.path.display()
+            ));
+        }
+        arguments.options.json.as_deref().map_or(Ok(()), |json| runs.write(json))?;
+        Ok(runs.exit_code())
     }
-    arguments.options.json.as_deref().map_or(Ok(()), |json| runs.write(json))?;
-    Ok(runs.exit_code())
+
+    /// Serves the program over the network; returns the exit code of the program and its runs, or if that is 0, of the service, whose
+    /// run may have been rejected.
+    fn with_service(&self, service: Service) -> Result<i32, Early> {
+        let Self { arguments, program, own, stop, .. } = self;
+        let folder = Folder::new()?;
+        let served = service.start(arguments, &folder, own, stop)?;
+        let end = self.carry_out(&mut self.guarded(&folder), &folder)?;
+        let served = served.finish();
+        let runs = Runs::read(&folder.0, &end);
+        runs.tell(&program.path, arguments.options.record.as_deref());
+        if let Some(json) = &arguments.options.json {
+            match served {
+                _ if service.writes_summary() => runs.write(json)?,
+                ServiceEnd::Killed => write_json(json, &json!({ "end": ServiceEnd::KILLED }))?,
+                // The service has written the file.
+                ServiceEnd::Exited(_) => {}
+            }
+        }
+        Ok(match runs.exit_code() {
+            0 => served.exit_code(),
+            code => code,
+        })
+    }
+
+    /// Returns the command that starts the program under its [`guard`].
+    fn guarded(&self, folder: &Folder) -> Command {
+        let mut command = Command::new(&self.own);
+        command.args(["program-guard", "--parent", &std::process::id().to_string(), "--end"]);
+        command.arg(folder.program_end()).arg("--").arg(&self.program.path).args(self.rest);
+        command
+    }
+
+    /// Runs the guarded program; returns its end. A guard that cannot start the program has printed the cause.
+    fn carry_out(&self, command: &mut Command, folder: &Folder) -> Result<ProgramEnd, Early> {
+        if self.stop.stage() > Stage::Running {
+            return Err(Early::Exit(INTERRUPTED));
+        }
+        let guard = spawn_unblocked(command)
+            .map_err(|cause| CommandError::file(&self.program.path, "cannot be started", cause))?;
+        let status = wait(guard, &self.stop);
+        let end = match (ProgramEnd::read(&folder.program_end()), status.code()) {
+            (Some(end), _) => end,
+            (None, Some(code)) => return Err(Early::Exit(code)),
+            (None, None) => ProgramEnd::of(status),
+        };
+        end.tell();
+        Ok(end)
+    }
+
+    /// Sets the environment variables of a drop-in library.
+    fn set_environment(&self, command: &mut Command, folder: &Path) -> Result<(), CommandError> {
+        let before = std::env::var_os("LD_LIBRARY_PATH").filter(|path| !path.is_empty());
+        let before = before.iter().flat_map(std::env::split_paths);
+        let path = std::env::join_paths([folder.to_path_buf()].into_iter().chain(before));
+        command.env("LD_LIBRARY_PATH", path.map_err(|error| CommandError::Failed(error.to_string()))?);
+        if folder.join("lib").is_dir() {
+            command.env("FDSDK", folder).env("FORCEDIM_SDK", folder);
+        }
+        self.arguments.set_environment(command, folder, &self.own)
+    }
 }
 
 /// Creates the folder with the libraries of one interface, or of all.
@@ -135,66 +215,6 @@ fn folder_of_libraries(api: Option<Api>, program: &Program, own: &Path) -> Resul
     Ok(folder)
 }
 
-/// Returns the command that starts the program under its [`guard`].
-fn guarded(program: &Program, rest: &[OsString], folder: &Folder, own: &Path) -> Command {
-    let mut command = Command::new(own);
-    command.args(["program-guard", "--parent", &std::process::id().to_string(), "--end"]);
-    command.arg(folder.program_end()).arg("--").arg(&program.path).args(rest);
-    command
-}
-
-/// Runs the guarded program; returns its end. A guard that cannot start the program has printed the cause.
-fn carry_out(
-    command: &mut Command,
-    program: &Program,
-    folder: &Folder,
-    stop: &StopRequest,
-) -> Result<ProgramEnd, Early> {
-    if stop.stage() > Stage::Running {
-        return Err(Early::Exit(INTERRUPTED));
-    }
-    let guard = spawn_unblocked(command)
-        .map_err(|cause| CommandError::file(&program.path, "cannot be started", cause))?;
-    let status = wait(guard, stop);
-    let end = match (ProgramEnd::read(&folder.program_end()), status.code()) {
-        (Some(end), _) => end,
-        (None, Some(code)) => return Err(Early::Exit(code)),
-        (None, None) => ProgramEnd::of(status),
-    };
-    end.tell();
-    Ok(end)
-}
-
-/// Serves a program over the network; returns the exit code of the program and its runs, or if that is 0, of the service, whose run
-/// may have been rejected.
-fn serve(
-    arguments: &LendArguments,
-    service: Service,
-    program: &Program,
-    rest: &[OsString],
-    own: &Path,
-    stop: &StopRequest,
-) -> Result<i32, Early> {
-    let folder = Folder::new()?;
-    let served = service.start(arguments, &folder, own, stop)?;
-    let end = carry_out(&mut guarded(program, rest, &folder, own), program, &folder, stop)?;
-    let served = served.finish();
-    let runs = Runs::read(&folder.0, &end);
-    runs.tell(&program.path, arguments.options.record.as_deref());
-    if let Some(json) = &arguments.options.json {
-        match served {
-            _ if service.writes_summary() => runs.write(json)?,
-            ServiceEnd::Killed => write_json(json, &json!({ "end": ServiceEnd::KILLED }))?,
-            // The service has written the file.
-            ServiceEnd::Exited(_) => {}
-        }
-    }
-    Ok(match runs.exit_code() {
-        0 => served.exit_code(),
-        code => code,
-    })
-}
-
 /// Checks the scene and its plugins before the program starts, which would otherwise see a missing device.
 fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
     let Some(file) = &arguments.scene else { return Ok(()) };
@@ -214,26 +234,6 @@ fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
         ));
     }
     Ok(())
-}
-
-/// Sets the environment variables of a drop-in library.
-fn environment(
-    command: &mut Command,
-    arguments: &LendArguments,
-    folder: &Path,
-    own: &Path,
-) -> Result<(), CommandError> {
-    let before = std::env::var_os("LD_LIBRARY_PATH").filter(|path| !path.is_empty());
-    let folders = std::iter::once(folder.to_path_buf())
-        .chain(before.iter().flat_map(std::env::split_paths).collect::<Vec<_>>());
-    let path = std::env::join_paths(folders).map_err(|error| CommandError::Failed(error.to_string()))?;
-    command.env("LD_LIBRARY_PATH", path);
-    if folder.join("lib").is_dir() {
-        for variable in ["FDSDK", "FORCEDIM_SDK"] {
-            command.env(variable, folder);
-        }
-    }
-    arguments.set_environment(command, folder, own)
 }
 
 /// Waits for the guard of the program. After a request to stop, sends SIGTERM to the guard, then the request to kill the group. At the

@@ -1,6 +1,6 @@
 //! Diagnosis of a device's USB connection from sysfs: presence, hub, driver, permission.
 
-use crate::diagnosis::Diagnosis;
+use crate::diagnosis::{Diagnosis, Grade};
 use flotor_hal::{UsbAccess, UsbKind};
 use rustix::fs::{Access, access};
 use std::fs::{read_dir, read_link, read_to_string};
@@ -200,10 +200,7 @@ impl Seen {
 
 /// Creates a finding on an obstacle; a note if the device is open in spite of it, through a service or another connection.
 fn hindrance(is_open: bool, what: &'static str, found: String, remedy: String) -> Diagnosis {
-    match is_open {
-        true => Diagnosis::note(what, found, remedy),
-        false => Diagnosis::bad(what, found, remedy),
-    }
+    Diagnosis::problem(if is_open { Grade::Note } else { Grade::Bad }, what, found, remedy)
 }
 
 /// Diagnoses the connection of a device of these kinds; a missing device is a note if the plugin opened one, and bad otherwise.
@@ -242,7 +239,6 @@ fn text_of(folder: &Path, file: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diagnosis::Grade;
     use std::fs::{create_dir_all, write};
     use std::os::unix::fs::symlink;
 
