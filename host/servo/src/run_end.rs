@@ -33,35 +33,31 @@ impl RunEnd {
         matches!(self, Self::Finished | Self::Stopped)
     }
 
-    /// Returns the word for the end in summaries. Scripts rely on the words.
+    /// Returns the word for the end in summaries, on which scripts rely, and the exit code of a command.
+    const fn row(self) -> (&'static str, u8) {
+        match self {
+            Self::Finished => ("finished", 0),
+            Self::Stopped => ("stopped", 0),
+            Self::DeviceFault(_) => ("device_fault", 4),
+            Self::EmergencyStop(_) => ("emergency_stop", 4),
+            Self::TooFast(_) => ("too_fast", 4),
+            Self::NotPaced => ("not_paced", 2),
+            Self::Watchdog(_) => ("watchdog", 4),
+            Self::Oscillation => ("oscillation", 4),
+            Self::Unguarded => ("unguarded", 1),
+        }
+    }
+
+    /// Returns the word for the end in summaries.
     #[must_use]
     pub const fn word(self) -> &'static str {
-        match self {
-            Self::Finished => "finished",
-            Self::Stopped => "stopped",
-            Self::DeviceFault(_) => "device_fault",
-            Self::EmergencyStop(_) => "emergency_stop",
-            Self::TooFast(_) => "too_fast",
-            Self::NotPaced => "not_paced",
-            Self::Watchdog(_) => "watchdog",
-            Self::Oscillation => "oscillation",
-            Self::Unguarded => "unguarded",
-        }
+        self.row().0
     }
 
     /// Returns the exit code of a command after the run, if no model failed.
     #[must_use]
     pub const fn exit_code(self) -> u8 {
-        match self {
-            Self::Finished | Self::Stopped => 0,
-            Self::Unguarded => 1,
-            Self::NotPaced => 2,
-            Self::DeviceFault(_)
-            | Self::EmergencyStop(_)
-            | Self::TooFast(_)
-            | Self::Watchdog(_)
-            | Self::Oscillation => 4,
-        }
+        self.row().1
     }
 
     /// Returns the cause of the end, as text for users.
