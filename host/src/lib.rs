@@ -7,6 +7,7 @@
 //! To embed Flotor in a program, use `flotor-session`; this crate is for the command alone.
 
 pub mod cli;
+mod diagnosis;
 pub mod peak_bounds;
 mod platform;
 pub mod run_picture;

@@ -12,6 +12,16 @@ enum Peak {
     Torque,
 }
 
+impl Peak {
+    /// Returns heading and quantity of the axis.
+    fn axis(self) -> (&'static str, Quantity) {
+        match self {
+            Self::Force => ("Force, magnitude", Quantity::Force),
+            Self::Torque => ("Torque, magnitude", Quantity::Torque),
+        }
+    }
+}
+
 /// Bound of a peak, written as `peak_force_n=3.2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeakBound {
@@ -53,14 +63,8 @@ impl BoundedPeaks {
         let magnitude = |peak: Peak| {
             let bounds_si: Vec<f64> =
                 bounds.iter().filter(|bound| bound.peak == peak).map(|bound| bound.value_si).collect();
-            let trace = Trace::default();
-            (!bounds_si.is_empty()).then_some(Magnitude {
-                peak,
-                bounds_si,
-                trace,
-                tick: None,
-                largest: (0.0, 0.0),
-            })
+            let (trace, tick, largest) = (Trace::default(), None, (0.0, 0.0));
+            (!bounds_si.is_empty()).then_some(Magnitude { peak, bounds_si, trace, tick, largest })
         };
         Self([Peak::Force, Peak::Torque].into_iter().filter_map(magnitude).collect())
     }
@@ -102,19 +106,12 @@ impl Magnitude {
     }
 
     fn quantity(&self) -> Quantity {
-        match self.peak {
-            Peak::Force => Quantity::Force,
-            Peak::Torque => Quantity::Torque,
-        }
+        self.peak.axis().1
     }
 
     fn into_panel(mut self) -> Panel {
         self.end_tick();
-        let name = match self.peak {
-            Peak::Force => "Force, magnitude",
-            Peak::Torque => "Torque, magnitude",
-        };
-        let quantity = self.quantity();
+        let (name, quantity) = self.peak.axis();
         let (unit, per_si) = quantity.unit();
         let panel = Panel::new(Axis::of(name, quantity)).series(Series::trace("", self.trace));
         let (time_s, size) = self.largest;

@@ -125,6 +125,13 @@ impl Changes {
             self.further += 1;
         }
     }
+
+    /// Adds a mark for each change to a panel.
+    fn mark(&self, panel: Panel, names: Names) -> Panel {
+        self.marked.iter().fold(panel, |panel, (time_s, text)| {
+            panel.mark(Mark::at_x(*time_s, if names == Names::Written { text.as_str() } else { "" }))
+        })
+    }
 }
 
 impl EventTimes {
@@ -191,31 +198,24 @@ impl DeviceTraces {
 
     /// Returns the panels of the only device of a run.
     fn all_panels(self, changes: &Changes) -> Vec<Result<Panel, String>> {
-        let panels = vec![
-            self.position.panel("position"),
-            self.rotation.panel("rotation"),
-            self.force.panel("force"),
-            self.torque.panel("torque"),
-            energy_panel("stored energy", self.energy),
-        ];
-        with_events(panels, &self.events, changes)
+        let Self { position, rotation, force, torque, energy, events, .. } = self;
+        let vectors = [(position, "position"), (rotation, "rotation"), (force, "force"), (torque, "torque")];
+        let panels = vectors.map(|(trace, name)| trace.panel(name)).into_iter();
+        with_events(panels.chain([energy_panel("stored energy", energy)]), &events, changes)
     }
 
     /// Returns the panels of one device of several: motion, force and energy. Rotation and torque are in the recording.
     fn main_panels(self, changes: &Changes) -> Vec<Result<Panel, String>> {
         let name = |quantity: &str| format!("{quantity}, {}", self.name);
-        let panels = vec![
-            self.position.panel(&name("position")),
-            self.force.panel(&name("force")),
-            energy_panel(&name("stored energy"), self.energy),
-        ];
-        with_events(panels, &self.events, changes)
+        let (position, force) = (self.position.panel(&name("position")), self.force.panel(&name("force")));
+        let energy = energy_panel(&name("stored energy"), self.energy);
+        with_events([position, force, energy].into_iter(), &self.events, changes)
     }
 }
 
 /// Marks events and changes in each panel, with their names in the first.
 fn with_events(
-    panels: Vec<Result<Panel, String>>,
+    panels: impl Iterator<Item = Result<Panel, String>>,
     events: &EventTimes,
     changes: &Changes,
 ) -> Vec<Result<Panel, String>> {
@@ -225,7 +225,7 @@ fn with_events(
         names = Names::LeftOut;
         Ok(panel)
     };
-    panels.into_iter().map(marked).collect()
+    panels.map(marked).collect()
 }
 
 /// Returns the panel of the stored energy over time.
@@ -235,15 +235,6 @@ fn energy_panel(name: &str, trace: Trace) -> Result<Panel, String> {
     }
     let heading = name.replacen("stored", "Stored", 1);
     Ok(Panel::new(Axis::of(heading, Quantity::Energy)).series(Series::trace("", trace)))
-}
-
-impl Changes {
-    /// Adds a mark for each change to a panel.
-    fn mark(&self, panel: Panel, names: Names) -> Panel {
-        self.marked.iter().fold(panel, |panel, (time_s, text)| {
-            panel.mark(Mark::at_x(*time_s, if names == Names::Written { text.as_str() } else { "" }))
-        })
-    }
 }
 
 fn seconds(time_ns: u64) -> f64 {

@@ -6,7 +6,7 @@
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
 use flotor_record::RecordError;
-use flotor_servo::{EmergencySource, Place, Stuck};
+use flotor_servo::{Place, RunEnd};
 use flotor_session::registry::LookupError;
 use flotor_session::{Call, CallError, RunError};
 use std::path::{Path, PathBuf};
@@ -34,27 +34,9 @@ pub enum CommandError {
         /// Message of the device; may be empty.
         words: String,
     },
-    /// The emergency stop was pressed.
-    #[error("emergency stop ({}); the device is stopped and exerts no force until the next run", .0.word())]
-    EmergencyStop(EmergencySource),
-    /// A tick took so long that the watchdog stopped the device.
-    #[error(
-        "tick {} exceeded the time limit, and the watchdog stopped the device; check the machine with \
-         `flotor doctor`, or raise `[limits] watchdog_ms`", .0.tick
-    )]
-    Watchdog(Stuck),
-    /// The force of a device swung between its limits.
-    #[error(
-        "the force oscillated between its limits, and continued to oscillate when the host attenuated it: the loop is \
-         unstable; lower the stiffness or the gain of the scene (`flotor stability` computes the largest stable stiffness)"
-    )]
-    Oscillation,
-    /// The required watchdog process exited, and the run was ended.
-    #[error(
-        "the watchdog process has ended, so no process stops the devices if this program is killed; the run ended \
-         because the scene has `[limits] require_independent_stop`"
-    )]
-    Unguarded,
+    /// A run ended, not in order.
+    #[error("{}", ended(*.0))]
+    RunEnded(RunEnd),
     /// The device sets the pace, at a rate above the scene's.
     #[error(
         "the device paces the loop with {samples_per_s} samples a second, above the scene's `rate_hz = {rate_hz}`: ramps would be \
@@ -66,11 +48,6 @@ pub enum CommandError {
         /// Loop rate of the scene, Hz.
         rate_hz: f64,
     },
-    /// The scene requires that the device sets the pace, which it does not.
-    #[error(
-        "the device does not set the pace of the loop with its present settings; remove `pacing = \"device\"` from the scene"
-    )]
-    NotPaced,
     /// A plugin was refused.
     #[error("{0}")]
     PluginRefused(String),
@@ -114,11 +91,20 @@ impl CommandError {
         Self::File { path: path.into(), action, cause }
     }
 
+    /// Creates the error of a run with this end, not in order; `rate_hz` is the loop rate of its scene.
+    #[must_use]
+    pub fn run_ended(end: RunEnd, rate_hz: f64) -> Self {
+        match end {
+            RunEnd::TooFast(samples_per_s) => Self::TooFast { samples_per_s, rate_hz },
+            end => Self::RunEnded(end),
+        }
+    }
+
     /// Returns the exit code of the program.
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Usage(_) | Self::Read(_) | Self::Record(RecordError::Exists { .. }) | Self::NotPaced => 2,
+            Self::Usage(_) | Self::Read(_) | Self::Record(RecordError::Exists { .. }) => 2,
             Self::Run(error) => match error {
                 wrong if wrong.is_configuration() => 2,
                 // The device may still exert a force.
@@ -135,13 +121,12 @@ impl CommandError {
                 _ => 1,
             },
             Self::PluginRefused(_) => 3,
-            Self::DeviceFault(_)
-            | Self::RunFault { .. }
-            | Self::EmergencyStop(_)
-            | Self::TooFast { .. }
-            | Self::Oscillation
-            | Self::Watchdog(_) => 4,
-            Self::Unguarded | Self::File { .. } | Self::Record(_) | Self::Failed(_) => 1,
+            Self::RunEnded(end) => end.exit_code(),
+            Self::TooFast { samples_per_s, .. } => RunEnd::TooFast(*samples_per_s).exit_code(),
+            Self::DeviceFault(fault) | Self::RunFault { fault, .. } => {
+                RunEnd::DeviceFault(*fault).exit_code()
+            }
+            Self::File { .. } | Self::Record(_) | Self::Failed(_) => 1,
         }
     }
 }
@@ -150,4 +135,32 @@ impl CommandError {
 #[must_use]
 pub fn before_advice(words: &str) -> String {
     if words.is_empty() { String::new() } else { format!("{words}; ") }
+}
+
+/// Describes the end of a run with its remedy, for users.
+fn ended(end: RunEnd) -> String {
+    match end {
+        RunEnd::Finished => "the run finished".to_owned(),
+        RunEnd::DeviceFault(fault) => CommandError::DeviceFault(fault).to_string(),
+        RunEnd::Stopped | RunEnd::TooFast(_) => end.cause(),
+        RunEnd::EmergencyStop(source) => format!(
+            "emergency stop ({}); the device is stopped and exerts no force until the next run",
+            source.word()
+        ),
+        RunEnd::Watchdog(stuck) => format!(
+            "tick {} exceeded the time limit, and the watchdog stopped the device; check the machine with \
+             `flotor doctor`, or raise `[limits] watchdog_ms`",
+            stuck.tick
+        ),
+        RunEnd::Oscillation => "the force oscillated between its limits, and continued to oscillate when the host \
+            attenuated it: the loop is unstable; lower the stiffness or the gain of the scene (`flotor stability` \
+            computes the largest stable stiffness)"
+            .to_owned(),
+        RunEnd::Unguarded => "the watchdog process has ended, so no process stops the devices if this program is \
+            killed; the run ended because the scene has `[limits] require_independent_stop`"
+            .to_owned(),
+        RunEnd::NotPaced => "the device does not set the pace of the loop with its present settings; remove \
+            `pacing = \"device\"` from the scene"
+            .to_owned(),
+    }
 }

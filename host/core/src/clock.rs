@@ -9,6 +9,17 @@ pub enum Clock {
     Virtual,
 }
 
+impl Clock {
+    /// Returns the word for the clock in summaries.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Real => "real",
+            Self::Virtual => "virtual",
+        }
+    }
+}
+
 /// Returns a time in nanoseconds, rounded; 0 for a negative time and for NaN.
 #[must_use]
 pub fn to_ns(time_s: f64) -> u64 {

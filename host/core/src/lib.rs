@@ -7,7 +7,7 @@
 //! - [`plausibility`]: checks of device samples.
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between its two ends.
 //! - [`guidance`]: the parameters that guide a simulated hand.
-//! - [`Change`]: a change to a plugin while the loop ran.
+//! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: its number in the run.
 //! - [`words`]: words of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
 //!
 //! The crate reads no files, starts no threads and, apart from [`lock()`], makes no system calls.
@@ -25,6 +25,7 @@ pub mod oscillation;
 mod outputs;
 pub mod peer;
 pub mod plausibility;
+mod plugin_index;
 mod quantile;
 mod random;
 pub mod region;
@@ -36,6 +37,7 @@ pub use change::{Change, ChangeOutcome, ChangeSubject};
 pub use clock::{Clock, period_ns, to_ns};
 pub use lock::lock;
 pub use outputs::ModelOutputs;
+pub use plugin_index::PluginIndex;
 pub use quantile::quantile;
 pub use random::Random;
 

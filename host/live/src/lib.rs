@@ -59,6 +59,7 @@ mod directory;
 mod frame;
 mod latch;
 mod message;
+mod pairing;
 mod peer_socket;
 mod platform;
 mod server;
@@ -73,6 +74,7 @@ pub use message::{
     Answer, Ask, End, EndKind, Greeting, PanelParameter, PanelPlugin, ParameterShape, RefusalCause, Request,
     SetValue, SoftLimits, WrenchLimits,
 };
+pub use pairing::{LinkCounts, Pairing};
 pub use peer_socket::{CALL_PERIOD, FoundCoupling, PeerSocket};
 pub use server::{Publication, PublishError, Serve};
 

@@ -295,7 +295,7 @@ impl Forces {
     /// Real-time: bounded by the objects of the model, no allocation.
     pub fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Box<Layer>> {
         let Replacement { model, generation, layer } = replacement;
-        match self.stack_of(model as usize) {
+        match self.stack_of(model) {
             Some((stack, place)) => stack.replace(place, layer, generation, tick),
             None => Some(layer),
         }
@@ -303,8 +303,8 @@ impl Forces {
 
     /// Removes a layer that has faded out; returns it with its model number. Real-time: bounded by the models, no allocation.
     #[inline]
-    pub fn take_faded(&mut self, tick: &Tick) -> Option<(u32, Box<Layer>)> {
-        let take = |slot: &mut Slot| Some((u32::try_from(slot.number).ok()?, slot.take_faded(tick)?));
+    pub fn take_faded(&mut self, tick: &Tick) -> Option<(usize, Box<Layer>)> {
+        let take = |slot: &mut Slot| Some((slot.number, slot.take_faded(tick)?));
         self.slots().find_map(take)
     }
 

@@ -2,7 +2,7 @@
 
 use super::clock::{monotonic_ns, sleep_until};
 use super::platform::last_stop::TakenSignals;
-use flotor_core::MAX_DEVICES;
+use flotor_core::{MAX_DEVICES, PluginIndex};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
 
@@ -44,6 +44,18 @@ impl Place {
             Self::Model(_) => "`step`",
             Self::Host => "the tick",
             Self::DeviceWrite(_) => "`write`",
+        }
+    }
+
+    /// Returns the plugin whose code runs, in a run with this many devices; `None` for code of the host.
+    #[must_use]
+    pub const fn plugin(self, devices: usize) -> Option<PluginIndex> {
+        match self {
+            Self::Waiting | Self::Host => None,
+            Self::DeviceWait(device) | Self::DeviceRead(device) | Self::DeviceWrite(device) => {
+                Some(PluginIndex::of_device(device))
+            }
+            Self::Model(model) => Some(PluginIndex::of_model(devices, model)),
         }
     }
 

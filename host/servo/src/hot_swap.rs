@@ -9,7 +9,7 @@ use flotor_hal::Tick;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 /// Layer that is no longer needed, with its model number.
-pub(crate) type Retired = (u32, Box<Layer>);
+pub(crate) type Retired = (usize, Box<Layer>);
 
 /// Loop side of the queues.
 pub struct LoopSwaps {
@@ -54,7 +54,7 @@ impl LoopSwaps {
     ///
     /// Real-time: bounded by the models and the schedule, no allocation.
     #[inline]
-    pub fn apply_due(&mut self, tick: &Tick, models: &mut Forces, mut report: impl FnMut(u32, u16)) {
+    pub fn apply_due(&mut self, tick: &Tick, models: &mut Forces, mut report: impl FnMut(usize, u16)) {
         while !self.retired.is_full()
             && let Some(faded) = models.take_faded(tick)
         {
@@ -76,7 +76,7 @@ impl LoopSwaps {
     pub fn into_layers(mut self) -> Vec<(usize, Box<Layer>)> {
         let scheduled = self.schedule.into_iter().filter_map(|(_, replacement)| replacement);
         let arriving = std::iter::from_fn(|| self.arriving.pop().ok());
-        scheduled.chain(arriving).map(|replacement| (replacement.model as usize, replacement.layer)).collect()
+        scheduled.chain(arriving).map(|replacement| (replacement.model, replacement.layer)).collect()
     }
 
     /// Takes the next replacement that is due.

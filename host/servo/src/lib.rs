@@ -27,6 +27,7 @@ mod queue;
 mod random;
 mod realtime;
 mod run;
+mod run_end;
 mod servo;
 mod stage_timer;
 mod standby;
@@ -51,10 +52,11 @@ pub use parameters::{
     ScheduledChange, WEIGHT,
 };
 pub use platform::{PRIORITY_NAME, THREAD_ADVICE};
-pub use queue::{Consumer, drain, queue};
+pub use queue::{Consumer, Producer, drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};
 pub use realtime::{enter_guard_priority, enter_real_time, enter_worker_priority, probe_real_time};
-pub use run::{Loop, RunEnd};
+pub use run::Loop;
+pub use run_end::RunEnd;
 pub use servo::{Dismantled, RunConfig, Servo};
 pub use standby::{Guarded, Standby};
 pub use state::{Cause, EmergencySource, Gate, RunEvent, RunState};

@@ -13,7 +13,7 @@ mod gradual;
 pub use change::{ChangeReport, PLUGIN, Pace, ParameterChange, WEIGHT};
 
 use super::queue::queue;
-use flotor_core::ChangeOutcome;
+use flotor_core::{ChangeOutcome, PluginIndex};
 use flotor_hal::Tick;
 use flotor_hal::abi::CallStatus;
 use gradual::Movements;
@@ -86,7 +86,7 @@ impl ParameterQueue {
     }
 
     /// Reports that a plugin was replaced. Real-time: bounded, no allocation.
-    pub fn report_replaced(&mut self, tick: &Tick, plugin: u16, generation: u16) {
+    pub fn report_replaced(&mut self, tick: &Tick, plugin: PluginIndex, generation: u16) {
         self.movements.forget_others(plugin, generation);
         let value = f64::from(generation);
         let change = ParameterChange { plugin, generation, parameter: PLUGIN, value, pace: Pace::AtOnce };

@@ -1,7 +1,7 @@
 //! Bounded queues between the loop and other threads ([`rtrb`]): one sender, one receiver, and neither waits for the other.
 
-pub use rtrb::Consumer;
-use rtrb::{Producer, RingBuffer};
+use rtrb::RingBuffer;
+pub use rtrb::{Consumer, Producer};
 use std::mem::MaybeUninit;
 
 /// Creates a queue for `capacity` records and touches its memory: a loop that may not lock its memory would otherwise pay for a

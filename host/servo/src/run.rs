@@ -1,64 +1,8 @@
 //! The loop: ticks until the duration is over, a stop is requested, or a device faults.
 
-use crate::{
-    Cause, EmergencySource, Heartbeat, PaceLost, Place, RunState, Schedule, Servo, StopSwitch, Stuck,
-};
+use crate::{Place, RunEnd, Schedule, Servo, StopSwitch};
 use flotor_core::trace::TickRecord;
-use flotor_hal::{Fault, SampleWait};
-
-/// End of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RunEnd {
-    /// The duration is over.
-    Finished,
-    /// A stop was requested.
-    Stopped,
-    /// The device faulted.
-    DeviceFault(Fault),
-    /// The emergency stop was pressed.
-    EmergencyStop(EmergencySource),
-    /// The device sets a faster pace than the scene declares: this many samples per second.
-    TooFast(u32),
-    /// The scene requires the device to set the pace, but the device sets none with its settings.
-    NotPaced,
-    /// A tick took so long that the watchdog stopped the device; the tick returned later.
-    Watchdog(Stuck),
-    /// The force of a device oscillated between its limits, even after damping.
-    Oscillation,
-    /// The required watchdog process exited; the run was stopped in order.
-    Unguarded,
-}
-
-impl RunEnd {
-    /// Returns true if the run finished, or stopped on request. Real-time: bounded, no allocation.
-    #[must_use]
-    pub const fn is_in_order(self) -> bool {
-        matches!(self, Self::Finished | Self::Stopped)
-    }
-
-    /// Converts a lost pace to a `RunEnd`.
-    fn without_pace(lost: PaceLost) -> Self {
-        match lost {
-            PaceLost::NotPaced => Self::NotPaced,
-            PaceLost::TooFast { samples, elapsed_ns } => {
-                let per_s = samples.saturating_mul(1_000_000_000) / elapsed_ns.max(1);
-                Self::TooFast(u32::try_from(per_s).unwrap_or(u32::MAX))
-            }
-        }
-    }
-
-    /// Converts the final run state to a `RunEnd`.
-    fn of(run: RunState, heartbeat: &Heartbeat) -> Self {
-        match (run, heartbeat.fired_at()) {
-            (RunState::Faulted(Cause::Device(fault)), _) => Self::DeviceFault(fault),
-            // The watchdog has not fired if the whole process was suspended.
-            (RunState::Faulted(Cause::Watchdog), stuck) => Self::Watchdog(stuck.unwrap_or(heartbeat.now())),
-            (RunState::Faulted(Cause::Oscillation), _) => Self::Oscillation,
-            (RunState::EmergencyStopped(source), _) => Self::EmergencyStop(source),
-            _ => Self::Stopped,
-        }
-    }
-}
+use flotor_hal::SampleWait;
 
 /// Loop over a servo and its schedule, the same for both clocks.
 pub struct Loop {

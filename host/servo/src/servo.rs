@@ -13,6 +13,7 @@ use crate::{
     Cause, Due, EmergencySource, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, Place, Port,
     Reported, RunEvent, RunState, Stage, Station, StopSwitch, Timing, Unwound, WEIGHT,
 };
+use flotor_core::PluginIndex;
 use flotor_core::demand::ObserverDemand;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
@@ -189,15 +190,14 @@ impl Servo {
         let mut replaced = false;
         swaps.apply_due(tick, forces, |model, generation| {
             replaced = true;
-            let plugin = u16::try_from(model as usize + devices).unwrap_or(u16::MAX); // a run has fewer plugins
-            parameters.report_replaced(tick, plugin, generation);
+            parameters.report_replaced(tick, PluginIndex::of_model(devices, model), generation);
         });
         let changed = parameters.apply_due(tick, waiting, |change| {
-            let (plugin, parameter) = (usize::from(change.plugin), change.parameter as usize);
-            if let Some(station) = stations.get_mut(plugin) {
+            let parameter = change.parameter as usize;
+            if let Some(station) = stations.get_mut(change.plugin.position()) {
                 return station.device.set_parameter(parameter, change.value);
             }
-            let model = plugin - devices;
+            let Some(model) = change.plugin.among_models(devices) else { return CallStatus::Unsupported };
             if change.parameter == WEIGHT {
                 forces.set_weight(model, tick, change.value)
             } else if forces.generation(model) == Some(change.generation) {

@@ -20,6 +20,7 @@
 //! ```
 
 use crate::scene::Location;
+pub use crate::scene::SceneError as CalibrationFileError;
 use flotor_hal::{InvalidCalibration, TextProblem, VerticalCalibration, read_text};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -110,20 +111,8 @@ pub enum Source {
     Imported,
 }
 
-/// Reason why a calibration file cannot be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{location}: {problem}")]
-pub struct CalibrationFileError {
-    /// File, with the line of the problem if there is one.
-    pub location: Location,
-    /// Problem and remedy.
-    pub problem: String,
-}
-
-impl CalibrationFileError {
-    fn new(file: &str, line: usize, problem: impl Into<String>) -> Self {
-        Self { location: Location { file: file.into(), line }, problem: problem.into() }
-    }
+fn error(file: &str, line: usize, problem: impl Into<String>) -> CalibrationFileError {
+    Location { file: file.into(), line }.problem(problem)
 }
 
 const MM: f64 = 1.0e-3;
@@ -179,7 +168,7 @@ impl CalibrationFile {
     pub fn load(path: &Path) -> Result<(Self, VerticalCalibration), CalibrationFileError> {
         let file = path.display().to_string();
         let text = read_text(path, "the calibration")
-            .map_err(|TextProblem { line, problem }| CalibrationFileError::new(&file, line, problem))?;
+            .map_err(|TextProblem { line, problem }| error(&file, line, problem))?;
         Self::parse(&file, &text)
     }
 
@@ -188,16 +177,15 @@ impl CalibrationFile {
     /// # Errors
     /// [`CalibrationFileError`].
     pub fn parse(file: &str, text: &str) -> Result<(Self, VerticalCalibration), CalibrationFileError> {
-        let read: Self = toml::from_str(text).map_err(|error| {
-            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
-            let message = error.message().lines().next().unwrap_or_default();
+        let read: Self = toml::from_str(text).map_err(|wrong: toml::de::Error| {
+            let before = wrong.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+            let message = wrong.message().lines().next().unwrap_or_default();
             let cause =
                 message.split(", expected one of").next().unwrap_or_default().replace(" field ", " key ");
             let problem = format!("is not a calibration file ({cause})");
-            CalibrationFileError::new(file, before.matches('\n').count() + 1, problem)
+            error(file, before.matches('\n').count() + 1, problem)
         })?;
-        let wrong =
-            |keys: &[&str], problem: String| CalibrationFileError::new(file, line_of(text, keys), problem);
+        let wrong = |keys: &[&str], problem: String| error(file, line_of(text, keys), problem);
         if read.format != FORMAT {
             let found = read.format;
             return Err(wrong(
@@ -238,7 +226,7 @@ impl CalibrationFile {
         let problem = format!(
             "the file is for `{wanted}` {wanted_serial}, the device is `{plugin}` {serial}; calibrate this device"
         );
-        Err(CalibrationFileError::new(file, 0, problem))
+        Err(error(file, 0, problem))
     }
 }
 
@@ -252,18 +240,15 @@ pub fn today() -> toml::value::Datetime {
 
 /// Converts a number of days since 1970 to year, month and day, by counting whole years and months.
 fn civil_date(mut days: u64) -> (u16, u8, u8) {
-    let mut year = 1970_u16;
-    let leap = |year: u16| (year.is_multiple_of(4) && !year.is_multiple_of(100)) || year.is_multiple_of(400);
-    loop {
-        let length = if leap(year) { 366 } else { 365 };
-        if days < length || year == u16::MAX {
-            break;
-        }
-        days -= length;
+    let is_leap =
+        |year: u16| (year.is_multiple_of(4) && !year.is_multiple_of(100)) || year.is_multiple_of(400);
+    let mut year = 1970;
+    while days >= 365 + u64::from(is_leap(year)) && year < u16::MAX {
+        days -= 365 + u64::from(is_leap(year));
         year += 1;
     }
-    let february = if leap(year) { 29 } else { 28 };
-    for (month, length) in (1_u8..).zip([31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31]) {
+    let february = 28 + u64::from(is_leap(year));
+    for (month, length) in (1..).zip([31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31]) {
         if days < length {
             return (year, month, u8::try_from(days + 1).unwrap_or(1));
         }

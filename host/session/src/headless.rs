@@ -3,12 +3,10 @@
 use crate::registry::Registry;
 use crate::run_description::describe;
 use crate::scene::Scene;
-use crate::summary::{RunFacts, RunSummary, Tally};
-use crate::{Observer, RunError, RunOptions, RunRecording, Session};
-use flotor_core::Change;
-use flotor_core::trace::TickRecord;
+use crate::summary::RunSummary;
+use crate::{Measurements, RunError, RunOptions, Session};
 use flotor_hal::Demand;
-use flotor_record::{RecordError, Recorder, TraceDigest};
+use flotor_record::{RecordError, Recorder};
 use flotor_servo::{Clock, StopSwitch};
 use std::path::Path;
 
@@ -41,50 +39,14 @@ pub fn run(
     let (plugins, notices) = (session.plugins().to_vec(), session.notices());
     let recorder =
         recording.map(|path| Recorder::create(path, &describe(scene, &options, &plugins))).transpose()?;
-    let recording = RunRecording::new(recorder);
-    let mut watchers = Watchers { tally: Tally::default(), digest: TraceDigest::new(), recording, demand };
-    let ran = session.run(&mut watchers, &StopSwitch::default());
-    let requested = watchers.demand();
-    let Watchers { tally, digest, mut recording, .. } = watchers;
+    let mut measured = Measurements::new(recorder, demand);
+    let ran = session.run(&mut measured, &StopSwitch::default());
+    let facts = measured.facts(scene, &options, &plugins);
     // The recording of a failed run is finished, too.
-    let recorded = recording.finish(&[]);
+    let recorded = measured.recording.finish(&[]);
     let mut outcome = ran?;
     recorded?;
     // The notices were not shown before the run.
     outcome.warnings.splice(0..0, notices);
-    let facts = RunFacts {
-        title: &scene.title,
-        clock: "virtual",
-        seed,
-        rate_hz: scene.rate_hz,
-        plugins: &plugins,
-        requested,
-        couplings: &scene.couplings,
-        carried: &[],
-        trace_digest: digest.finish(),
-    };
-    Ok(RunSummary::new(facts, &outcome, &tally))
-}
-
-struct Watchers {
-    tally: Tally,
-    digest: TraceDigest,
-    recording: RunRecording,
-    demand: Demand,
-}
-
-impl Observer for Watchers {
-    fn change(&mut self, change: &Change) {
-        self.recording.change(change);
-    }
-
-    fn observe(&mut self, record: &TickRecord) {
-        self.tally.observe(record);
-        self.digest.update(record);
-        self.recording.observe(record);
-    }
-
-    fn demand(&self) -> Demand {
-        self.demand.with(self.recording.demand())
-    }
+    Ok(RunSummary::new(facts, &outcome, &measured.tally))
 }

@@ -19,13 +19,15 @@ mod calls;
 mod estimates;
 mod feel;
 pub mod headless;
+mod lock;
 mod long_call;
+mod measurements;
+mod nanoseconds;
 mod platform;
 mod plugin_process;
 pub mod program;
 pub mod registry;
 pub mod run_description;
-mod run_recording;
 pub mod scene;
 mod session;
 pub mod summary;
@@ -38,9 +40,9 @@ pub use calls::{
 pub use estimates::estimates;
 pub use flotor_servo::THREAD_ADVICE;
 pub use long_call::{Exceeded, LongCall, step_limit};
+pub use measurements::{Measurements, RunRecording};
 pub use platform::{ThreadClock, end_with_this_thread};
 pub use plugin_process::PluginProcess;
-pub use run_recording::RunRecording;
 pub use session::{
     ControlError, Controls, DeviceOutcome, FaultyPlugin, Guardian, LatchGuard, LatchWatch, Lockstep,
     NewValue, Observer, Outcome, PluginReport, RunError, RunOptions, Session, Steps, StopReach, StopTime,

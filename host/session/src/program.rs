@@ -10,6 +10,8 @@
 //! stated time after the first tick that reads it; then it fades to zero, which is counted. Force fades in when the program enables
 //! it. Neither side waits for the other.
 
+use crate::lock::lock;
+use crate::nanoseconds::whole_ns;
 use crate::scene::{ModelUse, Scene};
 use flotor_core::mapping::Mapping;
 use flotor_core::words::{Decoder, Encoder};
@@ -19,7 +21,7 @@ use flotor_hal::{
 };
 use flotor_sync::{Observer, Publisher, Words, latest};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Plugin id of the model in scenes.
 pub const ID: &str = "program";
@@ -88,10 +90,6 @@ struct ModelEnd {
 /// Ports that no model has taken yet.
 static FREE: Mutex<Vec<(u32, ModelEnd)>> = Mutex::new(Vec::new());
 static NEXT: AtomicU32 = AtomicU32::new(1);
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
 
 /// A wrench with a number that is not finite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -230,8 +228,8 @@ pub fn connect(scene: &mut Scene) -> Vec<Connected> {
         });
         Connected { port, device, mapping, ramp_ns }
     };
-    let devices = u16::try_from(scene.devices.len()).unwrap_or(u16::MAX);
-    (0..devices).map(connect).collect()
+    let devices: Vec<u16> = (0..).zip(&scene.devices).map(|(device, _)| device).collect();
+    devices.into_iter().map(connect).collect()
 }
 
 /// Returns the fade-in time of a model `program`, ns, as set in the scene. A value that is no number is rejected with the scene.
@@ -240,10 +238,9 @@ fn ramp_ns(model: &ModelUse) -> u64 {
     set.and_then(|parameter| parameter.value.parse().ok()).map_or(nanoseconds(RAMP_MS), nanoseconds)
 }
 
-/// Converts ms of a parameter, at most a minute, to ns.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+/// Converts ms of a parameter to ns.
 fn nanoseconds(time_ms: f64) -> u64 {
-    (time_ms * 1.0e6).round() as u64
+    whole_ns(time_ms * 1.0e6)
 }
 
 /// Force model with the wrench of a program. Times are those of ticks, so that a run on the virtual clock can be repeated.
@@ -260,6 +257,11 @@ struct ProgramModel {
     since_ns: u64,
     rise_ns: u64,
     has_lapsed: bool,
+}
+
+/// Returns the parameter of a time, ms, at most a minute.
+const fn time(id: &'static str, least: f64, default: f64, doc: &'static str) -> Parameter {
+    Parameter::real(id, "ms", least, 60_000.0, default, doc)
 }
 
 impl ForceModel for ProgramModel {
@@ -280,30 +282,9 @@ impl ForceModel for ProgramModel {
             0.0,
             "Number of the program that commands the model: set by `flotor lend` and the drop-in libraries",
         ),
-        Parameter::real(
-            "valid_ms",
-            "ms",
-            1.0,
-            60_000.0,
-            50.0,
-            "Time for which a wrench is valid without a newer one",
-        ),
-        Parameter::real(
-            "fade_ms",
-            "ms",
-            0.0,
-            60_000.0,
-            50.0,
-            "Time in which an expired wrench fades to zero",
-        ),
-        Parameter::real(
-            "ramp_ms",
-            "ms",
-            0.0,
-            60_000.0,
-            RAMP_MS,
-            "Time in which force fades in once it is enabled",
-        ),
+        time("valid_ms", 1.0, 50.0, "Time for which a wrench is valid without a newer one"),
+        time("fade_ms", 0.0, 50.0, "Time in which an expired wrench fades to zero"),
+        time("ramp_ms", 0.0, RAMP_MS, "Time in which force fades in once it is enabled"),
     ];
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {

@@ -1,6 +1,6 @@
 //! Description of a run before its start: the first message of a recording and of a live view.
 
-use crate::scene::{DeviceUse, ModelUse, PluginUse, Scene};
+use crate::scene::{PluginUse, Scene};
 use crate::{PluginReport, RunOptions};
 use flotor_core::mapping::Blend;
 use flotor_hal::ParameterKind;
@@ -12,15 +12,18 @@ use std::path::PathBuf;
 /// `plugins` are those of the prepared scene: the devices, then the models, both in the scene's order.
 #[must_use]
 pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -> RunDescription {
-    let device = |(number, device): (u16, &DeviceUse)| {
-        (device.plugin.clone(), Role::Device, number, Vec::new(), Blend::default(), None)
-    };
-    let model = |model: &ModelUse| {
-        let role = Role::Model(model.mapping);
-        (model.plugin.clone(), role, model.device, model.places_m.clone(), model.blend, model.field)
-    };
-    let devices = (0..).zip(&scene.devices).map(device);
-    let plugins = devices.chain(scene.models.iter().map(model)).zip(plugins);
+    let devices = (0..).zip(&scene.devices).zip(plugins).map(|((device, used), report)| PluginDescription {
+        device,
+        ..describe_plugin(&used.plugin, Role::Device, report)
+    });
+    let models = scene.models.iter().zip(plugins.iter().skip(scene.devices.len()));
+    let models = models.map(|(used, report)| PluginDescription {
+        device: used.device,
+        places_m: used.places_m.clone(),
+        blend: used.blend,
+        field: used.field,
+        ..describe_plugin(&used.plugin, Role::Model(used.mapping), report)
+    });
     RunDescription {
         flotor_version: env!("CARGO_PKG_VERSION").to_owned(),
         rate_hz: scene.rate_hz,
@@ -28,15 +31,7 @@ pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -
         seed: options.seed,
         clock: options.clock,
         scene_toml: scene.text.clone(),
-        plugins: plugins
-            .map(|((used, role, device, places_m, blend, field), report)| PluginDescription {
-                device,
-                places_m,
-                blend,
-                field,
-                ..describe_plugin(&used, role, report)
-            })
-            .collect(),
+        plugins: devices.chain(models).collect(),
         couplings: scene.couplings.clone(),
     }
 }
@@ -74,9 +69,7 @@ pub fn named_files(report: &PluginReport) -> impl Iterator<Item = (&'static str,
 /// Returns the contents of the files that a plugin's parameters name, as further parameters for the description. Files that cannot
 /// be read any more are left out. Not real-time.
 fn contents_of_files(report: &PluginReport) -> Vec<(String, String)> {
-    let content = |(parameter, path): (&'static str, PathBuf)| {
-        let file = NamedFile::read(&path).ok()?;
-        Some(file.to_parameters(parameter))
-    };
+    let content =
+        |(parameter, path): (_, PathBuf)| Some(NamedFile::read(&path).ok()?.to_parameters(parameter));
     named_files(report).filter_map(content).flatten().collect()
 }

@@ -1,9 +1,9 @@
 //! Summary of a run: numbers for machines, a page for users.
 
 use crate::feel::Feel;
-use crate::scene::Isolation;
+use crate::scene::{Isolation, Scene};
 use crate::telemetry::LinkCounts;
-use crate::{FaultyPlugin, Observer, Outcome, PluginReport};
+use crate::{FaultyPlugin, Observer, Outcome, PluginReport, RunOptions};
 use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;
 use flotor_core::trace::{Events, TickRecord};
@@ -13,7 +13,7 @@ use flotor_servo::RunEnd;
 use flotor_servo::{
     CouplingOutcome, EnvelopeEffects, ModelHealth, Overrun, Percentiles, Stage, StageEffect, Timing,
 };
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Observer that collects the tick statistics of a run.
 #[derive(Default)]
@@ -25,8 +25,8 @@ pub struct Tally {
     events: Events,
     generated_peak_j: f64,
     port_lowest_j: f64,
-    /// Outputs of the models that were not computed in every tick.
-    not_computed: NotComputed,
+    /// Outputs of the models that were computed in every tick at every device; `None` before the first tick.
+    computed: Option<Demand>,
 }
 
 /// Tick statistics of one device.
@@ -119,7 +119,8 @@ impl Observer for Tally {
             self.events = Events::NONE;
         }
         self.events.insert(record.events);
-        self.not_computed.observe(record);
+        let computed = record.model.computed();
+        self.computed = Some(self.computed.map_or(computed, |all| all.limited_to(computed)));
         let device = usize::from(record.device);
         if self.devices.len() <= device {
             self.devices.resize_with(device + 1, DeviceTally::default);
@@ -134,41 +135,14 @@ impl Observer for Tally {
     }
 }
 
-/// Outputs of the models that were absent in some tick at some device.
-#[derive(Default)]
-struct NotComputed {
-    torque: bool,
-    energy: bool,
-}
-
-impl NotComputed {
-    fn observe(&mut self, record: &TickRecord) {
-        self.torque |= record.model.torque().is_none();
-        self.energy |= record.model.energy_j().is_none();
-    }
-
-    /// Adds the outputs that only clients requested: the summary does not depend on clients.
-    fn beyond(&self, needed: Demand) -> Self {
-        let is_absent = |absent: bool, output| absent || !needed.contains(output);
-        Self {
-            torque: is_absent(self.torque, Demand::TORQUE),
-            energy: is_absent(self.energy, Demand::ENERGY),
-        }
-    }
-
-    fn names(&self) -> Vec<&'static str> {
-        let all = [(self.torque, "torque"), (self.energy, "energy")];
-        all.into_iter().filter_map(|(is_absent, name)| is_absent.then_some(name)).collect()
-    }
-}
-
 /// A run in numbers. The names are a contract: scripts rely on them.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunSummary {
     /// Title of the scene.
     pub title: String,
-    /// End: "finished", "stopped", "device_fault", "emergency_stop", "too_fast", "not_paced", "watchdog", "oscillation" or "unguarded".
-    pub end: &'static str,
+    /// End, in JSON its [word](RunEnd::word).
+    #[serde(serialize_with = "write_word")]
+    pub end: RunEnd,
     /// "real" or "virtual".
     pub clock: &'static str,
     /// Seed of the run.
@@ -296,17 +270,11 @@ impl EnvelopeSummary {
         let Self { passivity_active_s, passivity_removed_j, slew_active_s, slew_generated_j } = *self;
         let removed_mj = passivity_removed_j * 1.0e3;
         let generated_mj = slew_generated_j * 1.0e3;
-        [
-            (
-                "passivity",
-                passivity_active_s,
-                format!("removed {removed_mj:.3} mJ in {passivity_active_s:.3} s"),
-            ),
-            ("slew limit", slew_active_s, format!("generated {generated_mj:+.3} mJ in {slew_active_s:.3} s")),
-        ]
-        .into_iter()
-        .filter(|(_, active_s, _)| *active_s > 0.0)
-        .map(|(stage, _, text)| (stage, text))
+        let passivity = format!("removed {removed_mj:.3} mJ in {passivity_active_s:.3} s");
+        let slew = format!("generated {generated_mj:+.3} mJ in {slew_active_s:.3} s");
+        let rows = [("passivity", passivity, passivity_active_s), ("slew limit", slew, slew_active_s)];
+        let active = rows.into_iter().filter(|(.., active_s)| *active_s > 0.0);
+        active.map(|(stage, text, _)| (stage, text))
     }
 }
 
@@ -406,20 +374,14 @@ pub struct PluginSummary {
 
 /// Inputs of a summary, beyond the outcome.
 pub struct RunFacts<'a> {
-    /// Title of the scene.
-    pub title: &'a str,
-    /// "real" or "virtual".
-    pub clock: &'static str,
-    /// Seed of the run.
-    pub seed: u64,
-    /// Requested rate, Hz.
-    pub rate_hz: f64,
+    /// Scene of the run.
+    pub scene: &'a Scene,
+    /// Options of the run.
+    pub options: &'a RunOptions,
     /// Plugins of the run.
     pub plugins: &'a [PluginReport],
     /// Model outputs that the run's own observer requested, without those of clients.
     pub requested: Demand,
-    /// Couplings between devices.
-    pub couplings: &'a [CouplingDescription],
     /// Counts of messages between hosts, by name of the coupling.
     pub carried: &'a [(String, LinkCounts)],
     /// Digest of the trace.
@@ -435,27 +397,20 @@ impl LinkSummary {
             0 => format!("longest wait for a message {longest_wait_ms:.0} ms"),
             silences => format!("force removed {silences} times for lack of messages"),
         };
-        let impossible = match implausible {
+        let unless_none = |count: u64, text: &dyn Fn(u64) -> String| match count {
             0 => String::new(),
-            count => format!(", {count} implausible"),
+            count => text(count),
         };
+        let impossible = unless_none(*implausible, &|count| format!(", {count} implausible"));
         let partner = match self.partner.as_str() {
             "" => "no partner".to_owned(),
             run => format!("partner: run {run}"),
         };
-        let others = match others {
-            0 => String::new(),
-            others => format!(", {others} of other runs ignored"),
-        };
-        let cut = match self.cut_ticks {
-            0 => String::new(),
-            ticks => format!(
-                "; claims rejected in {ticks} ticks: {:.3} mJ, {:.1} mm, {:.3} rad",
-                self.cut_j * 1.0e3,
-                self.cut_path_m * 1.0e3,
-                self.cut_turn_rad
-            ),
-        };
+        let others = unless_none(*others, &|others| format!(", {others} of other runs ignored"));
+        let (cut_mj, cut_mm, cut_rad) = (self.cut_j * 1.0e3, self.cut_path_m * 1.0e3, self.cut_turn_rad);
+        let cut = unless_none(self.cut_ticks, &|ticks| {
+            format!("; claims rejected in {ticks} ticks: {cut_mj:.3} mJ, {cut_mm:.1} mm, {cut_rad:.3} rad")
+        });
         let rejected_runs = match self.rejected_runs.as_slice() {
             [] => String::new(),
             runs => format!("; disconnected because of its claims: run {}", runs.join(", run ")),
@@ -467,21 +422,8 @@ impl LinkSummary {
     }
 }
 
-/// Returns the cause of the end of a run, as text for users.
-#[must_use]
-pub fn end_cause(end: &RunEnd) -> String {
-    match end {
-        RunEnd::DeviceFault(fault) => format!("device fault, {}", fault.advice()),
-        RunEnd::EmergencyStop(source) => format!("emergency stop ({})", source.word()),
-        RunEnd::TooFast(samples_per_s) => {
-            format!("the device sends {samples_per_s} samples a second, too many")
-        }
-        RunEnd::NotPaced => "the device does not set the pace".to_owned(),
-        RunEnd::Oscillation => "the force oscillated between its limits".to_owned(),
-        RunEnd::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
-        RunEnd::Unguarded => "the watchdog process had ended".to_owned(),
-        RunEnd::Finished | RunEnd::Stopped => "the run was stopped".to_owned(),
-    }
+fn write_word<S: Serializer>(end: &RunEnd, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(end.word())
 }
 
 impl RunSummary {
@@ -496,23 +438,17 @@ impl RunSummary {
         let elapsed_s = outcome.elapsed_ns as f64 * 1.0e-9;
         let needed = (facts.plugins.iter().zip(&tally.devices))
             .fold(Demand::ALL, |all, (device, _)| all.limited_to(device.at_hand.with(facts.requested)));
-        let not_computed = tally.not_computed.beyond(needed).names();
+        // Without the outputs that only clients requested: the summary does not depend on clients.
+        let computed = tally.computed.map_or(needed, |computed| computed.limited_to(needed));
+        let outputs = [(Demand::TORQUE, "torque"), (Demand::ENERGY, "energy")];
+        let absent = outputs.into_iter().filter(|(output, _)| !computed.contains(*output));
+        let not_computed: Vec<&str> = absent.map(|(_, name)| name).collect();
         Self {
-            title: facts.title.to_owned(),
-            end: match outcome.end {
-                RunEnd::Finished => "finished",
-                RunEnd::Stopped => "stopped",
-                RunEnd::DeviceFault(_) => "device_fault",
-                RunEnd::EmergencyStop(_) => "emergency_stop",
-                RunEnd::TooFast(_) => "too_fast",
-                RunEnd::NotPaced => "not_paced",
-                RunEnd::Watchdog(_) => "watchdog",
-                RunEnd::Oscillation => "oscillation",
-                RunEnd::Unguarded => "unguarded",
-            },
-            clock: facts.clock,
-            seed: facts.seed,
-            rate_hz: facts.rate_hz,
+            title: facts.scene.title.clone(),
+            end: outcome.end,
+            clock: facts.options.clock.word(),
+            seed: facts.options.seed,
+            rate_hz: facts.scene.rate_hz,
             ticks: *ticks,
             late_ticks: *late,
             missed_ticks: *missed,
@@ -546,7 +482,7 @@ impl RunSummary {
             devices: (facts.plugins.iter().zip(&tally.devices).enumerate())
                 .map(|(number, device)| device_summary(device, number, outcome))
                 .collect(),
-            couplings: (facts.couplings.iter().zip(&outcome.couplings))
+            couplings: (facts.scene.couplings.iter().zip(&outcome.couplings))
                 .map(|(coupling, outcome)| coupling_summary(coupling, outcome, facts.carried))
                 .collect(),
             events: events.filter(|(_, count)| *count > 0).collect(),

@@ -2,6 +2,7 @@
 
 mod device;
 
+use crate::diagnosis::{Diagnosis, Grade};
 use crate::platform::doctor::{MEMORY_REMEDY, core_remedy, of_the_system, priority_remedy};
 use crate::platform::usb;
 use clap::Args;
@@ -10,7 +11,6 @@ use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
 use flotor_servo::{PRIORITY_NAME, Privilege, RealTimeReport, probe_real_time};
 use flotor_session::registry::Registry;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// Check this machine's real-time configuration, or why a device does not start, and suggest fixes.
@@ -34,43 +34,6 @@ pub(crate) struct DoctorArguments {
     json: JsonOption,
     #[command(flatten)]
     plugin_path: PluginPathOption,
-}
-
-/// Severity of a finding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum Grade {
-    Good,
-    Note,
-    Bad,
-}
-
-/// Finding of the diagnosis.
-#[derive(Debug, Serialize)]
-pub(crate) struct Diagnosis {
-    pub(crate) what: &'static str,
-    pub(crate) grade: Grade,
-    pub(crate) found: String,
-    pub(crate) remedy: Option<String>,
-}
-
-impl Diagnosis {
-    pub(crate) fn good(what: &'static str, found: impl Into<String>) -> Self {
-        Self { what, grade: Grade::Good, found: found.into(), remedy: None }
-    }
-
-    pub(crate) fn note(what: &'static str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { what, grade: Grade::Note, found: found.into(), remedy: Some(remedy.into()) }
-    }
-
-    /// Creates a bad finding whose text contains the remedy.
-    pub(crate) fn bad_without_remedy(what: &'static str, found: impl Into<String>) -> Self {
-        Self { what, grade: Grade::Bad, found: found.into(), remedy: None }
-    }
-
-    pub(crate) fn bad(what: &'static str, found: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self { what, grade: Grade::Bad, found: found.into(), remedy: Some(remedy.into()) }
-    }
 }
 
 pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
@@ -149,7 +112,7 @@ fn privileges(report: &RealTimeReport, root: &Path) -> [Diagnosis; 2] {
 
 fn plugins(registry: &Registry) -> Diagnosis {
     let ids: Vec<&str> = registry.found().iter().map(|plugin| plugin.id.as_str()).collect();
-    let broken = registry.broken().len();
+    let broken = registry.findings().broken.len();
     match (ids.is_empty(), broken) {
         (true, _) => Diagnosis::bad(
             "plugins",

@@ -3,7 +3,7 @@
 //! Commands without a servo loop are separate programs beside this one, which shortens a first build.
 
 mod bridge;
-pub(crate) mod doctor;
+mod doctor;
 mod emulate;
 mod new;
 mod plugins;
@@ -49,18 +49,17 @@ struct Arguments {
 }
 
 /// Program that measures plugins, loops and recordings.
-const LAB: SeparateProgram<'static> =
-    SeparateProgram { program: "flotor-lab", built: Built::WithThis, build: "cargo build --release" };
+const LAB: SeparateProgram<'static> = built_with_this("flotor-lab");
 /// Program for perception experiments.
-const STUDY: SeparateProgram<'static> =
-    SeparateProgram { program: "flotor-study", built: Built::WithThis, build: "cargo build --release" };
+const STUDY: SeparateProgram<'static> = built_with_this("flotor-study");
 /// Program for the calibration of devices.
-const CALIBRATION: SeparateProgram<'static> =
-    SeparateProgram { program: "flotor-calibration", built: Built::WithThis, build: "cargo build --release" };
-
+const CALIBRATION: SeparateProgram<'static> = built_with_this("flotor-calibration");
 /// Program that tests scenes with expectations.
-const TEST: SeparateProgram<'static> =
-    SeparateProgram { program: "flotor-test", built: Built::WithThis, build: "cargo build --release" };
+const TEST: SeparateProgram<'static> = built_with_this("flotor-test");
+
+const fn built_with_this(program: &'static str) -> SeparateProgram<'static> {
+    SeparateProgram { program, built: Built::WithThis, build: "cargo build --release" }
+}
 
 /// Program that sweeps parameters into tables; in its own workspace, because it depends on Parquet.
 const SWEEP: SeparateProgram<'static> = SeparateProgram {

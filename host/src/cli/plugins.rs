@@ -8,7 +8,7 @@ use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Metadata, Plugin};
 use flotor_hal::{Input, Mutability, Output, Parameter, ParameterKind, Pose, Wrench};
 use flotor_session::estimates;
-use flotor_session::registry::{PATH_VARIABLE, Registry, SkippedFolder, installation_is_unknown};
+use flotor_session::registry::{Findings, PATH_VARIABLE, Registry, SkippedFolder, installation_is_unknown};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -51,19 +51,16 @@ pub(crate) fn run(arguments: &PluginsArguments) -> Result<(), CommandError> {
 }
 
 fn list(registry: &Registry, json: &JsonOption) -> Result<(), CommandError> {
-    let listed: Vec<Listed<'_>> = registry
-        .found()
-        .iter()
-        .map(|plugin| Listed {
-            id: &plugin.id,
-            kind: plugin.kind.name(),
-            name: &plugin.name,
-            doc: &plugin.doc,
-            version: &plugin.version,
-            abi: &plugin.abi,
-            file: plugin.path.display().to_string(),
-        })
-        .collect();
+    let listed = registry.found().iter().map(|plugin| Listed {
+        id: &plugin.id,
+        kind: plugin.kind.name(),
+        name: &plugin.name,
+        doc: &plugin.doc,
+        version: &plugin.version,
+        abi: &plugin.abi,
+        file: plugin.path.display().to_string(),
+    });
+    let listed: Vec<_> = listed.collect();
     if let Some(file) = json.file() {
         write_json(file, &listed)?;
     }
@@ -78,19 +75,20 @@ fn list(registry: &Registry, json: &JsonOption) -> Result<(), CommandError> {
         }
     }
     let note = style::warning("note:");
-    for Metadata { path, id, .. } in registry.shadowed() {
+    let Findings { shadowed, ambiguous, broken, skipped, .. } = registry.findings();
+    for Metadata { path, id, .. } in shadowed {
         say!("{note} {}: not used, because a plugin listed above has the same id `{id}`", path.display());
     }
-    for (one, other) in registry.ambiguous() {
+    for (one, other) in ambiguous {
         let (one, other, id) = (one.path.display(), other.path.display(), &one.id);
         say!(
             "{note} {one} and {other} have the same id `{id}`: a scene that names it is refused; remove one of them"
         );
     }
-    for broken in registry.broken() {
+    for broken in broken {
         say!("{note} {broken}");
     }
-    for SkippedFolder { folder, reason } in registry.skipped() {
+    for SkippedFolder { folder, reason } in skipped {
         say!("{note} {}: not searched: {reason}", folder.display());
     }
     if listed.is_empty() {
@@ -159,13 +157,12 @@ fn print_certificate(plugin: &Plugin, sets: &[KeyValue]) -> Result<(), CommandEr
     }
     let home = Input::at_rest(Pose::HOME);
     let mut output = Output::from(Wrench::ZERO);
-    let mut times_ns: Vec<u128> = (0..TIMED_TICKS)
-        .map(|_| {
-            let started = Instant::now();
-            let _ = model.step(&home, &mut output);
-            started.elapsed().as_nanos()
-        })
-        .collect();
+    let time_ns = || {
+        let started = Instant::now();
+        let _ = model.step(&home, &mut output);
+        started.elapsed().as_nanos()
+    };
+    let mut times_ns: Vec<u128> = std::iter::repeat_with(time_ns).take(TIMED_TICKS).collect();
     times_ns.sort_unstable();
     let with = if sets.is_empty() { "defaults" } else { "these settings" };
     say!("with {with}: ready in {ready_s:.2} s, a tick at home {} ns (median)", times_ns[TIMED_TICKS / 2]);
@@ -179,21 +176,16 @@ fn print_certificate(plugin: &Plugin, sets: &[KeyValue]) -> Result<(), CommandEr
 fn described(parameter: &Parameter) -> Described<'_> {
     let choices: Vec<&str> = parameter.choices().iter().map(flotor_hal::abi::Str::as_str).collect();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // an index of a few choices
-    let default = match parameter.kind() {
-        ParameterKind::Real => parameter.default().to_string(),
-        ParameterKind::Choice => {
-            choices.get(parameter.default() as usize).copied().unwrap_or_default().to_owned()
-        }
-        ParameterKind::Text | ParameterKind::File => String::new(),
+    let choice = |index: f64| choices.get(index as usize).copied().unwrap_or_default().to_owned();
+    let (kind, default) = match parameter.kind() {
+        ParameterKind::Real => ("real", parameter.default().to_string()),
+        ParameterKind::Choice => ("choice", choice(parameter.default())),
+        ParameterKind::Text => ("text", String::new()),
+        ParameterKind::File => ("file", String::new()),
     };
     Described {
         id: parameter.id(),
-        kind: match parameter.kind() {
-            ParameterKind::Real => "real",
-            ParameterKind::Choice => "choice",
-            ParameterKind::Text => "text",
-            ParameterKind::File => "file",
-        },
+        kind,
         unit: parameter.unit(),
         min: parameter.min(),
         max: parameter.max(),

@@ -10,23 +10,23 @@ use flotor_command::options::{
 };
 use flotor_command::stopping::{Keys, stop_on_signals, stop_run_on_signals};
 use flotor_command::{
-    CommandError, first_error, keep_results_apart, note, print_result, progress_bar, style, while_preparing,
-    write_json,
+    CommandError, before_advice, first_error, keep_results_apart, note, print_result, progress_bar, style,
+    while_preparing, write_json,
 };
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_coupling::Line;
 use flotor_hal::Demand;
 use flotor_live::{Directory, EndKind};
-use flotor_record::{Note, Recorder, Severity, TraceDigest};
+use flotor_record::{Note, Recorder, RunDescription, Severity};
 use flotor_servo::{Clock, Core, EmergencySource, RunEnd};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
-use flotor_session::summary::{RunFacts, RunSummary, Tally};
+use flotor_session::summary::{RunFacts, RunSummary};
 use flotor_session::telemetry::{LinkCounts, ObservedRun, PeerLink, publish, start_peer_link};
 use flotor_session::{
-    LatchGuard, Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session, stop_waits_with,
+    LatchGuard, Measurements, Observer, Outcome, PluginReport, RunError, RunOptions, Session, stop_waits_with,
 };
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
@@ -118,89 +118,95 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
         keep_results_apart()?;
     }
     let scene = scene(&arguments)?;
-    if matches!(arguments.clock, ClockOption::Real) {
-        enough_files()?;
-    }
-    let clock = match arguments.clock {
-        ClockOption::Real => Clock::Real,
-        ClockOption::Virtual => Clock::Virtual,
-    };
-    if clock == Clock::Virtual && arguments.core.is_some() {
-        return Err(CommandError::Usage("--core needs the real clock: omit `--clock virtual`".to_owned()));
-    }
-    let options = RunOptions { clock, seed: arguments.seed };
-    let registry = Registry::search(&scene.plugin_folders);
-    let session = while_preparing(&scene.title, || Session::prepare(&scene, &registry, &options))?;
-    let mut session = session.with_strength(arguments.options.strength()).on_core(arguments.core);
-    if !arguments.is_lent() {
-        session.notices().into_iter().for_each(note);
-    }
-    session.warnings().iter().for_each(note);
-    let links = peer_links(&mut session, clock)?;
+    let options = run_options(&arguments)?;
+    let mut session = prepare(&arguments, &scene, &options)?;
+    let links = peer_links(&mut session, options.clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
     let publication = publish(&Directory::of_this_user(), &scene, &description, &session, &stop);
     let publication =
         publication.map_err(|error| note(format_args!("telemetry server not started: {error}"))).ok();
-
-    let clock_word = if clock == Clock::Real { "real" } else { "virtual" };
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
-    let length_ms = (scene.duration_s * 1.0e3) as u64;
-    let watchers = Watchers {
-        tally: Tally::default(),
-        digest: TraceDigest::new(),
-        recording: RunRecording::new(
-            arguments.record.as_deref().map(|path| Recorder::create(path, &description)).transpose()?,
-        ),
-        plot: arguments.plot.as_ref().map(|_| {
-            let devices = scene.devices.iter().map(|device| device.name.clone()).collect();
-            RunPicture::new(&scene.title, devices, &arguments.plot_bound)
-        }),
-        compute: arguments.compute.iter().fold(Demand::FORCE, |all, output| all.with(output.demand())),
-        progress: progress_bar(length_ms, "{percent:>3} %  {msg}"),
-    };
-    let keys = (clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
-    let mut watched = ObservedRun { observer: watchers, publication };
+    let mut watched = ObservedRun { observer: Watchers::new(&arguments, &scene, &description)?, publication };
+    let keys = (options.clock == Clock::Real).then(|| Keys::listen(&stop)).flatten();
     let latch = session.latch().cloned();
     let outcome = session.run(&mut watched, &stop);
     drop(keys);
-    let requested = watched.demand();
-    let ObservedRun { observer: Watchers { tally, digest, mut recording, plot, progress, .. }, publication } =
-        watched;
-    progress.finish_and_clear();
-    let facts = RunFacts {
-        title: &scene.title,
-        clock: clock_word,
-        seed: arguments.seed,
-        rate_hz: scene.rate_hz,
-        plugins: &plugins,
-        requested,
-        couplings: &[],
-        carried: &[],
-        trace_digest: digest.finish(),
-    };
+    let ObservedRun { observer: watchers, publication } = watched;
+    watchers.progress.finish_and_clear();
+    let facts = watchers.measured.facts(&scene, &options, &plugins);
+    let facts = RunFacts { requested: watchers.demand(), ..facts };
     let outcome = match outcome {
         Ok(outcome) => outcome,
-        Err(error) => {
-            let recorded = recording.finish(&[]).map_err(Into::into);
-            let reported = match (&error, arguments.json.file()) {
-                (RunError::Hung { who, stuck, .. }, Some(json)) => {
-                    let elapsed_ns = tally.last_ns();
-                    let summary = RunSummary::new(facts, &Outcome::of_hung_loop(*stuck, elapsed_ns), &tally);
-                    write_json(json, &summary.with_health(who, &error.to_string()))
-                }
-                _ => Ok(()),
-            };
-            return first_error([Err(error.into()), recorded, reported]);
-        }
+        Err(error) => return report_failure(&arguments, facts, watchers, error),
     };
-
     let carried: Vec<(String, LinkCounts)> =
         links.into_iter().map(|(name, link)| (name, link.finish())).collect();
     if let Some(publication) = publication {
-        publication.end(&end_words(&outcome, scene.rate_hz), end_kind(outcome.end));
+        let kind = if outcome.end.is_in_order() { EndKind::InOrder } else { EndKind::Failed };
+        publication.end(&end_words(&outcome, scene.rate_hz), kind);
     }
-    let facts = RunFacts { couplings: &scene.couplings, carried: &carried, ..facts };
+    report(&arguments, RunFacts { carried: &carried, ..facts }, watchers, outcome, latch.as_ref())
+}
+
+/// Returns the options of the run, checked against each other and the machine.
+fn run_options(arguments: &RunArguments) -> Result<RunOptions, CommandError> {
+    let clock = match arguments.clock {
+        ClockOption::Real => Clock::Real,
+        ClockOption::Virtual => Clock::Virtual,
+    };
+    match clock {
+        Clock::Real => enough_files()?,
+        Clock::Virtual if arguments.core.is_some() => {
+            return Err(CommandError::Usage(
+                "--core needs the real clock: omit `--clock virtual`".to_owned(),
+            ));
+        }
+        Clock::Virtual => {}
+    }
+    Ok(RunOptions { clock, seed: arguments.seed })
+}
+
+/// Prepares the session, with its notices and warnings.
+fn prepare(arguments: &RunArguments, scene: &Scene, options: &RunOptions) -> Result<Session, CommandError> {
+    let registry = Registry::search(&scene.plugin_folders);
+    let session = while_preparing(&scene.title, || Session::prepare(scene, &registry, options))?;
+    let session = session.with_strength(arguments.options.strength()).on_core(arguments.core);
+    if !arguments.is_lent() {
+        session.notices().into_iter().for_each(note);
+    }
+    session.warnings().iter().for_each(note);
+    Ok(session)
+}
+
+/// Finishes the recording of a run that failed, and writes the summary of a loop that is stuck.
+fn report_failure(
+    arguments: &RunArguments,
+    facts: RunFacts<'_>,
+    watchers: Watchers,
+    error: RunError,
+) -> Result<(), CommandError> {
+    let Measurements { tally, mut recording, .. } = watchers.measured;
+    let recorded = recording.finish(&[]).map_err(Into::into);
+    let reported = match (&error, arguments.json.file()) {
+        (RunError::Hung { who, stuck, .. }, Some(json)) => {
+            let summary = RunSummary::new(facts, &Outcome::of_hung_loop(*stuck, tally.last_ns()), &tally);
+            write_json(json, &summary.with_health(who, &error.to_string()))
+        }
+        _ => Ok(()),
+    };
+    first_error([Err(error.into()), recorded, reported])
+}
+
+/// Finishes the recording of a run, draws and prints its results, and frees its plugins.
+fn report(
+    arguments: &RunArguments,
+    facts: RunFacts<'_>,
+    watchers: Watchers,
+    outcome: Outcome,
+    latch: Option<&LatchGuard>,
+) -> Result<(), CommandError> {
+    let Watchers { measured: Measurements { tally, mut recording, .. }, plot, .. } = watchers;
+    let plugins = facts.plugins;
     let summary = RunSummary::new(facts, &outcome, &tally);
     // Before any other step that can fail: the recording cannot be repeated.
     let recorded = recording.finish(&notes(&outcome, &summary)).map_err(Into::into);
@@ -213,8 +219,8 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     let printed = print_result(arguments.json.file(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
     outcome.later_warnings().iter().for_each(note);
-    latch.and_then(|latch| stop_note(outcome.end, &latch)).into_iter().for_each(note);
-    let verdict = verdict(&outcome, &plugins, &summary);
+    latch.and_then(|latch| stop_note(outcome.end, latch)).into_iter().for_each(note);
+    let verdict = verdict(&outcome, plugins, &summary);
     // Last, because the code of a plugin may hang, or end the process.
     let Outcome { unresponsive, unfreed_plugins, .. } = outcome;
     let freed = unfreed_plugins.free();
@@ -261,15 +267,8 @@ fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) ->
             let words = words.to_owned();
             Err(CommandError::RunFault { path, fault, words })
         }
-        RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
-        RunEnd::TooFast(samples_per_s) => {
-            Err(CommandError::TooFast { samples_per_s, rate_hz: summary.rate_hz })
-        }
-        RunEnd::NotPaced => Err(CommandError::NotPaced),
-        RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
-        RunEnd::Oscillation => Err(CommandError::Oscillation),
-        RunEnd::Unguarded => Err(CommandError::Unguarded),
-        RunEnd::Finished | RunEnd::Stopped => broken_plugins(outcome, summary),
+        end if end.is_in_order() => broken_plugins(outcome, summary),
+        end => Err(CommandError::run_ended(end, summary.rate_hz)),
     }
 }
 
@@ -328,29 +327,14 @@ fn peer_links(session: &mut Session, clock: Clock) -> Result<Vec<(String, PeerLi
     lines.into_iter().map(link).collect()
 }
 
-/// Returns the kind of end of a run, for its clients.
-fn end_kind(end: RunEnd) -> EndKind {
-    if end.is_in_order() { EndKind::InOrder } else { EndKind::Failed }
-}
-
 /// Describes the end of a run, for its clients.
 fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
     match outcome.end {
-        RunEnd::Finished => "the run finished".to_owned(),
-        RunEnd::Stopped => "the run was stopped".to_owned(),
         RunEnd::DeviceFault(fault) => {
-            format!(
-                "device fault: {}{}",
-                flotor_command::before_advice(outcome.faulted().map_or("", |(_, words)| words)),
-                fault.advice()
-            )
+            let words = outcome.faulted().map_or("", |(_, words)| words);
+            format!("device fault: {}{}", before_advice(words), fault.advice())
         }
-        RunEnd::EmergencyStop(source) => CommandError::EmergencyStop(source).to_string(),
-        RunEnd::TooFast(samples_per_s) => CommandError::TooFast { samples_per_s, rate_hz }.to_string(),
-        RunEnd::NotPaced => CommandError::NotPaced.to_string(),
-        RunEnd::Watchdog(stuck) => CommandError::Watchdog(stuck).to_string(),
-        RunEnd::Oscillation => CommandError::Oscillation.to_string(),
-        RunEnd::Unguarded => CommandError::Unguarded.to_string(),
+        end => CommandError::run_ended(end, rate_hz).to_string(),
     }
 }
 
@@ -373,21 +357,37 @@ fn broken_plugins(outcome: &Outcome, summary: &RunSummary) -> Result<(), Command
 
 /// Observers of every tick of a run.
 struct Watchers {
-    tally: Tally,
-    digest: TraceDigest,
-    recording: RunRecording,
+    measured: Measurements,
     plot: Option<RunPicture>,
-    /// Outputs of the models that the command line requests.
-    compute: Demand,
     progress: ProgressBar,
 }
 
 /// Interval between updates of the progress line, ticks; at 1 kHz thirty updates a second.
 const PROGRESS_TICKS: u64 = 33;
 
+impl Watchers {
+    fn new(
+        arguments: &RunArguments,
+        scene: &Scene,
+        description: &RunDescription,
+    ) -> Result<Self, CommandError> {
+        let recorder = arguments.record.as_deref().map(|path| Recorder::create(path, description));
+        let computed = arguments.compute.iter().fold(Demand::FORCE, |all, output| all.with(output.demand()));
+        let devices = || scene.devices.iter().map(|device| device.name.clone()).collect();
+        let plot = || RunPicture::new(&scene.title, devices(), &arguments.plot_bound);
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
+        let length_ms = (scene.duration_s * 1.0e3) as u64;
+        Ok(Self {
+            measured: Measurements::new(recorder.transpose()?, computed),
+            plot: arguments.plot.is_some().then(plot),
+            progress: progress_bar(length_ms, "{percent:>3} %  {msg}"),
+        })
+    }
+}
+
 impl Observer for Watchers {
     fn change(&mut self, change: &Change) {
-        self.recording.change(change);
+        self.measured.change(change);
         if let Some(plot) = &mut self.plot {
             plot.change(change);
         }
@@ -395,13 +395,11 @@ impl Observer for Watchers {
 
     fn demand(&self) -> Demand {
         let plot = self.plot.as_ref().map_or(Demand::FORCE, RunPicture::demand);
-        self.compute.with(self.recording.demand()).with(plot)
+        self.measured.demand().with(plot)
     }
 
     fn observe(&mut self, record: &TickRecord) {
-        self.tally.observe(record);
-        self.digest.update(record);
-        self.recording.observe(record);
+        self.measured.observe(record);
         if let Some(plot) = &mut self.plot {
             plot.observe(record);
         }
@@ -421,16 +419,11 @@ fn live_line(record: &TickRecord) -> String {
     let force_n = record.commanded.force().z;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // clamped to a few columns
     let column = ((z_mm + 10.0) / 20.0 * COLUMNS as f64).clamp(0.0, (COLUMNS - 1) as f64) as usize;
-    let bar: String = (0..COLUMNS)
-        .map(|i| {
-            if i == column {
-                '█'
-            } else if i == COLUMNS / 2 {
-                '┊'
-            } else {
-                '·'
-            }
-        })
-        .collect();
+    let mark = |place: usize| match place {
+        place if place == column => '█',
+        place if place == COLUMNS / 2 => '┊',
+        _ => '·',
+    };
+    let bar: String = (0..COLUMNS).map(mark).collect();
     format!("-10 mm {bar} +10   z {z_mm:+6.2} mm   Fz {force_n:+6.2} N")
 }

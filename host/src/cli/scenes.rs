@@ -6,6 +6,7 @@ use flotor_command::{CommandError, say, style, write_json};
 use flotor_session::RunError;
 use flotor_session::scene::{OWN_SCENES, OwnScene, did_you_mean};
 use serde::Serialize;
+use std::collections::BTreeSet;
 
 /// List Flotor's own scenes, or print a scene as a template.
 #[derive(Args)]
@@ -76,11 +77,6 @@ impl Listed {
 
 /// Returns the names in their order, without repetitions.
 fn each_once(names: impl Iterator<Item = String>) -> Vec<String> {
-    let mut once: Vec<String> = Vec::new();
-    for name in names {
-        if !once.contains(&name) {
-            once.push(name);
-        }
-    }
-    once
+    let mut seen = BTreeSet::new();
+    names.filter(|name| seen.insert(name.clone())).collect()
 }

@@ -133,18 +133,11 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
         ("--view", &arguments.view),
         ("--measure", &arguments.measure),
     ];
-    for (name, value) in options {
-        value.iter().for_each(|value| add(name, value.into()));
-    }
-    if let Some(process) = arguments.run {
-        add("--run", process.to_string().into());
-    }
-    if let Some(export) = &arguments.export {
-        add("--export", export.into());
-    }
-    if let Some(screenshot) = &arguments.screenshot {
-        add("--screenshot", screenshot.into());
-    }
+    let texts = options.into_iter().filter_map(|(name, value)| Some((name, value.as_ref()?.into())));
+    let files = [("--export", &arguments.export), ("--screenshot", &arguments.screenshot)];
+    let files = files.into_iter().filter_map(|(name, file)| Some((name, file.as_ref()?.into())));
+    let run = arguments.run.map(|process| ("--run", process.to_string().into()));
+    texts.chain(run).chain(files).for_each(|(name, value)| add(name, value));
     for_viewer.extend(arguments.window.then(|| "--window".into()));
     for_viewer.extend(file.into_iter().chain(&arguments.second).map(|file| file.into()));
     match remote {

@@ -33,7 +33,7 @@ pub(crate) fn end_with_parent() {}
 pub(crate) mod doctor {
     //! Findings of `flotor doctor` about the system.
 
-    use crate::cli::doctor::Diagnosis;
+    use crate::diagnosis::Diagnosis;
     use std::path::Path;
 
     /// Returns the remedy for missing priority.
@@ -63,7 +63,7 @@ pub(crate) mod doctor {
 pub(crate) mod usb {
     //! USB connection of a device.
 
-    use crate::cli::doctor::Diagnosis;
+    use crate::diagnosis::Diagnosis;
     use flotor_hal::UsbKind;
     use std::path::Path;
 

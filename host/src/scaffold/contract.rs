@@ -1,6 +1,6 @@
 //! Source of the crate `flotor-hal` for a new plugin: the registry, the sources of the running program, or a copy.
 
-use super::ScaffoldError;
+use super::error::ScaffoldError;
 use super::vendor::{write_copy, write_file};
 use crate::platform::canonical;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
 //! Copy of the contract's sources that builds without their workspace.
 
-use super::ScaffoldError;
+use super::error::ScaffoldError;
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;

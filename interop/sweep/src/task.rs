@@ -232,7 +232,7 @@ impl Sweep {
                 Cell::number(summary.peak_torque_nm),
                 Cell::number(summary.energy.loop_generated_j.unwrap_or(f64::NAN)),
                 Cell::number(summary.energy.device_peak_j.unwrap_or(f64::NAN)),
-                Cell::Word(summary.end.to_owned()),
+                Cell::Word(summary.end.word().to_owned()),
                 Cell::Word(summary.trace_digest),
                 Cell::Word(String::new()),
             ],

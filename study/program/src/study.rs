@@ -596,10 +596,12 @@ fn refused(error: CohortError) -> CommandError {
 /// note, with subject and trial.
 fn outside(cause: ApparatusOrFrontEndError, message: String) -> CommandError {
     let error = match cause.downcast_ref::<RunEnded>() {
-        Some(RunEnded(RunEnd::DeviceFault(fault))) => CommandError::DeviceFault(*fault),
-        Some(RunEnded(RunEnd::EmergencyStop(source))) => CommandError::EmergencyStop(*source),
-        Some(RunEnded(RunEnd::Watchdog(stuck))) => CommandError::Watchdog(*stuck),
-        Some(RunEnded(RunEnd::Oscillation)) => CommandError::Oscillation,
+        Some(RunEnded(
+            end @ (RunEnd::DeviceFault(_)
+            | RunEnd::EmergencyStop(_)
+            | RunEnd::Watchdog(_)
+            | RunEnd::Oscillation),
+        )) => CommandError::RunEnded(*end),
         _ => {
             let error = cause.downcast().map(|error| CommandError::Run(*error));
             return error.unwrap_or(CommandError::Failed(message));

@@ -283,13 +283,10 @@ fn summary_with_clients(axes: &str, clients: usize) -> Value {
     let mut tally = Tally::default();
     watched.observer.records.iter().for_each(|record| tally.observe(record));
     let facts = RunFacts {
-        title: &scene.title,
-        clock: "virtual",
-        seed: OPTIONS.seed,
-        rate_hz: scene.rate_hz,
+        scene: &scene,
+        options: &OPTIONS,
         plugins: &plugins,
         requested: watched.observer.demand,
-        couplings: &[],
         carried: &[],
         trace_digest: String::new(),
     };

@@ -6,10 +6,11 @@
 
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Demand, EnergyLedger, Input, Output, Pose};
-use flotor_servo::RunEnd;
-use flotor_session::Observer;
+use flotor_servo::{Clock, RunEnd};
 use flotor_session::registry::load_file;
+use flotor_session::scene::Scene;
 use flotor_session::summary::{RunFacts, RunSummary, Tally};
+use flotor_session::{Observer, RunOptions};
 use flotor_tests::library::plugin_file;
 use flotor_tests::watched::{Watched, watch};
 
@@ -157,13 +158,10 @@ fn the_hold_puts_out_exactly_the_energy_a_held_spring_must() {
     let mut tally = Tally::default();
     watched.records.iter().for_each(|record| tally.observe(record));
     let facts = RunFacts {
-        title: "",
-        clock: "virtual",
-        seed: 1,
-        rate_hz: 1.0 / PERIOD_S,
+        scene: &Scene::demo().expect("it is a scene"),
+        options: &RunOptions { clock: Clock::Virtual, seed: 1 },
         plugins: &[],
         requested: Demand::ALL,
-        couplings: &[],
         carried: &[],
         trace_digest: String::new(),
     };

@@ -173,14 +173,8 @@ impl Armed {
     }
 
     fn name(&self, place: Place) -> &str {
-        let index = match place {
-            Place::Waiting | Place::Host => return "host",
-            Place::DeviceWait(device) | Place::DeviceRead(device) | Place::DeviceWrite(device) => {
-                usize::from(device)
-            }
-            Place::Model(model) => self.stoppers.len() + model,
-        };
-        self.names.get(index).map_or("a plugin", String::as_str)
+        let Some(plugin) = place.plugin(self.stoppers.len()) else { return "host" };
+        self.names.get(plugin.position()).map_or("a plugin", String::as_str)
     }
 }
 

@@ -40,7 +40,7 @@ pub(crate) struct ModelStack {
 /// Replacement of a model in a running loop.
 pub struct Replacement {
     /// Number of the model to replace.
-    pub model: u32,
+    pub model: usize,
     /// Generation of the new layer, named in changes of its parameters.
     pub generation: u16,
     /// New layer.

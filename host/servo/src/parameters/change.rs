@@ -1,6 +1,6 @@
 //! Changes of parameters, and reports on them.
 
-use flotor_core::ChangeOutcome;
+use flotor_core::{ChangeOutcome, PluginIndex};
 use flotor_hal::Tick;
 
 /// Parameter number that stands for the weight of a model.
@@ -11,8 +11,8 @@ pub const PLUGIN: u32 = u32::MAX - 1;
 /// New value of a parameter. The numbers come from a schema: see `session::Controls`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterChange {
-    /// Number of the plugin in the run: the devices, then the models, both in the scene's order.
-    pub plugin: u16,
+    /// Number of the plugin in the run.
+    pub plugin: PluginIndex,
     /// Generation of the plugin that the change was checked against.
     pub generation: u16,
     /// Index into the plugin's schema, [`WEIGHT`], or in a report [`PLUGIN`].

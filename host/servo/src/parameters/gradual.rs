@@ -1,7 +1,7 @@
 //! Numbers that move to a new value at a rate, so that a user's slider does not make the force jump.
 
 use super::change::{Pace, ParameterChange};
-use flotor_core::ChangeOutcome;
+use flotor_core::{ChangeOutcome, PluginIndex};
 use flotor_hal::Tick;
 
 /// Longest time step of a movement in a tick, ns: missed ticks are not caught up.
@@ -13,7 +13,7 @@ const PATIENCE_NS: u64 = 1_000_000_000;
 /// Number with its value and movement.
 #[derive(Clone, Copy, Debug)]
 struct Known {
-    plugin: u16,
+    plugin: PluginIndex,
     generation: u16,
     parameter: u32,
     value: f64,
@@ -116,7 +116,7 @@ impl Movements {
     }
 
     /// Drops the numbers of a plugin's other generations after a replacement. Real-time: bounded, no allocation.
-    pub(super) fn forget_others(&mut self, plugin: u16, generation: u16) {
+    pub(super) fn forget_others(&mut self, plugin: PluginIndex, generation: u16) {
         self.known.retain(|known| known.plugin != plugin || known.generation == generation);
         self.count();
     }

@@ -2,7 +2,13 @@ use super::super::queue::drain;
 use super::*;
 
 fn change(value: f64) -> ParameterChange {
-    ParameterChange { plugin: 1, generation: 3, parameter: 2, value, pace: Pace::AtOnce }
+    ParameterChange {
+        plugin: PluginIndex::of_device(1),
+        generation: 3,
+        parameter: 2,
+        value,
+        pace: Pace::AtOnce,
+    }
 }
 
 fn at(index: u64) -> Tick {
@@ -139,6 +145,6 @@ fn a_replaced_plugin_is_not_moved_any_more() {
     let (mut queue, mut sender, _reports) = ParameterQueue::new(Vec::new(), 0);
     sender.push(gradual(40.0)).unwrap();
     assert_eq!(applied(&mut queue, 1).len(), 1);
-    queue.report_replaced(&at(2), 1, 4);
+    queue.report_replaced(&at(2), PluginIndex::of_device(1), 4);
     assert_eq!(applied(&mut queue, 2), [0.0; 0]);
 }

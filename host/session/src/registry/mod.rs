@@ -5,14 +5,15 @@
 mod stamp;
 
 use self::stamp::{FileStamp, hash_of};
-use crate::calls::{self, Call, CallError, attended_while};
+use crate::calls::{self, Call, CallError, CallThread};
+use crate::lock::lock;
 pub use crate::platform::is_same_file;
 use crate::platform::{UNKNOWN_PROGRAM, distrust, user_folder};
 use crate::scene::nearest;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 
 /// Environment variable with further plugin folders, separated like `PATH`.
 pub const PATH_VARIABLE: &str = "FLOTOR_PLUGIN_PATH";
@@ -26,15 +27,26 @@ pub struct SkippedFolder {
     pub reason: String,
 }
 
+/// Findings of a search for plugins.
+#[derive(Default)]
+pub struct Findings {
+    /// Plugins in search order.
+    pub found: Vec<Metadata>,
+    /// Plugins hidden by an earlier one with the same id.
+    pub shadowed: Vec<Metadata>,
+    /// Pairs of files with one id in one folder. A scene that names the id is rejected.
+    pub ambiguous: Vec<(Metadata, Metadata)>,
+    /// Files that look like plugins and cannot be read as one.
+    pub broken: Vec<LoadError>,
+    /// Folders that were not searched.
+    pub skipped: Vec<SkippedFolder>,
+}
+
 /// Plugins found, in search order: of two folders with a plugin of one id the first one counts; two files with one id in one folder
 /// are rejected.
 pub struct Registry {
     linked: Vec<Plugin>,
-    found: Vec<Metadata>,
-    shadowed: Vec<Metadata>,
-    ambiguous: Vec<(Metadata, Metadata)>,
-    broken: Vec<LoadError>,
-    skipped: Vec<SkippedFolder>,
+    findings: Findings,
     /// Searched folders, those of the scene first.
     folders: Vec<PathBuf>,
     /// Number of folders of the scene.
@@ -112,11 +124,7 @@ impl Registry {
         let mut registry = Self {
             // Part of the host; refuses itself without a program.
             linked: Plugin::in_process(&crate::program::ENTRY).into_iter().collect(),
-            found: Vec::new(),
-            shadowed: Vec::new(),
-            ambiguous: Vec::new(),
-            broken: Vec::new(),
-            skipped: Vec::new(),
+            findings: Findings::default(),
             folders,
             of_scene: scene_folders.len(),
             loaded: Mutex::new(Vec::new()),
@@ -140,7 +148,7 @@ impl Registry {
     fn scan(&mut self, folder: &Path) {
         let Ok(attributes) = std::fs::metadata(folder) else { return };
         if let Some(reason) = distrust(folder, &attributes) {
-            self.skipped.push(SkippedFolder { folder: folder.into(), reason });
+            self.findings.skipped.push(SkippedFolder { folder: folder.into(), reason });
             return;
         }
         let Ok(entries) = std::fs::read_dir(folder) else { return };
@@ -149,20 +157,21 @@ impl Registry {
             file.extension().is_some_and(|extension| extension == std::env::consts::DLL_EXTENSION)
         });
         files.sort();
+        let Findings { found, shadowed, ambiguous, broken, .. } = &mut self.findings;
         for file in files {
             match read_metadata(&file) {
-                Ok(metadata) => match self.found.iter().find(|known| known.id == metadata.id) {
-                    None => self.found.push(metadata),
+                Ok(metadata) => match found.iter().find(|known| known.id == metadata.id) {
+                    None => found.push(metadata),
                     // Cargo links its output into two folders: one file under two names hides nothing.
                     Some(known) if is_same_file(&known.path, &metadata.path) => {}
                     Some(known) if known.path.parent() == metadata.path.parent() => {
-                        self.ambiguous.push((known.clone(), metadata));
+                        ambiguous.push((known.clone(), metadata));
                     }
-                    Some(_) => self.shadowed.push(metadata),
+                    Some(_) => shadowed.push(metadata),
                 },
                 // Other libraries may lie beside plugins; only files that claim to be one are reported.
                 Err(LoadError::NotAPlugin { .. }) => {}
-                Err(error) => self.broken.push(error),
+                Err(error) => broken.push(error),
             }
         }
     }
@@ -170,31 +179,13 @@ impl Registry {
     /// Returns the plugins found, in search order.
     #[must_use]
     pub fn found(&self) -> &[Metadata] {
-        &self.found
+        &self.findings.found
     }
 
-    /// Returns the plugins hidden by an earlier one with the same id.
+    /// Returns the findings of the search.
     #[must_use]
-    pub fn shadowed(&self) -> &[Metadata] {
-        &self.shadowed
-    }
-
-    /// Returns pairs of files with one id in one folder. A scene that names the id is rejected.
-    #[must_use]
-    pub fn ambiguous(&self) -> &[(Metadata, Metadata)] {
-        &self.ambiguous
-    }
-
-    /// Returns the files that look like plugins and cannot be read as one.
-    #[must_use]
-    pub fn broken(&self) -> &[LoadError] {
-        &self.broken
-    }
-
-    /// Returns the folders that were not searched, with the reasons.
-    #[must_use]
-    pub fn skipped(&self) -> &[SkippedFolder] {
-        &self.skipped
+    pub fn findings(&self) -> &Findings {
+        &self.findings
     }
 
     /// Returns the folders in search order, existing or not.
@@ -250,9 +241,9 @@ impl Registry {
         if let Some(linked) = self.linked.iter().find(|plugin| fits(plugin.metadata())) {
             return Ok(Located::Linked(linked));
         }
-        let found = self.found.iter().find(|known| known.id == id).ok_or_else(|| self.unknown(id, kind))?;
+        let found = self.found().iter().find(|known| known.id == id).ok_or_else(|| self.unknown(id, kind))?;
         check_kind(found, kind)?;
-        if let Some((one, other)) = self.ambiguous.iter().find(|(one, _)| one.path == found.path) {
+        if let Some((one, other)) = self.findings.ambiguous.iter().find(|(one, _)| one.path == found.path) {
             let (one, other) = (one.path.clone(), other.path.clone());
             return Err(LookupError::Ambiguous { id: id.to_owned(), one, other });
         }
@@ -261,12 +252,12 @@ impl Registry {
 
     /// Returns the error about an unknown id, with the closest known one.
     fn unknown(&self, id: &str, kind: Option<PluginKind>) -> LookupError {
-        let candidates = self.found.iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
+        let candidates = self.found().iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
         let unknown_program = || installation_is_unknown().map(str::to_owned);
         let here = Path::new(id)
             .is_file()
             .then(|| format!("for the file of this name write `.{MAIN_SEPARATOR}{id}`"));
-        let broken = || self.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
+        let broken = || self.findings.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
         LookupError::Unknown {
             id: id.to_owned(),
             kind,
@@ -277,7 +268,8 @@ impl Registry {
 
     /// Returns advice to build, if a folder of the scene contains no plugin.
     fn unbuilt(&self) -> Option<String> {
-        let holds_plugin = |folder: &Path| self.found.iter().any(|known| known.path.parent() == Some(folder));
+        let holds_plugin =
+            |folder: &Path| self.found().iter().any(|known| known.path.parent() == Some(folder));
         let mut of_scene = self.folders.iter().take(self.of_scene);
         let empty = of_scene.find(|folder| !holds_plugin(folder))?;
         Some(format!("`{}` contains no plugin: build it first", empty.display()))
@@ -288,7 +280,7 @@ impl Registry {
     fn open(&self, path: &Path) -> Result<Plugin, LookupError> {
         // Taken before the bytes are read: a write meanwhile is noticed the next time.
         let Ok(stamp) = FileStamp::of(path) else { return load_in_time(path) }; // reports the error
-        let mut loaded = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut loaded = lock(&self.loaded);
         if let Some(known) = loaded.iter().find(|known| known.path == path && known.stamp.is_same_as(&stamp))
         {
             return Ok(known.plugin.clone());
@@ -332,7 +324,7 @@ pub(crate) fn is_installed(plugin: &Path) -> bool {
 /// Loads a plugin file, with a time limit for its initialisers.
 fn load_in_time(path: &Path) -> Result<Plugin, LookupError> {
     let path = path.to_path_buf();
-    let loaded = attended_while(calls::limit(), calls::is_to_begin, move |progress| {
+    let loaded = CallThread::default().run_while(calls::limit(), calls::is_to_begin, move |progress| {
         progress.enter(&path.display().to_string(), Call::Load);
         load_file(&path)
     });

@@ -52,7 +52,7 @@ pub struct Alternative {
 impl Alternative {
     /// Takes `plugin` and `parameters` of a table.
     fn take(section: &mut Section<'_>) -> Result<Self, SceneError> {
-        let plugin = section.take("plugin").map(Value::text).transpose()?;
+        let plugin = section.read("plugin", Value::text)?;
         let parameters =
             section.section("parameters")?.map_or_else(|| Ok(Vec::new()), Section::into_texts)?;
         Ok(Self { plugin, parameters })

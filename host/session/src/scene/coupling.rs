@@ -1,7 +1,7 @@
 //! `[[coupling]]`: the virtual coupling of two devices.
 
 use super::devices::{self, DeviceUse};
-use super::reader::{SceneError, Section};
+use super::reader::{SceneError, Section, Value};
 use super::{Limits, frame_and_scales, passivity};
 use flotor_core::coupling::{
     CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MAX_DELAY_TICKS, PassivityMode,
@@ -25,12 +25,10 @@ fn coupling(
     let here = section.location();
     let wrong = |problem: &str| here.problem(problem);
     let default = CouplingConfig::default();
-    let name = section.take("name").map(devices::name).transpose()?;
-    let partner = section.take("partner");
-    let partner =
-        partner.map(|value| value.one_of(&[("here", Partner::Here), ("elsewhere", Partner::Elsewhere)]));
-    let partner = partner.transpose()?.unwrap_or(Partner::Here);
-    let mut gain = |key, most, default| section.number(key, 0.0..=most).map(|value| value.unwrap_or(default));
+    let name = section.read("name", devices::name)?;
+    let places = [("here", Partner::Here), ("elsewhere", Partner::Elsewhere)];
+    let partner = section.read("partner", |value| value.one_of(&places))?.unwrap_or(Partner::Here);
+    let mut gain = |key, most, default| section.number_or(key, 0.0..=most, default);
     let config = CouplingConfig {
         stiffness_n_per_m: gain("stiffness_n_per_m", 1.0e5, default.stiffness_n_per_m)?,
         damping_ns_per_m: gain("damping_ns_per_m", 1.0e3, default.damping_ns_per_m)?,
@@ -44,10 +42,9 @@ fn coupling(
             }
             (None, _) => default.delay_ticks,
         },
-        passivity: section.take("passivity").map(passivity).transpose()?.unwrap_or(default.passivity),
+        passivity: section.read("passivity", passivity)?.unwrap_or(default.passivity),
     };
-    let may_amplify =
-        section.take("allow_amplification").map(|value| value.truth()).transpose()?.unwrap_or(false);
+    let may_amplify = section.read("allow_amplification", Value::truth)?.unwrap_or(false);
     let ends = section.sections("end")?;
     section.finish()?;
     let ends = ends.into_iter().map(|section| end(section, devices)).collect::<Result<Vec<_>, _>>()?;

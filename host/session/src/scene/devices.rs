@@ -30,8 +30,7 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError>
     let mut devices: Vec<DeviceUse> = Vec::new();
     for mut section in sections {
         let here = section.location();
-        let name = section.take("name").map(name).transpose()?;
-        let name = match name {
+        let name = match section.read("name", name)? {
             Some(name) => name,
             None if is_one => "device".to_owned(),
             None => return Err(section.missing("name")),
@@ -45,11 +44,11 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError>
             return Err(here.problem(format!("a scene has at most {MAX_DEVICES} devices")));
         }
         let plugin = plugin_use(&mut section)?;
-        let calibration = section.take("calibration").map(|value| {
+        let calibration = section.read("calibration", |value| {
             let location = value.location.clone();
             Ok(CalibrationUse { file: value.text()?.into(), location })
-        });
-        devices.push(DeviceUse { name, plugin, calibration: calibration.transpose()? });
+        })?;
+        devices.push(DeviceUse { name, plugin, calibration });
         section.finish()?;
     }
     Ok(devices)

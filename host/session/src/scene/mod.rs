@@ -17,7 +17,7 @@ use flotor_core::limits::{Boundary, Limits};
 use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
 use flotor_core::plausibility::is_rotation;
 pub use own::{OWN_SCENES, OwnScene};
-pub use reader::{Location, SceneError};
+pub use reader::{Location, ParameterText, SceneError};
 pub use reference::{KeyReference, SectionReference, reference};
 pub use setting::{KeyValue, PluginKeyValue};
 
@@ -90,17 +90,6 @@ impl CalibrationUse {
             _ => self.file.clone(),
         }
     }
-}
-
-/// Parameter as written.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ParameterText {
-    /// Id of the parameter.
-    pub key: String,
-    /// Value as text.
-    pub value: String,
-    /// Location in the scene.
-    pub location: Location,
 }
 
 /// A force model in a scene.
@@ -237,11 +226,11 @@ impl Scene {
 
     fn read(source: &Source<'_>) -> Result<Self, SceneError> {
         let mut root = source.parse()?;
-        let title = root.take("title").map(|value| value.text()).transpose()?.unwrap_or_default();
-        let rate_hz = root.number("rate_hz", 100.0..=10_000.0)?.unwrap_or(1000.0);
-        let pacing = root.take("pacing").map(pacing).transpose()?.unwrap_or(Pacing::Host);
-        let duration_s = root.number("duration_s", 0.0..=31_536_000.0)?.unwrap_or(Self::DURATION_S);
-        let folders = root.take("plugin_folders").map(|value| value.texts()).transpose()?.unwrap_or_default();
+        let title = root.read("title", Value::text)?.unwrap_or_default();
+        let rate_hz = root.number_or("rate_hz", 100.0..=10_000.0, 1000.0)?;
+        let pacing = root.read("pacing", pacing)?.unwrap_or(Pacing::Host);
+        let duration_s = root.number_or("duration_s", 0.0..=31_536_000.0, Self::DURATION_S)?;
+        let folders = root.read("plugin_folders", Value::texts)?.unwrap_or_default();
         let devices = devices::read(&mut root)?;
         let models = root.sections("model")?.into_iter().map(|section| model(section, &devices));
         let models = models.collect::<Result<Vec<_>, _>>()?.concat();
@@ -289,14 +278,14 @@ fn pacing(value: Value<'_>) -> Result<Pacing, SceneError> {
 /// Reads a model, once for each of its devices.
 fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse>, SceneError> {
     let plugin = plugin_use(&mut section)?;
-    let name = section.take("name").map(devices::name).transpose()?;
+    let name = section.read("name", devices::name)?;
     let on = devices::of_model(devices, section.take("device"), &plugin.location)?;
     let (mapping, places_m) = match section.section("mapping")? {
         Some(section) => mapping(section)?,
         None => (MappingConfig::default(), vec![[0.0; 3]]),
     };
     let blend = section.section("blend")?.map_or_else(|| Ok(Blend::default()), blend)?;
-    let isolation = section.take("isolation").map(isolation).transpose()?.unwrap_or_default();
+    let isolation = section.read("isolation", isolation)?.unwrap_or_default();
     let budget_us = section.number("budget_us", 1.0..=1.0e6)?;
     let field = section.section("field")?.map(field).transpose()?;
     section.finish()?;
@@ -335,11 +324,11 @@ fn field(mut section: Section<'_>) -> Result<FieldTiming, SceneError> {
 
 fn blend(mut section: Section<'_>) -> Result<Blend, SceneError> {
     let default = Blend::default();
-    let priority = section.take("priority").map(|value| value.whole(0..=u8::MAX.into())).transpose()?;
+    let priority = section.read("priority", |value| value.whole(0..=u8::MAX.into()))?;
     let blend = Blend {
-        weight: section.number("weight", 0.0..=1.0)?.unwrap_or(default.weight),
+        weight: section.number_or("weight", 0.0..=1.0, default.weight)?,
         priority: priority.and_then(|priority| u8::try_from(priority).ok()).unwrap_or(default.priority),
-        fade_s: section.number("fade_s", 0.0..=60.0)?.unwrap_or(default.fade_s),
+        fade_s: section.number_or("fade_s", 0.0..=60.0, default.fade_s)?,
     };
     section.finish()?;
     Ok(blend)
@@ -364,24 +353,23 @@ fn mapping(mut section: Section<'_>) -> Result<(MappingConfig, Vec<[f64; 3]>), S
 /// Reads rotation and scales, without the torque scale.
 fn frame_and_scales(section: &mut Section<'_>) -> Result<MappingConfig, SceneError> {
     let default = MappingConfig::default();
-    let rotation =
-        section.take("rotation_xyzw").map(|value| (value.numbers::<4>(), value)).map(|(numbers, value)| {
-            let numbers = numbers?;
-            let rotation = DQuat::from_array(numbers);
-            if !is_rotation(rotation) {
-                return Err(value.problem(format!(
-                    "a rotation is a unit quaternion [x, y, z, w]; this quaternion has length {}",
-                    rotation.length()
-                )));
-            }
-            Ok((rotation / rotation.length()).to_array())
-        });
     Ok(MappingConfig {
-        rotation_xyzw: rotation.transpose()?.unwrap_or(default.rotation_xyzw),
-        motion_scale: section.number("motion_scale", SCALE)?.unwrap_or(default.motion_scale),
-        force_scale: section.number("force_scale", SCALE)?.unwrap_or(default.force_scale),
+        rotation_xyzw: section.read("rotation_xyzw", rotation)?.unwrap_or(default.rotation_xyzw),
+        motion_scale: section.number_or("motion_scale", SCALE, default.motion_scale)?,
+        force_scale: section.number_or("force_scale", SCALE, default.force_scale)?,
         torque_scale: None,
     })
+}
+
+fn rotation(value: Value<'_>) -> Result<[f64; 4], SceneError> {
+    let rotation = DQuat::from_array(value.numbers()?);
+    if is_rotation(rotation) {
+        return Ok((rotation / rotation.length()).to_array());
+    }
+    Err(value.problem(format!(
+        "a rotation is a unit quaternion [x, y, z, w]; this quaternion has length {}",
+        rotation.length()
+    )))
 }
 
 /// Legal scales: zero would suppress motion or force; a million is a wrong unit.
@@ -414,43 +402,45 @@ fn legal_watchdog_s(watchdog_s: f64, rate_hz: f64, place: Location) -> Result<f6
     Err(place.problem(problem))
 }
 
+/// Largest value of a limit.
+const MOST: f64 = f64::INFINITY;
+
 fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> {
     let default = Limits::default();
     let limits = Limits {
-        force_n: section.bound("force_n", 0.0..=f64::INFINITY)?.unwrap_or(default.force_n),
-        torque_nm: section.bound("torque_nm", 0.0..=f64::INFINITY)?.unwrap_or(default.torque_nm),
-        force_slew_n_per_s: section
-            .number("force_slew_n_per_s", 1.0..=f64::INFINITY)?
-            .unwrap_or(default.force_slew_n_per_s),
-        torque_slew_nm_per_s: section
-            .number("torque_slew_nm_per_s", 0.01..=f64::INFINITY)?
-            .unwrap_or(default.torque_slew_nm_per_s),
-        velocity_m_per_s: section
-            .bound("velocity_m_per_s", 1.0e-6..=f64::INFINITY)?
-            .unwrap_or(default.velocity_m_per_s),
-        angular_velocity_rad_per_s: section
-            .bound("angular_velocity_rad_per_s", 1.0e-6..=f64::INFINITY)?
-            .unwrap_or(default.angular_velocity_rad_per_s),
-        ramp_s: section.number("ramp_s", 0.0..=60.0)?.unwrap_or(default.ramp_s),
+        force_n: section.bound_or("force_n", 0.0..=MOST, default.force_n)?,
+        torque_nm: section.bound_or("torque_nm", 0.0..=MOST, default.torque_nm)?,
+        force_slew_n_per_s: section.number_or(
+            "force_slew_n_per_s",
+            1.0..=MOST,
+            default.force_slew_n_per_s,
+        )?,
+        torque_slew_nm_per_s: section.number_or(
+            "torque_slew_nm_per_s",
+            0.01..=MOST,
+            default.torque_slew_nm_per_s,
+        )?,
+        velocity_m_per_s: section.bound_or("velocity_m_per_s", 1.0e-6..=MOST, default.velocity_m_per_s)?,
+        angular_velocity_rad_per_s: section.bound_or(
+            "angular_velocity_rad_per_s",
+            1.0e-6..=MOST,
+            default.angular_velocity_rad_per_s,
+        )?,
+        ramp_s: section.number_or("ramp_s", 0.0..=60.0, default.ramp_s)?,
         watchdog_s: section
             .number_and_place("watchdog_ms", 1.0..=LONGEST_WATCHDOG_MS)?
             .map_or(Ok(default.watchdog_s), |(ms, place)| legal_watchdog_s(ms * 1.0e-3, rate_hz, place))?,
         emergency_buttons: section
-            .take("emergency_button")
-            .map(|value| value.whole(0..=31))
-            .transpose()?
+            .read("emergency_button", |value| value.whole(0..=31))?
             .map_or(default.emergency_buttons, |button| 1 << button),
-        passivity: section.take("passivity").map(passivity).transpose()?.unwrap_or(default.passivity),
-        require_independent_stop: truth(&mut section, "require_independent_stop")?,
-        accept_shared_control_group: truth(&mut section, "accept_shared_control_group")?,
+        passivity: section.read("passivity", passivity)?.unwrap_or(default.passivity),
+        require_independent_stop: section.read("require_independent_stop", Value::truth)?.unwrap_or(false),
+        accept_shared_control_group: section
+            .read("accept_shared_control_group", Value::truth)?
+            .unwrap_or(false),
     };
     section.finish()?;
     Ok(limits)
-}
-
-/// Reads a key that is false by default.
-fn truth(section: &mut Section<'_>, key: &'static str) -> Result<bool, SceneError> {
-    section.take(key).map_or(Ok(false), |value| value.truth())
 }
 
 fn isolation(value: Value<'_>) -> Result<Isolation, SceneError> {
@@ -465,14 +455,14 @@ fn boundary(mut section: Section<'_>) -> Result<Boundary, SceneError> {
     let default = Boundary::default();
     let millimetres = section.number("margin_mm", 0.0..=100.0)?;
     let degrees = section.number("margin_deg", 0.0..=90.0)?;
-    let mut gain = |key, range, default| section.number(key, range).map(|value| value.unwrap_or(default));
+    let mut gain = |key, most, default| section.number_or(key, 0.0..=most, default);
     let boundary = Boundary {
         margin_m: millimetres.map_or(default.margin_m, |mm| mm * 1.0e-3),
         margin_rad: degrees.map_or(default.margin_rad, f64::to_radians),
-        stiffness_n_per_m: gain("stiffness_n_per_m", 0.0..=1.0e5, default.stiffness_n_per_m)?,
-        damping_ns_per_m: gain("damping_ns_per_m", 0.0..=1.0e3, default.damping_ns_per_m)?,
-        stiffness_nm_per_rad: gain("stiffness_nm_per_rad", 0.0..=1.0e3, default.stiffness_nm_per_rad)?,
-        damping_nms_per_rad: gain("damping_nms_per_rad", 0.0..=10.0, default.damping_nms_per_rad)?,
+        stiffness_n_per_m: gain("stiffness_n_per_m", 1.0e5, default.stiffness_n_per_m)?,
+        damping_ns_per_m: gain("damping_ns_per_m", 1.0e3, default.damping_ns_per_m)?,
+        stiffness_nm_per_rad: gain("stiffness_nm_per_rad", 1.0e3, default.stiffness_nm_per_rad)?,
+        damping_nms_per_rad: gain("damping_nms_per_rad", 10.0, default.damping_nms_per_rad)?,
     };
     section.finish()?;
     Ok(boundary)

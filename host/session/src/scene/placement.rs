@@ -20,10 +20,8 @@ pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneErro
             return Err(list.problem("a model has `positions_mm` or a `grid`, not both"));
         }
     };
-    let from_centre = |place_mm: [f64; 3]| {
-        let [x, y, z] = std::array::from_fn(|axis| (centre_mm[axis] + place_mm[axis]) * 1.0e-3);
-        [x, y, z]
-    };
+    let from_centre =
+        |place_mm: [f64; 3]| std::array::from_fn(|axis| (centre_mm[axis] + place_mm[axis]) * 1.0e-3);
     Ok(places_mm.into_iter().map(from_centre).collect())
 }
 

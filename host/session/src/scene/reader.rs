@@ -3,11 +3,11 @@
 //! serde would report the line of an unknown key but not the closest valid one; here each key is taken by name, and keys left over
 //! at the end are unknown.
 
-use super::ParameterText;
 use flotor_core::limits::Bound;
 pub use flotor_hal::abi::loader::nearest;
 use std::borrow::Cow;
 use std::cell::RefCell;
+use std::fmt::Display;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -35,7 +35,7 @@ impl Location {
     }
 }
 
-impl std::fmt::Display for Location {
+impl Display for Location {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self.line {
             0 => write!(f, "{}", self.file.display()),
@@ -52,6 +52,17 @@ pub struct SceneError {
     pub location: Location,
     /// Key, problem and remedy.
     pub problem: String,
+}
+
+/// Parameter as written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterText {
+    /// Id of the parameter.
+    pub key: String,
+    /// Value as text.
+    pub value: String,
+    /// Location in the scene.
+    pub location: Location,
 }
 
 /// Text of a scene, with an index of its lines.
@@ -126,13 +137,8 @@ impl<'t> Source<'t> {
             };
             location.problem(format!("not valid TOML: `{line}`: {problem}"))
         })?;
-        Ok(Section {
-            source: self,
-            name: String::new(),
-            span: root.span(),
-            table: root.into_inner(),
-            known: Vec::new(),
-        })
+        let (name, span) = (String::new(), root.span());
+        Ok(Section { source: self, name, span, table: root.into_inner(), known: Vec::new() })
     }
 }
 
@@ -193,6 +199,25 @@ impl<'t> Section<'t> {
         self.location().problem(format!("`{}` is missing", self.path(key)))
     }
 
+    /// Takes a key, if present, and reads its value.
+    pub(super) fn read<T>(
+        &mut self,
+        key: &'static str,
+        read: impl FnOnce(Value<'t>) -> Result<T, SceneError>,
+    ) -> Result<Option<T>, SceneError> {
+        self.take(key).map(read).transpose()
+    }
+
+    /// Takes a number, or `default`, and checks that it lies in `range`.
+    pub(super) fn number_or(
+        &mut self,
+        key: &'static str,
+        range: RangeInclusive<f64>,
+        default: f64,
+    ) -> Result<f64, SceneError> {
+        Ok(self.number(key, range)?.unwrap_or(default))
+    }
+
     /// Takes a number, if present, and checks that it lies in `range`.
     pub(super) fn number(
         &mut self,
@@ -222,25 +247,26 @@ impl<'t> Section<'t> {
         self.take_as(key, Takes::Three(range.clone())).map(|value| value.three(range)).transpose()
     }
 
-    /// Takes the bound of a vector, if present, and checks that its numbers lie in `range`: a norm, a number for each axis, or a
+    /// Takes the bound of a vector, or `default`, and checks that its numbers lie in `range`: a norm, a number for each axis, or a
     /// table with both.
-    pub(super) fn bound(
+    pub(super) fn bound_or(
         &mut self,
         key: &'static str,
         range: RangeInclusive<f64>,
-    ) -> Result<Option<Bound>, SceneError> {
+        default: Bound,
+    ) -> Result<Bound, SceneError> {
         if matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Table(_)))
             && let Some(mut both) = self.section(key)?
         {
             let norm = both.require("norm")?.number(range.clone())?;
             let axes = both.require("axes")?.axes(range)?;
             both.finish()?;
-            return Ok(Some(Bound::ball(norm).and(Bound::box_of(axes))));
+            return Ok(Bound::ball(norm).and(Bound::box_of(axes)));
         }
-        let Some(value) = self.take_as(key, Takes::Bound(range.clone())) else { return Ok(None) };
+        let Some(value) = self.take_as(key, Takes::Bound(range.clone())) else { return Ok(default) };
         match (parse_number(&value.value), &value.value) {
-            (Some(norm), _) => value.in_range(norm, &range).map(|norm| Some(Bound::ball(norm))),
-            (None, DeValue::Array(_)) => value.axes(range).map(|axes| Some(Bound::box_of(axes))),
+            (Some(norm), _) => value.in_range(norm, &range).map(Bound::ball),
+            (None, DeValue::Array(_)) => value.axes(range).map(Bound::box_of),
             (None, _) => Err(value.no_bound()),
         }
     }
@@ -345,43 +371,41 @@ impl Value<'_> {
         self.location.problem(problem)
     }
 
+    /// Returns the error about a value that must be something else.
+    fn must_be(&self, legal: impl Display) -> SceneError {
+        self.problem(format!("`{}` must be {legal}", self.key))
+    }
+
+    /// Returns the error about a value of another type.
+    fn wrong_type(&self, legal: &str) -> SceneError {
+        self.must_be(format_args!("{legal}; found: {}", self.value.type_str()))
+    }
+
     pub(super) fn text(self) -> Result<String, SceneError> {
-        match self.value {
-            DeValue::String(ref text) if is_for_people(text) => Ok(text.to_string()),
+        match &self.value {
+            DeValue::String(text) if is_for_people(text) => Ok(text.to_string()),
             DeValue::String(_) => {
                 Err(self.problem(format!("`{}` must not contain control characters", self.key)))
             }
-            ref other => Err(self.problem(format!(
-                "`{}` must be text in quotes; found: {}",
-                self.key,
-                other.type_str()
-            ))),
+            _ => Err(self.wrong_type("text in quotes")),
         }
     }
 
     /// Returns a Boolean value.
     pub(super) fn truth(self) -> Result<bool, SceneError> {
-        match self.value {
-            DeValue::Boolean(truth) => Ok(truth),
-            ref other => Err(self.problem(format!(
-                "`{}` must be true or false; found: {}",
-                self.key,
-                other.type_str()
-            ))),
-        }
+        self.value.as_bool().ok_or_else(|| self.wrong_type("true or false"))
     }
 
     /// Returns the meaning of one of a few words.
     pub(super) fn one_of<T: Copy>(self, words: &[(&str, T)]) -> Result<T, SceneError> {
         let legal: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
-        let wrong = self.problem(format!("`{}` must be one of: {}", self.key, legal.join(", ")));
+        let wrong = self.must_be(format_args!("one of: {}", legal.join(", ")));
         let text = self.text()?;
         words.iter().find(|(word, _)| *word == text).map(|(_, meaning)| *meaning).ok_or(wrong)
     }
 
     pub(super) fn texts(self) -> Result<Vec<String>, SceneError> {
-        let wrong = self
-            .problem(format!("`{}` must be a list of texts in quotes, without control characters", self.key));
+        let wrong = self.must_be("a list of texts in quotes, without control characters");
         let DeValue::Array(list) = self.value else { return Err(wrong) };
         let texts = list.into_iter().map(|value| match value.into_inner() {
             DeValue::String(text) if is_for_people(&text) => Ok(text.into_owned()),
@@ -399,10 +423,7 @@ impl Value<'_> {
     }
 
     pub(super) fn number(self, range: RangeInclusive<f64>) -> Result<f64, SceneError> {
-        let number = parse_number(&self.value);
-        let number = number.ok_or_else(|| {
-            self.problem(format!("`{}` must be a number; found: {}", self.key, self.value.type_str()))
-        })?;
+        let number = parse_number(&self.value).ok_or_else(|| self.wrong_type("a number"))?;
         self.in_range(number, &range)
     }
 
@@ -411,38 +432,23 @@ impl Value<'_> {
             return self.in_range(number, &range).map(|number| [number; 3]);
         }
         if !matches!(self.value, DeValue::Array(_)) {
-            let (key, found) = (&self.key, self.value.type_str());
-            return Err(self.problem(format!("`{key}` must be a number or a list of three; found: {found}")));
+            return Err(self.wrong_type("a number or a list of three"));
         }
-        let numbers = self.numbers::<3>()?;
-        for number in numbers {
-            self.in_range(number, &range)?;
-        }
-        Ok(numbers)
+        self.each_in_range(self.numbers()?, &range)
     }
 
     /// Returns a number in `range` for each axis.
     fn axes(self, range: RangeInclusive<f64>) -> Result<[f64; 3], SceneError> {
-        let axes = self.numbers::<3>().map_err(|_| self.no_bound())?;
-        axes.iter().try_for_each(|axis| self.in_range(*axis, &range).map(drop))?;
-        Ok(axes)
+        self.each_in_range(self.numbers().map_err(|_| self.no_bound())?, &range)
     }
 
     fn no_bound(&self) -> SceneError {
-        self.problem(format!(
-            "`{}` must be one number (the largest norm) or three numbers (the largest along each axis)",
-            self.key
-        ))
+        self.must_be("one number (the largest norm) or three numbers (the largest along each axis)")
     }
 
     /// Returns a whole number in `range`.
     pub(super) fn whole(self, range: RangeInclusive<u32>) -> Result<u32, SceneError> {
-        let wrong = self.problem(format!(
-            "`{}` must be a whole number from {} to {}",
-            self.key,
-            range.start(),
-            range.end()
-        ));
+        let wrong = self.must_be(format_args!("a whole number from {} to {}", range.start(), range.end()));
         let number =
             self.number(f64::from(*range.start())..=f64::from(*range.end())).map_err(|_| wrong.clone())?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // whole, and in the range of a u32
@@ -455,32 +461,24 @@ impl Value<'_> {
         range: RangeInclusive<f64>,
         counts: RangeInclusive<usize>,
     ) -> Result<Vec<[f64; 3]>, SceneError> {
-        let wrong = self.problem(format!(
-            "`{}` must be a list of {} to {} points, each three numbers from {} to {}",
-            self.key,
-            counts.start(),
-            counts.end(),
-            range.start(),
-            range.end()
+        let ([least, most], [from, to]) = ([counts.start(), counts.end()], [range.start(), range.end()]);
+        let wrong = self.must_be(format_args!(
+            "a list of {least} to {most} points, each three numbers from {from} to {to}"
         ));
         let DeValue::Array(list) = &self.value else { return Err(wrong) };
-        let point = |value: &Spanned<DeValue<'_>>| {
-            let DeValue::Array(numbers) = value.get_ref() else { return None };
-            let numbers: Option<Vec<f64>> =
-                numbers.iter().map(|value| parse_number(value.get_ref())).collect();
-            <[f64; 3]>::try_from(numbers?)
-                .ok()
-                .filter(|point| point.iter().all(|number| range.contains(number)))
-        };
+        let is_in_range = |point: &[f64; 3]| point.iter().all(|number| range.contains(number));
+        let point = |value: &Spanned<DeValue<'_>>| parse_numbers(value.get_ref()).filter(is_in_range);
         let points: Option<Vec<[f64; 3]>> = list.iter().map(point).collect();
         points.filter(|points| counts.contains(&points.len())).ok_or(wrong)
     }
 
     pub(super) fn numbers<const N: usize>(&self) -> Result<[f64; N], SceneError> {
-        let wrong = || self.problem(format!("`{}` must be a list of {N} numbers", self.key));
-        let DeValue::Array(list) = &self.value else { return Err(wrong()) };
-        let numbers: Option<Vec<f64>> = list.iter().map(|value| parse_number(value.get_ref())).collect();
-        numbers.and_then(|numbers| numbers.try_into().ok()).ok_or_else(wrong)
+        parse_numbers(&self.value).ok_or_else(|| self.must_be(format_args!("a list of {N} numbers")))
+    }
+
+    fn each_in_range(&self, numbers: [f64; 3], range: &RangeInclusive<f64>) -> Result<[f64; 3], SceneError> {
+        numbers.iter().try_for_each(|number| self.in_range(*number, range).map(drop))?;
+        Ok(numbers)
     }
 
     fn in_range(&self, number: f64, range: &RangeInclusive<f64>) -> Result<f64, SceneError> {
@@ -503,6 +501,13 @@ fn parse_number(value: &DeValue<'_>) -> Option<f64> {
         DeValue::Float(number) => number.as_str().replace('_', "").parse().ok(),
         _ => None,
     }
+}
+
+/// Parses a list of `N` numbers.
+fn parse_numbers<const N: usize>(value: &DeValue<'_>) -> Option<[f64; N]> {
+    let DeValue::Array(list) = value else { return None };
+    let numbers: Option<Vec<f64>> = list.iter().map(|value| parse_number(value.get_ref())).collect();
+    numbers?.try_into().ok()
 }
 
 /// Returns a hint at the closest known word, to append to an error; empty without a similar word. Not real-time.

@@ -98,19 +98,14 @@ impl PluginKeyValue {
         let of_name = |device: &DeviceUse| device.name == self.plugin || self.plugin == "device";
         let of_id = |device: &DeviceUse| device.plugin.plugin == self.plugin;
         let by_name = devices.iter().any(of_name);
-        let mut found = false;
-        for device in
-            devices.iter_mut().filter(|device| if by_name { of_name(device) } else { of_id(device) })
-        {
-            device.plugin.parameters.push(self.parameter());
-            found = true;
-        }
-        if found {
+        if by_name || devices.iter().any(of_id) {
+            let is_meant = |device: &&mut DeviceUse| if by_name { of_name(device) } else { of_id(device) };
+            let meant = devices.iter_mut().filter(is_meant);
+            meant.for_each(|device| device.plugin.parameters.push(self.parameter()));
             return Ok(());
         }
-        let names: Vec<&str> =
-            devices.iter().flat_map(|device| [device.name.as_str(), device.plugin.plugin.as_str()]).collect();
-        self.apply_among(models, &names)
+        let names = devices.iter().flat_map(|device| [&*device.name, &*device.plugin.plugin]);
+        self.apply_among(models, &names.collect::<Vec<_>>())
     }
 
     /// Adds the setting to the models of this name in the scene, or of this plugin id.

@@ -1,7 +1,12 @@
-//! Ceiling of the host: the largest force for a device that does not declare itself simulated, unless the user allows more.
+//! Envelopes of the devices, and the ceiling of the host: the largest force for a device that does not declare itself simulated,
+//! unless the user allows more.
 
+use super::prepare::Opened;
+use crate::scene::Scene;
 use flotor_core::limits::{Bound, CEILING, Ceiling, Limits};
-use flotor_hal::{Capabilities, Embodiment};
+use flotor_core::rendered_boundary::RenderedBoundary;
+use flotor_hal::{Axes, Capabilities, Embodiment};
+use flotor_servo::{Envelope, Guarded};
 
 /// Permitted strength of the devices of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -42,7 +47,7 @@ pub struct StrongDevice {
 
 impl StrongDevice {
     /// Returns a device that could exceed the ceiling; `None` for any other. Not real-time.
-    pub(super) fn of(
+    fn of(
         [name, plugin]: [&str; 2],
         embodiment: Embodiment,
         limits: &Limits,
@@ -86,7 +91,7 @@ fn longest(limits: &Limits, device: &Capabilities) -> [f64; 2] {
 }
 
 /// Returns the limits of a device under the ceiling. Not real-time.
-pub(super) fn under_ceiling(limits: &Limits, embodiment: Embodiment) -> Limits {
+fn under_ceiling(limits: &Limits, embodiment: Embodiment) -> Limits {
     match embodiment {
         Embodiment::Physical => limits.under(CEILING),
         Embodiment::Simulated => *limits,
@@ -95,7 +100,7 @@ pub(super) fn under_ceiling(limits: &Limits, embodiment: Embodiment) -> Limits {
 
 /// Returns a notice if one number as a limit, which held along each axis in earlier versions, limits a device more as a norm. Not
 /// real-time.
-pub(super) fn norm_notice(limits: &Limits, devices: &[Capabilities]) -> Option<String> {
+fn norm_notice(limits: &Limits, devices: &[Capabilities]) -> Option<String> {
     let forces = devices.iter().map(|device| device.max_force_n);
     let torques = devices.iter().map(|device| device.max_torque_nm);
     // No device declares a largest speed of its handle.
@@ -125,6 +130,39 @@ fn changed(key: &str, bound: Bound, devices: impl Iterator<Item = [f64; 3]>, uni
              `[{most}, {most}, {most}]` limits each axis"
         )
     })
+}
+
+/// Guarded devices of a run.
+pub(super) struct Guards {
+    /// Devices in the scene's order, under the ceiling.
+    pub(super) devices: Vec<Guarded>,
+    /// Envelopes of all devices without the ceiling.
+    pub(super) strong_envelopes: Vec<Envelope>,
+    pub(super) strong_devices: Vec<StrongDevice>,
+    /// Notices about limits and boundary, to be shown before the run, a line each.
+    pub(super) notices: Vec<String>,
+}
+
+impl Guards {
+    pub(super) fn of(scene: &Scene, opened: Vec<Opened>, period_ns: u64) -> Self {
+        let capabilities: Vec<Capabilities> = opened.iter().map(|opened| opened.capabilities).collect();
+        let mut notices: Vec<String> = norm_notice(&scene.limits, &capabilities).into_iter().collect();
+        let (mut devices, mut strong_envelopes, mut strong_devices) = (Vec::new(), Vec::new(), Vec::new());
+        for (used, opened) in scene.devices.iter().zip(opened) {
+            let Opened { device, capabilities, embodiment, .. } = opened;
+            let envelope = |limits: &Limits| Envelope::new(limits, &scene.boundary, &capabilities, period_ns);
+            let names = [used.name.as_str(), used.plugin.plugin.as_str()];
+            strong_devices.extend(StrongDevice::of(names, embodiment, &scene.limits, &capabilities));
+            strong_envelopes.push(envelope(&scene.limits));
+            let wall =
+                RenderedBoundary::new(&scene.boundary, &capabilities, &scene.limits.force_n, period_ns);
+            let notice = wall.notice().filter(|_| capabilities.actuated != Axes::NONE);
+            notices.extend(notice.map(|notice| format!("`{}`: {notice}", used.name)));
+            let envelope = envelope(&under_ceiling(&scene.limits, embodiment));
+            devices.push(Guarded { device, capabilities, envelope });
+        }
+        Self { devices, strong_envelopes, strong_devices, notices }
+    }
 }
 
 #[cfg(test)]

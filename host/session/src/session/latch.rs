@@ -1,13 +1,14 @@
 //! Latch of the machine during a run: nothing is energised while the latch is pressed, a press ends the run, and an emergency stop
 //! of the run presses the latch.
 
-use super::RunError;
-use flotor_live::{Directory, Latch, LatchState, Pressed, process_number};
+use super::error::RunError;
+use crate::lock::lock;
+use flotor_live::{Directory, Latch, LatchState, process_number};
 use flotor_servo::{EmergencySource, StopSwitch, enter_guard_priority};
 use std::fmt::{self, Display, Formatter};
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
@@ -94,7 +95,7 @@ impl LatchGuard {
     /// Presses the latch for an emergency stop of this process, and requests all other runs to stop. Only the first call does so;
     /// later calls return the same reach. Not real-time: waits for the other runs, 2 s at most.
     pub fn press(&self, source: EmergencySource) -> StopReach {
-        let mut reach = self.reach.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut reach = lock(&self.reach);
         let reach = reach.get_or_insert_with(|| {
             let who = format!("emergency stop ({}) of process {}", source.word(), process_number());
             let pressed = self.latch.press(&who);
@@ -110,7 +111,7 @@ impl LatchGuard {
     /// Returns the reach of this run's emergency stop; `None` before, and for a stop by another run. Not real-time.
     #[must_use]
     pub fn reach(&self) -> Option<StopReach> {
-        self.reach.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        lock(&self.reach).clone()
     }
 
     /// Returns the time of a press that is not released. Not real-time.
@@ -154,21 +155,20 @@ impl StopReach {
     /// Returns the reasons why the stop has not reached every run, now and later; `None` if it has.
     #[must_use]
     pub fn problem(&self) -> Option<String> {
-        let unconfirmed = match &self.unconfirmed {
-            Ok(processes) if processes.is_empty() => None,
+        let mut problems = Vec::new();
+        match &self.unconfirmed {
+            Ok(processes) if processes.is_empty() => {}
             Ok(processes) => {
                 let processes: Vec<String> = processes.iter().map(u32::to_string).collect();
-                Some(format!("not confirmed by process {}: switch its device off", processes.join(", ")))
+                let processes = processes.join(", ");
+                problems.push(format!("not confirmed by process {processes}: switch its device off"));
             }
-            Err(cause) => {
-                Some(format!("the state of the other runs is unknown: {cause}; check that each has stopped"))
-            }
-        };
-        let unkept = self
-            .unkept
-            .as_ref()
-            .map(|cause| format!("the emergency stop does not prevent a later run: {cause}"));
-        let problems: Vec<String> = unconfirmed.into_iter().chain(unkept).collect();
+            Err(cause) => problems.push(format!(
+                "the state of the other runs is unknown: {cause}; check that each has stopped"
+            )),
+        }
+        let unkept = |cause| format!("the emergency stop does not prevent a later run: {cause}");
+        problems.extend(self.unkept.as_ref().map(unkept));
         (!problems.is_empty()).then(|| problems.join("; "))
     }
 }
@@ -198,17 +198,6 @@ impl Drop for LatchWatch {
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
         }
-    }
-}
-
-/// Returns the reason why nothing may be energised, as text.
-pub(super) fn latched_words(pressed: Option<&Pressed>) -> String {
-    match pressed {
-        Some(pressed) => format!(
-            "the emergency stop of this machine is pressed ({pressed}): nothing is energised; `flotor release` releases it"
-        ),
-        None => "the emergency stop of this machine was pressed while the run started: start the run again"
-            .to_owned(),
     }
 }
 

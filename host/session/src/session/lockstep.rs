@@ -1,22 +1,22 @@
 //! Run on the virtual clock that the caller advances, tick by tick, and that ends with the usual outcome.
 
-use super::prepare::activate;
-use super::{
-    ChangeLog, Controls, Epilogue, Finished, Observer, Outcome, RealTimeReport, RunError, Session, TapEnds,
-    publish_to,
-};
+use super::controls::ChangeLog;
+use super::observer::Taps;
+use super::outcome::{Epilogue, Finished};
+use super::prepared_loop::{PreparedLoop, activate};
+use super::{Controls, Observer, Outcome, RunError, Session};
 use crate::calls::EndReserve;
 use flotor_core::demand::DemandRequest;
 use flotor_hal::Demand;
 use flotor_hal::abi::loader::Stopper;
-use flotor_servo::{Loop, RunEnd, Schedule, StopSwitch};
+use flotor_servo::{Loop, RealTimeReport, RunEnd, Schedule, StopSwitch};
 
 /// Run that the caller advances. If it is dropped before its end, the devices are stopped.
 pub struct Lockstep {
     runner: Loop,
     controls: Controls,
     changes: ChangeLog,
-    taps: TapEnds,
+    taps: Taps,
     requested: DemandRequest,
     stoppers: Stoppers,
     epilogue: Epilogue,
@@ -39,7 +39,8 @@ impl Session {
     /// [`RunError`] if a device refuses to be energised; then none is.
     pub fn into_lockstep(self) -> Result<Lockstep, RunError> {
         let epilogue = self.epilogue(EndReserve::default());
-        let Session { standby, controls, changes, taps, period_ns, duration_ns, plugins, .. } = self;
+        let Session { prepared, controls, changes, .. } = self;
+        let PreparedLoop { standby, plugins, taps, period_ns, duration_ns } = prepared;
         let stoppers = Stoppers(standby.stoppers());
         let requested = standby.observers().request(Demand::FORCE);
         let runner = Loop::new(activate(standby, &plugins)?, Schedule::start_virtual(period_ns), duration_ns);
@@ -57,9 +58,8 @@ impl Lockstep {
         }
         requested.change_to(observer.demand());
         runner.advance(stop, |record| {
-            publish_to(taps, record);
-            changes.up_to(record.tick, |change| observer.change(change));
-            observer.observe(record);
+            taps.publish(record);
+            changes.deliver(record, observer);
         });
         controls.sweep();
         runner.end()

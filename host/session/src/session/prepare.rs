@@ -1,35 +1,30 @@
-//! Preparation of a scene: loads plugins, checks their settings, and pairs scene and devices.
+//! Devices and models of a scene: loads their plugins, checks their settings, opens the devices and creates the models.
 
-use super::choice::chosen;
-use super::controls::{ChosenBy, ControlError, NewValue, PluginTable, understands};
-use super::stop_without_host::StopWithoutHost;
-use super::{PluginReport, RunError};
+use super::{PluginReport, RunError, StopWithoutHost};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
-use crate::calls::{Call, Progress, attended_while, is_to_begin, keeping_machine, limit};
+use crate::calls::{Call, CallThread, Progress, is_to_begin, keeping_machine, limit};
 use crate::estimates;
+use crate::nanoseconds::whole_ns;
 use crate::registry::{LookupError, Registry, is_installed};
 use crate::scene::{
-    Alternative, CalibrationUse, ChangeUse, ChangeWhat, DeviceUse, Isolation, ModelUse, Pacing,
-    ParameterText, PluginUse, Scene, SceneError,
+    CalibrationUse, DeviceUse, Isolation, ModelUse, ParameterText, PluginUse, Scene, SceneError,
 };
-use flotor_core::limits::Boundary;
+use flotor_core::demand::hand_demand;
+use flotor_core::limits::Bound;
 use flotor_core::mapping::Mapping;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{LoadError, Metadata, OpenedDevice, Plugin, Setting, Stopper};
+use flotor_hal::abi::loader::{Metadata, OpenedDevice, Plugin, Setting};
 use flotor_hal::{
-    Axes, Capabilities, DVec3, Demand, Embodiment, LoopConfig, Parameter, ParameterKind, Refusal,
-    SampledLoop, SoftRange,
+    Capabilities, DVec3, Demand, Embodiment, LoopConfig, Parameter, ParameterKind, SampledLoop, SoftRange,
 };
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerConfig};
 use flotor_servo::last_stop::{SignalGuard, TakenSignals};
-use flotor_servo::{
-    Clock, Engine, Layer, Replacement, ScheduledChange, Servo, Standby, TimeBudget, pushes_at_home,
-};
+use flotor_servo::{Clock, Engine, Layer, TimeBudget, pushes_at_home};
 use std::borrow::Cow;
 use std::time::Duration;
 
-pub(super) fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
+fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plugin, RunError> {
     registry.load(&plugin.plugin, kind).map_err(|error| not_found(plugin, error))
 }
 
@@ -52,39 +47,6 @@ fn not_found(plugin: &PluginUse, error: LookupError) -> RunError {
     }
 }
 
-/// Returns the error about a plugin that refused.
-pub(super) fn refused(metadata: &Metadata, refusal: Refusal) -> RunError {
-    let Metadata { path, id, .. } = metadata.clone();
-    RunError::Plugin(LoadError::Refused { path, id, refusal })
-}
-
-/// Energises the devices of a run right before its first tick, each within a time limit. Not real-time.
-pub(super) fn activate(standby: Standby, plugins: &[PluginReport]) -> Result<Servo, RunError> {
-    let (plugins, stoppers) = (plugins.to_vec(), standby.stoppers());
-    let activated =
-        attended_while(limit(), is_to_begin, move |progress| activate_here(standby, &plugins, progress));
-    let activated = activated.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
-    activated.inspect(Servo::register_loop_thread)
-}
-
-/// Energises the devices on this thread, while another thread polls the progress. Not real-time.
-pub(super) fn activate_here(
-    standby: Standby,
-    plugins: &[PluginReport],
-    progress: &Progress,
-) -> Result<Servo, RunError> {
-    let enters = |device: usize| {
-        progress.enter(plugins.get(device).map_or("", |plugin| plugin.name.as_str()), Call::Activate);
-    };
-    let names = plugins.iter().map(|plugin| plugin.name.clone()).collect();
-    let activated = standby.activate(names, enters);
-    progress.exit();
-    activated.map_err(|(device, refusal)| match plugins.get(device) {
-        Some(report) => refused(&report.metadata, refusal),
-        None => RunError::Thread("names a device that the scene does not have"),
-    })
-}
-
 /// Passes the scene's calibration to the device that it was measured on. Not real-time.
 fn calibrate(
     plugin: &Plugin,
@@ -96,7 +58,7 @@ fn calibrate(
     let (file, curve) = CalibrationFile::load(&path).map_err(wrong)?;
     let id = &plugin.metadata().id;
     file.check_device(&path.display().to_string(), id, &device.serial()).map_err(wrong)?;
-    device.calibrate_vertical(&curve).map_err(|refusal| refused(plugin.metadata(), refusal))
+    device.calibrate_vertical(&curve).map_err(|refusal| RunError::refused(plugin.metadata(), refusal))
 }
 
 /// Opened device, not energised.
@@ -108,37 +70,21 @@ pub(super) struct Opened {
     pub(super) stop: StopWithoutHost,
 }
 
-/// Returns a warning if models may request torque that the device lacks, unless the scene wants none. No mismatch: a model declares
-/// that it can compute torque, not that it will.
-pub(super) fn without_torque(scene: &Scene, number: u16, device: &Capabilities) -> Option<String> {
-    let is_driven = device.actuated != Axes::NONE && !device.actuated.contains(Axes::ROTATION);
-    let is_felt = scene.models.iter().any(|model| model.device == number);
-    let is_wanted = scene.limits.torque_nm.axes().iter().any(|most_nm| *most_nm > 0.0);
-    (is_driven && is_felt && is_wanted).then(|| {
-        let name = scene.devices.get(usize::from(number)).map_or("", |device| device.name.as_str());
-        format!(
-            "`{name}` exerts no torque, so the hand cannot feel the torque of a model; `[limits] torque_nm = [0, 0, \
-             0]` accepts this"
-        )
-    })
-}
-
-/// Returns a warning for each coupling that amplifies, with the scene's consent.
-pub(super) fn amplifications(scene: &Scene) -> impl Iterator<Item = String> + '_ {
-    let gains = scene.couplings.iter().map(|coupling| (&coupling.name, coupling.ends.energy_gain()));
-    gains.filter(|(_, gain)| *gain > 1.0).map(|(name, gain)| {
-        format!(
-            "the coupling `{name}` amplifies: one hand may get {gain:.4} times the energy that the other puts in \
-             (`allow_amplification`)"
-        )
-    })
-}
-
-/// Loads and opens one device of a scene. Not real-time.
-pub(super) fn open_device(
+/// Loads and opens the devices of a scene. Not real-time.
+pub(super) fn open_devices(
     registry: &Registry,
-    device: &DeviceUse,
-) -> Result<(Opened, PluginReport), RunError> {
+    scene: &Scene,
+) -> Result<(Vec<Opened>, Vec<PluginReport>), RunError> {
+    let open = |device| {
+        let (opened, mut report) = open_device(registry, device)?;
+        let most_torque_nm = Bound::box_of(opened.capabilities.max_torque_nm);
+        report.at_hand = hand_demand(&scene.limits.torque_nm.and(most_torque_nm));
+        Ok((opened, report))
+    };
+    scene.devices.iter().map(open).collect()
+}
+
+fn open_device(registry: &Registry, device: &DeviceUse) -> Result<(Opened, PluginReport), RunError> {
     let DeviceUse { name, plugin: used, calibration } = device;
     let signals = SignalGuard::take();
     let plugin = load(registry, used, PluginKind::Device)?;
@@ -147,7 +93,7 @@ pub(super) fn open_device(
     let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
     let open = move |progress: &Progress| {
         progress.enter(&who, Call::Open);
-        let refuse = |refusal| refused(opening.metadata(), refusal);
+        let refuse = |refusal| RunError::refused(opening.metadata(), refusal);
         let mut device = opening.open_device(&given)?;
         let capabilities = device.capabilities().map_err(refuse)?;
         let stop = StopWithoutHost::of(&who, embodiment, &capabilities, &mut device).map_err(refuse)?;
@@ -155,19 +101,14 @@ pub(super) fn open_device(
         Ok::<_, RunError>((device, capabilities, stop, values))
     };
     let (mut device, capabilities, stop, values) =
-        keeping_machine(name, || attended_while(limit(), is_to_begin, open))??;
-    let mut report = report(&plugin, name, used, &settings, |index| value_at(&values, index));
+        keeping_machine(name, || CallThread::default().run_while(limit(), is_to_begin, open))??;
+    let mut report = report(&plugin, name, used, &settings, &values);
     if let Some(calibration) = calibration {
         calibrate(&plugin, &mut device, calibration)?;
     }
     report.signals_taken = signals.put_back();
     report.latency_s = capabilities.latency_s;
     Ok((Opened { device, capabilities, embodiment, stop }, report))
-}
-
-/// Returns the value of a parameter; NaN without one.
-fn value_at(values: &[f64], index: usize) -> f64 {
-    values.get(index).copied().unwrap_or(f64::NAN)
 }
 
 /// Loads one model of a scene and creates it in all its places. Not real-time.
@@ -209,20 +150,45 @@ pub(super) fn prepare_model_while(
         Isolation::ByOrigin | Isolation::None => limit(),
     };
     let make = move |progress: &Progress| builder.layer(progress);
-    let (layer, values, estimates) = keeping_machine(&model.name, || attended_while(most, is_wanted, make))??;
-    let mut report = report(&plugin, &model.name, &model.plugin, &settings, |index| value_at(&values, index));
+    let (layer, values, estimates) =
+        keeping_machine(&model.name, || CallThread::default().run_while(most, is_wanted, make))??;
+    let mut report = report(&plugin, &model.name, &model.plugin, &settings, &values);
     report.signals_taken = signals.put_back();
     report.estimates = estimates;
     report.isolation = Some(isolation);
     Ok((layer, report))
 }
 
-/// Turns off isolation by origin where no hand is: on the virtual clock and on simulated devices.
-pub(super) fn settle_isolation(model: &mut ModelUse, clock: Clock, simulated: &[bool]) {
-    let is_felt = clock == Clock::Real && simulated.get(usize::from(model.device)) != Some(&true);
-    if model.isolation == Isolation::ByOrigin && !is_felt {
-        model.isolation = Isolation::None;
+/// Returns a scene with the latencies of its open devices, and without isolation by origin where no hand is: on the virtual clock
+/// and on simulated devices.
+pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
+    let mut scene = scene.clone();
+    for model in &mut scene.models {
+        let device = opened.get(usize::from(model.device));
+        let is_simulated = device.is_some_and(|device| device.embodiment == Embodiment::Simulated);
+        if model.isolation == Isolation::ByOrigin && (clock == Clock::Virtual || is_simulated) {
+            model.isolation = Isolation::None;
+        }
+        model.latency_s = device.map_or(0.0, |device| device.capabilities.latency_s);
     }
+    scene
+}
+
+/// Layers of a scene's models, each with its device number, and reports on their plugins.
+type Models = (Vec<(usize, Layer)>, Vec<PluginReport>);
+
+/// Loads the models of a scene and creates each in all its places. Not real-time.
+pub(super) fn prepare_models(
+    registry: &Registry,
+    scene: &Scene,
+    config: &LoopConfig,
+    clock: Clock,
+) -> Result<Models, RunError> {
+    let prepare = |model: &ModelUse| {
+        let (layer, report) = prepare_model(registry, model, config, clock)?;
+        Ok(((usize::from(model.device), layer), report))
+    };
+    scene.models.iter().map(prepare).collect()
 }
 
 /// Time for ending a worker whose model was not created in time.
@@ -237,13 +203,11 @@ fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolat
     match model.isolation {
         Isolation::ByOrigin if is_outside && model.places_m.len() > MAX_PROCESSES => {
             let objects = model.places_m.len();
-            Err(complain(
-                model,
-                &format!(
-                    "the plugin is from outside the installation, and each of its {objects} objects would have a process \
-                     of its own; set `isolation = \"process\"` or `isolation = \"none\"`"
-                ),
-            ))
+            let problem = format!(
+                "the plugin is from outside the installation, and each of its {objects} objects would have a process \
+                 of its own; set `isolation = \"process\"` or `isolation = \"none\"`"
+            );
+            Err(complain(model, &problem))
         }
         Isolation::ByOrigin if is_outside => Ok(Isolation::Process),
         Isolation::ByOrigin => Ok(Isolation::None),
@@ -304,20 +268,18 @@ impl ModelBuilder {
     /// Creates one instance: in the loop, in a worker, or asynchronous.
     fn engine(&self, budget_ns: Option<u64>, progress: &Progress) -> Result<Engine, RunError> {
         let Self { isolation, plugin, settings, model, config, clock } = self;
-        let no = |refusal| refused(plugin.metadata(), refusal);
+        let no = |refusal| RunError::refused(plugin.metadata(), refusal);
         progress.enter(&model.name, Call::Create);
         let mut engine = match isolation {
             Isolation::Process => {
                 let keys = model.plugin.parameters.iter().map(|parameter| parameter.key.clone());
                 let values = settings.iter().map(|setting| setting.display());
-                let in_the_loop = model.field.is_none().then_some(budget_ns).flatten();
+                let field = model.field.as_ref();
+                let in_the_loop = budget_ns.filter(|_| field.is_none());
                 let worker_config = WorkerConfig {
                     plugin: &plugin.metadata().path,
                     sets: keys.zip(values).collect(),
-                    config: model
-                        .field
-                        .as_ref()
-                        .map_or(*config, |field| AsynchronousModel::config(field, config)),
+                    config: field.map_or(*config, |field| AsynchronousModel::config(field, config)),
                     // The loop does not wait for a field.
                     timeout_ns: in_the_loop.unwrap_or(PATIENCE_NS),
                     create_timeout: limit(),
@@ -353,21 +315,16 @@ const PATIENCE_NS: u64 = 2_000_000_000;
 /// Returns the time limit of a step of a model, ns. On the virtual clock only if the scene sets one: the wall clock would make two
 /// runs differ.
 fn budget_ns(model: &ModelUse, clock: Clock, period_ns: u64) -> Option<u64> {
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked: at most a second
-    let told_ns = model.budget_s.map(|seconds| (seconds * 1.0e9).round() as u64);
+    let set_ns = model.budget_s.map(|seconds| whole_ns(seconds * 1.0e9));
     let usual_ns = match clock {
         Clock::Real => Some(period_ns / 2),
         Clock::Virtual => None,
     };
-    told_ns.or(usual_ns)
+    set_ns.or(usual_ns)
 }
 
 /// Checks settings against the plugin's schema; errors name file and line.
-pub(super) fn settings(
-    plugin: &Plugin,
-    name: &str,
-    parameters: &[ParameterText],
-) -> Result<Vec<Setting>, SceneError> {
+fn settings(plugin: &Plugin, name: &str, parameters: &[ParameterText]) -> Result<Vec<Setting>, SceneError> {
     let schema = plugin.parameters();
     let check = |parameter: &ParameterText| {
         let value = from_the_scene(schema, parameter);
@@ -393,16 +350,16 @@ fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, 
     }
 }
 
-/// Creates a report on a plugin with these settings; `value` reads a parameter of the plugin.
+/// Creates a report on a plugin with these settings and the values of its parameters.
 fn report(
     plugin: &Plugin,
     name: &str,
     used: &PluginUse,
     settings: &[Setting],
-    value: impl FnMut(usize) -> f64,
+    values: &[f64],
 ) -> PluginReport {
     let written = used.parameters.iter().map(|parameter| (parameter.key.clone(), parameter.value.clone()));
-    let parameters = in_force(plugin, settings, value);
+    let parameters = in_force(plugin, settings, values);
     PluginReport {
         name: name.to_owned(),
         metadata: plugin.metadata().clone(),
@@ -430,11 +387,7 @@ fn soft_ranges(plugin: &Plugin, values: &[(String, String)]) -> Vec<Option<SoftR
 }
 
 /// Returns every parameter with its value, as text.
-pub(super) fn in_force(
-    plugin: &Plugin,
-    settings: &[Setting],
-    mut value: impl FnMut(usize) -> f64,
-) -> Vec<(String, String)> {
+fn in_force(plugin: &Plugin, settings: &[Setting], values: &[f64]) -> Vec<(String, String)> {
     let schema = plugin.parameters();
     let show = |(index, parameter): (usize, &Parameter)| {
         let text = match parameter.kind() {
@@ -444,207 +397,12 @@ pub(super) fn in_force(
                 set.map_or_else(String::new, |setting| setting.display())
             }
             ParameterKind::Real | ParameterKind::Choice => {
-                let setting = Setting::number(schema, parameter.id(), value(index));
+                let value = values.get(index).copied().unwrap_or(f64::NAN);
+                let setting = Setting::number(schema, parameter.id(), value);
                 setting.map_or_else(|_| String::new(), |setting| setting.display())
             }
         };
         (parameter.id().to_owned(), text)
     };
     schema.iter().enumerate().map(show).collect()
-}
-
-/// Returns all mismatches of a scene with its device `number`, before anything is energised.
-pub(super) fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: bool) -> Vec<String> {
-    let mut mismatches = Vec::new();
-    let [slowest, fastest] = device.rate_hz;
-    if scene.rate_hz < slowest || scene.rate_hz > fastest {
-        mismatches.push(format!(
-            "rate {} Hz, but the device runs at {slowest} to {fastest} Hz; change `rate_hz`",
-            scene.rate_hz
-        ));
-    }
-    // Only the first device can set the pace.
-    if scene.pacing == Pacing::Device && number == 0 && !can_pace {
-        mismatches.push(
-            "the device cannot set the pace of the loop; remove `pacing`, or set `pacing = \"host\"`"
-                .to_owned(),
-        );
-    }
-    mismatches.extend(boundless(&scene.boundary, device));
-    let is_felt = scene.models.iter().any(|model| model.device == number)
-        || scene.couplings.iter().any(|coupling| coupling.ends.here().iter().any(|end| end.device == number));
-    if is_felt {
-        mismatches.extend(unfelt(&scene.limits.force_n.axes(), device));
-    }
-    mismatches
-}
-
-/// Returns an error text if the boundary's margin leaves no free workspace, but only a spring to the centre.
-fn boundless(boundary: &Boundary, device: &Capabilities) -> Option<String> {
-    let narrowest = |range: [f64; 3]| {
-        let moving = range.into_iter().filter(|half_side| *half_side > 0.0);
-        moving.fold(f64::INFINITY, f64::min)
-    };
-    let (range_m, range_rad) = (narrowest(device.range_m), narrowest(device.range_rad));
-    let says = |key, margin: f64, range: f64, unit| {
-        format!(
-            "`{key} = {margin:.3}` leaves no free workspace, because the device moves {range:.3} {unit} around home; reduce `{key}`"
-        )
-    };
-    if boundary.margin_m >= range_m {
-        return Some(says("margin_mm", boundary.margin_m * 1.0e3, range_m * 1.0e3, "mm"));
-    }
-    let (margin_deg, range_deg) = (boundary.margin_rad.to_degrees(), range_rad.to_degrees());
-    (margin_deg >= range_deg).then(|| says("margin_deg", margin_deg, range_deg, "degrees"))
-}
-
-/// Returns an error text if models may request a force that the device lacks, unless the scene wants none there.
-fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
-    let axes = [(Axes::X, "x"), (Axes::Y, "y"), (Axes::Z, "z")];
-    let is_driven = axes.map(|(axis, _)| device.actuated.contains(axis));
-    let is_unfelt =
-        |index: usize| !is_driven[index] && wanted_n.get(index).is_some_and(|most_n| *most_n > 0.0);
-    let unfelt: Vec<&str> = (0..3).filter(|index| is_unfelt(*index)).map(|index| axes[index].1).collect();
-    if unfelt.is_empty() {
-        return None;
-    }
-    let accepted: Vec<String> = device
-        .max_force_n
-        .iter()
-        .zip(is_driven)
-        .map(|(most_n, is_driven)| if is_driven { most_n.to_string() } else { "0".to_owned() })
-        .collect();
-    let accepted = accepted.join(", ");
-    Some(if is_driven == [false; 3] {
-        format!(
-            "the device exerts no force, so the hand cannot feel a model; set `[limits] force_n = [{accepted}]` to \
-             accept this: the host then computes, shows and records the models. A scene without a `[[model]]` \
-             records poses"
-        )
-    } else {
-        format!(
-            "the device exerts no force along {}, so the hand cannot feel this component of a model's force; set \
-             `[limits] force_n = [{accepted}]` to accept this",
-            unfelt.join(" and ")
-        )
-    })
-}
-
-/// Scheduled changes and replacements of a scene, checked and created.
-pub(super) struct Scheduled {
-    pub(super) changes: Vec<ScheduledChange>,
-    pub(super) replacements: Vec<(u64, Replacement)>,
-}
-
-/// Checks the scheduled changes of a scene and creates the models for replacements; errors name file and line.
-pub(super) fn schedule(
-    scene: &Scene,
-    plugins: &PluginTable,
-    registry: &Registry,
-    config: &LoopConfig,
-    clock: Clock,
-) -> Result<Scheduled, RunError> {
-    let mut in_time: Vec<&ChangeUse> = scene.changes.iter().collect();
-    in_time.sort_by(|a, b| a.at_s.total_cmp(&b.at_s)); // stable: a change is checked against the plugins of its time
-    let mut scheduled = Scheduled { changes: Vec::new(), replacements: Vec::new() };
-    // Alternatives not drawn by this seed, per model.
-    let mut passed_over = vec![Vec::new(); scene.models.len()];
-    for (draw, change) in (0..).zip(in_time) {
-        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
-        let time_ns = (change.at_s * 1.0e9).round() as u64;
-        let complain = |key: &str, error: ControlError| change.location.problem(format!("`{key}`: {error}"));
-        let checked = match &change.what {
-            ChangeWhat::Set { plugin, parameter: ParameterText { key, value, .. } } => {
-                let new = NewValue { plugin, parameter: key, value };
-                match plugins.check(&new) {
-                    Ok(checked) => checked,
-                    // The change is for another seed.
-                    Err(_) if passed_over.iter().flatten().any(|part| understands(part, &new)) => continue,
-                    Err(error) => return Err(complain("change.set", error).into()),
-                }
-            }
-            ChangeWhat::Weight { model, weight } => {
-                plugins.check_weight(model, *weight).map_err(|error| complain("change.weight", error))?
-            }
-            ChangeWhat::Swap { model, by } => {
-                let choice = chosen(config.seed, draw, by.len());
-                for number in plugins.models(model).map_err(|error| complain("change.swap", error))? {
-                    let Some(place) = scene.models.get(number) else { continue };
-                    let make = |Alternative { plugin, parameters }: &Alternative| {
-                        let mut other = place.replaced_by(plugin.as_deref(), &[]);
-                        other.plugin.location = change.location.clone();
-                        other.plugin.parameters.extend(parameters.iter().cloned());
-                        prepare_model(registry, &other, config, clock)
-                    };
-                    // All of them: an error in one is found with any seed.
-                    let mut made = by.iter().map(make).collect::<Result<Vec<_>, _>>()?;
-                    if choice >= made.len() {
-                        continue;
-                    }
-                    let (layer, report) = made.swap_remove(choice);
-                    if let Some(others) = passed_over.get_mut(number) {
-                        *others = made.into_iter().map(|(_, report)| report).collect();
-                    }
-                    let chosen_by = if by.len() > 1 { ChosenBy::Seed } else { ChosenBy::Name };
-                    let generation = plugins.add(number, report, chosen_by);
-                    let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
-                    let replacement = Replacement { model, generation, layer: Box::new(layer) };
-                    scheduled.replacements.push((time_ns, replacement));
-                }
-                continue;
-            }
-        };
-        scheduled.changes.extend(checked.into_iter().map(|change| ScheduledChange { time_ns, change }));
-    }
-    plugins.start_with_the_first();
-    Ok(scheduled)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const DEVICE: Capabilities = Capabilities {
-        sensed: Axes::ALL,
-        actuated: Axes::ALL,
-        range_m: [0.01, 0.01, 0.0],
-        range_rad: [0.1; 3],
-        resolution_m: 0.0,
-        max_force_n: [3.0; 3],
-        max_torque_nm: [0.0; 3],
-        max_force_slew_n_per_s: f64::INFINITY,
-        max_torque_slew_nm_per_s: f64::INFINITY,
-        max_stiffness_n_per_m: 0.0,
-        rate_hz: [100.0, 10_000.0],
-        latency_s: 0.0,
-    };
-
-    fn mismatch(wanted_n: [f64; 3], actuated: Axes, max_force_n: [f64; 3]) -> Option<String> {
-        unfelt(&wanted_n, &Capabilities { actuated, max_force_n, ..DEVICE })
-    }
-
-    #[test]
-    fn a_boundary_that_leaves_no_room_is_refused() {
-        let said = |boundary: Boundary| boundless(&boundary, &DEVICE);
-        assert_eq!(said(Boundary::default()), None); // an axis that does not move needs no room
-        let wide = said(Boundary { margin_m: 0.01, ..Boundary::default() }).expect("10 of 10 mm");
-        assert!(wide.contains("`margin_mm = 10.000`"), "{wide}");
-        let turned = said(Boundary { margin_rad: 0.2, ..Boundary::default() }).expect("0.2 of 0.1 rad");
-        assert!(turned.contains("`margin_deg = 11.459`"), "{turned}");
-    }
-
-    #[test]
-    fn a_device_without_force_says_what_works_and_takes_its_word() {
-        let said = mismatch([f64::INFINITY; 3], Axes::NONE, [0.0; 3]).expect("nothing could be felt");
-        assert!(said.contains("exerts no force") && said.contains("force_n = [0, 0, 0]"), "{said}");
-        assert_eq!(mismatch([0.0; 3], Axes::NONE, [0.0; 3]), None);
-        assert_eq!(mismatch([f64::INFINITY; 3], Axes::ALL, [3.0; 3]), None);
-    }
-
-    #[test]
-    fn a_planar_device_says_which_axis_is_missing_and_takes_its_word() {
-        let said = mismatch([f64::INFINITY; 3], Axes::PLANE, [3.0, 3.0, 0.0]).expect("z would not be felt");
-        assert!(said.contains("along z") && said.contains("force_n = [3, 3, 0]"), "{said}");
-        assert_eq!(mismatch([3.0, 3.0, 0.0], Axes::PLANE, [3.0, 3.0, 0.0]), None);
-    }
 }

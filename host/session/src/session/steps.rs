@@ -26,8 +26,9 @@ impl Steps {
         stop: &StopSwitch,
     ) -> Result<Self, RunError> {
         let mut session = Session::prepare(scene, registry, &RunOptions { clock: Clock::Virtual, seed })?;
-        let (controls, lines) = (session.controls(), session.take_lines());
-        Ok(Self { ticks: VirtualLoop::start(session, stop)?, controls, lines })
+        let lines = session.take_lines();
+        let Session { prepared, changes, controls, .. } = session;
+        Ok(Self { ticks: VirtualLoop::start(prepared, changes, stop)?, controls, lines })
     }
 
     /// Returns the handle to change parameters, weights and models of the run.
@@ -54,7 +55,10 @@ impl Steps {
     /// # Errors
     /// [`RunError::Hung`] if a plugin call does not return: there are no ticks any more.
     pub fn advance(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<Option<RunEnd>, RunError> {
-        self.ticks.advance(ticks, observer)?;
+        let mut left = ticks;
+        while left > 0 && self.ticks.end().is_none() {
+            left = self.ticks.batch(left, observer)?;
+        }
         Ok(self.ticks.end())
     }
 }

@@ -1,6 +1,6 @@
 //! Duration of an emergency stop, from its request to each device without force.
 
-use super::LatchGuard;
+use super::latch::LatchGuard;
 use flotor_servo::{EmergencySource, StopSwitch, monotonic_ns};
 use std::time::{Duration, SystemTime};
 

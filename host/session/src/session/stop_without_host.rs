@@ -1,7 +1,7 @@
 //! Stop of a device after the end of the host's process, and the watchdog process that sends the stop: one rule for runs and for
 //! commands that drive a device without a scene.
 
-use super::RunError;
+use super::error::RunError;
 use crate::platform::NOT_CAUGHT;
 use flotor_core::limits::Limits;
 use flotor_hal::abi::loader::OpenedDevice;

@@ -3,7 +3,7 @@
 //! That code may hang or end the process, and nothing of the run depends on it any more. So recordings should be closed and
 //! summaries printed before.
 
-use crate::calls::{Call, CallError, EndCalls, Unresponsive, end_limit};
+use crate::calls::{Call, CallError, CallThread, Unresponsive, end_limit};
 use flotor_hal::abi::loader::OpenedDevice;
 use flotor_servo::{LastStop, Layer};
 
@@ -14,7 +14,7 @@ pub struct UnfreedPlugins {
     models: Vec<(String, Box<Layer>)>,
     /// Owns the devices, too, and closes one without another owner.
     last_stop: Option<LastStop>,
-    calls: EndCalls,
+    calls: CallThread,
 }
 
 impl UnfreedPlugins {
@@ -22,7 +22,7 @@ impl UnfreedPlugins {
         devices: Vec<(String, OpenedDevice)>,
         models: Vec<(String, Box<Layer>)>,
         last_stop: Option<LastStop>,
-        calls: EndCalls,
+        calls: CallThread,
     ) -> Self {
         Self { devices, models, last_stop, calls }
     }
@@ -57,15 +57,19 @@ impl Drop for UnfreedPlugins {
 
 /// Drops a value that only plugin code can free.
 fn free<T: Send + 'static>(
-    calls: &mut EndCalls,
+    calls: &mut CallThread,
     who: String,
     call: Call,
     what: T,
 ) -> Result<(), Unresponsive> {
-    let freed = calls.attended(end_limit(), move |progress| {
-        progress.enter(&who, call);
-        drop(what);
-    });
+    let freed = calls.run_while(
+        end_limit(),
+        || true,
+        move |progress| {
+            progress.enter(&who, call);
+            drop(what);
+        },
+    );
     match freed {
         Err(CallError::Unresponsive(hung)) => Err(hung),
         // Without a thread the value was dropped here.

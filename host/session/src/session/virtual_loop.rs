@@ -1,7 +1,11 @@
 //! Loop on the virtual clock, on a thread of its own: a plugin call that does not return is reported, and the thread abandoned.
 
-use super::prepare::activate;
-use super::{ChangeLog, Finished, Observer, PluginReport, RunError, Session, TapEnds, hung, publish_to};
+use super::controls::ChangeLog;
+use super::observer::Taps;
+use super::outcome::Finished;
+use super::plugin_report::PluginNames;
+use super::prepared_loop::{PreparedLoop, activate};
+use super::{Controls, Observer, RunError};
 use crate::calls::abandon;
 use crate::long_call::{Exceeded, LongCall, step_limit};
 use crate::platform::ThreadClock;
@@ -25,26 +29,25 @@ const LOOK: Duration = Duration::from_millis(20);
 /// Loop with its publishers, passed to the loop's thread for a batch and returned afterwards.
 struct Batch {
     runner: Loop,
-    taps: TapEnds,
+    taps: Taps,
     /// Remaining ticks of the batch, if it is not full before.
     ticks: u64,
 }
 
-impl Session {
-    /// Runs the loop without waiting.
-    pub(super) fn run_virtual(
-        self,
-        observer: &mut dyn Observer,
-        stop: &StopSwitch,
-    ) -> Result<Finished, RunError> {
-        let controls = self.controls.clone();
-        let mut ticks = VirtualLoop::start(self, stop)?;
-        while ticks.end().is_none() {
-            ticks.batch(u64::MAX, observer)?;
-            controls.sweep();
-        }
-        ticks.finish()
+/// Runs the loop to its end without waiting.
+pub(super) fn run(
+    prepared: PreparedLoop,
+    changes: ChangeLog,
+    controls: &Controls,
+    observer: &mut dyn Observer,
+    stop: &StopSwitch,
+) -> Result<Finished, RunError> {
+    let mut ticks = VirtualLoop::start(prepared, changes, stop)?;
+    while ticks.end().is_none() {
+        ticks.batch(u64::MAX, observer)?;
+        controls.sweep();
     }
+    ticks.finish()
 }
 
 /// The loop of a run whose devices are energised.
@@ -58,16 +61,21 @@ pub(super) struct VirtualLoop {
     stop: StopSwitch,
     stoppers: Vec<Stopper>,
     heartbeat: Heartbeat,
-    plugins: Vec<PluginReport>,
+    names: PluginNames,
 }
 
 impl VirtualLoop {
-    /// Energises the devices of a session; `stop` ends the run. Not real-time.
+    /// Energises the devices; `stop` ends the run. Not real-time.
     ///
     /// # Errors
     /// [`RunError`]; nothing is energised then.
-    pub(super) fn start(session: Session, stop: &StopSwitch) -> Result<Self, RunError> {
-        let Session { standby, changes, taps, period_ns, duration_ns, plugins, .. } = session;
+    pub(super) fn start(
+        prepared: PreparedLoop,
+        changes: ChangeLog,
+        stop: &StopSwitch,
+    ) -> Result<Self, RunError> {
+        let PreparedLoop { standby, plugins, taps, period_ns, duration_ns } = prepared;
+        let names = PluginNames::of(&plugins);
         let (stoppers, heartbeat) = (standby.stoppers(), standby.heartbeat());
         let requested = standby.observers().request(Demand::FORCE);
         // The last tick of a batch may add a record for each device.
@@ -77,7 +85,7 @@ impl VirtualLoop {
             let mut records = 0;
             while records < BATCH && *ticks > 0 && runner.end().is_none() {
                 runner.advance(&loop_stop, |record| {
-                    publish_to(taps, record);
+                    taps.publish(record);
                     records += usize::from(sender.push(*record).is_ok());
                 });
                 *ticks -= 1;
@@ -86,17 +94,8 @@ impl VirtualLoop {
         let servo = activate(standby, &plugins)?;
         let runner = Loop::new(servo, Schedule::start_virtual(period_ns), duration_ns);
         let batch = Some(Batch { runner, taps, ticks: 0 });
-        Ok(Self {
-            thread,
-            batch,
-            records,
-            changes,
-            requested,
-            stop: stop.clone(),
-            stoppers,
-            heartbeat,
-            plugins,
-        })
+        let stop = stop.clone();
+        Ok(Self { thread, batch, records, changes, requested, stop, stoppers, heartbeat, names })
     }
 
     /// Returns the end of the run; `None` while the run continues.
@@ -104,20 +103,12 @@ impl VirtualLoop {
         self.batch.as_ref().and_then(|batch| batch.runner.end())
     }
 
-    /// Runs `ticks` ticks, or until the run ends; passes the changes before each and its records to the observer. Not real-time.
+    /// Runs `ticks` ticks, or until the batch is full or the run ends; returns the remaining ticks. Passes the changes before each
+    /// tick and the tick's records to the observer. Not real-time.
     ///
     /// # Errors
     /// [`RunError::Hung`] if a call does not return; then there are no ticks any more.
-    pub(super) fn advance(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<(), RunError> {
-        let mut left = ticks;
-        while left > 0 && self.end().is_none() {
-            left = self.batch(left, observer)?;
-        }
-        Ok(())
-    }
-
-    /// Runs `ticks` ticks, or until the batch is full or the run ends; returns the remaining ticks.
-    fn batch(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<u64, RunError> {
+    pub(super) fn batch(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<u64, RunError> {
         let batch = self.batch.take().ok_or(RunError::Thread("did not return its state"))?;
         self.requested.change_to(observer.demand());
         let ticked = self.thread.tick(Batch { ticks, ..batch }, &self.heartbeat, &self.stop);
@@ -126,12 +117,9 @@ impl VirtualLoop {
             self.heartbeat.finish();
         }
         let changes = &mut self.changes;
-        drain(&mut self.records, |record| {
-            changes.up_to(record.tick, |change| observer.change(change));
-            observer.observe(&record);
-        });
+        drain(&mut self.records, |record| changes.deliver(&record, observer));
         let batch = ticked.map_err(|lost| match lost {
-            Lost::Stuck(stuck, limit) => hung(stuck, &self.plugins, limit),
+            Lost::Stuck(stuck, limit) => RunError::hung(stuck, &self.names, limit),
             Lost::Thread => RunError::Thread("panicked"),
         })?;
         Ok(self.batch.insert(batch).ticks)

@@ -10,12 +10,12 @@
 //!
 //! A replacement for a model is loaded and created here, on a thread of its own, and sent to the loop when it is ready.
 
-mod pairing;
 mod peer_link;
 
-pub use pairing::{LinkCounts, Pairing};
+pub use flotor_live::{LinkCounts, Pairing};
 pub use peer_link::{PeerLink, start_peer_link};
 
+use crate::lock::lock;
 use crate::registry::Registry;
 use crate::scene::Scene;
 use crate::{ControlError, Controls, LatchGuard, NewValue, Observer, PluginReport, Session};
@@ -29,7 +29,7 @@ use flotor_live::{
 use flotor_record::RunDescription;
 use flotor_servo::{EmergencySource, StopSwitch};
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// Publishes a prepared run, to be found, observed and changed.
 ///
@@ -138,7 +138,7 @@ impl Host {
         let refused = |problem: String| ControlError::Refused { model: model.to_owned(), problem, cause };
         let settings: Vec<(&str, &str)> = settings.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
         let make = || {
-            let mut registry = self.registry.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut registry = lock(&self.registry);
             let registry = registry.get_or_insert_with(|| Registry::search(&self.folders));
             self.controls.swap(registry, model, plugin, &settings)
         };
@@ -182,26 +182,28 @@ pub fn machine_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) {
 impl Serve for Host {
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         let Self { controls, stop, latch, .. } = self;
-        match ask {
-            Ask::Watch { .. } | Ask::Unwatch => {} // handled by the publication
+        let changed = match ask {
             Ask::Set { values } => {
-                let values: Vec<NewValue<'_>> = values
-                    .iter()
-                    .map(|new| NewValue { plugin: &new.plugin, parameter: &new.parameter, value: &new.value })
-                    .collect();
-                controls.set_parameters(&values).map_err(|error| refused(&error))?;
+                let new = values.iter().map(|new| NewValue {
+                    plugin: &new.plugin,
+                    parameter: &new.parameter,
+                    value: &new.value,
+                });
+                controls.set_parameters(&new.collect::<Vec<_>>())
             }
-            Ask::Weight { model, weight } => {
-                controls.set_weight(&model, weight).map_err(|error| refused(&error))?;
-            }
-            Ask::Swap { model, plugin, settings } => {
-                let swapped = self.swap(&model, plugin.as_deref(), &settings);
-                swapped.map_err(|error| refused(&error))?;
-            }
-            Ask::Stop => stop.stop(),
+            Ask::Weight { model, weight } => controls.set_weight(&model, weight),
+            Ask::Swap { model, plugin, settings } => self.swap(&model, plugin.as_deref(), &settings),
             Ask::EmergencyStop => return emergency_stop(stop, latch.as_ref()),
-            Ask::MachineStop => machine_stop(stop, latch.as_ref()),
-        }
-        Ok(())
+            Ask::Watch { .. } | Ask::Unwatch => Ok(()), // handled by the publication
+            Ask::Stop => {
+                stop.stop();
+                Ok(())
+            }
+            Ask::MachineStop => {
+                machine_stop(stop, latch.as_ref());
+                Ok(())
+            }
+        };
+        changed.map_err(|error| refused(&error))
     }
 }

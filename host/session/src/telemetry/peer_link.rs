@@ -6,9 +6,8 @@
 //!
 //! One thread for each coupling; the loop never waits for it. Not real-time.
 
-use super::pairing::{LinkCounts, Pairing};
 use flotor_coupling::Line;
-use flotor_live::{Directory, PeerSocket, PublishError};
+use flotor_live::{Directory, LinkCounts, Pairing, PeerSocket, PublishError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;

@@ -1,6 +1,6 @@
 //! `flotor doctor --device ID`: diagnosis of a device by its plugin and by the connection to the machine.
 
-use super::Diagnosis;
+use crate::diagnosis::Diagnosis;
 use crate::platform::usb::{Machine, connection};
 use flotor_command::CommandError;
 use flotor_command::options::{KeyValue, settings};
@@ -114,7 +114,7 @@ fn axes(declared: &Capabilities) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::doctor::Grade;
+    use crate::diagnosis::Grade;
 
     #[test]
     fn a_device_that_is_stopped_by_a_message_is_well_only_where_it_is_sent() {

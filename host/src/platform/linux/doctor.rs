@@ -1,6 +1,6 @@
 //! Findings of `flotor doctor` from files of the kernel.
 
-use crate::cli::doctor::Diagnosis;
+use crate::diagnosis::{Diagnosis, Grade};
 use flotor_servo::platform::{GroupLimit, LimitValue, Use, group_limits, real_time_budget_advice};
 use flotor_servo::watchdog_process::probe_shared_group;
 use std::fs::read_to_string;
@@ -86,11 +86,8 @@ fn of_limit(limit: &GroupLimit) -> Option<Diagnosis> {
                  --cpus`, `CPUQuota=`",
                 if limit.file.ends_with("cpu.max") { "max" } else { "-1" }
             );
-            if cores < 1.0 {
-                Diagnosis::bad("CPU quota", found, remedy)
-            } else {
-                Diagnosis::note("CPU quota", found, remedy)
-            }
+            let grade = if cores < 1.0 { Grade::Bad } else { Grade::Note };
+            Diagnosis::problem(grade, "CPU quota", found, remedy)
         }
         LimitValue::CoreCount(_) => return None,
         LimitValue::Memory(memory) => {
@@ -120,11 +117,7 @@ fn of_memory(what: &'static str, Use { most, now }: Use, file: &Path, remedy: &s
     let mib = |bytes: u64| bytes >> 20;
     let found =
         format!("{} MiB in the control group (`{}`), {} MiB in use", mib(most), file.display(), mib(now));
-    if now > most / 10 * 9 {
-        Diagnosis::bad(what, found, remedy)
-    } else {
-        Diagnosis::note(what, found, remedy)
-    }
+    Diagnosis::problem(if now > most / 10 * 9 { Grade::Bad } else { Grade::Note }, what, found, remedy)
 }
 
 /// Checks whether a kill of all processes of a control group ends the watchdog process with the host.

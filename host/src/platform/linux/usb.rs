@@ -1,6 +1,6 @@
 //! Diagnosis of a device's USB connection from sysfs: presence, hub, driver, permission.
 
-use crate::cli::doctor::Diagnosis;
+use crate::diagnosis::{Diagnosis, Grade};
 use flotor_hal::{UsbAccess, UsbKind};
 use rustix::fs::{Access, access};
 use std::fs::{read_dir, read_link, read_to_string};
@@ -40,30 +40,29 @@ impl Machine {
 
     /// Returns the devices of these kinds.
     fn seen(&self, kinds: &[UsbKind]) -> Vec<Seen> {
-        let entries = read_dir(self.root.join("sys/bus/usb/devices")).into_iter().flatten().flatten();
-        let mut seen: Vec<Seen> = entries.filter_map(|entry| Seen::of(&entry.path(), kinds)).collect();
+        let folders = entries(&self.root.join("sys/bus/usb/devices"));
+        let mut seen: Vec<Seen> = folders.filter_map(|folder| Seen::of(&folder, kinds)).collect();
         seen.sort_by(|a, b| a.place.cmp(&b.place));
         seen
     }
 
     /// Returns true if a program of this name runs.
     fn runs(&self, program: &str) -> bool {
-        let processes = read_dir(self.root.join("proc")).into_iter().flatten().flatten();
-        processes.filter_map(|process| text_of(&process.path(), "comm")).any(|name| name == program)
+        let processes = entries(&self.root.join("proc"));
+        processes.filter_map(|process| text_of(&process, "comm")).any(|name| name == program)
     }
 
     /// Returns true if a rule of udev excludes a vendor's ports from ModemManager.
     fn keeps_modem_manager_away(&self, vendor: u16) -> bool {
         let vendor = format!("{vendor:04x}");
-        let files =
-            RULES.iter().flat_map(|folder| read_dir(self.root.join(folder)).into_iter().flatten().flatten());
-        let texts = files.filter_map(|file| read_to_string(file.path()).ok());
+        let files = RULES.iter().flat_map(|folder| entries(&self.root.join(folder)));
+        let mut texts = files.filter_map(|file| read_to_string(file).ok());
         let is_rule = |line: &str| {
             !line.trim_start().starts_with('#')
                 && line.contains(IGNORED)
                 && line.to_ascii_lowercase().contains(&vendor)
         };
-        texts.into_iter().any(|text| text.lines().any(is_rule))
+        texts.any(|text| text.lines().any(is_rule))
     }
 }
 
@@ -83,12 +82,11 @@ impl Seen {
     /// Returns the folders of its interfaces, such as `1-4.2:1.0`, in order.
     fn interfaces(&self) -> Vec<PathBuf> {
         let begins = format!("{}:", self.place);
-        let siblings =
-            self.folder.parent().and_then(|bus| read_dir(bus).ok()).into_iter().flatten().flatten();
         let is_own = |path: &PathBuf| {
             path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.starts_with(&begins))
         };
-        let mut own: Vec<PathBuf> = siblings.map(|entry| entry.path()).filter(is_own).collect();
+        let mut own: Vec<PathBuf> =
+            self.folder.parent().into_iter().flat_map(entries).filter(is_own).collect();
         own.sort();
         own
     }
@@ -102,17 +100,11 @@ impl Seen {
         }
         // tty/ttyACM0 below an interface, or hidraw/hidraw0 below the device of its driver.
         let kind = if self.access == UsbAccess::Serial { "tty" } else { "hidraw" };
-        let name = self.interfaces().into_iter().find_map(|interface| {
-            let below = read_dir(&interface).into_iter().flatten().flatten().map(|entry| entry.path());
-            let folders = [interface.join(kind)].into_iter().chain(below.map(|path| path.join(kind)));
-            folders
-                .filter_map(|folder| read_dir(folder).ok())
-                .flatten()
-                .flatten()
-                .next()
-                .map(|node| node.file_name())
+        let node = self.interfaces().into_iter().find_map(|interface| {
+            let below = entries(&interface).map(|path| path.join(kind));
+            [interface.join(kind)].into_iter().chain(below).flat_map(|folder| entries(&folder)).next()
         })?;
-        Some(machine.root.join("dev").join(name))
+        Some(machine.root.join("dev").join(node.file_name()?))
     }
 
     /// Returns the rule of udev that permits access for the user at the machine, limited to the product if the vendor has several.
@@ -152,13 +144,10 @@ impl Seen {
         diagnoses.extend(self.driver(is_open));
         diagnoses.extend(self.permission(machine, is_open));
         if self.access == UsbAccess::Serial && machine.runs("ModemManager") {
+            let found = "writes to its port whenever it is connected, to find a modem";
             diagnoses.push(match machine.keeps_modem_manager_away(self.vendor) {
                 true => Diagnosis::good("ModemManager", "does not open its port"),
-                false => Diagnosis::bad(
-                    "ModemManager",
-                    "writes to its port whenever it is connected, to find a modem",
-                    self.remedy_by_rule(),
-                ),
+                false => Diagnosis::bad("ModemManager", found, self.remedy_by_rule()),
             });
         }
         diagnoses
@@ -172,20 +161,14 @@ impl Seen {
         self.interfaces().into_iter().find_map(|interface| {
             let driver = read_link(interface.join("driver")).ok()?.file_name()?.to_str()?.to_owned();
             let interface = interface.file_name()?.to_str()?.to_owned();
-            match driver.as_str() {
-                "usbfs" if is_open => None,
-                "usbfs" => Some(Diagnosis::bad(
-                    "driver",
-                    "another program has the device open",
-                    "end that program; only one program at a time can open the device",
-                )),
-                _ => Some(hindrance(
-                    is_open,
-                    "driver",
-                    format!("the kernel's driver `{driver}` uses the device"),
-                    format!("as root: `echo {interface} > /sys/bus/usb/drivers/{driver}/unbind`"),
-                )),
+            if driver == "usbfs" {
+                let remedy = "end that program; only one program at a time can open the device";
+                let other = Diagnosis::bad("driver", "another program has the device open", remedy);
+                return Some(other).filter(|_| !is_open);
             }
+            let found = format!("the kernel's driver `{driver}` uses the device");
+            let remedy = format!("as root: `echo {interface} > /sys/bus/usb/drivers/{driver}/unbind`");
+            Some(hindrance(is_open, "driver", found, remedy))
         })
     }
 
@@ -196,32 +179,28 @@ impl Seen {
                 UsbAccess::Serial => ("serial port", "cdc_acm"),
                 UsbAccess::Hid => ("raw HID", "usbhid"),
             };
+            let remedy = format!("as root: `modprobe {module}`, and reconnect the device");
             return Some(Diagnosis::bad(
                 "driver",
                 format!("the kernel has no {what} for the device"),
-                format!("as root: `modprobe {module}`, and reconnect the device"),
+                remedy,
             ));
         };
         let shown = Path::new("/").join(node.strip_prefix(&machine.root).unwrap_or(&node));
-        Some(if (machine.may_use)(&node) {
-            Diagnosis::good("permission", format!("this user may use {}", shown.display()))
-        } else {
-            hindrance(
-                is_open,
-                "permission",
-                format!("this user may not use {}", shown.display()),
-                self.remedy_by_rule(),
-            )
+        let shown = shown.display();
+        Some(match (machine.may_use)(&node) {
+            true => Diagnosis::good("permission", format!("this user may use {shown}")),
+            false => {
+                let found = format!("this user may not use {shown}");
+                hindrance(is_open, "permission", found, self.remedy_by_rule())
+            }
         })
     }
 }
 
 /// Creates a finding on an obstacle; a note if the device is open in spite of it, through a service or another connection.
 fn hindrance(is_open: bool, what: &'static str, found: String, remedy: String) -> Diagnosis {
-    match is_open {
-        true => Diagnosis::note(what, found, remedy),
-        false => Diagnosis::bad(what, found, remedy),
-    }
+    Diagnosis::problem(if is_open { Grade::Note } else { Grade::Bad }, what, found, remedy)
 }
 
 /// Diagnoses the connection of a device of these kinds; a missing device is a note if the plugin opened one, and bad otherwise.
@@ -233,18 +212,11 @@ pub(crate) fn connection(machine: &Machine, kinds: &[UsbKind], is_open: bool) ->
     if seen.is_empty() {
         let wanted: Vec<String> = kinds.iter().map(wanted).collect();
         let found = format!("no device {}", wanted.join(" or "));
-        return vec![match is_open {
-            true => Diagnosis::note(
-                "on USB",
-                found,
-                "the device is open nevertheless: it is simulated, or has another connection",
-            ),
-            false => Diagnosis::bad(
-                "on USB",
-                found,
-                "connect the device and switch it on; `lsusb` lists the devices that the system detects",
-            ),
-        }];
+        let remedy = match is_open {
+            true => "the device is open nevertheless: it is simulated, or has another connection",
+            false => "connect the device and switch it on; `lsusb` lists the devices that the system detects",
+        };
+        return vec![hindrance(is_open, "on USB", found, remedy.to_owned())];
     }
     seen.iter().flat_map(|seen| seen.diagnose(machine, is_open)).collect()
 }
@@ -252,6 +224,11 @@ pub(crate) fn connection(machine: &Machine, kinds: &[UsbKind], is_open: bool) ->
 fn wanted(kind: &UsbKind) -> String {
     let product = kind.product().map_or_else(|| "*".to_owned(), |product| format!("{product:04x}"));
     format!("{:04x}:{product}", kind.vendor())
+}
+
+/// Returns the paths in a folder; none if the folder cannot be read.
+fn entries(folder: &Path) -> impl Iterator<Item = PathBuf> + use<> {
+    read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path())
 }
 
 /// Reads the trimmed text of a small file.
@@ -262,7 +239,6 @@ fn text_of(folder: &Path, file: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::doctor::Grade;
     use std::fs::{create_dir_all, write};
     use std::os::unix::fs::symlink;
 

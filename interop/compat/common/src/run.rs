@@ -1,21 +1,21 @@
 //! Run behind a program: recorded, published to clients, reported at its end.
 
 use crate::host::{note_emergency_stop, stations_so_far};
-use crate::settings::{Pace, Settings};
+use crate::settings::Settings;
 use crate::station::Station;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use flotor_hal::terminal::escaped;
 use flotor_hal::{DVec3, Demand};
 use flotor_live::Directory;
-use flotor_record::{Note, Recorder, RunDescription, Severity, TraceDigest};
+use flotor_record::{Note, Recorder, RunDescription, Severity};
 use flotor_servo::{Place, RunEnd, StopSwitch, Stuck};
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
-use flotor_session::summary::{RunFacts, RunSummary, Tally, end_cause};
+use flotor_session::summary::RunSummary;
 use flotor_session::telemetry::{ObservedRun, publish};
 use flotor_session::{
-    Lockstep, Observer, Outcome, PluginReport, RunError, RunOptions, RunRecording, Session,
+    Lockstep, Measurements, Observer, Outcome, PluginReport, RunError, RunOptions, Session,
 };
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -30,9 +30,7 @@ pub(crate) struct Prepared {
 
 /// Observers of each tick.
 struct Watchers {
-    tally: Tally,
-    digest: TraceDigest,
-    recording: RunRecording,
+    measured: Measurements,
     requested: Vec<Asked>,
     draft: Option<Draft>,
 }
@@ -50,7 +48,7 @@ const DRAFT_LOOK: u64 = 64;
 
 impl Draft {
     /// Writes the intermediate summary atomically once per interval.
-    fn update(&mut self, record: &TickRecord, requested: &[Asked], run: Measured<'_>) {
+    fn update(&mut self, record: &TickRecord, requested: &[Asked], measured: &Measurements) {
         let is_fresh = |written: Instant| written.elapsed() < DRAFT_PERIOD;
         if !record.tick.is_multiple_of(DRAFT_LOOK) || self.written.is_some_and(is_fresh) {
             return;
@@ -71,7 +69,8 @@ impl Draft {
         if let Some(path) = settings.json.as_deref().filter(|path| path.as_os_str() != "-") {
             let here = Stuck { tick: record.tick, place: Place::Waiting };
             let outcome = Outcome::of_hung_loop(here, record.time_ns);
-            let mut summary = serde_json::to_value(self.facts.summary(&outcome, &run)).unwrap_or_default();
+            let mut summary =
+                serde_json::to_value(self.facts.summary(&outcome, measured)).unwrap_or_default();
             summary["end"] = "not ended".into();
             replace(&so_far(path), &summary.to_string());
         }
@@ -95,17 +94,15 @@ struct Asked {
 
 impl Observer for Watchers {
     fn change(&mut self, change: &Change) {
-        self.recording.change(change);
+        self.measured.change(change);
     }
 
     fn demand(&self) -> Demand {
-        demand(&self.recording)
+        self.measured.demand()
     }
 
     fn observe(&mut self, record: &TickRecord) {
-        self.tally.observe(record);
-        self.digest.update(record);
-        self.recording.observe(record);
+        self.measured.observe(record);
         let device = usize::from(record.device);
         if self.requested.len() <= device {
             self.requested.resize_with(device + 1, Asked::default);
@@ -117,26 +114,9 @@ impl Observer for Watchers {
             requested.applied_nm = requested.applied_nm.max(record.commanded.torque().length());
         }
         if let (0, Some(draft)) = (record.device, &mut self.draft) {
-            let demand = demand(&self.recording);
-            draft.update(
-                record,
-                &self.requested,
-                Measured { tally: &self.tally, digest: &self.digest, demand },
-            );
+            draft.update(record, &self.requested, &self.measured);
         }
     }
-}
-
-/// Returns the outputs to compute: force and torque, which the program requests, and those that a recording stores.
-fn demand(recording: &RunRecording) -> Demand {
-    Demand::WRENCH.with(recording.demand())
-}
-
-/// Measurements of a run so far, for a summary.
-struct Measured<'a> {
-    tally: &'a Tally,
-    digest: &'a TraceDigest,
-    demand: Demand,
 }
 
 /// Returns the length of a vector, without overflow of its square.
@@ -150,7 +130,7 @@ fn length(vector: DVec3) -> f64 {
 struct Facts {
     scene: Scene,
     settings: Settings,
-    seed: u64,
+    options: RunOptions,
     plugins: Vec<PluginReport>,
 }
 
@@ -163,13 +143,13 @@ impl Prepared {
         let recorder = settings.record.as_deref().map(|path| Recorder::create(path, &description));
         let recorder = recorder.transpose().map_err(|error| error.to_string())?;
         let publication = publish(&Directory::of_this_user(), scene, &description, session, stop);
-        let facts = Facts { scene: scene.clone(), settings: settings.clone(), seed: options.seed, plugins };
+        let facts =
+            Facts { scene: scene.clone(), settings: settings.clone(), options: options.clone(), plugins };
         let is_to_file = |path: &PathBuf| path.as_os_str() != "-";
         let is_reported = settings.report.iter().chain(&settings.json).any(is_to_file);
         let watchers = Watchers {
-            tally: Tally::default(),
-            digest: TraceDigest::new(),
-            recording: RunRecording::new(recorder),
+            // The program requests force and torque.
+            measured: Measurements::new(recorder, Demand::WRENCH),
             requested: Vec::new(),
             draft: is_reported.then(|| Draft { facts: facts.clone(), written: None }),
         };
@@ -190,7 +170,7 @@ impl Prepared {
                 facts.report(watched, outcome, stations);
             }
             Err(error) => {
-                let _ = watched.observer.recording.finish(&[]);
+                let _ = watched.observer.measured.recording.finish(&[]);
                 report_line(&error.to_string());
             }
         }
@@ -228,27 +208,15 @@ impl LockstepRun {
 
 impl Facts {
     /// Returns the summary of a run with an outcome, also of one in progress.
-    fn summary(&self, outcome: &Outcome, run: &Measured<'_>) -> RunSummary {
-        let facts = RunFacts {
-            title: &self.scene.title,
-            clock: if self.settings.pace == Pace::Real { "real" } else { "virtual" },
-            seed: self.seed,
-            rate_hz: self.scene.rate_hz,
-            plugins: &self.plugins,
-            requested: run.demand,
-            couplings: &self.scene.couplings,
-            carried: &[],
-            trace_digest: run.digest.finish(),
-        };
-        RunSummary::new(facts, outcome, run.tally)
+    fn summary(&self, outcome: &Outcome, measured: &Measurements) -> RunSummary {
+        let facts = measured.facts(&self.scene, &self.options, &self.plugins);
+        RunSummary::new(facts, outcome, &measured.tally)
     }
 
     /// Finishes the recording and writes the requested summaries.
     fn report(self, watched: ObservedRun<Watchers>, outcome: Outcome, stations: &[Station]) {
-        let ObservedRun { observer: Watchers { tally, digest, mut recording, requested, .. }, publication } =
-            watched;
-        let run = Measured { tally: &tally, digest: &digest, demand: demand(&recording) };
-        let summary = self.summary(&outcome, &run);
+        let ObservedRun { observer: Watchers { mut measured, requested, .. }, publication } = watched;
+        let summary = self.summary(&outcome, &measured);
         let settings = &self.settings;
         let mut lines: Vec<String> =
             stations.iter().zip(&requested).map(|(station, requested)| line(station, *requested)).collect();
@@ -262,7 +230,7 @@ impl Facts {
                 text: text.clone(),
             })
             .collect();
-        if let Err(error) = recording.finish(&notes) {
+        if let Err(error) = measured.recording.finish(&notes) {
             report_line(&error.to_string());
         }
         if let Some(publication) = publication {
@@ -317,8 +285,7 @@ fn line(station: &Station, requested: Asked) -> String {
 
 /// Formats the cause if the run ended before the program.
 fn end_of(outcome: &Outcome) -> Option<String> {
-    (!outcome.end.is_in_order())
-        .then(|| format!("the run ended before the program: {}", end_cause(&outcome.end)))
+    (!outcome.end.is_in_order()).then(|| format!("the run ended before the program: {}", outcome.end.cause()))
 }
 
 /// Writes a result, to standard error if it is named `-`. Returns whether it was written.

@@ -301,7 +301,6 @@ impl<'r> Replay<'r> {
         *report = now;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a count
         let generation = change.number as u16;
-        let model = u32::try_from(model).unwrap_or(u32::MAX);
         drop(self.forces.replace(Replacement { model, generation, layer: Box::new(layer) }, tick));
         Ok(())
     }

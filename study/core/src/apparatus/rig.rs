@@ -19,13 +19,12 @@ use flotor_hal::Demand;
 use flotor_record::Recorder;
 use flotor_servo::{Clock, RunEnd, StopSwitch};
 use flotor_session::scene::Scene;
-use flotor_session::summary::end_cause;
 use flotor_session::{ControlError, Observer, RunError, RunRecording, Steps};
 use std::path::PathBuf;
 
 /// Run that ended before the experiment did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the run ended during a trial: {}", end_cause(.0))]
+#[error("the run ended during a trial: {}", .0.cause())]
 pub struct RunEnded(pub RunEnd);
 
 /// Stimulus that the model rejected although the check had accepted it.

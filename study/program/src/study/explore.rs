@@ -115,14 +115,8 @@ fn end(
     stop.stop();
     let outcome = run.join().map_err(|_| RunError::Thread("panicked"))??;
     match outcome.end {
-        flotor_servo::RunEnd::DeviceFault(fault) => Err(CommandError::DeviceFault(fault)),
-        flotor_servo::RunEnd::EmergencyStop(source) => Err(CommandError::EmergencyStop(source)),
-        flotor_servo::RunEnd::NotPaced => Err(CommandError::NotPaced),
-        flotor_servo::RunEnd::Oscillation => Err(CommandError::Oscillation),
-        flotor_servo::RunEnd::Unguarded => Err(CommandError::Unguarded),
-        flotor_servo::RunEnd::Watchdog(stuck) => Err(CommandError::Watchdog(stuck)),
-        flotor_servo::RunEnd::TooFast(samples_per_s) => Err(CommandError::TooFast { samples_per_s, rate_hz }),
-        flotor_servo::RunEnd::Finished | flotor_servo::RunEnd::Stopped => Ok(()),
+        end if end.is_in_order() => Ok(()),
+        end => Err(CommandError::run_ended(end, rate_hz)),
     }
 }
 

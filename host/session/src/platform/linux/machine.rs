@@ -48,9 +48,7 @@ impl MachineState {
         let Self { folder, limits, cores, nice, mask, locale } = self;
         let now = Self::now();
         let mut changed = Vec::new();
-        if let Some(folder) = folder
-            && now.folder.as_ref() != Some(folder)
-        {
+        if let Some(folder) = lost(folder, &now.folder) {
             let _ = chdir(folder);
             changed.push("the working folder");
         }
@@ -60,32 +58,29 @@ impl MachineState {
                 changed.push(name);
             }
         }
-        if let Some(cores) = cores
-            && now.cores.as_ref() != Some(cores)
-        {
+        if let Some(cores) = lost(cores, &now.cores) {
             let _ = sched_setaffinity(Some(getpid()), cores);
             changed.push("the cores of the main thread");
         }
-        if let Some(nice) = nice
-            && now.nice != Some(*nice)
-        {
+        if let Some(nice) = lost(nice, &now.nice) {
             let _ = setpriority_process(Some(getpid()), *nice);
             changed.push("the priority of the main thread");
         }
-        if let Some(mask) = mask
-            && now.mask != Some(*mask)
-        {
+        if let Some(mask) = lost(mask, &now.mask) {
             let _ = umask(*mask);
             changed.push("the mode mask of new files");
         }
-        if let Some(locale) = locale
-            && now.locale.as_ref() != Some(locale)
-        {
+        if let Some(locale) = lost(locale, &now.locale) {
             locale::set(locale);
             changed.push("the locale");
         }
         changed
     }
+}
+
+/// Returns the former value of a part, if it is known and the part has changed.
+fn lost<'a, T: PartialEq>(before: &'a Option<T>, now: &Option<T>) -> Option<&'a T> {
+    before.as_ref().filter(|before| now.as_ref() != Some(before))
 }
 
 /// Returns the mode mask of new files, from a file of the kernel: reading it with `umask` would change it.

@@ -3,104 +3,30 @@
 //! Texts are checked against the schema of a plugin here; only numbers enter the loop.
 
 mod change_log;
+mod error;
 mod plugin_table;
 mod swaps;
 mod versions;
 
 pub(super) use change_log::ChangeLog;
+pub use error::ControlError;
+pub use plugin_table::NewValue;
 pub(super) use plugin_table::{PluginTable, understands};
 pub use swaps::FaultyPlugin;
 pub(super) use swaps::Settled;
 pub(super) use versions::ChosenBy;
 
+use super::error::RunError;
 use super::prepare::prepare_model_while;
 use crate::calls::is_to_begin;
+use crate::lock::lock;
 use crate::registry::Registry;
 use crate::scene::{Location, ModelUse};
-use flotor_hal::abi::loader::SettingError;
 use flotor_hal::{LoopConfig, Parameter};
 use flotor_live::RefusalCause;
 use flotor_servo::{ChangeSender, Clock, HostSwaps, Layer, LayerReport, ParameterChange, Replacement};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use swaps::Swaps;
-
-/// Reason for a refused change.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ControlError {
-    /// No plugin of the run has this name.
-    #[error(
-        "the run has no plugin `{name}`{} (its plugins: {})",
-        nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
-        names.join(", ")
-    )]
-    UnknownPlugin {
-        /// Requested name.
-        name: String,
-        /// Most similar name of a plugin.
-        nearest: Option<String>,
-        /// Names of all plugins.
-        names: Vec<String>,
-    },
-    /// The plugin has no such parameter, or the value is not legal for it.
-    #[error("[{plugin}] {error}")]
-    Setting {
-        /// Name of the plugin.
-        plugin: String,
-        /// Error of the setting.
-        #[source]
-        error: SettingError,
-    },
-    /// The parameter is only read when the plugin is created.
-    #[error("[{plugin}] `{id}` cannot change while the loop runs; {}", live_words(live))]
-    Fixed {
-        /// Name of the plugin.
-        plugin: String,
-        /// Id of the parameter.
-        id: String,
-        /// Ids of the parameters that can change.
-        live: Vec<String>,
-    },
-    /// A device has no weight and cannot be replaced.
-    #[error("only models have a weight and can be swapped; name a model instead of a device")]
-    NoWeight,
-    /// A model cannot be replaced.
-    #[error("[{model}] model unchanged: {problem}")]
-    Refused {
-        /// Name of the model.
-        model: String,
-        /// Problem as text.
-        problem: String,
-        /// Cause of the refusal.
-        cause: RefusalCause,
-    },
-    /// Too many changes are pending, or the last replacement of the model is still fading.
-    #[error("previous changes are pending, or a swap is still fading in; try again in a moment")]
-    Busy,
-    /// The loop has ended.
-    #[error("the run has ended; start a new run")]
-    Ended,
-}
-
-fn live_words(live: &[String]) -> String {
-    if live.is_empty() {
-        "no parameter of this plugin can change then".to_owned()
-    } else {
-        format!("parameters that can change then: {}", live.join(", "))
-    }
-}
-
-/// New value for a parameter of a plugin of the run, as text.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct NewValue<'a> {
-    /// Name of a device or model in the scene (a model on several devices: `NAME@DEVICE` for one of them, `NAME` for all), or id of
-    /// a plugin.
-    pub plugin: &'a str,
-    /// Id of the parameter.
-    pub parameter: &'a str,
-    /// Value in the notation of users.
-    pub value: &'a str,
-}
 
 /// Handle to a running loop, for any thread, with cheap clones. No method makes the loop wait.
 #[derive(Clone)]
@@ -117,12 +43,6 @@ struct Shared {
     config: LoopConfig,
     clock: Clock,
     swaps: Mutex<Swaps>,
-}
-
-impl Shared {
-    fn changes(&self) -> MutexGuard<'_, ChangeSender> {
-        self.changes.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl Controls {
@@ -188,7 +108,7 @@ impl Controls {
     }
 
     fn send(&self, checked: &[ParameterChange]) -> Result<(), ControlError> {
-        let mut changes = self.shared.changes();
+        let mut changes = lock(&self.shared.changes);
         if changes.is_abandoned() {
             return Err(ControlError::Ended);
         }
@@ -213,11 +133,11 @@ impl Controls {
     ) -> Result<(), ControlError> {
         let Shared { plugins, models, config, clock, .. } = &*self.shared;
         let numbers = plugins.models(model)?;
-        if self.shared.changes().is_abandoned() {
+        if lock(&self.shared.changes).is_abandoned() {
             return Err(ControlError::Ended);
         }
         self.swaps().reserve(plugins, &numbers)?;
-        let refused = |error: super::RunError| ControlError::Refused {
+        let refused = |error: RunError| ControlError::Refused {
             model: model.to_owned(),
             problem: error.to_string(),
             cause: if error.is_configuration() { RefusalCause::Request } else { RefusalCause::Plugin },
@@ -228,7 +148,7 @@ impl Controls {
                 other.plugin.location = Location { file: "--plugin".into(), line: 0 };
             }
             // After the end of a run, or a request for it, no thread waits for plugin code.
-            let is_wanted = || !self.shared.changes().is_abandoned() && is_to_begin();
+            let is_wanted = || !lock(&self.shared.changes).is_abandoned() && is_to_begin();
             prepare_model_while(registry, &other, config, *clock, is_wanted).map_err(refused)
         };
         // Without the lock: the run goes on meanwhile, and may end.
@@ -238,8 +158,7 @@ impl Controls {
         for (number, (layer, report)) in numbers.into_iter().zip(made) {
             swaps.warn(report.warning());
             let generation = plugins.add(number, report, ChosenBy::Name);
-            let model = u32::try_from(number).unwrap_or(u32::MAX); // a scene has fewer models
-            swaps.send(number, Replacement { model, generation, layer: Box::new(layer) })?;
+            swaps.send(Replacement { model: number, generation, layer: Box::new(layer) })?;
         }
         Ok(())
     }
@@ -250,7 +169,7 @@ impl Controls {
     }
 
     fn swaps(&self) -> MutexGuard<'_, Swaps> {
-        self.shared.swaps.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.shared.swaps)
     }
 
     /// Frees models that the loop has returned, unless another thread does. Not real-time.

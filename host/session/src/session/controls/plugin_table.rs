@@ -1,15 +1,28 @@
 //! Table of the plugins of a run with their replacements: checks new values before they enter the loop, and describes its reports.
 
-use super::super::PluginReport;
+use super::super::plugin_report::PluginReport;
+use super::error::ControlError;
 use super::versions::{ChosenBy, Versions};
-use super::{ControlError, NewValue};
+use crate::lock::lock;
 use crate::scene::{is_named, nearest};
-use flotor_core::{Change, ChangeSubject};
+use flotor_core::{Change, ChangeSubject, PluginIndex};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Mutability, Parameter};
 use flotor_servo::{ChangeReport, PLUGIN, Pace, ParameterChange, WEIGHT};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
+
+/// New value for a parameter of a plugin of the run, as text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NewValue<'a> {
+    /// Name of a device or model in the scene (a model on several devices: `NAME@DEVICE` for one of them, `NAME` for all), or id of
+    /// a plugin.
+    pub plugin: &'a str,
+    /// Id of the parameter.
+    pub parameter: &'a str,
+    /// Value in the notation of users.
+    pub value: &'a str,
+}
 
 /// Parses a new value of a live parameter.
 ///
@@ -40,28 +53,34 @@ pub(in super::super) fn understands(part: &PluginReport, new: &NewValue<'_>) -> 
 #[derive(Clone)]
 pub(in super::super) struct PluginTable {
     places: Arc<Mutex<Vec<Versions>>>,
+    devices: usize,
 }
 
 impl PluginTable {
     /// Creates the table of the plugins that a run begins with.
     pub(in super::super) fn new(plugins: &[PluginReport]) -> Self {
-        Self { places: Arc::new(Mutex::new(plugins.iter().map(Versions::new).collect())) }
+        let is_device = |plugin: &&PluginReport| plugin.metadata.kind == PluginKind::Device;
+        let devices = plugins.iter().filter(is_device).count();
+        Self { places: Arc::new(Mutex::new(plugins.iter().map(Versions::new).collect())), devices }
     }
 
     pub(super) fn lock(&self) -> MutexGuard<'_, Vec<Versions>> {
-        self.places.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.places)
+    }
+
+    /// Calls `on_model` with the versions of a model; returns `None` if the run has fewer models.
+    fn model<T>(&self, model: usize, on_model: impl FnOnce(&mut Versions) -> T) -> Option<T> {
+        self.lock().get_mut(PluginIndex::of_model(self.devices, model).position()).map(on_model)
     }
 
     /// Adds the replacement of a model and returns its generation; new values are checked against it from now on.
     pub(in super::super) fn add(&self, model: usize, report: PluginReport, chosen_by: ChosenBy) -> u16 {
-        let mut places = self.lock();
-        let devices = devices(&places);
-        places.get_mut(devices + model).map_or(0, |versions| versions.add(report, chosen_by))
+        self.model(model, |versions| versions.add(report, chosen_by)).unwrap_or(0)
     }
 
     /// Records that the loop has put a generation in place; new values are checked against it from now on.
-    pub(super) fn set_current(&self, plugin: u16, generation: u16) {
-        if let Some(versions) = self.lock().get_mut(usize::from(plugin)) {
+    pub(super) fn set_current(&self, plugin: PluginIndex, generation: u16) {
+        if let Some(versions) = self.lock().get_mut(plugin.position()) {
             (versions.current, versions.in_place) = (generation, generation);
             versions.forget();
         }
@@ -69,8 +88,13 @@ impl PluginTable {
 
     /// Returns the plugin of a model and generation.
     pub(super) fn plugin(&self, model: usize, generation: u16) -> Option<PluginReport> {
-        let places = self.lock();
-        places.get(devices(&places) + model).map(|versions| versions.get(generation).clone())
+        self.model(model, |versions| versions.get(generation).clone())
+    }
+
+    /// Returns the name of a model; its number, if the run has fewer models.
+    pub(super) fn name(&self, model: usize) -> String {
+        let name = self.model(model, |versions| versions.first.name.clone());
+        name.unwrap_or_else(|| PluginIndex::of_model(self.devices, model).to_string())
     }
 
     /// Returns the replacements in place, except those that the seed chose.
@@ -85,14 +109,7 @@ impl PluginTable {
 
     /// Records that the loop has returned a generation of a model, which may be dropped.
     pub(super) fn retire(&self, model: usize, generation: u16) {
-        let mut places = self.lock();
-        let devices = devices(&places);
-        let Some(versions) = places.get_mut(devices + model) else { return };
-        let retired = versions.later.iter_mut().find(|version| version.generation == generation);
-        if let Some(version) = retired {
-            version.is_retired = true;
-        }
-        versions.forget();
+        self.model(model, |versions| versions.retire(generation));
     }
 
     /// Checks new values against the plugins that a run begins with.
@@ -101,15 +118,15 @@ impl PluginTable {
     }
 
     /// Returns the numbers of the plugins with a name (a model has one on each of its devices), or of the first plugin with this id.
-    fn numbers(&self, name: &str) -> Result<Vec<u16>, ControlError> {
+    fn numbers(&self, name: &str) -> Result<Vec<PluginIndex>, ControlError> {
         let places = self.lock();
-        let named = |versions: &Versions| is_named(&versions.now().name, name);
-        let found: Vec<u16> =
-            (0..).zip(&*places).filter(|(_, versions)| named(versions)).map(|(number, _)| number).collect();
+        let numbered = || (0..).map(PluginIndex::at).zip(&*places);
+        let named = numbered().filter(|(_, versions)| is_named(&versions.now().name, name));
+        let found: Vec<PluginIndex> = named.map(|(number, _)| number).collect();
         if !found.is_empty() {
             return Ok(found);
         }
-        let of_id = (0..).zip(&*places).find(|(_, versions)| versions.now().metadata.id == name);
+        let of_id = numbered().find(|(_, versions)| versions.now().metadata.id == name);
         of_id.map(|(number, _)| vec![number]).ok_or_else(|| {
             let names = || places.iter().map(|versions| versions.now().name.as_str());
             ControlError::UnknownPlugin {
@@ -122,8 +139,7 @@ impl PluginTable {
 
     /// Returns the numbers, among the models, of the models with a name.
     pub(in super::super) fn models(&self, name: &str) -> Result<Vec<usize>, ControlError> {
-        let devices = devices(&self.lock());
-        let model = |number: u16| usize::from(number).checked_sub(devices).ok_or(ControlError::NoWeight);
+        let model = |plugin: PluginIndex| plugin.among_models(self.devices).ok_or(ControlError::NoWeight);
         self.numbers(name)?.into_iter().map(model).collect()
     }
 
@@ -145,9 +161,9 @@ impl PluginTable {
         self.numbers(new.plugin)?.into_iter().map(|plugin| self.check_one(plugin, new)).collect()
     }
 
-    fn check_one(&self, plugin: u16, new: &NewValue<'_>) -> Result<ParameterChange, ControlError> {
+    fn check_one(&self, plugin: PluginIndex, new: &NewValue<'_>) -> Result<ParameterChange, ControlError> {
         let places = self.lock();
-        let versions = places.get(usize::from(plugin)).ok_or(ControlError::Ended)?;
+        let versions = places.get(plugin.position()).ok_or(ControlError::Ended)?;
         let (part, generation) = (versions.now(), versions.current);
         let setting = live_setting(part, new)?;
         let parameter = u32::try_from(setting.index()).unwrap_or(u32::MAX); // schemas have tens of entries
@@ -157,7 +173,7 @@ impl PluginTable {
     /// Returns the rate at which a user's request moves a number: a tenth of its soft range in 50 ms.
     pub(super) fn pace(&self, change: &ParameterChange) -> Pace {
         let places = self.lock();
-        let part = places.get(usize::from(change.plugin)).map(|versions| versions.get(change.generation));
+        let part = places.get(change.plugin.position()).map(|versions| versions.get(change.generation));
         let index = change.parameter as usize;
         part.and_then(|part| {
             let range = part.soft_ranges.get(index)?.as_ref()?;
@@ -172,7 +188,7 @@ impl PluginTable {
     pub(super) fn describe(&self, report: &ChangeReport) -> Change {
         let ChangeReport { tick, time_ns, change, outcome } = *report;
         let places = self.lock();
-        let part = places.get(usize::from(change.plugin)).map(|versions| versions.get(change.generation));
+        let part = places.get(change.plugin.position()).map(|versions| versions.get(change.generation));
         let (subject, parameter, value) = match (part, change.parameter) {
             (_, WEIGHT) => (ChangeSubject::Weight, "weight".to_owned(), change.value.to_string()),
             (Some(part), PLUGIN) => {
@@ -190,7 +206,7 @@ impl PluginTable {
         Change {
             tick,
             time_ns,
-            plugin: part.map_or_else(String::new, |part| part.name.clone()),
+            plugin: part.map_or_else(|| change.plugin.to_string(), |part| part.name.clone()),
             subject,
             parameter,
             value,
@@ -199,9 +215,4 @@ impl PluginTable {
             outcome,
         }
     }
-}
-
-/// Returns the number of devices, which come first.
-fn devices(plugins: &[Versions]) -> usize {
-    plugins.iter().take_while(|versions| versions.now().metadata.kind == PluginKind::Device).count()
 }

@@ -1,9 +1,9 @@
 //! Hot swaps of models: pending replacements, and plugins that the loop has returned.
 
-use super::super::PluginReport;
-use super::ControlError;
+use super::super::plugin_report::PluginReport;
+use super::error::ControlError;
 use super::plugin_table::PluginTable;
-use crate::calls::{Attended, Call, Unresponsive, end_limit};
+use crate::calls::{Call, CallThread, PendingCall, Unresponsive, end_limit};
 use flotor_servo::{HostSwaps, Layer, LayerReport, ModelHealth, Replacement};
 use std::time::Duration;
 
@@ -27,7 +27,7 @@ pub(super) struct Swaps {
     /// Warnings about replacements, a sentence each.
     warnings: Vec<String>,
     /// Plugins being freed on helper threads: `sweep` does not wait for plugin code.
-    freeing: Vec<Attended<LayerReport>>,
+    freeing: Vec<PendingCall<LayerReport>>,
     /// The first plugin that was not freed in time.
     hung: Option<Unresponsive>,
 }
@@ -59,19 +59,15 @@ impl Swaps {
     /// Starts to free plugins that the loop has returned, and records faults of the freed ones. Not real-time; does not wait.
     pub(super) fn sweep(&mut self, plugins: &PluginTable) {
         while let Ok((model, mut layer)) = self.queues.retired.pop() {
-            let number = model as usize;
-            let who =
-                plugins.plugin(number, layer.generation()).map_or_else(String::new, |plugin| plugin.name);
-            let freed = Attended::start(end_limit(), move |progress| {
-                let report = layer.report(number, || progress.enter(&who, Call::LastMessage));
+            let who = plugins.name(model);
+            let freed = CallThread::default().begin(end_limit(), move |progress| {
+                let report = layer.report(model, || progress.enter(&who, Call::LastMessage));
                 progress.enter(&who, Call::Destroy);
                 drop(layer);
                 report
             });
             self.freeing.extend(freed);
-            if let Some(busy) = self.busy.get_mut(number) {
-                *busy = false;
-            }
+            self.release(&[model]);
         }
         self.collect(plugins, Duration::ZERO);
     }
@@ -95,8 +91,9 @@ impl Swaps {
     }
 
     fn set_busy(&mut self, numbers: &[usize], is_busy: bool) {
-        let models = self.busy.iter_mut().enumerate().filter(|(number, _)| numbers.contains(number));
-        models.for_each(|(_, busy)| *busy = is_busy);
+        for number in numbers {
+            self.busy.get_mut(*number).into_iter().for_each(|busy| *busy = is_busy);
+        }
     }
 
     /// Records the faults of freed plugins, waiting for each up to a time.
@@ -142,18 +139,16 @@ impl Swaps {
     ///
     /// # Errors
     /// [`ControlError::Busy`].
-    pub(super) fn send(&mut self, number: usize, replacement: Replacement) -> Result<(), ControlError> {
+    pub(super) fn send(&mut self, replacement: Replacement) -> Result<(), ControlError> {
+        let model = replacement.model;
         let sent = self.queues.leaving_for_the_loop.push(replacement);
-        if let Some(busy) = self.busy.get_mut(number) {
-            *busy = sent.is_ok();
-        }
+        self.set_busy(&[model], sent.is_ok());
         sent.map_err(|_| ControlError::Busy)
     }
 
     /// Returns the models that a finished loop has returned last, each with its number.
     pub(super) fn take_retired(&mut self) -> Vec<(usize, Box<Layer>)> {
-        let retired = std::iter::from_fn(|| self.queues.retired.pop().ok());
-        retired.map(|(model, layer)| (model as usize, layer)).collect()
+        std::iter::from_fn(|| self.queues.retired.pop().ok()).collect()
     }
 
     pub(super) fn warn(&mut self, warning: Option<String>) {

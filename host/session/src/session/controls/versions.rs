@@ -1,6 +1,6 @@
 //! Versions of a plugin in a run: the first one and its replacements, by generation.
 
-use super::super::PluginReport;
+use super::super::plugin_report::PluginReport;
 use std::collections::VecDeque;
 
 /// Capacity that stays allocated: for the version in place, the one before, one that fades in, one that fades out.
@@ -56,6 +56,15 @@ impl Versions {
         self.current = self.newest;
         self.later.push_back(Version { generation: self.newest, report, chosen_by, is_retired: false });
         self.newest
+    }
+
+    /// Records that the loop has returned a generation, which may be dropped.
+    pub(super) fn retire(&mut self, generation: u16) {
+        let mut later = self.later.iter_mut();
+        if let Some(version) = later.find(|version| version.generation == generation) {
+            version.is_retired = true;
+        }
+        self.forget();
     }
 
     /// Drops replacements that no report can refer to any more, so that memory stays bounded. A pending change may refer to the

@@ -1,8 +1,8 @@
 //! Summaries of the runs behind a program in the folder of `flotor lend`: one for each process that opened a device.
 
 use super::guard::ProgramEnd;
-use super::program::Program;
 use flotor_command::{CommandError, note, say, write_json};
+use flotor_servo::RunEnd;
 use flotor_servo::last_stop::SignalName;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -62,8 +62,8 @@ impl<'a> Runs<'a> {
     }
 
     /// Prints the text of each run; returns true if there is any.
-    pub(super) fn tell(&self, program: &Program, record: Option<&Path>) -> bool {
-        let name = program.path.display();
+    pub(super) fn tell(&self, program: &Path, record: Option<&Path>) -> bool {
+        let name = program.display();
         for (suffix, run) in &self.runs {
             let Some(text) = &run.text else { continue };
             say!("{}", text.trim_end());
@@ -116,9 +116,10 @@ impl<'a> Runs<'a> {
 
     /// Returns the exit code of the command: that of the program, or that of a failed run whose program ended with 0.
     pub(super) fn exit_code(&self) -> i32 {
+        let in_order = [RunEnd::Finished, RunEnd::Stopped].map(RunEnd::word);
         let ended_early = |run: &Run| {
             let end = run.summary.as_ref().and_then(|summary| summary.get("end")).and_then(Value::as_str);
-            run.is_whole && end.is_some_and(|end| !["finished", "stopped"].contains(&end))
+            run.is_whole && end.is_some_and(|end| !in_order.contains(&end))
         };
         let status = self.program.status();
         match (status.code(), status.signal()) {

@@ -1,6 +1,6 @@
 //! Program of `flotor lend`: its path, and checks whether a drop-in library can replace its maker's.
 
-use super::Api;
+use super::api::Api;
 use flotor_command::CommandError;
 use std::ffi::OsStr;
 use std::os::unix::fs::PermissionsExt;

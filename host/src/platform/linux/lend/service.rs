@@ -1,7 +1,8 @@
 //! Interfaces that a program reaches over the network: the service is a separate process beside the program.
 
-use super::stop_request::{Stage, StopRequest};
-use super::{Early, Folder, LendArguments, PaceOption, has_ended, set_environment};
+use super::arguments::{LendArguments, PaceOption};
+use super::folder::Folder;
+use super::stop_request::{Early, Stage, StopRequest, has_ended};
 use flotor_command::separate::{Built, SeparateProgram};
 use flotor_command::{CommandError, INTERRUPTED, note, say};
 use flotor_servo::last_stop::spawn_unblocked;
@@ -67,7 +68,7 @@ impl Service {
                     build: "cargo build --release -p flotor-haply-service",
                 };
                 let mut command = program.command()?;
-                set_environment(&mut command, arguments, &folder.0, own)?;
+                arguments.set_environment(&mut command, &folder.0, own)?;
                 command.arg("--lent");
                 if let Some(listen) = &arguments.listen {
                     command.args(["--listen", listen, "--events", "127.0.0.1:0"]);

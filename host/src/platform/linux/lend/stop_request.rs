@@ -5,6 +5,7 @@ use flotor_command::CommandError;
 use flotor_command::stopping::stop_on_signals;
 use flotor_servo::StopSwitch;
 use std::cell::OnceCell;
+use std::process::{Child, ExitStatus};
 use std::time::{Duration, Instant};
 
 /// Poll interval of the request and of the processes that end after it.
@@ -38,6 +39,19 @@ impl Stage {
     fn after(since_request: Duration) -> Self {
         let begun = Self::SCHEDULE.iter().rev().find(|(_, start)| since_request >= *start);
         begun.map_or(Self::Requested, |(stage, _)| *stage)
+    }
+}
+
+/// Reason why `flotor lend` ends without an end of its program.
+pub(super) enum Early {
+    Failed(CommandError),
+    /// The exit code, after a request to stop or an error that another process has printed.
+    Exit(i32),
+}
+
+impl From<CommandError> for Early {
+    fn from(error: CommandError) -> Self {
+        Self::Failed(error)
     }
 }
 
@@ -81,6 +95,11 @@ impl StopRequest {
             std::thread::sleep(POLL);
         }
     }
+}
+
+/// Returns the exit status of a process once it has ended.
+pub(super) fn has_ended(child: &mut Child) -> Option<ExitStatus> {
+    child.try_wait().unwrap_or_else(|_| Some(ExitStatus::default()))
 }
 
 #[cfg(test)]

@@ -1,0 +1,136 @@
+//! State of the process that all plugin calls share, and notices about it.
+
+use super::call::Call;
+use crate::platform::MachineState;
+use flotor_servo::StopSwitch;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsString;
+use std::fmt;
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Notice for the user.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Notice {
+    /// A call takes long.
+    Waiting {
+        /// Name in the scene, or path of the file.
+        who: String,
+        /// Call in progress.
+        call: Call,
+        /// Time limit of the call.
+        limit: Duration,
+    },
+    /// A plugin changed the state of the process.
+    Changed {
+        /// Name in the scene.
+        who: String,
+        /// Changed parts, restored by the host.
+        restored: Vec<&'static str>,
+        /// Changed environment variables, which stay: other threads may read them at any time.
+        variables: Vec<String>,
+    },
+    /// The watchdog process has ended, and the run continues.
+    Unguarded,
+}
+
+impl fmt::Display for Notice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Waiting { who, call, limit } => {
+                write!(f, "waiting for `{who}` to return from {call}, for up to {} s", limit.as_secs_f64())
+            }
+            Self::Changed { who, restored, variables } => {
+                write!(f, "`{who}` changed ")?;
+                if !restored.is_empty() {
+                    write!(f, "{} of the host; restored by the host", restored.join(", "))?;
+                }
+                if !variables.is_empty() {
+                    let joined = if restored.is_empty() { "" } else { "; it also changed " };
+                    write!(
+                        f,
+                        "{joined}environment variables of the host ({}), which the host does not restore",
+                        variables.join(", ")
+                    )?;
+                }
+                Ok(())
+            }
+            Self::Unguarded => f.write_str(
+                "the watchdog process has ended, so no process stops the devices if this program is killed",
+            ),
+        }
+    }
+}
+
+/// Shared state of the plugin calls of this process.
+struct ProcessCalls {
+    on_notice: OnceLock<fn(&Notice)>,
+    /// Switch that stops waiting for a call before a run.
+    stop: OnceLock<StopSwitch>,
+    /// True once a thread with plugin code was abandoned.
+    has_abandoned: AtomicBool,
+}
+
+static CALLS: ProcessCalls =
+    ProcessCalls { on_notice: OnceLock::new(), stop: OnceLock::new(), has_abandoned: AtomicBool::new(false) };
+
+/// Sets the callback for notices: calls that take 5 s or more, changes of the process by plugins, and the end of a watchdog
+/// process. Only the first callback counts.
+pub fn on_notice(notify: fn(&Notice)) {
+    let _ = CALLS.on_notice.set(notify);
+}
+
+pub(crate) fn notify(notice: &Notice) {
+    if let Some(notify) = CALLS.on_notice.get() {
+        notify(notice);
+    }
+}
+
+/// Sets the switch that stops waiting for a call before a run, when nothing is energised. Only the first switch counts.
+pub fn stop_waits_with(stop: &StopSwitch) {
+    let _ = CALLS.stop.set(stop.clone());
+}
+
+/// Returns true unless a stop was requested.
+pub(crate) fn is_to_begin() -> bool {
+    CALLS.stop.get().is_none_or(|stop| !stop.is_stop_requested() && stop.emergency().is_none())
+}
+
+/// Returns true if a call did not return and its thread still runs: exit handlers of the process may wait for that thread.
+#[must_use]
+pub fn is_abandoned() -> bool {
+    CALLS.has_abandoned.load(Ordering::Relaxed)
+}
+
+/// Records that a thread with plugin code is abandoned.
+pub(crate) fn abandon() {
+    CALLS.has_abandoned.store(true, Ordering::Relaxed);
+}
+
+/// Runs plugin code, `make`, and restores the state of the process afterwards.
+pub(crate) fn keeping_machine<T>(who: &str, make: impl FnOnce() -> T) -> T {
+    let (before, variables) = (MachineState::now(), environment());
+    let made = make();
+    let (restored, variables) = (before.restore(), changed_variables(&variables, &environment()));
+    if !(restored.is_empty() && variables.is_empty()) {
+        notify(&Notice::Changed { who: who.to_owned(), restored, variables });
+    }
+    made
+}
+
+/// Returns the environment variables by name.
+fn environment() -> BTreeMap<OsString, OsString> {
+    std::env::vars_os().collect()
+}
+
+/// Returns the names of variables that were added, changed or removed.
+fn changed_variables(
+    before: &BTreeMap<OsString, OsString>,
+    after: &BTreeMap<OsString, OsString>,
+) -> Vec<String> {
+    let names: BTreeSet<&OsString> = before.keys().chain(after.keys()).collect();
+    let changed = names.into_iter().filter(|name| before.get(*name) != after.get(*name));
+    changed.map(|name| name.display().to_string()).collect()
+}

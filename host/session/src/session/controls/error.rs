@@ -1,0 +1,70 @@
+//! Errors of changes.
+
+use flotor_hal::abi::loader::SettingError;
+use flotor_live::RefusalCause;
+
+/// Reason for a refused change.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ControlError {
+    /// No plugin of the run has this name.
+    #[error(
+        "the run has no plugin `{name}`{} (its plugins: {})",
+        nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
+        names.join(", ")
+    )]
+    UnknownPlugin {
+        /// Requested name.
+        name: String,
+        /// Most similar name of a plugin.
+        nearest: Option<String>,
+        /// Names of all plugins.
+        names: Vec<String>,
+    },
+    /// The plugin has no such parameter, or the value is not legal for it.
+    #[error("[{plugin}] {error}")]
+    Setting {
+        /// Name of the plugin.
+        plugin: String,
+        /// Error of the setting.
+        #[source]
+        error: SettingError,
+    },
+    /// The parameter is only read when the plugin is created.
+    #[error("[{plugin}] `{id}` cannot change while the loop runs; {}", live_words(live))]
+    Fixed {
+        /// Name of the plugin.
+        plugin: String,
+        /// Id of the parameter.
+        id: String,
+        /// Ids of the parameters that can change.
+        live: Vec<String>,
+    },
+    /// A device has no weight and cannot be replaced.
+    #[error("only models have a weight and can be swapped; name a model instead of a device")]
+    NoWeight,
+    /// A model cannot be replaced.
+    #[error("[{model}] model unchanged: {problem}")]
+    Refused {
+        /// Name of the model.
+        model: String,
+        /// Problem as text.
+        problem: String,
+        /// Cause of the refusal.
+        cause: RefusalCause,
+    },
+    /// Too many changes are pending, or the last replacement of the model is still fading.
+    #[error("previous changes are pending, or a swap is still fading in; try again in a moment")]
+    Busy,
+    /// The loop has ended.
+    #[error("the run has ended; start a new run")]
+    Ended,
+}
+
+fn live_words(live: &[String]) -> String {
+    if live.is_empty() {
+        "no parameter of this plugin can change then".to_owned()
+    } else {
+        format!("parameters that can change then: {}", live.join(", "))
+    }
+}

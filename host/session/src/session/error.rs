@@ -1,0 +1,116 @@
+//! Errors of a run.
+
+use super::plugin_report::PluginNames;
+use crate::calls::CallError;
+use crate::long_call::Exceeded;
+use crate::registry::LookupError;
+use crate::scene::SceneError;
+use flotor_hal::Refusal;
+use flotor_hal::abi::loader::{LoadError, Metadata};
+use flotor_live::Pressed;
+use flotor_servo::{Stuck, THREAD_ADVICE};
+
+/// Reason why a run did not start, or failed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// The scene is not valid.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A plugin is unknown or was rejected.
+    #[error(transparent)]
+    Lookup(#[from] LookupError),
+    /// A plugin refused its settings or a call.
+    #[error(transparent)]
+    Plugin(#[from] LoadError),
+    /// Device and scene do not fit; all mismatches at once.
+    #[error("the scene does not fit the device `{device}`: {}", mismatches.join("; "))]
+    Mismatch {
+        /// Id of the device.
+        device: String,
+        /// Mismatches, each with a remedy.
+        mismatches: Vec<String>,
+    },
+    /// A plugin did not return from a call before the run.
+    #[error(transparent)]
+    Calls(#[from] CallError),
+    /// The servo thread failed.
+    #[error("the servo thread {0}; no device was moved")]
+    Thread(&'static str),
+    /// The system has no thread for this part of the run.
+    #[error("cannot start the thread for {0}, so no device was moved; {THREAD_ADVICE}")]
+    NoThread(&'static str),
+    /// The scene requires a stop that does not depend on this process, and there is none.
+    #[error(
+        "cannot start the watchdog process: {0}; `[limits] require_independent_stop = true` requires this process; \
+         correct the cause, or remove that line"
+    )]
+    WatchdogProcess(std::io::Error),
+    /// Only the watchdog process stops a device when this process is gone, and a kill of one control group ends both.
+    #[error(
+        "a kill of the control group `{group}`, as at the end of a service or a container or when memory runs out, leaves the force of \
+         `{device}` on: the watchdog process cannot leave that group, and the device has no watchdog of its own; \
+         `flotor doctor` describes how to start the program; `[limits] accept_shared_control_group = true` in a \
+         scene or `--accept-shared-control-group` accepts it"
+    )]
+    SharedControlGroup {
+        /// Name of the device in the scene.
+        device: String,
+        /// Control group of both processes.
+        group: String,
+    },
+    /// The emergency stop of the machine is pressed, or was while the run started; nothing was energised.
+    #[error("{}", latched(.0.as_ref()))]
+    Latched(Option<Pressed>),
+    /// A call of the loop did not return; the devices are stopped.
+    #[error("`{who}` did not return from {} in tick {}{limit}", stuck.place.call(), stuck.tick)]
+    Hung {
+        /// Name in the scene, or "device" or "host".
+        who: String,
+        /// Tick and place of the call.
+        stuck: Stuck,
+        /// The limit that the call has exceeded.
+        limit: Exceeded,
+    },
+}
+
+impl RunError {
+    /// Creates the error of a loop that is stuck in a call, with the plugin that blocks it.
+    pub(super) fn hung(stuck: Stuck, names: &PluginNames, limit: Exceeded) -> Self {
+        Self::Hung { who: names.at(stuck.place), stuck, limit }
+    }
+
+    /// Creates the error of a plugin that refused.
+    pub(super) fn refused(metadata: &Metadata, refusal: Refusal) -> Self {
+        let Metadata { path, id, .. } = metadata.clone();
+        Self::Plugin(LoadError::Refused { path, id, refusal })
+    }
+
+    /// Returns true if a stop was requested before the run.
+    #[must_use]
+    pub const fn is_stopped(&self) -> bool {
+        matches!(self, Self::Calls(CallError::Stopped) | Self::Lookup(LookupError::Calls(CallError::Stopped)))
+    }
+
+    /// Returns true if the scene or the command line is wrong, not a plugin.
+    #[must_use]
+    pub fn is_configuration(&self) -> bool {
+        match self {
+            Self::Scene(_) | Self::Mismatch { .. } | Self::SharedControlGroup { .. } => true,
+            Self::Lookup(LookupError::Unknown { .. } | LookupError::Ambiguous { .. }) => true,
+            Self::Lookup(LookupError::Refused(error)) | Self::Plugin(error) => error.is_configuration(),
+            _ => false,
+        }
+    }
+}
+
+/// Returns the reason why nothing may be energised, as text.
+fn latched(pressed: Option<&Pressed>) -> String {
+    match pressed {
+        Some(pressed) => format!(
+            "the emergency stop of this machine is pressed ({pressed}): nothing is energised; `flotor release` releases it"
+        ),
+        None => "the emergency stop of this machine was pressed while the run started: start the run again"
+            .to_owned(),
+    }
+}

@@ -1,0 +1,260 @@
+//! Outcome of a run, and its end: de-energises the devices and queries the last messages of the models.
+
+use super::controls::Settled;
+use super::plugin_report::PluginNames;
+use super::{Controls, FaultyPlugin, PluginReport, StopTime, UnfreedPlugins};
+use crate::calls::{Call, CallError, CallThread, EndReserve, Progress, Unresponsive, end_limit};
+use flotor_core::plausibility::ImplausibleSamples;
+use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
+use flotor_hal::{EnergyLedger, Fault};
+use flotor_servo::{
+    CouplingOutcome, Dismantled, EnvelopeEffects, Forces, Heartbeat, Layer, LayerReport, Loop, ModelHealth,
+    RealTimeReport, Reported, RunEnd, Servo, Stuck, Timing,
+};
+use std::time::Instant;
+
+/// Outcome of a run.
+pub struct Outcome {
+    /// End of the run.
+    pub end: RunEnd,
+    /// Timing statistics of the loop.
+    pub timing: Timing,
+    /// Time from the first deadline to the end of the last period, ns (virtual clock: virtual time).
+    pub elapsed_ns: u64,
+    /// Wall-clock time, s.
+    pub wall_s: f64,
+    /// Ticks whose records were dropped because an observer was too slow (real clock only).
+    pub dropped_records: u64,
+    /// Privileges that the system granted.
+    pub real_time: RealTimeReport,
+    /// Duration of the emergency stop, if there was one (real clock only).
+    pub stop_time: Option<StopTime>,
+    /// Outcomes of the devices, in the scene's order.
+    pub devices: Vec<DeviceOutcome>,
+    /// Statistics of the couplings, in the scene's order.
+    pub couplings: Vec<CouplingOutcome>,
+    /// Name, health and last message of each model that the run began with.
+    pub models: Vec<(String, ModelHealth, String)>,
+    /// Replacements with faults.
+    pub faulty_plugins: Vec<FaultyPlugin>,
+    /// Replacements in place at the end, after a hot swap; not those that the seed chose among several.
+    pub replacements: Vec<PluginReport>,
+    /// Warnings for users, a sentence each: first those known before the run.
+    pub warnings: Vec<String>,
+    /// Number of warnings that were shown before the run or at once.
+    known_before: usize,
+    /// The first plugin that did not return from a call right after the run.
+    pub unresponsive: Option<Unresponsive>,
+    /// Plugin instances left to free. Free or drop them last: plugin code may hang.
+    pub unfreed_plugins: UnfreedPlugins,
+}
+
+impl Outcome {
+    /// Returns the warnings that came up in the run.
+    #[must_use]
+    pub fn later_warnings(&self) -> &[String] {
+        self.warnings.get(self.known_before..).unwrap_or_default()
+    }
+    /// Returns the outcome of a run whose loop did not return, from the stuck place and the time observed, ns.
+    #[must_use]
+    pub fn of_hung_loop(stuck: Stuck, elapsed_ns: u64) -> Self {
+        Self {
+            end: RunEnd::Watchdog(stuck),
+            timing: Timing { ticks: stuck.tick, ..Timing::default() },
+            elapsed_ns,
+            wall_s: elapsed_ns as f64 * 1.0e-9,
+            dropped_records: 0,
+            real_time: RealTimeReport::not_requested(),
+            stop_time: None,
+            devices: Vec::new(),
+            couplings: Vec::new(),
+            models: Vec::new(),
+            faulty_plugins: Vec::new(),
+            replacements: Vec::new(),
+            warnings: Vec::new(),
+            known_before: 0,
+            unresponsive: None,
+            unfreed_plugins: UnfreedPlugins::default(),
+        }
+    }
+
+    /// Returns the number of the faulted device and its last message.
+    #[must_use]
+    pub fn faulted(&self) -> Option<(usize, &str)> {
+        let mut devices = self.devices.iter().enumerate();
+        let (number, device) = devices.find(|(_, device)| device.fault.is_some())?;
+        Some((number, device.words.as_str()))
+    }
+}
+
+/// Outcome of a device after a run.
+#[derive(Clone, Debug)]
+pub struct DeviceOutcome {
+    /// First fault, reported by the device or found by the host.
+    pub fault: Option<Fault>,
+    /// Implausible samples of the device.
+    pub implausible: ImplausibleSamples,
+    /// Effects of the envelope's passivity controller and slew limit.
+    pub effects: EnvelopeEffects,
+    /// Problem with samples or commands of the device, found by the host.
+    pub problem: Option<String>,
+    /// Energy balance of the device itself, if it keeps one.
+    pub ledger: Option<EnergyLedger>,
+    /// Last message of the device, or the problem that the host found; empty without either.
+    pub words: String,
+    /// Calls that changed the floating-point environment of the loop's thread; the host restored it each time.
+    pub float_changes: u64,
+}
+
+/// Loop that has ended, with its devices stopped.
+pub(super) struct Finished {
+    pub(super) servo: Servo,
+    pub(super) end: RunEnd,
+    pub(super) elapsed_ns: u64,
+    pub(super) dropped_records: u64,
+    pub(super) real_time: RealTimeReport,
+    /// `None` without an emergency stop on the real clock.
+    pub(super) stop_time: Option<StopTime>,
+    /// Warning for users, which was shown already.
+    pub(super) warning: Option<String>,
+}
+
+impl Finished {
+    pub(super) fn of(ended: Loop, dropped_records: u64, real_time: RealTimeReport) -> Self {
+        let (servo, end, elapsed_ns) = ended.finish();
+        Self { servo, end, elapsed_ns, dropped_records, real_time, stop_time: None, warning: None }
+    }
+}
+
+/// Data from the beginning of a run that its end needs.
+pub(super) struct Epilogue {
+    pub(super) started: Instant,
+    pub(super) warnings: Vec<String>,
+    pub(super) heartbeat: Heartbeat,
+    pub(super) names: PluginNames,
+    pub(super) controls: Controls,
+    pub(super) reserve: EndReserve,
+}
+
+impl Epilogue {
+    /// De-energises the devices and returns the outcome of the run.
+    pub(super) fn conclude(self, finished: Finished) -> Outcome {
+        let Self { started, mut warnings, heartbeat, names, controls, reserve } = self;
+        let mut calls = reserve.begin();
+        let Finished { servo, end, elapsed_ns, dropped_records, real_time, stop_time, warning } = finished;
+        warnings.extend(warning);
+        let known_before = warnings.len();
+        let Dismantled { devices, last_stop, forces, swaps, timing } = servo.dismantle();
+        let mut unresponsive = None;
+        let (mut outcomes, mut closing) = (Vec::new(), Vec::new());
+        for (name, device) in names.all().iter().zip(devices) {
+            let (outcome, opened) = deactivate(&mut calls, name, device, &mut unresponsive);
+            outcomes.push(outcome);
+            closing.extend(opened.map(|opened| (name.clone(), opened)));
+        }
+        let couplings = forces.coupling_outcomes();
+        // Replacements that no tick will apply any more.
+        let waiting = swaps.into_layers().into_iter();
+        let (layers, reports) =
+            last_words(&mut calls, &names, (forces, controls.take_retired()), &mut unresponsive);
+        let Settled { first: health, faulty_plugins, replacements, hung } = controls.settle(reports);
+        unresponsive = unresponsive.or(hung);
+        let models = names.models().iter().cloned().zip(health);
+        let models = models.map(|(name, (health, words))| (name, health, words)).collect();
+        let layers = layers.into_iter().chain(waiting);
+        let layers = layers.map(|(model, layer)| (names.model(model), layer)).collect();
+        let unfreed_plugins = UnfreedPlugins::new(closing, layers, last_stop, calls);
+        let wall_s = started.elapsed().as_secs_f64();
+        warnings.extend(controls.warnings());
+        warnings.extend(stop_time.as_ref().and_then(|time| time.warning(names.all())));
+        let taken = heartbeat.signals_taken();
+        if !taken.is_none() {
+            warnings.push(format!(
+                "a plugin replaced {taken} of the host during the run; the host has restored them"
+            ));
+        }
+        Outcome {
+            warnings,
+            known_before,
+            end,
+            timing,
+            elapsed_ns,
+            wall_s,
+            dropped_records,
+            real_time,
+            stop_time,
+            devices: outcomes,
+            couplings,
+            models,
+            faulty_plugins,
+            replacements,
+            unresponsive,
+            unfreed_plugins,
+        }
+    }
+}
+
+/// De-energises a stopped device; returns its outcome, and the device unless its plugin failed or hangs.
+fn deactivate(
+    calls: &mut CallThread,
+    name: &str,
+    (mut device, reported): (ActiveDevice, Reported),
+    unresponsive: &mut Option<Unresponsive>,
+) -> (DeviceOutcome, Option<OpenedDevice>) {
+    let (who, float_changes) = (name.to_owned(), device.float_changes());
+    let told = calls.run_while(
+        end_limit(),
+        || true,
+        move |progress| {
+            progress.enter(&who, Call::Deactivate);
+            let ledger = device.energy_ledger();
+            let words = device.last_message();
+            (ledger, words, device.deactivate())
+        },
+    );
+    let (ledger, words, opened) = told.unwrap_or_else(|error| {
+        note(error, unresponsive);
+        (None, String::new(), None)
+    });
+    let problem = reported.problem();
+    let found = problem.clone().filter(|_| !reported.is_own_fault);
+    let Reported { fault, implausible, effects, .. } = reported;
+    let words = found.unwrap_or(words);
+    (DeviceOutcome { fault, implausible, effects, problem, ledger, words, float_changes }, opened)
+}
+
+/// Layers, each with its model number.
+type Layers = Vec<(usize, Box<Layer>)>;
+
+/// Returns reports on the layers in the loop and on those that it returned, with the last messages of unhealthy ones; and the
+/// layers, unless a call hangs.
+fn last_words(
+    calls: &mut CallThread,
+    names: &PluginNames,
+    (mut forces, mut retired): (Forces, Layers),
+    unresponsive: &mut Option<Unresponsive>,
+) -> (Layers, Vec<LayerReport>) {
+    let names = names.clone();
+    let told = calls.run_while(
+        end_limit(),
+        || true,
+        move |progress: &Progress| {
+            let on_query = |model: usize| progress.enter(&names.model(model), Call::LastMessage);
+            let mut reports: Vec<LayerReport> =
+                retired.iter_mut().map(|(model, layer)| layer.report(*model, || on_query(*model))).collect();
+            reports.extend(forces.reports(on_query));
+            (forces.into_layers().chain(retired).collect(), reports)
+        },
+    );
+    told.unwrap_or_else(|error| {
+        note(error, unresponsive);
+        (Vec::new(), Vec::new())
+    })
+}
+
+/// Records the first plugin that did not return.
+fn note(error: CallError, unresponsive: &mut Option<Unresponsive>) {
+    if let CallError::Unresponsive(hung) = error {
+        unresponsive.get_or_insert(hung);
+    }
+}

@@ -1,0 +1,104 @@
+//! Library interfaces of other makers, and their drop-in libraries.
+
+use flotor_command::CommandError;
+use std::path::{Path, PathBuf};
+
+/// Library interface of another maker.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Api {
+    /// Force Dimension's DHD and DRD
+    Dhd,
+    /// 3D Systems' OpenHaptics (HDAPI)
+    Openhaptics,
+    /// CHAI3D's interface to a Phantom
+    Chai3d,
+}
+
+/// Drop-in library for an interface.
+struct Library {
+    word: &'static str,
+    /// File that cargo builds.
+    built: &'static str,
+    package: &'static str,
+    names: &'static [&'static str],
+    marks: &'static [&'static str],
+}
+
+impl Api {
+    pub(super) const ALL: [Self; 3] = [Self::Dhd, Self::Openhaptics, Self::Chai3d];
+
+    /// Returns the name for `--api`.
+    pub(super) fn word(self) -> &'static str {
+        self.library().word
+    }
+
+    fn library(self) -> Library {
+        match self {
+            Self::Dhd => Library {
+                word: "dhd",
+                built: "libdrd.so",
+                package: "flotor-dhd",
+                names: &[
+                    "libdhd.so",
+                    "libdhd.so.3",
+                    "libdhd.so.3.17.6",
+                    "libdrd.so",
+                    "libdrd.so.3",
+                    "libdrd.so.3.17.6",
+                ],
+                marks: &["libdhd.so", "libdrd.so"],
+            },
+            Self::Openhaptics => Library {
+                word: "openhaptics",
+                built: "libHD.so",
+                package: "flotor-openhaptics",
+                // Programs that are linked with the higher layer load it, and call none of its functions.
+                names: &[
+                    "libHL.so",
+                    "libHL.so.3.4",
+                    "libHD.so.3.0",
+                    "libHD.so.3.4",
+                    "libHD.so.3.4.0",
+                    "libHD.so",
+                ],
+                marks: &["libHD.so"],
+            },
+            Self::Chai3d => Library {
+                word: "chai3d",
+                built: "libhdPhantom.so",
+                package: "flotor-chai3d",
+                names: &["libhdPhantom.so"],
+                marks: &["libhdPhantom.so"],
+            },
+        }
+    }
+
+    /// Returns the file names by which programs load the library; the last one is used by an installation.
+    pub(super) fn names(self) -> &'static [&'static str] {
+        self.library().names
+    }
+
+    /// Returns strings in a program that is linked with the library, or loads it.
+    pub(super) fn marks(self) -> &'static [&'static str] {
+        self.library().marks
+    }
+
+    /// Finds the library, in the installation or the build folder of this program.
+    pub(super) fn find(self, own: &Path) -> Result<PathBuf, CommandError> {
+        let folder = own.parent().unwrap_or(Path::new("."));
+        let Library { built, package, .. } = self.library();
+        let installed = folder.join("../lib/flotor/compat").join(self.word());
+        let installed = self.names().iter().rev().map(|name| installed.join(name));
+        let beside = [folder.join(built), folder.join("deps").join(built)];
+        installed.chain(beside).find(|file| file.is_file()).ok_or_else(|| {
+            let release = if folder.ends_with("debug") { "" } else { " --release" };
+            CommandError::Usage(format!(
+                "the drop-in library for `--api {}` is missing: neither `{}` nor `../lib/flotor/compat/{}`; `cargo build{release} \
+                 -p {package}` builds it",
+                self.word(),
+                folder.join(built).display(),
+                self.word()
+            ))
+        })
+    }
+}

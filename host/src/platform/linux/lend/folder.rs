@@ -1,0 +1,48 @@
+//! Private folder of `flotor lend`: the libraries that a program finds, and the files that its runs write.
+
+use super::api::Api;
+use flotor_command::CommandError;
+use std::os::unix::fs::{DirBuilderExt, symlink};
+use std::path::{Path, PathBuf};
+
+/// Private folder with links to the libraries, removed when dropped.
+pub(super) struct Folder(pub(super) PathBuf);
+
+impl Folder {
+    pub(super) fn new() -> Result<Self, CommandError> {
+        let path = std::env::temp_dir().join(format!("flotor-lend-{}", std::process::id()));
+        // From a killed process with the same id.
+        let _ = std::fs::remove_dir_all(&path);
+        let made = std::fs::DirBuilder::new().mode(0o700).create(&path);
+        made.map_err(|cause| CommandError::file(&path, "cannot make a folder for the libraries", cause))?;
+        Ok(Self(path))
+    }
+
+    /// Links a library under the names of its interface, in the folders that loader and SDK variables search.
+    pub(super) fn put(&self, api: Api, library: &Path) -> Result<(), CommandError> {
+        let library = library.canonicalize().unwrap_or_else(|_| library.to_path_buf());
+        let sdk = self.0.join(format!("lib/release/lin-{}-gcc", std::env::consts::ARCH));
+        // One old client searches a folder `lib` in the folder of the libraries.
+        let folders = match api {
+            Api::Dhd => vec![self.0.clone(), sdk.clone(), sdk.join("lib")],
+            Api::Openhaptics | Api::Chai3d => vec![self.0.clone()],
+        };
+        for folder in folders {
+            let linked = std::fs::create_dir_all(&folder)
+                .and_then(|()| api.names().iter().try_for_each(|name| symlink(&library, folder.join(name))));
+            linked.map_err(|cause| CommandError::file(&folder, "cannot link the libraries", cause))?;
+        }
+        Ok(())
+    }
+
+    /// Returns the file for the end of the program.
+    pub(super) fn program_end(&self) -> PathBuf {
+        self.0.join("program-end.json")
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}

@@ -1,0 +1,65 @@
+//! Errors of `flotor new`.
+
+use super::name::NameError;
+use std::path::PathBuf;
+
+/// Reason why no plugin was created.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScaffoldError {
+    /// The name cannot be used.
+    #[error(transparent)]
+    Name(#[from] NameError),
+    /// The plugin's type would have the name of a type that the template uses.
+    #[error("type `{type_name}` of plugin `{id}` clashes with a type of the contract; use `my-{id}`")]
+    Clash {
+        /// Id of the plugin.
+        id: String,
+        /// Name of the type.
+        type_name: String,
+    },
+    /// A file or folder of this name exists.
+    #[error("{} exists; move it or choose another name", .0.display())]
+    Exists(PathBuf),
+    /// The folder belongs to a cargo workspace that includes every folder in it as a member.
+    #[error(
+        "{} belongs to Flotor's own workspace, whose plugins use `flotor-hal.workspace = true` (see \
+         ARCHITECTURE.md, Adding a plugin); change to a folder outside it",
+        .0.display()
+    )]
+    InsideWorkspace(PathBuf),
+    /// The contract's sources were not found.
+    #[error(
+        "the sources of the contract (`hal/`, `share/flotor/hal/`) are neither in a folder above this program nor at {}; give \
+         their folder with --hal PATH",
+        .0.display()
+    )]
+    NoContract(PathBuf),
+    /// The manifest of the contract cannot be copied.
+    #[error("{}: {reason}; give the folder of complete sources with --hal PATH", path.display())]
+    Manifest {
+        /// Path of the manifest.
+        path: PathBuf,
+        /// Reason, for people.
+        reason: String,
+    },
+    /// A path that cannot be written into a manifest.
+    #[error("{}: the path is not valid UTF-8, or has quotes or backslashes; use another folder", .0.display())]
+    NotText(PathBuf),
+    /// A file cannot be read.
+    #[error("{}: cannot read the file: {cause}; check its permissions", path.display())]
+    Read {
+        /// Path of the file.
+        path: PathBuf,
+        /// Error of the system.
+        cause: std::io::Error,
+    },
+    /// A file or folder cannot be written.
+    #[error("{}: cannot write: {cause}; choose a folder where you may write", path.display())]
+    Write {
+        /// Path of the file or folder.
+        path: PathBuf,
+        /// Error of the system.
+        cause: std::io::Error,
+    },
+}
