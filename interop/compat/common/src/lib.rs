@@ -12,6 +12,7 @@
 //! Not real-time: the loop has a thread of its own, and neither side waits for the other.
 #![allow(unsafe_code)] // `process.rs` and `pointer.rs`; listed in tests/tests/system/architecture.rs
 
+mod entry;
 mod frame;
 mod host;
 pub mod pointer;

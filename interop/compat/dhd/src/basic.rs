@@ -1,13 +1,12 @@
 //! Entry points to open, identify and read a device: pose, velocity, buttons.
 
 use crate::device::{
-    FRAME, Open, any, close, count, default, expert, kind, open, open_first, open_number, sampled,
-    set_default,
+    FRAME, Open, any, close, count, default, expert, kind, open, open_first, open_number, set_default,
 };
 use crate::error::{Code, DONE, failed, result};
-use crate::force;
+use crate::regulator::{follow_all, sampled};
 use flotor_compat::pointer::Out;
-use flotor_compat::{Pace, Station, host};
+use flotor_compat::{Pace, Station, export, host};
 use flotor_hal::{DVec3, math};
 use std::ffi::{CStr, CString, c_char, c_int, c_uint};
 use std::sync::OnceLock;
@@ -279,7 +278,7 @@ fn sleep(seconds: f64) {
             let period = Duration::from_nanos(host.period_ns().max(1));
             let ticks = time.as_nanos().div_ceil(period.as_nanos());
             for _ in 0..ticks {
-                force::follow_all();
+                follow_all();
                 host.sleep(period);
             }
         }

@@ -117,11 +117,6 @@ pub(crate) fn live(id: i8) -> Result<Open, Code> {
     open(id).and_then(|open| if open.host.is_running() { Ok(open) } else { Err(Code::Com) })
 }
 
-/// Returns the device of an id for a read of its sample, which is counted, if open and not lost.
-pub(crate) fn sampled(id: i8) -> Result<Open, Code> {
-    live(id).inspect(|open| open.host.note_read(crate::force::follow_all))
-}
-
 /// Returns the device of an id, if open and not lost, in expert mode.
 pub(crate) fn expert(id: i8) -> Result<Open, Code> {
     if EXPERT.load(Ordering::Acquire) { live(id) } else { Err(Code::ExpertModeDisabled) }

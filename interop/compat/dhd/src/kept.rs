@@ -3,6 +3,7 @@
 use crate::basic::read;
 use crate::error::{Code, failed};
 use crate::force::keep;
+use flotor_compat::export;
 use flotor_compat::pointer::Out;
 use std::ffi::c_int;
 

@@ -1,10 +1,12 @@
 //! Entry points of regulation and motion: hold the handle, move it, follow the program.
 
 use crate::basic::{angles, put3, read, read_live, turning};
-use crate::device::{FRAME, Open, Switch, live, open, sampled};
+use crate::device::{FRAME, Open, Switch, live, open};
 use crate::error::{Code, DONE, failed, result};
 use crate::kept::{POSITION_MOVE, ROTATION_MOVE};
-use crate::regulation::{self, Progress, Regulation};
+use crate::regulation::{Progress, Regulation};
+use crate::regulator::{follow, sampled, start};
+use flotor_compat::export;
 use flotor_compat::pointer::{In, Out};
 use flotor_hal::{DQuat, DVec3, rotation_vector};
 use std::ffi::c_int;
@@ -12,7 +14,7 @@ use std::time::Duration;
 
 fn begin(id: i8) -> c_int {
     result(live(id).map(|open| {
-        regulation::start(&open);
+        start(&open);
         DONE
     }))
 }
@@ -99,7 +101,7 @@ fn wait_for_arrival(open: &Open, goal: Goal) -> Result<c_int, Code> {
             Some(Progress::Moving) if !open.host.is_running() => return Err(Code::Com),
             Some(Progress::Moving) => {}
         }
-        regulation::follow(open);
+        follow(open);
         open.host.sleep(Duration::from_nanos(open.host.period_ns()));
     }
 }
@@ -230,7 +232,7 @@ export! {
     fn drdWaitForTick(id: i8) -> () [()] {
         match live(id) {
             Ok(open) => {
-                regulation::follow(&open);
+                follow(&open);
                 open.host.wait(open.station);
             }
             // Throttles a loop without a device.

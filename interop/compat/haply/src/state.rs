@@ -1,7 +1,8 @@
 //! Encoder of messages to clients: the state of all devices; the first message, and any on request, includes the configuration.
 
-use crate::service::{Service, Session, Shared, grip_id, inverse_id, joint_angles};
-use crate::view::{Transform, View};
+use crate::device::{ARM_M, grip_id, inverse_id, joint_angles};
+use crate::service::{Service, Session, Shared};
+use crate::view::{Transform, View, of_vector};
 use flotor_compat::{Axes, State};
 use flotor_hal::{DQuat, DVec3};
 use serde_json::ser::{CompactFormatter, Formatter};
@@ -93,7 +94,7 @@ fn arm(text: &mut String, seen: &Seen<'_>, [view, _]: &[View; 2], extent: Extent
     text.push_str(",\"current_cursor_position\":");
     vector(text, position);
     text.push_str(",\"current_angular_torques\":");
-    angles(text, applied_n * crate::service::ARM_M);
+    angles(text, applied_n * ARM_M);
     text.push_str(",\"current_angular_position\":");
     angles(text, joint_angles(state.position_m));
     let in_use = control != "idle";
@@ -170,7 +171,7 @@ pub(crate) fn damping(view: &View) -> Value {
     if x == y && y == z {
         json!({ "scalar": x })
     } else {
-        json!({ "scalar": 0.0, "vector": crate::view::of_vector(view.damping) })
+        json!({ "scalar": 0.0, "vector": of_vector(view.damping) })
     }
 }
 
