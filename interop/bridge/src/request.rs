@@ -1,10 +1,11 @@
 //! Requests of remote peers, and their admission control with replay protection.
 
 use crate::keys::Name;
+use crate::wall_clock::since_1970;
 use flotor_live::{Ask, SetValue};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::Instant;
 
 /// Limit on the length of a request, bytes; longer ones are rejected unread.
 pub const MAX_REQUEST_BYTES: usize = 64 * 1024;
@@ -212,10 +213,9 @@ struct Last {
 
 impl Default for AdmissionControl {
     fn default() -> Self {
-        let began = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
         #[allow(clippy::cast_possible_truncation)] // in the year 2554
         Self {
-            began: began as u64,
+            began: since_1970().as_nanos() as u64,
             since: Instant::now(),
             members: BTreeMap::new(),
             forgotten_ms: 0,

@@ -4,11 +4,11 @@
 //! for a separate thread, which a slow host or member may delay.
 
 use super::emergency::{Emergency, who};
+use super::launcher::Launcher;
 use super::station::{Station, json};
-use super::{Launcher, WaitNow};
 use crate::couple::{CoupleError, MessageCounts};
 use crate::keys::Name;
-use crate::link::LinkError;
+use crate::link::{LinkError, WaitNow};
 use crate::request::{AdmissionControl, MAX_REQUEST_BYTES, Refusal, Request, Right, is_emergency_stop};
 use crate::status::{State, Status};
 use flotor_live::{Answer, ChangeMessage, Client, Directory, Greeting, Latch, RefusalCause, RequestClient};

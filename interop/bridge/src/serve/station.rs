@@ -1,8 +1,7 @@
 //! Publishers of a bridge.
 
-use super::WaitNow;
 use crate::keys::Name;
-use crate::link::LinkError;
+use crate::link::{LinkError, WaitNow};
 use crate::status::Status;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
