@@ -3,8 +3,8 @@
 
 mod figures;
 
-use crate::analyse::Report;
 use crate::analyse::provenance::Provenance;
+use crate::analyse::report::Report;
 use flotor_analysis::exclusion::Applied;
 use flotor_analysis::published::ThesisComparison;
 use flotor_analysis::{

@@ -20,7 +20,7 @@ use crate::couple::{CoupleError, Couplers, Side};
 use crate::keys::Name;
 use crate::link::{Link, WaitNow};
 use crate::request::Right;
-use flotor_live::{Ask, Client, Directory, Event, LiveError};
+use flotor_live::{Ask, Client, Directory, End, EndKind, Event, LiveError};
 use handler::RequestHandler;
 use station::Station;
 use std::sync::Arc;
@@ -151,10 +151,8 @@ impl Relay<'_> {
                     break;
                 }
                 Err(error) => {
-                    station.end(
-                        &flotor_live::End { words: error.to_string(), kind: flotor_live::EndKind::Failed },
-                        handler.due(),
-                    )?;
+                    let end = End { words: error.to_string(), kind: EndKind::Failed };
+                    station.end(&end, handler.due())?;
                     break;
                 }
             }

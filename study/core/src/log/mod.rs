@@ -10,12 +10,14 @@
 //! breaks the chain from there on: protection against accidents, not against forgery, because anyone can recompute the chain. An
 //! incomplete last line is left by a killed process and is ignored.
 
+mod error;
 mod incident;
 mod reader;
 mod writer;
 
+pub use error::{LogError, LogProblem};
 pub use incident::Incident;
-pub use reader::{LogError, LogProblem, SittingLog, TrialRecord};
+pub use reader::{SittingLog, TrialRecord};
 pub use writer::LogWriter;
 
 use crate::exclusion::ExclusionRules;
