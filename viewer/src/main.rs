@@ -22,7 +22,8 @@ use flotor_viewer::picture::{
     write_png,
 };
 use flotor_viewer::shape::shapes_of;
-use flotor_viewer::ui::plot_stack::{ExportFormat, PlotStack, Window};
+use flotor_viewer::ui::export_options::ExportFormat;
+use flotor_viewer::ui::plot_stack::{PlotStack, Window};
 use flotor_viewer::window::{WindowError, WindowOptions, open};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};

@@ -3,9 +3,9 @@
 mod choices;
 
 use crate::display_options::DisplayOptions;
-use crate::export::ExportOptions;
 use crate::palette::Palette;
 use crate::trace::Trace;
+use crate::ui::export_options::{ExportFormat, ExportOptions};
 use crate::ui::force_position::ForcePositionPlot;
 use crate::ui::marks::Marks;
 use crate::ui::plots::{Lines, Maximise, PlotView, plot};
@@ -15,7 +15,6 @@ use flotor_history::History;
 use flotor_history::player::Motion;
 use flotor_history::quantity::{Quantity, Units};
 use std::collections::BTreeMap;
-use std::path::Path;
 
 /// Default traces.
 pub const FIRST_TRACES: [Quantity; 2] = [Quantity::Force, Quantity::Position];
@@ -60,32 +59,6 @@ pub enum PlotRequest {
     Seek(f64),
     /// Export the shown traces to a file.
     Export(ExportFormat),
-}
-
-/// File format of exported traces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ExportFormat {
-    /// Numbers as CSV.
-    Csv,
-    /// Vector graphics as SVG.
-    Svg,
-    /// Pixels as PNG.
-    Png,
-}
-
-impl ExportFormat {
-    /// Returns the format of a file, from the extension of its name.
-    ///
-    /// # Errors
-    /// A message of one line if the extension is none of csv, svg and png.
-    pub fn of_file(file: &Path) -> Result<Self, String> {
-        match file.extension().and_then(|ending| ending.to_str()) {
-            Some("csv") => Ok(Self::Csv),
-            Some("svg") => Ok(Self::Svg),
-            Some("png") => Ok(Self::Png),
-            _ => Err(format!("`{}` must end with .csv, .svg or .png", file.display())),
-        }
-    }
 }
 
 /// Error of a picture too low for its traces.

@@ -10,7 +10,7 @@ use flotor_viewer::app::{Recorded, Start};
 use flotor_viewer::display_options::DisplayOptions;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureError, PictureOptions, has_moment, least_height_px, picture};
-use flotor_viewer::ui::plot_stack::ExportFormat;
+use flotor_viewer::ui::export_options::ExportFormat;
 
 #[test]
 fn a_recording_is_played_scrubbed_and_repeated() {

@@ -1,7 +1,8 @@
 //! Row above the traces: quantities, number of hidden traces, time span, units, export.
 
-use super::{ExportFormat, PlotRequest, PlotStack, Window};
+use super::{PlotRequest, PlotStack, Window};
 use crate::palette::Palette;
+use crate::ui::export_options::ExportFormat;
 use crate::ui::overlay::width_pt;
 use crate::ui::style::SMALL_PT;
 use egui::containers::menu::{MenuButton, MenuConfig};
