@@ -1,6 +1,6 @@
 //! Program `flotor bridge`: a running host on a network.
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand};
 use flotor_bridge::access::{AccessError, Members, write_keys};
 use flotor_bridge::attach::attach;
 use flotor_bridge::couple::couple;
@@ -88,23 +88,13 @@ struct ServeArguments {
     name: Option<Name>,
     /// Highest right whose requests are accepted; the access control of the network sets the right of each member
     #[arg(long, value_enum, default_value = "watch")]
-    allow: Allow,
+    allow: Right,
     /// A scene that may be started from the network, with `--allow own`
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Publish one tick in N
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Allow {
-    /// Observe a run and press the emergency stop
-    Watch,
-    /// Also change parameters and stop a run in the normal way
-    Operate,
-    /// Also start the scene, release an emergency stop
-    Own,
 }
 
 #[derive(Subcommand)]
@@ -322,11 +312,6 @@ fn report_keys(link: &Link) {
 fn service(arguments: ServeArguments) -> Result<Service, Box<dyn Error>> {
     let ServeArguments { name, allow, scene, every } = arguments;
     let program = std::env::current_exe()?.with_file_name(format!("flotor{}", std::env::consts::EXE_SUFFIX));
-    let allow = match allow {
-        Allow::Watch => Right::Watch,
-        Allow::Operate => Right::Operate,
-        Allow::Own => Right::Own,
-    };
     let launcher = scene.map(|scene| Launcher::new(program, scene));
     Ok(Service { name: name.unwrap_or_else(Name::of_this_machine), allow, every, launcher })
 }

@@ -2,6 +2,7 @@
 
 use crate::keys::Name;
 use crate::wall_clock::since_1970;
+use clap::ValueEnum;
 use flotor_live::{Ask, SetValue};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -45,15 +46,15 @@ pub enum Request {
 }
 
 /// Rights of a member. Each includes the previous ones.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Right {
-    /// Observe, and press the emergency stop.
+    /// Observe a run and press the emergency stop
     #[default]
     Watch,
-    /// Change parameters, end a run in order.
+    /// Also change parameters and stop a run in the normal way
     Operate,
-    /// Start runs, release an emergency stop.
+    /// Also start the scene, release an emergency stop
     Own,
 }
 

@@ -9,6 +9,7 @@
 
 use super::words::State;
 use super::{Audience, Source, VIEW_PARTS, Viewer};
+use crate::experiment::key_of;
 use crate::export::export;
 use crate::palette::Palette;
 use crate::scene::{Moment, SceneBuilder};
@@ -92,7 +93,7 @@ impl Viewer {
     /// Returns the name and the key of the emergency stop: the space bar, or in a sitting the configured key.
     fn stop(&self) -> Stop {
         match &self.sitting {
-            Some(prompt) => Stop { name: prompt.texts.stop.clone(), key: prompt.stop_key.key().name() },
+            Some(prompt) => Stop { name: prompt.texts.stop.clone(), key: key_of(prompt.stop_key).name() },
             None => Stop { name: STOP.to_owned(), key: egui::Key::Space.name() },
         }
     }
