@@ -204,8 +204,8 @@ impl SubjectQuality {
 /// with a floor of 0.
 fn without_difference(record: &SubjectRecord) -> usize {
     let is_judged = |event: &&flotor_study::log::TrialEvent| {
-        let named = matches!(event.response, Response::First | Response::Second);
-        named && matches!(event.trial.presented, Presented::Pair(pair) if pair.delta == 0.0)
+        event.response.named().is_some()
+            && matches!(event.trial.presented, Presented::Pair(pair) if pair.delta == 0.0)
     };
     record.counted().filter(is_judged).count()
 }

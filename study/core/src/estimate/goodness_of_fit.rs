@@ -7,7 +7,6 @@ use crate::random::{Purpose, Stream};
 use crate::trial::Judgement;
 use serde::Serialize;
 
-const JUDGEMENTS: [Judgement; 3] = [Judgement::Correct, Judgement::Wrong, Judgement::Unsure];
 /// Number of simulated answer sets.
 const SETS: u32 = 999;
 /// Maximum number of classes of the difference, and minimum number of answers per class.
@@ -30,7 +29,7 @@ pub(super) fn of(observations: &[Observation], observer: &TernaryObserver) -> Go
     let mut sorted = observations.to_vec();
     sorted.sort_by(|a, b| a.delta.total_cmp(&b.delta));
     let shares_of = |one: &Observation| {
-        JUDGEMENTS.map(|judgement| probability(observer, &Observation { judgement, ..*one }))
+        Judgement::ALL.map(|judgement| probability(observer, &Observation { judgement, ..*one }))
     };
     let shares: Vec<[f64; 3]> = sorted.iter().map(shares_of).collect();
     let sum = |class: &[Observation]| {
@@ -54,7 +53,8 @@ pub(super) fn of(observations: &[Observation], observer: &TernaryObserver) -> Go
         }
         sum
     };
-    let kind = |one: &Observation| JUDGEMENTS.iter().position(|known| *known == one.judgement).unwrap_or(0);
+    let kind =
+        |one: &Observation| Judgement::ALL.iter().position(|known| *known == one.judgement).unwrap_or(0);
     let found = chi_square(&mut sorted.iter().map(kind));
     let mut stream = Stream::new(0, Purpose::GoodnessOfFit, 0, 0);
     let mut drawn = || {
