@@ -4,6 +4,7 @@ use crate::keys::{Name, ROOT};
 use crate::request::{ANYONE, Right};
 use crate::stop_channel::new_key_line;
 use crate::wall_clock::since_1970;
+use clap::ValueEnum;
 use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
     KeyUsagePurpose, date_time_ymd,
@@ -272,12 +273,8 @@ fn access_control(members: &Members) -> Value {
     json!({ "enabled": true, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies })
 }
 
-const fn word(right: Right) -> &'static str {
-    match right {
-        Right::Watch => "watch",
-        Right::Operate => "operate",
-        Right::Own => "own",
-    }
+fn word(right: Right) -> String {
+    right.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 /// Read permission of a file.

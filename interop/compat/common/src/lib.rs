@@ -21,9 +21,9 @@ mod run;
 mod settings;
 mod station;
 
-pub use frame::Frame;
+pub use frame::{Frame, length};
 pub use host::{Host, host, prepare};
-pub use process::{Language, guarded, language, library, quietly};
+pub use process::{Language, guarded, interned, language, library, quietly};
 pub use settings::{Pace, Settings, SharedControlGroup, env_value};
 pub use station::{Axes, State, Station, Turn};
 

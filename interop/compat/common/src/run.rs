@@ -1,11 +1,12 @@
 //! Run behind a program: recorded, published to clients, reported at its end.
 
+use crate::frame::length;
 use crate::settings::{Pace, Settings};
 use crate::station::Station;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
+use flotor_hal::Demand;
 use flotor_hal::terminal::escaped;
-use flotor_hal::{DVec3, Demand};
 use flotor_live::Directory;
 use flotor_record::{Note, Recorder, RunDescription, Severity, TraceDigest};
 use flotor_servo::{Place, RunEnd, StopSwitch, Stuck};
@@ -142,12 +143,6 @@ struct Measured<'a> {
     tally: &'a Tally,
     digest: &'a TraceDigest,
     demand: Demand,
-}
-
-/// Returns the length of a vector, without overflow of its square.
-fn length(vector: DVec3) -> f64 {
-    let largest = vector.abs().max_element();
-    if largest > 0.0 && largest.is_finite() { (vector / largest).length() * largest } else { largest }
 }
 
 /// Facts of a run apart from its ticks.

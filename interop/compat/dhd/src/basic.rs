@@ -6,16 +6,15 @@ use crate::device::{
 use crate::error::{Code, DONE, failed, result};
 use crate::regulator::{follow_all, sampled};
 use flotor_compat::pointer::Out;
-use flotor_compat::{Pace, Station, export, host};
+use flotor_compat::{Pace, export, host, interned};
 use flotor_hal::{DVec3, math};
-use std::ffi::{CStr, CString, c_char, c_int, c_uint};
-use std::sync::OnceLock;
+use std::ffi::{CStr, c_char, c_int, c_uint};
 use std::time::Duration;
 
 /// Version of the interface: major, minor, release, revision.
 const VERSION: [c_int; 4] = [3, 17, 6, 0];
 /// Degrees per radian.
-const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+pub(crate) const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 fn number(index: i8) -> Result<usize, Code> {
     usize::try_from(index).map_err(|_| Code::InvalidIndex)
@@ -258,13 +257,7 @@ pub(crate) fn angles(rows: &[[f64; 3]; 3]) -> DVec3 {
 
 /// Returns the name of a device, or "no device"; valid for the life of the process.
 fn name(open: Option<&Open>) -> &'static CStr {
-    static NAMES: [OnceLock<CString>; crate::device::MOST] = [const { OnceLock::new() }; crate::device::MOST];
-    let none = c"no device";
-    let Some((open, place)) = open.and_then(|open| Some((open, NAMES.get(open.number)?))) else {
-        return none;
-    };
-    let named = |station: &Station| CString::new(format!("Flotor {}", station.plugin())).unwrap_or_default();
-    place.get_or_init(|| named(open.station))
+    open.map_or(c"no device", |open| interned(format!("Flotor {}", open.station.plugin())))
 }
 
 fn now_s() -> f64 {

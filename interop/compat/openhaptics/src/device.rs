@@ -11,10 +11,9 @@ use crate::parameter::{
     SERIAL_NUMBER, STATUS_LIGHT, TABLETOP_OFFSET, TORQUE, TRANSFORM, UPDATE_RATE, VELOCITY, VELOCITY_LIMIT,
     VENDOR, VERSION, Values, WORKSPACES,
 };
-use flotor_compat::{Axes, Frame, Host, Station, env_value, host};
+use flotor_compat::{Axes, Frame, Host, Station, env_value, host, interned};
 use flotor_hal::{DVec3, Wrench, math};
-use std::collections::BTreeMap;
-use std::ffi::{CStr, CString, c_uint};
+use std::ffi::{CStr, c_uint};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -247,19 +246,10 @@ pub(crate) fn text(parameter: c_uint) -> Result<&'static CStr, Code> {
                 MODEL_TYPE => env_value("FLOTOR_HD_MODEL").unwrap_or_else(|| format!("Flotor {plugin}")),
                 _ => format!("flotor-{number}"),
             };
-            Ok(kept(text))
+            Ok(interned(text))
         }
         _ => Err(Code::InvalidEnum),
     }
-}
-
-/// Interns a text, so that its pointer stays valid for the life of the process.
-fn kept(text: String) -> &'static CStr {
-    static TEXTS: Mutex<BTreeMap<String, &'static CStr>> = Mutex::new(BTreeMap::new());
-    let mut texts = TEXTS.lock().unwrap_or_else(PoisonError::into_inner);
-    let keep =
-        |text: &String| &*Box::leak(CString::new(text.as_str()).unwrap_or_default().into_boxed_c_str());
-    texts.entry(text).or_insert_with_key(keep)
 }
 
 impl Device {

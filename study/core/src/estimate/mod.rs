@@ -19,7 +19,7 @@ pub use psychometric::{NotBounded, Psychometric, psychometric};
 
 use crate::observer::TernaryObserver;
 use crate::trial::Judgement;
-use flotor_statistics::distribution::normal_below;
+use flotor_statistics::distribution::{normal_below, normal_density};
 use serde::{Deserialize, Serialize};
 
 /// One answer: its difference, as a share of the base, and its judgement.
@@ -83,11 +83,11 @@ impl Prior {
 ///
 /// Newton's method; a test compares it with bisection.
 fn unit_threshold(criterion: f64, target: f64) -> f64 {
-    let density = |x: f64| libm::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
     let mut delta = criterion.max(0.1);
     for _ in 0..40 {
         let reached = 0.5 * (1.0 + normal_below(delta - criterion) - normal_below(-delta - criterion));
-        let step = (target - reached) / (0.5 * (density(delta - criterion) + density(delta + criterion)));
+        let step = (target - reached)
+            / (0.5 * (normal_density(delta - criterion) + normal_density(delta + criterion)));
         delta = (delta + step).max(1.0e-6);
         if step.abs() < 1.0e-12 {
             break;
