@@ -83,16 +83,20 @@ impl SubjectRecord {
         self.trials.iter().filter(counts)
     }
 
-    /// Returns the counted judgements of pairs in one condition.
-    fn observations(&self, modality: Modality, base: f64) -> Vec<Observation> {
-        let here = self.counted().filter(|event| event.trial.modality == modality);
-        let judged = here.filter_map(|event| match (event.trial.presented, event.verdict) {
-            (Presented::Pair(pair), Verdict::Judged { judgement, .. }) if pair.base == base => {
-                Some(Observation { delta: pair.delta, judgement })
+    /// Returns the counted trials with a judged pair, with the observation and the base of each.
+    pub fn judged(&self) -> impl Iterator<Item = (&TrialEvent, Observation, f64)> {
+        self.counted().filter_map(|event| match (event.trial.presented, event.verdict) {
+            (Presented::Pair(pair), Verdict::Judged { judgement, .. }) => {
+                Some((event, Observation { delta: pair.delta, judgement }, pair.base))
             }
             _ => None,
-        });
-        judged.collect()
+        })
+    }
+
+    /// Returns the counted judgements of pairs in one condition.
+    fn observations(&self, modality: Modality, base: f64) -> Vec<Observation> {
+        let here = self.judged().filter(|(event, _, at)| event.trial.modality == modality && *at == base);
+        here.map(|(_, observation, _)| observation).collect()
     }
 }
 

@@ -1,26 +1,21 @@
 //! Channels of the service: the simulation channel with HTTP, and the events channel, which sends each event to all clients and
 //! reads nothing.
 
-use crate::connection::{PATIENCE, accept, answer, prepared, read_body, upgraded};
+use crate::connection::{PATIENCE, answer, prepared, read_body, upgraded};
 use crate::events::{Level, device_data, event};
 use crate::http;
 use crate::service::Service;
 use crate::session::{self, socket};
-use flotor_emulation::port::Port;
 use std::io;
 use std::net::{Shutdown, TcpStream};
 use std::time::Instant;
 use tungstenite::Message;
 
-/// Serves the simulation channel and HTTP.
+/// Serves a client of the simulation channel, or answers an HTTP request.
 ///
 /// # Errors
-/// If the accepting thread cannot be created.
-pub(crate) fn serve_simulation(service: &'static Service, port: Port) -> io::Result<()> {
-    accept(port, "flotor-accept", move |stream| answer_client(service, stream))
-}
-
-fn answer_client(service: &Service, mut stream: TcpStream) -> io::Result<()> {
+/// Error of the connection.
+pub(crate) fn answer_client(service: &Service, mut stream: TcpStream) -> io::Result<()> {
     let deadline = Instant::now() + PATIENCE;
     let Some(mut head) = prepared(&mut stream, &service.access, deadline)? else { return Ok(()) };
     match upgraded(&mut stream, &head)? {
@@ -33,15 +28,11 @@ fn answer_client(service: &Service, mut stream: TcpStream) -> io::Result<()> {
     Ok(())
 }
 
-/// Serves the events channel.
+/// Sends all events to a client of the events channel.
 ///
 /// # Errors
-/// If the accepting thread cannot be created.
-pub(crate) fn serve_events(service: &'static Service, port: Port) -> io::Result<()> {
-    accept(port, "flotor-events", move |stream| send_events(service, stream))
-}
-
-fn send_events(service: &Service, mut stream: TcpStream) -> io::Result<()> {
+/// Error of the connection.
+pub(crate) fn send_events(service: &Service, mut stream: TcpStream) -> io::Result<()> {
     let deadline = Instant::now() + PATIENCE;
     let Some(head) = prepared(&mut stream, &service.access, deadline)? else { return Ok(()) };
     if !upgraded(&mut stream, &head)? {

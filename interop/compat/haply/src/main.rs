@@ -32,6 +32,7 @@ mod view;
 
 use access::Access;
 use clap::{Parser, ValueEnum};
+use connection::accept;
 use flotor_command::options::{LendOptions, arguments, seed};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, say, supervised};
@@ -128,9 +129,11 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
         return Err(CommandError::Failed("the run did not start; its message is above".to_owned()));
     }
     let service = Service::leak(host, access);
-    let started = service.follow().and_then(|()| channels::serve_events(service, events));
+    let started = service.follow().and_then(|()| {
+        accept(events, "flotor-events", |stream| channels::send_events(service, stream))?;
+        accept(simulation, "flotor-accept", |stream| channels::answer_client(service, stream))
+    });
     started
-        .and_then(|()| channels::serve_simulation(service, simulation))
         .map_err(|cause| CommandError::Failed(format!("cannot start a thread for the service: {cause}")))?;
     say!("listening ws://{simulation_at}/ events ws://{events_at}/");
     while !stop.is_stop_requested() && host.is_running() {
