@@ -138,16 +138,14 @@ export! {
     fn dhdGetPositionAndOrientationRad(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
-            put3([x, y, z], position_m);
-            put3([a, b, g], angles(&rows));
+            put6([x, y, z, a, b, g], [position_m, angles(&rows)]);
         })
     }
     /// Reads the position, m, and the angles, degrees.
     fn dhdGetPositionAndOrientationDeg(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
-            put3([x, y, z], position_m);
-            put3([a, b, g], angles(&rows) * DEGREES);
+            put6([x, y, z, a, b, g], [position_m, angles(&rows) * DEGREES]);
         })
     }
     /// Reads the velocity, m/s.
@@ -235,6 +233,13 @@ pub(crate) fn read_expert(id: i8, body: impl FnOnce(&Open)) -> c_int {
 
 pub(crate) fn put3(places: [Out<f64>; 3], values: DVec3) {
     places.into_iter().zip(values.to_array()).for_each(|(place, value)| place.put(value));
+}
+
+pub(crate) fn put6(places: [Out<f64>; 6], values: [DVec3; 2]) {
+    places
+        .into_iter()
+        .zip(values.iter().flat_map(DVec3::to_array))
+        .for_each(|(place, value)| place.put(value));
 }
 
 fn no_gripper<const N: usize>(places: [Out<f64>; N]) -> c_int {

@@ -1,6 +1,6 @@
 //! Entry points of force: switch, commands, limits, and status.
 
-use crate::basic::{put3, read, read_live};
+use crate::basic::{put3, put6, read, read_live};
 use crate::device::{Device, FRAME, Open, Switch, live, open};
 use crate::error::{Code, DONE, SATURATED, failed, result};
 use flotor_compat::export;
@@ -86,18 +86,12 @@ export! {
     }
     /// Reads the applied force, N, and torque, N·m.
     fn dhdGetForceAndTorque(x: Out<f64>, y: Out<f64>, z: Out<f64>, tx: Out<f64>, ty: Out<f64>, tz: Out<f64>, id: i8) -> c_int [-1] {
-        read_live(id, |open| {
-            let [force_n, torque_nm] = applied(open);
-            put3([x, y, z], force_n);
-            put3([tx, ty, tz], torque_nm);
-        })
+        read_live(id, |open| put6([x, y, z, tx, ty, tz], applied(open)))
     }
     /// Reads the applied force, N, and torque, N·m, and 0 for a gripper.
     fn dhdGetForceAndTorqueAndGripperForce(x: Out<f64>, y: Out<f64>, z: Out<f64>, tx: Out<f64>, ty: Out<f64>, tz: Out<f64>, gripper: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
-            let [force_n, torque_nm] = applied(open);
-            put3([x, y, z], force_n);
-            put3([tx, ty, tz], torque_nm);
+            put6([x, y, z, tx, ty, tz], applied(open));
             gripper.put(0.0);
         })
     }

@@ -1,6 +1,6 @@
 //! Entry points of regulation and motion: hold the handle, move it, follow the program.
 
-use crate::basic::{angles, put3, read, read_live, turning};
+use crate::basic::{angles, put6, read, read_live, turning};
 use crate::device::{FRAME, Open, Switch, live, open};
 use crate::error::{Code, DONE, failed, result};
 use crate::kept::{POSITION_MOVE, ROTATION_MOVE};
@@ -210,8 +210,7 @@ export! {
     fn drdGetPositionAndOrientation(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
-            put3([x, y, z], position_m);
-            put3([a, b, g], angles(&rows));
+            put6([x, y, z, a, b, g], [position_m, angles(&rows)]);
             gap.put(0.0);
             matrix.put_all(rows.as_flattened());
         })
@@ -219,8 +218,8 @@ export! {
     /// Reads velocity, m/s, angular velocity, rad/s, and 0 for a gripper.
     fn drdGetVelocity(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
-            put3([x, y, z], FRAME.of_flotor(open.station.state().velocity_m_per_s));
-            put3([a, b, g], turning(open));
+            let velocity_m_per_s = FRAME.of_flotor(open.station.state().velocity_m_per_s);
+            put6([x, y, z, a, b, g], [velocity_m_per_s, turning(open)]);
             gap.put(0.0);
         })
     }

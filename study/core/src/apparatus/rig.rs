@@ -14,11 +14,13 @@ use crate::kinematics::KinematicsMeter;
 use crate::protocol::SubjectNumber;
 use crate::trial::{Exploration, Trial};
 use flotor_core::Change;
+use flotor_core::trace::TickRecord;
+use flotor_hal::Demand;
 use flotor_record::Recorder;
 use flotor_servo::{Clock, RunEnd, StopSwitch};
 use flotor_session::scene::Scene;
 use flotor_session::summary::end_cause;
-use flotor_session::{ControlError, RunError, RunRecording, Steps};
+use flotor_session::{ControlError, Observer, RunError, RunRecording, Steps};
 use std::path::PathBuf;
 
 /// Run that ended before the experiment did.
@@ -112,17 +114,24 @@ impl<'a> Rig<'a> {
         })
     }
 
-    /// Presents the stimuli of a trial, each for its time.
-    fn feel(&mut self, trial: &Trial) -> Result<Exploration, ApparatusOrFrontEndError> {
+    /// Presents the stimuli of a trial, each for its time, to a second observer as well.
+    ///
+    /// # Errors
+    /// Errors of the apparatus.
+    pub fn present_watched(
+        &mut self,
+        trial: &Trial,
+        also: &mut dyn Observer,
+    ) -> Result<Exploration, ApparatusOrFrontEndError> {
         if let (Kinematics::Full, Some(files)) = (self.kinematics, &self.files) {
             let run = self.apparatus.describe(&self.scene, Clock::Virtual, self.seed);
             self.watch.recording = RunRecording::new(Some(Recorder::create(&files.next_of(trial), &run)?));
         }
         let mut exploration = Exploration::default();
         for value in trial.presented.values() {
-            self.change_to(value)?;
+            self.change_to(value, also)?;
             self.watch.meter = Some(KinematicsMeter::default());
-            self.advance(self.feel_ticks)?;
+            self.advance(self.feel_ticks, also)?;
             if let Some(meter) = self.watch.meter.take() {
                 exploration.boundary_hit |= meter.out_of_range();
                 if self.kinematics != Kinematics::None {
@@ -135,33 +144,57 @@ impl<'a> Rig<'a> {
         Ok(exploration)
     }
 
-    fn change_to(&mut self, value: f64) -> Result<(), ApparatusOrFrontEndError> {
+    fn change_to(&mut self, value: f64, also: &mut dyn Observer) -> Result<(), ApparatusOrFrontEndError> {
         let apparatus = self.apparatus;
         apparatus.show(self.steps.controls(), false)?;
-        self.advance(self.fade_ticks)?;
+        self.advance(self.fade_ticks, also)?;
         // A replaced model is dropped after its fade-out; only then can another replacement start.
         let mut busy = apparatus.set(self.steps.controls(), value);
         if let Err(ControlError::Busy) = busy {
-            self.advance(self.fade_ticks)?;
+            self.advance(self.fade_ticks, also)?;
             busy = apparatus.set(self.steps.controls(), value);
         }
         busy?;
         apparatus.show(self.steps.controls(), true)?;
-        self.advance(self.fade_ticks)?;
+        self.advance(self.fade_ticks, also)?;
         self.watch.refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change).into()))
     }
 
-    fn advance(&mut self, ticks: u64) -> Result<(), ApparatusOrFrontEndError> {
-        let end = self.steps.advance(ticks, &mut self.watch)?;
+    fn advance(&mut self, ticks: u64, also: &mut dyn Observer) -> Result<(), ApparatusOrFrontEndError> {
+        let end = self.steps.advance(ticks, &mut Both(&mut self.watch, also))?;
         end.map_or(Ok(()), |end| Err(RunEnded(end).into()))
     }
 }
 
 impl Presenter for Rig<'_> {
     fn present(&mut self, trial: &Trial) -> Result<Option<Exploration>, ApparatusOrFrontEndError> {
-        match self.feel(trial) {
+        match self.present_watched(trial, &mut Nobody) {
             Err(error) if matches!(error.downcast_ref(), Some(RunEnded(RunEnd::Stopped))) => Ok(None),
             presented => presented.map(Some),
         }
     }
+}
+
+struct Both<'a>(&'a mut Watch, &'a mut dyn Observer);
+
+impl Observer for Both<'_> {
+    fn observe(&mut self, record: &TickRecord) {
+        self.0.observe(record);
+        self.1.observe(record);
+    }
+
+    fn demand(&self) -> Demand {
+        self.0.demand().with(self.1.demand())
+    }
+
+    fn change(&mut self, change: &Change) {
+        self.0.change(change);
+        self.1.change(change);
+    }
+}
+
+struct Nobody;
+
+impl Observer for Nobody {
+    fn observe(&mut self, _: &TickRecord) {}
 }
