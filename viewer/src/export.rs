@@ -2,9 +2,10 @@
 
 use crate::palette::{Look, Palette};
 use crate::picture::{PictureError, draw_without_window, write_png};
+use crate::ui::export_options::ExportFormat;
 use crate::ui::force_position::said;
-use crate::ui::plot_stack::{ExportFormat, PlotStack, TooLow, TraceSource};
-use crate::ui::readout::{subtitle_of, title_of};
+use crate::ui::plot_stack::{PlotStack, TooLow, TraceSource};
+use crate::ui::readout::subtitle_of;
 use crate::ui::view3d::pixels;
 use egui::{UiBuilder, vec2};
 use flotor_core::trace::Events;
@@ -33,50 +34,6 @@ pub enum ExportError {
     TooLow(#[from] TooLow),
 }
 
-/// Options for pictures of traces.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ExportOptions {
-    /// Look of the picture.
-    pub look: Look,
-    /// Width and height, pixels.
-    pub size_px: [f64; 2],
-    /// Title; empty: the title of the run.
-    pub title: String,
-}
-
-impl Default for ExportOptions {
-    /// Returns the options for paper: light, and as wide as a page at 300 dots per inch.
-    fn default() -> Self {
-        Self { look: Look::Light, size_px: [1800.0, 1000.0], title: String::new() }
-    }
-}
-
-impl ExportOptions {
-    /// Shows controls for the options.
-    pub fn choose(&mut self, ui: &mut egui::Ui) {
-        ui.horizontal(|ui| {
-            ui.selectable_value(&mut self.look, Look::Light, "Light");
-            ui.selectable_value(&mut self.look, Look::Dark, "Dark");
-        });
-        ui.horizontal(|ui| {
-            let [width, height] = &mut self.size_px;
-            for (length, name) in [(width, "Width"), (height, "Height")] {
-                let value = egui::DragValue::new(length).range(400.0..=8000.0).max_decimals(0).suffix(" px");
-                let value = ui.add(value.update_while_editing(false)).on_hover_text(name);
-                value.widget_info(|| egui::WidgetInfo::labeled(egui::Role::SpinButton, true, name));
-            }
-        });
-        let title =
-            egui::TextEdit::singleline(&mut self.title).hint_text("Title of the run").desired_width(180.0);
-        ui.add(title);
-    }
-
-    fn title(&self, history: &History, device: Option<&str>) -> String {
-        let title = if self.title.is_empty() { title_of(history.run()) } else { self.title.clone() };
-        device.map_or_else(|| title.clone(), |device| format!("{title}: {device}"))
-    }
-}
-
 /// Pixels per point of a picture.
 const SCALE: f32 = 2.0;
 /// Height of title and margins, points.
@@ -92,12 +49,7 @@ pub fn export(
     plots: &PlotStack,
     format: ExportFormat,
 ) -> Result<PathBuf, ExportError> {
-    let ending = match format {
-        ExportFormat::Csv => "csv",
-        ExportFormat::Svg => "svg",
-        ExportFormat::Png => "png",
-    };
-    let path = free_name(ending);
+    let path = free_name(format.extension());
     write(history, device, plots, format, &path)?;
     Ok(path)
 }

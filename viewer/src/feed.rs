@@ -8,7 +8,7 @@ use flotor_record::RunDescription;
 use std::collections::VecDeque;
 use std::io::ErrorKind;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 /// Largest number of buffered ticks: a hidden window takes no ticks, and memory stays bounded.
@@ -179,7 +179,7 @@ impl Waiting {
 }
 
 fn lock(waiting: &Mutex<Waiting>) -> MutexGuard<'_, Waiting> {
-    waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    flotor_core::lock(waiting)
 }
 
 /// Returns the decimation of ticks for pictures: at least a thousand ticks per second are read.

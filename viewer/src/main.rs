@@ -8,13 +8,13 @@ use flotor_history::History;
 use flotor_history::compared::Compared;
 use flotor_history::quantity::Quantity;
 use flotor_live::Directory;
-use flotor_study::screen::{Screen, WindowMessage};
+use flotor_study::screen::{Screen, StopKey, WindowMessage};
 use flotor_viewer::app::{Recorded, RunSelection, Start, Viewer};
 use flotor_viewer::devices::Devices;
 use flotor_viewer::display_options::DisplayOptions;
+use flotor_viewer::experiment::Prompt;
 use flotor_viewer::experiment::texts::Texts;
 use flotor_viewer::experiment::wire::connect_stdio;
-use flotor_viewer::experiment::{Prompt, StopKey};
 use flotor_viewer::export::{self, ExportError};
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{
@@ -22,7 +22,8 @@ use flotor_viewer::picture::{
     write_png,
 };
 use flotor_viewer::shape::shapes_of;
-use flotor_viewer::ui::plot_stack::{ExportFormat, PlotStack, Window};
+use flotor_viewer::ui::export_options::ExportFormat;
+use flotor_viewer::ui::plot_stack::{PlotStack, Window};
 use flotor_viewer::window::{WindowError, WindowOptions, open};
 use std::fmt::Display;
 use std::path::{Path, PathBuf};

@@ -5,12 +5,13 @@
 //! This module passes each picture the events up to the next press or release, and the rest to later pictures: text typed after a
 //! click goes to the clicked field. Only the keys of an emergency stop are passed at once.
 
-use crate::experiment::StopKey;
+use crate::experiment::key_of;
 use egui::{Event, Key, RawInput};
+use flotor_study::screen::StopKey;
 use std::collections::VecDeque;
 
 /// Keys that may be the emergency stop.
-const STOP_KEYS: [Key; 3] = [StopKey::Escape.key(), StopKey::Space.key(), StopKey::F12.key()];
+const STOP_KEYS: [Key; 3] = [key_of(StopKey::Escape), key_of(StopKey::Space), key_of(StopKey::F12)];
 
 /// Splitter for the input of a late picture, at presses and releases.
 #[derive(Debug, Default)]

@@ -19,7 +19,6 @@ mod calls;
 mod estimates;
 mod feel;
 pub mod headless;
-mod lock;
 mod long_call;
 mod measurements;
 mod nanoseconds;

@@ -10,9 +10,9 @@
 //! stated time after the first tick that reads it; then it fades to zero, which is counted. Force fades in when the program enables
 //! it. Neither side waits for the other.
 
-use crate::lock::lock;
 use crate::nanoseconds::whole_ns;
 use crate::scene::{ModelUse, Scene};
+use flotor_core::lock;
 use flotor_core::mapping::Mapping;
 use flotor_core::words::{Decoder, Encoder};
 use flotor_hal::abi::{Entry, model_entry};

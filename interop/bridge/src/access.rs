@@ -1,9 +1,10 @@
 //! Keys and access control: one command sets up a network whose members are all known, each with its rights.
 
 use crate::keys::{Name, ROOT};
-use crate::link::MEMBER;
 use crate::request::{ANYONE, Right};
 use crate::stop_channel::new_key_line;
+use crate::wall_clock::since_1970;
+use clap::ValueEnum;
 use rcgen::{
     BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair,
     KeyUsagePurpose, date_time_ymd,
@@ -13,7 +14,7 @@ use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 /// Members of a network.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -29,6 +30,8 @@ pub struct Members {
 /// Default validity of the keys: a year.
 pub const VALID: Duration = Duration::from_secs(365 * DAY_S);
 const DAY_S: u64 = 86_400;
+/// Configuration key of the member's name.
+pub const MEMBER: &str = "member";
 /// Configuration key of the certificate's expiry, s since 1970.
 pub const EXPIRES: &str = "expires_s";
 /// Configuration key of the file of stop keys ([`crate::stop_channel`]).
@@ -152,13 +155,9 @@ pub(crate) fn exposed_key(tls: &Value, metadata: &Value, config: Option<&Path>) 
 /// Sets the validity: from yesterday, for clocks that differ, to the chosen time from now.
 fn expire(parameters: &mut CertificateParams, valid: Duration) {
     let at = |s: u64| date_time_ymd(1970, 1, 1) + Duration::from_secs(s);
-    parameters.not_before = at(now_s().saturating_sub(DAY_S));
+    parameters.not_before = at(since_1970().as_secs().saturating_sub(DAY_S));
     // Certificates end before year 10000.
-    parameters.not_after = at(now_s().saturating_add(valid.as_secs()).min(8000 * 365 * DAY_S));
-}
-
-pub(crate) fn now_s() -> u64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
+    parameters.not_after = at(since_1970().as_secs().saturating_add(valid.as_secs()).min(8000 * 365 * DAY_S));
 }
 
 /// Returns the TLS section of a Zenoh configuration: both ends present certificates.
@@ -199,7 +198,7 @@ fn peer_config(folder: &Path, name: &str, members: &Members) -> Value {
 
 /// Returns the metadata that this program reads in a configuration: name, expiry, and stop keys.
 fn metadata(folder: &Path, name: &str, members: &Members) -> Value {
-    let expires_s = now_s().saturating_add(members.valid.as_secs());
+    let expires_s = since_1970().as_secs().saturating_add(members.valid.as_secs());
     if members.peers.is_empty() {
         return json!({ MEMBER: name, EXPIRES: expires_s });
     }
@@ -274,12 +273,8 @@ fn access_control(members: &Members) -> Value {
     json!({ "enabled": true, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies })
 }
 
-const fn word(right: Right) -> &'static str {
-    match right {
-        Right::Watch => "watch",
-        Right::Operate => "operate",
-        Right::Own => "own",
-    }
+fn word(right: Right) -> String {
+    right.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 
 /// Read permission of a file.

@@ -10,7 +10,7 @@
 //! claims as far as possible (`flotor_coupling`).
 
 use crate::keys::Name;
-use crate::link::LinkError;
+use crate::link::{LinkError, WaitNow};
 use flotor_core::peer::{DISPATCH_BYTES, Dispatch};
 use flotor_live::{CALL_PERIOD, Directory, DirectoryError, FoundCoupling, PeerSocket};
 use serde::{Deserialize, Serialize};
@@ -253,15 +253,14 @@ impl Coupler {
             }
         };
         let key = side.incoming_key(name, &found.name);
-        let subscriber = key.map(|key| session.declare_subscriber(key).callback(receive).wait()).transpose();
-        let subscriber = subscriber.map_err(LinkError::from)?;
+        let subscriber =
+            key.map(|key| session.declare_subscriber(key).callback(receive).wait_now()).transpose()?;
         // Highest priority. Not express: on a slow network messages share a batch instead of being dropped.
         let tells = session
             .declare_publisher(side.tells(name, &found.name))
             .congestion_control(CongestionControl::Drop)
             .priority(Priority::RealTime)
-            .wait()
-            .map_err(LinkError::from)?;
+            .wait_now()?;
         let socket = PeerSocket::join(directory, found)?;
         let stop = Arc::new(AtomicBool::new(false));
         let (of_thread, until) = (Arc::clone(&counts), Arc::clone(&stop));

@@ -25,3 +25,4 @@ pub mod request;
 pub mod serve;
 pub mod status;
 pub mod stop_channel;
+mod wall_clock;

@@ -3,6 +3,7 @@
 use crate::access;
 use crate::keys::Name;
 use crate::stop_channel::{StopChannel, StopKeys};
+use crate::wall_clock::since_1970;
 use clap::Args;
 use flotor_live::Directory;
 use serde_json::{Value, json};
@@ -15,8 +16,6 @@ use zenoh::{Config, Session, Wait};
 const UNIX: &str = "unixsock-stream/";
 /// Prefix of the sockets of bridges: `bridge-NAME`.
 const SOCKET: &str = "bridge-";
-/// Configuration key of the member's name.
-pub const MEMBER: &str = "member";
 
 /// Command line options of a session.
 #[derive(Args, Clone, Debug, Default)]
@@ -77,6 +76,21 @@ impl From<zenoh::Error> for LinkError {
     }
 }
 
+/// Wait for operations that complete at once: all declarations here are local.
+pub(crate) trait WaitNow<T> {
+    /// Waits for the operation.
+    fn wait_now(self) -> Result<T, LinkError>;
+}
+
+impl<T, R> WaitNow<T> for R
+where
+    R: Wait + zenoh::Resolvable<To = zenoh::Result<T>>,
+{
+    fn wait_now(self) -> Result<T, LinkError> {
+        self.wait().map_err(LinkError::from)
+    }
+}
+
 /// Role of this program on a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
@@ -119,7 +133,7 @@ impl Link {
     /// Returns the remaining validity of the keys, days.
     #[must_use]
     pub fn days_left(&self) -> Option<u64> {
-        Some(self.expires_s?.saturating_sub(access::now_s()) / 86_400)
+        Some(self.expires_s?.saturating_sub(since_1970().as_secs()) / 86_400)
     }
 }
 
@@ -259,7 +273,7 @@ fn datagram_address(endpoint: &str) -> Option<String> {
 
 /// Returns the member name in the metadata of a configuration; without keys, `anyone`.
 fn member_of(metadata: &Value) -> Name {
-    let member = metadata.get(MEMBER).and_then(Value::as_str).and_then(|name| Name::new(name).ok());
+    let member = metadata.get(access::MEMBER).and_then(Value::as_str).and_then(|name| Name::new(name).ok());
     member.unwrap_or_else(Name::anyone)
 }
 

@@ -1,7 +1,7 @@
 //! Program `flotor bridge`: a running host on a network.
 
-use clap::{Args, Parser, Subcommand, ValueEnum};
-use flotor_bridge::access::{Members, write_keys};
+use clap::{Args, Parser, Subcommand};
+use flotor_bridge::access::{AccessError, Members, write_keys};
 use flotor_bridge::attach::attach;
 use flotor_bridge::couple::couple;
 use flotor_bridge::keys::Name;
@@ -14,7 +14,7 @@ use flotor_bridge::stop_channel::press_both_ways;
 use flotor_hal::terminal::{escaped, escaped_arguments};
 use flotor_live::{Directory, SetValue};
 use std::error::Error;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -88,23 +88,13 @@ struct ServeArguments {
     name: Option<Name>,
     /// Highest right whose requests are accepted; the access control of the network sets the right of each member
     #[arg(long, value_enum, default_value = "watch")]
-    allow: Allow,
+    allow: Right,
     /// A scene that may be started from the network, with `--allow own`
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Publish one tick in N
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum Allow {
-    /// Observe a run and press the emergency stop
-    Watch,
-    /// Also change parameters and stop a run in the normal way
-    Operate,
-    /// Also start the scene, release an emergency stop
-    Own,
 }
 
 #[derive(Subcommand)]
@@ -189,60 +179,22 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         signal_hook::flag::register(signal, Arc::clone(&stop))?;
     }
     let directory = Directory::of_this_user();
-    let visit = |link: LinkOptions| {
-        let link = open(&link.or_this_user(&directory, None), End::Visiting)?;
-        report_keys(&link, &mut |line| eprintln!("{}", escaped(line)));
-        Ok::<Link, LinkError>(link)
-    };
-    let mut report_line = |line: &str| eprintln!("{}", escaped(line));
     match command {
-        Command::Serve(serving) => {
-            let service = service(serving)?;
-            directory.make()?;
-            let link = link.or_this_user(&directory, Some(&service.name));
-            let session = open(&link, End::Serving)?;
-            report_keys(&session, &mut report_line);
-            if let (None, Some(endpoint)) = (&link.config, link.open_to_others()) {
-                report_line(&format!(
-                    "without keys: every user who can reach {endpoint}, including all users of this machine, has \
-                     the rights of --allow"
-                ));
-            }
-            report_line(&format!("zenoh/{}: waiting for a run on this machine (Ctrl-C ends)", service.name));
-            serve(&session, &directory, service, &stop, &mut report_line)?;
-        }
+        Command::Serve(serving) => serve_runs(link, serving, &directory, &stop)?,
         Command::Attach { name } => {
-            let remote = Remote::listen(&visit(link)?, &name)?;
+            let remote = Remote::listen(&visit(link, &directory)?, &name)?;
             report_line(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
             attach(&remote, &directory, &stop, &mut report_line)?;
         }
         Command::Couple { name } => {
-            let session = visit(link)?;
+            let session = visit(link, &directory)?;
             report_line(&format!("waiting for a coupling with zenoh/{name} (Ctrl-C ends)"));
             couple(&session, &directory, &name, &stop, &mut report_line)?;
         }
         Command::Record { name, file } => {
-            let remote = Remote::listen(&visit(link)?, &name)?;
+            let remote = Remote::listen(&visit(link, &directory)?, &name)?;
             report_line(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
-            let recorded = record(&remote, &file, &stop)?;
-            let words = match &recorded.end {
-                RecordingEnd::Over(words) => words,
-                RecordingEnd::Stopped => "stopped recording",
-                RecordingEnd::Cut => "the bridge is no longer reachable",
-            };
-            let shown = format!(
-                "{}: {} ticks, {} lost by the network; {words}",
-                file.display(),
-                recorded.ticks,
-                recorded.lost
-            );
-            println!("{}", escaped(&shown));
-            if recorded.end == RecordingEnd::Cut {
-                return Err(
-                    "the recording ends before the run; the file contains the ticks received until then"
-                        .into(),
-                );
-            }
+            record_run(&remote, &file, &stop)?;
         }
         Command::Ask { name, request: RequestArgument::EmergencyStop } => {
             let link = link.or_this_user(&directory, None);
@@ -250,43 +202,101 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             press_both_ways(link, datagrams, &name)?;
         }
         Command::Ask { name, request } => {
-            let remote = Remote::listen(&visit(link)?, &name)?;
+            let remote = Remote::listen(&visit(link, &directory)?, &name)?;
             remote.requests().run(request.into())?;
         }
-        Command::List => {
-            let session = visit(link)?;
-            let names = bridges(&session)?;
-            if names.is_empty() {
-                report_line(
-                    "no bridge found; start a bridge with `flotor bridge serve`, or give its endpoint with --connect",
-                );
-            }
-            for name in names {
-                let status = Remote::listen(&session, &name)?.status()?.unwrap_or_default();
-                println!("zenoh/{name:<20} {:<18} {}", status.state.word(), escaped(&status.title));
-            }
-        }
-        Command::Keys(KeysArguments { folder, hosts, watch, operate, own, days }) => {
-            let with = |names: Vec<Name>, right| names.into_iter().map(move |name| (name, right));
-            let peers = with(watch, Right::Watch)
-                .chain(with(operate, Right::Operate))
-                .chain(with(own, Right::Own))
-                .collect();
-            for written in
-                write_keys(&folder, &Members { hosts, peers, valid: Duration::from_secs(days * 86_400) })?
-            {
-                println!("{}", written.display());
-            }
-            report_line(
-                "Give each member its .json5, .pem, .key and .stop, and authority.pem; keep the .key and .stop files secret.",
-            );
-        }
+        Command::List => list(&visit(link, &directory)?)?,
+        Command::Keys(arguments) => make_keys(arguments)?,
     }
     Ok(())
 }
 
+/// Writes a line for people.
+fn report_line(line: &str) {
+    eprintln!("{}", escaped(line));
+}
+
+/// Opens the session of a visitor.
+fn visit(link: LinkOptions, directory: &Directory) -> Result<Link, LinkError> {
+    let link = open(&link.or_this_user(directory, None), End::Visiting)?;
+    report_keys(&link);
+    Ok(link)
+}
+
+/// Serves the runs of this machine until stopped.
+fn serve_runs(
+    link: LinkOptions,
+    serving: ServeArguments,
+    directory: &Directory,
+    stop: &AtomicBool,
+) -> Result<(), Box<dyn Error>> {
+    let service = service(serving)?;
+    directory.make()?;
+    let link = link.or_this_user(directory, Some(&service.name));
+    let session = open(&link, End::Serving)?;
+    report_keys(&session);
+    if let (None, Some(endpoint)) = (&link.config, link.open_to_others()) {
+        report_line(&format!(
+            "without keys: every user who can reach {endpoint}, including all users of this machine, has \
+             the rights of --allow"
+        ));
+    }
+    report_line(&format!("zenoh/{}: waiting for a run on this machine (Ctrl-C ends)", service.name));
+    Ok(serve(&session, directory, service, stop, &mut report_line)?)
+}
+
+/// Records a run, and prints the result.
+fn record_run(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<(), Box<dyn Error>> {
+    let recorded = record(remote, file, stop)?;
+    let words = match &recorded.end {
+        RecordingEnd::Over(words) => words,
+        RecordingEnd::Stopped => "stopped recording",
+        RecordingEnd::Cut => "the bridge is no longer reachable",
+    };
+    let (ticks, lost) = (recorded.ticks, recorded.lost);
+    let shown = format!("{}: {ticks} ticks, {lost} lost by the network; {words}", file.display());
+    println!("{}", escaped(&shown));
+    if recorded.end == RecordingEnd::Cut {
+        return Err(
+            "the recording ends before the run; the file contains the ticks received until then".into()
+        );
+    }
+    Ok(())
+}
+
+/// Prints the bridges on the network, with their states.
+fn list(session: &Link) -> Result<(), LinkError> {
+    let names = bridges(session)?;
+    if names.is_empty() {
+        report_line(
+            "no bridge found; start a bridge with `flotor bridge serve`, or give its endpoint with --connect",
+        );
+    }
+    for name in names {
+        let status = Remote::listen(session, &name)?.status()?.unwrap_or_default();
+        println!("zenoh/{name:<20} {:<18} {}", status.state.word(), escaped(&status.title));
+    }
+    Ok(())
+}
+
+/// Writes the keys and configurations of all members.
+fn make_keys(arguments: KeysArguments) -> Result<(), AccessError> {
+    let KeysArguments { folder, hosts, watch, operate, own, days } = arguments;
+    let with = |names: Vec<Name>, right| names.into_iter().map(move |name| (name, right));
+    let peers =
+        with(watch, Right::Watch).chain(with(operate, Right::Operate)).chain(with(own, Right::Own)).collect();
+    let members = Members { hosts, peers, valid: Duration::from_secs(days * 86_400) };
+    for written in write_keys(&folder, &members)? {
+        println!("{}", written.display());
+    }
+    report_line(
+        "Give each member its .json5, .pem, .key and .stop, and authority.pem; keep the .key and .stop files secret.",
+    );
+    Ok(())
+}
+
 /// Warns of keys that expire soon, and of keys without a second path for an emergency stop.
-fn report_keys(link: &Link, report_line: &mut dyn FnMut(&str)) {
+fn report_keys(link: &Link) {
     if link.lacks_stop_keys() {
         report_line(
             "the keys have no stop key, so a flood of connections can delay the emergency stop of a new member; \
@@ -302,11 +312,6 @@ fn report_keys(link: &Link, report_line: &mut dyn FnMut(&str)) {
 fn service(arguments: ServeArguments) -> Result<Service, Box<dyn Error>> {
     let ServeArguments { name, allow, scene, every } = arguments;
     let program = std::env::current_exe()?.with_file_name(format!("flotor{}", std::env::consts::EXE_SUFFIX));
-    let allow = match allow {
-        Allow::Watch => Right::Watch,
-        Allow::Operate => Right::Operate,
-        Allow::Own => Right::Own,
-    };
     let launcher = scene.map(|scene| Launcher::new(program, scene));
     Ok(Service { name: name.unwrap_or_else(Name::of_this_machine), allow, every, launcher })
 }

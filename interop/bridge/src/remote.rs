@@ -10,7 +10,7 @@ use flotor_live::{Answer, End, Greeting};
 use flotor_record::{RunDescription, tick_from_messages};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 use zenoh::handlers::FifoChannelHandler;
 use zenoh::pubsub::Subscriber;
@@ -212,7 +212,7 @@ impl RequestClient {
 
     fn send(&self, request: Request, status: &Status) -> Result<Answers, String> {
         let key = format!("{}/{}", self.name.key(request.key()), self.member);
-        let mut number = self.number.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut number = flotor_core::lock(&self.number);
         *number += 1;
         let run = match request.right() {
             Right::Own => status.run,

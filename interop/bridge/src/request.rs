@@ -1,10 +1,12 @@
 //! Requests of remote peers, and their admission control with replay protection.
 
 use crate::keys::Name;
+use crate::wall_clock::since_1970;
+use clap::ValueEnum;
 use flotor_live::{Ask, SetValue};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::Instant;
 
 /// Limit on the length of a request, bytes; longer ones are rejected unread.
 pub const MAX_REQUEST_BYTES: usize = 64 * 1024;
@@ -44,15 +46,15 @@ pub enum Request {
 }
 
 /// Rights of a member. Each includes the previous ones.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Right {
-    /// Observe, and press the emergency stop.
+    /// Observe a run and press the emergency stop
     #[default]
     Watch,
-    /// Change parameters, end a run in order.
+    /// Also change parameters and stop a run in the normal way
     Operate,
-    /// Start runs, release an emergency stop.
+    /// Also start the scene, release an emergency stop
     Own,
 }
 
@@ -212,10 +214,9 @@ struct Last {
 
 impl Default for AdmissionControl {
     fn default() -> Self {
-        let began = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_nanos());
         #[allow(clippy::cast_possible_truncation)] // in the year 2554
         Self {
-            began: began as u64,
+            began: since_1970().as_nanos() as u64,
             since: Instant::now(),
             members: BTreeMap::new(),
             forgotten_ms: 0,

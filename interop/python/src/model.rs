@@ -13,7 +13,7 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::sync::{Mutex, MutexGuard, TryLockError};
 
 /// Parameter of a plugin's schema.
 #[pyclass(frozen, get_all, module = "flotor")]
@@ -191,7 +191,7 @@ impl Model {
     /// `os.fork()`.
     fn lock(&self) -> PyResult<MutexGuard<'_, flotor_hal::abi::loader::Model>> {
         if self.process == std::process::id() {
-            return Ok(self.instance.lock().unwrap_or_else(PoisonError::into_inner));
+            return Ok(flotor_core::lock(&self.instance));
         }
         match self.instance.try_lock() {
             Ok(instance) => Ok(instance),

@@ -2,15 +2,14 @@
 
 use clap::Parser;
 use flotor_command::options::{JsonOption, PluginPathOption, arguments};
-use flotor_command::{print_error_line, say};
+use flotor_command::{CommandError, exit_code_of, progress_bar, say};
 use flotor_sweep::executor::execute;
 use flotor_sweep::plan::Plan;
 use flotor_sweep::store::Store;
 use flotor_sweep::task::Sweep;
 use flotor_sweep::{picture, table};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::num::NonZeroUsize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 
@@ -44,25 +43,14 @@ struct Arguments {
     plugin_path: PluginPathOption,
 }
 
-/// Errors by exit code of the `flotor` commands: 2 is usage or configuration, 1 anything else.
-enum Failure {
-    Usage(String),
-    Other(String),
-}
-
 fn main() -> ExitCode {
-    let (code, message) = match run(&arguments()) {
-        Ok(()) => return ExitCode::SUCCESS,
-        Err(Failure::Usage(message)) => (2, message),
-        Err(Failure::Other(message)) => (1, message),
-    };
-    print_error_line(format_args!("error: {message}"));
-    ExitCode::from(code)
+    exit_code_of(run(&arguments()))
 }
 
-fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let usage = |error: &dyn std::fmt::Display| Failure::Usage(error.to_string());
-    let other = |error: &dyn std::fmt::Display| Failure::Other(error.to_string());
+fn run(arguments: &Arguments) -> Result<(), CommandError> {
+    let usage = |error: &dyn std::fmt::Display| CommandError::Usage(error.to_string());
+    let other = |error: &dyn std::fmt::Display| CommandError::Failed(error.to_string());
+    let unwritten = |path: &Path, cause| CommandError::Failed(format!("{}: {cause}", path.display()));
     let plan = Plan::load(&arguments.plan).map_err(|error| usage(&error))?;
     let sweep = Sweep::prepare(plan, arguments.plugin_path.folders()).map_err(|error| usage(&error))?;
     let out = arguments.out.clone().unwrap_or_else(|| arguments.plan.with_extension(""));
@@ -70,7 +58,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     let jobs =
         arguments.jobs.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
 
-    let bar = progress_bar(sweep.plan().row_count().unwrap_or(0));
+    let bar = progress_bar(sweep.plan().row_count().unwrap_or(0), "{wide_bar} {pos}/{len} rows, {eta} left");
     let started = std::time::Instant::now();
     let stop = AtomicBool::new(false);
     let progress = execute(&sweep, &store, jobs, &stop, &|task| bar.inc(task.count));
@@ -82,7 +70,7 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     table::write(&results, &columns, &rows).map_err(|error| other(&error))?;
     if let Some(path) = &arguments.plot {
         let svg = picture::draw(sweep.plan(), &columns, &rows, &arguments.draw);
-        std::fs::write(path, svg).map_err(|cause| Failure::Other(format!("{}: {cause}", path.display())))?;
+        std::fs::write(path, svg).map_err(|cause: std::io::Error| unwritten(path, cause))?;
     }
     let summary = serde_json::json!({
         "rows": rows.len(),
@@ -93,8 +81,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
     });
     match arguments.json.file() {
         Some(path) if path.as_os_str() == "-" => println!("{summary:#}"),
-        Some(path) => std::fs::write(path, format!("{summary:#}\n"))
-            .map_err(|cause| Failure::Other(format!("{}: {cause}", path.display())))?,
+        Some(path) => {
+            std::fs::write(path, format!("{summary:#}\n")).map_err(|cause| unwritten(path, cause))?;
+        }
         None => say!(
             "{} rows in {} ({} tasks done now, {} found finished, {:.1} s)",
             rows.len(),
@@ -105,11 +94,4 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         ),
     }
     Ok(())
-}
-
-fn progress_bar(rows: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(rows), ProgressDrawTarget::stderr());
-    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} rows, {eta} left");
-    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-    bar
 }

@@ -224,7 +224,6 @@ impl Sweep {
             let registry = Registry::search(folders);
             headless::run(&scene, &registry, point.seed, None, Demand::ALL).map_err(|e| e.to_string())
         });
-        let none = || Cell::Number(None);
         match answer {
             Ok(summary) => vec![
                 Cell::number(summary.ticks as f64),
@@ -236,10 +235,7 @@ impl Sweep {
                 Cell::Word(summary.trace_digest),
                 Cell::Word(String::new()),
             ],
-            Err(reason) => {
-                let words = [Cell::Word(String::new()), Cell::Word(String::new()), Cell::Word(reason)];
-                std::iter::repeat_with(none).take(RUN_COLUMNS.len() - words.len()).chain(words).collect()
-            }
+            Err(reason) => refused(&RUN_COLUMNS, &reason),
         }
     }
 
@@ -270,7 +266,7 @@ impl Sweep {
             });
             match evaluated {
                 Ok(evaluated) => answers.extend(evaluated.iter().map(answered)),
-                Err(reason) => answers.extend(group.iter().map(|_| refused(&reason))),
+                Err(reason) => answers.extend(group.iter().map(|_| refused(&EVAL_COLUMNS, &reason))),
             }
         }
         answers
@@ -329,9 +325,16 @@ fn answered(answer: &Answer) -> Vec<Cell> {
     wrench.chain([energy]).chain(words).collect()
 }
 
-fn refused(reason: &str) -> Vec<Cell> {
-    let words = [Cell::Word(String::new()), Cell::Word(reason.to_owned())];
-    std::iter::repeat_n(Cell::Number(None), EVAL_COLUMNS.len() - words.len()).chain(words).collect()
+/// Returns the row of a rejected point: the reason in the last column, the others empty.
+fn refused(columns: &[(&str, ColumnKind)], reason: &str) -> Vec<Cell> {
+    let empty = |(_, kind): &(&str, ColumnKind)| match kind {
+        ColumnKind::Number => Cell::Number(None),
+        ColumnKind::Word => Cell::Word(String::new()),
+    };
+    let mut row: Vec<Cell> = columns.iter().map(empty).collect();
+    row.pop();
+    row.push(Cell::Word(reason.to_owned()));
+    row
 }
 
 /// Checks that every axis is a pose column or a parameter of the model.

@@ -8,7 +8,7 @@ use flotor_session::{Exceeded, LongCall, ThreadClock};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::io;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::thread;
 use std::time::Duration;
 
@@ -42,7 +42,7 @@ thread_local! {
 
 /// Locks a mutex; poisoning is ignored, because no invariant spans statements.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+    flotor_core::lock(mutex)
 }
 
 /// Guard: while it exists, this thread is in a call.

@@ -293,7 +293,7 @@ fn in_parallel<T: Sync, R: Send>(jobs: usize, items: &[T], work: impl Fn(&T) -> 
             Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|index| Some((index, items.get(index)?)))
         {
             let result = work(item);
-            done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((index, result));
+            flotor_core::lock(&done).push((index, result));
         }
     };
     std::thread::scope(|scope| {

@@ -4,7 +4,7 @@ use super::SubjectRecord;
 use flotor_statistics::describe::mean;
 use flotor_study::log::TrialEvent;
 use flotor_study::sitting::Verdict;
-use flotor_study::trial::{Phase, Position, Presented, Response};
+use flotor_study::trial::{Phase, Presented, Response};
 use serde::Serialize;
 
 /// Check results of one subject.
@@ -37,7 +37,6 @@ impl SubjectChecks {
             here.filter(move |(_, event)| event.trial.phase == phase && event.verdict != Verdict::Repeated)
         };
         let catch: Vec<_> = of_phase(Phase::Catch).collect();
-        let named = |event: &TrialEvent| matches!(event.response, Response::First | Response::Second);
         let obvious: Vec<_> = of_phase(Phase::Obvious).collect();
         let twice: Vec<(Response, Response)> = of_phase(Phase::RepeatCheck)
             .filter_map(|(place, event)| Some((first_time(record, place, event)?, event.response)))
@@ -57,7 +56,7 @@ impl SubjectChecks {
         Self {
             subject: record.subject.to_string(),
             catch_trials: catch.len(),
-            false_alarms: catch.iter().filter(|(_, event)| named(event)).count(),
+            false_alarms: catch.iter().filter(|(_, event)| event.response.named().is_some()).count(),
             obvious_pairs: obvious.len(),
             missed_obvious: obvious.iter().filter(|(_, event)| !names_the_larger(event)).count(),
             repeat_checks: twice.len(),
@@ -102,12 +101,8 @@ impl SubjectChecks {
 }
 
 fn names_the_larger(event: &TrialEvent) -> bool {
-    let named = match event.response {
-        Response::First => Position::First,
-        Response::Second => Position::Second,
-        Response::DontKnow | Response::Rating(_) | Response::Seen => return false,
-    };
-    matches!(event.trial.presented, Presented::Pair(pair) if pair.larger_at == named)
+    let named = event.response.named();
+    matches!(event.trial.presented, Presented::Pair(pair) if Some(pair.larger_at) == named)
 }
 
 /// Returns the earlier answer to a repeated trial: the last counted one in the same track or replication.

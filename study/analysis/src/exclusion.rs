@@ -1,7 +1,7 @@
 //! Applies the exclusion rules to complete sittings.
 
 use crate::large::wrong_at_large;
-use crate::{Estimator, SubjectChecks, SubjectRecord};
+use crate::{Estimator, SubjectChecks, SubjectRecord, conditions};
 use flotor_study::exclusion::{EMPTY_CONDITION, Exclusion, ExclusionRules, Scope};
 use flotor_study::log::TrialEvent;
 use flotor_study::protocol::{Protocol, SubjectNumber};
@@ -245,10 +245,7 @@ fn emptied(protocol: &Protocol, estimator: Estimator, kept: &SubjectRecord) -> O
             kept.counted().any(|event| event.trial.modality == modality && level(event) == at)
         }
     };
-    let mut all = Modality::ALL
-        .into_iter()
-        .flat_map(|modality| protocol.levels().iter().map(move |at| (modality, *at)));
-    let (modality, at) = all.find(|condition| !has_result(*condition))?;
+    let (modality, at) = conditions(protocol.levels()).find(|condition| !has_result(*condition))?;
     let what = if by_tracks { "track with a threshold" } else { "answer" };
     Some(format!("{} at {at}: no {what}", modality.word()))
 }

@@ -4,17 +4,16 @@ use super::kinematics::{KinematicMeasure, measures};
 use super::published::ThesisComparison;
 use super::{
     AnalysisError, AnalysisOptions, CONFIDENCE, Estimator, PostHoc, ResponseRow, SubjectRecord,
-    mean_responses, order_factor, post_hoc, response_rows, within_factors,
+    mean_responses, means_of_both, order_factor, post_hoc, response_rows, within_factors,
 };
 use flotor_statistics::Outcome;
 use flotor_statistics::anova::{Design, Effect, WithinFactor, analyse};
 use flotor_statistics::describe::{MeanInterval, mean, mean_interval};
 use flotor_statistics::t_test::{TTest, paired};
 use flotor_statistics::trend;
-use flotor_study::estimate::{Observation, Prior, most_likely};
+use flotor_study::estimate::{Prior, most_likely};
 use flotor_study::protocol::JndProtocol;
-use flotor_study::sitting::Verdict;
-use flotor_study::trial::{Modality, Presented};
+use flotor_study::trial::Modality;
 use serde::Serialize;
 
 /// Values for the two modalities.
@@ -29,6 +28,13 @@ pub struct WeberFractions<T> {
 impl<T> WeberFractions<T> {
     fn try_each<E>(mut of: impl FnMut(Modality) -> Result<T, E>) -> Result<Self, E> {
         Ok(Self { vh: of(Modality::Vh)?, h: of(Modality::H)? })
+    }
+
+    fn modality(&self, modality: Modality) -> &T {
+        match modality {
+            Modality::Vh => &self.vh,
+            Modality::H => &self.h,
+        }
     }
 
     fn map<U>(&self, of: impl Fn(&T) -> U) -> WeberFractions<U> {
@@ -97,7 +103,7 @@ pub fn analyse_jnd(
 ) -> Result<JndAnalysis, AnalysisError> {
     let fractions = subjects.iter().map(|subject| Fractions::of(protocol, subject, options.estimator));
     let fractions = fractions.collect::<Result<Vec<_>, _>>()?;
-    let of = |modality| fractions.iter().map(|subject| subject.mean(modality)).collect::<Vec<_>>();
+    let of = |modality| fractions.iter().map(|subject| mean(subject.modality(modality))).collect::<Vec<_>>();
     let weber_detail = WeberFractions::try_each(|modality| mean_interval(&of(modality), CONFIDENCE))?;
 
     let responses: Vec<Vec<f64>> = fractions.iter().map(|subject| subject.thresholds(protocol)).collect();
@@ -124,10 +130,7 @@ pub fn analyse_jnd(
         pairs_per_subject: mean(&pairs),
         unfinished_tracks: subjects.iter().map(unfinished).sum(),
         post_hoc: {
-            let both = |subject: &Fractions| {
-                subject.vh.iter().zip(&subject.h).map(|(vh, h)| 0.5 * (vh + h)).collect::<Vec<_>>()
-            };
-            let fractions: Vec<Vec<f64>> = fractions.iter().map(both).collect();
+            let fractions: Vec<Vec<f64>> = fractions.iter().map(Fractions::of_both).collect();
             let modalities = post_hoc::modalities("base", &protocol.bases, &responses);
             let bases = post_hoc::levels("fraction, base", &protocol.bases, &fractions);
             modalities.into_iter().chain(bases).collect()
@@ -139,10 +142,7 @@ pub fn analyse_jnd(
 }
 
 /// Thresholds of a subject as shares of the base, averaged over replications.
-struct Fractions {
-    vh: Vec<f64>,
-    h: Vec<f64>,
-}
+type Fractions = WeberFractions<Vec<f64>>;
 
 impl Fractions {
     fn of(
@@ -158,20 +158,12 @@ impl Fractions {
             let (subject, modality) = (record.subject, modality.word());
             found.ok_or(AnalysisError::NoThreshold { subject, modality, base })
         };
-        let each =
-            |modality| protocol.bases.iter().map(|base| of(modality, *base)).collect::<Result<Vec<_>, _>>();
-        Ok(Self { vh: each(Modality::Vh)?, h: each(Modality::H)? })
+        Self::try_each(|modality| protocol.bases.iter().map(|base| of(modality, *base)).collect())
     }
 
-    fn modality(&self, modality: Modality) -> &[f64] {
-        match modality {
-            Modality::Vh => &self.vh,
-            Modality::H => &self.h,
-        }
-    }
-
-    fn mean(&self, modality: Modality) -> f64 {
-        mean(self.modality(modality))
+    /// Returns the means of both modalities, by base.
+    fn of_both(&self) -> Vec<f64> {
+        means_of_both(&self.vh, &self.h)
     }
 
     /// Returns the thresholds in the unit of the stimulus, modality by base.
@@ -196,14 +188,7 @@ fn map_of_trials(
     modality: Modality,
     base: f64,
 ) -> Option<f64> {
-    let here = record.counted().filter(|event| event.trial.modality == modality);
-    let observed = here.filter_map(|event| match (event.trial.presented, event.verdict) {
-        (Presented::Pair(pair), Verdict::Judged { judgement, .. }) if pair.base == base => {
-            Some(Observation { delta: pair.delta, judgement })
-        }
-        _ => None,
-    });
-    let observed: Vec<Observation> = observed.collect();
+    let observed = record.observations(modality, base);
     let target = protocol.procedure.target();
     (!observed.is_empty()).then(|| most_likely(&observed, &Prior::default(), target).threshold)
 }
@@ -219,15 +204,14 @@ fn constancy(
         return Ok(None);
     }
     let base = WithinFactor { name: "base".to_owned(), levels: protocol.bases.len() };
-    let rows: Vec<Vec<f64>> = fractions.iter().map(|subject| subject.modality(modality).to_vec()).collect();
+    let rows: Vec<Vec<f64>> = fractions.iter().map(|subject| subject.modality(modality).clone()).collect();
     let design = Design::new(Vec::new(), vec![base], &rows)?;
     Ok(analyse(&design, options.sums_of_squares).into_iter().next())
 }
 
 fn linear_r2(protocol: &JndProtocol, fractions: &[Fractions]) -> f64 {
     let row = |subject: &Fractions| {
-        let both = subject.vh.iter().zip(&subject.h).zip(&protocol.bases);
-        both.map(|((vh, h), base)| 0.5 * (vh + h) * base).collect::<Vec<_>>()
+        subject.of_both().iter().zip(&protocol.bases).map(|(share, base)| share * base).collect()
     };
     let rows: Vec<Vec<f64>> = fractions.iter().map(row).collect();
     trend::linear(&protocol.bases, &rows).map_or(f64::NAN, |trend| trend.r_squared)

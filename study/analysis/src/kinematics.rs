@@ -3,7 +3,9 @@
 //! Of a pair, only the base is analysed. An adaptive procedure presents larger comparisons where thresholds are larger, and the
 //! same hand moves a larger stimulus differently: the comparisons would add an effect of the threshold to each modality.
 
-use super::{AnalysisError, AnalysisOptions, CONFIDENCE, SubjectRecord, conditions, within_factors};
+use super::{
+    AnalysisError, AnalysisOptions, CONFIDENCE, SubjectRecord, conditions, means_of_both, within_factors,
+};
 use flotor_statistics::anova::{Design, Effect, analyse};
 use flotor_statistics::describe::{MeanInterval, deviation, mean, mean_interval};
 use flotor_study::kinematics::StimulusKinematics;
@@ -77,7 +79,7 @@ fn standard_error(rows: &[Vec<f64>], level: usize, levels: usize) -> f64 {
 fn exponent(levels: &[f64], row: &[f64]) -> Option<f64> {
     let (vh, h) = row.split_at_checked(levels.len())?;
     let x: Vec<f64> = levels.iter().map(|level| libm::log(*level)).collect();
-    let y: Vec<f64> = vh.iter().zip(h).map(|(vh, h)| libm::log(0.5 * (vh + h))).collect();
+    let y: Vec<f64> = means_of_both(vh, h).into_iter().map(libm::log).collect();
     let (mean_x, mean_y) = (mean(&x), mean(&y));
     let products = x.iter().zip(&y).map(|(x, y)| (x - mean_x) * (y - mean_y)).sum::<f64>();
     let squares = x.iter().map(|x| (x - mean_x) * (x - mean_x)).sum::<f64>();

@@ -2,8 +2,7 @@
 
 use crate::SubjectRecord;
 use flotor_study::protocol::JndProtocol;
-use flotor_study::sitting::Verdict;
-use flotor_study::trial::{Judgement, Presented};
+use flotor_study::trial::Judgement;
 
 /// Answers to large differences.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,14 +24,9 @@ impl AtLarge {
 /// threshold of a subject who is always wrong exceeds every difference.
 pub(crate) fn wrong_at_large(record: &SubjectRecord) -> AtLarge {
     let mut found = AtLarge::default();
-    for event in record.counted() {
-        if let (Presented::Pair(pair), Verdict::Judged { judgement, .. }) =
-            (event.trial.presented, event.verdict)
-            && pair.delta >= JndProtocol::LARGE_DELTA
-        {
-            found.answers += 1;
-            found.wrong += usize::from(judgement == Judgement::Wrong);
-        }
+    for (_, one, _) in record.judged().filter(|(_, one, _)| one.delta >= JndProtocol::LARGE_DELTA) {
+        found.answers += 1;
+        found.wrong += usize::from(one.judgement == Judgement::Wrong);
     }
     found
 }

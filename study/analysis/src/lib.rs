@@ -20,16 +20,16 @@ pub use kinematics::KinematicMeasure;
 pub use magnitude::{MagnitudeAnalysis, RatingCell, analyse_magnitude};
 pub use post_hoc::{PairTest, PostHoc};
 pub use subject::{SubjectCondition, SubjectQuality};
+pub use text::{effect_text, exponent_text, p_text, size_interval_text, t_text};
 
 use flotor_statistics::StatisticsError;
 use flotor_statistics::anova::{BetweenFactor, Effect, SumOfSquares, WithinFactor};
 use flotor_statistics::describe::{MeanInterval, mean_interval};
-use flotor_statistics::effect_size::EffectSize;
-use flotor_statistics::t_test::TTest;
+use flotor_study::estimate::Observation;
 use flotor_study::log::{SittingLog, TrialEvent};
 use flotor_study::protocol::{Protocol, SubjectNumber};
 use flotor_study::sitting::{TrackResult, Verdict};
-use flotor_study::trial::{Modality, Phase};
+use flotor_study::trial::{Modality, Phase, Presented};
 use serde::Serialize;
 
 /// Python script that reproduces the tables from [`flotor_study::dataset::trials_csv`].
@@ -81,6 +81,22 @@ impl SubjectRecord {
         let counts =
             |event: &&TrialEvent| event.trial.phase == Phase::Main && event.verdict != Verdict::Repeated;
         self.trials.iter().filter(counts)
+    }
+
+    /// Returns the counted trials with a judged pair, with the observation and the base of each.
+    pub fn judged(&self) -> impl Iterator<Item = (&TrialEvent, Observation, f64)> {
+        self.counted().filter_map(|event| match (event.trial.presented, event.verdict) {
+            (Presented::Pair(pair), Verdict::Judged { judgement, .. }) => {
+                Some((event, Observation { delta: pair.delta, judgement }, pair.base))
+            }
+            _ => None,
+        })
+    }
+
+    /// Returns the counted judgements of pairs in one condition.
+    fn observations(&self, modality: Modality, base: f64) -> Vec<Observation> {
+        let here = self.judged().filter(|(event, _, at)| event.trial.modality == modality && *at == base);
+        here.map(|(_, observation, _)| observation).collect()
     }
 }
 
@@ -189,42 +205,12 @@ impl Analysis {
     }
 }
 
-/// Formats a t-test as in publications: `t(15) = 3.30, p = 0.005`.
-#[must_use]
-pub fn t_text(t: &TTest) -> String {
-    text::t_text(t, t.p)
-}
-
-/// Formats the interval of an effect size: `0.24 to 1.39`.
-#[must_use]
-pub fn size_interval_text(size: &EffectSize) -> String {
-    text::size_interval_text(size)
-}
-
-/// Formats an effect as in publications: `F(2, 30) = 1.46, p = 0.250 (HF p = 0.251)`.
-#[must_use]
-pub fn effect_text(effect: &Effect) -> String {
-    text::effect_text(effect)
-}
-
 /// Returns a note if the model has no effect of the order of modalities.
 #[must_use]
 pub fn order_note(effects: &[Effect]) -> Option<&'static str> {
     effects.iter().all(|effect| effect.effect != "order").then_some(
         "order is not in the model, because the factor needs three subjects or more, and subjects who start with each modality",
     )
-}
-
-/// Formats an exponent with its interval.
-#[must_use]
-pub fn exponent_text(exponent: &MeanInterval) -> String {
-    text::exponent_text(exponent)
-}
-
-/// Formats a p-value: `p = 0.250`, or `p < 0.001`.
-#[must_use]
-pub fn p_text(p: f64) -> String {
-    text::p_text(p)
 }
 
 /// Response of one subject in one condition: a row of the exported table.
@@ -269,14 +255,23 @@ fn conditions(levels: &[f64]) -> impl Iterator<Item = (Modality, f64)> {
     Modality::ALL.into_iter().flat_map(|modality| levels.iter().map(move |level| (modality, *level)))
 }
 
+/// Returns a column of `rows`.
+fn column(rows: &[Vec<f64>], index: usize) -> Vec<f64> {
+    rows.iter().filter_map(|row| row.get(index).copied()).collect()
+}
+
+/// Returns the means of both modalities.
+fn means_of_both(vh: &[f64], h: &[f64]) -> Vec<f64> {
+    vh.iter().zip(h).map(|(vh, h)| 0.5 * (vh + h)).collect()
+}
+
 /// Returns the mean over subjects in each condition, of `responses[subject][modality by level]`.
 fn mean_responses(
     levels: &[f64],
     responses: &[Vec<f64>],
 ) -> Result<Vec<(Modality, f64, MeanInterval)>, StatisticsError> {
     let cell = |(index, (modality, level)): (usize, (Modality, f64))| {
-        let values: Vec<f64> = responses.iter().filter_map(|row| row.get(index).copied()).collect();
-        Ok((modality, level, mean_interval(&values, CONFIDENCE)?))
+        Ok((modality, level, mean_interval(&column(responses, index), CONFIDENCE)?))
     };
     conditions(levels).enumerate().map(cell).collect()
 }

@@ -4,7 +4,7 @@ use super::kinematics::{KinematicMeasure, measures};
 use super::published::ThesisComparison;
 use super::{
     AnalysisError, AnalysisOptions, PostHoc, ResponseRow, SubjectRecord, conditions, mean_responses,
-    order_factor, post_hoc, response_rows, within_factors,
+    means_of_both, order_factor, post_hoc, response_rows, within_factors,
 };
 use flotor_statistics::Outcome;
 use flotor_statistics::anova::{Design, Effect, analyse};
@@ -73,7 +73,7 @@ pub fn analyse_magnitude(
     let design = Design::new(order_factor(subjects), within_factors("stimulus", stimuli), &rows)?;
     let both = |row: &Vec<f64>| {
         let (vh, h) = row.split_at(stimuli.len());
-        vh.iter().zip(h).map(|(vh, h)| 0.5 * (vh + h)).collect::<Vec<_>>()
+        means_of_both(vh, h)
     };
     let trend = Outcome::from(trend::linear(stimuli, &rows.iter().map(both).collect::<Vec<_>>()));
     let ratings = mean_responses(stimuli, &rows)?.into_iter();

@@ -1,5 +1,6 @@
 //! Post-hoc comparisons of conditions: paired t-tests with a correction for multiple tests, and effect sizes.
 
+use super::column;
 use flotor_statistics::effect_size::{EffectSize, of_pairs};
 use flotor_statistics::multiple::holm;
 use flotor_statistics::t_test::{TTest, paired};
@@ -42,23 +43,17 @@ pub(super) fn compare(pairs: impl IntoIterator<Item = (String, Vec<f64>, Vec<f64
 
 /// Compares the modalities at each level, from `responses[subject][modality by level]`.
 pub(super) fn modalities(name: &str, levels: &[f64], responses: &[Vec<f64>]) -> Vec<PostHoc> {
-    let column = |index: usize| responses.iter().filter_map(|row| row.get(index).copied()).collect();
     compare(levels.iter().enumerate().map(|(index, level)| {
-        (
-            format!("h - vh, {name} {}", (level * 1.0e4).round() / 1.0e4),
-            column(levels.len() + index),
-            column(index),
-        )
+        let text = format!("h - vh, {name} {}", (level * 1.0e4).round() / 1.0e4);
+        (text, column(responses, levels.len() + index), column(responses, index))
     }))
 }
 
 /// Compares each pair of levels, from `responses[subject][level]`.
 pub(super) fn levels(name: &str, levels: &[f64], responses: &[Vec<f64>]) -> Vec<PostHoc> {
-    let column =
-        |index: usize| responses.iter().filter_map(|row| row.get(index).copied()).collect::<Vec<_>>();
     let pair = |(low, high): (usize, usize)| {
         let text = format!("{name} {} - {}", levels[high], levels[low]);
-        (text, column(high), column(low))
+        (text, column(responses, high), column(responses, low))
     };
     let pairs = (0..levels.len()).flat_map(|low| (low + 1..levels.len()).map(move |high| (low, high)));
     compare(pairs.map(pair))

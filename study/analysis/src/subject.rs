@@ -2,13 +2,15 @@
 //! stimuli.
 
 use crate::large::wrong_at_large;
-use crate::{SubjectChecks, SubjectRecord, p_text};
+use crate::text::p_text;
+use crate::{SubjectChecks, SubjectRecord, conditions};
 use flotor_core::quantile;
-use flotor_study::estimate::{Observation, Prior, Psychometric, psychometric};
+use flotor_study::estimate::{Prior, Psychometric, psychometric};
+use flotor_study::kinematics::StimulusKinematics;
 use flotor_study::log::Incident;
 use flotor_study::protocol::Protocol;
-use flotor_study::sitting::{TrackResult, Verdict};
-use flotor_study::trial::{Modality, Phase, Presented, Response};
+use flotor_study::sitting::TrackResult;
+use flotor_study::trial::{Modality, Presented, Response};
 use serde::Serialize;
 
 /// Exploration time below which a presentation is suspicious, s.
@@ -83,7 +85,6 @@ impl SubjectQuality {
         let [first, second, unsure] = [Response::First, Response::Second, Response::DontKnow].map(named);
         let is_jnd = matches!(protocol, Protocol::Jnd(_));
         let share = |part: f64, whole: f64| (is_jnd && whole > 0.0).then(|| part / whole);
-        let conditions = conditions(protocol, record);
         let mut quality = Self {
             subject: record.subject.to_string(),
             answers: counted.len(),
@@ -93,7 +94,7 @@ impl SubjectQuality {
             first: share(first, first + second),
             checks: SubjectChecks::of(record),
             flags: Vec::new(),
-            conditions,
+            conditions: functions(protocol, record),
         };
         quality.flags = quality.suspicions(record, first + second, incidents);
         quality
@@ -101,23 +102,16 @@ impl SubjectQuality {
 
     fn suspicions(&self, record: &SubjectRecord, named: f64, incidents: &[Incident]) -> Vec<String> {
         let mut flags = Vec::new();
-        let felt = |event: &&flotor_study::log::TrialEvent| !event.exploration.kinematics.is_empty();
-        let short = record
-            .counted()
-            .filter(felt)
-            .filter(|event| event.exploration.kinematics.iter().any(|one| one.duration_s < SHORT_S));
-        let still = record
-            .counted()
-            .filter(felt)
-            .filter(|event| event.exploration.kinematics.iter().any(|one| one.cycles == 0));
-        let (short, still) = (short.count(), still.count());
+        let any = |has: fn(&StimulusKinematics) -> bool| {
+            record.counted().filter(|event| event.exploration.kinematics.iter().any(has)).count()
+        };
         let mut say = |count: usize, what: &str| {
             if count > 0 {
                 flags.push(format!("{count} {what}"));
             }
         };
-        say(short, "answers after less than half a second with a stimulus");
-        say(still, "answers without a whole movement down and up");
+        say(any(|one| one.duration_s < SHORT_S), "answers after less than half a second with a stimulus");
+        say(any(|one| one.cycles == 0), "answers without a whole movement down and up");
         say(wrong_at_large(record).wrong, "wrong answers to differences of 40 % and more");
         say(
             without_difference(record),
@@ -138,21 +132,25 @@ impl SubjectQuality {
         {
             flags.push(format!("a preference: {:.0} % of the answers named the first", first * 100.0));
         }
-        if self.dont_know.is_some_and(|share| share > 0.5) {
-            flags.push("more than half of the answers are \"I don't know\"".to_owned());
-        }
-        if self.checks.false_alarm_share().is_some_and(|share| share > 0.5) {
-            flags.push("more than half of the catch trials named one of two equal stimuli".to_owned());
-        }
-        if self.checks.missed_obvious_share().is_some_and(|share| share > 0.5) {
-            flags.push("more than half of the obvious pairs were missed".to_owned());
-        }
-        if self.checks.agreement.is_some_and(|share| share < 0.5) {
-            flags.push("fewer than half of the repeated pairs had the same answer".to_owned());
-        }
-        if self.checks.retest_deviation.is_some_and(|share| share > 0.5) {
-            flags.push("a rating and its repetition deviate by more than half of the mean rating".to_owned());
-        }
+        let checks = &self.checks;
+        let above_half = |share: Option<f64>| share.is_some_and(|share| share > 0.5);
+        let findings = [
+            (above_half(self.dont_know), "more than half of the answers are \"I don't know\""),
+            (
+                above_half(checks.false_alarm_share()),
+                "more than half of the catch trials named one of two equal stimuli",
+            ),
+            (above_half(checks.missed_obvious_share()), "more than half of the obvious pairs were missed"),
+            (
+                checks.agreement.is_some_and(|share| share < 0.5),
+                "fewer than half of the repeated pairs had the same answer",
+            ),
+            (
+                above_half(checks.retest_deviation),
+                "a rating and its repetition deviate by more than half of the mean rating",
+            ),
+        ];
+        flags.extend(findings.into_iter().filter(|(is_found, _)| *is_found).map(|(_, text)| text.to_owned()));
         flags
     }
 
@@ -206,29 +204,18 @@ impl SubjectQuality {
 /// with a floor of 0.
 fn without_difference(record: &SubjectRecord) -> usize {
     let is_judged = |event: &&flotor_study::log::TrialEvent| {
-        let named = matches!(event.response, Response::First | Response::Second);
-        named && matches!(event.trial.presented, Presented::Pair(pair) if pair.delta == 0.0)
+        event.response.named().is_some()
+            && matches!(event.trial.presented, Presented::Pair(pair) if pair.delta == 0.0)
     };
     record.counted().filter(is_judged).count()
 }
 
-fn conditions(protocol: &Protocol, record: &SubjectRecord) -> Vec<SubjectCondition> {
+fn functions(protocol: &Protocol, record: &SubjectRecord) -> Vec<SubjectCondition> {
     let Protocol::Jnd(jnd) = protocol else { return Vec::new() };
-    let of = |modality: Modality, base: f64| {
-        let here = record.counted().filter(|event| event.trial.modality == modality);
-        let observed = here.filter_map(|event| match (event.trial.presented, event.verdict) {
-            (Presented::Pair(pair), Verdict::Judged { judgement, .. })
-                if pair.base == base && event.trial.phase == Phase::Main =>
-            {
-                Some(Observation { delta: pair.delta, judgement })
-            }
-            _ => None,
-        });
-        let observed: Vec<Observation> = observed.collect();
+    let of = |(modality, base): (Modality, f64)| {
+        let observed = record.observations(modality, base);
         let function = psychometric(&observed, &Prior::default(), jnd.procedure.target())?;
         Some(SubjectCondition { modality, base, function })
     };
-    let all =
-        Modality::ALL.into_iter().flat_map(|modality| jnd.bases.iter().map(move |base| (modality, *base)));
-    all.filter_map(|(modality, base)| of(modality, base)).collect()
+    conditions(&jnd.bases).filter_map(of).collect()
 }

@@ -24,7 +24,7 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
         let [low, high] = detail.interval.map(|end| end * 100.0);
         page.row(name, &format!("{:.1} %  (95 %: {low:.1} to {high:.1})", detail.mean * 100.0), published);
     }
-    page.row("difference", &analysis.t.to_text(|t| t_text(t, t.p)), published::T);
+    page.row("difference", &analysis.t.to_text(t_text), published::T);
     page.gap();
     page.columns("Thresholds", "vision + haptics", "haptics alone");
     let of = |modality| analysis.thresholds.iter().filter(move |cell| cell.modality == modality);
@@ -33,7 +33,6 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
         page.columns(&name, &interval_text(&vh.threshold), &interval_text(&h.threshold));
     }
     page.effects("thresholds", &analysis.anova, &published::JND);
-    page.lines.extend(order_note(&analysis.anova).map(|note| format!("  {note}")));
     page.sizes(&analysis.anova);
     page.post_hoc(&analysis.post_hoc);
     let constancy = [
@@ -70,7 +69,6 @@ pub(super) fn magnitude(analysis: &MagnitudeAnalysis) -> String {
         page.columns(&name, &interval_text(&vh.rating), &interval_text(&h.rating));
     }
     page.effects("ratings", &analysis.anova, &published::MAGNITUDE);
-    page.lines.extend(order_note(&analysis.anova).map(|note| format!("  {note}")));
     page.sizes(&analysis.anova);
     page.post_hoc(&analysis.post_hoc);
     page.movements(analysis.task, &analysis.kinematics);
@@ -129,8 +127,9 @@ impl Page {
         }
     }
 
-    /// Adds the effect sizes.
+    /// Adds the effect sizes, after a note on a missing effect of the order.
     fn sizes(&mut self, table: &[Effect]) {
+        self.lines.extend(order_note(table).map(|note| format!("  {note}")));
         self.gap();
         self.row("Partial omega squared", "with its 95 % interval", "");
         for effect in table {
@@ -147,7 +146,8 @@ impl Page {
         self.gap();
         self.columns("Comparisons", "paired t, p after Holm", "   Cohen's d of the pairs");
         for PostHoc { comparison, test } in comparisons {
-            let here = |PairTest { t, p_holm, d }: &PairTest| column(&t_text(t, *p_holm), 26) + &size_text(d);
+            let here =
+                |PairTest { t, p_holm, d }: &PairTest| column(&t_with_p_text(t, *p_holm), 26) + &size_text(d);
             self.lines.push(format!("  {}{}", column(comparison, 30), test.to_text(here)));
         }
     }
@@ -178,7 +178,9 @@ fn size_text(size: &EffectSize) -> String {
     format!("{:.2}  ({})", size.value, size_interval_text(size))
 }
 
-pub(super) fn size_interval_text(size: &EffectSize) -> String {
+/// Formats the interval of an effect size: `0.24 to 1.39`.
+#[must_use]
+pub fn size_interval_text(size: &EffectSize) -> String {
     match size.interval {
         [low, high] if high.is_infinite() => format!("{low:.2} or more"),
         [low, high] if low.is_infinite() => format!("{high:.2} or less"),
@@ -186,11 +188,19 @@ pub(super) fn size_interval_text(size: &EffectSize) -> String {
     }
 }
 
-pub(super) fn t_text(t: &TTest, p: f64) -> String {
+/// Formats a t-test as in publications: `t(15) = 3.30, p = 0.005`.
+#[must_use]
+pub fn t_text(t: &TTest) -> String {
+    t_with_p_text(t, t.p)
+}
+
+fn t_with_p_text(t: &TTest, p: f64) -> String {
     format!("t({}) = {:.2}, {}", t.df, t.value, p_text(p))
 }
 
-pub(super) fn exponent_text(exponent: &MeanInterval) -> String {
+/// Formats an exponent with its interval.
+#[must_use]
+pub fn exponent_text(exponent: &MeanInterval) -> String {
     let [low, high] = exponent.interval;
     format!("{:.3} (95 %: {low:.3} to {high:.3})", exponent.mean)
 }
@@ -199,7 +209,9 @@ fn interval_text(value: &MeanInterval) -> String {
     format!("{:.3} (se {:.3})", value.mean, value.se)
 }
 
-pub(super) fn effect_text(effect: &Effect) -> String {
+/// Formats an effect as in publications: `F(2, 30) = 1.46, p = 0.250 (HF p = 0.251)`.
+#[must_use]
+pub fn effect_text(effect: &Effect) -> String {
     if let Some(reason) = &effect.not_testable {
         return not_testable_text(reason);
     }
@@ -207,7 +219,9 @@ pub(super) fn effect_text(effect: &Effect) -> String {
     format!("F({}, {}) = {:.2}, {}{corrected}", effect.df, effect.error_df, effect.f, p_text(effect.p))
 }
 
-pub(super) fn p_text(p: f64) -> String {
+/// Formats a p-value: `p = 0.250`, or `p < 0.001`.
+#[must_use]
+pub fn p_text(p: f64) -> String {
     if p < 0.001 { "p < 0.001".to_owned() } else { format!("p = {p:.3}") }
 }
 

@@ -4,8 +4,9 @@
 #![allow(clippy::unwrap_used, clippy::cast_possible_truncation, clippy::cast_sign_loss)] // tests may panic
 
 use flotor_analysis::{AnalysisOptions, JndAnalysis, SubjectRecord, analyse_jnd, analyse_magnitude};
-use flotor_study::bias::{BiasRow, Method, observer_of, rows};
+use flotor_study::bias::{BiasRow, Method, rows};
 use flotor_study::log::TrialEvent;
+use flotor_study::observer::TernaryObserver;
 use flotor_study::observer::{Population, Sensitivity, SimulatedSubject};
 use flotor_study::procedure::{Procedure, WeightedUpDownRule};
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Protocol, SubjectNumber};
@@ -159,7 +160,7 @@ fn better_estimators_find_the_threshold() {
         _ => 60,
     };
     for (threshold, criterion) in [(0.1114, 1.0), (0.1357, 1.0), (0.142, 0.0), (0.142, 0.25), (0.142, 0.5)] {
-        let rows = rows(&observer_of(threshold, criterion), 2, runs, 5);
+        let rows = rows(&TernaryObserver::with_threshold(threshold, criterion), 2, runs, 5);
         let of = |method| *rows.iter().find(|row| row.method == method).unwrap();
         let (thesis, map, quest) = (of(Method::Thesis), of(Method::Map), of(Method::QuestPlus));
         // Four standard errors of the mean beside the promised bound.
@@ -190,7 +191,7 @@ fn estimators_err_as_an_independent_simulation_does() {
     for observer in lines.chunks(Method::ALL.len()) {
         let number = |line: &[&str], column: usize| line[column].parse::<f64>().unwrap();
         let (criterion, threshold) = (number(&observer[0], 0), number(&observer[0], 1));
-        let found = rows(&observer_of(threshold, criterion), 2, runs, 19);
+        let found = rows(&TernaryObserver::with_threshold(threshold, criterion), 2, runs, 19);
         for (line, row) in observer.iter().zip(found) {
             assert_eq!(line[2], row.method.word());
             let [estimates, bias, deviation, trials] = [3, 4, 5, 6].map(|column| number(line, column));

@@ -58,13 +58,6 @@ pub struct BiasRow {
     pub trials: f64,
 }
 
-/// Returns the observer with a given threshold at a target of 75 %.
-#[must_use]
-pub fn observer_of(threshold: f64, criterion: f64) -> TernaryObserver {
-    let unit = TernaryObserver { sigma: 1.0, criterion, bias: 0.0, lapse: 0.0 };
-    TernaryObserver { sigma: threshold / unit.threshold(0.75), ..unit }
-}
-
 /// Runs every method on an observer. `tracks` tracks make one estimate: means for `thesis` and `questplus`, all trials
 /// together for `map`.
 #[must_use]

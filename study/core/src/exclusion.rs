@@ -86,9 +86,7 @@ impl Exclusion {
         };
         self.subject == subject && trial.phase == Phase::Main && is_here
     }
-}
 
-impl Exclusion {
     /// Formats the exclusion as one line.
     #[must_use]
     pub fn to_text(&self, rules: &ExclusionRules) -> String {

@@ -5,7 +5,9 @@
 
 use crate::estimate::NotBounded;
 use crate::procedure::Track;
-use crate::protocol::{AtBoundary, ComparisonSide, JndProtocol, PresentationOrder, Protocol, SubjectNumber};
+use crate::protocol::{
+    AtBoundary, ComparisonSide, JndProtocol, MagnitudeProtocol, PresentationOrder, Protocol, SubjectNumber,
+};
 use crate::random::{Purpose, Stream};
 use crate::schedule;
 use crate::trial::{Exploration, Judgement, Modality, Pair, Phase, Position, Presented, Response, Trial};
@@ -109,7 +111,7 @@ impl Sitting {
     pub fn new(protocol: &Protocol, seed: u64, subject: SubjectNumber) -> Self {
         let items = match protocol {
             Protocol::Jnd(jnd) => jnd_items(jnd, seed, subject),
-            Protocol::Magnitude(_) => magnitude_items(protocol, seed, subject),
+            Protocol::Magnitude(magnitude) => magnitude_items(magnitude, seed, subject),
         };
         let mut sitting = Self {
             protocol: protocol.clone(),
@@ -301,11 +303,7 @@ impl Sitting {
 }
 
 fn pair(base: f64, comparison: f64, comparison_at: Position, above: bool) -> Pair {
-    let base_at = match comparison_at {
-        Position::First => Position::Second,
-        Position::Second => Position::First,
-    };
-    let larger_at = if above { comparison_at } else { base_at };
+    let larger_at = if above { comparison_at } else { comparison_at.other() };
     Pair { base, comparison, delta: (comparison - base).abs() / base, comparison_at, larger_at }
 }
 
@@ -324,13 +322,11 @@ pub(crate) fn check_kind(trial: &Trial, response: Response) -> Result<(), Answer
 }
 
 fn judge(pair: &Pair, response: Response) -> Option<Judgement> {
-    let named = match response {
-        Response::First => Position::First,
-        Response::Second => Position::Second,
-        Response::DontKnow => return Some(Judgement::Unsure),
-        Response::Rating(_) | Response::Seen => return None,
-    };
-    Some(if named == pair.larger_at { Judgement::Correct } else { Judgement::Wrong })
+    match response.named() {
+        Some(named) if named == pair.larger_at => Some(Judgement::Correct),
+        Some(_) => Some(Judgement::Wrong),
+        None => (response == Response::DontKnow).then_some(Judgement::Unsure),
+    }
 }
 
 fn jnd_items(jnd: &JndProtocol, seed: u64, subject: SubjectNumber) -> VecDeque<Item> {
@@ -348,8 +344,7 @@ fn jnd_items(jnd: &JndProtocol, seed: u64, subject: SubjectNumber) -> VecDeque<I
     demo.chain(tracks).collect()
 }
 
-fn magnitude_items(protocol: &Protocol, seed: u64, subject: SubjectNumber) -> VecDeque<Item> {
-    let Protocol::Magnitude(magnitude) = protocol else { return VecDeque::new() };
+fn magnitude_items(magnitude: &MagnitudeProtocol, seed: u64, subject: SubjectNumber) -> VecDeque<Item> {
     let first = magnitude.first_modality.of(subject);
     let mut items = VecDeque::new();
     for (block, modality) in [first, first.other()].into_iter().enumerate() {

@@ -83,6 +83,26 @@ pub enum Position {
     Second,
 }
 
+impl Position {
+    /// Returns the other position.
+    #[must_use]
+    pub fn other(self) -> Self {
+        match self {
+            Self::First => Self::Second,
+            Self::Second => Self::First,
+        }
+    }
+
+    /// Returns the label used in tables.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::First => "first",
+            Self::Second => "second",
+        }
+    }
+}
+
 /// Two stimuli to compare: a base and a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pair {
@@ -169,6 +189,16 @@ pub enum Response {
 }
 
 impl Response {
+    /// Returns the named stimulus of a pair.
+    #[must_use]
+    pub fn named(self) -> Option<Position> {
+        match self {
+            Self::First => Some(Position::First),
+            Self::Second => Some(Position::Second),
+            Self::DontKnow | Self::Rating(_) | Self::Seen => None,
+        }
+    }
+
     /// Returns the label used in tables, without a rating's number.
     #[must_use]
     pub fn word(&self) -> &'static str {
@@ -192,6 +222,21 @@ pub enum Judgement {
     Wrong,
     /// Neither stimulus was named.
     Unsure,
+}
+
+impl Judgement {
+    /// All judgements.
+    pub const ALL: [Self; 3] = [Self::Correct, Self::Wrong, Self::Unsure];
+
+    /// Returns the label used in tables.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Correct => "correct",
+            Self::Wrong => "wrong",
+            Self::Unsure => "unsure",
+        }
+    }
 }
 
 /// Measurements during a presentation.

@@ -2,11 +2,12 @@
 
 pub(crate) mod choices;
 pub(crate) mod provenance;
+pub(crate) mod report;
 
 use crate::page::html;
 use choices::Choices;
 use clap::Args;
-use flotor_analysis::exclusion::{Applied, NotApplied, apply};
+use flotor_analysis::exclusion::{Applied, apply};
 use flotor_analysis::{Analysis, BlindedAnalysis, SubjectChecks, SubjectQuality, SubjectRecord};
 use flotor_analysis::{SCRIPT_PYTHON, script_in_r};
 use flotor_command::options::JsonOption;
@@ -15,10 +16,12 @@ use flotor_command::{CommandError, note, print_result, style, write_text};
 use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, trials_csv};
 use flotor_study::exclusion::Exclusion;
-use flotor_study::log::{Incident, ObserverKind, SittingLog};
+use flotor_study::log::{Begin, Incident, ObserverKind, SittingLog};
+use flotor_study::protocol::Protocol;
 use provenance::Provenance;
+use report::Report;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Analyse the data of a perception experiment
 #[derive(Args)]
@@ -57,54 +60,34 @@ pub(crate) struct AnalyseArguments {
 
 pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
-    let Some(first) = logs.first() else { return Ok(()) };
-    let complete = logs.iter().filter(|log| log.complete).count();
+    let Some(begin) = logs.first().map(|first| first.begin.clone()) else { return Ok(()) };
     // A pilot is analysed before a second subject is complete.
-    if arguments.each || complete < 2 {
-        let needs_all = [&arguments.html, &arguments.csv, &arguments.trials].into_iter().any(Option::is_some);
-        if arguments.blind || needs_all {
-            return Err(CommandError::Usage(
-                "the tables of single subjects (--each, or fewer than two complete sittings) are unblinded, and only --json \
-                 stores them; omit --blind, --html, --csv and --trials"
-                    .to_owned(),
-            ));
-        }
-        if arguments.each {
-            return tell_each(arguments, &logs);
-        }
+    if arguments.each || logs.iter().filter(|log| log.complete).count() < 2 {
+        arguments.refuse_tables()?;
     }
-    if complete == 0 {
-        let (data, each): (_, Vec<String>) =
-            (arguments.data.display(), logs.iter().map(incomplete).collect());
-        return Err(CommandError::Usage(format!(
-            "{data}: no sitting is complete ({}); `--each` shows the incomplete sittings",
-            each.join(", ")
-        )));
+    if arguments.each {
+        return tell_each(arguments, &logs);
     }
-    for log in logs.iter().filter(|log| !log.complete) {
-        note(format_args!("{}, omitted", incomplete(log)));
+    let logs = complete(arguments, logs)?;
+    if logs.len() < 2 {
+        return tell_each(arguments, &logs);
     }
-    if complete < 2 {
-        let complete: Vec<SittingLog> = logs.into_iter().filter(|log| log.complete).collect();
-        return tell_each(arguments, &complete);
-    }
-    let observer = first.begin.observer_kind();
+    let observer = begin.observer_kind();
     if let Some(restriction) = observer.restriction() {
         note(format_args!(
             "{restriction}: the result is one random draw; another --seed than {} gives another result",
-            first.begin.seed
+            begin.seed
         ));
     }
-    let complete = logs.iter().filter(|log| log.complete).map(SubjectRecord::of_log);
-    let subjects: Vec<SubjectRecord> = complete.collect();
-    let checks: Vec<SubjectChecks> = match first.begin.protocol.has_checks() {
+    let protocol = &begin.protocol;
+    let subjects: Vec<SubjectRecord> = logs.iter().map(SubjectRecord::of_log).collect();
+    let checks: Vec<SubjectChecks> = match protocol.has_checks() {
         true => subjects.iter().map(SubjectChecks::of).collect(),
         false => Vec::new(),
     };
     let options = arguments.choices.options();
-    let protocol = &first.begin.protocol;
-    let rules = first.begin.exclusion();
-    let applied = apply(&rules, protocol, subjects, options.estimator, first.begin.rate_hz());
+    let rules = begin.exclusion();
+    let applied = apply(&rules, protocol, subjects, options.estimator, begin.rate_hz());
     let subjects = &applied.kept;
     if !applied.excluded.is_empty() {
         let (kept, excluded) = (subjects.len(), applied.excluded.len());
@@ -118,10 +101,10 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         CommandError::Usage(format!("{}: {error}", arguments.data.display()))
     })?;
     if arguments.blind {
-        let codes = Codes::new(protocol, first.begin.seed);
+        let codes = Codes::new(protocol, begin.seed);
         return tell_blinded(arguments, &BlindedAnalysis::of(&analysis, &codes), observer);
     }
-    let provenance = Provenance::of(&first.begin, &logs, arguments.choices, &applied);
+    let provenance = Provenance::of(&begin, &logs, arguments.choices, &applied);
     let Applied { excluded, not_applied, .. } = &applied;
     let report = Report {
         observer,
@@ -131,52 +114,83 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         not_applied,
         provenance: &provenance,
     };
-    let text = || {
-        let title = titled(format!("{} of {}", protocol.task(), protocol.stimulus()), observer);
-        let analysed = format!("{}\n{}", style::title(&title), analysis.to_text());
-        let has_exclusions = !rules.are_none() || !applied.excluded.is_empty();
-        let excluded = has_exclusions.then(|| applied.to_text(&rules));
-        let checked = (!checks.is_empty()).then(|| checks_text(&checks));
-        let blocks = [Some(analysed), checked, excluded, Some(provenance.to_text())];
-        blocks.into_iter().flatten().collect::<Vec<_>>().join("\n\n")
-    };
-    print_result(arguments.json.file(), &report, text)?;
-    write_text(arguments.html.as_deref(), || html(&first.begin, &report, &applied))?;
+    print_result(arguments.json.file(), &report, || report_text(&begin, &report, &applied))?;
+    write_text(arguments.html.as_deref(), || html(&begin, &report, &applied))?;
     write_text(arguments.csv.as_deref(), || {
         let head = ["subject", "first_modality", "modality", "stimulus", "response", "observer"];
         to_csv(head, analysis.responses().iter().map(|row| (row, observer)))
     })?;
-    let Some(path) = &arguments.trials else { return Ok(()) };
+    match &arguments.trials {
+        Some(path) => write_trials(path, arguments.choices, &logs, protocol, excluded),
+        None => Ok(()),
+    }
+}
+
+impl AnalyseArguments {
+    /// Rejects the options that need a table of all subjects.
+    fn refuse_tables(&self) -> Result<(), CommandError> {
+        if self.blind || [&self.html, &self.csv, &self.trials].into_iter().any(Option::is_some) {
+            return Err(CommandError::Usage(
+                "the tables of single subjects (--each, or fewer than two complete sittings) are unblinded, and only --json \
+                 stores them; omit --blind, --html, --csv and --trials"
+                    .to_owned(),
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// Returns the complete sittings, with a note on each other one; an error if none is complete.
+fn complete(arguments: &AnalyseArguments, logs: Vec<SittingLog>) -> Result<Vec<SittingLog>, CommandError> {
+    let (complete, others): (Vec<_>, Vec<_>) = logs.into_iter().partition(|log| log.complete);
+    if complete.is_empty() {
+        let (data, each): (_, Vec<String>) =
+            (arguments.data.display(), others.iter().map(incomplete).collect());
+        return Err(CommandError::Usage(format!(
+            "{data}: no sitting is complete ({}); `--each` shows the incomplete sittings",
+            each.join(", ")
+        )));
+    }
+    for log in &others {
+        note(format_args!("{}, omitted", incomplete(log)));
+    }
+    Ok(complete)
+}
+
+/// Formats a result for the terminal.
+fn report_text(begin: &Begin, report: &Report<'_>, applied: &Applied) -> String {
+    let (protocol, rules) = (&begin.protocol, begin.exclusion());
+    let title = titled(format!("{} of {}", protocol.task(), protocol.stimulus()), report.observer);
+    let analysed = format!("{}\n{}", style::title(&title), report.analysis.to_text());
+    let has_exclusions = !rules.are_none() || !applied.excluded.is_empty();
+    let excluded = has_exclusions.then(|| applied.to_text(&rules));
+    let checked = (!report.checks.is_empty()).then(|| checks_text(report.checks));
+    let blocks = [Some(analysed), checked, excluded, Some(report.provenance.to_text())];
+    blocks.into_iter().flatten().collect::<Vec<_>>().join("\n\n")
+}
+
+/// Writes a row for each trial, and beside it the scripts that reproduce the tables.
+fn write_trials(
+    path: &Path,
+    choices: Choices,
+    logs: &[SittingLog],
+    protocol: &Protocol,
+    excluded: &[Exclusion],
+) -> Result<(), CommandError> {
     if path.extension().is_none_or(|extension| extension != "csv") {
         let path = path.display();
         return Err(CommandError::Usage(format!("--trials {path}: name a file that ends in .csv")));
     }
-    if !arguments.choices.deviations(Choices::default(), protocol).is_empty() {
+    if !choices.deviations(Choices::default(), protocol).is_empty() {
         note(format_args!(
             "the scripts beside {} use the defaults of --estimator, --type and --ratings: their tables differ from these tables",
             path.display()
         ));
     }
-    let complete: Vec<SittingLog> = logs.into_iter().filter(|log| log.complete).collect();
-    write_text(Some(path), || trials_csv(&complete, &applied.excluded))?;
+    write_text(Some(path), || trials_csv(logs, excluded))?;
     write_text(Some(&path.with_extension("py")), || SCRIPT_PYTHON.to_owned())?;
     let table = path.file_name().unwrap_or_default().to_string_lossy();
     write_text(Some(&path.with_extension("R")), || script_in_r(&table))
-}
-
-/// Analysis with its provenance, checks and exclusions.
-#[derive(Serialize)]
-pub(crate) struct Report<'a> {
-    pub(crate) observer: ObserverKind,
-    #[serde(flatten)]
-    pub(crate) analysis: &'a Analysis,
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    pub(crate) checks: &'a [SubjectChecks],
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    excluded: &'a [Exclusion],
-    #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    not_applied: &'a [NotApplied],
-    pub(crate) provenance: &'a Provenance,
 }
 
 /// Result of one subject, or a blinded result, with the origin of its answers.

@@ -3,8 +3,8 @@
 
 mod figures;
 
-use crate::analyse::Report;
 use crate::analyse::provenance::Provenance;
+use crate::analyse::report::Report;
 use flotor_analysis::exclusion::Applied;
 use flotor_analysis::published::ThesisComparison;
 use flotor_analysis::{
@@ -112,16 +112,12 @@ fn jnd_page(
         percent(h),
         analysis.t.to_text(t_text),
     ));
-    page.figure(
-        figures::thresholds(analysis, stimulus),
-        match analysis.thesis {
-            ThesisComparison::Thesis => {
-                "Thresholds by base and modality, as figure 18 of CMU-RI-TR-07-21. Its bars are printed without numbers; \
-                 the markers are its mean Weber fraction, 14.2 and 17.2 %, times the base."
-            }
-            ThesisComparison::Nothing => "Thresholds by base and modality.",
-        },
+    let as_printed = analysis.thesis.text(
+        ", as figure 18 of CMU-RI-TR-07-21. Its bars are printed without numbers; the markers are its mean Weber fraction, \
+         14.2 and 17.2 %, times the base",
     );
+    let caption = format!("Thresholds by base and modality{as_printed}.");
+    page.figure(figures::thresholds(analysis, stimulus), &caption);
     page.heading("Weber fractions");
     page.table(&["", "this study", "95 % interval", "thesis"], |rows| {
         for ((name, detail), published) in
@@ -214,13 +210,9 @@ fn magnitude_page(page: &mut Page, analysis: &MagnitudeAnalysis, stimulus: &Stim
         analysis.repeated,
         analysis.trend.to_text(rise),
     ));
-    page.figure(
-        figures::ratings(analysis, stimulus),
-        match analysis.thesis {
-            ThesisComparison::Thesis => "Mean ratings over the stimulus, as figure 17 of CMU-RI-TR-07-21.",
-            ThesisComparison::Nothing => "Mean ratings over the stimulus.",
-        },
-    );
+    let as_printed = analysis.thesis.text(", as figure 17 of CMU-RI-TR-07-21");
+    let caption = format!("Mean ratings over the stimulus{as_printed}.");
+    page.figure(figures::ratings(analysis, stimulus), &caption);
     page.heading("Ratings");
     page.means("Stimulus", analysis.ratings.iter().map(|cell| (cell.modality, cell.stimulus, &cell.rating)));
     page.heading("Effects on ratings");

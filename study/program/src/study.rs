@@ -36,6 +36,7 @@ use flotor_study::protocol::{
     Checks, ComparisonSide, JndDemo, JndProtocol, MagnitudeProtocol, ObviousPairs, PresentationOrder,
     Protocol, Stimulus, SubjectNumber,
 };
+use flotor_study::screen::StopKey;
 use serde_json::json;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -156,7 +157,7 @@ struct Common {
     handedness: Option<String>,
     /// Key of the emergency stop in the viewer's window (human)
     #[arg(long, value_enum, default_value_t, value_name = "KEY")]
-    stop_key: front::StopKeyOption,
+    stop_key: StopKey,
     /// Texts of the screens in the viewer's window, in the language of the person (human; default: English)
     #[arg(long, value_name = "FILE")]
     texts: Option<PathBuf>,

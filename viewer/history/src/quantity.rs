@@ -2,6 +2,7 @@
 
 use crate::Sample;
 use flotor_hal::DVec3;
+use flotor_plot::Quantity as Measured;
 use serde::{Deserialize, Serialize};
 
 /// Units of axes and readouts.
@@ -39,20 +40,10 @@ pub enum Quantity {
     Lateness,
 }
 
-impl Quantity {
-    /// All quantities, in the order of menus.
-    pub const ALL: [Quantity; 9] = [
-        Self::Force,
-        Self::Torque,
-        Self::Position,
-        Self::Rotation,
-        Self::Velocity,
-        Self::AngularVelocity,
-        Self::Energy,
-        Self::Stiffness,
-        Self::Lateness,
-    ];
+/// Name, names of components, quantity of `flotor_plot`, SI unit, and handy unit with its factor from SI.
+type Entry = (&'static str, &'static [&'static str], Measured, &'static str, (&'static str, f64));
 
+impl Quantity {
     /// Returns the name for menus and axes.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -68,51 +59,39 @@ impl Quantity {
     /// Returns the unit, and the factor that converts an SI value to it.
     #[must_use]
     pub const fn unit(self, units: Units) -> (&'static str, f64) {
-        let (_, _, si, handy) = self.entry();
+        let (_, _, _, si, handy) = self.entry();
         match units {
             Units::Si => (si, 1.0),
             Units::Handy => handy,
         }
     }
 
-    /// Returns the corresponding quantity of `flotor_plot`, which defines the smallest range of an axis.
-    #[must_use]
-    pub const fn measured(self) -> flotor_plot::Quantity {
-        use flotor_plot::Quantity as Measured;
-        match self {
-            Self::Force => Measured::Force,
-            Self::Torque => Measured::Torque,
-            Self::Position => Measured::Length,
-            Self::Rotation => Measured::Angle,
-            Self::Velocity => Measured::Velocity,
-            Self::AngularVelocity => Measured::AngularVelocity,
-            Self::Energy => Measured::Energy,
-            Self::Stiffness => Measured::Stiffness,
-            Self::Lateness => Measured::Lateness,
-        }
-    }
-
     /// Returns the smallest range of an axis, in these units.
     #[must_use]
     pub fn least_range(self, units: Units) -> f64 {
-        self.measured().least_range_si() * self.unit(units).1
+        self.entry().2.least_range_si() * self.unit(units).1
     }
 
-    /// Returns name, names of components, SI unit, and the handy unit with its factor from SI.
-    const fn entry(self) -> (&'static str, &'static [&'static str], &'static str, (&'static str, f64)) {
+    /// Returns the entry of the table of quantities.
+    const fn entry(self) -> Entry {
         const DEGREES_PER_RAD: f64 = 180.0 / std::f64::consts::PI;
         match self {
-            Self::Force => ("Force", &["Fx", "Fy", "Fz"], "N", ("N", 1.0)),
-            Self::Torque => ("Torque", &["Mx", "My", "Mz"], "N·m", ("mN·m", 1.0e3)),
-            Self::Position => ("Position", &["x", "y", "z"], "m", ("mm", 1.0e3)),
-            Self::Rotation => ("Rotation", &["rx", "ry", "rz"], "rad", ("°", DEGREES_PER_RAD)),
-            Self::Velocity => ("Velocity", &["vx", "vy", "vz"], "m/s", ("mm/s", 1.0e3)),
-            Self::AngularVelocity => {
-                ("Angular velocity", &["wx", "wy", "wz"], "rad/s", ("°/s", DEGREES_PER_RAD))
+            Self::Force => ("Force", &["Fx", "Fy", "Fz"], Measured::Force, "N", ("N", 1.0)),
+            Self::Torque => ("Torque", &["Mx", "My", "Mz"], Measured::Torque, "N·m", ("mN·m", 1.0e3)),
+            Self::Position => ("Position", &["x", "y", "z"], Measured::Length, "m", ("mm", 1.0e3)),
+            Self::Rotation => {
+                ("Rotation", &["rx", "ry", "rz"], Measured::Angle, "rad", ("°", DEGREES_PER_RAD))
             }
-            Self::Energy => ("Energy", &["stored"], "J", ("mJ", 1.0e3)),
-            Self::Stiffness => ("Stiffness", &["-dF/dx"], "N/m", ("N/mm", 1.0e-3)),
-            Self::Lateness => ("Lateness", &["late start", "computing"], "s", ("µs", 1.0e6)),
+            Self::Velocity => ("Velocity", &["vx", "vy", "vz"], Measured::Velocity, "m/s", ("mm/s", 1.0e3)),
+            Self::AngularVelocity => {
+                let turn = Measured::AngularVelocity;
+                ("Angular velocity", &["wx", "wy", "wz"], turn, "rad/s", ("°/s", DEGREES_PER_RAD))
+            }
+            Self::Energy => ("Energy", &["stored"], Measured::Energy, "J", ("mJ", 1.0e3)),
+            Self::Stiffness => ("Stiffness", &["-dF/dx"], Measured::Stiffness, "N/m", ("N/mm", 1.0e-3)),
+            Self::Lateness => {
+                ("Lateness", &["late start", "computing"], Measured::Lateness, "s", ("µs", 1.0e6))
+            }
         }
     }
 

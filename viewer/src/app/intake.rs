@@ -1,12 +1,10 @@
 //! Intake of new data from a running host, and the search for a run.
 
 use super::source::{Parts, connect};
-use super::{Audience, Heading, RunSelection, Source, Viewer};
+use super::{Audience, RunSelection, Source, Viewer};
 use crate::devices::Devices;
 use crate::feed::{Arrivals, FeedState, STALE_AFTER};
-use crate::guide::Guide;
 use crate::panel::Panel;
-use crate::scene::SceneBuilder;
 use egui::Context;
 use flotor_core::trace::Events;
 use flotor_history::player::Player;
@@ -64,17 +62,10 @@ impl Viewer {
         let parts = Parts::of_host(&feed);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a minute of ticks
         let kept = ((feed.run.rate_hz * KEPT_S) as usize).clamp(1, MOST_KEPT);
-        self.devices = Devices::new(History::of_each_device(&feed.run, Retention::Newest(kept)));
-        self.heading = Heading::of(&feed.run);
-        self.limits = feed.greeting.limits;
-        (self.guide, self.drag) = (Guide::new(&feed.greeting.plugins), None);
+        let devices = Devices::new(History::of_each_device(&feed.run, Retention::Newest(kept)));
+        let wanted = wanted.clone();
+        self.replace_run(Source::Live { feed: Box::new(feed), wanted }, devices, parts);
         self.player = Player::live();
-        self.compared = None;
-        self.plots.start_over();
-        self.view.reset(SceneBuilder::extent(&parts.shapes, self.devices.count()));
-        (self.shapes, self.panels, self.missing) = (parts.shapes, parts.panels, parts.missing);
-        self.shape_version += 1;
-        self.source = Source::Live { feed: Box::new(feed), wanted: wanted.clone() };
     }
 
     fn digest(&mut self, arrivals: Arrivals) {

@@ -49,18 +49,9 @@ impl Viewer {
         if pressed(Key::F) && is_live {
             self.player.toggle(true, span_s);
         }
-        const DIGITS: [Key; 9] = [
-            Key::Num1,
-            Key::Num2,
-            Key::Num3,
-            Key::Num4,
-            Key::Num5,
-            Key::Num6,
-            Key::Num7,
-            Key::Num8,
-            Key::Num9,
-        ];
-        if let Some(number) = DIGITS.into_iter().position(pressed) {
+        if let Some(number) =
+            (1..=9).position(|digit: u8| Key::from_name(&digit.to_string()).is_some_and(pressed))
+        {
             self.look_at(number);
         }
         if pressed(Key::M) {

@@ -9,8 +9,10 @@
 
 use super::words::State;
 use super::{Audience, Source, VIEW_PARTS, Viewer};
+use crate::experiment::key_of;
 use crate::export::export;
 use crate::palette::Palette;
+use crate::panel::Panel;
 use crate::scene::{Moment, SceneBuilder};
 use crate::ui::handle::HINT;
 use crate::ui::messages::{Extent, Messages};
@@ -92,7 +94,7 @@ impl Viewer {
     /// Returns the name and the key of the emergency stop: the space bar, or in a sitting the configured key.
     fn stop(&self) -> Stop {
         match &self.sitting {
-            Some(prompt) => Stop { name: prompt.texts.stop.clone(), key: prompt.stop_key.key().name() },
+            Some(prompt) => Stop { name: prompt.texts.stop.clone(), key: key_of(prompt.stop_key).name() },
             None => Stop { name: STOP.to_owned(), key: egui::Key::Space.name() },
         }
     }
@@ -127,10 +129,7 @@ impl Viewer {
                 standing::limits(ui, sample, &self.limits, self.plots.units, palette);
                 ui.add_space(8.0);
             }
-            // Models before devices: users mostly change models.
-            let has_device = self.devices.history().run().devices().count().min(self.panels.len());
-            let (device, models) = self.panels.split_at_mut(has_device);
-            for panel in models.iter_mut().chain(device) {
+            for panel in self.models_and_devices() {
                 let changed = parameters::panel(ui, panel, palette);
                 values.extend(changed.into_iter().filter_map(|index| panel.change(index)));
                 ui.add_space(8.0);
@@ -142,12 +141,17 @@ impl Viewer {
         }
     }
 
+    /// Returns the panels in the shown order, models before devices: users mostly change models.
+    fn models_and_devices(&mut self) -> impl Iterator<Item = &mut Panel> {
+        let device_count = self.devices.history().run().devices().count().min(self.panels.len());
+        let (devices, models) = self.panels.split_at_mut(device_count);
+        models.iter_mut().chain(devices)
+    }
+
     /// Undoes the last change of a panel, in models before devices.
     pub(super) fn undo(&mut self) {
-        let has_device = self.devices.history().run().devices().count().min(self.panels.len());
-        let (device, models) = self.panels.split_at_mut(has_device);
-        let mut panels = models.iter_mut().chain(device);
-        let undone = panels.find_map(|panel| panel.undo().and_then(|index| panel.change(index)));
+        let undone =
+            self.models_and_devices().find_map(|panel| panel.undo().and_then(|index| panel.change(index)));
         if let Some(value) = undone {
             self.ask(Ask::Set { values: vec![value] });
         }

@@ -8,6 +8,7 @@ mod intake;
 mod keys;
 mod layout;
 mod opening;
+mod recording;
 mod sitting;
 mod source;
 mod words;

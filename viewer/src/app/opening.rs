@@ -1,20 +1,9 @@
-//! Opening of recordings in the window: by drag and drop, by path, or from the list of latest recordings.
+//! Form for opening a recording: by path, or from the list of latest recordings.
 
-use super::source::{Parts, Source};
-use super::{Heading, Recorded, Viewer};
-use crate::devices::Devices;
-use crate::guide::Guide;
 use crate::palette::Palette;
-use crate::scene::SceneBuilder;
-use crate::ui::plot_stack::Window;
 use crate::ui::style::SMALL_PT;
-use egui::{Button, DroppedFile, Key, RichText, Role, TextEdit, Ui, WidgetInfo};
-use flotor_history::compared::Compared;
-use flotor_history::player::Player;
-use flotor_history::{History, Sample};
-use flotor_live::WrenchLimits;
+use egui::{Button, Key, RichText, Role, TextEdit, Ui, WidgetInfo};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Largest number of latest recordings.
 const MOST_LATEST: usize = 5;
@@ -30,11 +19,11 @@ const FIELD: &str = "Path of a recording";
 #[derive(Clone, Debug, Default)]
 pub(super) struct Opening {
     /// Text of the field.
-    typed: String,
+    pub(super) typed: String,
     /// Recordings opened last, the newest first.
     latest: Vec<PathBuf>,
     /// Plugin files for drawing the bodies.
-    plugins: Vec<PathBuf>,
+    pub(super) plugins: Vec<PathBuf>,
 }
 
 impl Opening {
@@ -57,7 +46,7 @@ impl Opening {
     }
 
     /// Moves a recording to the front of the latest recordings.
-    fn remember(&mut self, file: &Path) {
+    pub(super) fn remember(&mut self, file: &Path) {
         let file = std::path::absolute(file).unwrap_or_else(|_| file.to_path_buf());
         self.latest.retain(|known| *known != file);
         self.latest.insert(0, file);
@@ -100,68 +89,5 @@ impl Opening {
             }
         }
         chosen
-    }
-}
-
-impl Viewer {
-    /// Opens a recording dropped on an empty window; otherwise shows it over the current run, so that a session and its emergency stop stay
-    /// visible.
-    pub(super) fn open_dropped(&mut self, ui: &Ui) {
-        let path = |file: &Arc<dyn DroppedFile + Send + Sync>| file.path().to_path_buf();
-        let dropped: Vec<PathBuf> = ui.input(|input| input.raw.dropped_files.iter().map(path).collect());
-        for file in dropped {
-            if matches!(self.source, Source::Waiting(_)) {
-                self.open(&file);
-            } else {
-                self.lay_over(&file);
-            }
-        }
-    }
-
-    /// Shows a recording over the current run, or a warning if the file cannot be read.
-    fn lay_over(&mut self, file: &Path) {
-        match Compared::read(file) {
-            Ok(compared) => {
-                self.compared = Some(compared);
-                self.plots.forget_compared();
-            }
-            Err(error) => self.say(error.to_string()),
-        }
-    }
-
-    /// Shows a recording in place of the current run, or a warning if the file cannot be read.
-    pub(super) fn open(&mut self, file: &Path) {
-        match History::read(file) {
-            Ok(histories) => {
-                let plugins = self.opening.plugins.clone();
-                self.opening.typed.clear();
-                self.show_recording(Recorded {
-                    file: Some(file.into()),
-                    ..Recorded::new(histories, plugins)
-                });
-            }
-            Err(error) => self.say(error.to_string()),
-        }
-    }
-
-    /// Shows a recording, at the time of the largest force unless another time is given.
-    pub(super) fn show_recording(&mut self, recorded: Recorded) {
-        let Recorded { histories, at_s, plugins, file, compared } = recorded;
-        self.devices = Devices::new(histories);
-        let run = self.devices.history().run();
-        let parts = Parts::of_recording(run, &plugins);
-        self.heading = Heading::of(run);
-        (self.opening.plugins, self.compared) = (plugins, compared);
-        file.iter().for_each(|file| self.opening.remember(file));
-        let strongest_s = self.devices.history().strongest().map(Sample::time_s);
-        self.player = Player::at(at_s.or(strongest_s).unwrap_or(0.0));
-        self.plots.window = Window::Whole;
-        self.plots.start_over();
-        self.view.reset(SceneBuilder::extent(&parts.shapes, self.devices.count()));
-        (self.shapes, self.panels, self.missing) = (parts.shapes, parts.panels, parts.missing);
-        self.shape_version += 1;
-        (self.guide, self.drag) = (Guide::new(&[]), None);
-        self.limits = WrenchLimits::default();
-        self.source = Source::Recording;
     }
 }

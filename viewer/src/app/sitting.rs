@@ -1,7 +1,7 @@
 //! Window for a person in a sitting: one screen at a time and the emergency stop.
 
 use super::{Source, Viewer};
-use crate::experiment::{Prompt, screens};
+use crate::experiment::{Prompt, key_of, screens};
 use crate::palette::Palette;
 use crate::scene::SceneBuilder;
 use egui::{CentralPanel, Frame, Key, Panel as Edge, Rect, Ui, ViewportCommand};
@@ -22,7 +22,7 @@ impl Viewer {
     /// Shows the screen of a sitting, and sends the input of the person to the experiment.
     pub(super) fn sit(&mut self, ui: &mut Ui, palette: &Palette) {
         let is_running = self.source.is_running();
-        let stop_key = self.sitting.as_ref().map(|prompt| prompt.stop_key.key());
+        let stop_key = self.sitting.as_ref().map(|prompt| key_of(prompt.stop_key));
         if is_running && stop_key.is_some_and(|key| ui.input(|input| input.key_pressed(key))) {
             self.ask(Ask::EmergencyStop);
         }

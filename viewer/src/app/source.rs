@@ -1,10 +1,11 @@
 //! Source of the window's data: no run yet, a running host, or a recording.
 
 use crate::feed::{Feed, FeedState};
+use crate::guide::Guide;
 use crate::panel::{Panel, PanelPurpose};
 use crate::shape::{Shape, file_of, load_file, shapes_of};
 use egui::Context;
-use flotor_live::{Client, Directory, LiveError, PanelPlugin};
+use flotor_live::{Client, Directory, LiveError, PanelPlugin, WrenchLimits};
 use flotor_record::RunDescription;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -103,16 +104,22 @@ pub(super) struct Parts {
     pub(super) panels: Vec<Panel>,
     /// Messages about missing bodies.
     pub(super) missing: Vec<String>,
+    /// Hands that can be guided.
+    pub(super) guide: Guide,
+    /// Limits of the wrench.
+    pub(super) limits: WrenchLimits,
 }
 
 impl Parts {
     /// Builds the parts of a running host, from the plugin files of its greeting.
     #[must_use]
     pub(super) fn of_host(feed: &Feed) -> Self {
-        let files: Vec<PathBuf> = feed.greeting.plugins.iter().map(|plugin| plugin.file.clone()).collect();
+        let plugins = &feed.greeting.plugins;
+        let files: Vec<PathBuf> = plugins.iter().map(|plugin| plugin.file.clone()).collect();
         let (mut shapes, missing) = shapes_of(&feed.run, &files);
-        let panels = feed.greeting.plugins.iter().map(|plugin| panel(plugin, &mut shapes)).collect();
-        Self { shapes, panels, missing: missing.iter().map(ToString::to_string).collect() }
+        let panels = plugins.iter().map(|plugin| panel(plugin, &mut shapes)).collect();
+        let missing = missing.iter().map(ToString::to_string).collect();
+        Self { shapes, panels, missing, guide: Guide::new(plugins), limits: feed.greeting.limits }
     }
 
     /// Builds the parts of a recording, from the plugin files that were found.
@@ -131,8 +138,8 @@ impl Parts {
                 PanelPurpose::Read,
             )
         });
-        let panels = panels.collect();
-        Self { shapes, panels, missing: missing.iter().map(ToString::to_string).collect() }
+        let (panels, missing) = (panels.collect(), missing.iter().map(ToString::to_string).collect());
+        Self { shapes, panels, missing, guide: Guide::new(&[]), limits: WrenchLimits::default() }
     }
 }
 

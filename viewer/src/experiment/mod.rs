@@ -10,7 +10,7 @@ pub mod texts;
 pub mod wire;
 
 use egui::Context;
-use flotor_study::screen::{Input, May, Question, Screen, WindowMessage, WindowReply, WindowState};
+use flotor_study::screen::{Input, May, Question, Screen, StopKey, WindowMessage, WindowReply, WindowState};
 use flotor_study::trial::Response;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError};
 use std::sync::{Arc, OnceLock};
@@ -41,27 +41,13 @@ const MOST_DIGITS: usize = 8;
 /// Display time of a warning.
 const WARNED: Duration = Duration::from_secs(2);
 
-/// Key of the emergency stop in a sitting; by default not the largest key, which a person tends to press to continue.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum StopKey {
-    /// Escape
-    #[default]
-    Escape,
-    /// The space bar
-    Space,
-    /// F12
-    F12,
-}
-
-impl StopKey {
-    /// Returns the key of the window.
-    #[must_use]
-    pub const fn key(self) -> egui::Key {
-        match self {
-            Self::Escape => egui::Key::Escape,
-            Self::Space => egui::Key::Space,
-            Self::F12 => egui::Key::F12,
-        }
+/// Returns the key of the window for an emergency stop.
+#[must_use]
+pub const fn key_of(stop_key: StopKey) -> egui::Key {
+    match stop_key {
+        StopKey::Escape => egui::Key::Escape,
+        StopKey::Space => egui::Key::Space,
+        StopKey::F12 => egui::Key::F12,
     }
 }
 

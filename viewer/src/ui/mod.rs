@@ -1,6 +1,7 @@
 //! Parts of the interface, used by window, tests and headless pictures.
 
 pub mod device_row;
+pub mod export_options;
 pub mod force_position;
 pub mod handle;
 pub mod help;

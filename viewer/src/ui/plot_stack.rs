@@ -3,9 +3,9 @@
 mod choices;
 
 use crate::display_options::DisplayOptions;
-use crate::export::ExportOptions;
 use crate::palette::Palette;
 use crate::trace::Trace;
+use crate::ui::export_options::{ExportFormat, ExportOptions};
 use crate::ui::force_position::ForcePositionPlot;
 use crate::ui::marks::Marks;
 use crate::ui::plots::{Lines, Maximise, PlotView, plot};
@@ -15,7 +15,6 @@ use flotor_history::History;
 use flotor_history::player::Motion;
 use flotor_history::quantity::{Quantity, Units};
 use std::collections::BTreeMap;
-use std::path::Path;
 
 /// Default traces.
 pub const FIRST_TRACES: [Quantity; 2] = [Quantity::Force, Quantity::Position];
@@ -60,32 +59,6 @@ pub enum PlotRequest {
     Seek(f64),
     /// Export the shown traces to a file.
     Export(ExportFormat),
-}
-
-/// File format of exported traces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ExportFormat {
-    /// Numbers as CSV.
-    Csv,
-    /// Vector graphics as SVG.
-    Svg,
-    /// Pixels as PNG.
-    Png,
-}
-
-impl ExportFormat {
-    /// Returns the format of a file, from the extension of its name.
-    ///
-    /// # Errors
-    /// A message of one line if the extension is none of csv, svg and png.
-    pub fn of_file(file: &Path) -> Result<Self, String> {
-        match file.extension().and_then(|ending| ending.to_str()) {
-            Some("csv") => Ok(Self::Csv),
-            Some("svg") => Ok(Self::Svg),
-            Some("png") => Ok(Self::Png),
-            _ => Err(format!("`{}` must end with .csv, .svg or .png", file.display())),
-        }
-    }
 }
 
 /// Error of a picture too low for its traces.
@@ -212,43 +185,19 @@ impl PlotStack {
 
     /// Draws the traces, and force over position, into the available area, as a picture without controls.
     pub fn still(&mut self, ui: &mut Ui, seen: TraceSource<'_>, cursor_s: f64, palette: &Palette) {
-        let TraceSource { history, device, .. } = seen;
-        let span_s = self.span_of_both_s(seen);
+        self.traces.clear();
+        self.forget_compared();
         let mut left = ui.available_rect_before_wrap();
         if self.force_position.axis.is_some() {
-            let beside;
-            (left, beside) = split_for_force_position(left, 16.0);
-            let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
-            self.force_position.show(&mut right, (history, f64::NAN), span_s, self.units, palette);
+            left = self.show_beside(ui, seen, (f64::NAN, 16.0), palette);
         }
         // Half of the last number of the time axis is beyond its end.
         let mut ui = ui.new_child(UiBuilder::new().max_rect(left.with_max_x(left.right() - 16.0)));
-        ui.spacing_mut().item_spacing.y = GAP_PT;
         let in_sight = self.in_sight();
         let count = in_sight.len().max(1) as f32;
-        let height = (ui.available_height() - HEADING_AND_GAPS_PT * count - 16.0) / count;
-        for (index, quantity) in in_sight.iter().enumerate() {
-            let time_axis = index + 1 == in_sight.len();
-            let view = PlotView {
-                device,
-                span_s,
-                cursor_s,
-                units: self.units,
-                height: height + if time_axis { 14.0 } else { 0.0 },
-                time_axis,
-                values: self.shown_values_of(*quantity),
-                maximise: Maximise::No,
-                wheel: Wheel::Zooms,
-            };
-            let mut traces = [Trace::of(*quantity), Trace::of(*quantity)];
-            let [trace, compared] = &mut traces;
-            let compared = seen.compared.map(|history| Lines { history, trace: compared });
-            let drawn = plot(&mut ui, Lines { history, trace }, compared, view, palette);
-            self.marks.show_faults(&ui, history, span_s, drawn.frame, palette);
-            if time_axis {
-                self.marks.show(&mut ui, history, span_s, drawn.frame, palette);
-            }
-        }
+        let height_pt = (ui.available_height() - HEADING_AND_GAPS_PT * count - 16.0) / count;
+        let controls = (Maximise::No, Wheel::Zooms);
+        self.stack(&mut ui, (seen, cursor_s), (&in_sight, height_pt), controls, palette);
     }
 
     /// Returns the range of values of a zoomed trace, in the displayed units.
@@ -375,15 +324,31 @@ impl PlotStack {
         if self.force_position.axis.is_some() && ui.available_width() < ROOM_BESIDE_PT {
             self.force_position.show(ui, (seen.history, cursor_s), span_s, self.units, palette);
         } else if self.force_position.axis.is_some() {
-            let (left, beside) = split_for_force_position(ui.available_rect_before_wrap(), 12.0);
-            let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
-            self.force_position.show(&mut right, (seen.history, cursor_s), span_s, self.units, palette);
+            let left = self.show_beside(ui, seen, (cursor_s, 12.0), palette);
             let mut left = ui.new_child(UiBuilder::new().max_rect(left).id_salt("over time"));
             self.over_time(&mut left, seen, now_s, palette, &mut requests);
         } else {
             self.over_time(ui, seen, now_s, palette, &mut requests);
         }
         requests
+    }
+
+    /// Shows force over position at the right of the available area; returns the area for the traces, left of it and a gap.
+    fn show_beside(
+        &mut self,
+        ui: &mut Ui,
+        seen: TraceSource<'_>,
+        (cursor_s, gap_pt): (f64, f32),
+        palette: &Palette,
+    ) -> Rect {
+        /// Fraction of the width for force over position.
+        const PART: f32 = 0.36;
+        let all = ui.available_rect_before_wrap();
+        let beside = all.with_min_x(all.right() - (PART * all.width()).round());
+        let span_s = self.span_of_both_s(seen);
+        let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
+        self.force_position.show(&mut right, (seen.history, cursor_s), span_s, self.units, palette);
+        all.with_max_x(beside.left() - gap_pt)
     }
 
     /// Shows all traces, or as many as fit, and stores the number of the others.
@@ -407,7 +372,14 @@ impl PlotStack {
         let shown = all.get(self.first..self.first + count).unwrap_or(&all);
         self.out_of_sight = [self.first, all.len().saturating_sub(self.first + count)];
         let height_pt = room_for(count).max(LEAST_TRACE_PT);
-        requests.extend(self.stack(ui, seen, now_s, (shown, height_pt, wheel), palette));
+        let maximise = match (self.alone, self.shown.len()) {
+            (Some(_), _) => Maximise::Done,
+            (None, 0 | 1) => Maximise::No,
+            (None, _) => Maximise::Possible,
+        };
+        let cursor_s = self.hover_s.unwrap_or(now_s);
+        let controls = (maximise, wheel);
+        requests.extend(self.stack(ui, (seen, cursor_s), (shown, height_pt), controls, palette));
     }
 
     /// Scrolls by a trace when the wheel turns over the traces.
@@ -432,19 +404,13 @@ impl PlotStack {
     fn stack(
         &mut self,
         ui: &mut Ui,
-        seen: TraceSource<'_>,
-        now_s: f64,
-        (shown, height_pt, wheel): (&[Quantity], f32, Wheel),
+        (seen, cursor_s): (TraceSource<'_>, f64),
+        (shown, height_pt): (&[Quantity], f32),
+        (maximise, wheel): (Maximise, Wheel),
         palette: &Palette,
     ) -> Vec<PlotRequest> {
         let TraceSource { history, device, .. } = seen;
         let span_s = self.span_of_both_s(seen);
-        let cursor_s = self.hover_s.unwrap_or(now_s);
-        let maximise = match (self.alone, self.shown.len()) {
-            (Some(_), _) => Maximise::Done,
-            (None, 0 | 1) => Maximise::No,
-            (None, _) => Maximise::Possible,
-        };
         self.hover_s = None;
         ui.spacing_mut().item_spacing.y = GAP_PT;
         let mut requests = Vec::new();
@@ -521,12 +487,4 @@ impl PlotStack {
             Units::Si => Units::Handy,
         };
     }
-}
-
-/// Splits an area into one for the traces and, to the right, one for force over position.
-fn split_for_force_position(all: Rect, gap_pt: f32) -> (Rect, Rect) {
-    /// Fraction of the width for force over position.
-    const PART: f32 = 0.36;
-    let beside = all.with_min_x(all.right() - (PART * all.width()).round());
-    (all.with_max_x(beside.left() - gap_pt), beside)
 }

@@ -1,6 +1,7 @@
 //! A recording: played and scrubbed; its traces, in which units, where the moment is, and as files.
 
 use super::window::{Window, recorded, recording, window};
+use clap::ValueEnum;
 use egui::Key;
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
@@ -10,7 +11,7 @@ use flotor_viewer::app::{Recorded, Start};
 use flotor_viewer::display_options::DisplayOptions;
 use flotor_viewer::palette::Look;
 use flotor_viewer::picture::{PictureError, PictureOptions, has_moment, least_height_px, picture};
-use flotor_viewer::ui::plot_stack::ExportFormat;
+use flotor_viewer::ui::export_options::ExportFormat;
 
 #[test]
 fn a_recording_is_played_scrubbed_and_repeated() {
@@ -183,7 +184,7 @@ fn what_a_command_line_chooses_holds_in_a_window_and_in_a_picture() {
     assert_ne!(drawn(chosen, [640, 600]).expect("a picture"), usual);
     let explicit = DisplayOptions::new(0, vec![Quantity::Force, Quantity::Position], None);
     assert_eq!(drawn(explicit, [640, 600]).expect("a picture"), usual);
-    let all = DisplayOptions::new(0, Quantity::ALL.to_vec(), None);
+    let all = DisplayOptions::new(0, Quantity::value_variants().to_vec(), None);
     assert!(matches!(drawn(all, [640, 600]), Err(PictureError::TooLow(_))));
     // Whether the traces were chosen or not.
     let least_px = least_height_px(&DisplayOptions::default(), 1.0);
@@ -207,7 +208,7 @@ fn a_moment_outside_the_recording_is_refused_with_its_ends() {
 #[test]
 fn a_file_too_low_for_its_traces_is_refused_and_the_least_height_is_enough() {
     let mut window = recording();
-    window.state_mut().choose(&DisplayOptions::new(0, Quantity::ALL.to_vec(), None));
+    window.state_mut().choose(&DisplayOptions::new(0, Quantity::value_variants().to_vec(), None));
     let folder = tempfile::tempdir().expect("a scratch folder");
     let mut plots = window.state().plots().clone();
     let written = |plots: &_, format| {

@@ -2,7 +2,7 @@
 
 use super::call::{Call, CallError, Unresponsive};
 use super::process::{Notice, abandon, notify};
-use crate::lock::lock;
+use flotor_core::lock;
 use flotor_servo::last_stop::{enter_call, exit_call, prepare_for_calls};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};

@@ -6,10 +6,10 @@ mod stamp;
 
 use self::stamp::{FileStamp, hash_of};
 use crate::calls::{self, Call, CallError, CallThread};
-use crate::lock::lock;
 pub use crate::platform::is_same_file;
 use crate::platform::{UNKNOWN_PROGRAM, distrust, user_folder};
 use crate::scene::nearest;
+use flotor_core::lock;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};

@@ -2,7 +2,7 @@
 //! of the run presses the latch.
 
 use super::error::RunError;
-use crate::lock::lock;
+use flotor_core::lock;
 use flotor_live::{Directory, Latch, LatchState, process_number};
 use flotor_servo::{EmergencySource, StopSwitch, enter_guard_priority};
 use std::fmt::{self, Display, Formatter};

@@ -15,11 +15,11 @@ mod peer_link;
 pub use flotor_live::{LinkCounts, Pairing};
 pub use peer_link::{PeerLink, start_peer_link};
 
-use crate::lock::lock;
 use crate::registry::Registry;
 use crate::scene::Scene;
 use crate::{ControlError, Controls, LatchGuard, NewValue, Observer, PluginReport, Session};
 use flotor_core::Change;
+use flotor_core::lock;
 use flotor_core::trace::TickRecord;
 use flotor_hal::{Demand, Embodiment};
 use flotor_live::{

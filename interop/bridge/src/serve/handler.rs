@@ -4,18 +4,18 @@
 //! for a separate thread, which a slow host or member may delay.
 
 use super::emergency::{Emergency, who};
+use super::launcher::Launcher;
 use super::station::{Station, json};
-use super::{Launcher, WaitNow};
 use crate::couple::{CoupleError, MessageCounts};
 use crate::keys::Name;
-use crate::link::LinkError;
+use crate::link::{LinkError, WaitNow};
 use crate::request::{AdmissionControl, MAX_REQUEST_BYTES, Refusal, Request, Right, is_emergency_stop};
 use crate::status::{State, Status};
 use flotor_live::{Answer, ChangeMessage, Client, Directory, Greeting, Latch, RefusalCause, RequestClient};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 use zenoh::Session;
 use zenoh::query::{Query, Queryable};
@@ -159,7 +159,7 @@ impl RequestHandler {
     }
 
     fn lock(&self) -> MutexGuard<'_, Inside> {
-        self.inside.lock().unwrap_or_else(PoisonError::into_inner)
+        flotor_core::lock(&self.inside)
     }
 
     /// Stores a new run.

@@ -18,9 +18,9 @@ pub use launcher::Launcher;
 
 use crate::couple::{CoupleError, Couplers, Side};
 use crate::keys::Name;
-use crate::link::{Link, LinkError};
+use crate::link::{Link, WaitNow};
 use crate::request::Right;
-use flotor_live::{Ask, Client, Directory, Event, LiveError};
+use flotor_live::{Ask, Client, Directory, End, EndKind, Event, LiveError};
 use handler::RequestHandler;
 use station::Station;
 use std::sync::Arc;
@@ -151,10 +151,8 @@ impl Relay<'_> {
                     break;
                 }
                 Err(error) => {
-                    station.end(
-                        &flotor_live::End { words: error.to_string(), kind: flotor_live::EndKind::Failed },
-                        handler.due(),
-                    )?;
+                    let end = End { words: error.to_string(), kind: EndKind::Failed };
+                    station.end(&end, handler.due())?;
                     break;
                 }
             }
@@ -168,19 +166,5 @@ impl Relay<'_> {
         self.couplers.follow(report_line)?;
         self.handler.carried(self.couplers.carried());
         Ok(self.handler.report(&self.station)?)
-    }
-}
-
-/// Wait for operations that complete at once: all declarations here are local.
-trait WaitNow<T> {
-    fn wait_now(self) -> Result<T, LinkError>;
-}
-
-impl<T, R> WaitNow<T> for R
-where
-    R: zenoh::Wait + zenoh::Resolvable<To = zenoh::Result<T>>,
-{
-    fn wait_now(self) -> Result<T, LinkError> {
-        self.wait().map_err(LinkError::from)
     }
 }

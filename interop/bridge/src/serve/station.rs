@@ -1,8 +1,7 @@
 //! Publishers of a bridge.
 
-use super::WaitNow;
 use crate::keys::Name;
-use crate::link::LinkError;
+use crate::link::{LinkError, WaitNow};
 use crate::status::Status;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
@@ -50,7 +49,7 @@ impl Station {
     /// Publishes a tick with its number among all due ticks: a gap shows a loss.
     pub(super) fn tick(&self, record: &TickRecord, number: u64) -> Result<(), LinkError> {
         let (pose, tick) = {
-            let mut messages = self.messages.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            let mut messages = flotor_core::lock(&self.messages);
             messages.encode(record)
         };
         self.pose.put(pose).wait_now()?;

@@ -15,8 +15,8 @@ mod client;
 
 pub use client::press_both_ways;
 
-use crate::access::now_s;
 use crate::keys::Name;
+use crate::wall_clock::since_1970;
 use ring::hmac;
 use ring::rand::{SecureRandom, SystemRandom};
 use serde::{Deserialize, Serialize};
@@ -45,7 +45,7 @@ pub struct StopChannel {
 
 impl StopChannel {
     pub(crate) fn is_expired(&self) -> bool {
-        self.expires_s.is_some_and(|end| end < now_s())
+        self.expires_s.is_some_and(|end| end < since_1970().as_secs())
     }
 }
 

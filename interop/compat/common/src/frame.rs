@@ -42,6 +42,13 @@ impl Frame {
     }
 }
 
+/// Returns the length of a vector, without overflow of its square.
+#[must_use]
+pub fn length(vector: DVec3) -> f64 {
+    let largest = vector.abs().max_element();
+    if largest > 0.0 && largest.is_finite() { (vector / largest).length() * largest } else { largest }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

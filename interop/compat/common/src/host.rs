@@ -1,7 +1,7 @@
 //! The single run of a process: prepared at the first access, begun by the first open device, ended with the program.
 
 use crate::process::{at_end, guarded, is_copy, is_first, library, notice_copies, quietly};
-use crate::run::{LockstepRun, Prepared, report_line};
+use crate::run::{LockstepRun, Prepared, is_emergency_stopped, report_line};
 use crate::settings::{Pace, Settings, SharedControlGroup, env_value};
 use crate::station::{Station, Turn};
 use flotor_servo::{Clock, StopSwitch, guest, monotonic_ns};
@@ -9,8 +9,8 @@ use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
 use flotor_session::{RunOptions, Session, program};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, Once, OnceLock, PoisonError};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, Once, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -28,13 +28,6 @@ const LOOK: Duration = Duration::from_millis(1);
 const READS_OF_A_TICK: u64 = 100;
 
 static HOST: OnceLock<Option<Host>> = OnceLock::new();
-/// True once the emergency stop was pressed.
-static IS_STOPPED: AtomicBool = AtomicBool::new(false);
-
-/// Records that the emergency stop was pressed.
-pub(crate) fn note_emergency_stop() {
-    IS_STOPPED.store(true, Ordering::Release);
-}
 
 /// Returns the run of this process, preparing the scene at the first call; `None` in a forked copy of the process, or if the scene
 /// cannot be run, which is reported once. Not real-time.
@@ -69,7 +62,7 @@ fn host_so_far() -> Option<&'static Host> {
 }
 
 /// Returns the devices of this process's run; empty without one.
-pub(crate) fn stations_so_far() -> &'static [Station] {
+fn stations_so_far() -> &'static [Station] {
     host_so_far().map_or(&[], Host::stations)
 }
 
@@ -90,6 +83,16 @@ enum Stage {
     Beside(JoinHandle<()>),
     Lockstep(Box<LockstepRun>),
     Over,
+}
+
+impl Stage {
+    fn is_running(&self) -> bool {
+        match self {
+            Self::Lockstep(_) => true,
+            Self::Beside(thread) => !thread.is_finished(),
+            Self::Prepared(_) | Self::Over => false,
+        }
+    }
 }
 
 impl Host {
@@ -213,16 +216,12 @@ impl Host {
             }
             begun => *stage = begun,
         }
-        match &*stage {
-            Stage::Lockstep(_) => true,
-            Stage::Beside(thread) => !thread.is_finished(),
-            Stage::Prepared(_) | Stage::Over => false,
-        }
+        stage.is_running()
     }
 
     fn start(&self, prepared: Prepared) -> Stage {
         if self.pace == Pace::Lockstep {
-            return match prepared.in_lockstep(&self.stop) {
+            return match prepared.in_lockstep(&self.stop, stations_so_far()) {
                 Ok(mut run) => {
                     run.advance(); // there is a pose from the start on
                     Stage::Lockstep(Box::new(run))
@@ -255,17 +254,13 @@ impl Host {
     /// Returns whether the run is in progress, so that force can reach a hand.
     #[must_use]
     pub fn is_running(&self) -> bool {
-        match &*self.stage() {
-            Stage::Lockstep(_) => true,
-            Stage::Beside(thread) => !thread.is_finished(),
-            Stage::Prepared(_) | Stage::Over => false,
-        }
+        self.stage().is_running()
     }
 
     /// Returns whether the emergency stop ended the run, rather than the loss of a device.
     #[must_use]
     pub fn is_stopped_for_safety(&self) -> bool {
-        IS_STOPPED.load(Ordering::Acquire)
+        is_emergency_stopped()
     }
 
     /// Counts a read of the program. In lockstep the hundredth without a command makes a tick, after `before_tick`: otherwise a program
@@ -330,7 +325,7 @@ impl Host {
     }
 
     fn stage(&self) -> MutexGuard<'_, Stage> {
-        self.stage.lock().unwrap_or_else(PoisonError::into_inner)
+        flotor_core::lock(&self.stage)
     }
 }
 

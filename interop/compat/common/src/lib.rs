@@ -12,6 +12,7 @@
 //! Not real-time: the loop has a thread of its own, and neither side waits for the other.
 #![allow(unsafe_code)] // `process.rs` and `pointer.rs`; listed in tests/tests/system/architecture.rs
 
+mod entry;
 mod frame;
 mod host;
 pub mod pointer;
@@ -20,9 +21,9 @@ mod run;
 mod settings;
 mod station;
 
-pub use frame::Frame;
+pub use frame::{Frame, length};
 pub use host::{Host, host, prepare};
-pub use process::{Language, guarded, language, library, quietly};
+pub use process::{Language, guarded, interned, language, library, quietly};
 pub use settings::{Pace, Settings, SharedControlGroup, env_value};
 pub use station::{Axes, State, Station, Turn};
 

@@ -1,11 +1,13 @@
 //! Process of the program: forked copies, end, signals, and the file of this library.
 
+use std::collections::BTreeMap;
+use std::ffi::{CStr, CString};
 use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Once, OnceLock};
+use std::sync::{Mutex, Once, OnceLock};
 
 /// True in a forked copy of the process that prepared the run: the devices belong to the original.
 static IS_COPY: AtomicBool = AtomicBool::new(false);
@@ -108,4 +110,14 @@ pub fn library() -> Option<PathBuf> {
     let line = maps.lines().find(holds)?;
     let path = line.find('/').and_then(|start| line.get(start..))?;
     PathBuf::from(path).canonicalize().ok()
+}
+
+/// Interns a text for a program: the pointer stays valid for the life of the process.
+#[must_use]
+pub fn interned(text: String) -> &'static CStr {
+    static TEXTS: Mutex<BTreeMap<String, &'static CStr>> = Mutex::new(BTreeMap::new());
+    let mut texts = flotor_core::lock(&TEXTS);
+    let keep =
+        |text: &String| &*Box::leak(CString::new(text.as_str()).unwrap_or_default().into_boxed_c_str());
+    texts.entry(text).or_insert_with_key(keep)
 }

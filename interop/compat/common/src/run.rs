@@ -1,12 +1,12 @@
 //! Run behind a program: recorded, published to clients, reported at its end.
 
-use crate::host::{note_emergency_stop, stations_so_far};
+use crate::frame::length;
 use crate::settings::Settings;
 use crate::station::Station;
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
+use flotor_hal::Demand;
 use flotor_hal::terminal::escaped;
-use flotor_hal::{DVec3, Demand};
 use flotor_live::Directory;
 use flotor_record::{Note, Recorder, RunDescription, Severity};
 use flotor_servo::{Place, RunEnd, StopSwitch, Stuck};
@@ -18,7 +18,16 @@ use flotor_session::{
     Lockstep, Measurements, Observer, Outcome, PluginReport, RunError, RunOptions, Session,
 };
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
+
+/// True once the emergency stop was pressed.
+static IS_STOPPED: AtomicBool = AtomicBool::new(false);
+
+/// Returns whether the emergency stop ended the run of this process.
+pub(crate) fn is_emergency_stopped() -> bool {
+    IS_STOPPED.load(Ordering::Acquire)
+}
 
 /// Prepared run with the data of its report.
 pub(crate) struct Prepared {
@@ -38,6 +47,7 @@ struct Watchers {
 /// Intermediate summary, which stays if the program is killed.
 struct Draft {
     facts: Facts,
+    stations: &'static [Station],
     /// Time of the last write.
     written: Option<Instant>,
 }
@@ -54,11 +64,7 @@ impl Draft {
             return;
         }
         self.written = Some(Instant::now());
-        let lines: Vec<String> = stations_so_far()
-            .iter()
-            .zip(requested)
-            .map(|(station, requested)| line(station, *requested))
-            .collect();
+        let lines = lines(self.stations, requested);
         let ran_s = record.time_ns as f64 * 1.0e-9;
         let Facts { scene, settings, .. } = &self.facts;
         if let Some(path) = settings.report.as_deref().filter(|path| path.as_os_str() != "-") {
@@ -119,12 +125,6 @@ impl Observer for Watchers {
     }
 }
 
-/// Returns the length of a vector, without overflow of its square.
-fn length(vector: DVec3) -> f64 {
-    let largest = vector.abs().max_element();
-    if largest > 0.0 && largest.is_finite() { (vector / largest).length() * largest } else { largest }
-}
-
 /// Facts of a run apart from its ticks.
 #[derive(Clone)]
 struct Facts {
@@ -136,7 +136,11 @@ struct Facts {
 
 impl Prepared {
     /// Creates the observers of the run and the facts for its report.
-    fn watched(&self, stop: &StopSwitch) -> Result<(ObservedRun<Watchers>, Facts), String> {
+    fn watched(
+        &self,
+        stop: &StopSwitch,
+        stations: &'static [Station],
+    ) -> Result<(ObservedRun<Watchers>, Facts), String> {
         let Self { session, scene, options, settings } = self;
         let plugins = session.plugins().to_vec();
         let description: RunDescription = describe(scene, options, &plugins);
@@ -151,21 +155,21 @@ impl Prepared {
             // The program requests force and torque.
             measured: Measurements::new(recorder, Demand::WRENCH),
             requested: Vec::new(),
-            draft: is_reported.then(|| Draft { facts: facts.clone(), written: None }),
+            draft: is_reported.then(|| Draft { facts: facts.clone(), stations, written: None }),
         };
         Ok((ObservedRun { observer: watchers, publication: publication.ok() }, facts))
     }
 
     /// Executes the run on this thread, until it is stopped or the device faults. Not real-time.
-    pub(crate) fn run(self, stop: &StopSwitch, stations: &[Station]) {
-        let (mut watched, facts) = match self.watched(stop) {
+    pub(crate) fn run(self, stop: &StopSwitch, stations: &'static [Station]) {
+        let (mut watched, facts) = match self.watched(stop, stations) {
             Ok(watched) => watched,
             Err(problem) => return report_line(&problem),
         };
         match self.session.run(&mut watched, stop) {
             Ok(outcome) => {
                 if let RunEnd::EmergencyStop(_) = outcome.end {
-                    note_emergency_stop();
+                    IS_STOPPED.store(true, Ordering::Release);
                 }
                 facts.report(watched, outcome, stations);
             }
@@ -177,8 +181,12 @@ impl Prepared {
     }
 
     /// Converts to a run that the program advances. Not real-time.
-    pub(crate) fn in_lockstep(self, stop: &StopSwitch) -> Result<LockstepRun, String> {
-        let (watched, facts) = self.watched(stop)?;
+    pub(crate) fn in_lockstep(
+        self,
+        stop: &StopSwitch,
+        stations: &'static [Station],
+    ) -> Result<LockstepRun, String> {
+        let (watched, facts) = self.watched(stop, stations)?;
         let lockstep = self.session.into_lockstep().map_err(|error: RunError| error.to_string())?;
         Ok(LockstepRun { lockstep, watched, facts, stop: stop.clone() })
     }
@@ -218,8 +226,7 @@ impl Facts {
         let ObservedRun { observer: Watchers { mut measured, requested, .. }, publication } = watched;
         let summary = self.summary(&outcome, &measured);
         let settings = &self.settings;
-        let mut lines: Vec<String> =
-            stations.iter().zip(&requested).map(|(station, requested)| line(station, *requested)).collect();
+        let mut lines = lines(stations, &requested);
         lines.extend(end_of(&outcome));
         let notes: Vec<Note> = lines
             .iter()
@@ -256,6 +263,10 @@ impl Facts {
 /// Formats a quantity with its unit and a number of decimals; in scientific notation from a million.
 fn quantity(value: f64, decimals: usize, unit: &str) -> String {
     if value < 1.0e6 { format!("{value:.decimals$} {unit}") } else { format!("{value:.1e} {unit}") }
+}
+
+fn lines(stations: &[Station], requested: &[Asked]) -> Vec<String> {
+    stations.iter().zip(requested).map(|(station, requested)| line(station, *requested)).collect()
 }
 
 /// Formats the line of a station: requested and applied wrench, and counts.

@@ -8,7 +8,6 @@ use flotor_servo::{monotonic_ns, sleep_until};
 use flotor_session::Tap;
 use flotor_session::program::{Connected, NotFinite, Port, ProgramCounts};
 use std::sync::Mutex;
-use std::sync::PoisonError;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// Longest wait for a tick, ns.
@@ -235,7 +234,7 @@ impl Station {
     /// [`NotFinite`]: the previous wrench stays in force.
     pub fn command(&self, wrench: &Wrench, now_ns: u64) -> Result<(), NotFinite> {
         self.port.command(wrench)?;
-        let mut rate = self.rate.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut rate = flotor_core::lock(&self.rate);
         rate.commands += 1;
         let elapsed_ns = now_ns.saturating_sub(rate.since_ns);
         if elapsed_ns >= RATE_WINDOW_NS {
@@ -248,7 +247,7 @@ impl Station {
     /// Returns the recent rate of commands, Hz.
     #[must_use]
     pub fn command_rate_hz(&self) -> f64 {
-        self.rate.lock().unwrap_or_else(PoisonError::into_inner).hz
+        flotor_core::lock(&self.rate).hz
     }
 
     /// Returns the number of ticks so far.

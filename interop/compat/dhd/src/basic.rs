@@ -1,22 +1,20 @@
 //! Entry points to open, identify and read a device: pose, velocity, buttons.
 
 use crate::device::{
-    FRAME, Open, any, close, count, default, expert, kind, open, open_first, open_number, sampled,
-    set_default,
+    FRAME, Open, any, close, count, default, expert, kind, open, open_first, open_number, set_default,
 };
 use crate::error::{Code, DONE, failed, result};
-use crate::force;
+use crate::regulator::{follow_all, sampled};
 use flotor_compat::pointer::Out;
-use flotor_compat::{Pace, Station, host};
+use flotor_compat::{Pace, export, host, interned};
 use flotor_hal::{DVec3, math};
-use std::ffi::{CStr, CString, c_char, c_int, c_uint};
-use std::sync::OnceLock;
+use std::ffi::{CStr, c_char, c_int, c_uint};
 use std::time::Duration;
 
 /// Version of the interface: major, minor, release, revision.
 const VERSION: [c_int; 4] = [3, 17, 6, 0];
 /// Degrees per radian.
-const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+pub(crate) const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 fn number(index: i8) -> Result<usize, Code> {
     usize::try_from(index).map_err(|_| Code::InvalidIndex)
@@ -140,16 +138,14 @@ export! {
     fn dhdGetPositionAndOrientationRad(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
-            put3([x, y, z], position_m);
-            put3([a, b, g], angles(&rows));
+            put6([x, y, z, a, b, g], [position_m, angles(&rows)]);
         })
     }
     /// Reads the position, m, and the angles, degrees.
     fn dhdGetPositionAndOrientationDeg(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
-            put3([x, y, z], position_m);
-            put3([a, b, g], angles(&rows) * DEGREES);
+            put6([x, y, z, a, b, g], [position_m, angles(&rows) * DEGREES]);
         })
     }
     /// Reads the velocity, m/s.
@@ -239,6 +235,13 @@ pub(crate) fn put3(places: [Out<f64>; 3], values: DVec3) {
     places.into_iter().zip(values.to_array()).for_each(|(place, value)| place.put(value));
 }
 
+pub(crate) fn put6(places: [Out<f64>; 6], values: [DVec3; 2]) {
+    places
+        .into_iter()
+        .zip(values.iter().flat_map(DVec3::to_array))
+        .for_each(|(place, value)| place.put(value));
+}
+
 fn no_gripper<const N: usize>(places: [Out<f64>; N]) -> c_int {
     places.into_iter().for_each(|place| place.put(0.0));
     failed(Code::NotAvailable)
@@ -259,13 +262,7 @@ pub(crate) fn angles(rows: &[[f64; 3]; 3]) -> DVec3 {
 
 /// Returns the name of a device, or "no device"; valid for the life of the process.
 fn name(open: Option<&Open>) -> &'static CStr {
-    static NAMES: [OnceLock<CString>; crate::device::MOST] = [const { OnceLock::new() }; crate::device::MOST];
-    let none = c"no device";
-    let Some((open, place)) = open.and_then(|open| Some((open, NAMES.get(open.number)?))) else {
-        return none;
-    };
-    let named = |station: &Station| CString::new(format!("Flotor {}", station.plugin())).unwrap_or_default();
-    place.get_or_init(|| named(open.station))
+    open.map_or(c"no device", |open| interned(format!("Flotor {}", open.station.plugin())))
 }
 
 fn now_s() -> f64 {
@@ -279,7 +276,7 @@ fn sleep(seconds: f64) {
             let period = Duration::from_nanos(host.period_ns().max(1));
             let ticks = time.as_nanos().div_ceil(period.as_nanos());
             for _ in 0..ticks {
-                force::follow_all();
+                follow_all();
                 host.sleep(period);
             }
         }

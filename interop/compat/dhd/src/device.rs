@@ -2,7 +2,7 @@
 
 use crate::error::Code;
 use crate::regulation::Regulation;
-use flotor_compat::{Axes, Frame, Host, Language, Station, env_value, host, language};
+use flotor_compat::{Axes, Frame, Host, Language, Station, env_value, host, language, length};
 use flotor_hal::{DVec3, Wrench, math};
 use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -115,11 +115,6 @@ pub(crate) fn open(id: i8) -> Result<Open, Code> {
 /// Returns the device of an id, if open and not lost.
 pub(crate) fn live(id: i8) -> Result<Open, Code> {
     open(id).and_then(|open| if open.host.is_running() { Ok(open) } else { Err(Code::Com) })
-}
-
-/// Returns the device of an id for a read of its sample, which is counted, if open and not lost.
-pub(crate) fn sampled(id: i8) -> Result<Open, Code> {
-    live(id).inspect(|open| open.host.note_read(crate::force::follow_all))
 }
 
 /// Returns the device of an id, if open and not lost, in expert mode.
@@ -271,12 +266,6 @@ impl Open {
         // Non-finite parts were rejected before; the port rejects an overflowing sum in the same way.
         let _ = self.station.command(&Wrench::new(force_n, torque_nm), now_ns);
     }
-}
-
-/// Returns the length of a vector, without overflow of its square.
-fn length(vector: DVec3) -> f64 {
-    let largest = vector.abs().max_element();
-    if largest > 0.0 { (vector / largest).length() * largest } else { 0.0 }
 }
 
 /// Limits the length of a vector.

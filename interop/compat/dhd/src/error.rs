@@ -1,5 +1,6 @@
 //! Last error of each thread, and texts of the error numbers.
 
+use flotor_compat::export;
 use std::cell::Cell;
 use std::ffi::{CStr, c_char, c_int};
 

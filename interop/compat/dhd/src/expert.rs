@@ -3,6 +3,7 @@
 use crate::basic::read_expert;
 use crate::device::expert;
 use crate::error::{Code, DONE, failed, result};
+use flotor_compat::export;
 use flotor_compat::pointer::{In, Out};
 use std::ffi::{c_int, c_uchar, c_uint};
 

@@ -1,9 +1,9 @@
 //! Entry points of force: switch, commands, limits, and status.
 
-use crate::basic::{put3, read, read_live};
-use crate::device::{self, Device, FRAME, Open, Switch, live, open};
+use crate::basic::{put3, put6, read, read_live};
+use crate::device::{Device, FRAME, Open, Switch, live, open};
 use crate::error::{Code, DONE, SATURATED, failed, result};
-use crate::regulation;
+use flotor_compat::export;
 use flotor_compat::pointer::Out;
 use flotor_hal::DVec3;
 use std::ffi::{c_int, c_uchar, c_uint};
@@ -13,28 +13,14 @@ const STATUS: usize = 17;
 
 /// Sends a command; with `waits`, waits for the next tick.
 fn command(id: i8, force_n: DVec3, torque_nm: Option<DVec3>, waits: bool) -> c_int {
-    let open = match live(id) {
-        Ok(open) => open,
-        Err(code) => return failed(code),
-    };
-    let sent = {
-        let mut device = open.device();
-        open.send(&mut device, force_n, torque_nm.unwrap_or(DVec3::ZERO))
-    };
-    // A rejected command waits too: a program that retries must not loop faster for it.
-    if waits {
-        open.host.wait(open.station);
-    }
-    result(sent.map(|is_scaled| if is_scaled { SATURATED } else { DONE }))
-}
-
-/// Updates the regulation of all devices, for the next tick in lockstep.
-pub(crate) fn follow_all() {
-    for id in (0..).take(device::count()) {
-        if let Ok(open) = live(id) {
-            regulation::follow(&open);
+    result(live(id).and_then(|open| {
+        let sent = open.send(&mut open.device(), force_n, torque_nm.unwrap_or(DVec3::ZERO));
+        // A rejected command waits too: a program that retries must not loop faster for it.
+        if waits {
+            open.host.wait(open.station);
         }
-    }
+        sent.map(|is_scaled| if is_scaled { SATURATED } else { DONE })
+    }))
 }
 
 /// Returns the applied force and torque, after all limits: N and N·m.
@@ -100,18 +86,12 @@ export! {
     }
     /// Reads the applied force, N, and torque, N·m.
     fn dhdGetForceAndTorque(x: Out<f64>, y: Out<f64>, z: Out<f64>, tx: Out<f64>, ty: Out<f64>, tz: Out<f64>, id: i8) -> c_int [-1] {
-        read_live(id, |open| {
-            let [force_n, torque_nm] = applied(open);
-            put3([x, y, z], force_n);
-            put3([tx, ty, tz], torque_nm);
-        })
+        read_live(id, |open| put6([x, y, z, tx, ty, tz], applied(open)))
     }
     /// Reads the applied force, N, and torque, N·m, and 0 for a gripper.
     fn dhdGetForceAndTorqueAndGripperForce(x: Out<f64>, y: Out<f64>, z: Out<f64>, tx: Out<f64>, ty: Out<f64>, tz: Out<f64>, gripper: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
-            let [force_n, torque_nm] = applied(open);
-            put3([x, y, z], force_n);
-            put3([tx, ty, tz], torque_nm);
+            put6([x, y, z, tx, ty, tz], applied(open));
             gripper.put(0.0);
         })
     }

@@ -7,6 +7,7 @@
 use crate::basic::{angles, put3, read_expert, turning};
 use crate::device::{FRAME, expert};
 use crate::error::{Code, failed, result};
+use flotor_compat::export;
 use flotor_compat::pointer::{In, Out};
 use flotor_hal::DVec3;
 use std::ffi::c_int;

@@ -1,12 +1,11 @@
 //! Entry points of settings that are stored and returned, mostly without effect.
 
-use crate::basic::read;
+use crate::basic::{DEGREES, read};
 use crate::error::{Code, failed};
 use crate::force::keep;
+use flotor_compat::export;
 use flotor_compat::pointer::Out;
 use std::ffi::c_int;
-
-const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 fn set_angle(id: i8, index: usize, angle_rad: f64) -> c_int {
     if !angle_rad.is_finite() {

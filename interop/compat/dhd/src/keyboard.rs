@@ -1,6 +1,7 @@
 //! Entry points for keys of the terminal, and for threads of the program.
 
 use crate::error::{Code, DONE, failed};
+use flotor_compat::export;
 use std::ffi::{c_char, c_int, c_void};
 use std::mem::MaybeUninit;
 use std::sync::{Mutex, Once, PoisonError};

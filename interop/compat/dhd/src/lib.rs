@@ -11,21 +11,6 @@
 #![allow(unsafe_code)] // C entry points; listed in tests/tests/system/architecture.rs
 #![allow(non_snake_case)] // the names are another maker's
 
-/// Exports entry points: on a panic the program gets the value in brackets. A pointer is null or leads to as many values as
-/// the entry point states.
-macro_rules! export {
-    ($($(#[$meta:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) -> $result:ty [$fallback:expr] $body:block)*) => {
-        $(
-            $(#[$meta])*
-            #[unsafe(no_mangle)]
-            #[allow(clippy::too_many_arguments, clippy::unused_unit)] // as the interface has it
-            pub(crate) extern "C" fn $name($($argument: $type),*) -> $result {
-                flotor_compat::guarded($fallback, || $body)
-            }
-        )*
-    };
-}
-
 mod absent;
 mod basic;
 mod device;
@@ -37,11 +22,12 @@ mod kept;
 mod keyboard;
 mod motion;
 mod regulation;
+mod regulator;
 
+use flotor_compat::{MARKER, export};
 use std::ffi::c_char;
 
-/// Returns the marker of a drop-in library.
-#[unsafe(no_mangle)]
-pub extern "C" fn flotor_dropin() -> *const c_char {
-    flotor_compat::MARKER.as_ptr().cast()
+export! {
+    /// Returns the marker of a drop-in library.
+    fn flotor_dropin() -> *const c_char [MARKER.as_ptr().cast()] { MARKER.as_ptr().cast() }
 }

@@ -1,10 +1,12 @@
 //! Entry points of regulation and motion: hold the handle, move it, follow the program.
 
-use crate::basic::{angles, put3, read, read_live, turning};
-use crate::device::{FRAME, Open, Switch, live, open, sampled};
+use crate::basic::{angles, put6, read, read_live, turning};
+use crate::device::{FRAME, Open, Switch, live, open};
 use crate::error::{Code, DONE, failed, result};
 use crate::kept::{POSITION_MOVE, ROTATION_MOVE};
-use crate::regulation::{self, Progress, Regulation};
+use crate::regulation::{Progress, Regulation};
+use crate::regulator::{follow, sampled, start};
+use flotor_compat::export;
 use flotor_compat::pointer::{In, Out};
 use flotor_hal::{DQuat, DVec3, rotation_vector};
 use std::ffi::c_int;
@@ -12,7 +14,7 @@ use std::time::Duration;
 
 fn begin(id: i8) -> c_int {
     result(live(id).map(|open| {
-        regulation::start(&open);
+        start(&open);
         DONE
     }))
 }
@@ -99,7 +101,7 @@ fn wait_for_arrival(open: &Open, goal: Goal) -> Result<c_int, Code> {
             Some(Progress::Moving) if !open.host.is_running() => return Err(Code::Com),
             Some(Progress::Moving) => {}
         }
-        regulation::follow(open);
+        follow(open);
         open.host.sleep(Duration::from_nanos(open.host.period_ns()));
     }
 }
@@ -208,8 +210,7 @@ export! {
     fn drdGetPositionAndOrientation(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
-            put3([x, y, z], position_m);
-            put3([a, b, g], angles(&rows));
+            put6([x, y, z, a, b, g], [position_m, angles(&rows)]);
             gap.put(0.0);
             matrix.put_all(rows.as_flattened());
         })
@@ -217,8 +218,8 @@ export! {
     /// Reads velocity, m/s, angular velocity, rad/s, and 0 for a gripper.
     fn drdGetVelocity(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
-            put3([x, y, z], FRAME.of_flotor(open.station.state().velocity_m_per_s));
-            put3([a, b, g], turning(open));
+            let velocity_m_per_s = FRAME.of_flotor(open.station.state().velocity_m_per_s);
+            put6([x, y, z, a, b, g], [velocity_m_per_s, turning(open)]);
             gap.put(0.0);
         })
     }
@@ -230,7 +231,7 @@ export! {
     fn drdWaitForTick(id: i8) -> () [()] {
         match live(id) {
             Ok(open) => {
-                regulation::follow(&open);
+                follow(&open);
                 open.host.wait(open.station);
             }
             // Throttles a loop without a device.

@@ -3,10 +3,8 @@
 //! The original regulates encoders by motors. Here a spring and a damper at the handle replace them, inside the envelope:
 //! soft enough for any device, so that a resisting hand wins.
 
-use crate::device::{self, Open};
-use flotor_compat::{Axes, Pace, State, quietly};
+use flotor_compat::{Axes, State};
 use flotor_hal::{DQuat, DVec3, orientation_from_rotation_vector, rotation_vector};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Stiffness and damping of the position, N/m and N·s/m.
 const STIFFNESS: [f64; 2] = [400.0, 4.0];
@@ -98,6 +96,13 @@ impl Regulation {
     pub(crate) const OFF: Self =
         Self { is_running: false, axes: [true; 3], position: Motion::NONE, rotation: Motion::NONE };
 
+    /// Creates a regulation that holds the handle at its current pose.
+    pub(crate) fn started(state: &State) -> Self {
+        let mut started = Self { is_running: true, ..Self::OFF };
+        started.hold(state);
+        started
+    }
+
     /// Holds the handle at its current pose.
     pub(crate) fn hold(&mut self, state: &State) {
         self.position = Motion::at(state.position_m);
@@ -160,57 +165,4 @@ impl Regulation {
 fn turn_from(state: &State, to_rad: DVec3) -> DVec3 {
     let target: DQuat = orientation_from_rotation_vector(to_rad);
     rotation_vector(target * state.orientation.conjugate())
-}
-
-/// True while the regulation thread runs.
-static HAS_THREAD: AtomicBool = AtomicBool::new(false);
-
-/// Starts the regulation of a device: in real time a thread sends a command per tick; in lockstep every call that makes a
-/// tick does.
-pub(crate) fn start(open: &Open) {
-    let state = open.station.state();
-    {
-        let mut device = open.device();
-        open.set_switch(&mut device, crate::device::Switch::On);
-        device.regulation = Regulation { is_running: true, ..Regulation::OFF };
-        device.regulation.hold(&state);
-        open.send_again(&mut device);
-    }
-    if open.host.pace() == Pace::Lockstep || HAS_THREAD.swap(true, Ordering::AcqRel) {
-        return;
-    }
-    let thread = std::thread::Builder::new().name("flotor-drd".to_owned());
-    if quietly(|| thread.spawn(regulate)).is_err() {
-        HAS_THREAD.store(false, Ordering::Release);
-    }
-}
-
-/// Sends the commands of all regulated devices, while there are any.
-fn regulate() {
-    loop {
-        let mut first = None;
-        for id in (0..).take(device::count()) {
-            let Ok(open) = device::live(id) else { continue };
-            let mut device = open.device();
-            if device.regulation.is_running {
-                open.send_again(&mut device);
-                drop(device);
-                first = first.or(Some(open));
-            }
-        }
-        let Some(open) = first else { break };
-        // Sleeps a period instead of waiting for a tick, which would consume the program's.
-        std::thread::sleep(std::time::Duration::from_nanos(open.host.period_ns()));
-    }
-    HAS_THREAD.store(false, Ordering::Release);
-}
-
-/// Sends the command of a regulated device, in lockstep, where no thread does.
-pub(crate) fn follow(open: &Open) {
-    if open.host.pace() == Pace::Lockstep {
-        let mut device = open.device();
-        if device.regulation.is_running {
-            open.send_again(&mut device);
-        }
-    }
 }

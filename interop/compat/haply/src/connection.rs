@@ -1,10 +1,9 @@
-//! Connections of a port with two protocols: the first lines of a connection request a WebSocket, or are an HTTP request.
+//! Connections of a port with two protocols: the first lines of a connection request a WebSocket, or are an HTTP request. The
+//! [`crate::channels`] serve them.
 
 use crate::access::Access;
-use crate::http;
-use crate::service::Service;
-use crate::session;
 use flotor_emulation::port::Port;
+use serde_json::{Value, json};
 use std::io::{self, Read as _, Write as _};
 use std::net::TcpStream;
 use std::sync::Arc;
@@ -33,7 +32,7 @@ pub(crate) struct Request {
 /// Parsed head of a request, and the bytes received after it.
 #[derive(Debug, Default)]
 pub(crate) struct Head {
-    request: Request,
+    pub(crate) request: Request,
     /// Key of a WebSocket request.
     key: Option<String>,
     /// Origin of the web page that opened the connection.
@@ -41,15 +40,8 @@ pub(crate) struct Head {
     /// Host name used by the client.
     host: Option<String>,
     length: usize,
-    rest: Vec<u8>,
-}
-
-/// Accepts and serves connections in threads.
-///
-/// # Errors
-/// If the accepting thread cannot be created.
-pub(crate) fn serve(service: &'static Service, port: Port) -> io::Result<()> {
-    accept(port, "flotor-accept", move |stream| serve_one(service, stream))
+    /// Bytes received after the head.
+    pub(crate) rest: Vec<u8>,
 }
 
 /// Accepts connections in a thread, and serves each in a thread of its own.
@@ -85,19 +77,6 @@ pub(crate) fn accept(
     Ok(())
 }
 
-fn serve_one(service: &Service, mut stream: TcpStream) -> io::Result<()> {
-    let deadline = Instant::now() + PATIENCE;
-    let Some(mut head) = prepared(&mut stream, &service.access, deadline)? else { return Ok(()) };
-    match upgraded(&mut stream, &head)? {
-        true => session::serve(service, session::socket(stream, head.rest)),
-        false => {
-            read_body(&mut stream, &mut head, deadline)?;
-            stream.write_all(http::answer(service, &head.request).as_bytes())?;
-        }
-    }
-    Ok(())
-}
-
 /// Reads the head of a connection, and refuses one without access; `None` without a request to serve.
 pub(crate) fn prepared(
     stream: &mut TcpStream,
@@ -120,7 +99,7 @@ pub(crate) fn prepared(
             return match access.check(head.origin.as_deref(), head.host.as_deref()) {
                 Ok(()) => Ok(Some(head)),
                 Err(forbidden) => {
-                    stream.write_all(http::refusal(&forbidden).as_bytes())?;
+                    answer(stream, &failed(403, &forbidden.to_string()))?;
                     Ok(None)
                 }
             };
@@ -151,12 +130,8 @@ pub(crate) fn upgraded(stream: &mut TcpStream, head: &Head) -> io::Result<bool> 
     Ok(true)
 }
 
-/// Returns the bytes received after a WebSocket request.
-pub(crate) fn rest(head: Head) -> Vec<u8> {
-    head.rest
-}
-
-fn read_body(stream: &mut TcpStream, head: &mut Head, deadline: Instant) -> io::Result<()> {
+/// Reads the body of a request.
+pub(crate) fn read_body(stream: &mut TcpStream, head: &mut Head, deadline: Instant) -> io::Result<()> {
     let length = head.length.min(LONGEST_BODY);
     let mut body = std::mem::take(&mut head.rest);
     let mut buffer = [0; 2048];
@@ -170,6 +145,25 @@ fn read_body(stream: &mut TcpStream, head: &mut Head, deadline: Instant) -> io::
     body.truncate(length);
     head.request.body = String::from_utf8_lossy(&body).into_owned();
     Ok(())
+}
+
+/// Reply to a request: status and JSON.
+pub(crate) type Answer = (u16, Value);
+
+/// Returns the reply to a request that failed.
+pub(crate) fn failed(status: u16, why: &str) -> Answer {
+    (status, json!({ "ok": false, "error": why }))
+}
+
+/// Writes the complete response to a request.
+pub(crate) fn answer(stream: &mut TcpStream, (status, body): &Answer) -> io::Result<()> {
+    let reason = if *status == 200 { "OK" } else { "Error" };
+    let text = body.to_string();
+    let length = text.len();
+    let response = format!(
+        "HTTP/1.1 {status} {reason}\r\nContent-Type: application/json\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{text}"
+    );
+    stream.write_all(response.as_bytes())
 }
 
 impl Head {

@@ -1,48 +1,30 @@
 //! HTTP interface: version, devices, sessions, and the settings of a device.
 
-use crate::access::Forbidden;
-use crate::connection::Request;
+use crate::connection::{Answer, Request, failed};
+use crate::device::{grip_id, inverse_id, kept_at_first};
 use crate::message::set;
-use crate::service::{Service, Session, Shared, grip_id, inverse_id, kept_at_first};
+use crate::service::{Service, Session, Shared};
 use crate::state::{Extent, damping, force_gate, session_json, write};
 use crate::view::View;
 use serde_json::{Value, json};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 /// Emulated version of the service.
 const VERSION: &str = "3.5.0";
 
-/// Reply: status and JSON.
-type Answer = (u16, Value);
-
-/// Returns the complete response to a request.
-pub(crate) fn answer(service: &Service, request: &Request) -> String {
+/// Returns the reply to a request.
+pub(crate) fn answer(service: &Service, request: &Request) -> Answer {
     let (path, query) = request.target.split_once('?').unwrap_or((&request.target, ""));
     let parts: Vec<&str> = path.split('/').filter(|part| !part.is_empty()).collect();
     let body: Value = serde_json::from_str(&request.body).unwrap_or(Value::Null);
-    written(route(service, &request.method, &parts, query, &body))
+    route(service, &request.method, &parts, query, &body)
 }
 
-/// Returns the complete response to a connection without access.
-pub(crate) fn refusal(forbidden: &Forbidden) -> String {
-    written(failed(403, &forbidden.to_string()))
-}
-
-fn written((status, told): Answer) -> String {
-    let reason = if status == 200 { "OK" } else { "Error" };
-    let text = told.to_string();
-    format!(
-        "HTTP/1.1 {status} {reason}\r\nContent-Type: application/json\r\nContent-Length: {}\r\nConnection: close\r\n\r\n{text}",
-        text.len()
-    )
+fn ok() -> Answer {
+    (200, json!({ "ok": true }))
 }
 
 fn done(data: Value) -> Answer {
     (200, json!({ "ok": true, "data": data }))
-}
-
-fn failed(status: u16, why: &str) -> Answer {
-    (status, json!({ "ok": false, "error": why }))
 }
 
 fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Value) -> Answer {
@@ -50,16 +32,11 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
         ("GET", [] | ["version"] | ["3.0" | "3.1", "version"]) => (200, version()),
         ("GET", ["devices"]) => (200, devices(service)),
         ("GET", ["expert", "status"]) => {
-            let shared = service.shared();
-            let sessions: Vec<Value> = shared.sessions.iter().map(session_json).collect();
-            (
-                200,
-                json!({ "detection": {}, "devices": service.host.stations().len(), "sessions": sessions, "global": {} }),
-            )
+            let devices = service.host.stations().len();
+            (200, json!({ "detection": {}, "devices": devices, "sessions": sessions(service), "global": {} }))
         }
         ("GET", ["sessions"]) => {
-            let shared = service.shared();
-            let sessions: Vec<Value> = shared.sessions.iter().map(session_json).collect();
+            let sessions = sessions(service);
             done(json!({ "session_count": sessions.len(), "sessions": sessions }))
         }
         (_, ["sessions", id, rest @ ..]) => session(service, method, id, rest, body),
@@ -67,13 +44,12 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
         ("POST", ["settings"]) => match body {
             Value::Object(settings) => {
                 let mut shared = service.shared();
-                let all = settings.iter().all(|(key, value)| shared.keep_setting(key, value));
-                if all { (200, json!({ "ok": true })) } else { no_room() }
+                stored(settings.iter().all(|(key, value)| shared.keep_setting(key, value)))
             }
             _ => failed(400, "the settings must be a JSON object"),
         },
         (_, ["settings", key]) => setting(service, method, key, body),
-        ("POST", ["save_configuration"] | ["ports", _, "reset"]) => (200, json!({ "ok": true })),
+        ("POST", ["save_configuration"] | ["ports", _, "reset"]) => ok(),
         (_, [kind, device, "config", name @ ..]) => {
             configured(service, method, [kind, device], &name.join("/"), query, body)
         }
@@ -84,8 +60,13 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
     }
 }
 
-fn no_room() -> Answer {
-    failed(507, "too many settings; delete some settings")
+/// Returns the reply to a setting that was stored, or had no room.
+fn stored(had_room: bool) -> Answer {
+    if had_room { ok() } else { failed(507, "too many settings; delete some settings") }
+}
+
+fn sessions(service: &Service) -> Vec<Value> {
+    service.shared().sessions.iter().map(session_json).collect()
 }
 
 fn version() -> Value {
@@ -118,7 +99,7 @@ fn session(service: &Service, method: &str, id: &str, rest: &[&str], body: &Valu
         },
         ("DELETE", ["profile"]) => {
             "default".clone_into(&mut own.profile);
-            (200, json!({ "ok": true }))
+            ok()
         }
         _ => failed(404, "unknown route"),
     }
@@ -131,16 +112,10 @@ fn setting(service: &Service, method: &str, key: &str, body: &Value) -> Answer {
             Some(value) => (200, value.clone()),
             None => failed(404, "unknown setting"),
         },
-        "POST" => {
-            if shared.keep_setting(key, body) {
-                (200, json!({ "ok": true }))
-            } else {
-                no_room()
-            }
-        }
+        "POST" => stored(shared.keep_setting(key, body)),
         "DELETE" => {
             shared.settings.remove(key);
-            (200, json!({ "ok": true }))
+            ok()
         }
         _ => failed(405, "use GET, POST or DELETE"),
     }
@@ -314,21 +289,6 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         "transform" => Ok(json!({ "transform": view.workspace.to_json() })),
         _ => Err(failed(404, "unknown setting")),
     }
-}
-
-/// Returns the current time as the service writes it: date and time in UTC.
-pub(crate) fn now_text() -> String {
-    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
-    let (days, second) = (seconds / 86_400, seconds % 86_400);
-    // Years begin in March, in eras of 400 years, so that leap days come last.
-    let shifted = days + 719_468;
-    let (era, day) = (shifted / 146_097, shifted % 146_097);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let (day, month) = (day - (153 * month + 2) / 5 + 1, if month < 10 { month + 3 } else { month - 9 });
-    let year = year + era * 400 + u64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02} {:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60)
 }
 
 #[cfg(test)]

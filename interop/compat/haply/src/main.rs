@@ -6,18 +6,21 @@
 //! ```
 //!
 //! - [`access`]: access control: no web pages, no foreign names.
-//! - [`connection`]: one port for the simulation channel and for HTTP; a thread for each connection.
+//! - [`channels`]: the simulation channel with HTTP, and the events channel, port 10020.
+//! - [`connection`]: a thread for each connection; the head of a request.
 //! - [`session`]: a client of the simulation channel, with its pace and replies.
 //! - [`message`]: parser of a client's messages. [`state`]: encoder of the replies.
 //! - [`view`]: axes, mount and workspace of a session. [`force`]: the sum of all sessions' commands.
-//! - [`http`]: version, devices, sessions, settings. [`events`]: port 10020.
+//! - [`http`]: version, devices, sessions, settings. [`events`]: queues of events. [`device`]: ids and nominal arm.
 //!
 //! Source: the public documentation of the service, version 3.5, and its open clients: names, shapes and units only. Positions in
 //! m, velocities in m/s, forces in N, joint angles in degrees; x right, y away from the user, z up. Not real-time: the loop has a
 //! thread of its own.
 
 mod access;
+mod channels;
 mod connection;
+mod device;
 mod events;
 mod force;
 mod http;
@@ -29,6 +32,7 @@ mod view;
 
 use access::Access;
 use clap::{Parser, ValueEnum};
+use connection::accept;
 use flotor_command::options::{LendOptions, arguments, seed};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, say, supervised};
@@ -125,9 +129,11 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
         return Err(CommandError::Failed("the run did not start; its message is above".to_owned()));
     }
     let service = Service::leak(host, access);
-    let started = service.follow().and_then(|()| events::serve(service, events));
+    let started = service.follow().and_then(|()| {
+        accept(events, "flotor-events", |stream| channels::send_events(service, stream))?;
+        accept(simulation, "flotor-accept", |stream| channels::answer_client(service, stream))
+    });
     started
-        .and_then(|()| connection::serve(service, simulation))
         .map_err(|cause| CommandError::Failed(format!("cannot start a thread for the service: {cause}")))?;
     say!("listening ws://{simulation_at}/ events ws://{events_at}/");
     while !stop.is_stop_requested() && host.is_running() {

@@ -1,7 +1,8 @@
 //! Parser of clients' messages, which applies their settings and commands.
 
+use crate::device::{ARM_M, grip_id, inverse_id};
 use crate::force::{Domain, SessionCommand};
-use crate::service::{ARM_M, Service, Session, Shared, grip_id, inverse_id};
+use crate::service::{Service, Session, Shared};
 use crate::view::{Basis, Transform, View, numbers, vector};
 use flotor_hal::DVec3;
 use serde_json::Value;

@@ -1,17 +1,18 @@
 //! State shared by all connections: the run, its devices, the sessions and their settings.
 
 use crate::access::Access;
-use crate::events::{Events, Level};
+use crate::device::kept_at_first;
+use crate::events::{Events, Level, device_data};
 use crate::force::{Domain, Forces, SessionCommand};
 use crate::view::View;
 use flotor_compat::{Host, Pace, State, Station};
-use flotor_hal::{DVec3, Wrench};
+use flotor_hal::Wrench;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Service with its run and shared state.
 pub(crate) struct Service {
@@ -63,16 +64,6 @@ impl Shared {
     }
 }
 
-/// Returns the initial settings of a device that belong to no session.
-pub(crate) fn kept_at_first() -> BTreeMap<&'static str, Value> {
-    BTreeMap::from([
-        ("gravity_compensation", json!({ "enabled": true, "scaling_factor": 1.0 })),
-        ("handedness", json!("right")),
-        ("torque_scaling", json!({ "enabled": true })),
-        ("home_return", json!({ "enabled": false })),
-    ])
-}
-
 impl Service {
     /// Creates the service, which lives as long as the process.
     pub(crate) fn leak(host: &'static Host, access: Access) -> &'static Self {
@@ -102,7 +93,7 @@ impl Service {
         let id = self.next_session.fetch_add(1, Ordering::Relaxed);
         let views = self.host.stations().iter().map(|_| <[View; 2]>::default()).collect();
         let profile = "default".to_owned();
-        shared.sessions.push(Session { id, profile, started: crate::http::now_text(), views });
+        shared.sessions.push(Session { id, profile, started: now_text(), views });
         id
     }
 
@@ -181,7 +172,7 @@ impl Service {
     /// Emits an event per device: the devices are gone.
     pub(crate) fn device_lost(&self) {
         for number in 0..self.host.stations().len() {
-            let data = json!({ "device_family": "inverse", "device_id": inverse_id(number) });
+            let data = device_data(number);
             self.events.emit("device-disconnected", "device", Level::Warning, data, "the run ended");
         }
     }
@@ -204,19 +195,17 @@ impl Shared {
     }
 }
 
-/// Returns the id of the arm of a device: four digits, as on the label of the original.
-pub(crate) fn inverse_id(number: usize) -> String {
-    format!("F{:03X}", number + 1)
-}
-
-pub(crate) fn grip_id(number: usize) -> String {
-    format!("A{:03X}", number + 1)
-}
-
-/// Length of a nominal arm, m: joint angles are displacements over this length, and a torque is a force along it.
-pub(crate) const ARM_M: f64 = 0.2;
-
-/// Returns the joint angles of the nominal arm for a displacement, degrees.
-pub(crate) fn joint_angles(displacement_m: DVec3) -> DVec3 {
-    displacement_m / ARM_M * (180.0 / std::f64::consts::PI)
+/// Returns the current time as the service writes it: date and time in UTC.
+fn now_text() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+    let (days, second) = (seconds / 86_400, seconds % 86_400);
+    // Years begin in March, in eras of 400 years, so that leap days come last.
+    let shifted = days + 719_468;
+    let (era, day) = (shifted / 146_097, shifted % 146_097);
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * day + 2) / 153;
+    let (day, month) = (day - (153 * month + 2) / 5 + 1, if month < 10 { month + 3 } else { month - 9 });
+    let year = year + era * 400 + u64::from(month <= 2);
+    format!("{year:04}-{month:02}-{day:02} {:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60)
 }

@@ -1,7 +1,8 @@
 //! Encoder of messages to clients: the state of all devices; the first message, and any on request, includes the configuration.
 
-use crate::service::{Service, Session, Shared, grip_id, inverse_id, joint_angles};
-use crate::view::{Transform, View};
+use crate::device::{ARM_M, grip_id, inverse_id, joint_angles};
+use crate::service::{Service, Session, Shared};
+use crate::view::{Transform, View, of_vector};
 use flotor_compat::{Axes, State};
 use flotor_hal::{DQuat, DVec3};
 use serde_json::ser::{CompactFormatter, Formatter};
@@ -76,31 +77,20 @@ fn arm(text: &mut String, seen: &Seen<'_>, [view, _]: &[View; 2], extent: Extent
         let _ = write!(text, ",\"config\":{}", arm_config(shared, *number, view));
     }
     let [mode, domain, control] = service.control(shared, *number);
-    text.push_str(",\"state\":{\"cursor_position\":");
-    let position = view.position(state.position_m);
-    vector(text, position);
-    text.push_str(",\"cursor_velocity\":");
-    vector(text, view.velocity(state.velocity_m_per_s));
-    text.push_str(",\"angular_position\":");
-    angles(text, joint_angles(state.position_m));
-    text.push_str(",\"angular_velocity\":");
-    angles(text, joint_angles(state.velocity_m_per_s));
-    text.push_str(",\"body_orientation\":");
-    quaternion(text, DQuat::IDENTITY);
-    text.push_str(",\"current_cursor_force\":");
-    let applied_n = state.applied.force();
-    vector(text, view.force(applied_n));
-    text.push_str(",\"current_cursor_position\":");
-    vector(text, position);
-    text.push_str(",\"current_angular_torques\":");
-    angles(text, applied_n * crate::service::ARM_M);
-    text.push_str(",\"current_angular_position\":");
-    angles(text, joint_angles(state.position_m));
+    text.push_str(",\"state\":{");
+    let (position, applied_n) = (view.position(state.position_m), state.applied.force());
+    vector(text, "cursor_position", position);
+    vector(text, "cursor_velocity", view.velocity(state.velocity_m_per_s));
+    angles(text, "angular_position", joint_angles(state.position_m));
+    angles(text, "angular_velocity", joint_angles(state.velocity_m_per_s));
+    quaternion(text, "body_orientation", DQuat::IDENTITY);
+    vector(text, "current_cursor_force", view.force(applied_n));
+    vector(text, "current_cursor_position", position);
+    angles(text, "current_angular_torques", applied_n * ARM_M);
+    angles(text, "current_angular_position", joint_angles(state.position_m));
     let in_use = control != "idle";
-    let _ = write!(
-        text,
-        ",\"mode\":\"{mode}\",\"control_domain\":\"{domain}\",\"control_mode\":\"{control}\",\"transform\":"
-    );
+    let _ =
+        write!(text, ",\"mode\":\"{mode}\",\"control_domain\":\"{domain}\",\"control_mode\":\"{control}\"");
     transform(text, &view.workspace);
     let _ = write!(
         text,
@@ -123,16 +113,13 @@ fn grip(text: &mut String, seen: &Seen<'_>, [_, view]: &[View; 2], extent: Exten
     let pressed = |bit: u32| state.buttons >> bit & 1 == 1;
     let _ = write!(
         text,
-        ",\"state\":{{\"battery_level\":1.0,\"battery_voltage\":4.2,\"buttons\":{{\"a\":{},\"b\":{},\"c\":{}}},\"hall\":0,\"orientation\":",
+        ",\"state\":{{\"battery_level\":1.0,\"battery_voltage\":4.2,\"buttons\":{{\"a\":{},\"b\":{},\"c\":{}}},\"hall\":0",
         pressed(0),
         pressed(1),
         pressed(2)
     );
-    quaternion(
-        text,
-        view.orientation(if *axes == Axes::Three { DQuat::IDENTITY } else { state.orientation }),
-    );
-    text.push_str(",\"transform\":");
+    let orientation = if *axes == Axes::Three { DQuat::IDENTITY } else { state.orientation };
+    quaternion(text, "orientation", view.orientation(orientation));
     transform(text, &view.workspace);
     let _ = write!(
         text,
@@ -170,7 +157,7 @@ pub(crate) fn damping(view: &View) -> Value {
     if x == y && y == z {
         json!({ "scalar": x })
     } else {
-        json!({ "scalar": 0.0, "vector": crate::view::of_vector(view.damping) })
+        json!({ "scalar": 0.0, "vector": of_vector(view.damping) })
     }
 }
 
@@ -195,7 +182,15 @@ fn number(text: &mut String, number: f64) {
     let _ = CompactFormatter.write_f64(&mut Sink(text), number);
 }
 
+/// Writes the name of a member.
+fn key(text: &mut String, name: &str) {
+    text.push_str(if text.ends_with('{') { "\"" } else { ",\"" });
+    text.push_str(name);
+    text.push_str("\":");
+}
+
 fn transform(text: &mut String, transform: &Transform) {
+    key(text, "transform");
     if *transform == Transform::NONE {
         text.push_str("{}");
     } else {
@@ -203,24 +198,24 @@ fn transform(text: &mut String, transform: &Transform) {
     }
 }
 
-fn named(text: &mut String, parts: &[(&str, f64)]) {
-    for (place, (name, value)) in parts.iter().enumerate() {
-        text.push_str(if place == 0 { "{\"" } else { ",\"" });
-        text.push_str(name);
-        text.push_str("\":");
+fn numbers(text: &mut String, name: &str, parts: &[(&str, f64)]) {
+    key(text, name);
+    text.push('{');
+    for (name, value) in parts {
+        key(text, name);
         number(text, *value);
     }
     text.push('}');
 }
 
-fn vector(text: &mut String, DVec3 { x, y, z }: DVec3) {
-    named(text, &[("x", x), ("y", y), ("z", z)]);
+fn vector(text: &mut String, name: &str, DVec3 { x, y, z }: DVec3) {
+    numbers(text, name, &[("x", x), ("y", y), ("z", z)]);
 }
 
-fn angles(text: &mut String, DVec3 { x, y, z }: DVec3) {
-    named(text, &[("a0", x), ("a1", y), ("a2", z)]);
+fn angles(text: &mut String, name: &str, DVec3 { x, y, z }: DVec3) {
+    numbers(text, name, &[("a0", x), ("a1", y), ("a2", z)]);
 }
 
-fn quaternion(text: &mut String, DQuat { x, y, z, w }: DQuat) {
-    named(text, &[("w", w), ("x", x), ("y", y), ("z", z)]);
+fn quaternion(text: &mut String, name: &str, DQuat { x, y, z, w }: DQuat) {
+    numbers(text, name, &[("w", w), ("x", x), ("y", y), ("z", z)]);
 }

@@ -1,7 +1,7 @@
 //! Device between the program and its station: snapshot and settings of a frame, and capabilities.
 
-use crate::NO_DEVICE;
-use crate::error::Code;
+use crate::callbacks;
+use crate::error::{Code, NO_DEVICE};
 use crate::parameter::{
     ANGULAR_VELOCITY, BUTTONS, CALIBRATION_STYLE, DRIVER_VERSION, ENCODERS, FIRMWARE_VERSION, FORCE,
     FORCE_CLAMPING, FORCE_OUTPUT, GIMBAL_ANGLES, GIMBAL_TORQUE, IMPULSE_LIMIT, INKWELL_SWITCH, INPUT_DOF,
@@ -11,11 +11,9 @@ use crate::parameter::{
     SERIAL_NUMBER, STATUS_LIGHT, TABLETOP_OFFSET, TORQUE, TRANSFORM, UPDATE_RATE, VELOCITY, VELOCITY_LIMIT,
     VENDOR, VERSION, Values, WORKSPACES,
 };
-use crate::scheduler::Scheduler;
-use flotor_compat::{Axes, Frame, Host, Station, env_value, host};
+use flotor_compat::{Axes, Frame, Host, Station, env_value, host, interned};
 use flotor_hal::{DVec3, Wrench, math};
-use std::collections::BTreeMap;
-use std::ffi::{CStr, CString, c_uint};
+use std::ffi::{CStr, c_uint};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -45,7 +43,7 @@ impl Current {
 
     /// Selects an initialised device; returns false for any other.
     pub(crate) fn set(&self, handle: c_uint) -> bool {
-        let is_there = Devices::lock(handle).is_some_and(|device| device.is_initialised);
+        let is_there = Devices::initialised(handle).is_some();
         if is_there {
             self.0.store(handle, Ordering::Release);
         }
@@ -112,19 +110,19 @@ impl Devices {
         Some(device.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
+    /// Locks an initialised device.
+    fn initialised(handle: c_uint) -> Option<MutexGuard<'static, Device>> {
+        Self::lock(handle).filter(|device| device.is_initialised)
+    }
+
     /// Runs `body` on the current device.
-    pub(crate) fn with_current<T>(body: impl FnOnce(&mut Device) -> T) -> Result<T, Code> {
-        match Self::lock(CURRENT.get()) {
-            Some(mut device) if device.is_initialised => Ok(body(&mut device)),
-            _ => Err(Code::InvalidOperation),
-        }
+    pub(crate) fn with_current<T>(body: impl FnOnce(&mut Device) -> Result<T, Code>) -> Result<T, Code> {
+        body(&mut *Self::initialised(CURRENT.get()).ok_or(Code::InvalidOperation)?)
     }
 
     /// Returns the first initialised device, to wait for a tick.
     pub(crate) fn any() -> Option<(&'static Host, &'static Station)> {
-        let number = (0..)
-            .take(MOST)
-            .find(|handle| Self::lock(*handle).is_some_and(|device| device.is_initialised))?;
+        let number = (0..).take(MOST).find(|handle| Self::initialised(*handle).is_some())?;
         let host = host()?;
         Some((host, host.station(usize::try_from(number).ok()?)?))
     }
@@ -161,7 +159,7 @@ pub(crate) fn init(name: Option<&str>) -> Result<c_uint, Code> {
 
 /// Closes a device; returns whether it was open.
 pub(crate) fn disable(handle: c_uint) -> bool {
-    let Some(mut device) = Devices::lock(handle).filter(|device| device.is_initialised) else { return false };
+    let Some(mut device) = Devices::initialised(handle) else { return false };
     device.station().into_iter().for_each(|(_, station)| {
         station.close();
     });
@@ -169,14 +167,14 @@ pub(crate) fn disable(handle: c_uint) -> bool {
     drop(device);
     let _ = CURRENT.0.compare_exchange(handle, NO_DEVICE, Ordering::AcqRel, Ordering::Acquire);
     if Devices::any().is_none() {
-        Scheduler::clear();
+        callbacks::clear();
     }
     true
 }
 
 /// Begins a frame; outside of the scheduler waits for a tick without a frame.
 pub(crate) fn begin_frame(handle: c_uint) -> Result<(), Code> {
-    let mut device = Devices::lock(handle).filter(|device| device.is_initialised).ok_or(Code::BadHandle)?;
+    let mut device = Devices::initialised(handle).ok_or(Code::BadHandle)?;
     CURRENT.0.store(handle, Ordering::Release);
     let (host, station) = device.station().ok_or(Code::CommError)?;
     let mut when = device.when(station);
@@ -195,7 +193,7 @@ pub(crate) fn begin_frame(handle: c_uint) -> Result<(), Code> {
         }
         drop(device);
         host.wait(station);
-        device = Devices::lock(handle).filter(|device| device.is_initialised).ok_or(Code::BadHandle)?;
+        device = Devices::initialised(handle).ok_or(Code::BadHandle)?;
         when = device.when(station);
     }
     (device.depth, device.begun) = (1, Some(when));
@@ -216,7 +214,7 @@ fn alive(host: &Host) -> Result<(), Code> {
 
 /// Ends a frame; outside of the scheduler, after setting a force, waits for the next tick.
 pub(crate) fn end_frame(handle: c_uint) -> Result<(), Code> {
-    let mut device = Devices::lock(handle).filter(|device| device.is_initialised).ok_or(Code::BadHandle)?;
+    let mut device = Devices::initialised(handle).ok_or(Code::BadHandle)?;
     if device.depth == 0 {
         return Err(Code::IllegalEnd);
     }
@@ -225,7 +223,7 @@ pub(crate) fn end_frame(handle: c_uint) -> Result<(), Code> {
         return Ok(());
     }
     let (host, station) = device.station().ok_or(Code::CommError)?;
-    let waits = device.has_set() && !Scheduler::is_here();
+    let waits = device.has_set() && !callbacks::is_here();
     let sent = device.send(host, station);
     drop(device);
     if waits {
@@ -242,35 +240,16 @@ pub(crate) fn text(parameter: c_uint) -> Result<&'static CStr, Code> {
         MODEL_TYPE | SERIAL_NUMBER => {
             let (number, plugin) = Devices::with_current(|device| {
                 let plugin = device.station().map(|(_, station)| station.plugin().to_owned());
-                (device.number, plugin.unwrap_or_default())
+                Ok((device.number, plugin.unwrap_or_default()))
             })?;
             let text = match parameter {
                 MODEL_TYPE => env_value("FLOTOR_HD_MODEL").unwrap_or_else(|| format!("Flotor {plugin}")),
                 _ => format!("flotor-{number}"),
             };
-            Ok(kept(text))
+            Ok(interned(text))
         }
         _ => Err(Code::InvalidEnum),
     }
-}
-
-/// Interns a text, so that its pointer stays valid for the life of the process.
-fn kept(text: String) -> &'static CStr {
-    static TEXTS: Mutex<BTreeMap<String, &'static CStr>> = Mutex::new(BTreeMap::new());
-    let mut texts = TEXTS.lock().unwrap_or_else(PoisonError::into_inner);
-    let keep =
-        |text: &String| &*Box::leak(CString::new(text.as_str()).unwrap_or_default().into_boxed_c_str());
-    let kept = keep_once(&mut texts, text, keep);
-    drop(texts);
-    kept
-}
-
-fn keep_once(
-    texts: &mut BTreeMap<String, &'static CStr>,
-    text: String,
-    keep: impl FnOnce(&String) -> &'static CStr,
-) -> &'static CStr {
-    texts.entry(text).or_insert_with_key(keep)
 }
 
 impl Device {
@@ -297,7 +276,7 @@ impl Device {
     }
 
     fn when(&self, station: &Station) -> When {
-        if Scheduler::is_here() { When::Scheduled(Scheduler::tick()) } else { When::Outside(station.ticks()) }
+        if callbacks::is_here() { When::Scheduled(callbacks::tick()) } else { When::Outside(station.ticks()) }
     }
 
     /// Updates the snapshot.
@@ -375,15 +354,14 @@ impl Device {
         if !self.is_initialised {
             return;
         }
-        let is_on = self.capability(FORCE_OUTPUT) == Some(true) && Scheduler::is_running();
+        let is_on = self.capability(FORCE_OUTPUT) == Some(true) && callbacks::is_running();
         self.station()
             .into_iter()
             .for_each(|(_, station)| if is_on { station.enable() } else { station.disable() });
     }
 
     /// Sets a parameter; the last value in a frame wins.
-    pub(crate) fn set(&mut self, parameter: c_uint, values: [f64; 6]) -> Result<(), Code> {
-        let [x, y, z, ..] = values;
+    pub(crate) fn set(&mut self, parameter: c_uint, [x, y, z]: [f64; 3]) -> Result<(), Code> {
         if !(x.is_finite() && y.is_finite() && z.is_finite()) {
             return Err(Code::InvalidValue);
         }
@@ -405,64 +383,39 @@ impl Device {
     /// Returns the values of a parameter in this frame, or in the last one.
     pub(crate) fn value(&self, parameter: c_uint) -> Result<Values, Code> {
         let (_, station) = self.station().ok_or(Code::CommError)?;
-        let seen = [&self.now, &self.last];
-        let frames = |[now, last]: [c_uint; 2]| match parameter {
-            _ if parameter == now => Some(0),
-            _ if parameter == last => Some(1),
-            _ => None,
-        };
-        let of = |ids: [c_uint; 2]| frames(ids).and_then(|index| seen.get(index).copied());
-        let vector = |vector: DVec3| Values::real(vector.to_array());
-        if let Some(seen) = of(POSITION) {
-            return Ok(vector(seen.position_mm));
-        }
-        if let Some(seen) = of(TRANSFORM) {
-            return Ok(Values::real(transform(seen)));
-        }
-        if let Some(seen) = of(BUTTONS) {
-            return Ok(Values::integer(seen.buttons));
-        }
-        if let Some(seen) = of(VELOCITY) {
-            return Ok(vector(seen.velocity_mm_per_s));
-        }
-        if let Some(seen) = of(ANGULAR_VELOCITY) {
-            return Ok(vector(seen.angular_velocity_rad_per_s));
-        }
-        if let Some(seen) = of(JOINT_ANGLES) {
-            return Ok(vector(joint_angles(seen.position_mm / MILLI)));
-        }
-        if let Some(seen) = of(GIMBAL_ANGLES) {
-            return Ok(vector(gimbal_angles(&seen.rows)));
-        }
+        // Position in a pair of numbers: the current frame, or the last one.
+        let of = |ids: [c_uint; 2]| ids.iter().position(|id| *id == parameter);
+        let seen = |ids: [c_uint; 2]| of(ids).map(|frame| [&self.now, &self.last][frame]);
         // The current force reads 0 until set in this frame, because programs add to it.
         let [force_n, torque_nm] = self.now.applied;
-        match frames(FORCE) {
-            Some(0) => return Ok(vector(self.force_n.unwrap_or_default())),
-            Some(_) => return Ok(vector(force_n)),
-            None => {}
+        let forces_n = [self.force_n.unwrap_or_default(), force_n];
+        let torques_mnm = [self.torque_mnm.unwrap_or_default(), torque_nm * MILLI];
+        let vector = seen(POSITION)
+            .map(|seen| seen.position_mm)
+            .or_else(|| seen(VELOCITY).map(|seen| seen.velocity_mm_per_s))
+            .or_else(|| seen(ANGULAR_VELOCITY).map(|seen| seen.angular_velocity_rad_per_s))
+            .or_else(|| seen(JOINT_ANGLES).map(|seen| joint_angles(seen.position_mm / MILLI)))
+            .or_else(|| seen(GIMBAL_ANGLES).map(|seen| gimbal_angles(&seen.rows)))
+            .or_else(|| of(FORCE).map(|frame| forces_n[frame]))
+            .or_else(|| of(TORQUE).map(|frame| torques_mnm[frame]))
+            .or_else(|| of(JOINT_TORQUE).or(of(GIMBAL_TORQUE)).map(|_| DVec3::ZERO));
+        if let Some(vector) = vector {
+            return Ok(Values::real(vector.to_array()));
         }
-        match frames(TORQUE) {
-            Some(0) => return Ok(vector(self.torque_mnm.unwrap_or_default())),
-            Some(_) => return Ok(vector(torque_nm * MILLI)),
-            None => {}
+        if let Some(seen) = seen(TRANSFORM) {
+            return Ok(Values::real(transform(seen)));
         }
-        if frames(JOINT_TORQUE).or(frames(GIMBAL_TORQUE)).is_some() {
-            return Ok(vector(DVec3::ZERO));
-        }
-        if of(ENCODERS).is_some() {
-            return Ok(Values::new(Kind::Long, &encoders(&self.now)));
-        }
-        if PINCH.contains(&parameter) {
-            return Ok(Values::real([0.0]));
+        if let Some(seen) = seen(BUTTONS) {
+            return Ok(Values::integer(seen.buttons));
         }
         // "In the inkwell" would mean without force; the safety switch is closed while the device is held.
-        if SAFETY_SWITCH.contains(&parameter) {
-            return Ok(Values::boolean(false));
+        match parameter {
+            _ if ENCODERS.contains(&parameter) => Ok(Values::new(Kind::Long, &encoders(&self.now))),
+            _ if PINCH.contains(&parameter) => Ok(Values::real([0.0])),
+            _ if SAFETY_SWITCH.contains(&parameter) => Ok(Values::boolean(false)),
+            _ if INKWELL_SWITCH.contains(&parameter) => Ok(Values::boolean(true)),
+            _ => self.constant(parameter, station),
         }
-        if INKWELL_SWITCH.contains(&parameter) {
-            return Ok(Values::boolean(true));
-        }
-        self.constant(parameter, station)
     }
 
     /// Returns the value of a parameter that does not depend on a frame.
@@ -484,7 +437,7 @@ impl Device {
             INPUT_DOF => Values::integer(if six { 6 } else { 3 }),
             OUTPUT_DOF => Values::integer(if station.axes() == Axes::Six { 6 } else { 3 }),
             CALIBRATION_STYLE => Values::integer(2),
-            UPDATE_RATE | INSTANTANEOUS_RATE => Values::integer(Scheduler::rate_hz()),
+            UPDATE_RATE | INSTANTANEOUS_RATE => Values::integer(callbacks::rate_hz()),
             MAX_STIFFNESS => Values::real([stiffness_n_per_mm]),
             MAX_DAMPING => Values::real([stiffness_n_per_mm * 1.0e-3]),
             MAX_FORCE | MAX_CONTINUOUS_FORCE => Values::real([force_n]),

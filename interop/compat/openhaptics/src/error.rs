@@ -3,6 +3,8 @@
 use std::cell::RefCell;
 use std::ffi::{CStr, c_int, c_uint};
 
+/// Handle of no device.
+pub(crate) const NO_DEVICE: c_uint = 0xFFFF_FFFF;
 /// Limit on the stored errors of a thread; older ones are dropped.
 const MOST: usize = 64;
 
@@ -30,13 +32,14 @@ pub(crate) enum Code {
 /// `HDErrorInfo`, 12 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ErrorInfo {
+pub(crate) struct ErrorInfo {
     code: c_uint,
     internal: c_int,
     device: c_uint,
 }
 
-const NONE: ErrorInfo = ErrorInfo { code: 0, internal: 0, device: super::NO_DEVICE };
+/// No error.
+pub(crate) const NONE: ErrorInfo = ErrorInfo { code: 0, internal: 0, device: NO_DEVICE };
 
 thread_local! {
     static ERRORS: RefCell<Vec<ErrorInfo>> = const { RefCell::new(Vec::new()) };

@@ -9,42 +9,72 @@
 #![allow(unsafe_code)] // C entry points; listed in tests/tests/system/architecture.rs
 #![allow(non_snake_case)] // the names are another maker's
 
+mod callbacks;
 mod device;
 mod error;
 mod parameter;
 mod scheduler;
 
+use callbacks::{Callback, Entry};
 use device::{CURRENT, Devices};
-use error::{Code, ErrorInfo, raise};
-use flotor_compat::pointer::{get, get_text, put};
-use flotor_compat::{MARKER, guarded};
-use parameter::{Kind, Reading, Values};
-use scheduler::{Callback, Scheduler};
+use error::{Code, ErrorInfo, NO_DEVICE, raise};
+use flotor_compat::pointer::{In, Out};
+use flotor_compat::{MARKER, export};
+use parameter::Kind;
 use std::ffi::{c_char, c_double, c_float, c_int, c_long, c_uchar, c_uint, c_ulong, c_ushort, c_void};
 
-/// Handle of no device.
-const NO_DEVICE: c_uint = 0xFFFF_FFFF;
 /// State of calibration, `HD_CALIBRATION_OK`.
 const CALIBRATED: c_uint = 0x5000;
 
-/// Returns the marker of a drop-in library.
-#[unsafe(no_mangle)]
-pub extern "C" fn flotor_dropin() -> *const c_char {
-    MARKER.as_ptr().cast()
+/// Returns the value of a result, or raises its error for the current device and returns `otherwise`.
+fn value_or<T>(otherwise: T, result: Result<T, Code>) -> T {
+    result.unwrap_or_else(|code| {
+        raise(code, CURRENT.get());
+        otherwise
+    })
 }
 
-// ---------------------------------------------------------------- devices
+/// Reads a parameter of the current device, converted to the type that the program requests.
+fn read<T: Copy>(parameter: c_uint, kind: Kind, place: Out<T>, convert: impl Fn(f64) -> T) {
+    let read = Devices::with_current(|device| device.value(parameter));
+    // All or nothing: a wrong type leaves the buffer unchanged.
+    let values = read.and_then(|values| values.of_kind(kind).ok_or(Code::InvalidInputType));
+    let written = values.map(|(numbers, count)| {
+        place.put_all(numbers.map(convert).get(..count).unwrap_or_default());
+    });
+    value_or((), written);
+}
 
-/// Opens a device by name and makes it current; returns its handle.
-///
-/// # Safety
-/// `name` is null or a terminated text.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdInitDevice(name: *const c_char) -> c_uint {
-    guarded(NO_DEVICE, || {
-        // SAFETY: by the contract of this function.
-        let name = unsafe { get_text(name) };
-        match device::init(name.as_deref()) {
+/// Sets a parameter of the current device from values of the program.
+fn write<T: Copy>(parameter: c_uint, kind: Kind, place: In<T>, convert: impl Fn(T) -> f64) {
+    let set = parameter::settable(parameter, kind).and_then(|count| {
+        let values = match count {
+            1 => place.get().map(|value| [convert(value), 0.0, 0.0]),
+            _ => place.get_all().map(|values| values.map(convert)),
+        };
+        let values = values.ok_or(Code::InvalidValue)?;
+        Devices::with_current(|device| device.set(parameter, values))
+    });
+    value_or((), set);
+}
+
+fn switch(capability: c_uint, on: bool) {
+    value_or((), Devices::with_current(|device| device.switch(capability, on)));
+}
+
+fn raise_unless(is_done: bool, code: Code, device: c_uint) {
+    if !is_done {
+        raise(code, device);
+    }
+}
+
+export! {
+    /// Returns the marker of a drop-in library.
+    fn flotor_dropin() -> *const c_char [MARKER.as_ptr().cast()] { MARKER.as_ptr().cast() }
+
+    /// Opens a device by name and makes it current; returns its handle.
+    fn hdInitDevice(name: In<c_char>) -> c_uint [NO_DEVICE] {
+        match device::init(name.get_text().as_deref()) {
             Ok(handle) => {
                 error::clear();
                 handle
@@ -54,396 +84,115 @@ pub unsafe extern "C" fn hdInitDevice(name: *const c_char) -> c_uint {
                 NO_DEVICE
             }
         }
-    })
-}
-
-/// Closes a device, whose force ends with the next tick.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdDisableDevice(handle: c_uint) {
-    guarded((), || {
-        if !device::disable(handle) {
-            raise(Code::BadHandle, handle);
-        }
-    });
-}
-
-/// Makes a device current, for the whole process.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdMakeCurrentDevice(handle: c_uint) {
-    guarded((), || {
-        if !CURRENT.set(handle) {
-            raise(Code::BadHandle, handle);
-        }
-    });
-}
-
-/// Returns the current device.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdGetCurrentDevice() -> c_uint {
-    guarded(NO_DEVICE, || {
+    }
+    /// Closes a device, whose force ends with the next tick.
+    fn hdDisableDevice(handle: c_uint) -> () [()] { raise_unless(device::disable(handle), Code::BadHandle, handle) }
+    /// Makes a device current, for the whole process.
+    fn hdMakeCurrentDevice(handle: c_uint) -> () [()] { raise_unless(CURRENT.set(handle), Code::BadHandle, handle) }
+    /// Returns the current device.
+    fn hdGetCurrentDevice() -> c_uint [NO_DEVICE] {
         let current = CURRENT.get();
-        if current == NO_DEVICE {
-            raise(Code::InvalidOperation, NO_DEVICE);
-        }
+        raise_unless(current != NO_DEVICE, Code::InvalidOperation, NO_DEVICE);
         current
-    })
-}
-
-/// Begins a frame with a snapshot of the device.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdBeginFrame(handle: c_uint) {
-    guarded((), || device::begin_frame(handle).unwrap_or_else(|code| raise(code, handle)));
-}
-
-/// Ends a frame and sends the values set in it.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdEndFrame(handle: c_uint) {
-    guarded((), || device::end_frame(handle).unwrap_or_else(|code| raise(code, handle)));
-}
-
-// ---------------------------------------------------------------- values
-
-/// Reads a parameter of the current device, converted to the type that the program requests.
-///
-/// # Safety
-/// `place` is null or as many values may be written as the parameter has.
-unsafe fn read<T>(parameter: c_uint, place: *mut T, convert: impl Fn(&Values, usize) -> Option<T>) {
-    guarded((), || {
-        let read = Devices::with_current(|device| device.value(parameter));
-        let values = match read.and_then(|value| value) {
-            Ok(values) => values,
-            Err(code) => return raise(code, CURRENT.get()),
-        };
-        // All or nothing: a wrong type leaves the buffer unchanged.
-        if (0..values.len()).any(|index| convert(&values, index).is_none()) {
-            return raise(Code::InvalidInputType, CURRENT.get());
-        }
-        for index in 0..values.len() {
-            if let Some(value) = convert(&values, index)
-                && !place.is_null()
-            {
-                // SAFETY: by the contract of this function there is room for all of them.
-                unsafe { put(place.add(index), value) };
-            }
-        }
-    });
-}
-
-/// Reads the boolean values of a parameter of the current device.
-///
-/// # Safety
-/// The pointer is null or leads to as many values as the parameter has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdGetBooleanv(parameter: c_uint, place: *mut c_uchar) {
-    // SAFETY: by the contract of this function.
-    unsafe {
-        read(parameter, place, |values, index| values.read(Kind::Boolean, index).map(Reading::as_boolean))
     }
-}
+    /// Begins a frame with a snapshot of the device.
+    fn hdBeginFrame(handle: c_uint) -> () [()] { device::begin_frame(handle).unwrap_or_else(|code| raise(code, handle)) }
+    /// Ends a frame and sends the values set in it.
+    fn hdEndFrame(handle: c_uint) -> () [()] { device::end_frame(handle).unwrap_or_else(|code| raise(code, handle)) }
 
-/// Reads the integer values of a parameter of the current device.
-///
-/// # Safety
-/// The pointer is null or leads to as many values as the parameter has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdGetIntegerv(parameter: c_uint, place: *mut c_int) {
-    // SAFETY: by the contract of this function.
-    unsafe {
-        read(parameter, place, |values, index| values.read(Kind::Integer, index).map(Reading::as_integer))
+    /// Reads the boolean values of a parameter of the current device.
+    fn hdGetBooleanv(parameter: c_uint, place: Out<c_uchar>) -> () [()] {
+        read(parameter, Kind::Boolean, place, |value| c_uchar::from(value != 0.0));
     }
-}
+    /// Reads the integer values of a parameter of the current device.
+    fn hdGetIntegerv(parameter: c_uint, place: Out<c_int>) -> () [()] {
+        #[allow(clippy::cast_possible_truncation)] // whole and small, or saturated
+        read(parameter, Kind::Integer, place, |value| value as c_int);
+    }
+    /// Reads the long integer values of a parameter of the current device.
+    fn hdGetLongv(parameter: c_uint, place: Out<c_long>) -> () [()] {
+        #[allow(clippy::cast_possible_truncation)] // whole and small, or saturated
+        read(parameter, Kind::Long, place, |value| value as c_long);
+    }
+    /// Reads the single-precision values of a parameter of the current device.
+    fn hdGetFloatv(parameter: c_uint, place: Out<c_float>) -> () [()] {
+        #[allow(clippy::cast_possible_truncation)] // what the program asks for
+        read(parameter, Kind::Real, place, |value| value as c_float);
+    }
+    /// Reads the double-precision values of a parameter of the current device.
+    fn hdGetDoublev(parameter: c_uint, place: Out<c_double>) -> () [()] { read(parameter, Kind::Real, place, |value| value) }
+    /// Returns a text, never null; texts of the interface are valid before any device is open.
+    fn hdGetString(parameter: c_uint) -> *const c_char [c"".as_ptr()] { value_or(c"", device::text(parameter)).as_ptr() }
+    /// Sets the boolean values of a parameter of the current device.
+    fn hdSetBooleanv(parameter: c_uint, place: In<c_uchar>) -> () [()] { write(parameter, Kind::Boolean, place, f64::from) }
+    /// Sets the integer values of a parameter of the current device.
+    fn hdSetIntegerv(parameter: c_uint, place: In<c_int>) -> () [()] { write(parameter, Kind::Integer, place, f64::from) }
+    /// Sets the long integer values of a parameter of the current device.
+    fn hdSetLongv(parameter: c_uint, place: In<c_long>) -> () [()] { write(parameter, Kind::Long, place, |value| value as f64) }
+    /// Sets the single-precision values of a parameter of the current device.
+    fn hdSetFloatv(parameter: c_uint, place: In<c_float>) -> () [()] { write(parameter, Kind::Real, place, f64::from) }
+    /// Sets the double-precision values of a parameter of the current device.
+    fn hdSetDoublev(parameter: c_uint, place: In<c_double>) -> () [()] { write(parameter, Kind::Real, place, |value| value) }
+    /// Enables a capability of the current device.
+    fn hdEnable(capability: c_uint) -> () [()] { switch(capability, true) }
+    /// Disables a capability of the current device.
+    fn hdDisable(capability: c_uint) -> () [()] { switch(capability, false) }
+    /// Returns whether a capability of the current device is enabled.
+    fn hdIsEnabled(capability: c_uint) -> c_uchar [0] {
+        c_uchar::from(value_or(false, Devices::with_current(|device| device.is_on(capability))))
+    }
 
-/// Reads the long integer values of a parameter of the current device.
-///
-/// # Safety
-/// The pointer is null or leads to as many values as the parameter has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdGetLongv(parameter: c_uint, place: *mut c_long) {
-    // SAFETY: by the contract of this function.
-    unsafe { read(parameter, place, |values, index| values.read(Kind::Long, index).map(Reading::as_long)) }
-}
+    /// Pops the newest error of the calling thread.
+    fn hdGetError() -> ErrorInfo [error::NONE] { error::take() }
+    /// Returns the text of an error number, never null.
+    fn hdGetErrorString(code: c_uint) -> *const c_char [c"".as_ptr()] { error::words(code).as_ptr() }
 
-/// Reads the single-precision values of a parameter of the current device.
-///
-/// # Safety
-/// The pointer is null or leads to as many values as the parameter has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdGetFloatv(parameter: c_uint, place: *mut c_float) {
-    #[allow(clippy::cast_possible_truncation)] // what the program asks for
-    let convert = |values: &Values, index: usize| {
-        values.read(Kind::Real, index).map(|reading| reading.as_real() as c_float)
-    };
-    // SAFETY: by the contract of this function.
-    unsafe { read(parameter, place, convert) }
-}
+    /// Returns "calibrated" always, because programs wait for it.
+    fn hdCheckCalibration() -> c_uint [CALIBRATED] { CALIBRATED }
+    /// Returns "calibrated" always, as [`hdCheckCalibration`].
+    fn hdCheckCalibrationStyle() -> c_uint [CALIBRATED] { CALIBRATED }
+    /// Does nothing: there is nothing to calibrate.
+    fn hdUpdateCalibration(_style: c_uint) -> () [()] {}
+    /// Does nothing: there is nothing to calibrate.
+    fn hdUpdateCalibrationMessage(_style: c_uint) -> () [()] {}
 
-/// Reads the double-precision values of a parameter of the current device.
-///
-/// # Safety
-/// The pointer is null or leads to as many values as the parameter has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdGetDoublev(parameter: c_uint, place: *mut c_double) {
-    // SAFETY: by the contract of this function.
-    unsafe { read(parameter, place, |values, index| values.read(Kind::Real, index).map(Reading::as_real)) }
-}
-
-/// Returns a text, never null; texts of the interface are valid before any device is open.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdGetString(parameter: c_uint) -> *const c_char {
-    let nothing = c"".as_ptr();
-    guarded(nothing, || match device::text(parameter) {
-        Ok(text) => text.as_ptr(),
-        Err(code) => {
-            raise(code, CURRENT.get());
-            nothing
+    /// Starts the scheduler, and with it the enabled force.
+    fn hdStartScheduler() -> () [()] { raise_unless(scheduler::start(), Code::TimerError, CURRENT.get()) }
+    /// Stops the scheduler and waits for its end: no callback is called afterwards.
+    fn hdStopScheduler() -> () [()] { scheduler::stop() }
+    /// Sets the rate of the scheduler, 1000 or 500 Hz.
+    fn hdSetSchedulerRate(rate_hz: c_ulong) -> () [()] {
+        raise_unless(callbacks::set_rate(rate_hz), Code::InvalidValue, CURRENT.get());
+    }
+    /// Schedules a callback, called in every tick until it returns 0; higher priority first. The callback may be called with `data`
+    /// from another thread until it returned 0 or was taken out.
+    fn hdScheduleAsynchronous(callback: Option<Callback>, data: *mut c_void, priority: c_ushort) -> c_ulong [c_ulong::MAX] {
+        // SAFETY: the caller of this entry point guarantees what its documentation states.
+        let entry = callback.map(|callback| unsafe { Entry::new(callback, data, priority) });
+        value_or(c_ulong::MAX, entry.ok_or(Code::InvalidValue).and_then(Entry::schedule))
+    }
+    /// Schedules a callback and returns once it has returned 0; without a running scheduler, or on its thread, calls it directly.
+    /// The callback may be called with `data` from another thread until this returns.
+    fn hdScheduleSynchronous(callback: Option<Callback>, data: *mut c_void, priority: c_ushort) -> () [()] {
+        match callback {
+            // SAFETY: the caller of this entry point guarantees what its documentation states.
+            Some(callback) => unsafe { scheduler::synchronous(callback, data, priority) },
+            None => raise(Code::InvalidValue, CURRENT.get()),
         }
-    })
-}
+    }
+    /// Unschedules a callback.
+    fn hdUnschedule(handle: c_ulong) -> () [()] {
+        raise_unless(callbacks::unschedule(handle), Code::InvalidOperation, CURRENT.get());
+    }
+    /// Returns whether a callback is still scheduled; with `how` = 1, waits for its end first.
+    fn hdWaitForCompletion(handle: c_ulong, how: c_uint) -> c_uchar [0] {
+        c_uchar::from(callbacks::is_scheduled(handle, how != 0))
+    }
+    /// Returns the time since this tick began, s.
+    fn hdGetSchedulerTimeStamp() -> c_double [0.0] { callbacks::since_tick_s() }
 
-/// Sets a parameter of the current device from values of the program.
-///
-/// # Safety
-/// `place` is null or as many values may be read as the parameter has.
-unsafe fn write<T: Copy>(parameter: c_uint, kind: Kind, place: *const T, convert: impl Fn(T) -> f64) {
-    guarded((), || {
-        let set = || {
-            let count = parameter::settable(parameter, kind)?;
-            let mut values = [0.0; 6];
-            for (index, value) in values.iter_mut().enumerate().take(count) {
-                // SAFETY: by the contract of this function; nothing is added to null.
-                let read = (!place.is_null()).then(|| unsafe { get(place.add(index)) }).flatten();
-                *value = convert(read.ok_or(Code::InvalidValue)?);
-            }
-            Devices::with_current(|device| device.set(parameter, values)).and_then(|set| set)
-        };
-        set().unwrap_or_else(|code| raise(code, CURRENT.get()));
-    });
-}
-
-/// Sets the boolean values of a parameter of the current device.
-///
-/// # Safety
-/// The pointer is null or leads to as many values as the parameter has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdSetBooleanv(parameter: c_uint, place: *const c_uchar) {
-    // SAFETY: by the contract of this function.
-    unsafe { write(parameter, Kind::Boolean, place, f64::from) }
-}
-
-/// Sets the integer values of a parameter of the current device.
-///
-/// # Safety
-/// The pointer is null or leads to as many values as the parameter has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdSetIntegerv(parameter: c_uint, place: *const c_int) {
-    // SAFETY: by the contract of this function.
-    unsafe { write(parameter, Kind::Integer, place, f64::from) }
-}
-
-/// Sets the long integer values of a parameter of the current device.
-///
-/// # Safety
-/// The pointer is null or leads to as many values as the parameter has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdSetLongv(parameter: c_uint, place: *const c_long) {
-    // SAFETY: by the contract of this function.
-    unsafe { write(parameter, Kind::Long, place, |value| value as f64) }
-}
-
-/// Sets the single-precision values of a parameter of the current device.
-///
-/// # Safety
-/// The pointer is null or leads to as many values as the parameter has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdSetFloatv(parameter: c_uint, place: *const c_float) {
-    // SAFETY: by the contract of this function.
-    unsafe { write(parameter, Kind::Real, place, f64::from) }
-}
-
-/// Sets the double-precision values of a parameter of the current device.
-///
-/// # Safety
-/// The pointer is null or leads to as many values as the parameter has.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdSetDoublev(parameter: c_uint, place: *const c_double) {
-    // SAFETY: by the contract of this function.
-    unsafe { write(parameter, Kind::Real, place, |value| value) }
-}
-
-/// Enables a capability of the current device.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdEnable(capability: c_uint) {
-    guarded((), || switch(capability, true));
-}
-
-/// Disables a capability of the current device.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdDisable(capability: c_uint) {
-    guarded((), || switch(capability, false));
-}
-
-fn switch(capability: c_uint, on: bool) {
-    let switched = Devices::with_current(|device| device.switch(capability, on)).and_then(|done| done);
-    switched.unwrap_or_else(|code| raise(code, CURRENT.get()));
-}
-
-/// Returns whether a capability of the current device is enabled.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdIsEnabled(capability: c_uint) -> c_uchar {
-    guarded(0, || {
-        let is_on = Devices::with_current(|device| device.is_on(capability)).and_then(|is_on| is_on);
-        is_on.map_or_else(
-            |code| {
-                raise(code, CURRENT.get());
-                0
-            },
-            c_uchar::from,
-        )
-    })
-}
-
-// ---------------------------------------------------------------- errors
-
-/// Pops the newest error of the calling thread.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdGetError() -> ErrorInfo {
-    error::take()
-}
-
-/// Returns the text of an error number, never null.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdGetErrorString(code: c_uint) -> *const c_char {
-    error::words(code).as_ptr()
-}
-
-// ---------------------------------------------------------------- calibration
-
-/// Returns "calibrated" always, because programs wait for it.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdCheckCalibration() -> c_uint {
-    CALIBRATED
-}
-
-/// Returns "calibrated" always, as [`hdCheckCalibration`].
-#[unsafe(no_mangle)]
-pub extern "C" fn hdCheckCalibrationStyle() -> c_uint {
-    CALIBRATED
-}
-
-/// Does nothing: there is nothing to calibrate.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdUpdateCalibration(_style: c_uint) {}
-
-/// Does nothing: there is nothing to calibrate.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdUpdateCalibrationMessage(_style: c_uint) {}
-
-// ---------------------------------------------------------------- scheduler
-
-/// Starts the scheduler, and with it the enabled force.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdStartScheduler() {
-    guarded((), || {
-        if !Scheduler::start() {
-            raise(Code::TimerError, CURRENT.get());
-        }
-    });
-}
-
-/// Stops the scheduler and waits for its end: no callback is called afterwards.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdStopScheduler() {
-    guarded((), Scheduler::stop);
-}
-
-/// Sets the rate of the scheduler, 1000 or 500 Hz.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdSetSchedulerRate(rate_hz: c_ulong) {
-    guarded((), || {
-        if !Scheduler::set_rate(rate_hz) {
-            raise(Code::InvalidValue, CURRENT.get());
-        }
-    });
-}
-
-/// Schedules a callback, called in every tick until it returns 0; higher priority first.
-///
-/// # Safety
-/// `callback` may be called with `data` from another thread until it returned 0 or was taken out.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdScheduleAsynchronous(
-    callback: Option<Callback>,
-    data: *mut c_void,
-    priority: c_ushort,
-) -> c_ulong {
-    guarded(c_ulong::MAX, || match callback {
-        Some(callback) => {
-            // SAFETY: by the contract of this function.
-            let handle = unsafe { Scheduler::asynchronous(callback, data, priority) };
-            handle.unwrap_or_else(|| {
-                raise(Code::SchedulerFull, CURRENT.get());
-                c_ulong::MAX
-            })
-        }
-        None => {
-            raise(Code::InvalidValue, CURRENT.get());
-            c_ulong::MAX
-        }
-    })
-}
-
-/// Schedules a callback and returns once it has returned 0; without a running scheduler, or on its thread, calls it
-/// directly.
-///
-/// # Safety
-/// `callback` may be called with `data` from another thread until this returns.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn hdScheduleSynchronous(
-    callback: Option<Callback>,
-    data: *mut c_void,
-    priority: c_ushort,
-) {
-    guarded((), || match callback {
-        // SAFETY: by the contract of this function.
-        Some(callback) => unsafe { Scheduler::synchronous(callback, data, priority) },
-        None => raise(Code::InvalidValue, CURRENT.get()),
-    });
-}
-
-/// Unschedules a callback.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdUnschedule(handle: c_ulong) {
-    guarded((), || {
-        if !Scheduler::unschedule(handle) {
-            raise(Code::InvalidOperation, CURRENT.get());
-        }
-    });
-}
-
-/// Returns whether a callback is still scheduled; with `how` = 1, waits for its end first.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdWaitForCompletion(handle: c_ulong, how: c_uint) -> c_uchar {
-    guarded(0, || c_uchar::from(Scheduler::is_scheduled(handle, how != 0)))
-}
-
-/// Returns the time since this tick began, s.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdGetSchedulerTimeStamp() -> c_double {
-    guarded(0.0, Scheduler::since_tick_s)
-}
-
-// ---------------------------------------------------------------- the rest
-
-/// Does nothing: angles are not scaled.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdScaleGimbalAngles(_x: c_double, _y: c_double, _z: c_double, _matrix: *mut c_double) {}
-
-/// Returns success: no licence is required.
-#[unsafe(no_mangle)]
-pub extern "C" fn hdDeploymentLicense(
-    _vendor: *const c_char,
-    _application: *const c_char,
-    _password: *const c_char,
-) -> c_uchar {
-    1
+    /// Does nothing: angles are not scaled.
+    fn hdScaleGimbalAngles(_x: c_double, _y: c_double, _z: c_double, _matrix: Out<c_double>) -> () [()] {}
+    /// Returns success: no licence is required.
+    fn hdDeploymentLicense(_vendor: In<c_char>, _application: In<c_char>, _password: In<c_char>) -> c_uchar [1] { 1 }
 }

@@ -1,7 +1,7 @@
 //! Parameters by number, with the number and type of their values.
 
 use crate::error::Code;
-use std::ffi::{c_int, c_long, c_uchar, c_uint};
+use std::ffi::c_uint;
 
 pub(crate) const BUTTONS: [c_uint; 2] = [0x2000, 0x2200];
 pub(crate) const SAFETY_SWITCH: [c_uint; 2] = [0x2001, 0x2201];
@@ -66,10 +66,6 @@ pub(crate) struct Values {
     numbers: [f64; 16],
 }
 
-/// One value of a parameter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Reading(f64);
-
 impl Values {
     pub(crate) fn new(kind: Kind, values: &[f64]) -> Self {
         let mut numbers = [0.0; 16];
@@ -90,32 +86,9 @@ impl Values {
         Self::new(Kind::Boolean, &[f64::from(u8::from(value))])
     }
 
-    pub(crate) fn len(&self) -> usize {
-        self.count
-    }
-
-    /// Returns a value if it is of this type.
-    pub(crate) fn read(&self, kind: Kind, index: usize) -> Option<Reading> {
-        (kind == self.kind).then(|| self.numbers.get(index).copied().map(Reading)).flatten()
-    }
-}
-
-#[allow(clippy::cast_possible_truncation)] // whole and small, or saturated
-impl Reading {
-    pub(crate) fn as_boolean(self) -> c_uchar {
-        c_uchar::from(self.0 != 0.0)
-    }
-
-    pub(crate) fn as_integer(self) -> c_int {
-        self.0 as c_int
-    }
-
-    pub(crate) fn as_long(self) -> c_long {
-        self.0 as c_long
-    }
-
-    pub(crate) fn as_real(self) -> f64 {
-        self.0
+    /// Returns the values, and how many of them count, if they are of this type.
+    pub(crate) fn of_kind(&self, kind: Kind) -> Option<([f64; 16], usize)> {
+        (kind == self.kind).then_some((self.numbers, self.count))
     }
 }
 

@@ -1,7 +1,7 @@
 //! Presents stimuli to a person: the servo loop in real time, on its own threads. Clients may display and stop the run; only the
 //! experiment changes the stimuli.
 
-use super::watch::Shared;
+use super::watch::{RunThread, Shared, spawn_run};
 use super::{Apparatus, Kinematics};
 use crate::apparatus::rig::{RunEnded, StimulusRefused, TrialFiles};
 use crate::conduct::{ApparatusOrFrontEndError, Ending};
@@ -9,15 +9,12 @@ use crate::kinematics::KinematicsMeter;
 use crate::log::Incident;
 use crate::screen::StimulusExploration;
 use crate::trial::Trial;
-use flotor_live::{Ask, Directory, EndKind, RefusalCause, Serve};
+use flotor_live::{Ask, Directory, RefusalCause, Serve};
 use flotor_record::Recorder;
 use flotor_servo::{Clock, RunEnd, StopSwitch};
 use flotor_session::telemetry::{ObservedRun, announce, emergency_stop, machine_stop};
-use flotor_session::{
-    ControlError, Controls, LatchGuard, Outcome, RunError, RunOptions, RunRecording, Session,
-};
+use flotor_session::{ControlError, Controls, LatchGuard, RunError, RunOptions, RunRecording, Session};
 use std::sync::Arc;
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 /// Settling time, longer than the loop needs to apply a change and its observers to report it.
@@ -34,7 +31,7 @@ pub struct RealTimeRig<'a> {
     viewer_error: Option<String>,
     /// Warnings of the run.
     warnings: Vec<String>,
-    run: Option<JoinHandle<Result<Outcome, RunError>>>,
+    run: Option<RunThread>,
     /// End of the run, once known.
     ended: Option<RunEnd>,
 }
@@ -81,16 +78,8 @@ impl<'a> RealTimeRig<'a> {
         let host = Arc::new(OnlyStop { stop: stop.clone(), latch: session.latch().cloned() });
         let publication = announce(&Directory::of_this_user(), apparatus.scene(), &run, &session, host);
         let viewer_error = publication.as_ref().err().map(ToString::to_string);
-        let mut observers = ObservedRun { observer: shared.clone(), publication: publication.ok() };
-        let switch = stop.clone();
-        let thread = std::thread::Builder::new().name("flotor-study".to_owned());
-        let run = thread.spawn(move || {
-            let outcome = session.run(&mut observers, &switch);
-            let is_in_order = outcome.as_ref().is_ok_and(|outcome| outcome.end.is_in_order());
-            let kind = if is_in_order { EndKind::InOrder } else { EndKind::Failed };
-            observers.end("the sitting has ended", kind);
-            outcome
-        })?;
+        let observers = ObservedRun { observer: shared.clone(), publication: publication.ok() };
+        let run = spawn_run(session, observers, stop.clone(), "the sitting has ended")?;
         Ok(Self {
             apparatus,
             kinematics,
@@ -195,7 +184,7 @@ impl<'a> RealTimeRig<'a> {
 
     /// Returns true if a stop was requested or the run has ended.
     fn is_stopping(&self) -> bool {
-        self.stop.is_stop_requested() || self.run.as_ref().is_none_or(JoinHandle::is_finished)
+        self.stop.is_stop_requested() || self.run.as_ref().is_none_or(RunThread::is_finished)
     }
 
     /// Returns the incident that stops the sitting, if any: an emergency stop, a stop request, or the end of the run.
@@ -278,7 +267,7 @@ impl<'a> RealTimeRig<'a> {
             (None, Some(end)) => return Err(RunEnded(end).into()),
             _ => {}
         }
-        let outcome = self.run.take().map(JoinHandle::join).transpose();
+        let outcome = self.run.take().map(RunThread::join).transpose();
         let outcome = outcome.ok().flatten().ok_or(RunError::Thread("panicked"))?;
         let end = outcome?.end;
         self.ended = Some(end);

@@ -4,8 +4,16 @@ use crate::kinematics::{KinematicsMeter, Sample};
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome};
 use flotor_hal::Demand;
-use flotor_session::{Observer, RunRecording};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use flotor_live::EndKind;
+use flotor_servo::StopSwitch;
+use flotor_session::telemetry::ObservedRun;
+use flotor_session::{Observer, Outcome, RunError, RunRecording, Session};
+use std::io;
+use std::sync::{Arc, Mutex, MutexGuard};
+use std::thread::JoinHandle;
+
+/// Thread of a run.
+pub type RunThread = JoinHandle<Result<Outcome, RunError>>;
 
 /// Observer of every tick of a study.
 #[derive(Default)]
@@ -46,6 +54,24 @@ impl Observer for Watch {
     }
 }
 
+/// Runs a session in a thread of its own, and notifies its clients of the end with a text.
+///
+/// # Errors
+/// If the thread cannot be created.
+pub fn spawn_run(
+    session: Session,
+    mut observers: ObservedRun<Shared>,
+    stop: StopSwitch,
+    end: &'static str,
+) -> io::Result<RunThread> {
+    std::thread::Builder::new().name("flotor-study".to_owned()).spawn(move || {
+        let outcome = session.run(&mut observers, &stop);
+        let is_in_order = outcome.as_ref().is_ok_and(|outcome| outcome.end.is_in_order());
+        observers.end(end, if is_in_order { EndKind::InOrder } else { EndKind::Failed });
+        outcome
+    })
+}
+
 /// Shared handle to a [`Watch`] for the observers' thread and its readers; never for the servo thread.
 #[derive(Clone, Default)]
 pub struct Shared(Arc<Mutex<Watch>>);
@@ -53,7 +79,7 @@ pub struct Shared(Arc<Mutex<Watch>>);
 impl Shared {
     /// Locks the collected data. Not real-time: waits for the observers.
     pub fn lock(&self) -> MutexGuard<'_, Watch> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        flotor_core::lock(&self.0)
     }
 
     /// Requests all outputs that a recording stores, from now on. Not real-time.

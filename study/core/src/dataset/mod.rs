@@ -15,8 +15,8 @@ mod kept;
 mod table;
 
 pub use kept::Unmergeable;
+pub use table::trials_csv;
 
-use crate::exclusion::Exclusion;
 use crate::log::{Begin, Event, InputFile, LogError, LogProblem, LogWriter, SittingLog};
 use crate::protocol::SubjectNumber;
 use crate::sitting::Sitting;
@@ -140,6 +140,12 @@ pub enum DatasetError {
     },
 }
 
+impl DatasetError {
+    fn file(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
+        Self::File { path: path.into(), action, cause }
+    }
+}
+
 impl Dataset {
     /// Returns the data set in a folder, which need not exist yet.
     #[must_use]
@@ -258,7 +264,7 @@ impl Dataset {
     pub fn begin(&self, begin: Begin) -> Result<(Sitting, LogWriter), DatasetError> {
         let path = self.log_path(begin.subject, begin.protocol.task());
         let folder = self.source_folder(begin.subject);
-        self.file(&folder, "cannot make the folder", std::fs::create_dir_all(&folder))?;
+        make_folder(&folder)?;
         let sitting = Sitting::new(&begin.protocol, begin.seed, begin.subject);
         let writer = LogWriter::create(&path)?;
         let mut writer = if begin.is_of_a_person() { writer.stamped() } else { writer };
@@ -277,86 +283,73 @@ impl Dataset {
             participants += &table::participant(&log);
             if log.complete {
                 let path = self.table_path(log.begin.subject, log.begin.protocol.task());
-                self.replace(&path, &table::trials(&log))?;
+                replace(&path, &table::trials(&log))?;
                 if let Some(scans) = table::scans(&log) {
                     let subject = log.begin.subject;
                     let path = self.root.join(format!("{subject}/{subject}_scans.tsv"));
-                    self.complete_table(&path, &scans, table::SCAN)?;
+                    complete_table(&path, &scans, table::SCAN)?;
                 }
             }
             first.get_or_insert(log.begin);
             Ok(())
         })?;
         let Some(begin) = first else { return Ok(()) };
-        self.complete_table(&self.root.join("participants.tsv"), &participants, table::PARTICIPANT)?;
+        complete_table(&self.root.join("participants.tsv"), &participants, table::PARTICIPANT)?;
         let task = format!("task-{}_beh.json", begin.protocol.task());
         for (name, (object, owned)) in [
             (task.as_str(), table::columns(&begin.protocol)),
             ("dataset_description.json", table::description(&begin)),
             ("participants.json", table::participant_columns()),
         ] {
-            self.complete_object(&self.root.join(name), object, owned)?;
+            let generated = pretty(object.clone());
+            complete(&self.root.join(name), &generated, |earlier| {
+                Ok(kept::object(earlier, object, owned)?.map(pretty))
+            })?;
         }
         Ok(())
     }
+}
 
-    /// Merges a table with the edits of people and writes it.
-    fn complete_table(&self, path: &Path, generated: &str, key: &'static str) -> Result<(), DatasetError> {
-        let Some(earlier) = self.read_earlier(path)? else { return self.replace(path, generated) };
-        let merged = kept::table(&earlier, generated, key);
-        let merged = merged.map_err(|problem| DatasetError::Unmergeable { path: path.into(), problem })?;
-        merged.map_or(Ok(()), |text| self.replace(path, &text))
-    }
+/// Writes a file, merged with an earlier one that people may have edited.
+fn complete(
+    path: &Path,
+    generated: &str,
+    merge: impl FnOnce(&str) -> Result<Option<String>, Unmergeable>,
+) -> Result<(), DatasetError> {
+    let Some(earlier) = read_earlier(path)? else { return replace(path, generated) };
+    let merged =
+        merge(&earlier).map_err(|problem| DatasetError::Unmergeable { path: path.into(), problem })?;
+    merged.map_or(Ok(()), |text| replace(path, &text))
+}
 
-    /// Merges a JSON object with the edits of people and writes it; keys in `owned` are always the program's.
-    fn complete_object(
-        &self,
-        path: &Path,
-        generated: Map<String, Value>,
-        owned: &[&str],
-    ) -> Result<(), DatasetError> {
-        let Some(earlier) = self.read_earlier(path)? else { return self.replace(path, &pretty(generated)) };
-        let merged = kept::object(&earlier, generated, owned);
-        let merged = merged.map_err(|problem| DatasetError::Unmergeable { path: path.into(), problem })?;
-        merged.map_or(Ok(()), |object| self.replace(path, &pretty(object)))
-    }
+fn complete_table(path: &Path, generated: &str, key: &'static str) -> Result<(), DatasetError> {
+    complete(path, generated, |earlier| kept::table(earlier, generated, key))
+}
 
-    /// Reads an existing file; returns `None` if there is none.
-    fn read_earlier(&self, path: &Path) -> Result<Option<String>, DatasetError> {
-        match std::fs::read_to_string(path) {
-            Ok(text) => Ok(Some(text)),
-            Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
-            Err(cause) => {
-                Err(DatasetError::File { path: path.into(), action: "cannot read the file", cause })
-            }
-        }
-    }
-
-    /// Writes a file atomically.
-    fn replace(&self, path: &Path, text: &str) -> Result<(), DatasetError> {
-        if let Some(folder) = path.parent() {
-            self.file(folder, "cannot make the folder", std::fs::create_dir_all(folder))?;
-        }
-        let aside = path.with_extension("part");
-        self.file(&aside, "cannot write the table", std::fs::write(&aside, text))?;
-        self.file(path, "cannot replace the old table", std::fs::rename(&aside, path))
-    }
-
-    #[allow(clippy::unused_self)] // method for readability
-    fn file(
-        &self,
-        path: &Path,
-        action: &'static str,
-        result: std::io::Result<()>,
-    ) -> Result<(), DatasetError> {
-        result.map_err(|cause| DatasetError::File { path: path.into(), action, cause })
+/// Reads an existing file; returns `None` if there is none.
+fn read_earlier(path: &Path) -> Result<Option<String>, DatasetError> {
+    match std::fs::read_to_string(path) {
+        Ok(text) => Ok(Some(text)),
+        Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
+        Err(cause) => Err(DatasetError::file(path, "cannot read the file", cause)),
     }
 }
 
-/// Returns all trials of all sittings as one comma-separated table, with the rule that excluded each trial.
-#[must_use]
-pub fn trials_csv(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
-    table::long(logs, excluded)
+/// Writes a file atomically.
+fn replace(path: &Path, text: &str) -> Result<(), DatasetError> {
+    if let Some(folder) = path.parent() {
+        make_folder(folder)?;
+    }
+    let aside = path.with_extension("part");
+    std::fs::write(&aside, text)
+        .map_err(|cause| DatasetError::file(&aside, "cannot write the table", cause))?;
+    std::fs::rename(&aside, path)
+        .map_err(|cause| DatasetError::file(path, "cannot replace the old table", cause))
+}
+
+fn make_folder(folder: &Path) -> Result<(), DatasetError> {
+    std::fs::create_dir_all(folder)
+        .map_err(|cause| DatasetError::file(folder, "cannot make the folder", cause))
 }
 
 fn pretty(object: Map<String, Value>) -> String {

@@ -6,7 +6,7 @@ use crate::kinematics::StimulusKinematics;
 use crate::log::{Begin, SittingLog, TrialRecord};
 use crate::protocol::Protocol;
 use crate::sitting::Verdict;
-use crate::trial::{Judgement, Position, Presented, Response};
+use crate::trial::{Judgement, Presented, Response};
 use serde_json::{Map, Value, json};
 
 /// Missing value in BIDS.
@@ -60,9 +60,10 @@ pub(super) fn trials(log: &SittingLog) -> String {
     [head.join("\t")].into_iter().chain(rows).fold(String::new(), |text, line| text + &line + "\n")
 }
 
-/// Returns all trials as one comma-separated table for other programs: subject and first modality, the columns of [`trials`],
-/// movement per stimulus, and the excluding rule; lists within a cell are separated by spaces.
-pub(super) fn long(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
+/// Returns all trials of all sittings as one comma-separated table for other programs: subject and first modality, the columns of a
+/// sitting's table, movement per stimulus, and the rule that excluded the trial; lists within a cell are separated by spaces.
+#[must_use]
+pub fn trials_csv(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
     let head = COLUMNS.iter().map(|(name, _)| *name);
     let head = ["subject", "first_modality"].into_iter().chain(head).chain(EACH).chain(["excluded"]);
     let mut text = head.collect::<Vec<_>>().join(",") + "\n";
@@ -135,17 +136,10 @@ fn row(record: &TrialRecord, codes: &Codes, log: &SittingLog) -> Vec<String> {
         number(pair.map(|pair| pair.comparison)),
         number(single),
         number(pair.map(|pair| pair.delta)),
-        word(pair.map(|pair| match pair.comparison_at {
-            Position::First => "first",
-            Position::Second => "second",
-        })),
+        word(pair.map(|pair| pair.comparison_at.word())),
         event.response.word().to_owned(),
         number(rating),
-        word(judgement.map(|judgement| match judgement {
-            Judgement::Correct => "correct",
-            Judgement::Wrong => "wrong",
-            Judgement::Unsure => "unsure",
-        })),
+        word(judgement.map(Judgement::word)),
         flag(reversal),
         flag(event.verdict == Verdict::Repeated),
         number(record.track.and_then(|track| track.threshold)),

@@ -1,25 +1,35 @@
 //! Goodness of fit of an observer (Wichmann and Hill, Perception & Psychophysics 63:1293, 2001: by simulation, because a track has
 //! too few answers at a difference for the chi-square distribution).
 
-use super::psychometric::GoodnessOfFit;
 use super::{Observation, probability};
 use crate::observer::TernaryObserver;
 use crate::random::{Purpose, Stream};
 use crate::trial::Judgement;
+use serde::Serialize;
 
-const JUDGEMENTS: [Judgement; 3] = [Judgement::Correct, Judgement::Wrong, Judgement::Unsure];
 /// Number of simulated answer sets.
 const SETS: u32 = 999;
 /// Maximum number of classes of the difference, and minimum number of answers per class.
 const CLASSES_MOST: usize = 4;
 const ANSWERS_LEAST: usize = 6;
 
+/// Pearson's chi-square of the three kinds of answers in classes of the difference, against the fitted observer.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct GoodnessOfFit {
+    /// Sum over classes and kinds of the squared distance over the number expected.
+    pub chi_square: f64,
+    /// Number of classes of the difference.
+    pub classes: usize,
+    /// Probability of a larger sum: share among answer sets simulated from the fitted observer at the same differences.
+    pub p: f64,
+}
+
 /// Tests the fit of an observer to answers. The simulation has a fixed seed, so equal answers give equal probabilities.
 pub(super) fn of(observations: &[Observation], observer: &TernaryObserver) -> GoodnessOfFit {
     let mut sorted = observations.to_vec();
     sorted.sort_by(|a, b| a.delta.total_cmp(&b.delta));
     let shares_of = |one: &Observation| {
-        JUDGEMENTS.map(|judgement| probability(observer, &Observation { judgement, ..*one }))
+        Judgement::ALL.map(|judgement| probability(observer, &Observation { judgement, ..*one }))
     };
     let shares: Vec<[f64; 3]> = sorted.iter().map(shares_of).collect();
     let sum = |class: &[Observation]| {
@@ -43,7 +53,8 @@ pub(super) fn of(observations: &[Observation], observer: &TernaryObserver) -> Go
         }
         sum
     };
-    let kind = |one: &Observation| JUDGEMENTS.iter().position(|known| *known == one.judgement).unwrap_or(0);
+    let kind =
+        |one: &Observation| Judgement::ALL.iter().position(|known| *known == one.judgement).unwrap_or(0);
     let found = chi_square(&mut sorted.iter().map(kind));
     let mut stream = Stream::new(0, Purpose::GoodnessOfFit, 0, 0);
     let mut drawn = || {

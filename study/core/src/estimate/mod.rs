@@ -8,16 +8,18 @@ mod goodness_of_fit;
 mod most_likely;
 mod posterior;
 mod posterior_density;
+mod posterior_mean;
 mod psychometric;
 
+pub use goodness_of_fit::GoodnessOfFit;
 pub use most_likely::most_likely;
 pub use posterior::{Posterior, PosteriorGrid};
-pub use psychometric::{GoodnessOfFit, NotBounded, Psychometric, psychometric};
+pub(crate) use posterior_mean::posterior_mean;
+pub use psychometric::{NotBounded, Psychometric, psychometric};
 
 use crate::observer::TernaryObserver;
 use crate::trial::Judgement;
-use flotor_statistics::distribution::normal_below;
-use posterior_density::{LapsePrior, Nodes, PosteriorDensity};
+use flotor_statistics::distribution::{normal_below, normal_density};
 use serde::{Deserialize, Serialize};
 
 /// One answer: its difference, as a share of the base, and its judgement.
@@ -81,11 +83,11 @@ impl Prior {
 ///
 /// Newton's method; a test compares it with bisection.
 fn unit_threshold(criterion: f64, target: f64) -> f64 {
-    let density = |x: f64| libm::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
     let mut delta = criterion.max(0.1);
     for _ in 0..40 {
         let reached = 0.5 * (1.0 + normal_below(delta - criterion) - normal_below(-delta - criterion));
-        let step = (target - reached) / (0.5 * (density(delta - criterion) + density(delta + criterion)));
+        let step = (target - reached)
+            / (0.5 * (normal_density(delta - criterion) + normal_density(delta + criterion)));
         delta = (delta + step).max(1.0e-6);
         if step.abs() < 1.0e-12 {
             break;
@@ -103,24 +105,6 @@ pub struct Estimate {
     pub criterion: f64,
     /// Difference at which the target is reached, as a share of the base.
     pub threshold: f64,
-}
-
-/// Estimates the observer by posterior means, geometric for sigma and threshold, and returns the ends of the threshold that the
-/// answers do not bound.
-pub(crate) fn posterior_mean(
-    observations: &[Observation],
-    prior: &Prior,
-    target: f64,
-) -> (Estimate, Option<NotBounded>) {
-    const NODES: Nodes = Nodes { thresholds: 24, criteria: 16, lapses: 1 };
-    let lapse = LapsePrior::Known(prior.lapse);
-    let posterior = PosteriorDensity::new(observations, prior, target, lapse, NODES);
-    let estimate = Estimate {
-        sigma: libm::exp(posterior.mean_log_sigma),
-        criterion: posterior.mean_criterion,
-        threshold: libm::exp(posterior.mean_log_threshold),
-    };
-    (estimate, NotBounded::of(posterior.is_bounded))
 }
 
 /// Returns the probability of an observer's answer.

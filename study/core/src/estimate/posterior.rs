@@ -7,7 +7,6 @@ use super::{Observation, Prior, probability};
 use crate::observer::TernaryObserver;
 use crate::trial::Judgement;
 
-const JUDGEMENTS: [Judgement; 3] = [Judgement::Correct, Judgement::Wrong, Judgement::Unsure];
 /// Grid of observers: thresholds evenly spaced in their logarithm, times criteria evenly spaced from 0.
 const THRESHOLDS: u32 = 31;
 const CRITERIA: u32 = 10;
@@ -58,7 +57,7 @@ impl PosteriorGrid {
 }
 
 fn answers(observer: &TernaryObserver, delta: f64) -> ([f64; 3], f64) {
-    let shares = JUDGEMENTS.map(|judgement| probability(observer, &Observation { delta, judgement }));
+    let shares = Judgement::ALL.map(|judgement| probability(observer, &Observation { delta, judgement }));
     (shares, entropy(&shares))
 }
 

@@ -184,7 +184,7 @@ fn equal(observations: &[Observation]) -> Vec<Equal> {
     let group = |same: &[Observation]| {
         let count = |judgement| same.iter().filter(|one| one.judgement == judgement).count();
         let delta = same.first().map_or(0.0, |one| one.delta);
-        Equal { delta, counts: [Judgement::Correct, Judgement::Wrong, Judgement::Unsure].map(count) }
+        Equal { delta, counts: Judgement::ALL.map(count) }
     };
     alike.map(group).collect()
 }

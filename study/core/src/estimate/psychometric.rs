@@ -3,8 +3,9 @@
 //! The posterior combines the [`Prior`] of the other estimators with an exponential prior of the lapse, mean 2 % (as in Kuss, Jäkel
 //! and Wichmann 2005). Intervals hold 95 % of the posterior.
 
+use super::goodness_of_fit::{self, GoodnessOfFit};
 use super::posterior_density::{LapsePrior, Nodes, PosteriorDensity};
-use super::{Observation, Prior, goodness_of_fit};
+use super::{Observation, Prior};
 use crate::trial::Judgement;
 use flotor_statistics::distribution::binomial_at_least;
 use serde::Serialize;
@@ -74,17 +75,6 @@ impl NotBounded {
             Self::Both => "not bounded by these answers",
         }
     }
-}
-
-/// Pearson's chi-square of the three kinds of answers in classes of the difference, against the fitted observer.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct GoodnessOfFit {
-    /// Sum over classes and kinds of the squared distance over the number expected.
-    pub chi_square: f64,
-    /// Number of classes of the difference.
-    pub classes: usize,
-    /// Probability of a larger sum: share among answer sets simulated from the fitted observer at the same differences.
-    pub p: f64,
 }
 
 /// Estimates the psychometric function of answers; `target` is the share of correct answers at the threshold. Returns `None`

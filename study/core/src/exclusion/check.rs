@@ -49,36 +49,24 @@ impl ExclusionRules {
             Protocol::Jnd(jnd) => (jnd.checks.catch, jnd.checks.obvious.is_some(), jnd.checks.repeats, true),
             Protocol::Magnitude(magnitude) => (0, false, magnitude.repeat_checks, false),
         };
-        for (rule, is_said, is_had, needs) in [
-            (
-                "most_false_alarms",
-                self.most_false_alarms,
-                catch > 0,
-                "catch_trials of a difference experiment",
-            ),
-            (
-                "most_missed_obvious",
-                self.most_missed_obvious,
-                has_obvious,
-                "obvious_pairs of a difference experiment",
-            ),
-            ("most_wrong_at_large", self.most_wrong_at_large, is_jnd, "a difference experiment"),
-            (
-                "least_agreement",
-                self.least_agreement,
-                is_jnd && repeats > 0,
-                "repeat_checks of a difference experiment",
-            ),
+        const PAIRS: &str = "a difference experiment";
+        const RATINGS: &str = "an experiment with ratings";
+        for (rule, said, is_had, needs, of) in [
+            ("most_false_alarms", self.most_false_alarms, catch > 0, "catch_trials of ", PAIRS),
+            ("most_missed_obvious", self.most_missed_obvious, has_obvious, "obvious_pairs of ", PAIRS),
+            ("most_wrong_at_large", self.most_wrong_at_large, is_jnd, "", PAIRS),
+            ("least_agreement", self.least_agreement, is_jnd && repeats > 0, "repeat_checks of ", PAIRS),
             (
                 "most_retest_deviation",
                 self.most_retest_deviation,
                 !is_jnd && repeats > 0,
-                "repeat_checks of an experiment with ratings",
+                "repeat_checks of ",
+                RATINGS,
             ),
-            ("most_dont_know", self.most_dont_know, is_jnd, "a difference experiment"),
+            ("most_dont_know", self.most_dont_know, is_jnd, "", PAIRS),
         ] {
-            if is_said.is_some() && !is_had {
-                return Err(format!("exclusion.{rule} needs {needs}"));
+            if said.is_some() && !is_had {
+                return Err(format!("exclusion.{rule} needs {needs}{of}"));
             }
         }
         Ok(())

@@ -10,12 +10,14 @@
 //! breaks the chain from there on: protection against accidents, not against forgery, because anyone can recompute the chain. An
 //! incomplete last line is left by a killed process and is ignored.
 
+mod error;
 mod incident;
 mod reader;
 mod writer;
 
+pub use error::{LogError, LogProblem};
 pub use incident::Incident;
-pub use reader::{LogError, LogProblem, SittingLog, TrialRecord};
+pub use reader::{SittingLog, TrialRecord};
 pub use writer::LogWriter;
 
 use crate::exclusion::ExclusionRules;
@@ -138,21 +140,13 @@ impl Begin {
     /// Describes the first difference from an earlier sitting's configuration; subject and version may differ.
     #[must_use]
     pub fn differs(&self, earlier: &Self) -> Option<String> {
-        let own = |what: String, is_same: bool| (!is_same).then_some(what);
         let what = Plan::differs(self.plan.as_ref(), earlier.plan.as_ref())
+            .or_else(|| another("protocol", &earlier.protocol, &self.protocol))
             .or_else(|| {
-                own(another("protocol", &earlier.protocol, &self.protocol), self.protocol == earlier.protocol)
+                (self.seed != earlier.seed).then(|| format!("--seed {}, not {}", earlier.seed, self.seed))
             })
-            .or_else(|| own(format!("--seed {}, not {}", earlier.seed, self.seed), self.seed == earlier.seed))
-            .or_else(|| {
-                own(another("observer", &earlier.observer, &self.observer), self.observer == earlier.observer)
-            })
-            .or_else(|| {
-                own(
-                    another("apparatus", &earlier.apparatus, &self.apparatus),
-                    self.apparatus == earlier.apparatus,
-                )
-            });
+            .or_else(|| another("observer", &earlier.observer, &self.observer))
+            .or_else(|| another("apparatus", &earlier.apparatus, &self.apparatus));
         what.map(|what| format!("begun with {what}"))
     }
 
@@ -272,14 +266,14 @@ fn changed(before: &str, after: &str) -> String {
     format!(": line {} on had {}, and has {} now", same + 1, middle(&before), middle(&after))
 }
 
-/// Names a changed part of a sitting and the first difference.
-fn another(what: &str, earlier: &impl Serialize, now: &impl Serialize) -> String {
-    let [earlier, now] =
-        [serde_json::to_value(earlier), serde_json::to_value(now)].map(Result::unwrap_or_default);
-    match difference(&earlier, &now, String::new()) {
-        Some(place) => format!("another {what}: {place}"),
-        None => format!("another {what}"),
+/// Names a part of a sitting that has changed, and the first difference.
+fn another<T: PartialEq + Serialize>(what: &str, earlier: &T, now: &T) -> Option<String> {
+    if earlier == now {
+        return None;
     }
+    let [earlier, now] = [earlier, now].map(|part| serde_json::to_value(part).unwrap_or_default());
+    let place = difference(&earlier, &now, String::new());
+    Some(place.map_or(format!("another {what}"), |place| format!("another {what}: {place}")))
 }
 
 /// Returns the path of the first difference of two values, with both values.

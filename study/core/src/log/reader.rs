@@ -1,7 +1,8 @@
 //! Reads and verifies a log: chain, syntax, order of events, and a replay of the experiment.
 
+use super::error::{LogError, LogProblem};
 use super::{Begin, CHAIN_START, Event, FORMAT, Incident, LogWriter, TrialEvent, chain, parts, unstamped};
-use crate::sitting::{AnswerError, Sitting, TrackResult};
+use crate::sitting::{Sitting, TrackResult};
 use crate::time_of_day::TimeOfDay;
 use crate::trial::{Response, Trial};
 use flotor_hal::read_file;
@@ -9,90 +10,6 @@ use std::path::{Path, PathBuf};
 
 /// Maximum size of a log, bytes: hundreds of hours.
 const MOST_BYTES: u64 = 256 << 20;
-
-/// Error of a log: file, line (from 1; 0 for the whole file) and problem.
-#[derive(Debug, thiserror::Error)]
-#[error("{}{}: {problem}", path.display(), line_text(*.line))]
-pub struct LogError {
-    /// Path of the log.
-    pub path: PathBuf,
-    /// Line number, from 1; 0 for the whole file.
-    pub line: usize,
-    /// Reason.
-    #[source]
-    pub problem: LogProblem,
-}
-
-fn line_text(line: usize) -> String {
-    if line == 0 { String::new() } else { format!(":{line}") }
-}
-
-/// Problem with a log.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum LogProblem {
-    /// The file could not be read or written.
-    #[error("{action}: {cause}")]
-    File {
-        /// Attempted operation.
-        action: &'static str,
-        /// Error of the system.
-        cause: std::io::Error,
-    },
-    /// Another process has the log open, or has written to it since it was read.
-    #[error("another process is running this sitting; end that process before you continue the sitting here")]
-    InUse,
-    /// The log has no complete line.
-    #[error("has no complete line, so it contains no data; remove the file")]
-    Empty,
-    /// A line with invalid syntax.
-    #[error("is not a line of an event log: {0}")]
-    Text(String),
-    /// The hash chain is broken.
-    #[error(
-        "the hash chain is broken: this line or an earlier one was changed, removed or exchanged; use an unchanged \
-         copy"
-    )]
-    Chain,
-    /// Unknown format revision.
-    #[error(
-        "format {found} is not supported, this version reads up to {FORMAT}; use the version that wrote the log"
-    )]
-    Format {
-        /// Revision found in the log.
-        found: u32,
-    },
-    /// Event out of sequence.
-    #[error("{0}")]
-    Order(&'static str),
-    /// The replayed experiment would have presented another trial.
-    #[error(
-        "trial {number} does not follow from protocol, seed and answers; another version of the program wrote the \
-         log: use that version"
-    )]
-    Diverges {
-        /// Trial, from 1.
-        number: u32,
-    },
-    /// The answer does not fit the trial.
-    #[error("trial {number}: {cause}")]
-    Answer {
-        /// Trial, from 1.
-        number: u32,
-        /// Error of the answer.
-        cause: AnswerError,
-    },
-}
-
-impl LogError {
-    pub(crate) fn file(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
-        Self { path: path.into(), line: 0, problem: LogProblem::File { action, cause } }
-    }
-
-    pub(super) fn in_use(path: &Path) -> Self {
-        Self { path: path.into(), line: 0, problem: LogProblem::InUse }
-    }
-}
 
 /// Logged trial.
 #[derive(Clone, Debug, PartialEq)]

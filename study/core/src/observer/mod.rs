@@ -101,8 +101,8 @@ impl Population {
     pub fn with_thresholds([vh, h]: [f64; 2]) -> Self {
         let usual = Self::default();
         let of = |usual: Sensitivity, threshold: f64| {
-            let unit = TernaryObserver { sigma: 1.0, criterion: usual.criterion, bias: 0.0, lapse: 0.0 };
-            Sensitivity { sigma: threshold / unit.threshold(0.75), ..usual }
+            let sigma = TernaryObserver::with_threshold(threshold, usual.criterion).sigma;
+            Sensitivity { sigma, ..usual }
         };
         Self { vh: of(usual.vh, vh), h: of(usual.h, h), ..usual }
     }

@@ -18,6 +18,13 @@ pub struct TernaryObserver {
 }
 
 impl TernaryObserver {
+    /// Returns the observer with a given threshold at a target of 75 %, without bias and lapses.
+    #[must_use]
+    pub fn with_threshold(threshold: f64, criterion: f64) -> Self {
+        let unit = Self { sigma: 1.0, criterion, bias: 0.0, lapse: 0.0 };
+        Self { sigma: threshold / unit.threshold(0.75), ..unit }
+    }
+
     /// Returns the probabilities of naming the larger stimulus (averaged over both orders) and the smaller one.
     #[must_use]
     pub fn correct_and_wrong(&self, delta: f64) -> [f64; 2] {

@@ -35,19 +35,13 @@ impl QuestPlusRule {
             return Err(InvalidRule::new("--trials", self.trials, "must be 1 or more"));
         }
         if !(self.target > 0.5 && self.target < 1.0) {
-            return Err(InvalidRule::new(
-                "--target",
-                self.target,
-                "must be above 0.5 (guessing) and below 1",
-            ));
+            let legal = "must be above 0.5 (guessing) and below 1";
+            return Err(InvalidRule::new("--target", self.target, legal));
         }
         let [least, most] = self.deltas;
         if !(least > 0.0 && least < most && most < 1.0) {
-            return Err(InvalidRule::new(
-                "smallest difference",
-                least,
-                "must be above 0 and below the largest",
-            ));
+            let legal = "must be above 0 and below the largest";
+            return Err(InvalidRule::new("smallest difference", least, legal));
         }
         Ok(())
     }

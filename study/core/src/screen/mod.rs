@@ -22,6 +22,30 @@ use crate::protocol::Quality;
 use crate::trial::{Phase, Position, Response};
 use serde::{Deserialize, Serialize};
 
+/// Key of the emergency stop in a window; by default not the largest key, which a person tends to press to continue.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum StopKey {
+    /// Escape
+    #[default]
+    Escape,
+    /// The space bar
+    Space,
+    /// F12
+    F12,
+}
+
+impl StopKey {
+    /// Returns the name on a command line.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Escape => "escape",
+            Self::Space => "space",
+            Self::F12 => "f12",
+        }
+    }
+}
+
 /// Current screen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "screen", rename_all = "kebab-case")]

@@ -3,7 +3,8 @@
 use clap::Args;
 use flotor_command::options::{JsonOption, count, seed};
 use flotor_command::{CommandError, print_result, progress_bar, style};
-use flotor_study::bias::{BiasRow, observer_of, rows};
+use flotor_study::bias::{BiasRow, rows};
+use flotor_study::observer::TernaryObserver;
 use rayon::prelude::*;
 
 /// Simulated observers: true threshold as a share of the base, and criterion. First the two of the default population, then one
@@ -37,7 +38,7 @@ pub(super) struct BiasArguments {
 pub(super) fn run(arguments: &BiasArguments) -> Result<(), CommandError> {
     let progress = progress_bar(OBSERVERS.len() as u64, "{percent:>3} %  observer {pos} of {len}");
     let of_one = |(threshold, criterion)| {
-        let observer = observer_of(threshold, criterion);
+        let observer = TernaryObserver::with_threshold(threshold, criterion);
         let rows = rows(&observer, arguments.tracks, arguments.runs, arguments.seed);
         progress.inc(1);
         rows

@@ -10,14 +10,13 @@ use flotor_command::{CommandError, note, style};
 use flotor_core::Change;
 use flotor_hal::{Parameter, ParameterKind};
 use flotor_live::Directory;
-use flotor_live::EndKind;
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::telemetry::{ObservedRun, publish};
 use flotor_session::{ControlError, Controls, NewValue, RunError, RunOptions, Session, stop_waits_with};
-use flotor_study::apparatus::watch::Shared;
+use flotor_study::apparatus::watch::{RunThread, Shared, spawn_run};
 use flotor_study::kinematics::{KinematicsMeter, StimulusKinematics};
 use std::io::{BufReader, stdin};
 use std::path::PathBuf;
@@ -83,15 +82,8 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
         watch: watch.clone(),
         mapping,
     };
-    let (switch, mut observers) =
-        (stop.clone(), ObservedRun { observer: watch, publication: publication.ok() });
-    let run = std::thread::Builder::new().name("flotor-study".to_owned()).spawn(move || {
-        let outcome = session.run(&mut observers, &switch);
-        let is_in_order = outcome.as_ref().is_ok_and(|outcome| outcome.end.is_in_order());
-        let kind = if is_in_order { EndKind::InOrder } else { EndKind::Failed };
-        observers.end("the exploration ended", kind);
-        outcome
-    });
+    let observers = ObservedRun { observer: watch, publication: publication.ok() };
+    let run = spawn_run(session, observers, stop.clone(), "the exploration ended");
     let run = run.map_err(|_| RunError::NoThread("the exploration"))?;
     say!("{}", style::title(&scene.title));
     say!("  type a parameter and its value; ? lists the parameters, q ends{hint}");
@@ -107,11 +99,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     end(&stop, run, scene.rate_hz)
 }
 
-fn end(
-    stop: &StopSwitch,
-    run: std::thread::JoinHandle<Result<flotor_session::Outcome, RunError>>,
-    rate_hz: f64,
-) -> Result<(), CommandError> {
+fn end(stop: &StopSwitch, run: RunThread, rate_hz: f64) -> Result<(), CommandError> {
     stop.stop();
     let outcome = run.join().map_err(|_| RunError::Thread("panicked"))??;
     match outcome.end {

@@ -16,7 +16,7 @@ use flotor_study::apparatus::rig::TrialFiles;
 use flotor_study::apparatus::{Apparatus, Kinematics};
 use flotor_study::conduct::{ApparatusOrFrontEndError, Ending};
 use flotor_study::dataset::{Dataset, DatasetError, Progress};
-use flotor_study::log::{Begin, Event, FORMAT, digest};
+use flotor_study::log::{Begin, Event, FORMAT, LogError, LogWriter, digest};
 use flotor_study::protocol::{Protocol, SubjectNumber};
 use flotor_study::screen::ScreenStateMachine;
 use serde_json::json;
@@ -26,23 +26,8 @@ use std::path::Path;
 /// Runs the sitting of a person. Checks the configuration, starts the loop and opens the window before the log begins.
 pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -> Result<(), CommandError> {
     let dataset = Dataset::at(&common.out);
-    let subject = subject(common, &dataset, protocol)?;
-    let begin = Begin {
-        format: FORMAT,
-        person: common.person(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        subject,
-        seed: common.seed,
-        plan: common.plan.clone(),
-        protocol: protocol.clone(),
-        observer: json!("human"),
-        apparatus: apparatus.description(),
-        inputs: [apparatus.input_files(), apparatus.plugin_files()]
-            .into_iter()
-            .collect::<Result<Vec<_>, _>>()
-            .map_err(super::unfit)?
-            .concat(),
-    };
+    let begin = begin(common, &dataset, protocol, apparatus)?;
+    let subject = begin.subject;
     let earlier = match dataset.progress(&begin, common.existing_log()).map_err(of_dataset)? {
         Progress::New => None,
         Progress::Partial(log) => Some(log),
@@ -50,23 +35,14 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
             return Err(of_dataset(DatasetError::Duplicate { subject, root: common.out.clone() }));
         }
     };
-    let files =
-        (dataset.source_folder(subject).join("motion"), format!("{subject}_task-{}", protocol.task()));
-    // Consent is given once, before the first trial; instructions are shown again when the sitting resumes.
-    let has_begun = earlier.as_ref().is_some_and(|log| !log.trials.is_empty());
-    let consent = common.consent.iter().filter(|_| !has_begun);
-    let texts =
-        consent.chain(&common.instructions).map(|path| text_of(path)).collect::<Result<Vec<_>, _>>()?;
-    let screen_texts = common.texts.as_deref().map(text_of).transpose()?;
-    if screen_texts.is_some() && common.screen != ScreenOption::Viewer {
-        let why = "--texts is for the viewer's window; omit --texts or --screen";
-        return Err(CommandError::Usage(why.to_owned()));
-    }
-    let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
     let presented = earlier.as_ref().map_or(0, |log| log.trials.len());
+    let is_answered_anew = earlier.as_ref().is_some_and(|log| log.is_answered_anew());
+    let texts = texts(common, presented)?;
+    let screen_texts = screen_texts(common)?;
+    let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
+    let bytes_per_s = if kinematics == Kinematics::Full { apparatus.recording_bytes_per_s() } else { 0.0 };
     // Tracks may need more trials than expected: plan for at least one.
     let trials = protocol.presentations_about().saturating_sub(presented as u64).max(1) as f64;
-    let bytes_per_s = if kinematics == Kinematics::Full { apparatus.recording_bytes_per_s() } else { 0.0 };
     space::check(&common.out, Need { stimuli: trials * protocol.stimuli_in_a_trial(), bytes_per_s })?;
     let stop = stop_run_on_signals()?;
     stop_waits_with(&stop);
@@ -75,42 +51,29 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     rig.warnings().iter().for_each(note);
     let mut front = Front::open(common, &rig)?;
 
-    let is_answered_anew = earlier.as_ref().is_some_and(|log| log.is_answered_anew());
     let (sitting, mut log) = match earlier {
         None => dataset.begin(begin).map_err(of_dataset)?,
         Some(log) => log.resume(&begin.version).map_err(|error| of_dataset(error.into()))?,
     };
     if kinematics == Kinematics::Full {
-        let files = TrialFiles::make(files.0, files.1);
+        let folder = dataset.source_folder(subject).join("motion");
+        let files = TrialFiles::make(folder, format!("{subject}_task-{}", protocol.task()));
         rig.record_into(
             files.map_err(|cause| CommandError::file(&common.out, "cannot make the folder", cause))?,
         );
     }
-    let text = format!("white noise: {}", noise.as_ref().map_or("none", WhiteNoise::player));
-    log.write(&Event::Note { text }).map_err(failed)?;
-
-    if let Some(texts) = screen_texts {
-        log.write(&Event::Note { text: format!("texts of the screens: SHA-256 {}", digest(&texts)) })
-            .map_err(failed)?;
-    }
-    let least =
-        MinimumExploration { time_s: common.least_time, path_length_m: common.least_movement_mm * 1.0e-3 };
-    let text = format!("least time {} s, least movement {} mm", least.time_s, common.least_movement_mm);
-    log.write(&Event::Note { text }).map_err(failed)?;
-
+    note_conditions(&mut log, common, noise.as_ref(), screen_texts.as_deref()).map_err(failed)?;
     let mut attended = ScreenStateMachine::new(sitting, protocol, common.rest_every).after_reading(texts);
-    if has_begun {
+    if presented > 0 {
         attended = attended.with_practice_offered();
     }
     if is_answered_anew {
         attended = attended.with_answer_taken_back();
     }
     if let Some(times) = common.feel_again {
-        log.write(&Event::Note { text: format!("at most {times} repetitions of a trial") })
-            .map_err(failed)?;
         attended = attended.with_again_at_most(times);
     }
-    let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), least);
+    let ending = attend(&mut attended, &mut log, &mut rig, front.as_dyn(), least_exploration(common));
     // Write the tables from the log, however the sitting ended.
     let tables = dataset.write_tables();
     let ended = ending.and_then(|ending| rig.finish_after(ending)).map_err(|error| {
@@ -131,6 +94,65 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
             Ok(())
         }
     }
+}
+
+/// Returns the first line of the sitting's log.
+fn begin(
+    common: &Common,
+    dataset: &Dataset,
+    protocol: &Protocol,
+    apparatus: &Apparatus,
+) -> Result<Begin, CommandError> {
+    let inputs = [apparatus.input_files(), apparatus.plugin_files()];
+    Ok(Begin {
+        format: FORMAT,
+        subject: subject(common, dataset, protocol)?,
+        person: common.person(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        seed: common.seed,
+        plan: common.plan.clone(),
+        protocol: protocol.clone(),
+        observer: json!("human"),
+        apparatus: apparatus.description(),
+        inputs: inputs.into_iter().collect::<Result<Vec<_>, _>>().map_err(super::unfit)?.concat(),
+    })
+}
+
+/// Reads the texts that the person reads first. Consent is given once, before the first trial; instructions are shown again when the
+/// sitting resumes.
+fn texts(common: &Common, presented: usize) -> Result<Vec<String>, CommandError> {
+    let consent = common.consent.iter().filter(|_| presented == 0);
+    consent.chain(&common.instructions).map(|path| text_of(path)).collect()
+}
+
+/// Reads the texts of the window's screens, if given.
+fn screen_texts(common: &Common) -> Result<Option<String>, CommandError> {
+    let texts = common.texts.as_deref().map(text_of).transpose()?;
+    if texts.is_some() && common.screen != ScreenOption::Viewer {
+        let why = "--texts is for the viewer's window; omit --texts or --screen";
+        return Err(CommandError::Usage(why.to_owned()));
+    }
+    Ok(texts)
+}
+
+fn least_exploration(common: &Common) -> MinimumExploration {
+    MinimumExploration { time_s: common.least_time, path_length_m: common.least_movement_mm * 1.0e-3 }
+}
+
+/// Notes the conditions of the sitting in its log.
+fn note_conditions(
+    log: &mut LogWriter,
+    common: &Common,
+    noise: Option<&WhiteNoise>,
+    screen_texts: Option<&str>,
+) -> Result<(), LogError> {
+    let notes = [
+        Some(format!("white noise: {}", noise.map_or("none", WhiteNoise::player))),
+        screen_texts.map(|texts| format!("texts of the screens: SHA-256 {}", digest(texts))),
+        Some(format!("least time {} s, least movement {} mm", common.least_time, common.least_movement_mm)),
+        common.feel_again.map(|times| format!("at most {times} repetitions of a trial")),
+    ];
+    notes.into_iter().flatten().try_for_each(|text| log.write(&Event::Note { text }))
 }
 
 /// Reads a text to be shown to the person.

@@ -9,20 +9,9 @@ mod target;
 use crate::camera::Camera;
 use crate::geometry::Mesh;
 use crate::raster::{Backdrop, View};
-use bytemuck::{Pod, Zeroable};
-use pipeline::{Pipelines, pipelines};
+use pipeline::{Pipelines, ViewUniform, pipelines};
 use target::Target;
 use wgpu::{BufferDescriptor, BufferUsages, Device, Queue, TextureView};
-
-/// Uniform buffer of the shader, laid out as `View` in `scene.wgsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Pod, Zeroable)]
-struct ViewUniform {
-    projection: [[f32; 4]; 4],
-    eye_mm: [f32; 4],
-    top: [f32; 4],
-    bottom: [f32; 4],
-}
 
 /// Renderer of scenes; buffers and textures are reused from picture to picture.
 pub struct GpuScene {

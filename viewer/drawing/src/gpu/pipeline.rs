@@ -1,8 +1,8 @@
 //! Render pipelines of the 3D view: backdrop and triangles.
 
-use super::ViewUniform;
 use crate::geometry::Vertex;
 use crate::light;
+use bytemuck::{Pod, Zeroable};
 use std::num::NonZeroU64;
 use wgpu::{
     BindGroupLayout, BlendState, CompareFunction, DepthStencilState, Device, FragmentState, MultisampleState,
@@ -15,6 +15,16 @@ pub(super) const COLOR: TextureFormat = TextureFormat::Rgba8Unorm;
 pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 /// Samples per pixel: every adapter supports four.
 pub(super) const SAMPLES: u32 = 4;
+
+/// Uniform buffer of the shader, laid out as `View` in `scene.wgsl`.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+pub(super) struct ViewUniform {
+    pub(super) projection: [[f32; 4]; 4],
+    pub(super) eye_mm: [f32; 4],
+    pub(super) top: [f32; 4],
+    pub(super) bottom: [f32; 4],
+}
 
 pub(super) struct Pipelines {
     pub(super) solid: RenderPipeline,

@@ -1,9 +1,11 @@
 //! Row above the traces: quantities, number of hidden traces, time span, units, export.
 
-use super::{ExportFormat, PlotRequest, PlotStack, Window};
+use super::{PlotRequest, PlotStack, Window};
 use crate::palette::Palette;
+use crate::ui::export_options::ExportFormat;
 use crate::ui::overlay::width_pt;
 use crate::ui::style::SMALL_PT;
+use clap::ValueEnum;
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Color32, ComboBox, FontId, PopupCloseBehavior, RichText, Role, Ui, WidgetInfo};
 use flotor_history::quantity::{Quantity, Units};
@@ -52,7 +54,7 @@ impl PlotStack {
     /// Shows the quantities, for switching each on or off.
     fn quantities(&mut self, ui: &mut Ui, palette: &Palette) {
         ui.spacing_mut().item_spacing.x = 4.0;
-        for quantity in Quantity::ALL {
+        for quantity in Quantity::value_variants().iter().copied() {
             let is_shown = self.shown.contains(&quantity);
             let text = RichText::new(quantity.name()).size(SMALL_PT + 0.5);
             // White on the blue of a selection, in both looks.
@@ -113,7 +115,7 @@ impl PlotStack {
 /// Returns the width of the choice of quantities, points.
 fn tabs_pt(ui: &Ui) -> f32 {
     let font = FontId::proportional(SMALL_PT + 0.5);
-    let names = Quantity::ALL.iter().map(|quantity| quantity.name()).chain(["F(x)"]);
+    let names = Quantity::value_variants().iter().map(|quantity| quantity.name()).chain(["F(x)"]);
     let tab_pt =
         |name| width_pt(ui.painter(), name, font.clone()) + 2.0 * ui.spacing().button_padding.x + 4.0;
     names.map(tab_pt).sum()

@@ -3,8 +3,8 @@
 use super::super::plugin_report::PluginReport;
 use super::error::ControlError;
 use super::versions::{ChosenBy, Versions};
-use crate::lock::lock;
 use crate::scene::{is_named, nearest};
+use flotor_core::lock;
 use flotor_core::{Change, ChangeSubject, PluginIndex};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Setting;

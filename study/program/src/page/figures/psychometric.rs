@@ -7,8 +7,7 @@ use flotor_statistics::describe::mean;
 use flotor_study::estimate::{Observation, Prior, most_likely};
 use flotor_study::observer::TernaryObserver;
 use flotor_study::protocol::JndProtocol;
-use flotor_study::sitting::Verdict;
-use flotor_study::trial::{Judgement, Modality, Phase, Presented};
+use flotor_study::trial::{Judgement, Modality};
 
 /// Width of a group of differences, as a share of the base, and the minimum number of answers in a plotted group.
 const GROUP: f64 = 0.05;
@@ -43,15 +42,8 @@ pub(in super::super) fn psychometric(protocol: &JndProtocol, subjects: &[Subject
 
 /// Returns the judged answers of a subject in a modality.
 fn observations(record: &SubjectRecord, modality: Modality) -> Vec<Observation> {
-    let here =
-        record.counted().filter(|event| event.trial.modality == modality && event.trial.phase == Phase::Main);
-    let judged = here.filter_map(|event| match (event.trial.presented, event.verdict) {
-        (Presented::Pair(pair), Verdict::Judged { judgement, .. }) => {
-            Some(Observation { delta: pair.delta, judgement })
-        }
-        _ => None,
-    });
-    judged.collect()
+    let here = record.judged().filter(|(event, ..)| event.trial.modality == modality);
+    here.map(|(_, observation, _)| observation).collect()
 }
 
 fn panel(slot: usize, name: &str, of_subjects: &[Vec<Observation>], target: f64, largest: f64) -> Panel {

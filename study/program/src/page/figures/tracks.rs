@@ -3,10 +3,9 @@
 use super::MODALITIES;
 use flotor_analysis::SubjectRecord;
 use flotor_plot::{Axis, Figure, Mark, Panel, Series};
-use flotor_study::log::TrialEvent;
 use flotor_study::protocol::Stimulus;
 use flotor_study::sitting::{TrackResult, Verdict};
-use flotor_study::trial::{Judgement, Presented};
+use flotor_study::trial::Judgement;
 
 /// Style slots of wrong answers, "I don't know", and reversals.
 const WRONG: usize = 6;
@@ -48,20 +47,14 @@ pub(in super::super) fn tracks(record: &SubjectRecord, stimulus: &Stimulus) -> F
 
 /// Returns the judged answers of a track, in order.
 fn answers(record: &SubjectRecord, track: &TrackResult) -> Vec<Answer> {
-    let judged = |event: &TrialEvent| match (event.trial.presented, event.verdict) {
-        (Presented::Pair(pair), Verdict::Judged { judgement, reversal }) => {
-            Some((pair.delta, judgement, reversal))
-        }
-        _ => None,
-    };
-    let here = record.counted().filter(|event| event.trial.track == track.track).filter_map(judged);
+    let here = record.judged().filter(|(event, ..)| event.trial.track == track.track);
     (1_u32..)
         .zip(here)
-        .map(|(trial, (delta, judgement, is_reversal))| Answer {
+        .map(|(trial, (event, observation, _))| Answer {
             trial: f64::from(trial),
-            difference_percent: delta * 100.0,
-            judgement,
-            is_reversal,
+            difference_percent: observation.delta * 100.0,
+            judgement: observation.judgement,
+            is_reversal: matches!(event.verdict, Verdict::Judged { reversal: true, .. }),
         })
         .collect()
 }

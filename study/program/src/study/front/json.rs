@@ -1,11 +1,11 @@
 //! Screens and inputs as lines of JSON, for a separate window program.
 
-use super::MOMENT;
+use super::next_line;
 use flotor_study::apparatus::attend::{FrontEnd, PollResult};
 use flotor_study::conduct::ApparatusOrFrontEndError;
 use flotor_study::screen::{Screen, Warning, WindowMessage, WindowReply};
 use std::io::{ErrorKind, Write};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::Receiver;
 
 /// Front end over lines of JSON in both directions.
 pub(in crate::study) struct JsonLines<W> {
@@ -35,11 +35,9 @@ impl<W: Write> FrontEnd for JsonLines<W> {
     }
 
     fn poll(&mut self, _screen: &Screen) -> Result<PollResult, ApparatusOrFrontEndError> {
-        let line = match self.lines.recv_timeout(MOMENT) {
+        let line = match next_line(&self.lines) {
             Ok(line) => line,
-            Err(RecvTimeoutError::Timeout) => return Ok(PollResult::Nothing),
-            // The input has ended: the window is closed.
-            Err(RecvTimeoutError::Disconnected) => return Ok(PollResult::Closed),
+            Err(noticed) => return Ok(noticed),
         };
         match WindowReply::read(&line) {
             Ok(WindowReply::Input(input)) => Ok(PollResult::Input(input)),

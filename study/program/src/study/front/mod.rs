@@ -9,8 +9,9 @@ pub(super) use terminal::Terminal;
 pub(super) use window::Window;
 
 use clap::ValueEnum;
+use flotor_study::apparatus::attend::PollResult;
 use std::io::BufRead;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 /// Timeout of one poll for input, so that the handle is watched meanwhile.
@@ -28,27 +29,13 @@ pub(super) enum ScreenOption {
     Json,
 }
 
-/// Values of `--stop-key`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub(super) enum StopKeyOption {
-    /// Escape
-    #[default]
-    Escape,
-    /// The space bar
-    Space,
-    /// F12
-    F12,
-}
-
-impl StopKeyOption {
-    /// Returns the name in the viewer's options.
-    fn word(self) -> &'static str {
-        match self {
-            Self::Escape => "escape",
-            Self::Space => "space",
-            Self::F12 => "f12",
-        }
-    }
+/// Waits a moment for a line of input; without one returns what the front end has noticed.
+fn next_line(lines: &Receiver<String>) -> Result<String, PollResult> {
+    lines.recv_timeout(MOMENT).map_err(|none| match none {
+        RecvTimeoutError::Timeout => PollResult::Nothing,
+        // The input has ended: the window, or standard input, is closed.
+        RecvTimeoutError::Disconnected => PollResult::Closed,
+    })
 }
 
 /// Reads lines in a background thread and returns their channel.

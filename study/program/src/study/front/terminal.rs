@@ -1,6 +1,6 @@
 //! Front end on a terminal, with answers by keyboard.
 
-use super::{MOMENT, lines_of};
+use super::{lines_of, next_line};
 use flotor_command::say;
 use flotor_command::style;
 use flotor_study::apparatus::attend::{FrontEnd, PollResult};
@@ -9,7 +9,7 @@ use flotor_study::protocol::Quality;
 use flotor_study::screen::{Input, May, Pause, Question, Screen, TrialView};
 use flotor_study::trial::{Phase, Position, Response};
 use std::io::{BufReader, IsTerminal, Write};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::Receiver;
 
 /// Front end on this terminal.
 pub(in crate::study) struct Terminal {
@@ -34,11 +34,9 @@ impl FrontEnd for Terminal {
     }
 
     fn poll(&mut self, screen: &Screen) -> Result<PollResult, ApparatusOrFrontEndError> {
-        let line = match self.lines.recv_timeout(MOMENT) {
+        let line = match next_line(&self.lines) {
             Ok(line) => line,
-            Err(RecvTimeoutError::Timeout) => return Ok(PollResult::Nothing),
-            // Standard input is closed.
-            Err(RecvTimeoutError::Disconnected) => return Ok(PollResult::Closed),
+            Err(noticed) => return Ok(noticed),
         };
         match typed(&line, screen) {
             Ok(input) => Ok(PollResult::Input(input)),

@@ -1,11 +1,12 @@
 //! Front end in the viewer's window: a separate process that displays the run and the screens and sends the person's inputs.
 
-use super::{JsonLines, StopKeyOption, lines_of};
+use super::{JsonLines, lines_of};
 use flotor_command::CommandError;
 use flotor_command::separate::{Running, SeparateProgram};
 use flotor_live::process_number;
 use flotor_servo::StopSwitch;
 use flotor_servo::last_stop::spawn_unblocked;
+use flotor_study::screen::StopKey;
 use std::io::BufReader;
 use std::path::Path;
 use std::process::{ChildStdin, Stdio};
@@ -26,10 +27,7 @@ impl Window {
     ///
     /// # Errors
     /// If there is no viewer, or the viewer cannot open a window and has printed the reason.
-    pub(in crate::study) fn open(
-        stop_key: StopKeyOption,
-        texts: Option<&Path>,
-    ) -> Result<Self, CommandError> {
+    pub(in crate::study) fn open(stop_key: StopKey, texts: Option<&Path>) -> Result<Self, CommandError> {
         let mut command = SeparateProgram::VIEWER.command()?;
         command.arg("--sitting").arg("--run").arg(process_number().to_string());
         command.arg("--stop-key").arg(stop_key.word());

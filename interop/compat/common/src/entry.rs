@@ -1,0 +1,17 @@
+//! Entry points of a drop-in library.
+
+/// Exports entry points: on a panic the program gets the value in brackets. A pointer ([`Out`](crate::pointer::Out),
+/// [`In`](crate::pointer::In)) is null or leads to as many values as the entry point states.
+#[macro_export]
+macro_rules! export {
+    ($($(#[$meta:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) -> $result:ty [$fallback:expr] $body:block)*) => {
+        $(
+            $(#[$meta])*
+            #[unsafe(no_mangle)]
+            #[allow(clippy::too_many_arguments, clippy::unused_unit)] // as the interface has it
+            pub(crate) extern "C" fn $name($($argument: $type),*) -> $result {
+                $crate::guarded($fallback, || $body)
+            }
+        )*
+    };
+}
