@@ -130,7 +130,7 @@ before_tests() {
 }
 
 after_tests() {
-    step lint cargo clippy --workspace --all-targets --all-features -- -D warnings
+    step lint lint
     # With the features and examples of `lint`: else what wgpu and serde depend on is checked a second time, with fewer features.
     # The named program is the only one without a library beside it.
     step docs env RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --all-features --lib --examples \
@@ -140,6 +140,13 @@ after_tests() {
     # Every interleaving of the lock-free cell. A target folder of its own: the flag changes every crate. The crate forbids
     # `unsafe`, so that data races are left to the compiler.
     step loom env RUSTFLAGS="--cfg loom" cargo test -p flotor-sync --release --test loom --target-dir target/loom
+}
+
+# Clippy of the core, the examples and the fuzzing targets. The other satellites' is in the steps that build them.
+lint() {
+    cargo clippy --workspace --all-targets --all-features -- -D warnings
+    cargo clippy --manifest-path examples/Cargo.toml --target-dir target --workspace --all-targets -- -D warnings
+    cargo clippy --manifest-path tests/fuzz/Cargo.toml --target-dir target --all-targets -- -D warnings
 }
 
 # The machine this runs on, as Rust calls it: with a target of its own, build scripts stay without sanitizers.
