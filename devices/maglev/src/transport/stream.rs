@@ -7,6 +7,8 @@ use std::io::{ErrorKind, Read, Write};
 
 /// Size of the read buffer, bytes: a few frames.
 const CHUNK_BYTES: usize = 256;
+/// Maximum number of reads per call: another end that sends bytes without a packet must not hold the tick.
+const MOST_READS: u32 = 2;
 
 /// Link over a non-blocking byte stream: a read or write without progress must return `WouldBlock` or `TimedOut`.
 #[derive(Debug)]
@@ -87,7 +89,7 @@ impl<S: Read + Write + Send> Transport for StreamLink<S> {
     }
 
     fn receive(&mut self) -> Result<Incoming, LinkLost> {
-        loop {
+        for _ in 0..=MOST_READS {
             for index in self.fresh.by_ref() {
                 let byte = self.chunk.get(index).copied().unwrap_or(0);
                 match self.decoder.push(byte) {
@@ -97,8 +99,72 @@ impl<S: Read + Write + Send> Transport for StreamLink<S> {
                 }
             }
             if !self.fill()? {
-                return Ok(Incoming::Nothing);
+                break;
             }
+        }
+        Ok(Incoming::Nothing)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::stream::coded;
+
+    /// Stream that delivers one byte again and again, then some frames, and counts its reads.
+    struct Flood {
+        byte: u8,
+        left: u32,
+        frame: Vec<u8>,
+        reads: u32,
+    }
+
+    impl Read for Flood {
+        fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+            self.reads += 1;
+            if self.left > 0 {
+                self.left -= 1;
+                buffer.fill(self.byte);
+                return Ok(buffer.len());
+            }
+            let length = self.frame.len().min(buffer.len());
+            if length == 0 {
+                return Err(ErrorKind::WouldBlock.into());
+            }
+            for (slot, byte) in buffer.iter_mut().zip(self.frame.drain(..length)) {
+                *slot = byte;
+            }
+            Ok(length)
+        }
+    }
+
+    impl Write for Flood {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn bytes_without_a_packet_end_a_call_after_few_reads() {
+        for byte in [0, 7] {
+            let (frame, length) = coded(&[9; FRAME_BYTES]);
+            let frame = [&[0], &frame[..length]].concat();
+            let mut link = StreamLink::new(Flood { byte, left: 1000, frame, reads: 0 });
+            let mut packet = None;
+            for _ in 0..1000 {
+                let before = link.stream.reads;
+                let incoming = link.receive().expect("the stream is open");
+                assert!(link.stream.reads - before <= MOST_READS + 1, "{byte}");
+                if let Incoming::Packet(received) = incoming {
+                    packet = Some(received);
+                    break;
+                }
+            }
+            assert_eq!(packet, Some([9; FRAME_BYTES]), "{byte}");
         }
     }
 }
