@@ -192,7 +192,7 @@ impl<'a> Subject<'a> {
         Input { demand: self.demand, ..Input::at_rest(pose) }
     }
 
-    /// Returns the input of the next tick.
+    /// Returns the input of the next tick, `dt_ns` after the previous one; advances tick and time of this subject.
     pub fn input(&mut self, pose: Pose, twist: Twist, dt_ns: u64) -> Input {
         let Self { time_ns, tick, demand, .. } = *self;
         let input = Input { twist, time_ns, dt_ns, tick, demand, ..Input::at_rest(pose) };

@@ -32,12 +32,12 @@ pub struct Trajectory {
     pub rotation: Series,
 }
 
-/// Mean and sines of three coordinates.
+/// Sum of a mean and sines, for three coordinates.
 pub struct Series {
     /// Mean of the coordinates.
     pub mean: DVec3,
     terms: Vec<Term>,
-    /// Angle of a rate of one per unit of the parameter, rad.
+    /// Angle per rate and parameter, rad: 1 for angular frequencies over time, 2π for whole periods per lap.
     scale: f64,
 }
 

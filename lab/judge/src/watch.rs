@@ -45,7 +45,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Guard: while it exists, this thread is in a call.
+/// Guard of a call: while it exists, its thread counts as being in a step.
 pub struct CallGuard(());
 
 /// Marks this thread as being in `step` with these inputs, until the result is dropped. Takes some tens of nanoseconds.

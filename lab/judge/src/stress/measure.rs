@@ -106,7 +106,7 @@ impl From<Pose> for PoseRecord {
     }
 }
 
-/// Line of the score.
+/// Result of one measure: a row of the score.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measure {
     /// Identifier, "M0" to "M10".
@@ -122,7 +122,7 @@ pub struct Measure {
     pub bound: Option<f64>,
     /// Verdict on the value.
     pub verdict: Verdict,
-    /// Pose of the worst value.
+    /// Pose of the worst value; `None` if there is none.
     pub pose: Option<PoseRecord>,
     /// Comment on the number.
     #[serde(rename = "remark")]

@@ -68,8 +68,9 @@ impl Motion {
     }
 }
 
-/// Returns the later lap that generates least: a model in motion may return in one lap energy stored in an earlier one, or,
-/// where friction holds it, a part of it in each of many. So laps follow until one generates no less than the one before.
+/// Returns the lap, after the first, that generates the least energy. A model in motion may return in one lap energy
+/// that it stored in an earlier one, or, held by friction, a part of it in each of many laps. So laps follow until one
+/// generates no less than all before.
 fn least_of_later_laps(mut lap: impl FnMut() -> Option<Lap>) -> Option<Lap> {
     lap()?;
     let mut least = lap()?;

@@ -8,7 +8,7 @@ use flotor_hal::{Demand, Pose};
 use flotor_judge::call_timer::overhead_ns;
 use serde::Serialize;
 
-/// Times of calls with a detail above zero, and of the others.
+/// Times of the calls with a detail above zero, and of the other calls.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SplitTimes {
     /// Fraction of the ticks with the detail above zero, 0 to 1.

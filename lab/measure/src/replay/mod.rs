@@ -178,8 +178,8 @@ impl<'r> Replay<'r> {
         &self.plugins
     }
 
-    /// Evaluates the models at every recorded pose. `look` is called with each recorded tick and the models' outputs
-    /// now, limited to the recorded ones.
+    /// Evaluates the models at every recorded pose. `look` is called with each recorded tick and the outputs of the
+    /// models in this replay, limited to the recorded outputs. Not real-time.
     ///
     /// # Errors
     /// [`ReplayError`] at damaged data, or if a plugin swapped in during the run is rejected; the comparison up to
