@@ -60,7 +60,7 @@ pub struct JitterReport {
 pub struct MissedMore {
     /// Missed ticks of the servo less those of the bare loop.
     pub ticks: f64,
-    /// Standard error of `ticks`; grows with the root of the time. `None` for a single pair.
+    /// Standard error of `ticks`; grows with the square root of the time. `None` for a single pair.
     pub standard_error: Option<f64>,
 }
 

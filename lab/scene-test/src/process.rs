@@ -20,7 +20,7 @@ pub(crate) struct ProcessResult {
     /// Exit code; `None` if a signal ended the process.
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
-    /// Last line of standard error, or the process's end if it is empty.
+    /// Last line of standard error that starts with `error: `, else the last line, else the end of the process.
     pub(crate) error: String,
 }
 

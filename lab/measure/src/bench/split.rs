@@ -13,7 +13,7 @@ use serde::Serialize;
 pub struct SplitTimes {
     /// Fraction of the ticks with the detail above zero, 0 to 1.
     pub share: f64,
-    /// Times of those ticks; `None` if there are none.
+    /// Times of the ticks with the detail above zero; `None` if there are none.
     pub above: Option<Speed>,
     /// Times of the other ticks; `None` if there are none.
     pub others: Option<Speed>,
