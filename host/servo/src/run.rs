@@ -1,4 +1,4 @@
-//! The loop: ticks until the duration is over, a stop is requested, or a device faults.
+//! Loop of a run: ticks until the duration is over, a stop is requested, or a fault occurs.
 
 use crate::{
     Cause, EmergencySource, Heartbeat, PaceLost, Place, RunState, Schedule, Servo, StopSwitch, Stuck,
@@ -13,19 +13,20 @@ pub enum RunEnd {
     Finished,
     /// A stop was requested.
     Stopped,
-    /// The device faulted.
+    /// A device faulted.
     DeviceFault(Fault),
-    /// The emergency stop was pressed.
+    /// An emergency stop was triggered.
     EmergencyStop(EmergencySource),
-    /// The device sets a faster pace than the scene declares: this many samples per second.
+    /// The device sets a faster pace than the scene declares; with the measured rate, samples per second.
     TooFast(u32),
     /// The scene requires the device to set the pace, but the device sets none with its settings.
     NotPaced,
-    /// A tick took so long that the watchdog stopped the device; the tick returned later.
+    /// The watchdog stopped the devices during a tick that took too long, or the gap between two ticks was too long; with tick and
+    /// running code.
     Watchdog(Stuck),
     /// The force of a device oscillated between its limits, even after damping.
     Oscillation,
-    /// The required watchdog process exited; the run was stopped in order.
+    /// The required watchdog process exited, so the host stopped the run as on request.
     Unguarded,
 }
 
@@ -60,7 +61,7 @@ impl RunEnd {
     }
 }
 
-/// Loop over a servo and its schedule, the same for both clocks.
+/// Loop of a servo with its schedule, the same on the real and the virtual clock.
 pub struct Loop {
     servo: Servo,
     schedule: Schedule,
@@ -77,14 +78,15 @@ impl Loop {
         Self { servo, schedule, duration_ns, release_ns: u64::MAX, end: None }
     }
 
-    /// Fades the force out at the end of the duration, so that it does not drop abruptly. Unnecessary on the virtual clock, which
-    /// has no hand.
+    /// Makes the loop fade the force out over the ramp time before the end of the duration, so that the force does not drop
+    /// abruptly. Unnecessary on the virtual clock, which has no hand.
     #[must_use]
     pub fn releasing(self) -> Self {
         Self { release_ns: self.duration_ns.saturating_sub(self.servo.ramp_ns()), ..self }
     }
 
-    /// Waits for and runs the next tick, or sets `end`; passes the tick's records to `on_record`. Real-time: bounded, no allocation.
+    /// Waits for the next tick and runs it, passing its records to `on_record`; or ends the run ([`Self::end`]). Real-time after
+    /// the wait: bounded, no allocation.
     #[inline]
     pub fn advance(&mut self, stop: &StopSwitch, on_record: impl FnMut(&TickRecord)) {
         if self.schedule.next_time_ns() >= self.duration_ns {
@@ -126,12 +128,13 @@ impl Loop {
         self.end
     }
 
-    /// Returns the servo with its devices and models.
+    /// Returns the servo, with its devices and models.
     pub fn servo(&mut self) -> &mut Servo {
         &mut self.servo
     }
 
-    /// Waits for the end of the last tick's period; returns the servo, the end of the run and its duration, ns. Not real-time.
+    /// Returns the servo, the end of the run ([`RunEnd::Stopped`] if the loop was still running) and the duration, ns. On the real
+    /// clock first waits for the end of the last tick's period. Not real-time.
     #[must_use]
     pub fn finish(self) -> (Servo, RunEnd, u64) {
         (self.servo, self.end.unwrap_or(RunEnd::Stopped), self.schedule.finish())
