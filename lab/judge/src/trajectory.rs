@@ -34,7 +34,7 @@ pub struct Trajectory {
 
 /// Sum of a mean and sines, for three coordinates.
 pub struct Series {
-    /// Mean of the coordinates.
+    /// Mean of the coordinates, in the unit of the series.
     pub mean: DVec3,
     terms: Vec<Term>,
     /// Angle per rate and parameter, rad: 1 for angular frequencies over time, 2π for whole periods per lap.

@@ -101,7 +101,7 @@ pub fn start(limit: Duration, on_stuck: impl FnOnce(StuckStep) + Send + 'static)
     Ok(())
 }
 
-/// Returns a step that has exceeded its limit. `seen`: call of each thread.
+/// Returns a step that has exceeded its limit; `None` if there is none. `seen`: call of each thread at the last poll.
 fn stuck(seen: &mut BTreeMap<usize, LongCall<u64>>, limit: Duration) -> Option<StuckStep> {
     let callers: Vec<Arc<Caller>> = {
         let mut all = locked(&CALLERS);

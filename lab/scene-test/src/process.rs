@@ -25,7 +25,7 @@ pub(crate) struct ProcessResult {
 }
 
 impl ProcessResult {
-    /// Parses the JSON on standard output.
+    /// Parses the JSON on standard output; `None` if it is not valid.
     pub(crate) fn json(&self) -> Option<Value> {
         serde_json::from_str(&self.stdout).ok()
     }

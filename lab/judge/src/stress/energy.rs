@@ -39,7 +39,7 @@ const MOVING_SAMPLES: usize = 1024;
 /// Tolerated difference of stored energy and work, relative to the energy stored on a lap.
 const SAME_ENERGY: f64 = 1.0e-3;
 
-/// Samples pose, power and stored energy at a fraction of a lap, from 0 to 1.
+/// Samples power and stored energy at a fraction of a lap, from 0 to 1; `None` if the model gives no answer.
 fn sample(subject: &mut Subject<'_>, path: &Trajectory, part: f64) -> Option<Sample> {
     let (pose, motion_m, turn_rad) = path.at(part);
     let answer = subject.answer_at(pose).ok()?;

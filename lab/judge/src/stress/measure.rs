@@ -76,7 +76,7 @@ pub struct PoseRecord {
     /// Rotation vector, rad.
     #[serde(deserialize_with = "numbers_or_none")]
     pub rotation_rad: [f64; 3],
-    /// Original quaternion, if it is not a rotation.
+    /// Original quaternion if it does not describe a rotation, else `None`.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "quaternion_or_none")]
     pub orientation_xyzw: Option<[f64; 4]>,
 }

@@ -43,7 +43,7 @@ impl Motion {
         (pose, motion_m * pace, turn_rad * pace)
     }
 
-    /// Measures the work of a lap.
+    /// Measures the work of a lap, after the model has settled into the motion; `None` if the model gives no answer.
     pub(super) fn lap(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
         subject.restart();
         if subject.memory() == Memory::PathDependent {
@@ -96,8 +96,8 @@ pub(super) struct Triangle {
 }
 
 impl Triangle {
-    /// Measures the work of a lap, with half of the samples of each edge and with all: the difference bounds the error of a
-    /// smooth force.
+    /// Measures the work of a lap, with half of the samples of each edge and with all: the difference bounds the error
+    /// of a smooth force. `None` if the model gives no answer.
     pub(super) fn lap(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
         let coarse = self.sampled(subject, samples / 2)?;
         let fine = self.sampled(subject, samples)?;

@@ -73,13 +73,13 @@ impl Part {
         PARTS.iter().find(|(part, ..)| *part == self).map_or("", |(_, word, _)| word)
     }
 
-    /// Finds the part with a name.
+    /// Finds the part with a name; `None` for an unknown name.
     #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {
         PARTS.iter().find(|(_, known, _)| *known == word).map(|(part, ..)| *part)
     }
 
-    /// Finds the part of a measure, "M0" to "M10".
+    /// Finds the part of a measure, "M0" to "M10"; `None` for an unknown measure.
     #[must_use]
     pub fn of_measure(id: &str) -> Option<Self> {
         PARTS.iter().find(|(.., names)| names.iter().any(|[known, _]| *known == id)).map(|(part, ..)| *part)

@@ -28,7 +28,7 @@ pub struct StressReport {
     pub measures: Vec<Measure>,
     /// Distributions for pictures.
     pub distributions: Distributions,
-    /// First step that did not return, which a measure reports.
+    /// First step that did not return, which a measure reports; `None` if all steps returned.
     #[serde(skip)]
     pub stuck: Option<String>,
 }

@@ -13,13 +13,13 @@ pub struct Finding {
     pub rule: &'static str,
     /// Requirement of the rule.
     pub text: &'static str,
-    /// Violation that was found, or description of a step that did not return.
+    /// Violation that was found, or description of a step that did not return; `None` if there is neither.
     pub violation: Option<String>,
-    /// Reason why the rule could not be checked.
+    /// Reason why the rule could not be checked; `None` if it was checked.
     pub unchecked: Option<String>,
-    /// Category of the reason in `unchecked`.
+    /// Category of the reason in `unchecked`; `None` without one.
     pub obstacle: Option<Obstacle>,
-    /// Figures measured by the check, if any.
+    /// Figures measured by the check; `None` for a check that measures none.
     pub figures: Option<Figures>,
 }
 
@@ -124,7 +124,7 @@ fn is_told(reason: &str) -> bool {
 pub struct Verdict {
     /// Outcome; `None` if the rule holds.
     pub seen: Option<Outcome>,
-    /// Figures measured by the check.
+    /// Figures measured by the check; `None` for a check that measures none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub figures: Option<Figures>,
 }

@@ -66,7 +66,7 @@ pub struct Plan {
     pub cases: Vec<Case>,
     /// Index of the baseline case of the times.
     pub baseline: usize,
-    /// Reference case of the errors.
+    /// Reference case of the errors; `None`: no errors are measured.
     pub reference: Option<Case>,
     /// Motion of the hand.
     pub hand: Hand,

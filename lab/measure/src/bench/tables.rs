@@ -13,7 +13,7 @@ pub struct BenchReport {
     pub model: String,
     /// Version of the plugin.
     pub version: String,
-    /// Reference case of the errors.
+    /// Name of the reference case of the errors; `None` without a reference.
     pub reference: Option<String>,
     /// Baseline case of the times.
     pub yardstick: Option<String>,
