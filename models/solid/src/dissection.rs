@@ -8,7 +8,7 @@
 use crate::dense::{self, NotPositive};
 use crate::grid::{Elements, Grid, Lame};
 
-/// Source of elements, their nodes and their stiffness.
+/// Finite-element model to assemble: elements with their nodes and stiffness matrices.
 pub trait Assembly {
     /// Returns the number of nodes.
     fn node_count(&self) -> usize;

@@ -44,7 +44,7 @@ pub struct Contact {
     pub force_n: [f64; 3],
     /// Distance of the farthest cell in contact from the middle, in cells.
     pub reach: f64,
-    /// Largest change of a normal in the last step; zero when converged.
+    /// Largest change of a unit normal in the last step; below 1e-8 when converged.
     pub residual: f64,
     normals: Vec<[f64; 3]>,
     active: Vec<bool>,

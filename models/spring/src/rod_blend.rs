@@ -130,7 +130,7 @@ impl RodBlend {
         (self.share > 0.0).then(|| self.rod.state())
     }
 
-    /// Returns the rod if its weight is 1.
+    /// Returns the rod if its weight is 1, else `None`.
     pub(crate) fn rod_alone(&mut self) -> Option<&mut Rod> {
         (self.share >= 1.0).then_some(&mut self.rod)
     }
