@@ -20,13 +20,13 @@
 // Major version of the contract; contracts of different major versions are incompatible.
 #define FLOTOR_ABI_MAJOR 1
 
-// Minor version of the contract; a later minor version only adds.
+// Minor version of the contract; a later minor version only adds to the contract.
 #define FLOTOR_ABI_MINOR 0
 
-// 1 in a release candidate of the version, 0 after its release.
+// 1 for a release candidate of this contract version, 0 for the release.
 #define FLOTOR_ABI_CANDIDATE 1
 
-// [`Host::flags`] bit: the plugin has its own Rust runtime and may silence its panic hook.
+// [`Host::flags`] bit: the plugin has its own Rust runtime and may replace its panic hook by a silent one.
 #define FLOTOR_HOST_QUIET_PANICS 1
 
 // Maximum number of coefficients of a calibration: a polynomial of degree seven.
@@ -414,7 +414,7 @@ typedef struct FlotorEntry {
     const struct FlotorLayoutProof *layout_proof;
 } FlotorEntry;
 
-// A constant list of words, made by [`crate::choices!`].
+// Constant list of words, built by [`crate::choices!`].
 typedef struct FlotorChoices {
     const struct FlotorStr *ptr;
     size_t len;
@@ -601,7 +601,7 @@ typedef struct FlotorCapabilities {
     double range_m[3];
     // Largest rotation about each axis, rad; together the semi-axes of an ellipsoid of rotation vectors.
     double range_rad[3];
-    // Smallest position step that is resolved, m.
+    // Position resolution, m: smallest step that the sensors resolve.
     double resolution_m;
     // Largest force along each axis, N.
     double max_force_n[3];
@@ -745,7 +745,7 @@ typedef struct FlotorPrimitive {
     uint32_t part;
     // Centre (m, model frame) and orientation.
     struct FlotorPose pose;
-    // Half sides along the axes of the pose, m.
+    // Half extents along the axes of the pose, m.
     double half_sides_m[3];
 } FlotorPrimitive;
 

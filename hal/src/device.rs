@@ -265,7 +265,7 @@ pub struct Capabilities {
     pub range_m: [f64; 3],
     /// Largest rotation about each axis, rad; together the semi-axes of an ellipsoid of rotation vectors.
     pub range_rad: [f64; 3],
-    /// Smallest position step that is resolved, m.
+    /// Position resolution, m: smallest step that the sensors resolve.
     pub resolution_m: f64,
     /// Largest force along each axis, N.
     pub max_force_n: [f64; 3],
@@ -388,7 +388,8 @@ pub struct DeviceInfo {
 }
 
 impl DeviceInfo {
-    /// Builds the declaration of a physical device: `id` for scenes and commands ("simulated"), `name` and `doc` for people.
+    /// Builds the declaration of a physical device: `id` for scenes and commands ("simulated"), `name` and `doc` for
+    /// display.
     #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
         Self {

@@ -203,7 +203,7 @@ pub struct ModelInfo {
 }
 
 impl ModelInfo {
-    /// Builds a declaration: `id` for scenes and commands ("spring"), `name` and `doc` for people.
+    /// Builds a declaration: `id` for scenes and commands ("spring"), `name` and `doc` for display.
     #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
         Self {

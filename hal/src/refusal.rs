@@ -34,7 +34,7 @@ impl RefusalKind {
 pub struct Refusal {
     /// Kind of the refusal, which determines the remedy.
     pub kind: RefusalKind,
-    /// Reason in one sentence for people: value, problem and remedy.
+    /// Reason in one sentence for users: value, problem and remedy.
     pub reason: String,
 }
 

@@ -21,10 +21,10 @@ pub struct SampledLoop {
 /// Damper in parallel with a spring, N·s/m or N·m·s/rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Damper {
-    /// Resists motion in both directions.
+    /// Damper that resists motion in both directions.
     BothWays(f64),
-    /// Resists motion in one direction, as in a wall that never pulls. Active for half of an oscillation, so it counts
-    /// half.
+    /// Damper that resists motion in one direction, as in a wall that never pulls. It acts during half of an oscillation,
+    /// so half of its damping counts.
     OneWay(f64),
 }
 

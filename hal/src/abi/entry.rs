@@ -11,9 +11,9 @@ pub const MAGIC: [u8; 8] = *b"FLOTOR\r\n";
 pub const CONTRACT: &str = "1.0-rc";
 /// Major version of the contract; contracts of different major versions are incompatible.
 pub const ABI_MAJOR: u16 = 1;
-/// Minor version of the contract; a later minor version only adds.
+/// Minor version of the contract; a later minor version only adds to the contract.
 pub const ABI_MINOR: u16 = 0;
-/// 1 in a release candidate of the version, 0 after its release.
+/// 1 for a release candidate of this contract version, 0 for the release.
 pub const ABI_CANDIDATE: u32 = 1;
 
 /// Kind of a plugin, by its main interface.
@@ -81,7 +81,7 @@ impl CallStatus {
     }
 }
 
-/// [`Host::flags`] bit: the plugin has its own Rust runtime and may silence its panic hook.
+/// [`Host::flags`] bit: the plugin has its own Rust runtime and may replace its panic hook by a silent one.
 pub const HOST_QUIET_PANICS: u32 = 1;
 
 /// Host information that a plugin receives once, before any other call.

@@ -86,7 +86,7 @@ impl fmt::Debug for Str {
     }
 }
 
-/// A constant list of words, made by [`crate::choices!`].
+/// Constant list of words, built by [`crate::choices!`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]

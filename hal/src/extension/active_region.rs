@@ -13,7 +13,7 @@ use crate::{DVec3, ForceModel};
 pub enum RegionShape {
     /// The model may act at any position: it is never inactive.
     Everywhere,
-    /// Ball; `half_sides` is its radius three times.
+    /// Ball; each of its half extents is the radius.
     Sphere,
     /// Box with sides along the axes of the model frame.
     Box,
@@ -45,7 +45,7 @@ impl ActiveRegion {
         Self { shape: 1, reserved: 0, center_m, half_sides_m: [radius_m; 3] }
     }
 
-    /// Builds a box about `center_m` from half its side lengths, both in m, with sides along the axes of the model frame.
+    /// Builds a box about `center_m` from its half extents, both in m, with sides along the axes of the model frame.
     #[must_use]
     pub const fn cuboid(center_m: [f64; 3], half_sides_m: [f64; 3]) -> Self {
         Self { shape: 2, reserved: 0, center_m, half_sides_m }
@@ -72,7 +72,7 @@ impl ActiveRegion {
         DVec3::from_array(self.center_m)
     }
 
-    /// Returns half the sides of the bounding box, m (for a ball, the radius three times).
+    /// Returns the half extents of the bounding box, m (for a ball, each is the radius).
     #[must_use]
     pub fn half_sides(&self) -> DVec3 {
         DVec3::from_array(self.half_sides_m)

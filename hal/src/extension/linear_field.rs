@@ -78,8 +78,8 @@ impl LinearField {
             && self.valid_rad >= 0.0
     }
 
-    /// Returns the wrench at a pose, and true if the pose is within the range of validity; beyond, the wrench is that
-    /// at the edge in the same direction. Real-time: bounded, no allocation.
+    /// Returns the wrench at a pose, and true if the pose is within the range of validity; beyond, the wrench is
+    /// taken at the edge of this range in the same direction. Real-time: bounded, no allocation.
     #[must_use]
     pub fn at(&self, pose: &Pose) -> (Wrench, bool) {
         let (position_m, is_near) = shortened(pose.position() - self.anchor.position(), self.valid_m);

@@ -49,13 +49,13 @@ pub struct Primitive {
     part: u32,
     /// Centre (m, model frame) and orientation.
     pose: Pose,
-    /// Half sides along the axes of the pose, m.
+    /// Half extents along the axes of the pose, m.
     half_sides_m: [f64; 3],
 }
 
 impl Primitive {
-    /// Builds a body from half its sides, m: a plane has no third side, a sphere three equal ones (its radius), a
-    /// cylinder its radius twice and half its height.
+    /// Builds a body from its half extents: of a plane only the first two count, of a sphere each is the radius, of a
+    /// cylinder the first two are the radius and the third is half the height.
     #[must_use]
     pub const fn new(form: Form, part: Part, pose: Pose, half_sides_m: [f64; 3]) -> Self {
         Self { form: form as u32, part: part as u32, pose, half_sides_m }
@@ -91,7 +91,7 @@ impl Primitive {
         self.pose
     }
 
-    /// Returns the half sides along the axes of the pose, m.
+    /// Returns the half extents along the axes of the pose, m.
     #[must_use]
     pub const fn half_sides_m(&self) -> [f64; 3] {
         self.half_sides_m

@@ -40,9 +40,9 @@ impl SoftRange {
     }
 
     /// Returns a soft range about `value`, within the legal range, for a parameter without a declared one. For a positive
-    /// value of a parameter that cannot be negative: from a third of the value to three times the value. Otherwise to
-    /// both sides of the value twice its magnitude, at least a twentieth of the legal range. `None` for a parameter that
-    /// is not a number with a finite range.
+    /// value of a parameter that cannot be negative: from a third of the value to three times the value. Otherwise
+    /// the range extends to both sides of the value by twice its magnitude, at least by a twentieth of the legal range.
+    /// `None` for a parameter that is not a number with a finite range.
     #[must_use]
     pub fn around(parameter: &'static Parameter, value: f64) -> Option<Self> {
         let value = if value.is_finite() { value } else { parameter.default() };
@@ -72,13 +72,13 @@ impl SoftRange {
         self.id.as_str()
     }
 
-    /// Returns the smallest number, in the parameter's unit.
+    /// Returns the lower end of the soft range, in the parameter's unit.
     #[must_use]
     pub const fn min(&self) -> f64 {
         self.min
     }
 
-    /// Returns the largest number, in the parameter's unit.
+    /// Returns the upper end of the soft range, in the parameter's unit.
     #[must_use]
     pub const fn max(&self) -> f64 {
         self.max

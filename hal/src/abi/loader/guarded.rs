@@ -118,7 +118,7 @@ impl GuardedInstance {
         self.call(|instance| unsafe { function(instance, index) })
     }
 
-    /// Returns the message about the call that failed; empty without the function.
+    /// Returns the message about the last failure; empty without the function.
     pub(super) fn last_message(&mut self, function: Option<LastMessageFn>) -> Message {
         let mut message = Message::default();
         if let Some(function) = function {

@@ -34,7 +34,7 @@ pub struct Plugin {
 impl Plugin {
     /// Loads a plugin from a file. Not real-time; runs the plugin's code.
     ///
-    /// The checks find mistakes of an author, not malice. [`super::read_metadata`] runs none of the code.
+    /// The checks find mistakes of an author, not malice. [`super::read_metadata`] runs no code of the plugin.
     ///
     /// ```compile_fail,E0133
     /// # use flotor_hal::abi::loader::Plugin;
