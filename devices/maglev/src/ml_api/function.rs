@@ -4,7 +4,7 @@ use super::event::EventKind;
 
 macro_rules! functions {
     ($($(#[$doc:meta])* $name:ident = $id:literal,)+) => {
-        /// Function of the controller, with its number on the wire.
+        /// Function of the controller, with its number on the wire; units of [`super`].
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Function {
             $($(#[$doc])* $name = $id,)+
@@ -31,7 +31,7 @@ functions! {
     DefyGravity = 2,
     /// Ends the session of the client.
     Disconnect = 3,
-    /// Measures the wrench that holds the flotor; takes seconds.
+    /// Measures the gravity wrench, which balances the weight of the flotor; takes seconds.
     FindGravity = 4,
     /// Returns the pose of the flotor.
     GetActualPosition = 5,
@@ -55,7 +55,7 @@ functions! {
     GetForceAxis = 15,
     /// Returns the commanded wrench.
     GetForces = 16,
-    /// Returns the user's frame.
+    /// Returns the frame set by a client.
     GetFrame = 17,
     /// Returns the gains of all axes.
     GetGainVecAxes = 18,
@@ -111,15 +111,15 @@ functions! {
     SetBoundaryRadius = 44,
     /// Sets the current limit of each coil.
     SetCurrentLimits = 45,
-    /// Sets the current of each coil.
+    /// Commands the current of each coil.
     SetCurrents = 46,
     /// Sets the desired pose of the flotor.
     SetDesiredPosition = 47,
-    /// Sets the force of one axis.
+    /// Commands the force of one axis.
     SetForceAxis = 48,
-    /// Sets the wrench.
+    /// Commands a wrench.
     SetForces = 49,
-    /// Sets the user's frame.
+    /// Sets the frame in which poses and velocities are reported to clients.
     SetFrame = 50,
     /// Sets the gains of all axes.
     SetGainVecAxes = 51,

@@ -101,7 +101,7 @@ impl Pid {
 pub struct WirePose {
     /// True if the flotor is outside the sensors' range.
     pub out_of_range: bool,
-    /// Position, then the angles defined in [`super::angles`].
+    /// Position, m, then the angles defined in [`super::angles`], rad.
     pub at: AxisValues,
 }
 

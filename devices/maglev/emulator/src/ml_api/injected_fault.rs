@@ -14,9 +14,9 @@ const MACHINE_FAULT_S: f64 = 0.5;
 pub enum Deed {
     /// Normal reply to the call.
     Answer,
-    /// No reply to this client, now and later.
+    /// No reply to this call and to later calls of the client.
     Silence,
-    /// Half of the reply, and no more after that.
+    /// First half of the reply, and no reply to later calls of the client.
     HalfFrame,
     /// Orderly close of the client's connections.
     Close,

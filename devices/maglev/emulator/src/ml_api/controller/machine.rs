@@ -181,7 +181,7 @@ impl Controller {
         }
     }
 
-    /// Returns the configuration.
+    /// Returns the configuration passed to [`Self::new`].
     #[must_use]
     pub fn config(&self) -> &ControllerConfig {
         &self.config
