@@ -1,7 +1,8 @@
 //! Errors of commands, and their exit codes.
 //!
-//! Exit codes are a contract: 0 ok, 2 usage or configuration, 3 a plugin was refused, 4 device fault, 1 else;
-//! 130 after the third signal that requests an end, or the first one before anything is energised.
+//! Exit codes are a contract: 0 success, 2 invalid usage or configuration, 3 a plugin was refused or failed, 4 device fault or
+//! emergency stop, 1 any other error; 130 after the third signal that requests an end, or after the first signal if no device has
+//! been energised.
 
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
@@ -18,32 +19,32 @@ pub enum CommandError {
     /// The command line or a configuration is invalid.
     #[error("{0}")]
     Usage(String),
-    /// A run could not start.
+    /// A run could not start or be carried out.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A device faulted.
+    /// A device faulted; for commands without path and message of the device.
     #[error("device fault: {}", .0.advice())]
     DeviceFault(Fault),
-    /// A device faulted in a run.
+    /// A device faulted, with its path and message.
     #[error("{}: device fault: {}{}", path.display(), before_advice(words), fault.advice())]
     RunFault {
-        /// The plugin's file.
+        /// Path of the device plugin's shared library.
         path: PathBuf,
-        /// Kind of fault, with its advice.
+        /// Kind of fault.
         fault: Fault,
         /// Message of the device; may be empty.
         words: String,
     },
-    /// The emergency stop was pressed.
+    /// An emergency stop was triggered.
     #[error("emergency stop ({}); the device is stopped and exerts no force until the next run", .0.word())]
     EmergencyStop(EmergencySource),
-    /// A tick took so long that the watchdog stopped the device.
+    /// A tick took so long that the watchdog stopped the devices; with tick and running code.
     #[error(
         "tick {} exceeded the time limit, and the watchdog stopped the device; check the machine with \
          `flotor doctor`, or raise `[limits] watchdog_ms`", .0.tick
     )]
     Watchdog(Stuck),
-    /// The force of a device swung between its limits.
+    /// The force of a device oscillated between its limits, even after damping.
     #[error(
         "the force oscillated between its limits, and continued to oscillate when the host attenuated it: the loop is \
          unstable; lower the stiffness or the gain of the scene (`flotor stability` computes the largest stable stiffness)"
@@ -55,7 +56,7 @@ pub enum CommandError {
          because the scene has `[limits] require_independent_stop`"
     )]
     Unguarded,
-    /// The device sets the pace, at a rate above the scene's.
+    /// The device sets the pace, at a rate above the loop rate of the scene.
     #[error(
         "the device paces the loop with {samples_per_s} samples a second, above the scene's `rate_hz = {rate_hz}`: ramps would be \
          too short and slew limits too high; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
@@ -66,12 +67,12 @@ pub enum CommandError {
         /// Loop rate of the scene, Hz.
         rate_hz: f64,
     },
-    /// The scene requires that the device sets the pace, which it does not.
+    /// The scene requires the device to set the pace, but the device does not.
     #[error(
         "the device does not set the pace of the loop with its present settings; remove `pacing = \"device\"` from the scene"
     )]
     NotPaced,
-    /// A plugin was refused.
+    /// A plugin was refused, with the reason.
     #[error("{0}")]
     PluginRefused(String),
     /// A file could not be written or read.
@@ -87,10 +88,10 @@ pub enum CommandError {
     /// A recording could not be written or read.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A recording could not be replayed.
+    /// A recording could not be read.
     #[error(transparent)]
     Read(#[from] flotor_record::ReadError),
-    /// A failure with its message.
+    /// Any other failure, with its message.
     #[error("{0}")]
     Failed(String),
 }
@@ -146,7 +147,7 @@ impl CommandError {
     }
 }
 
-/// Returns the message of a device, to precede the advice for its fault; empty without a message.
+/// Formats the message of a device for the place before the advice on its fault: with a trailing semicolon, or empty without a message.
 #[must_use]
 pub fn before_advice(words: &str) -> String {
     if words.is_empty() { String::new() } else { format!("{words}; ") }
