@@ -45,7 +45,7 @@ enum First {
 /// emergency stop. To be called before other threads start.
 ///
 /// # Errors
-/// If the system refuses the signals or a thread.
+/// If the system cannot block the signals or start a thread.
 pub fn stop_on_signals() -> Result<StopSwitch, CommandError> {
     take_signals(First::InOrder)
 }
@@ -54,7 +54,7 @@ pub fn stop_on_signals() -> Result<StopSwitch, CommandError> {
 /// first signal ends the process, even while a plugin's code runs.
 ///
 /// # Errors
-/// If the system refuses the signals or a thread.
+/// If the system cannot block the signals or start a thread.
 pub fn stop_run_on_signals() -> Result<StopSwitch, CommandError> {
     take_signals(First::InOrderOnceEnergised)
 }

@@ -44,7 +44,7 @@ pub enum LiveError {
         "the host uses protocol version {host}, this program version {PROTOCOL}; use both from one build"
     )]
     Protocol {
-        /// Protocol version of the host.
+        /// Version of the host's protocol; this program has [`PROTOCOL`].
         host: u32,
     },
     /// A message of the host is malformed.

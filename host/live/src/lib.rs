@@ -76,5 +76,5 @@ pub use message::{
 pub use peer_socket::{CALL_PERIOD, FoundCoupling, PeerSocket};
 pub use server::{Publication, PublishError, Serve};
 
-/// Version of the protocol.
+/// Version of the protocol, the same in host and client.
 pub const PROTOCOL: u32 = 1;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// First message of a host.
+/// First message of a host: plugins with their parameters, and limits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Greeting {
     /// Version of the protocol: [`crate::PROTOCOL`].

@@ -2,10 +2,10 @@
 
 use super::axis::LARGEST_DRAWABLE;
 
-/// Largest number of intervals: about one for each pixel column of a figure.
+/// Maximum number of intervals: about one for each pixel column of a figure.
 const CAPACITY: usize = 1024;
 
-/// Largest number of intervals after a reduction.
+/// Number of gap widths in the whole: a reduction merges intervals with gaps up to one width.
 const REDUCED: f64 = 512.0;
 
 /// Intervals with ascending x. Before an interval beyond 1 024 is added, neighbours with gaps up to 1/512 of the whole (about two

@@ -67,7 +67,7 @@ impl Port {
         ModelOutputs::new(wrench, *energy_j).limited_to(*computed)
     }
 
-    /// Stores the request of the models; an output that only observers request goes no further than their record.
+    /// Stores the request of the models; an output that only observers request is recorded, but not part of the request.
     #[inline]
     fn take(&mut self, demand: TickDemand, wrench: Wrench, energy_j: f64) {
         (self.by_models, self.unfelt_torque_nm) = if self.at_hand.contains(Demand::TORQUE) {

@@ -87,7 +87,7 @@ pub struct Heartbeat {
 
 #[derive(Debug, Default)]
 struct Shared {
-    /// Low 48 bits of the tick above 16 bits of the place.
+    /// Code of the place in the low 16 bits, low 48 bits of the tick above.
     beat: AtomicU64,
     /// True once the loop is over: no more beats are due.
     done: AtomicBool,

@@ -72,7 +72,7 @@ pub struct Loop {
 }
 
 impl Loop {
-    /// Creates a loop before its first tick. Not real-time.
+    /// Creates a loop before its first tick, for a run of at most `duration_ns`. Not real-time.
     #[must_use]
     pub fn new(servo: Servo, schedule: Schedule, duration_ns: u64) -> Self {
         Self { servo, schedule, duration_ns, release_ns: u64::MAX, end: None }

@@ -30,7 +30,7 @@ pub struct Standby {
 }
 
 impl Standby {
-    /// Combines the parts of a servo. Not real-time.
+    /// Creates a standby from its parts, with a new heartbeat and no demand of observers. Not real-time.
     pub fn new(
         devices: Vec<Guarded>,
         forces: Forces,

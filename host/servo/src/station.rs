@@ -80,7 +80,7 @@ impl Station {
     }
 
     /// Reads the newest sample into the port, with a normalised orientation, and returns the event for the run state. A stale or
-    /// implausible sample leaves the port as it was.
+    /// implausible sample does not change the port.
     ///
     /// Real-time: bounded by the device, no allocation.
     pub(super) fn read(&mut self, tick: &Tick, port: &mut Port) -> RunEvent {

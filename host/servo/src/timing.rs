@@ -3,7 +3,7 @@
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-/// Upper limit of a histogram, ns; longer times count as this one.
+/// Upper limit of a histogram, ns; longer times count as this limit.
 const LONGEST_NS: u64 = 100_000_000_000;
 
 /// Two significant digits: a bin is at most 1 % wide, and the whole histogram is some 16 kB.
@@ -12,13 +12,13 @@ const DIGITS: u8 = 2;
 /// Percentiles of one histogram, ns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Percentiles {
-    /// Median.
+    /// Median, ns.
     pub p50: u64,
-    /// 99th percentile.
+    /// 99th percentile, ns.
     pub p99: u64,
-    /// 99.9th percentile.
+    /// 99.9th percentile, ns.
     pub p999: u64,
-    /// Largest value.
+    /// Largest value, ns.
     pub max: u64,
 }
 
@@ -66,7 +66,7 @@ impl Default for Durations {
     }
 }
 
-/// Stage of a tick.
+/// Stage of a tick with a histogram of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// Applying parameter changes, and reading the devices.

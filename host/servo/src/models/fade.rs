@@ -27,7 +27,7 @@ impl Fade {
         }
     }
 
-    /// Returns the weight at a time. Real-time: bounded, no allocation.
+    /// Returns the weight at the run time `now_ns`. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn at(&self, now_ns: u64) -> f64 {
         if self.from == self.target {

@@ -30,7 +30,7 @@ const INTERRUPTS: [c_int; 3] = [libc::SIGINT, libc::SIGQUIT, libc::SIGTERM];
 /// Process id of the supervisor, in its child; 0 in a process without a supervisor.
 static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
 
-/// Restores the default action of SIGINT, SIGQUIT and SIGTERM, which may be ignored since the start of this process. SIGHUP stays
+/// Restores the default action of SIGINT, SIGQUIT and SIGTERM, which this process may have inherited as ignored. SIGHUP stays
 /// ignored, for `nohup`. Not real-time.
 pub(crate) fn accept_interrupts() {
     for signal in INTERRUPTS {

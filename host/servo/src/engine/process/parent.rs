@@ -69,7 +69,7 @@ impl Worker {
         command.args(["--period-ns", &config.config.period_ns.to_string()]);
         command.args(["--seed", &config.config.seed.to_string()]);
         command.args(config.sets.iter().map(|(key, value)| format!("--set={key}={value}")));
-        // Output of the model goes to the host's standard error, where it does no harm.
+        // Output of the plugin goes to the host's standard error, not into results on standard output.
         command.stdin(file).stdout(io::stderr());
         // Terminal signals go to the host alone: it needs the model until the force has faded out.
         processes::keep_from_terminal(&mut command);
@@ -285,8 +285,8 @@ pub(super) fn receive_text(
 /// Process to start, with the channel for its handle.
 type Start = (Command, Sender<io::Result<Child>>);
 
-/// Starts a process from a thread that lives as long as this process: a worker ends with the *thread* that started it, and a thread
-/// that replaces a model may end before the run.
+/// Starts a process from a thread that lives as long as this process: the system kills a worker when the *thread* that started it
+/// ends, and a thread that replaces a model may end before the run.
 fn spawn(command: Command) -> io::Result<Child> {
     static STARTER: Mutex<Option<Sender<Start>>> = Mutex::new(None);
     let (reply, child) = channel();

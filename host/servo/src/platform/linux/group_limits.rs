@@ -33,9 +33,9 @@ pub enum LimitValue {
 /// Limit with its current use, bytes of memory or number of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Use {
-    /// Largest use allowed.
+    /// Limit, bytes or threads.
     pub most: u64,
-    /// Current use.
+    /// Current use, bytes or threads.
     pub now: u64,
 }
 

@@ -28,7 +28,7 @@ const HARMLESS: [c_int; 9] =
     [SIGKILL, SIGSTOP, SIGTSTP, SIGTTIN, SIGTTOU, SIGCHLD, SIGCONT, SIGURG, SIGWINCH];
 /// Signals that a timer, a limit or another program sends to the process as a whole.
 const SENT: [c_int; 7] = [SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO, SIGPWR];
-/// Signals reserved for the host: those of crashes, requests to end or suspend a run, the emergency stop.
+/// Signals reserved for the host: signals of crashes, requests to end or suspend a run, the emergency stop.
 const KEPT: [c_int; 15] = [
     SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP, SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP,
     SIGTTIN, SIGTTOU, SIGUSR1,
@@ -57,8 +57,8 @@ pub(crate) fn install() {
     take_sent();
 }
 
-/// Installs handlers for the signals that this thread raises when it crashes, and for `exit`. Requests to end the process are left
-/// alone: the host has not yet chosen their receiver. Not real-time.
+/// Installs handlers for the signals that this thread raises when it crashes, and for `exit`. Signals that request the end of the
+/// process are not handled: the host has not yet chosen their receiver. Not real-time.
 pub(crate) fn install_for_crashes() {
     install_for(|signal| RAISED.contains(&signal));
 }
@@ -298,7 +298,8 @@ impl Drop for AlternateStack {
 
 // ---------------------------------------------------------------- signals that stay the host's
 
-/// Blocks signals in the calling thread and in all that it starts from now on; [`wait_for_signal`] takes them. Not real-time.
+/// Blocks signals in the calling thread and in all threads that it starts from now on, to be received by [`wait_for_signal`]. Not
+/// real-time.
 ///
 /// # Errors
 /// If the system call fails.
@@ -441,7 +442,7 @@ fn set_action(signal: c_int, action: &sigaction) {
     let _ = unsafe { libc::sigaction(signal, action, std::ptr::null_mut()) };
 }
 
-/// Returns the set of these signals.
+/// Returns the set of `signals`.
 #[must_use]
 pub fn set_of(signals: &[i32]) -> sigset_t {
     let mut set = MaybeUninit::<sigset_t>::zeroed();
@@ -457,7 +458,7 @@ pub fn set_of(signals: &[i32]) -> sigset_t {
     set
 }
 
-/// Returns the set of all signals except these.
+/// Returns the set of all signals except `signals`.
 #[must_use]
 pub fn all_but(signals: &[i32]) -> sigset_t {
     let mut set = set_of(&[]);

@@ -65,7 +65,7 @@ unsafe extern "system" fn on_exception(exception: *const EXCEPTION_POINTERS) -> 
     CONTINUE_SEARCH
 }
 
-/// Callback of the loader at the end of the process, when this is the only thread left.
+/// Callback of the loader at the end of the process, when all other threads have ended.
 #[used]
 #[unsafe(link_section = ".CRT$XLD")]
 static AT_END: unsafe extern "system" fn(*mut c_void, u32, *mut c_void) = at_end;
