@@ -1,4 +1,4 @@
-//! Loads model plugins from files and steps each through a hundred poses: the plugin side of a host, without the rest.
+//! Loads model plugins from files and steps each through a hundred poses: a host reduced to its use of plugins.
 //!
 //! `cargo run -p flotor-hal --features loader --example load_model -- target/debug/libflotor_wall.so`
 //!
@@ -22,7 +22,7 @@ fn main() {
     for file in files {
         match ask(Path::new(&file)) {
             Ok(line) => println!("{line}"),
-            // The end of the sentence, with `it` in place of the path.
+            // Replaces the path by `it`, so that the line does not depend on the machine.
             Err(error) => println!("refused: {}", error.to_string().replace(&*file.to_string_lossy(), "it")),
         }
     }

@@ -20,13 +20,13 @@
 // Major version of the contract; contracts of different major versions are incompatible.
 #define FLOTOR_ABI_MAJOR 1
 
-// Minor version of the contract; a later minor version only adds.
+// Minor version of the contract; a later minor version only adds to the contract.
 #define FLOTOR_ABI_MINOR 0
 
-// 1 in a release candidate of the version, 0 after its release.
+// 1 for a release candidate of this contract version, 0 for the release.
 #define FLOTOR_ABI_CANDIDATE 1
 
-// [`Host::flags`] bit: the plugin has its own Rust runtime and may silence its panic hook.
+// [`Host::flags`] bit: the plugin has its own Rust runtime and may replace its panic hook by a silent one.
 #define FLOTOR_HOST_QUIET_PANICS 1
 
 // Maximum number of coefficients of a calibration: a polynomial of degree seven.
@@ -35,7 +35,7 @@
 // Capacity of a stop message, bytes.
 #define FLOTOR_STOP_MESSAGE_BYTES 64
 
-// Status of one call through a table.
+// Status returned by a table function.
 enum FlotorCallStatus
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -45,9 +45,9 @@ enum FlotorCallStatus
     FlotorCallStatus_Ok = 0,
     // The plugin panicked, now or earlier; the instance is disabled.
     FlotorCallStatus_Panicked = 1,
-    // The call is not allowed in this phase (real-time call on a device that is not active).
+    // The call is not allowed in the current phase of the device (such as `capabilities` of an active device).
     FlotorCallStatus_WrongPhase = 2,
-    // A value is out of range.
+    // A value, an index or a capacity is out of range, or the parameter cannot be changed now.
     FlotorCallStatus_OutOfRange = 3,
     // The plugin does not offer this function.
     FlotorCallStatus_Unsupported = 4,
@@ -66,9 +66,9 @@ enum FlotorPluginKind
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // Offers `flotor.force/1`.
+    // Force model: offers `flotor.force/1`.
     FlotorPluginKind_Model = 1,
-    // Offers `flotor.device/1`.
+    // Device: offers `flotor.device/1`.
     FlotorPluginKind_Device = 2,
 };
 #ifndef __cplusplus
@@ -85,13 +85,13 @@ enum FlotorRefusalKind
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // A parameter has a value that cannot be used: change it.
+    // A parameter has an unusable value: change the value.
     FlotorRefusalKind_Parameter = 1,
-    // The request is outside what this plugin can do (rate, demand, capability): choose another plugin or scene.
+    // The plugin does not support the request (rate, demand, capability): choose another plugin or scene.
     FlotorRefusalKind_Unsupported = 2,
     // Hardware or a file is missing, busy or not permitted: fix the machine, then retry.
     FlotorRefusalKind_Resource = 3,
-    // The plugin broke (it panicked, or it answered outside the contract): report it to its author.
+    // The plugin panicked or violated the contract: report this to its author.
     FlotorRefusalKind_Broken = 4,
 };
 #ifndef __cplusplus
@@ -112,10 +112,10 @@ enum FlotorParameterKind
     FlotorParameterKind_Real = 1,
     // One of `choices`; the number is its index.
     FlotorParameterKind_Choice = 2,
-    // Free text (a serial number); only at creation.
+    // Free text (a serial number); set at creation only.
     FlotorParameterKind_Text = 3,
-    // File, or one of `choices`, which are built in; only at creation. A host passes a path that can be opened from
-    // its working directory: a scene's `tap.toml` is relative to the scene.
+    // File, or one of `choices`, which are built in; set at creation only. A host passes a path that can be opened from
+    // its working directory, and resolves a relative path in a scene against the folder of the scene.
     FlotorParameterKind_File = 4,
 };
 #ifndef __cplusplus
@@ -126,7 +126,7 @@ typedef uint32_t FlotorParameterKind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Mutability of a parameter.
+// Times at which a parameter may be set.
 enum FlotorMutability
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -176,9 +176,9 @@ enum FlotorMemory
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // Same pose, same wrench: may be evaluated anywhere, in any order.
+    // The wrench depends on the current input only: inputs may be evaluated in any order.
     FlotorMemory_Stateless = 0,
-    // The path matters (iteration, friction, contact, branches).
+    // The wrench also depends on earlier inputs (iteration, friction, contact, branches).
     FlotorMemory_PathDependent = 1,
 };
 #ifndef __cplusplus
@@ -189,13 +189,13 @@ typedef uint32_t FlotorMemory;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Fault of a device, as a closed set with a remedy for each.
+// Fault of a device: a closed set, each fault with a remedy.
 enum FlotorFault
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // The handle left the sensor's range: move it back, then re-arm.
+    // The handle left the sensor's range: move the handle back, then start again.
     FlotorFault_SensorOutOfRange = 1,
     // A coil is too hot: let it cool.
     FlotorFault_OverTemperature = 2,
@@ -211,7 +211,7 @@ enum FlotorFault
     FlotorFault_Protocol = 7,
     // The emergency stop of the device is pressed.
     FlotorFault_EmergencyStop = 8,
-    // The plugin broke (panic, or a code outside the contract).
+    // The plugin panicked or returned a code outside the contract: report the fault to its author.
     FlotorFault_Broken = 9,
 };
 #ifndef __cplusplus
@@ -241,7 +241,7 @@ typedef uint32_t FlotorEmbodiment;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Access path to a USB device, as a closed set. In C, a number of this value.
+// Access path to a USB device, as a closed set. In C, a `uint32_t` with these values.
 enum FlotorUsbAccess
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -262,7 +262,7 @@ typedef uint32_t FlotorUsbAccess;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Final state of a stopped device. In C, a number of this value.
+// Final state of a stopped device. In C, a `uint32_t` with these values.
 enum FlotorStoppedState
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -281,13 +281,13 @@ typedef uint32_t FlotorStoppedState;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Form of a [`Primitive`]. In C, a number of this value.
+// Form of a [`Primitive`]. In C, a `uint32_t` with these values.
 enum FlotorForm
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
 #endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
  {
-    // Rectangle across z at the pose; the solid is below the rectangle.
+    // Rectangle normal to the z axis of the pose; the solid is on the side of negative z.
     FlotorForm_Plane = 0,
     // A ball.
     FlotorForm_Sphere = 1,
@@ -304,7 +304,7 @@ typedef uint32_t FlotorForm;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Role of a [`Primitive`]: touched body or tool. In C, a number of this value.
+// Role of a [`Primitive`]: touched body or tool. In C, a `uint32_t` with these values.
 enum FlotorPart
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -323,7 +323,7 @@ typedef uint32_t FlotorPart;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Visible sides of a surface. In C, a number of this value.
+// Visible sides of a surface. In C, a `uint32_t` with these values.
 enum FlotorSides
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -373,9 +373,10 @@ typedef struct FlotorStr {
     size_t len;
 } FlotorStr;
 
-// A second, independent proof of layouts, by abi_stable; absent (null) in C plugins and in a plain build.
+// Second, independent check of the layouts, by abi_stable; null in C plugins and in builds without the feature
+// `layout-proof`.
 typedef struct FlotorLayoutProof {
-    // Bytes of this struct.
+    // Size of this struct in the plugin's build, bytes.
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
@@ -405,15 +406,15 @@ typedef struct FlotorEntry {
     uint32_t layout_count;
     // Reserved, 0.
     uint32_t reserved;
-    // Called once after loading. May be null.
+    // Called once after loading, before any other function. May be null.
     void (*init)(const struct FlotorHost *host);
     // Returns the table of an interface id, or null if not offered.
     const void *(*get_interface)(struct FlotorStr id);
-    // A second proof of the layouts, or null.
+    // Second check of the layouts, or null.
     const struct FlotorLayoutProof *layout_proof;
 } FlotorEntry;
 
-// A constant list of words, made by [`crate::choices!`].
+// Constant list of words, built by [`crate::choices!`].
 typedef struct FlotorChoices {
     const struct FlotorStr *ptr;
     size_t len;
@@ -434,7 +435,8 @@ typedef struct FlotorParameter {
 
 // Outputs that a scene needs from a step; other outputs need not be computed.
 //
-// The shape is an extension ([`crate::extension::centerline`], [`crate::extension::shape`]) that observers call off the loop.
+// The shape is no output of a step: observers query the shape outside the loop, through the extensions
+// [`crate::extension::centerline`] and [`crate::extension::shape`].
 typedef struct FlotorDemand {
     uint32_t bits;
 } FlotorDemand;
@@ -456,13 +458,14 @@ typedef struct FlotorParameterValue {
     struct FlotorStr text;
 } FlotorParameterValue;
 
-// Message text for people, written by the callee to memory of the caller: nothing to allocate or to free.
+// Message for users, at most [`MESSAGE_BYTES`] bytes of UTF-8, written by the callee to memory of the caller: nothing to
+// allocate or to free.
 typedef struct FlotorMessage {
     uint32_t len;
     uint8_t text[FLOTOR_MESSAGE_BYTES];
 } FlotorMessage;
 
-// Opaque instance, created and owned by a plugin.
+// Opaque pointer to an instance of a model or device, created and owned by a plugin.
 typedef void *FlotorInstance;
 
 // Loop settings that a plugin receives before the start. 16 bytes.
@@ -483,7 +486,7 @@ typedef struct FlotorPose {
 
 // Linear and angular velocity of the handle. 48 bytes.
 typedef struct FlotorTwist {
-    // Velocity of the handle, m/s.
+    // Linear velocity of the handle, m/s.
     double linear_m_per_s[3];
     // Angular velocity, rad/s.
     double angular_rad_per_s[3];
@@ -501,9 +504,9 @@ typedef struct FlotorInput {
     uint64_t dt_ns;
     // Number of the tick, from 0.
     uint64_t tick;
-    // Buttons of the device, one bit each.
+    // Buttons of the device, one bit each: 1 while pressed.
     uint32_t buttons;
-    // Outputs needed.
+    // Outputs that the model must compute.
     struct FlotorDemand demand;
 } FlotorInput;
 
@@ -536,9 +539,9 @@ typedef struct FlotorForceTable {
     uint32_t parameter_count;
     // Parameter schema, constant.
     const struct FlotorParameter *parameters;
-    // Declaration of the model: id, texts, and demands and memory over all settings; constant.
+    // Declaration of the model: id, texts, and the demands and path dependence that cover all settings; constant.
     struct FlotorModelInfo info;
-    // Creates an instance from explicitly set values. Not real-time.
+    // Creates an instance from explicitly set values and writes the instance to `out`. Not real-time.
     uint32_t (*create)(const struct FlotorParameterValue *values,
                        uint32_t count,
                        struct FlotorMessage *message,
@@ -549,20 +552,22 @@ typedef struct FlotorForceTable {
     uint32_t (*prepare)(FlotorInstance instance,
                         const struct FlotorLoopConfig *config,
                         struct FlotorMessage *message);
-    // Computes the wrench for a pose. Real-time: no allocation, lock, system call or unwinding.
+    // Computes the output (wrench, energy, status) for an input. Real-time: no allocation, lock, system call or
+    // unwinding.
     uint32_t (*step)(FlotorInstance instance, const struct FlotorInput *input, struct FlotorOutput *output);
-    // Computes the wrenches for `count` poses in order. Real-time per pose. May be null: the host then calls `step`.
+    // Computes the outputs for `count` inputs in order. Real-time per input. May be null: the host then calls `step`.
     uint32_t (*step_batch)(FlotorInstance instance,
                            uint64_t count,
                            const struct FlotorInput *inputs,
                            struct FlotorOutput *outputs);
-    // Changes a live parameter at a tick boundary. Real-time. May be null.
+    // Changes the live parameter at `index` at a tick boundary (for a choice, `value` is its index). Real-time. May be
+    // null.
     uint32_t (*set_parameter)(FlotorInstance instance, uint32_t index, double value);
-    // Returns the current value of a parameter. Real-time. May be null.
+    // Returns the current value of the parameter at `index`; NaN if unknown. Real-time. May be null.
     double (*parameter)(FlotorInstance instance, uint32_t index);
-    // Clears the history. Real-time. May be null.
+    // Clears the history, keeps the parameters. Real-time. May be null.
     uint32_t (*reset)(FlotorInstance instance);
-    // Writes the reason of the last failure. Not real-time. May be null.
+    // Writes the message of the last failure to `message`; empty if there is none. Not real-time. May be null.
     void (*last_message)(FlotorInstance instance, struct FlotorMessage *message);
 } FlotorForceTable;
 
@@ -584,9 +589,9 @@ typedef struct FlotorAxes {
 
 // Capabilities of a device, as numbers that a host compares with a model and enforces. 200 bytes, device frame.
 //
-// Every number is finite and not negative, and constant from `open` on: a host refuses others before anything is
-// energised. An actuated axis has a limit and, if sensed, a range; actuated axes have a slew. Only the slew without an
-// actuated axis may be infinite.
+// Every number is finite and not negative, and constant from `open` on; a host rejects other capabilities before
+// activation. An actuated axis needs a limit above 0 and, if sensed, a range above 0; actuated axes need a slew rate
+// above 0. Only without actuated translations (rotations) may the slew rate of force (torque) be infinite.
 typedef struct FlotorCapabilities {
     // Axes whose position is measured.
     struct FlotorAxes sensed;
@@ -596,20 +601,21 @@ typedef struct FlotorCapabilities {
     double range_m[3];
     // Largest rotation about each axis, rad; together the semi-axes of an ellipsoid of rotation vectors.
     double range_rad[3];
-    // Smallest position step that is resolved, m.
+    // Position resolution, m: smallest step that the sensors resolve.
     double resolution_m;
     // Largest force along each axis, N.
     double max_force_n[3];
     // Largest torque about each axis, N·m.
     double max_torque_nm[3];
-    // Fastest change of force the device accepts, N/s.
+    // Maximum slew rate of the force that the device accepts, N/s.
     double max_force_slew_n_per_s;
-    // Fastest change of torque the device accepts, N·m/s.
+    // Maximum slew rate of the torque that the device accepts, N·m/s.
     double max_torque_slew_nm_per_s;
-    // Largest stiffness the device renders stably at its nominal rate, with the damping it recommends, N/m; 0: unknown.
-    // [`SampledLoop::largest_stiffness`](crate::SampledLoop::largest_stiffness) computes one.
+    // Largest stiffness that the device renders stably at its nominal rate with its recommended damping, N/m; 0:
+    // unknown. [`SampledLoop::largest_stiffness`](crate::SampledLoop::largest_stiffness) computes this limit from
+    // damping and timing.
     double max_stiffness_n_per_m;
-    // Slowest and fastest loop the device runs at, Hz.
+    // Lowest and highest loop rate of the device, Hz.
     double rate_hz[2];
     // Time from taking a sample to the resulting force, beyond one period, s.
     double latency_s;
@@ -618,7 +624,7 @@ typedef struct FlotorCapabilities {
 // Result of `read` and `write` at the boundary, 4 bytes. A separate type, so that no other code of the contract can be
 // mistaken for a result.
 typedef struct FlotorCycleCode {
-    // 0: fresh; 1: stale; 256 + code of a fault.
+    // 0: fresh; 1: stale; 256 plus the code of a [`crate::Fault`]: fault.
     uint32_t code;
 } FlotorCycleCode;
 
@@ -632,7 +638,7 @@ typedef struct FlotorTick {
     uint64_t dt_ns;
 } FlotorTick;
 
-// Conditions of a sample beside pose and faults, as a bit set; none ends a run.
+// Conditions of a sample beside pose and faults, as a bit set; no condition ends a run.
 typedef struct FlotorConditions {
     uint32_t bits;
 } FlotorConditions;
@@ -645,9 +651,9 @@ typedef struct FlotorDeviceState {
     struct FlotorTwist twist;
     // Wrench delivered to the hand since the previous tick, as reported by the device, N and N·m.
     struct FlotorWrench delivered;
-    // Time of the sample, ns on the loop's clock.
+    // Time of the sample, ns, on the clock of [`Tick::time_ns`].
     uint64_t sampled_ns;
-    // Buttons, one bit each.
+    // Buttons, one bit each: 1 while pressed.
     uint32_t buttons;
     // Further conditions of this sample.
     struct FlotorConditions conditions;
@@ -664,14 +670,14 @@ typedef struct FlotorDeviceTable {
     const struct FlotorParameter *parameters;
     // Id, name and description of the device, constant.
     struct FlotorDeviceInfo info;
-    // Opens a device. May block. Not real-time.
+    // Opens a device with explicitly set values and writes the instance to `out`. May block. Not real-time.
     uint32_t (*open)(const struct FlotorParameterValue *values,
                      uint32_t count,
                      struct FlotorMessage *message,
                      FlotorInstance *out);
     // Closes the device; deactivates an active device first. Not real-time.
     void (*close)(FlotorInstance instance);
-    // Writes the capabilities of the device. Not real-time.
+    // Writes the capabilities of an opened device to `out`. Not real-time.
     uint32_t (*capabilities)(FlotorInstance instance, struct FlotorCapabilities *out);
     // Energises the device at zero wrench. Not real-time.
     uint32_t (*activate)(FlotorInstance instance,
@@ -679,21 +685,23 @@ typedef struct FlotorDeviceTable {
                          struct FlotorMessage *message);
     // Commands zero wrench and returns to the opened phase. Not real-time.
     uint32_t (*deactivate)(FlotorInstance instance);
-    // Reads the newest sample. Real-time.
+    // Reads the newest sample of an active device into `state`. Real-time.
     struct FlotorCycleCode (*read)(FlotorInstance instance,
                                    const struct FlotorTick *tick,
                                    struct FlotorDeviceState *state);
-    // Commands the wrench on the hand until the next write. Real-time.
+    // Commands the wrench on the hand until the next write; of an active device only. Real-time.
     struct FlotorCycleCode (*write)(FlotorInstance instance,
                                     const struct FlotorTick *tick,
                                     const struct FlotorWrench *wrench);
-    // Makes the actuators safe at once. Any thread, any time, also during `read` and `write`.
+    // Sets the actuators to zero (or starts a controlled landing) at once, until the next activation. May be called from
+    // any thread at any time, also during `read` and `write`.
     void (*safe_stop)(FlotorInstance instance);
-    // Changes a live parameter at a tick boundary. Real-time. May be null.
+    // Changes the live parameter at `index` at a tick boundary (for a choice, `value` is its index). Real-time. May be
+    // null.
     uint32_t (*set_parameter)(FlotorInstance instance, uint32_t index, double value);
-    // Returns the current value of a parameter. May be null.
+    // Returns the current value of the parameter at `index` of an opened device; NaN if unknown. May be null.
     double (*parameter)(FlotorInstance instance, uint32_t index);
-    // Writes the reason of the last failure. Not real-time. May be null.
+    // Writes the message of the last failure to `message`; empty if there is none. Not real-time. May be null.
     void (*last_message)(FlotorInstance instance, struct FlotorMessage *message);
 } FlotorDeviceTable;
 
@@ -718,9 +726,10 @@ typedef struct FlotorCenterlineTable {
     uint32_t size;
     // Reserved, 0.
     uint32_t reserved;
-    // Writes the drawing style of the body.
+    // Writes the drawing style of the body; returns a [`crate::abi::CallStatus`] code.
     uint32_t (*info)(FlotorInstance instance, struct FlotorCenterlineInfo *out);
-    // Fills up to `capacity` points; writes the number of valid points to `count`.
+    // Fills up to `capacity` points from the fixed end to the handle and writes the number of valid points to `count`;
+    // returns a [`crate::abi::CallStatus`] code.
     uint32_t (*centerline)(FlotorInstance instance,
                            const struct FlotorInput *input,
                            struct FlotorPose *points,
@@ -736,7 +745,7 @@ typedef struct FlotorPrimitive {
     uint32_t part;
     // Centre (m, model frame) and orientation.
     struct FlotorPose pose;
-    // Half sides along the axes of the pose, m.
+    // Half extents along the axes of the pose, m.
     double half_sides_m[3];
 } FlotorPrimitive;
 
@@ -746,7 +755,7 @@ typedef struct FlotorSurfaceVertex {
     double position_m[3];
     // Outward unit normal.
     double normal[3];
-    // Value of the field at this vertex, in its unit; 0 without a field.
+    // Value of the scalar field at this vertex, in the unit of [`ScalarField`]; 0 without a field.
     double value;
 } FlotorSurfaceVertex;
 
@@ -804,7 +813,7 @@ typedef struct FlotorSoftRangeTable {
     const struct FlotorSoftRange *ranges;
 } FlotorSoftRangeTable;
 
-// Demands and memory of one instance; constant over its life. 8 bytes.
+// Demands that one instance serves, and its path dependence; constant over the life of the instance. 8 bytes.
 typedef struct FlotorVariantInfo {
     struct FlotorDemand serves;
     uint32_t memory;
@@ -824,7 +833,7 @@ typedef struct FlotorVariantTable {
 //
 // Outside the region wrench and stored energy are **zero at every orientation and velocity**, and the model has
 // **no history**: the first step inside is as after [`ForceModel::reset`]. The region may be larger than
-// necessary, never smaller; the host checks nothing and skips the step.
+// necessary, never smaller: the host skips the step outside without a check.
 typedef struct FlotorActiveRegion {
     uint32_t shape;
     uint32_t reserved;
@@ -858,8 +867,9 @@ typedef struct FlotorDetailsTable {
     uint32_t detail_count;
     // Diagnostic numbers, constant.
     const struct FlotorDetail *details;
-    // Writes the values of the last step to `capacity` places, `detail_count` at most; NaN for a missing value.
-    // Real-time: no allocation, lock, system call or unwinding.
+    // Writes the `detail_count` values of the last step, NaN for a missing value; returns a [`crate::abi::CallStatus`]
+    // code, `OutOfRange` if `capacity` is smaller than `detail_count`. Real-time: no allocation, lock, system call or
+    // unwinding.
     uint32_t (*values)(FlotorInstance instance, double *values, uint32_t capacity);
 } FlotorDetailsTable;
 
@@ -874,9 +884,9 @@ typedef struct FlotorLinearField {
     struct FlotorWrench wrench;
     // Rows: force x, y, z (N), torque x, y, z (N·m); columns: position x, y, z (m), rotation x, y, z (rad).
     double stiffness[6][6];
-    // Range of validity about the anchor, m. Beyond, a host uses the wrench at that distance.
+    // Radius of validity about the anchor, m; beyond, a host uses the wrench at that distance in the same direction.
     double valid_m;
-    // Range of validity in rotation, rad.
+    // Largest valid rotation from the orientation of the anchor, rad.
     double valid_rad;
     // Loop time for which the field was computed, ns.
     uint64_t time_ns;
@@ -913,22 +923,22 @@ typedef struct FlotorWorkspaceBoundsTable {
 
 // Balance of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
 //
-// Every term is integrated on its own, none is the difference of others:
-// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j` is a check, not a definition.
+// Every term is integrated separately, none is the difference of others, so that this balance is a check:
+// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j`.
 typedef struct FlotorEnergyLedger {
-    // Kinetic and potential energy now.
+    // Kinetic and potential energy now, J.
     double stored_j;
-    // Kinetic and potential energy at activation.
+    // Kinetic and potential energy at activation, J.
     double initial_j;
-    // Work done by the actuators for the commanded wrench.
+    // Work done on the handle by the actuators for the commanded wrench, J.
     double actuators_j;
-    // Work done by the actuators for gravity compensation.
+    // Work done on the handle by the actuators for gravity compensation, J.
     double feedforward_j;
-    // Work done by the hand.
+    // Work done on the handle by the hand, J.
     double hand_j;
-    // Energy turned into heat by damping.
+    // Energy turned into heat by damping, J.
     double dissipated_j;
-    // Largest mechanical energy (kinetic plus potential above its lowest point) so far: the scale of an error.
+    // Largest mechanical energy so far (kinetic, plus potential above its lowest point), J: the scale of the residual.
     double peak_j;
 } FlotorEnergyLedger;
 
@@ -942,7 +952,7 @@ typedef struct FlotorEnergyLedgerTable {
     uint32_t (*ledger)(FlotorInstance instance, struct FlotorEnergyLedger *out);
 } FlotorEnergyLedgerTable;
 
-// Ratio of delivered to commanded vertical force, as a polynomial of the height. 80 bytes.
+// Ratio of delivered to commanded vertical force, as a polynomial of the height in m. 80 bytes.
 typedef struct FlotorVerticalCalibration {
     double range_m[2];
     double coefficients[FLOTOR_CALIBRATION_COEFFICIENTS];
@@ -981,17 +991,17 @@ typedef struct FlotorConnectionTable {
     const struct FlotorUsbKind *usb;
 } FlotorConnectionTable;
 
-// Independent stop of a device, without its host. 88 bytes.
+// Stop of a device that does not depend on the host's process. 88 bytes.
 typedef struct FlotorIndependentStop {
-    // Time from the end of the host's commands, or from the message, until the device is in its safe state, ns; with
-    // descriptor -1 the largest number for a device without an independent stop.
+    // Time from the end of the host's commands, or from the message, until the device is in its safe state, ns. The
+    // largest number with descriptor -1: no independent stop.
     uint64_t within_ns;
     // File descriptor of the host's process, open for writing until the device is closed; the host duplicates the
-    // descriptor. On Windows the lower 32 bits of a handle. -1: the device stops by itself when no command comes.
+    // descriptor. On Windows the lower 32 bits of a handle. -1: the device stops by itself without commands.
     int32_t descriptor;
     // Length of the message, bytes, 1 to 64; 0 with descriptor -1.
     uint32_t length;
-    // Message written to the descriptor, up to three times: the same bytes at any time, also after half a command.
+    // Message written to the descriptor, up to three times: stops the device at any time, also after a partial command.
     uint8_t message[FLOTOR_STOP_MESSAGE_BYTES];
     // Code of a [`StoppedState`].
     uint32_t state;
@@ -1017,7 +1027,7 @@ typedef struct FlotorPacingTable {
     uint32_t reserved;
     // Waits for a sample that no earlier wait has reported, for `timeout_ns` at most; writes the number of samples
     // taken since the last successful wait, 0 after a timeout. Returns a [`crate::abi::CallStatus`] code. Real-time
-    // but for the waiting: no allocation.
+    // except for the wait: no allocation.
     uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
 } FlotorPacingTable;
 

@@ -14,19 +14,19 @@ pub enum Rule {
     Schema,
     /// An instance can be created from defaults alone.
     Defaults,
-    /// A model gives finite numbers at home and near home.
+    /// The outputs of a model are finite at home and near home.
     FiniteNearHome,
     /// NaN and infinity in the pose cause a status, not NaN and not a panic.
     SurvivesNotFinite,
-    /// Poses far outside any workspace give finite numbers and no panic.
+    /// Poses far outside any workspace cause finite outputs and no panic.
     SurvivesFarPoses,
-    /// After `reset` the same poses give the same bits.
+    /// After `reset` the same poses produce the same bits.
     ResetRepeats,
-    /// A step takes less than half a period at 1 kHz.
+    /// 99 of 100 steps take less than half a period at 1 kHz.
     TimeBudget,
-    /// Two instances give the same results alternately, on two threads and alone.
+    /// An instance returns the same results alone, alternately with another instance, and on two threads.
     Independent,
-    /// Neither `create`, `prepare`, a step nor `destroy` leaves a thread behind.
+    /// No thread is left running by `create`, `prepare`, a step or `destroy`.
     NoThreads,
     /// The force of a model without a history is minus the gradient of its energy: units and frame agree.
     EnergyGradient,
@@ -34,20 +34,21 @@ pub enum Rule {
     Capabilities,
     /// Activate, read, write, deactivate and activate again all work.
     Lifecycle,
-    /// After `safe_stop` from another thread the device gives no wrench and still responds.
+    /// After `safe_stop` from another thread the device exerts no wrench and still returns samples.
     SafeStop,
-    /// Reads and writes take less than half a period; stopping and activating end soon.
+    /// Reads and writes take less than half a period, a stop less than 100 ms, the rest of the life cycle less than 2 s.
     DeviceTime,
-    /// Every extension that is offered responds, and the instance works afterwards.
+    /// Every offered extension returns valid data, and the instance works afterwards.
     Extensions,
-    /// No call changes the state of the host's process: signals, floating-point mode, environment, limits.
+    /// No call changes the state of the host's process: signals, floating-point mode, environment, working folder,
+    /// limits, files.
     HostUntouched,
-    /// No call reads or writes memory that is not the plugin's or was not given to it.
+    /// No call reads or writes memory other than the plugin's own and the arguments of the call.
     InsideMemory,
 }
 
 impl Rule {
-    /// All rules, in the sequence of the checks.
+    /// All rules, in the order of the checks.
     pub const ALL: [Rule; 19] = [
         Rule::Metadata,
         Rule::Loads,
@@ -70,7 +71,7 @@ impl Rule {
         Rule::InsideMemory,
     ];
 
-    /// Returns the short name in reports.
+    /// Returns the short name of the rule in reports, such as `time-budget`.
     #[must_use]
     pub const fn id(self) -> &'static str {
         match self {
@@ -96,7 +97,7 @@ impl Rule {
         }
     }
 
-    /// Returns the requirement as a sentence for people.
+    /// Returns the requirement in one sentence, for reports.
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {

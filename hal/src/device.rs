@@ -1,7 +1,7 @@
 //! Devices: the traits that an author implements, and the data that goes in and out each tick.
 //!
-//! A device is *opened* (it answers questions, it gives no force), then *active* (energised, real-time), then
-//! opened again. The two are different types, so that a real-time call before activation does not compile.
+//! A device is *opened* (responds to queries, exerts no force), then *active* (energised, real-time), then opened again.
+//! The two phases are different types, so that a real-time call before activation does not compile.
 
 use crate::abi::Str;
 use crate::abi::layout::layout;
@@ -32,11 +32,11 @@ pub struct Tick {
     pub dt_ns: u64,
 }
 
-/// Fault of a device, as a closed set with a remedy for each.
+/// Fault of a device: a closed set, each fault with a remedy.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// The handle left the sensor's range: move it back, then re-arm.
+    /// The handle left the sensor's range: move the handle back, then start again.
     SensorOutOfRange = 1,
     /// A coil is too hot: let it cool.
     OverTemperature = 2,
@@ -52,7 +52,7 @@ pub enum Fault {
     Protocol = 7,
     /// The emergency stop of the device is pressed.
     EmergencyStop = 8,
-    /// The plugin broke (panic, or a code outside the contract).
+    /// The plugin panicked or returned a code outside the contract: report the fault to its author.
     Broken = 9,
 }
 
@@ -75,7 +75,7 @@ impl Fault {
         })
     }
 
-    /// Returns the cause and the remedy, for people.
+    /// Returns cause and remedy as a message for users.
     #[must_use]
     pub const fn advice(self) -> &'static str {
         match self {
@@ -98,11 +98,12 @@ impl Fault {
 #[must_use]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cycle {
-    /// A new sample is in the state.
+    /// From `read`: a new sample is in the state. From `write`: the device has accepted the command.
     Fresh,
-    /// No new sample since the last call; the state is unchanged.
+    /// From `read`: no new sample since the last call; the host keeps the previous state. From `write`: the device has
+    /// not accepted the command yet.
     Stale,
-    /// The device is faulted and gives no force.
+    /// The device is faulted and exerts no force.
     Fault(Fault),
 }
 
@@ -117,15 +118,15 @@ pub struct DeviceState {
     pub twist: Twist,
     /// Wrench delivered to the hand since the previous tick, as reported by the device, N and N·m.
     pub delivered: Wrench,
-    /// Time of the sample, ns on the loop's clock.
+    /// Time of the sample, ns, on the clock of [`Tick::time_ns`].
     pub sampled_ns: u64,
-    /// Buttons, one bit each.
+    /// Buttons, one bit each: 1 while pressed.
     pub buttons: u32,
     /// Further conditions of this sample.
     pub conditions: Conditions,
 }
 
-/// Conditions of a sample beside pose and faults, as a bit set; none ends a run.
+/// Conditions of a sample beside pose and faults, as a bit set; no condition ends a run.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -136,12 +137,12 @@ pub struct Conditions {
 impl Conditions {
     /// No condition.
     pub const NONE: Conditions = Conditions { bits: 0 };
-    /// Actuators at their limit: since the previous tick they gave less than commanded.
+    /// Actuators at their limit: since the previous tick they delivered less than commanded.
     pub const SATURATED: Conditions = Conditions { bits: 1 << 0 };
     /// Requested force above the recommended force of the device: warn the person who holds the handle.
     pub const EXCESS_FORCE: Conditions = Conditions { bits: 1 << 1 };
-    /// Pose measured with noise of at least one step of its numbers: a pose constant to the bit for a long time means
-    /// that the sensor is stuck. Not set by a device that counts steps (an encoder at rest).
+    /// Pose measured with noise of at least one step of its resolution: a bit-identical pose over a long time means that
+    /// the sensor is stuck. Not set by a device that counts steps (an encoder at rest).
     pub const NOISY: Conditions = Conditions { bits: 1 << 2 };
 
     /// Returns the union of both sets. Real-time: bounded, no allocation.
@@ -160,7 +161,7 @@ impl Conditions {
 }
 
 impl DeviceState {
-    /// State at home, at rest.
+    /// State at home and at rest, without force, at time 0.
     pub const HOME: DeviceState = DeviceState {
         pose: Pose::HOME,
         twist: Twist::ZERO,
@@ -170,7 +171,7 @@ impl DeviceState {
         conditions: Conditions::NONE,
     };
 
-    /// Returns true if every number is finite. Real-time: bounded, no allocation.
+    /// Returns true if pose and twist are finite; does not check `delivered`. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn is_finite(&self) -> bool {
@@ -210,7 +211,7 @@ impl Axes {
     /// All six axes.
     pub const ALL: Axes = Axes { bits: 0b11_1111 };
 
-    /// Joins two sets: `Axes::X.union(Axes::Z)` in constants, `Axes::X | Axes::Z` elsewhere.
+    /// Returns the union of both sets: `Axes::X.union(Axes::Z)` in constants, `Axes::X | Axes::Z` elsewhere.
     #[must_use]
     pub const fn union(self, other: Axes) -> Axes {
         Axes { bits: self.bits | other.bits }
@@ -222,7 +223,7 @@ impl Axes {
         self.bits & other.bits == other.bits
     }
 
-    /// Gives these axes a value for translations and another for rotations, and all other axes zero.
+    /// Returns `translation` for the translations of the set, `rotation` for its rotations, and 0 for all other axes.
     const fn spread(self, translation: f64, rotation: f64) -> ([f64; 3], [f64; 3]) {
         let (mut translations, mut rotations) = ([0.0; 3], [0.0; 3]);
         let mut axis = 0;
@@ -249,9 +250,9 @@ impl std::ops::BitOr for Axes {
 
 /// Capabilities of a device, as numbers that a host compares with a model and enforces. 200 bytes, device frame.
 ///
-/// Every number is finite and not negative, and constant from `open` on: a host refuses others before anything is
-/// energised. An actuated axis has a limit and, if sensed, a range; actuated axes have a slew. Only the slew without an
-/// actuated axis may be infinite.
+/// Every number is finite and not negative, and constant from `open` on; a host rejects other capabilities before
+/// activation. An actuated axis needs a limit above 0 and, if sensed, a range above 0; actuated axes need a slew rate
+/// above 0. Only without actuated translations (rotations) may the slew rate of force (torque) be infinite.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -264,20 +265,21 @@ pub struct Capabilities {
     pub range_m: [f64; 3],
     /// Largest rotation about each axis, rad; together the semi-axes of an ellipsoid of rotation vectors.
     pub range_rad: [f64; 3],
-    /// Smallest position step that is resolved, m.
+    /// Position resolution, m: smallest step that the sensors resolve.
     pub resolution_m: f64,
     /// Largest force along each axis, N.
     pub max_force_n: [f64; 3],
     /// Largest torque about each axis, N·m.
     pub max_torque_nm: [f64; 3],
-    /// Fastest change of force the device accepts, N/s.
+    /// Maximum slew rate of the force that the device accepts, N/s.
     pub max_force_slew_n_per_s: f64,
-    /// Fastest change of torque the device accepts, N·m/s.
+    /// Maximum slew rate of the torque that the device accepts, N·m/s.
     pub max_torque_slew_nm_per_s: f64,
-    /// Largest stiffness the device renders stably at its nominal rate, with the damping it recommends, N/m; 0: unknown.
-    /// [`SampledLoop::largest_stiffness`](crate::SampledLoop::largest_stiffness) computes one.
+    /// Largest stiffness that the device renders stably at its nominal rate with its recommended damping, N/m; 0:
+    /// unknown. [`SampledLoop::largest_stiffness`](crate::SampledLoop::largest_stiffness) computes this limit from
+    /// damping and timing.
     pub max_stiffness_n_per_m: f64,
-    /// Slowest and fastest loop the device runs at, Hz.
+    /// Lowest and highest loop rate of the device, Hz.
     pub rate_hz: [f64; 2],
     /// Time from taking a sample to the resulting force, beyond one period, s.
     pub latency_s: f64,
@@ -303,26 +305,27 @@ impl Capabilities {
     /// Time to the full force and torque from which [`Self::with_limits`] computes the slew, s.
     const DEFAULT_RISE_S: f64 = 0.5e-3;
 
-    /// Returns the capabilities of a device that senses and drives these axes, with range and limits of zero.
+    /// Returns the capabilities of a device that senses and drives `axes`, with ranges and limits still 0.
     #[must_use]
     pub const fn driving(axes: Axes) -> Self {
         Self { sensed: axes, actuated: axes, ..Self::UNDRIVEN }
     }
 
-    /// Sets the sensed axes.
+    /// Sets the axes whose position is measured; the driven axes are unchanged.
     #[must_use]
     pub const fn sensing(self, axes: Axes) -> Self {
         Self { sensed: axes, ..self }
     }
 
-    /// Sets the range of every sensed axis: largest displacement, m, and rotation, rad.
+    /// Sets the range of every axis in `sensed`: largest displacement, m, and rotation, rad, to both sides of the origin.
     #[must_use]
     pub const fn with_range(self, range_m: f64, range_rad: f64) -> Self {
         let (range_m, range_rad) = self.sensed.spread(range_m, range_rad);
         Self { range_m, range_rad, ..self }
     }
 
-    /// Sets the largest force, N, and torque, N·m, of every driven axis, and a slew that reaches them in 0.5 ms.
+    /// Sets the largest force, N, and torque, N·m, of every driven axis, and slew rates that reach these limits in 0.5
+    /// ms.
     #[must_use]
     pub const fn with_limits(self, max_force_n: f64, max_torque_nm: f64) -> Self {
         let (force_n, torque_nm) = self.actuated.spread(max_force_n, max_torque_nm);
@@ -330,19 +333,19 @@ impl Capabilities {
             .with_slew(max_force_n / Self::DEFAULT_RISE_S, max_torque_nm / Self::DEFAULT_RISE_S)
     }
 
-    /// Sets the fastest accepted change of force, N/s, and of torque, N·m/s.
+    /// Sets the maximum slew rates of force, N/s, and torque, N·m/s.
     #[must_use]
     pub const fn with_slew(self, max_force_slew_n_per_s: f64, max_torque_slew_nm_per_s: f64) -> Self {
         Self { max_force_slew_n_per_s, max_torque_slew_nm_per_s, ..self }
     }
 
-    /// Sets the largest stiffness rendered stably, N/m.
+    /// Sets the largest stiffness that the device renders stably, N/m.
     #[must_use]
     pub const fn with_stiffness(self, max_stiffness_n_per_m: f64) -> Self {
         Self { max_stiffness_n_per_m, ..self }
     }
 
-    /// Sets the latency beyond one period, s.
+    /// Sets the latency from a sample to the resulting force, beyond one period, s.
     #[must_use]
     pub const fn with_latency(self, latency_s: f64) -> Self {
         Self { latency_s, ..self }
@@ -385,7 +388,8 @@ pub struct DeviceInfo {
 }
 
 impl DeviceInfo {
-    /// Builds the declaration of a physical device: `id` for scenes and commands ("simulated"), `name` and `doc` for people.
+    /// Builds the declaration of a physical device: `id` for scenes and commands ("simulated"), `name` and `doc` for
+    /// display.
     #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
         Self {
@@ -397,14 +401,14 @@ impl DeviceInfo {
         }
     }
 
-    /// Marks the device as a simulation. A host limits the force of a physical device to its ceiling, unless a person
-    /// allows more.
+    /// Marks the device as a simulation. A host limits the force of a physical device to a ceiling unless the user allows
+    /// more; a simulated device has no ceiling.
     #[must_use]
     pub const fn simulated(self) -> Self {
         Self { embodiment: Embodiment::Simulated as u32, ..self }
     }
 
-    /// Returns the embodiment.
+    /// Returns the embodiment: physical or simulated.
     #[must_use]
     pub const fn embodiment(&self) -> Embodiment {
         Embodiment::from_code(self.embodiment)
@@ -429,14 +433,14 @@ impl DeviceInfo {
     }
 }
 
-/// Stop of a device from any thread at any time, without its cooperation.
+/// Handle that stops a device from any thread at any time, independently of the thread that uses the device.
 pub trait SafeStop: Send + Sync + 'static {
     /// Sets the actuators to zero (or to a controlled landing) until the next activation.
     /// Bounded, no allocation, no lock; may be called twice and while another thread is inside `read` or `write`.
     fn safe_stop(&self);
 
-    /// Allows force again. [`Simple`](crate::Simple) calls it before each activation; a [`Device`] does so in
-    /// [`Device::activate`]. Not real-time.
+    /// Clears the stop, so that the device may exert force again. [`Simple`](crate::Simple) calls this function before
+    /// each activation; a [`Device`] does so in [`Device::activate`]. Not real-time.
     fn arm(&self) {}
 }
 
@@ -448,7 +452,8 @@ impl SafeStop for NothingToStop {
     fn safe_stop(&self) {}
 }
 
-/// Opened device, not energised. Not real-time.
+/// Device in the opened phase, not energised: implemented by the author of a device, with [`ActiveDevice`]. Not
+/// real-time.
 pub trait Device: Sized + Send + 'static {
     /// Declaration of the device.
     const INFO: DeviceInfo;
@@ -465,7 +470,7 @@ pub trait Device: Sized + Send + 'static {
     /// A [`Refusal`] if the device is missing, busy, forbidden or configured wrongly.
     fn open(settings: &Settings<'_>) -> Result<Self, Refusal>;
 
-    /// Returns the capabilities of the opened device.
+    /// Returns the capabilities of the opened device, the same at every call.
     fn capabilities(&self) -> Capabilities;
 
     /// Returns the handle that stops the device from another thread; called once, right after opening.
@@ -477,14 +482,15 @@ pub trait Device: Sized + Send + 'static {
     /// The opened device and a [`Refusal`]: nothing is lost, the caller may retry.
     fn activate(self, config: &LoopConfig) -> Result<Self::Active, (Self, Refusal)>;
 
-    /// Returns the current value of a parameter, presets resolved (by index into [`Self::PARAMETERS`]).
+    /// Returns the current value of the parameter at `index` of [`Self::PARAMETERS`], including values set by a preset;
+    /// NaN if unknown.
     fn parameter(&self, index: usize) -> f64 {
         Self::PARAMETERS.get(index).map_or(f64::NAN, Parameter::default)
     }
 }
 
-/// Energised device. Every method is real-time: bounded, no allocation, no lock, no unwinding. Dropping it must set the
-/// actuators to zero.
+/// Energised device. Every method but `deactivate` is real-time: bounded, no allocation, no lock, no unwinding. An
+/// implementation must set the actuators to zero when dropped.
 pub trait ActiveDevice: Send + 'static {
     /// Type of the device after deactivation.
     type Opened;
@@ -495,7 +501,7 @@ pub trait ActiveDevice: Send + 'static {
     /// Commands the wrench on the hand until the next write. Real-time.
     fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle;
 
-    /// Changes a live parameter at a tick boundary; the range is already checked. Real-time.
+    /// Changes the live parameter at `index` at a tick boundary; the range is already checked. Real-time.
     ///
     /// # Errors
     /// [`SetParameterError`]; the old value stays.

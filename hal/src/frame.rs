@@ -1,8 +1,8 @@
 //! Poses, twists and wrenches: the plain data that crosses the plugin boundary.
 //!
-//! Everything is SI and `f64`, in a right-handed frame (device frame: x right, y away from the user, z up).
-//! The structs are `#[repr(C)]` arrays of `f64`, so a C plugin sees the same bytes; the methods give
-//! [`glam`] types to authors who write Rust. glam itself never crosses the boundary: its minors are breaking.
+//! Everything is SI and `f64`, in a right-handed frame (device frame: x right, y away from the user, z up). The structs
+//! are `#[repr(C)]` arrays of `f64`, so a C plugin sees the same bytes; the methods give [`glam`] types to authors who
+//! write Rust. glam itself never crosses the boundary: its minor versions break compatibility.
 
 use crate::abi::layout::layout;
 use crate::math;
@@ -63,7 +63,7 @@ impl Pose {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct Twist {
-    /// Velocity of the handle, m/s.
+    /// Linear velocity of the handle, m/s.
     pub linear_m_per_s: [f64; 3],
     /// Angular velocity, rad/s.
     pub angular_rad_per_s: [f64; 3],
@@ -126,7 +126,7 @@ impl Wrench {
         Self { force_n: force_n.to_array(), torque_nm: torque_nm.to_array() }
     }
 
-    /// Builds a wrench of a force in N, without torque. Real-time: bounded, no allocation.
+    /// Builds a wrench from a force, N, without torque. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn from_force(force_n: DVec3) -> Self {

@@ -3,20 +3,20 @@
 //! # The loop
 //!
 //! A **device** gives the pose of a handle and takes a wrench. A **force model** gives the wrench for a pose.
-//! A host runs both in a loop of a thousand ticks a second and more; between them it maps frames and scales
-//! and, after the model, enforces limits no plugin can bypass:
+//! A host runs both in a loop at a thousand ticks per second or more. The host maps frames and scales between device and
+//! model and, after the model, enforces limits that no plugin can bypass:
 //!
 //! ```text
 //! device.read -> mapping -> model.step -> mapping -> envelope -> device.write
 //! ```
 //!
-//! Everything is SI and `f64`, in right-handed frames with z up; units stand in the names. A wrench is always
+//! Everything is SI and `f64`, in right-handed frames with z up; names contain the unit. A wrench is always
 //! the force and torque **on the hand**.
 //!
 //! # Thread classes
 //!
 //! Every function is documented as one of:
-//! - *Not real-time*: may allocate, block and talk to the system. Runs before the loop starts or beside it.
+//! - *Not real-time*: may allocate, block and call the system. Runs before the loop starts, or in another thread.
 //! - *Real-time: bounded, no allocation*: runs inside a tick. No allocation, lock, system call, formatting or panic;
 //!   the boundary catches a panic, but disables the instance, and the tick has no force.
 //!

@@ -10,7 +10,8 @@ pub use libm::{
     log10, pow, sin, sincos as sin_cos, sinh, tan, tanh,
 };
 
-/// Returns a whole power by repeated squaring; `f64::powi` leaves the order of its products to the compiler.
+/// Returns `base` to an integer power by repeated squaring; the order of the products in `f64::powi` depends on the
+/// compiler.
 #[inline]
 #[must_use]
 pub fn powi(base: f64, exponent: i32) -> f64 {

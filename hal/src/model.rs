@@ -14,7 +14,8 @@ layout! {
 
 /// Outputs that a scene needs from a step; other outputs need not be computed.
 ///
-/// The shape is an extension ([`crate::extension::centerline`], [`crate::extension::shape`]) that observers call off the loop.
+/// The shape is no output of a step: observers query the shape outside the loop, through the extensions
+/// [`crate::extension::centerline`] and [`crate::extension::shape`].
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -23,11 +24,11 @@ pub struct Demand {
 }
 
 impl Demand {
-    /// Force only.
+    /// Force without torque.
     pub const FORCE: Demand = Demand { bits: 1 };
-    /// Torque.
+    /// Torque without force.
     pub const TORQUE: Demand = Demand { bits: 2 };
-    /// Stored elastic energy.
+    /// Stored energy.
     pub const ENERGY: Demand = Demand { bits: 4 };
     /// Force and torque.
     pub const WRENCH: Demand = Demand { bits: 3 };
@@ -69,9 +70,9 @@ pub struct Input {
     pub dt_ns: u64,
     /// Number of the tick, from 0.
     pub tick: u64,
-    /// Buttons of the device, one bit each.
+    /// Buttons of the device, one bit each: 1 while pressed.
     pub buttons: u32,
-    /// Outputs needed.
+    /// Outputs that the model must compute.
     pub demand: Demand,
 }
 
@@ -82,7 +83,7 @@ impl Input {
         Self { pose, twist: Twist::ZERO, time_ns: 0, dt_ns: 0, tick: 0, buttons: 0, demand: Demand::ALL }
     }
 
-    /// Returns the step length, s. Real-time: bounded, no allocation.
+    /// Returns the time since the previous step, s; 0 on the first step. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn dt_s(&self) -> f64 {
@@ -175,9 +176,9 @@ impl From<Wrench> for Output {
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Memory {
-    /// Same pose, same wrench: may be evaluated anywhere, in any order.
+    /// The wrench depends on the current input only: inputs may be evaluated in any order.
     Stateless = 0,
-    /// The path matters (iteration, friction, contact, branches).
+    /// The wrench also depends on earlier inputs (iteration, friction, contact, branches).
     PathDependent = 1,
 }
 
@@ -202,7 +203,7 @@ pub struct ModelInfo {
 }
 
 impl ModelInfo {
-    /// Builds a declaration: `id` for scenes and commands ("spring"), `name` and `doc` for people.
+    /// Builds a declaration: `id` for scenes and commands ("spring"), `name` and `doc` for display.
     #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
         Self {
@@ -221,8 +222,8 @@ impl ModelInfo {
         self
     }
 
-    /// Declares the path dependence of the output. If it depends on settings, declare the safe value here and the exact
-    /// one with [`crate::VariantModel`].
+    /// Declares the path dependence of the output. If this depends on settings, declare [`Memory::PathDependent`] here
+    /// and the path dependence of each instance with [`crate::VariantModel`].
     #[must_use]
     pub const fn with_memory(mut self, memory: Memory) -> Self {
         self.memory = memory as u32;
@@ -271,7 +272,7 @@ pub struct LoopConfig {
     pub seed: u64,
 }
 
-/// Force model: computes the wrench for a pose. Implement it, then write [`crate::export_model!`].
+/// Force model: computes the wrench for a pose. Implement this trait, then export the type with [`crate::export_model!`].
 ///
 /// ```
 /// use flotor_hal::{DVec3, ForceModel, Input, ModelInfo, Output, Parameter, Refusal, Settings, Wrench};
@@ -315,17 +316,19 @@ pub trait ForceModel: Sized + Send + 'static {
         Ok(())
     }
 
-    /// Computes the wrench for a pose. Real-time: bounded, no allocation, lock, system call or unwinding.
+    /// Computes the output (wrench, energy, status) for an input. Real-time: bounded, no allocation, lock, system call or
+    /// unwinding.
     fn step(&mut self, input: &Input) -> Output;
 
-    /// Computes the wrenches for many poses of one handle, in order. Real-time per pose; override it to go faster.
+    /// Computes the outputs for several inputs of one handle, in order. Real-time per input; override this function if a
+    /// batch can be computed faster.
     fn step_batch(&mut self, inputs: &[Input], outputs: &mut [Output]) {
         for (input, output) in inputs.iter().zip(outputs) {
             *output = self.step(input);
         }
     }
 
-    /// Changes a live parameter (by index into [`Self::PARAMETERS`]) at a tick boundary; range already checked.
+    /// Changes the live parameter at `index` of [`Self::PARAMETERS`] at a tick boundary; the range is already checked.
     /// Real-time: bounded, no allocation.
     ///
     /// # Errors
@@ -335,7 +338,8 @@ pub trait ForceModel: Sized + Send + 'static {
         Err(SetParameterError::Fixed)
     }
 
-    /// Returns the current value of a parameter, presets resolved (by index into [`Self::PARAMETERS`]). Real-time: bounded, no allocation.
+    /// Returns the current value of the parameter at `index` of [`Self::PARAMETERS`], including values set by a preset;
+    /// NaN if unknown. Real-time: bounded, no allocation.
     fn parameter(&self, index: usize) -> f64 {
         Self::PARAMETERS.get(index).map_or(f64::NAN, Parameter::default)
     }

@@ -1,4 +1,4 @@
-//! Parameters of plugins, as data from which panels, scenes and checks are generated.
+//! Parameters of plugins, as data from which control panels, scenes and checks are generated.
 //!
 //! A plugin declares a schema (`&'static [Parameter]`). A host checks values against the schema before the plugin sees
 //! them, so an author only checks conditions beyond a range (that values are consistent). Values are addressed by index
@@ -34,14 +34,14 @@ pub enum ParameterKind {
     Real = 1,
     /// One of `choices`; the number is its index.
     Choice = 2,
-    /// Free text (a serial number); only at creation.
+    /// Free text (a serial number); set at creation only.
     Text = 3,
-    /// File, or one of `choices`, which are built in; only at creation. A host passes a path that can be opened from
-    /// its working directory: a scene's `tap.toml` is relative to the scene.
+    /// File, or one of `choices`, which are built in; set at creation only. A host passes a path that can be opened from
+    /// its working directory, and resolves a relative path in a scene against the folder of the scene.
     File = 4,
 }
 
-/// Mutability of a parameter.
+/// Times at which a parameter may be set.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mutability {
@@ -68,7 +68,7 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// Declares a real number. `unit` is shown beside the slider ("mm", "N", "1" for none).
+    /// Declares a real number between `min` and `max`. `unit` is shown beside the slider ("mm", "N", "1" for none).
     #[must_use]
     pub const fn real(
         id: &'static str,
@@ -135,7 +135,7 @@ impl Parameter {
         self.id.as_str()
     }
 
-    /// Returns the unit for people; empty for a dimensionless number.
+    /// Returns the unit to display; "1" or empty for a dimensionless number.
     #[must_use]
     pub const fn unit(&self) -> &str {
         self.unit.as_str()
@@ -164,25 +164,25 @@ impl Parameter {
         }
     }
 
-    /// Returns the mutability.
+    /// Returns the mutability; an unknown code counts as fixed.
     #[must_use]
     pub const fn mutability(&self) -> Mutability {
         if self.mutability == Mutability::Live as u32 { Mutability::Live } else { Mutability::Fixed }
     }
 
-    /// Returns the smallest legal number.
+    /// Returns the smallest legal number, in the parameter's unit.
     #[must_use]
     pub const fn min(&self) -> f64 {
         self.min
     }
 
-    /// Returns the largest legal number.
+    /// Returns the largest legal number, in the parameter's unit.
     #[must_use]
     pub const fn max(&self) -> f64 {
         self.max
     }
 
-    /// Returns the default number (a preset may override it).
+    /// Returns the default number, in the parameter's unit; a preset may override the default.
     #[must_use]
     pub const fn default(&self) -> f64 {
         self.default
@@ -227,9 +227,9 @@ impl std::error::Error for OutOfRange {}
 /// Error of a change of a live parameter. `Copy`: nothing to allocate in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SetParameterError {
-    /// Parameter fixed in this instance: not live, or without effect beside the other values.
+    /// Parameter fixed in this instance: not live, or without effect with the current values of other parameters.
     Fixed,
-    /// Number inconsistent with the other values.
+    /// Number inconsistent with the values of other parameters.
     OutOfRange(OutOfRange),
 }
 
@@ -275,7 +275,7 @@ impl<'a> Settings<'a> {
         Self { schema, values }
     }
 
-    /// Returns settings without an explicit value, as tests of a plugin use them.
+    /// Returns settings without explicit values, for tests of a plugin.
     #[must_use]
     pub const fn defaults(schema: &'static [Parameter]) -> Settings<'static> {
         Settings { schema, values: &[] }
@@ -292,27 +292,27 @@ impl<'a> Settings<'a> {
         self.explicit(id).map(|value| value.number)
     }
 
-    /// Returns the number set, else the schema's default, else NaN for an unknown id.
+    /// Returns the number set for a parameter, else the default of the schema; NaN for an unknown id.
     #[must_use]
     pub fn number_or_default(&self, id: &str) -> f64 {
         let default = || self.schema.iter().find(|p| p.id() == id).map_or(f64::NAN, Parameter::default);
         self.number(id).unwrap_or_else(default)
     }
 
-    /// Returns the index set for a choice, else the schema's default.
+    /// Returns the index set for a choice, else the default of the schema; 0 for an unknown id.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked indices, small and whole
     pub fn choice_or_default(&self, id: &str) -> usize {
         self.number_or_default(id) as usize
     }
 
-    /// Returns the number of each parameter, set or default, in the sequence of the schema.
+    /// Returns the number of each parameter, set or default, in the order of the schema.
     #[must_use]
     pub fn values(&self) -> Vec<f64> {
         self.schema.iter().map(|parameter| self.number_or_default(parameter.id())).collect()
     }
 
-    /// Returns the element of `all` for a choice, set or default; `all` has the sequence of the choices.
+    /// Returns the element of `all` at the index of a choice, set or default; `all` must have the order of the choices.
     #[must_use]
     pub fn one_of<T: Copy, const N: usize>(&self, id: &str, all: [T; N]) -> T {
         const { assert!(N > 0, "a choice has at least one element") };
@@ -325,7 +325,7 @@ impl<'a> Settings<'a> {
         self.explicit(id).map(|value| value.text.as_str()).filter(|text| !text.is_empty())
     }
 
-    /// Returns the ids of all set values, in the sequence of the settings.
+    /// Returns the ids of all set values, in the order of the settings.
     pub fn ids(&self) -> impl Iterator<Item = &'static str> + 'a {
         let schema = self.schema;
         self.values.iter().filter_map(move |v| schema.get(v.index as usize).map(Parameter::id))

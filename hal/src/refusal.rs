@@ -6,13 +6,13 @@ use std::fmt;
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RefusalKind {
-    /// A parameter has a value that cannot be used: change it.
+    /// A parameter has an unusable value: change the value.
     Parameter = 1,
-    /// The request is outside what this plugin can do (rate, demand, capability): choose another plugin or scene.
+    /// The plugin does not support the request (rate, demand, capability): choose another plugin or scene.
     Unsupported = 2,
     /// Hardware or a file is missing, busy or not permitted: fix the machine, then retry.
     Resource = 3,
-    /// The plugin broke (it panicked, or it answered outside the contract): report it to its author.
+    /// The plugin panicked or violated the contract: report this to its author.
     Broken = 4,
 }
 
@@ -34,7 +34,7 @@ impl RefusalKind {
 pub struct Refusal {
     /// Kind of the refusal, which determines the remedy.
     pub kind: RefusalKind,
-    /// Reason in one sentence for people: value, problem and remedy.
+    /// Reason in one sentence for users: value, problem and remedy.
     pub reason: String,
 }
 
@@ -57,7 +57,7 @@ impl Refusal {
         Self { kind: RefusalKind::Resource, reason: reason.to_string() }
     }
 
-    /// Builds a refusal because the plugin panicked or broke the contract.
+    /// Builds a refusal because the plugin panicked or violated the contract.
     #[must_use]
     pub fn broken(reason: impl fmt::Display) -> Self {
         Self { kind: RefusalKind::Broken, reason: reason.to_string() }

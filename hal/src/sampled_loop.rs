@@ -3,7 +3,7 @@
 /// Timing of a sampled force loop: period and latency.
 ///
 /// The rule is the linear one of Gil, Sanchez, Hulin, Preusche and Hirzinger (2009, J. Comput. Inf. Sci. Eng. 9:011005),
-/// `K < (b + B) / (T / 2 + latency)`, with the damping of the device `b` and that of the wall `B`. It assumes
+/// `K < (b + B) / (T / 2 + latency)`, with the damping `b` of the device and `B` of the wall. It assumes
 /// - a spring and a damper that are sampled once a period, and a force that is constant until the next sample;
 /// - a rigid handle, and a hand that adds no energy;
 /// - a period and a latency that are short for handle and damper: `(b + B) (T + latency)` is at most a tenth of the mass.
@@ -18,13 +18,13 @@ pub struct SampledLoop {
     pub latency_s: f64,
 }
 
-/// Damper beside a spring, N·s/m or N·m·s/rad.
+/// Damper in parallel with a spring, N·s/m or N·m·s/rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Damper {
-    /// Resists motion in both directions.
+    /// Damper that resists motion in both directions.
     BothWays(f64),
-    /// Resists motion in one direction, as in a wall that never pulls. Active for half of an oscillation, so it counts
-    /// half.
+    /// Damper that resists motion in one direction, as in a wall that never pulls. It acts during half of an oscillation,
+    /// so half of its damping counts.
     OneWay(f64),
 }
 
@@ -43,15 +43,15 @@ impl SampledLoop {
     /// the velocity, quantisation, and handles lighter than assumed.
     pub const STABILITY_MARGIN: f64 = 0.5;
 
-    /// Returns the stiffness at which the loop becomes unstable, on a device of this damping; 0 without any damping. Not
-    /// real-time.
+    /// Returns the stiffness, N/m or N·m/rad, at which the loop becomes unstable on a device with the viscous damping
+    /// `device_damping`, N·s/m or N·m·s/rad; 0 without any damping. Real-time: bounded, no allocation.
     #[must_use]
     pub fn stability_limit(&self, device_damping: f64, damper: Damper) -> f64 {
         (device_damping + damper.mean()) / (0.5 * self.period_s + self.latency_s)
     }
 
-    /// Returns the largest stiffness to render: [half](Self::STABILITY_MARGIN) of the
-    /// [stability limit](Self::stability_limit). Not real-time.
+    /// Returns the largest stiffness to render, N/m or N·m/rad: [half](Self::STABILITY_MARGIN) of the
+    /// [stability limit](Self::stability_limit). Real-time: bounded, no allocation.
     #[must_use]
     pub fn largest_stiffness(&self, device_damping: f64, damper: Damper) -> f64 {
         Self::STABILITY_MARGIN * self.stability_limit(device_damping, damper)

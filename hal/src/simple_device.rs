@@ -1,7 +1,7 @@
-//! The short form of a device: three functions, and a part that takes the force away.
+//! The short form of a device: three functions, and a handle that removes the force.
 //!
-//! [`Device`] has a type for each phase of its life. Where both phases hold the same data, [`SimpleDevice`] says less, and
-//! [`Simple`] makes a [`Device`] of it: `export_device!(Simple<Crank>);`. The contract beneath is the same.
+//! [`Device`] has one type per phase. A device with the same data in both phases is shorter as a [`SimpleDevice`], which
+//! [`Simple`] converts to a [`Device`]: `export_device!(Simple<Crank>);`. The plugin contract is the same.
 
 use crate::{
     ActiveDevice, Capabilities, Cycle, Device, DeviceInfo, DeviceState, IndependentStop,
@@ -17,8 +17,8 @@ pub trait SimpleDevice: Sized + Send + 'static {
     const INFO: DeviceInfo;
     /// Schema of the parameters.
     const PARAMETERS: &'static [Parameter] = &[];
-    /// Part that takes the force away from another thread: a second descriptor, or a [`StopFlag`]. It borrows nothing from
-    /// the device, and so works while [`Self::read`] hangs.
+    /// Handle that removes the force from another thread: a second descriptor, or a [`StopFlag`]. The handle borrows
+    /// nothing from the device, so that a stop works while [`Self::read`] hangs.
     type Stop: SafeStop;
 
     /// Opens the device. The settings are already checked against the schema. May block. Not real-time.
@@ -39,10 +39,12 @@ pub trait SimpleDevice: Sized + Send + 'static {
     /// Reads the newest sample into `state`. Real-time: bounded, no allocation.
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle;
 
-    /// Commands the wrench on the hand until the next write; zero from a stop on. Real-time: bounded, no allocation.
+    /// Commands the wrench on the hand until the next write; after a stop, `wrench` is zero until the next activation.
+    /// Real-time: bounded, no allocation.
     fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle;
 
-    /// Changes a live parameter at a tick boundary; range already checked. Real-time: bounded, no allocation.
+    /// Changes the live parameter at `index` at a tick boundary; the range is already checked. Real-time: bounded, no
+    /// allocation.
     ///
     /// # Errors
     /// [`SetParameterError`]; the old value stays.
@@ -59,7 +61,7 @@ pub struct Opened<D: SimpleDevice> {
     pub device: D,
     /// Capabilities, constant from now on.
     pub capabilities: Capabilities,
-    /// Part that takes the force away.
+    /// Handle that removes the force from another thread.
     pub stop: D::Stop,
 }
 
@@ -86,7 +88,8 @@ impl SafeStop for StopFlag {
     }
 }
 
-/// Stop of a [`Simple`] device: stops its part, and holds later writes at zero.
+/// Stop of a [`Simple`] device: triggers the stop of the [`SimpleDevice`] and replaces later commands by zero until the
+/// next activation.
 pub struct SimpleStop<S>(Arc<(StopFlag, S)>);
 
 impl<S> Clone for SimpleStop<S> {
@@ -109,7 +112,7 @@ impl<S: SafeStop> SafeStop for SimpleStop<S> {
     }
 }
 
-/// A [`SimpleDevice`] as a [`Device`], not energised.
+/// Adapter from a [`SimpleDevice`] to a [`Device`], not energised.
 pub struct Simple<D: SimpleDevice> {
     device: D,
     capabilities: Capabilities,
@@ -118,7 +121,7 @@ pub struct Simple<D: SimpleDevice> {
     values: Vec<f64>,
 }
 
-/// A [`SimpleDevice`] as an [`ActiveDevice`].
+/// Adapter from a [`SimpleDevice`] to an [`ActiveDevice`]; dropping stops the device.
 pub struct ActiveSimple<D: SimpleDevice> {
     /// Dropped first: the force is zero before code of the device runs in its `drop`.
     _stop: StopOnDrop<D::Stop>,

@@ -1,7 +1,7 @@
 //! Tables of numbers in a text: a line of column names, then one line per row, cells separated by commas.
 //!
-//! One reader for all user-supplied tables, so that files of spreadsheets and programs are read, or rejected with the
-//! cause, alike everywhere.
+//! One reader for all user-supplied tables, so that every command accepts the same files, or rejects them with the same
+//! message.
 
 use crate::TextProblem;
 use std::borrow::Cow;
@@ -20,7 +20,7 @@ pub enum HashLines {
     Rows,
 }
 
-/// Table with its columns, and an iterator over its rows.
+/// Table with parsed column names, and rows that are parsed on demand ([`Self::rows`]).
 #[derive(Clone, Debug)]
 pub struct Table<'a> {
     lines: Lines<'a>,
@@ -55,7 +55,8 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// Reads the column names. A byte order mark and a spreadsheet's line `sep=,` are skipped. Not real-time.
+    /// Parses the column names; [`Self::rows`] parses the rows. A byte order mark and a spreadsheet's line `sep=,` are
+    /// skipped. Not real-time.
     ///
     /// # Errors
     /// For a separator other than a comma, a column without a name, a duplicate name, or no column at all.
@@ -93,7 +94,7 @@ impl<'a> Table<'a> {
         Ok(Self { lines, header_line, columns })
     }
 
-    /// Returns the names of the columns.
+    /// Returns the names of the columns, in the order of the cells.
     #[must_use]
     pub fn columns(&self) -> &[String] {
         &self.columns
@@ -111,7 +112,8 @@ impl<'a> Table<'a> {
         TextProblem::at(self.header_line, problem)
     }
 
-    /// Returns the rows, each with a cell for each column. Not real-time.
+    /// Parses the rows one after the other. A row with another number of cells than columns, or with a malformed cell, is
+    /// an error. Not real-time.
     pub fn rows(&self) -> impl Iterator<Item = Result<Row<'_>, TextProblem>> {
         self.lines.clone().map(|(line, text)| {
             let cells = cells(text).map_err(|problem| TextProblem::at(line, problem))?;
@@ -137,16 +139,17 @@ impl Row<'_> {
         self.line
     }
 
-    /// Returns the text of a cell, without the blanks around it.
+    /// Returns the text of the cell in a column, without surrounding blanks (blanks inside quotation marks are kept);
+    /// empty for an unknown column.
     #[must_use]
     pub fn text(&self, column: usize) -> &str {
         self.cells.get(column).map_or("", |cell| cell)
     }
 
-    /// Returns the number in a cell; NaN and infinity are numbers. Not real-time.
+    /// Returns the number in a cell, which may be NaN or infinite. Not real-time.
     ///
     /// # Errors
-    /// If the cell has another text.
+    /// If the text of the cell is not a number.
     pub fn number(&self, column: usize) -> Result<f64, TextProblem> {
         let text = self.text(column);
         text.parse().map_err(|_| {
@@ -162,7 +165,7 @@ impl Row<'_> {
     /// Returns the finite number in a cell. Not real-time.
     ///
     /// # Errors
-    /// If the cell has another text.
+    /// If the text of the cell is not a finite number.
     pub fn finite(&self, column: usize) -> Result<f64, TextProblem> {
         let number = self.number(column)?;
         let name = self.columns.get(column).map_or("", |name| name);

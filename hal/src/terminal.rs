@@ -24,8 +24,8 @@ fn is_harmless(character: char) -> bool {
     }
 }
 
-/// Returns the arguments of this process with control characters escaped. A parser that has rejected the arguments
-/// parses these instead, for its message. Not real-time.
+/// Returns the arguments of this process with control characters escaped. After a parse error, a parser parses the
+/// escaped arguments again, so that its error message contains no control characters. Not real-time.
 pub fn escaped_arguments() -> impl Iterator<Item = String> {
     std::env::args_os().map(|argument| escaped(&argument.to_string_lossy()))
 }

@@ -10,7 +10,7 @@ const MOST_TEXT_BYTES: u64 = 256 << 20;
 /// Byte order mark of UTF-8, which some programs write at the start of a text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Problem in a text file.
+/// Problem in a text file, with its line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TextProblem {
     /// Line, from 1; 0 for a problem of the whole file.
@@ -20,7 +20,7 @@ pub struct TextProblem {
 }
 
 impl TextProblem {
-    /// Builds a problem in a line, from 1. Not real-time.
+    /// Builds a problem in the line `line`, counted from 1. Not real-time.
     pub fn at(line: usize, problem: impl Into<String>) -> Self {
         Self { line, problem: problem.into() }
     }
@@ -74,7 +74,7 @@ pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
 /// Reads a text file of at most 256 MiB, as [`text_from_bytes`] does; `what` describes the file in an error. Not real-time.
 ///
 /// # Errors
-/// Errors of the operating system, or the first line that is not UTF-8 or has a byte 0.
+/// If the file cannot be read, is larger than 256 MiB or is no valid text (errors of [`text_from_bytes`]).
 pub fn read_text(path: &Path, what: &str) -> Result<String, TextProblem> {
     let bytes = read_file(path, MOST_TEXT_BYTES)
         .map_err(|error| TextProblem::of_file(format!("cannot read {what}: {error}")))?;
@@ -85,7 +85,7 @@ pub fn read_text(path: &Path, what: &str) -> Result<String, TextProblem> {
 /// line feed. Not real-time.
 ///
 /// # Errors
-/// The first line that is not UTF-8, or has a byte 0; UTF-16.
+/// If the text is UTF-16, is not valid UTF-8 or contains a NUL byte; the error has the first such line.
 pub fn text_from_bytes(mut bytes: Vec<u8>) -> Result<String, TextProblem> {
     if bytes.starts_with(BYTE_ORDER_MARK) {
         bytes.drain(..BYTE_ORDER_MARK.len());

@@ -1,9 +1,9 @@
-//! Velocity of a device that measures positions or orientations alone.
+//! Velocity estimation for devices that measure positions or orientations only.
 
 use crate::{DVec3, math};
 use std::f64::consts::TAU;
 
-/// Difference of positions or orientations through a first-order low-pass filter.
+/// Velocity estimator: difference quotient of positions or orientations, smoothed by a first-order low-pass filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityFilter {
     cutoff_hz: f64,
@@ -13,14 +13,15 @@ pub struct VelocityFilter {
 }
 
 impl VelocityFilter {
-    /// Creates a filter before its first sample.
+    /// Creates a filter with the cutoff frequency `cutoff_hz`, at velocity zero, before its first sample.
     #[must_use]
     pub const fn new(cutoff_hz: f64) -> Self {
         Self { cutoff_hz, velocity: DVec3::ZERO, sampled_ns: None }
     }
 
-    /// Returns the velocity, in the unit of the displacement per second, after a displacement since the previous sample; zero at the
-    /// first sample. Real-time: bounded, no allocation.
+    /// Updates the filter with the displacement since the previous sample and returns the velocity, in the unit of the
+    /// displacement per second; zero at the first sample and if the time has not advanced. Real-time: bounded, no
+    /// allocation.
     pub fn update(&mut self, displacement: DVec3, time_ns: u64) -> DVec3 {
         self.velocity = match self.sampled_ns {
             Some(before_ns) if time_ns > before_ns => {

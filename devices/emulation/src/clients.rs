@@ -6,7 +6,7 @@ use std::io;
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Time in which a client must send its first message.
+/// Timeout for the first message of a client.
 pub const FIRST_MESSAGE: Duration = Duration::from_secs(5);
 /// Timeout from the first bytes of a message to its last: a host writes a message at once, and a slower client delays the others.
 const REST_OF_MESSAGE: Duration = Duration::from_millis(200);
@@ -19,7 +19,8 @@ const MOST_SILENT: usize = 32;
 const CHECK: Timespec = Timespec { tv_sec: 1, tv_nsec: 0 };
 const NOW: Timespec = Timespec { tv_sec: 0, tv_nsec: 0 };
 
-/// Clients of a port, served one at a time by the arrival of their first messages. Silent clients block no others.
+/// Clients of a port, served one at a time in the order in which their first messages arrive. Clients that have sent
+/// nothing do not block the others.
 pub struct Clients {
     port: Port,
     silent: Vec<(TcpStream, Instant)>,
@@ -35,7 +36,8 @@ impl Clients {
         Ok(Self { port, silent: Vec::new() })
     }
 
-    /// Waits for the next client that sends something. Silent clients stay connected for [`FIRST_MESSAGE`].
+    /// Waits for the next client that has sent data and returns its connection. A client that sends nothing is
+    /// disconnected after [`FIRST_MESSAGE`], or earlier if too many such clients are connected.
     ///
     /// # Errors
     /// The error of `poll`.
@@ -49,7 +51,7 @@ impl Clients {
         }
     }
 
-    /// Returns whether another client has sent something and waits. Does not block.
+    /// Returns true if another client has sent data and waits for service. Does not block.
     fn is_one_waiting(&mut self) -> bool {
         // As many events at most as there may be silent clients.
         (0..MOST_SILENT).any(|_| self.look(&NOW).is_ok_and(|place| place.is_some()))
@@ -100,8 +102,8 @@ struct Ready {
     is_new: bool,
 }
 
-/// Service period of a client, watched while others wait. A client that sends whole messages is a host, and is not interrupted: a
-/// program of the same user could end the emulator as well.
+/// Time limits of the served client. A client that keeps sending complete messages is a host and is not disconnected,
+/// even if others wait: a hostile program of the same user could end the emulator anyway.
 pub struct Tenure<'c> {
     others: &'c mut Clients,
     /// Time of the last whole message.
@@ -111,24 +113,24 @@ pub struct Tenure<'c> {
 }
 
 impl<'c> Tenure<'c> {
-    /// Begins the service of a client, whose first message is due.
+    /// Starts the time limits of a client whose first message is not complete yet.
     pub fn begin(others: &'c mut Clients) -> Self {
         let now = Instant::now();
         Self { others, message: now, part: Some(now) }
     }
 
-    /// Records a whole message.
+    /// Records a complete message, which restarts the time limits.
     pub fn message(&mut self) {
         (self.message, self.part) = (Instant::now(), None);
     }
 
-    /// Records bytes of an incomplete message.
+    /// Records bytes of an incomplete message, whose other bytes are due within 200 ms of the first.
     pub fn part(&mut self) {
         self.part.get_or_insert_with(Instant::now);
     }
 
-    /// Returns whether the client is to be disconnected: the rest of a message is late, or the client has been silent for long and
-    /// another one waits.
+    /// Returns true if the client must be disconnected: a message has been incomplete for too long, or the client has
+    /// been silent for 5 s and another client waits. Does not block.
     pub fn is_over(&mut self) -> bool {
         self.part.is_some_and(|since| since.elapsed() > REST_OF_MESSAGE)
             || self.message.elapsed() > LONGEST_SILENCE && self.others.is_one_waiting()

@@ -15,7 +15,7 @@ pub fn arguments<T: Parser>() -> T {
     })
 }
 
-/// Parses the number of an option and checks its limits.
+/// Parses the number of an option, from `least` to `most`; `unit` is for the error message.
 ///
 /// # Errors
 /// A message: the text is no number, or the number is outside the limits.
@@ -31,7 +31,7 @@ pub fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, Stri
 /// Writes a line to standard output and flushes, with control characters escaped.
 pub fn say(line: &str) {
     let mut out = std::io::stdout().lock();
-    // Without a reader the write fails; the device goes on.
+    // Without a reader the write fails; the emulator continues.
     let _ = writeln!(out, "{}", escaped(line)).and_then(|()| out.flush());
 }
 

@@ -1,8 +1,9 @@
-//! Lookup of the user at the other end of a connection within this machine, by the kernel (`sock_diag`, `inet_diag`).
+//! Lookup of the user ID that owns the other end of a local TCP connection, by a netlink query (`sock_diag`,
+//! `inet_diag`).
 //!
 //! ```text
-//! question  header 16 bytes | family u8, protocol u8, 2 x 0 | states u32 | socket 48 bytes
-//! answer    header 16 bytes | family u8, state u8, 2 x u8   | socket 48 bytes | expires, rqueue, wqueue, user, inode: u32
+//! request   header 16 bytes | family u8, protocol u8, 2 x 0 | states u32 | socket 48 bytes
+//! reply     header 16 bytes | family u8, state u8, 2 x u8   | socket 48 bytes | expires, rqueue, wqueue, user, inode: u32
 //! socket    source port, destination port: u16 big-endian | source, destination: 16 bytes | interface u32 | cookie u64
 //! ```
 
@@ -18,7 +19,7 @@ const REQUEST: u16 = 1;
 const TCP: u8 = 6;
 const IPV4: u8 = 2;
 const IPV6: u8 = 10;
-/// Length of a request.
+/// Length of a request, bytes.
 const QUESTION_BYTES: u32 = 72;
 /// Offsets of type, user and inode in a reply, and of the code in an error.
 const TYPE_AT: usize = 4;
@@ -26,10 +27,10 @@ const ERROR_AT: usize = 16;
 const USER_AT: usize = 80;
 const INODE_AT: usize = 84;
 
-/// Returns the user of the process at the other end of a connection from this machine. Not real-time.
+/// Returns the user ID that owns the other end of a TCP connection within this machine. Not real-time.
 ///
 /// # Errors
-/// Errors of the system; `NotFound` if no process of this machine has the other end open any more.
+/// Errors of the system; `NotFound` if no process of this machine has the other end open.
 pub(crate) fn user(stream: &TcpStream) -> io::Result<Uid> {
     let question = question(stream.peer_addr()?, stream.local_addr()?);
     let kernel = socket(AddressFamily::NETLINK, SocketType::RAW, Some(SOCK_DIAG))?;

@@ -50,10 +50,11 @@ pub struct Port {
 }
 
 impl Port {
-    /// Binds a port and listens.
+    /// Binds the address `at` (`host:port`) and listens for connections within `reach`.
     ///
     /// # Errors
-    /// Errors of the system, or `InvalidInput` for an address beyond this machine without consent; both with the remedy.
+    /// Errors of the system, or `InvalidInput` for an address that other machines can reach without
+    /// [`Reach::AnyMachine`]; both with the remedy.
     pub fn bind(at: &str, reach: Reach) -> io::Result<Self> {
         let unusable = |error: io::Error| {
             let problem = format!("cannot listen at {at}: {error}; 127.0.0.1:0 selects any free port");
@@ -80,7 +81,8 @@ impl Port {
         self.listener.local_addr()
     }
 
-    /// Accepts the next connection within the reach of the port; closes others. The first refusal is reported.
+    /// Accepts the next connection within the reach of the port; closes other connections. The first rejection of the
+    /// process is reported on standard error.
     ///
     /// # Errors
     /// Errors of the system.

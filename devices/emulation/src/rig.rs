@@ -1,5 +1,5 @@
-//! Emulated rig of the vertical calibration: a stand that holds the handle and comes down step by step, and a force sensor on a
-//! pseudo terminal that answers `R` with `F` and the force on it in N.
+//! Emulated rig of the vertical calibration: a stand that holds the handle and comes down step by step, and a force
+//! sensor on a pseudo terminal that replies to `R` with `F` and the measured force in N.
 
 use crate::command_line::{link_to, within};
 use clap::Args;
@@ -93,7 +93,7 @@ impl Stand {
         from_mm * 1.0e-3
     }
 
-    /// Returns the motion as a script of a simulated hand, TOML.
+    /// Returns the motion as a TOML script for the simulated hand.
     #[must_use]
     pub fn script(&self) -> String {
         let (stop_s, repeat) = (self.stop_s, MOVEMENTS / (2 * (self.steps() + 1)));

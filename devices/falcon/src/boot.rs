@@ -1,18 +1,17 @@
 //! Handshake with the boot loader, which runs after each power-on (libnifalcon, `FalconFirmware`).
 //!
 //! ```text
-//! 9600 baud     host 0a 43 0d      device 0a 44 2c 0d, perhaps with 00 before it, perhaps only after many tries
+//! 9600 baud     host 0a 43 0d      device 0a 44 2c 0d, possibly preceded by 00, possibly only after many retries
 //! 140 kbaud     host 41            device 41
-//!               host firmware      device each byte again
+//!               host firmware      device echoes each byte
 //! 1.5 Mbaud     the firmware runs: a report for each command
-//! ```
 
 use crate::chip::{Chip, ChipLost, PACKET_BYTES, PAYLOAD_BYTES, Request, payload};
 use crate::protocol::{Command, Frames, Parsed, Report};
 use std::fmt;
 use std::time::{Duration, Instant};
 
-/// Baud rate divisors: 9600 baud for the prompt.
+/// Baud rate divisor for the prompt: 9600 baud.
 pub const PROMPT_DIVISOR: u16 = 0x4138;
 /// Baud rate divisor while the firmware loads: 3 MHz / 21.
 pub const LOAD_DIVISOR: u16 = 0x15;
@@ -47,16 +46,16 @@ const FIRST_REPORT: Duration = Duration::from_millis(1000);
 const QUIET: Duration = Duration::from_millis(20);
 const SETTLED: Duration = Duration::from_millis(500);
 
-/// Reason why a device could not be started.
+/// Error at the start of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BootFailure {
     /// The chip is gone.
     Lost,
-    /// A packet without its status: the chip is no FTDI, or the link is broken.
+    /// A packet without its two status bytes: the chip is no FTDI, or the link is broken.
     ShortPacket,
     /// No firmware runs, and the user named no file.
     NoFirmware,
-    /// The loader never answered.
+    /// The loader did not reply to the prompt.
     NoPrompt,
     /// The loader did not agree to receive a firmware: its reply, `None` on timeout.
     NotAgreed(Option<u8>),
@@ -172,10 +171,10 @@ impl<'c> Line<'c> {
     }
 }
 
-/// Starts a device up to its first report; loads the firmware unless it runs already. Not real-time.
+/// Starts a device and waits for its first report; loads the firmware unless it runs already. Not real-time.
 ///
 /// # Errors
-/// A [`BootFailure`], the one of the last attempt.
+/// The [`BootFailure`] of the last attempt.
 pub fn start(chip: &dyn Chip, firmware: Option<&[u8]>) -> Result<Report, BootFailure> {
     match run(chip) {
         Err(BootFailure::NoReport) => {}

@@ -3,18 +3,18 @@
 use flotor_hal::IndependentStop;
 use std::time::Duration;
 
-/// USB vendor of a Falcon.
+/// USB vendor ID of a Falcon.
 pub const VENDOR: u16 = 0x0403;
-/// USB product of a Falcon, assigned to Novint by FTDI.
+/// USB product ID of a Falcon, assigned to Novint by FTDI.
 pub const PRODUCT: u16 = 0xcb48;
-/// Largest packet of the chip's endpoints at full speed.
+/// Largest packet of the chip's endpoints at full speed, bytes.
 pub const PACKET_BYTES: usize = 64;
 /// Bytes of modem and line status at the head of each packet towards the host.
 pub const STATUS_BYTES: usize = 2;
-/// Bytes of data per packet.
+/// Largest number of data bytes per packet towards the host.
 pub const PAYLOAD_BYTES: usize = PACKET_BYTES - STATUS_BYTES;
 
-/// A request to the chip, by its number.
+/// Vendor request to the chip, with its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Value 0 resets the chip; 1, 2: clear the buffer towards the host, from the host.
@@ -31,17 +31,17 @@ pub enum Request {
     LatencyTimer = 9,
 }
 
-/// The chip is gone: unplugged, or its hub was reset.
+/// Error: the chip is gone (unplugged, or its hub was reset).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChipLost;
 
-/// A packet is shorter than its two status bytes.
+/// Error: a packet is shorter than its two status bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShortPacket;
 
 /// Connection to an FTDI chip; one thread may read while others write.
 pub trait Chip: Send + Sync + 'static {
-    /// Makes a request. Not real-time.
+    /// Sends a control request with its value. Not real-time.
     ///
     /// # Errors
     /// If the chip is gone.
@@ -53,21 +53,21 @@ pub trait Chip: Send + Sync + 'static {
     /// If the chip is gone.
     fn write(&self, bytes: &[u8]) -> Result<(), ChipLost>;
 
-    /// Waits for packets, at most for `patience`; returns the number of bytes of all packets, 64 each except the last. Not real-time:
-    /// waits for the bus.
+    /// Waits for packets until the timeout `patience`; returns the number of bytes of all packets, 64 each except the
+    /// last, or 0 on timeout. Not real-time: waits for the bus.
     ///
     /// # Errors
     /// If the chip is gone.
     fn read(&self, packets: &mut [u8], patience: Duration) -> Result<usize, ChipLost>;
 
-    /// Returns the stop by which a process without this plugin stops the device, with these bytes for the line. A chip on USB has none:
-    /// it takes bytes by calls that such a process cannot make.
+    /// Returns a stop that works without this plugin: a message that sends `_rest` on the serial line. A chip on USB
+    /// has no such stop, as it is reached only by system calls of this process.
     fn independent_stop(&self, _rest: &[u8]) -> IndependentStop {
         IndependentStop::none()
     }
 }
 
-/// Passes the received bytes on without the status bytes. Real-time: bounded, no allocation.
+/// Calls `each` with every received byte except the status bytes. Real-time: bounded, no allocation.
 ///
 /// # Errors
 /// If a packet is shorter than its status bytes.

@@ -3,16 +3,17 @@
 use crate::chip::{ChipLost, ShortPacket};
 use flotor_hal::Fault;
 
-/// Fault of a running device; after each the motors are set to rest, if the device still receives commands.
+/// Fault of a running device. After each fault the motors are set to zero torque, if the device still receives
+/// commands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DeviceError {
     /// The device was unplugged, or its hub was reset.
     Gone,
-    /// No report to any command: the chip sends its status bytes alone.
+    /// Timeout: no report to any command, the chip sends its status bytes alone.
     Silent,
     /// A packet without status bytes.
     ShortPacket,
-    /// A surplus report: all further ones would be late.
+    /// A surplus report: all later reports would be delayed.
     StaleReport,
     /// Malformed data on the serial line.
     Noise,
@@ -23,7 +24,7 @@ pub enum DeviceError {
 }
 
 impl DeviceError {
-    /// Returns the fault of the contract that the host receives.
+    /// Returns the corresponding fault of the device contract.
     #[must_use]
     pub const fn fault(self) -> Fault {
         match self {

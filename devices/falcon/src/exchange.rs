@@ -1,8 +1,8 @@
 //! Two threads between the tick and the chip: the reader always has a read pending, so that the chip never waits with a packet;
 //! the writer has one command in flight.
 //!
-//! The firmware answers each command with one report. A pending command is replaced by the next one. The device has no known
-//! watchdog: if no tick posts a command for [`COMMAND_LIFE`], the writer sets the motors to rest.
+//! The firmware replies to each command with one report. A pending command is replaced by the next one. The device has
+//! no known watchdog: if no tick posts a command for [`COMMAND_LIFE`], the writer sets the motors to zero torque.
 
 use crate::chip::{Chip, payload};
 use crate::device_error::DeviceError;
@@ -14,9 +14,9 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{JoinHandle, Thread};
 use std::time::{Duration, Instant};
 
-/// Validity of a command: without a newer one the motors are then set to rest.
+/// Watchdog timeout: after this time without a new command the motors are set to zero torque.
 pub const COMMAND_LIFE: Duration = Duration::from_millis(100);
-/// Report timeout, after which the next command is sent without a report.
+/// Report timeout, after which the next command is sent without waiting further.
 const REPLY_TIMEOUT: Duration = Duration::from_millis(20);
 /// Timeout of a report to the last command.
 const LAST_REPORT: Duration = Duration::from_millis(200);
@@ -45,7 +45,8 @@ struct Shared {
     slots: Mutex<Slots>,
     /// First fault.
     error: OnceLock<DeviceError>,
-    /// Requests the end of the threads; then: the last command is answered.
+    /// `is_over` requests the end of the threads; `is_done`: the writer has sent its last command, and its report has
+    /// arrived or timed out.
     is_over: AtomicBool,
     is_done: AtomicBool,
 }
@@ -77,7 +78,8 @@ pub struct Exchange {
 }
 
 impl Exchange {
-    /// Starts the threads. A device that is silent for `timeout` is a fault. Not real-time.
+    /// Starts the threads. No report to pending commands for `timeout` is a fault ([`DeviceError::Silent`]). Not
+    /// real-time.
     ///
     /// # Errors
     /// If a thread cannot be created.
@@ -94,10 +96,11 @@ impl Exchange {
         Ok(exchange)
     }
 
-    /// Returns the newest report since the last call. Real-time: bounded, no allocation, no wait.
+    /// Returns the newest report since the last call; `None` if no report has arrived, or a thread holds the lock.
+    /// Real-time: bounded, no allocation, no wait.
     ///
     /// # Errors
-    /// The first [`DeviceError`], from then on in each call.
+    /// The first [`DeviceError`], and the same error in every later call.
     pub fn take(&self) -> Result<Option<Report>, DeviceError> {
         match self.shared.error() {
             Some(error) => Err(error),
@@ -106,7 +109,8 @@ impl Exchange {
         }
     }
 
-    /// Posts a command for the writer; returns false if the lock is contended. Real-time: bounded, no allocation, no wait.
+    /// Posts a command for the writer, replacing a pending one; returns false if the lock is contended. Real-time:
+    /// bounded, no allocation, no wait.
     pub fn post(&self, command: Command) -> bool {
         let Ok(mut slots) = self.shared.slots.try_lock() else { return false };
         slots.command = Some(command);
@@ -117,7 +121,7 @@ impl Exchange {
         true
     }
 
-    /// Sets the motors to rest and ends the threads; returns the first fault. Not real-time.
+    /// Sets the motors to zero torque and ends the threads; returns the first fault. Not real-time.
     pub fn end(&mut self) -> Option<DeviceError> {
         self.shared.is_over.store(true, Ordering::Release);
         if let Some(writer) = self.writer.take() {
@@ -173,8 +177,8 @@ fn read(chip: &dyn Chip, shared: &Shared, writer: &Thread) {
     }
 }
 
-/// Sends commands until the exchange ends or a fault occurs; then sends rest and waits for a report, which the next session
-/// would otherwise receive as a stale one.
+/// Sends commands until the exchange ends or a fault occurs; then sends zero torque and waits for the outstanding
+/// report, which the next session would otherwise receive as a stale report.
 fn write(chip: &dyn Chip, shared: &Shared, switch: &ForceSwitch, timeout: Duration) {
     send_commands(chip, shared, switch, timeout);
     shared.lock().unanswered += 1;

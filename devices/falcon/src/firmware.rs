@@ -15,7 +15,8 @@ const KNOWN: [(&str, usize, &str); 2] =
 /// Minimum length of `firmware_sha256`, hex digits.
 const LEAST_DIGITS: usize = 16;
 
-/// Reads a firmware file and checks it: it must be known, or its SHA-256 must begin with `expected`. Not real-time.
+/// Reads a firmware file and checks its SHA-256: it must begin with the hex digits `expected` (at least 16), or,
+/// without `expected`, belong to a known firmware. Not real-time.
 ///
 /// # Errors
 /// One sentence with the cause and the remedy: the file cannot be read, is too large, or has another digest.
@@ -58,7 +59,7 @@ pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
     })
 }
 
-/// Returns the SHA-256 of bytes in hex. Not real-time.
+/// Returns the SHA-256 of bytes as lower-case hex digits. Not real-time.
 #[must_use]
 pub fn digest(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().fold(String::new(), |mut text, byte| {

@@ -1,4 +1,5 @@
-//! Kinematics of the delta linkage: three arms turn in planes 120° apart; each carries the handle's platform by a parallelogram.
+//! Kinematics of the delta linkage: three arms rotate in planes 120° apart; each carries the handle's platform by a
+//! parallelogram.
 //!
 //! In the frame of one arm (u outwards from its axis, v along its axis, w along the handle's axis), with the angle θ of the
 //! arm (Stamper 1997, and libnifalcon's numbers for the Falcon):
@@ -46,14 +47,14 @@ const SOLVED_RAD: f64 = 1.0e-12;
 const ACCEPTED_RAD: f64 = 1.0e-9;
 /// Limit on the steps of Newton's method: from the centre of the range four are enough anywhere.
 const STEPS: u32 = 20;
-/// Shortest lever of an arm, m: forces grow beyond bounds below.
+/// Smallest lever of an arm, m; with smaller levers the forces would be unbounded.
 const LEAST_LEVER_M: f64 = 1.0e-3;
 
-/// Posture of the linkage at three angles.
+/// Solved posture of the linkage: position of the handle, with its Jacobian.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posture {
     position_m: DVec3,
-    /// Derivative of the position by the angles, m/rad.
+    /// Jacobian of the position with respect to the angles, m/rad.
     jacobian: DMat3,
 }
 
@@ -113,7 +114,8 @@ pub fn inverse(position_m: DVec3) -> Option<DVec3> {
     Some(DVec3::from_array(angles))
 }
 
-/// Returns the residuals `g` of the three loop closures, their derivatives by the position (one row per arm) and by the angles.
+/// Returns the residuals `g` of the three loop-closure equations, their Jacobian with respect to the position (one row
+/// per arm), and their derivatives with respect to the arm angles.
 fn closure(position_m: DVec3, angles_rad: DVec3) -> (DVec3, [DVec3; 3], DVec3) {
     let (mut g, mut rows, mut h) = ([0.0; 3], [DVec3::ZERO; 3], [0.0; 3]);
     let arms = g.iter_mut().zip(&mut rows).zip(&mut h).zip(angles_rad.to_array()).enumerate();
@@ -132,8 +134,9 @@ fn closure(position_m: DVec3, angles_rad: DVec3) -> (DVec3, [DVec3; 3], DVec3) {
     (g.into(), rows, h.into())
 }
 
-/// Solves the posture for angles of the arms, rad, from a nearby position, m, usually the previous one. `None` where the
-/// linkage does not close, or has no lever. Real-time: bounded, no allocation.
+/// Solves for the posture at the arm angles, rad, by Newton's method with the initial guess `near_m`, m, usually the
+/// previous position. `None` if the linkage does not close, or is near a singularity. Real-time: bounded, no
+/// allocation.
 #[must_use]
 pub fn posture(angles_rad: DVec3, near_m: DVec3) -> Option<Posture> {
     let mut position_m = near_m;
@@ -168,13 +171,15 @@ impl Posture {
         self.position_m
     }
 
-    /// Returns the torques of the arms, N·m, that exert a force on the hand. Real-time: bounded, no allocation.
+    /// Returns the torques of the arms, N·m, that exert a force on the hand (N, maker's frame); positive torques act
+    /// towards larger angles. Real-time: bounded, no allocation.
     #[must_use]
     pub fn torques_nm(&self, force_n: DVec3) -> DVec3 {
         self.jacobian.transpose() * force_n
     }
 
-    /// Returns the force on the hand, N, that torques of the arms exert. Real-time: bounded, no allocation.
+    /// Returns the force on the hand, N, in the maker's frame, exerted by torques of the arms. Real-time: bounded, no
+    /// allocation.
     #[must_use]
     pub fn force_n(&self, torques_nm: DVec3) -> DVec3 {
         self.jacobian.transpose().inverse() * torques_nm

@@ -14,8 +14,7 @@
 //! - [`boot`]: the handshake with the boot loader, and the errors of a start.
 //! - [`firmware`]: the user's firmware file.
 //! - `usb`, `remote`: the chip on the bus, and an emulated one over TCP.
-//! - [`exchange`]: a thread that reads, and one that keeps one command in flight.
-//! - `plugin`: parameters and the contract.
+//! - [`exchange`]: a reader thread, and a writer thread that keeps one command in flight.
 
 pub mod boot;
 pub mod chip;

@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 /// Prefixes of an address.
 const USB: &str = "usb";
 const TCP: &str = "tcp:";
-/// Limit on the change of force, N/s: from zero to the default limit in a millisecond.
+/// Maximum slew rate of the force, N/s: from zero to the default limit in a millisecond.
 const SLEW_N_PER_S: f64 = 8000.0;
 /// Latency, s: a command and its report over full-speed USB, a frame of 1 ms each.
 const LATENCY_S: f64 = 2.0e-3;
@@ -93,7 +93,7 @@ struct Options {
     values: Vec<f64>,
 }
 
-/// Opened Falcon: its firmware runs, its motors are at rest.
+/// Opened Falcon: its firmware runs, the motors exert no torque.
 pub struct FalconDevice {
     options: Options,
     /// `None` after a fault: the next activation opens the chip again.
@@ -111,7 +111,7 @@ pub struct DrivenDevice {
     first: Option<Report>,
     state: DeviceState,
     velocity: VelocityFilter,
-    /// Last motor command as a force on the hand, and whether the words were clipped.
+    /// Last motor command as a force on the hand, N, and whether the words were clipped.
     force_n: DVec3,
     is_clipped: bool,
     /// Fault that removed the force.
@@ -383,7 +383,7 @@ impl ConnectionDevice for FalconDevice {
 }
 
 impl IndependentStopDevice for FalconDevice {
-    /// Returns the stop of the open connection; a device on USB has none.
+    /// Returns the independent stop of the open connection; a device on USB has none.
     fn independent_stop(&self) -> IndependentStop {
         let rest = Command::REST.bytes();
         self.chip.as_ref().map_or(IndependentStop::none(), |chip| chip.independent_stop(&rest))

@@ -46,7 +46,8 @@ pub enum Homing {
 /// Command to the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Command {
-    /// Motor words, a torque per arm.
+    /// Motor words, one torque per arm, at most [`MOST_WORD`] in magnitude; a positive word acts towards smaller
+    /// angles.
     pub motors: [i16; 3],
     /// Colour of the lamp.
     pub lamp: Lamp,
@@ -69,7 +70,7 @@ pub struct Report {
 pub const ALL_HOMED: u8 = 0b111;
 
 impl Command {
-    /// Command without torque.
+    /// Command of zero torque.
     pub const REST: Self = Self { motors: [0; 3], lamp: Lamp::Blue, homing: Homing::Done };
 
     /// Encodes the command. Real-time: bounded, no allocation.
@@ -103,7 +104,7 @@ impl Report {
         frame(self.encoders, buttons | (self.homed & ALL_HOMED) << 4, OFFSET)
     }
 
-    /// Decodes a report. Real-time: bounded, no allocation.
+    /// Decodes a report from a frame that [`Frames`] has checked. Real-time: bounded, no allocation.
     #[must_use]
     pub fn read(bytes: &[u8; FRAME_BYTES]) -> Self {
         let bits = bytes[INPUTS].wrapping_sub(OFFSET);
@@ -152,7 +153,7 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Parses the next byte. Real-time: bounded, no allocation.
+    /// Parses the next byte; resynchronises after malformed data. Real-time: bounded, no allocation.
     pub fn push(&mut self, byte: u8) -> Parsed {
         let fits = match self.length {
             0 => byte == START,
@@ -188,8 +189,8 @@ impl Frames {
     }
 }
 
-/// Rounds torques to motor words; scales all down together if one is too large, and none wraps round. Real-time: bounded, no
-/// allocation.
+/// Rounds torques, in units of the motor words, to words; scales all down by one factor if one exceeds [`MOST_WORD`];
+/// all zero if one is not finite. Real-time: bounded, no allocation.
 #[must_use]
 pub fn clipped_words(wanted: [f64; 3]) -> Clipped {
     let most = f64::from(MOST_WORD);

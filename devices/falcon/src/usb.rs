@@ -1,4 +1,4 @@
-//! FTDI chip on the USB bus, by libusb.
+//! FTDI chip on the USB bus, accessed with libusb.
 
 use crate::chip::{Chip, ChipLost, PRODUCT, Request, VENDOR};
 use crate::platform::{OTHER_REMEDY, access_remedy, has_bus};

@@ -37,7 +37,7 @@ pub(crate) struct Failed {
 }
 
 impl Failed {
-    /// Returns the fault of the contract while the loop runs.
+    /// Returns the corresponding fault of the device contract, for a failure while the loop runs.
     pub(crate) fn fault(&self) -> Fault {
         match self.code {
             COM | NO_DRIVER | NO_DEVICE => Fault::Disconnected,
@@ -46,7 +46,7 @@ impl Failed {
         }
     }
 
-    /// Returns the refusal before a run, with the remedy.
+    /// Returns the error for a failure before the loop runs, with the remedy.
     pub(crate) fn refusal(&self) -> Refusal {
         let remedy = match self.code {
             NO_DRIVER => {
@@ -64,14 +64,14 @@ impl Failed {
     }
 }
 
-/// Open device.
+/// Open device of the SDK; dropping it disables force, applies the brakes and closes the device.
 pub(crate) struct Dhd {
     functions: Box<Functions>,
     id: i8,
     wrist: Wrist,
 }
 
-/// Wrist of a device, in addition to the translations.
+/// Rotational axes of a device: none, sensed, or sensed and driven.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wrist {
     None,
@@ -160,7 +160,7 @@ impl Dhd {
         self.functions.is_initialized(self.id).unwrap_or(is_calibrated)
     }
 
-    /// Initialises the device by moving its arm, and ends the regulation. Not real-time: seconds.
+    /// Finds the reference position by moving the arm, then ends the SDK's position control. Not real-time: seconds.
     pub(crate) fn initialize(&self) -> Result<(), Refusal> {
         let Some(code) = without_signals(|| self.functions.auto_init(self.id)) else {
             return Err(Refusal::resource(
@@ -173,7 +173,8 @@ impl Dhd {
         stopped.map(drop).map_err(|failed| failed.refusal())
     }
 
-    /// Sets limits, velocity windows and watchdog, then enables force, at zero.
+    /// Sets gravity compensation, limits, velocity windows and watchdog, releases the brakes, enables force and sends
+    /// zero.
     pub(crate) fn energize(&self, setup: &Setup) -> Result<(), Failed> {
         let Self { functions, id, wrist } = self;
         let [most_n, most_nm] = setup.most;
@@ -237,7 +238,7 @@ impl Dhd {
         self.functions.buttons(self.id)
     }
 
-    /// Sends a wrench and waits for the exchange; returns whether the motors saturate.
+    /// Sends a wrench and waits for the exchange with the device; returns whether the motors saturate.
     pub(crate) fn send(&self, wrench: &Wrench) -> Result<Given, Failed> {
         const SATURATED: c_int = 2;
         let code = self.functions.set_wrench(to_dhd(wrench.force()), to_dhd(wrench.torque()), self.id);
@@ -279,7 +280,7 @@ pub(crate) enum Which {
     Serial(u16),
 }
 
-/// Saturation of the motors.
+/// Saturation of the motors: none, or at least one motor at its limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Given {
     All,

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Shortest cycle: the fastest device replies at 4 kHz, and a call that does not wait must not make the thread spin.
+/// Shortest cycle: the fastest device replies at 4 kHz, and calls that return at once must not cause a busy loop.
 const SHORTEST: Duration = Duration::from_micros(250);
 /// Interval of the check for disabled force, cycles.
 const STATUS_EVERY: u64 = 16;
@@ -40,7 +40,7 @@ impl Driver {
         }
     }
 
-    /// Ends the thread and returns the device, relaxed; `None` if the thread panicked. Not real-time.
+    /// Ends the thread and returns the device with force disabled; `None` if the thread panicked. Not real-time.
     pub(crate) fn end(&mut self) -> Option<Dhd> {
         self.exchange.end();
         self.thread.take()?.join().ok()

@@ -1,8 +1,8 @@
 //! Functions of DHD and DRD used by the plugin, as declared by their public interface (version 3.17): names, numbers and types
 //! only. All return `int`, 0 or a greater number for success and -1 for failure, unless the type says otherwise.
 //!
-//! Every call takes the id of a device as its last argument. Pointers lead to as many numbers as the call writes; each is a
-//! local of the function here that calls it, so that none outlives the call.
+//! Calls for a device take its id as the last argument. Pointers point to as many numbers as the call writes, locals of
+//! the wrapper functions below, so that no pointer outlives the call.
 #![allow(unsafe_code)] // calls into the SDK; listed in tests/tests/system/architecture.rs
 
 use flotor_vendor_sdk::{sdk_functions, static_text};
@@ -55,7 +55,7 @@ sdk_functions! {
     }
 }
 
-/// Velocity estimator with a window.
+/// Kind of the SDK's velocity estimator: with a window.
 const WINDOWING: c_int = 0;
 /// Buffer length for a status: 17 numbers in version 3.17, and a reserve for later versions.
 pub(crate) const STATUS: usize = 64;

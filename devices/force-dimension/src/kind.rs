@@ -1,9 +1,10 @@
 //! Ranges and limits of the devices, by the type number of the SDK.
 //!
-//! Compared with CHAI3D (`CDeltaDevices.cpp`, BSD): the numbers 31 to 37, 60 to 64 and 104 to 107, and the 12 N of an omega.3
-//! and 20 N of a delta.3. CHAI3D takes 31 for an early delta and gives a delta.6 (61, 62, 64) 0.2 N·m; both have less here. The
-//! other figures are meant to be the maker's (workspace, continuous force and torque) and were compared with no data sheet. A
-//! scene's `[limits]` bound them.
+//! Checked against CHAI3D (`CDeltaDevices.cpp`, BSD): type numbers 31 to 37, 60 to 64 and 104 to 107, 12 N of an
+//! omega.3 and 20 N of a delta.3. Deviations: CHAI3D treats type 31 as an early delta and allows 0.2 N·m for a delta.6
+//! (61, 62, 64); the limits here are lower for these types. All other figures (workspace, continuous force and torque)
+//! are believed to be the manufacturer's, but are not verified against data sheets; a scene's `[limits]` can lower the
+//! limits.
 
 use std::f64::consts::PI;
 

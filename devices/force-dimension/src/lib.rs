@@ -1,7 +1,7 @@
 //! Device plugin for Force Dimension's devices, over the SDK that the user has installed: no part of the SDK belongs to Flotor.
 //!
-//! The SDK's calls that set a force wait for the exchange with the device. A thread of the plugin therefore makes them, at up to
-//! 4 kHz, and the loop takes the newest sample:
+//! The SDK's calls that set a force wait for the exchange with the device. Therefore a thread of the plugin calls the
+//! SDK, at up to 4 kHz, and the loop takes the newest sample:
 //!
 //! ```text
 //! libdrd.so -> ffi -> Dhd -> Driver (thread) -> Exchange -> loop

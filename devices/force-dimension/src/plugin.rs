@@ -17,7 +17,7 @@ const INITIALISE: Choices = choices!["never", "automatic"];
 
 /// Highest exchange rate of the devices, Hz.
 const FASTEST_HZ: f64 = 4000.0;
-/// Unit of the watchdog, ms; it has eight bits.
+/// Unit of the watchdog timeout, ms; the timeout has eight bits.
 const WATCHDOG_UNIT_MS: f64 = 0.125;
 /// Resolution of the encoders at the handle, m: the coarsest of the family.
 const RESOLUTION_M: f64 = 3.0e-5;
@@ -51,7 +51,7 @@ const SCHEMA: &[Parameter] = &[
     PACE,
 ];
 
-/// Opened device of Force Dimension: identified, without force.
+/// Opened Force Dimension device: identified, without force.
 pub struct ForceDimensionDevice {
     /// `None` after a panic of the thread that owned the device.
     dhd: Option<Dhd>,
@@ -64,7 +64,7 @@ pub struct ForceDimensionDevice {
     values: Vec<f64>,
 }
 
-/// Active device, energised.
+/// Force Dimension device with force enabled: opened device, driver thread, and the loop's side of the exchange.
 pub struct EnergizedDevice {
     opened: ForceDimensionDevice,
     driver: Driver,
@@ -147,10 +147,10 @@ impl Device for ForceDimensionDevice {
             // Slew: from zero to the maximum in a millisecond, as the motors are driven directly.
             max_force_slew_n_per_s: force_n * 1.0e3,
             max_torque_slew_nm_per_s: if torque_nm > 0.0 { torque_nm * 1.0e3 } else { f64::INFINITY },
-            // The maker's figure is for the closed loop at 4 kHz, not for this one.
+            // The maker's figure holds for a control loop at 4 kHz, not for this loop.
             max_stiffness_n_per_m: 0.0,
             rate_hz: [100.0, FASTEST_HZ],
-            // A wrench waits for the next exchange, in which the sample after the wrench is read.
+            // A wrench is sent with the next exchange, which also reads the next sample: one period at 1 kHz.
             latency_s: 1.0 / 1000.0,
         }
     }
@@ -236,7 +236,7 @@ impl PacingDevice for EnergizedDevice {
 }
 
 impl IndependentStopDevice for ForceDimensionDevice {
-    /// Declares the device's own watchdog.
+    /// Declares the device's own watchdog, which removes the force.
     fn independent_stop(&self) -> IndependentStop {
         let within_ns = u64::from(self.setup.watchdog_units) * 125_000;
         IndependentStop::by_itself(StoppedState::Zero, within_ns)

@@ -4,8 +4,9 @@
 //! host: R  ->  sensor: F 1.234   (N, upwards positive)
 //! ```
 //!
-//! The device senses no pose and drives no axis; its measurement is the `delivered` force of its state. `flotor calibrate
-//! vertical` reads it, and a scene may include it as a further device, so that a recording contains the real force on a handle.
+//! The device senses no pose and drives no axis; its measurement is the `delivered` force of its state.
+//! `flotor calibrate vertical` reads the sensor, and a scene may include the sensor as a further device, so that a
+//! recording contains the measured force on a handle.
 //!
 //! - [`protocol`]: requests and replies as bytes.
 //! - [`mod@line`]: one request at a time over a serial port.

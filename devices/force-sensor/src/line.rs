@@ -5,12 +5,12 @@ use flotor_serial::Port;
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
-/// Speed of the line, baud: the default of microcontroller boards.
+/// Baud rate: the default of microcontroller boards.
 const BAUD: u32 = 115_200;
 /// Buffer size of one read, bytes: several replies.
 const CHUNK_BYTES: usize = 256;
 
-/// The port is closed, or the sensor is unplugged.
+/// Error: connection to the sensor lost (port closed or sensor unplugged).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LineLost;
 
@@ -19,13 +19,13 @@ pub struct LineLost;
 pub enum PollResult {
     /// No complete line yet.
     Nothing,
-    /// A force, N.
+    /// Measured vertical force, N, upwards positive.
     Force(f64),
     /// Malformed line; [`SensorLine::last`] returns it.
     Malformed,
 }
 
-/// Force sensor at the other end of a serial port.
+/// Connection to a force sensor behind a serial port.
 pub struct SensorLine {
     port: Port,
     lines: Lines,
@@ -34,7 +34,7 @@ pub struct SensorLine {
 }
 
 impl SensorLine {
-    /// Opens a port. Not real-time.
+    /// Opens a port and discards its pending input. Not real-time.
     ///
     /// # Errors
     /// One sentence with port, cause and remedy.
@@ -62,8 +62,8 @@ impl SensorLine {
         Ok(())
     }
 
-    /// Reads the received bytes and returns the result of the last complete line. Real-time: bounded, no allocation; two calls of the
-    /// system.
+    /// Reads the received bytes and returns the result of the last line that they complete; a completed line ends the
+    /// pending request. Real-time: bounded, no allocation; two calls of the system.
     ///
     /// # Errors
     /// If the sensor is gone.
@@ -90,7 +90,7 @@ impl SensorLine {
         Ok(polled)
     }
 
-    /// Returns the last line, complete or not.
+    /// Returns the text of the last line, complete or not, for errors. Not real-time.
     #[must_use]
     pub fn last(&self) -> String {
         String::from_utf8_lossy(self.lines.last()).into_owned()

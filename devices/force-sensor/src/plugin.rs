@@ -81,7 +81,8 @@ impl SimpleDevice for ForceSensor {
         Ok(Opened { device, capabilities, stop: NothingToStop })
     }
 
-    /// Reads the force on the sensor, N; fresh with each reading.
+    /// Reads the vertical force on the sensor, N: fresh with each new reading, a fault for a malformed line or after
+    /// the timeout.
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         let polled = self.line.poll().and_then(|polled| self.line.request().map(|()| polled));
         let cycle = match polled {

@@ -1,20 +1,22 @@
-//! Serial protocol of the sensor: lines of ASCII, simple enough for a terminal program and a twenty-line sketch on a microcontroller.
+//! Serial protocol of the sensor: lines of ASCII, simple enough for a terminal program and for a microcontroller sketch
+//! of twenty lines.
 //!
 //! | host | sensor | |
 //! |---|---|---|
 //! | `R` | `F 1.234` | read: the vertical force on the sensor, N, upwards positive |
 //! | anything else, or out of range | `E words` | cause of the error |
 //!
-//! Lines end in a line feed; a carriage return before it is ignored.
+//! Lines end in a line feed; a carriage return before the line feed is ignored.
 
 /// Request of a reading.
 pub const QUESTION: &[u8] = b"R\n";
-/// Longest line, bytes: a number of any precision, or a sentence.
+/// Limit on the length of a line, bytes: a number of any precision, or a sentence.
 pub const LONGEST_LINE_BYTES: usize = 200;
-/// Limit of plausible forces, N: more than any such sensor measures.
+/// Limit of plausible forces, N: above the range of such sensors.
 pub const PLAUSIBLE_N: f64 = 500.0;
 
-/// Parses the force of a reply, N; `None` for any other text. Real-time: bounded, no allocation.
+/// Parses the force of a reply, N, upwards positive; `None` for any other text, or beyond [`PLAUSIBLE_N`]. Real-time:
+/// bounded, no allocation.
 #[must_use]
 pub fn parse(answer: &[u8]) -> Option<f64> {
     let answer = std::str::from_utf8(answer).ok()?;

@@ -1,12 +1,13 @@
-//! Switch by which any thread removes the force of a device whose I/O runs on a thread of the plugin: wakes the I/O thread,
-//! which then commands zero force.
+//! Stop switch for devices whose I/O runs on a thread of the plugin: any thread can remove the force. The switch wakes
+//! the I/O thread, which then commands zero force.
 
 use flotor_hal::SafeStop;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::Thread;
 
-/// Force switch, usable from any thread; clones share the state.
+/// Stop switch for the force of a device, usable from any thread; clones share the state. [`SafeStop::safe_stop`] stops
+/// the force.
 #[derive(Clone, Debug, Default)]
 pub struct ForceSwitch {
     is_stopped: Arc<AtomicBool>,
@@ -14,18 +15,19 @@ pub struct ForceSwitch {
 }
 
 impl ForceSwitch {
-    /// Returns true while no force may be commanded. Real-time: bounded, no allocation.
+    /// Returns true from a stop until [`Self::rearm`]: the I/O thread must then command zero force. Real-time: bounded,
+    /// no allocation.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
         self.is_stopped.load(Ordering::Acquire)
     }
 
-    /// Permits force again. Real-time: bounded, no allocation.
+    /// Ends a stop: force is permitted again. Real-time: bounded, no allocation.
     pub fn rearm(&self) {
         self.is_stopped.store(false, Ordering::Release);
     }
 
-    /// Sets the thread to wake on a stop, replacing an earlier one. Not real-time.
+    /// Sets the I/O thread that a stop wakes, replacing an earlier one. Not real-time.
     pub fn wakes(&self, thread: Thread) {
         *self.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread);
     }

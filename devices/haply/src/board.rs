@@ -16,11 +16,11 @@ pub const REPLY_TIMEOUT: Duration = Duration::from_millis(20);
 /// Buffer size of one read, bytes: a few replies.
 const CHUNK_BYTES: usize = 64;
 
-/// The board is gone: unplugged, or its port is closed.
+/// Error: the board is gone (unplugged, or its port is closed).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LinkLost;
 
-/// Failure of the first request to a board.
+/// Error of the first request to a board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoAnswer {
     /// The board is gone.
@@ -79,7 +79,8 @@ impl Board {
         self.port.second()
     }
 
-    /// Configures the arms, without force, and waits for the first reply: returns the angles, °. Not real-time.
+    /// Resets the board, configures the arms, requests zero torque and waits for the first reply; returns the angles of
+    /// the arms, °. Not real-time.
     ///
     /// # Errors
     /// [`NoAnswer::Silent`] after `patience`, or [`NoAnswer::Lost`] if the board is gone.
@@ -102,8 +103,8 @@ impl Board {
         }
     }
 
-    /// Requests torques of the arms, N·m; drops the request while the last one is pending, because a newer one will follow.
-    /// Real-time: bounded, no allocation; one or two calls of the system.
+    /// Requests torques of the arms, N·m, and a reply with the angles; drops the request while the previous request is
+    /// pending, because a newer one will follow. Real-time: bounded, no allocation; one or two calls of the system.
     ///
     /// # Errors
     /// If the board is gone.
@@ -124,8 +125,8 @@ impl Board {
         Ok(())
     }
 
-    /// Returns the angles of the arms, °, of the newest received reply. Real-time: bounded, no allocation; two calls of the
-    /// system.
+    /// Returns the angles of the arms, °, of the newest received reply; `None` if no reply was completed. Real-time:
+    /// bounded, no allocation; two calls of the system.
     ///
     /// # Errors
     /// If the board is gone.
@@ -159,7 +160,7 @@ impl Board {
         self.silent_since.map_or(Duration::ZERO, |since| since.elapsed())
     }
 
-    /// Returns the number of requests without a reply, and of bytes that belong to no reply.
+    /// Returns the number of requests without a reply, and the number of received bytes that belong to no reply.
     #[must_use]
     pub fn losses(&self) -> (u64, u64) {
         (self.lost_answers, self.noise_bytes)

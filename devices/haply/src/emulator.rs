@@ -26,7 +26,7 @@ impl EmulatedBoard {
         self.handle_m = handle_m;
     }
 
-    /// Receives bytes and returns the replies; requests may be split.
+    /// Processes received bytes and returns the replies; requests may be split between calls.
     pub fn receive(&mut self, bytes: &[u8]) -> Vec<u8> {
         self.received.extend_from_slice(bytes);
         let mut said = Vec::new();
@@ -66,7 +66,7 @@ impl EmulatedBoard {
         self.arms.as_ref()
     }
 
-    /// Returns the force on the hand in the board's frame, N; `None` where the linkage has no posture.
+    /// Returns the force of the motors on the hand in the board's frame, N; `None` where the linkage has no posture.
     #[must_use]
     pub fn force_n(&self) -> Option<DVec2> {
         let posture = self.linkage.posture(self.linkage.angles_rad(self.handle_m)?)?;

@@ -9,14 +9,15 @@
 //! ```
 //!
 //! so `M dE = D dθ` with the rows `u`, `w` of `M` and `D = diag(u . A', w . B')`; and by virtual work the torques for a
-//! force `F` on the hand are `τ = D y` with `Mᵀ y = F`: `y` are the pulls of the outer arms over `L`.
+//! force `F` on the hand are `τ = D y` with `Mᵀ y = F`: `y` are the axial forces of the outer arms, positive in
+//! compression, divided by `L`.
 //!
 //! The frame is the board's: x to the left of the user, y towards the user, the motors at the far side.
 
 use flotor_hal::glam::{DMat2, DVec2};
 use flotor_hal::math;
 
-/// Lengths of the linkage, m.
+/// Five-bar linkage with its lengths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pantograph {
     /// Length of the inner arms, from motor to elbow, m.
@@ -27,7 +28,7 @@ pub struct Pantograph {
     pub base_m: f64,
 }
 
-/// Posture of the linkage at two angles.
+/// Solved posture of the linkage: position of the handle, with the matrices between torques and forces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Posture {
     handle_m: DVec2,
@@ -37,12 +38,12 @@ pub struct Posture {
     levers_m2: DVec2,
 }
 
-/// Smallest sine of the angle between the outer arms: below, forces along them grow beyond bounds.
+/// Smallest sine of the angle between the outer arms; with a smaller sine the forces along the arms would be unbounded.
 const LEAST_SINE: f64 = 0.05;
 
 impl Pantograph {
-    /// Solves the posture for angles of the arms, rad; `None` where the outer arms cannot meet, or lie in one line. Real-time:
-    /// bounded, no allocation.
+    /// Solves for the posture at the arm angles, rad; `None` where the outer arms cannot meet, or are nearly parallel.
+    /// Real-time: bounded, no allocation.
     #[must_use]
     pub fn posture(&self, angles_rad: [f64; 2]) -> Option<Posture> {
         let [first, second] = angles_rad.map(DVec2::from_angle);
@@ -84,14 +85,15 @@ impl Posture {
         self.handle_m
     }
 
-    /// Returns the torques of the motors, N·m, that exert a force on the hand. Real-time: bounded, no allocation.
+    /// Returns the torques of the motors, N·m, that exert a force on the hand (N, board's frame). Real-time: bounded,
+    /// no allocation.
     #[must_use]
     pub fn torques_nm(&self, force_n: DVec2) -> [f64; 2] {
         (self.levers_m2 * (self.pulls_per_m * force_n)).to_array()
     }
 
-    /// Returns the force on the hand, N, that torques of the motors exert; not finite where an arm has no lever. Not
-    /// real-time: for emulators.
+    /// Returns the force on the hand, N, in the board's frame, exerted by torques of the motors; not finite where an
+    /// arm has no lever. Not real-time: for emulators.
     #[must_use]
     pub fn force_n(&self, torques_nm: [f64; 2]) -> DVec2 {
         self.pulls_per_m.inverse() * (DVec2::from_array(torques_nm) / self.levers_m2)

@@ -94,7 +94,7 @@ pub struct HaplyDevice {
     timeout: Duration,
     /// Descriptor of the port of the stop.
     descriptor: i32,
-    /// Posture of the newest angles; `None` before the first activation.
+    /// Posture at the newest angles; `None` before the first activation.
     posture: Option<Posture>,
     /// True for a posture that was not read yet.
     is_fresh: bool,
@@ -103,12 +103,13 @@ pub struct HaplyDevice {
     force_n: DVec2,
 }
 
-/// Stop of the torques, usable from any thread, with a second handle of the port: the board holds the last torque indefinitely, so
-/// that zero must be sent even if the loop has stopped.
+/// Stop that sends zero torque through a second handle of the port, from any thread: the board holds the last torque
+/// indefinitely, so that zero must be sent even if the loop has stopped.
 pub struct TorqueStop(Mutex<Port>);
 
 impl SafeStop for TorqueStop {
-    /// Sends zero torque, also while a request is pending. Never waits: the holder of the lock is sending zero as well.
+    /// Sends zero torque, also while a request is pending. Does not wait for the lock: its holder is sending zero
+    /// torque as well.
     fn safe_stop(&self) {
         if let Ok(mut port) = self.0.try_lock() {
             let _ = port.write_all(&torques([0.0; 2]));

@@ -5,13 +5,13 @@
 //! answer   [device u8][f32 little-endian ...]                        to a request for torques only
 //! ```
 //!
-//! There is no length, no checksum and no mark between messages (hAPI, Haply Robotics 2018 and later: `Board`, `Device`). A
-//! lost byte shifts all later ones; a host therefore has one request in flight and discards a partial reply after a timeout
-//! ([`crate::board`]). Numbers are in the order of the ports, and motor 1 of the pantograph is on port 2.
+//! Messages have no length, no checksum and no delimiter (hAPI, Haply Robotics 2018 and later: `Board`, `Device`). A
+//! lost byte shifts all later bytes; a host therefore has one request in flight and discards a partial reply after a
+//! timeout ([`crate::board`]). Numbers are in the order of the ports, and motor 1 of the pantograph is on port 2.
 
-/// Number of the pantograph on its board, as in the maker's examples.
+/// Device number of the pantograph on its board, as in the maker's examples.
 pub const DEVICE: u8 = 5;
-/// Bytes of an answer: the number of the device and two angles.
+/// Bytes of a reply: the device number and two angles.
 pub const ANSWER_BYTES: usize = 1 + 2 * 4;
 /// Bytes of a request for torques.
 pub const TORQUES_BYTES: usize = 2 + 2 * 4;
@@ -36,7 +36,7 @@ pub enum Direction {
     Counterclockwise = 1,
 }
 
-/// Configuration of one arm.
+/// Configuration of one arm: directions, start angle and encoder resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arm {
     /// Direction of the motor for a positive torque.
@@ -102,7 +102,7 @@ impl Request {
     /// Parses the first request in a buffer; returns the request and its length, `None` while it is incomplete.
     ///
     /// # Errors
-    /// The number of bytes that belong to no request.
+    /// The number of bytes at the start of the buffer that belong to no request.
     pub fn parse(bytes: &[u8]) -> Result<Option<(Self, usize)>, usize> {
         let number = |at: usize| {
             let four = bytes.get(at..at + 4).and_then(|four| four.try_into().ok());

@@ -1,4 +1,4 @@
-//! Measures the time of a tick of the thread (message, reply, sample) on this machine's loopback.
+//! Measures the duration of one exchange of the plugin's thread (message, reply, sample) over the loopback interface.
 //!
 //! ```text
 //! $ cargo run --release -p flotor-inverse3 --example round_trip

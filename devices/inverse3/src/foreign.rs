@@ -8,7 +8,7 @@ use flotor_hal::DVec3;
 
 /// Length of the command history, messages: a service fades unrenewed commands within 0.1 s, 100 messages at 1 kHz.
 const MESSAGES: u32 = 200;
-/// Consecutive unexplained samples that are a fault: a single one may be noise.
+/// Number of consecutive unexplained samples that count as a fault; fewer may be noise.
 const SAMPLES: u32 = 3;
 
 /// Smallest and largest components of commands, and zero, N.
@@ -30,7 +30,7 @@ impl Extent {
     }
 }
 
-/// Detector of foreign force on a device.
+/// Detector of force that other programs command on the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForeignForce {
     tolerance_n: f64,
@@ -42,13 +42,15 @@ pub struct ForeignForce {
 }
 
 impl ForeignForce {
-    /// Creates a detector without commands. A component counts as foreign beyond the tolerance, N.
+    /// Creates a detector without commands; `tolerance_n` (N) is the largest deviation of a component from the range of
+    /// recent commands.
     #[must_use]
     pub fn new(tolerance_n: f64) -> Self {
         Self { tolerance_n, newest: Extent::NONE, older: Extent::NONE, messages: 0, unexplained: 0 }
     }
 
-    /// Records a command and returns whether the exerted force, N, includes a foreign one. Real-time: bounded, no allocation.
+    /// Records a command and the force exerted by the device, N; returns true if the last three exerted forces were
+    /// outside the range of recent commands. Real-time: bounded, no allocation.
     pub fn is_there(&mut self, commanded_n: DVec3, exerted_n: DVec3) -> bool {
         self.newest = self.newest.with(commanded_n);
         self.messages += 1;

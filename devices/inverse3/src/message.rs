@@ -1,4 +1,4 @@
-//! Messages to the service, and parsers of its messages.
+//! Encoders of messages to the service, and parsers of its messages.
 //!
 //! Names and shapes are those of the Inverse Service 3.5 (Haply Robotics, "WebSocket protocol" and "Control commands" of
 //! its documentation). A state contains all devices; only the selected arm and grip are read.
@@ -17,7 +17,7 @@ const BUTTONS: [&str; 3] = ["a", "b", "c"];
 const READY: [&str; 3] = ["calibrated", "power_supply", "ready"];
 /// Message without changes, answered with a state.
 pub const LOOK: &[u8] = b"{}";
-/// Smallest norm of a valid quaternion.
+/// Smallest norm of a quaternion that is accepted and normalised.
 const SHORTEST: f64 = 1.0e-3;
 
 /// Grip, identified by its list and its id.
@@ -64,7 +64,7 @@ pub struct Sample {
     pub is_commanded: bool,
 }
 
-/// Parses the devices of a message. Not real-time.
+/// Lists the devices in a message of the service, except devices with escape sequences in their ids. Not real-time.
 ///
 /// # Errors
 /// If the message is not JSON, or a list has another shape.
@@ -114,7 +114,7 @@ pub enum Presence {
     Optional,
 }
 
-/// Returns the required settings of the arm, with the gain of the force gate.
+/// Returns the required settings of the arm; `force_gate` is the gain of the force gate.
 #[must_use]
 pub fn settings(force_gate: f64) -> [Setting; 15] {
     use Presence::{Optional, Required};
@@ -159,7 +159,8 @@ pub fn configure(chosen: &Chosen, force_gate: f64) -> String {
     )
 }
 
-/// Returns path and value of the first setting that differs from its required value. Not real-time.
+/// Returns path and value of the first setting of the arm that differs from its required value; `None` if all agree.
+/// Not real-time.
 ///
 /// # Errors
 /// [`SessionError`] if the message is malformed or does not contain the arm.

@@ -18,7 +18,7 @@ const ADDRESS: &str = "127.0.0.1:10001";
 const NO_GRIP: &str = "none";
 /// Resolution of the cursor, m: the maker's figure.
 const RESOLUTION_M: f64 = 1.0e-5;
-/// Limit on the change of force, N/s: from zero to the default limit in a millisecond.
+/// Maximum slew rate of the force, N/s: from zero to the default limit in a millisecond.
 const SLEW_N_PER_S: f64 = 5000.0;
 /// Latency from a tick to its force, in addition to one period, s: to the service and to the device.
 const LATENCY_S: f64 = 1.0e-3;
@@ -103,7 +103,7 @@ impl Options {
         Ok(session)
     }
 
-    /// Returns a sample of the device without commands; waits for those of an earlier session to expire.
+    /// Waits until no earlier session commands the device, and returns a sample.
     fn idle(&self, session: &mut Session) -> Result<Sample, Refusal> {
         let started = Instant::now();
         loop {
@@ -268,7 +268,8 @@ impl DrivenDevice {
 }
 
 impl IndependentStopDevice for Inverse3Device {
-    /// Declares a stop by the service: the connection ends with the host's process, and the session and its force with the connection.
+    /// Declares a stop by the service: the connection ends with the host's process, and with the connection the service
+    /// removes the force.
     fn independent_stop(&self) -> IndependentStop {
         IndependentStop::by_itself(StoppedState::Zero, STOP_NS)
     }

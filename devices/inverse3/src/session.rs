@@ -21,11 +21,11 @@ pub struct Request {
     pub arm: Option<String>,
     /// Selection of the grip.
     pub grip: GripRequest,
-    /// Gain of the service's force gate.
+    /// Gain of the service's force gate, 0 to 1; 0: no force gate.
     pub force_gate: f64,
     /// Timeout of a reply of the service, after which it is at fault.
     pub timeout: Duration,
-    /// Tolerance of force beyond this session's own, N; more is a fault.
+    /// Largest deviation of the exerted force from recent commands of this session, N; a larger deviation is a fault.
     pub foreign_force_n: f64,
 }
 
@@ -105,7 +105,7 @@ impl Session {
     /// Commands a force on the hand, N, and waits for the sample of the reply. Real-time except for the wait: no allocation.
     ///
     /// # Errors
-    /// A [`SessionError`]; end the session then, which removes its force.
+    /// A [`SessionError`]; call [`Self::end`] then, which removes the force.
     pub fn exchange(&mut self, force_n: DVec3) -> Result<Sample, SessionError> {
         message::force(&mut self.message, &self.chosen.arm, force_n);
         self.socket.send(&self.message)?;

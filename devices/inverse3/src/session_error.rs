@@ -7,18 +7,18 @@ use std::fmt;
 /// Remedy for messages outside the documented interface.
 const UPDATE: &str = "update the service to 3.5 or newer";
 
-/// Fault of a session; after each the session and its force have ended.
+/// Fault of a session. After each fault the session has ended, and the service has removed its force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SessionError {
     /// The service closed the connection, or is gone.
     Gone,
-    /// Timeout: no state came.
+    /// Timeout without a state.
     Silent,
-    /// Timeout: a state is incomplete.
+    /// Timeout with an incomplete state.
     Unfinished,
     /// A message is longer than any state, bytes.
     TooLong(u64),
-    /// A malformed or fragmented WebSocket frame, or one with a client's mask.
+    /// A malformed, fragmented or masked WebSocket frame.
     NoFrame,
     /// A state is not JSON, or a field has another kind of value.
     NoState,
@@ -35,7 +35,7 @@ pub enum SessionError {
 }
 
 impl SessionError {
-    /// Returns the fault of the contract that the host receives.
+    /// Returns the corresponding fault of the device contract.
     #[must_use]
     pub const fn fault(self) -> Fault {
         match self {

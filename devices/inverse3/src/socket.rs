@@ -1,7 +1,7 @@
 //! WebSocket to the service: whole text messages in both directions, in buffers of fixed size.
 //!
-//! The frames are tungstenite's (RFC 6455). Tungstenite's own reader would first receive a message up to its size limit; here
-//! the header of a too long message suffices to refuse it.
+//! Frames are encoded with tungstenite (RFC 6455), but read here: tungstenite's reader would buffer an oversized
+//! message up to the size limit before rejecting the message; this reader rejects an oversized message by its header.
 
 use crate::session_error::SessionError;
 use std::io::{self, Cursor, ErrorKind, Read, Write};
@@ -21,7 +21,8 @@ const LONGEST_HEAD: usize = 8 << 10;
 /// Limit on a control frame, bytes (RFC 6455, section 5.5).
 const LONGEST_CONTROL: usize = 125;
 
-/// WebSocket connection with one pending message.
+/// WebSocket client connection; the last received message stays in the buffer until the next call of
+/// [`Socket::receive`].
 #[derive(Debug)]
 pub struct Socket {
     stream: TcpStream,
@@ -36,7 +37,8 @@ pub struct Socket {
 }
 
 impl Socket {
-    /// Connects and performs the WebSocket upgrade; `patience` limits each wait. Not real-time.
+    /// Connects and performs the WebSocket upgrade; `patience` is the timeout of the connection and of each read and
+    /// write. Not real-time.
     ///
     /// # Errors
     /// One clause with the error of the system or of the upgrade.
@@ -125,7 +127,8 @@ impl Socket {
     /// no allocation.
     ///
     /// # Errors
-    /// A [`SessionError`]: the connection is closed, silent, or sends malformed or fragmented messages.
+    /// A [`SessionError`]: the connection is closed, no message arrived until the timeout, or a message is oversized,
+    /// malformed or fragmented.
     pub fn receive(&mut self) -> Result<&[u8], SessionError> {
         let until = Instant::now() + self.patience;
         loop {

@@ -1,4 +1,4 @@
-//! Scripted service for tests: a callback decides each reply, and all messages are recorded. Not real-time.
+//! Scripted service for tests: a callback returns each reply, and all messages are recorded. Not real-time.
 //!
 //! `flotor emulate haply-service` is a correct service; this one simulates faulty ones.
 
@@ -79,7 +79,8 @@ pub struct StandIn {
 }
 
 impl StandIn {
-    /// Starts a service. `answer` receives the number of the message in its connection, 0 for the connection itself, and the message.
+    /// Starts a service. `answer` is called with the number of the message in its connection and the message; number 0
+    /// (empty message) requests the first message of the service.
     ///
     /// # Errors
     /// If there is no port, or no thread.
@@ -99,13 +100,13 @@ impl StandIn {
         Ok(Self { address, received, ended })
     }
 
-    /// Returns the number of ended connections, whose forces are gone.
+    /// Returns the number of closed connections.
     #[must_use]
     pub fn ended(&self) -> usize {
         self.ended.load(Ordering::Acquire)
     }
 
-    /// Returns all received messages.
+    /// Returns all received messages of all connections.
     #[must_use]
     pub fn received(&self) -> Vec<String> {
         self.received.lock().unwrap_or_else(PoisonError::into_inner).clone()

@@ -1,4 +1,5 @@
-//! Penetration of a push into the wall of the device: at rest, and upper bound on the way there.
+//! Penetration of the handle into the wall of the device under a constant push: at rest, and upper bound on the way
+//! there.
 //!
 //! `cargo run --release -p flotor-maglev --example penetration [PUSH_N]`
 
@@ -15,7 +16,7 @@ fn main() {
     table(push_n).iter().for_each(|line| println!("{line}"));
 }
 
-/// Computes the penetration of a push (N), by the delay of the loop.
+/// Returns a table of the penetration under a push, N: one line per delay of the loop.
 pub(crate) fn table(push_n: f64) -> Vec<String> {
     let margin_mm = (facts::RANGE_M - RADIUS_M) * 1.0e3;
     let head = [

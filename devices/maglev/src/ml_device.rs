@@ -1,4 +1,4 @@
-//! The device behind the ML API: opened over TCP, taken off by its own controller, driven by force commands.
+//! The device with the ML API: opened over TCP, lifted by its own controller, driven by force commands.
 
 use crate::facts;
 use crate::ml_api::{Event, FaultBits, Status, WirePose, angles};
@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 
 /// Latency from a tick to the resulting force, beyond one period, s: a round trip on a dedicated network.
 const LATENCY_S: f64 = 1.0e-3;
-/// Divisor of the period: time that a command may wait for its confirmation.
+/// Divisor of the period that gives the timeout for the confirmation of a command.
 const CONFIRMATION_SHARE: u32 = 2;
 /// Timeout of a lockstep tick: a delayed emulator is not a fault.
 const LOCKSTEP_PATIENCE: Duration = Duration::from_secs(10);
@@ -43,7 +43,7 @@ pub(crate) struct MlActive {
     timeout: Duration,
     budget: Duration,
     smoothing_s: f64,
-    /// The newest tick, until [`read`](Self::read) takes it.
+    /// Pose of the newest tick not yet returned by [`read`](Self::read).
     pending: Option<WirePose>,
     newest: WirePose,
     state: DeviceState,
@@ -160,7 +160,7 @@ impl MlDevice {
         }))
     }
 
-    /// Takes off; reopens a session that was lost since (unplugged, plugged in again).
+    /// Takes off; first reopens a lost session (cable unplugged and plugged in again).
     fn take_off(&mut self, options: &Options, plan: &Plan) -> Result<TakenOff, Refusal> {
         let address = &*options.address;
         self.stop.rearm();

@@ -1,4 +1,4 @@
-//! The device behind Flotor's own protocol: armed and taken off by activation, on any transport.
+//! The device with Flotor's own protocol: activation arms the controller and lifts the flotor, on any transport.
 
 use crate::flight::Holder;
 use crate::host_link::{AcknowledgedStatus, HostLink, Unanswered};
@@ -119,8 +119,8 @@ impl OwnDevice {
         }
     }
 
-    /// Begins a session, homes the handle if configured, and weighs it; reopens a link that broke since (unplugged, plugged
-    /// in again).
+    /// Begins a session, homes and weighs the handle if configured; first reopens a lost link (cable unplugged and
+    /// plugged in again). Returns the last status and the weight, N.
     fn take_off(&mut self, config: &LoopConfig) -> Result<(Status, f64), Refusal> {
         let period_us = u32::try_from(config.period_ns / 1000).unwrap_or(u32::MAX);
         let watchdog_us = self.options.watchdog_us;
@@ -298,7 +298,7 @@ fn sample(status: &Status) -> Option<DeviceState> {
     })
 }
 
-/// Returns the fault in a status: every mode but [`Mode::Levitating`] is one.
+/// Returns the fault of a status; `None` in the mode [`Mode::Levitating`].
 fn fault(status: &Status) -> Option<Fault> {
     if status.mode == Mode::Levitating {
         return None;

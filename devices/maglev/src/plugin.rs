@@ -13,7 +13,7 @@ use flotor_hal::{
 };
 use std::sync::Arc;
 
-/// The magnetic-levitation device, opened: the controller has identified itself; its coils are off.
+/// The magnetic-levitation device, opened: the controller has identified itself and is not commanded yet.
 pub struct MaglevDevice {
     options: Options,
     values: Values,
@@ -26,7 +26,7 @@ enum Opened {
     MlApi(Box<MlDevice>),
 }
 
-/// The levitating device.
+/// The magnetic-levitation device, active: the flotor levitates under the commands of the host.
 pub struct LevitatingDevice {
     options: Options,
     values: Values,
@@ -41,9 +41,9 @@ enum Active {
 
 /// Stop handle of the device, usable from any thread.
 pub enum Switch {
-    /// Switches the coils off at the next tick.
+    /// Switch-off of the coils at the next tick (Flotor's protocol).
     Coils(StopFlag),
-    /// Sends a Land frame at once.
+    /// Land frame, sent at once (ML API).
     Land(LandSwitch),
 }
 
@@ -196,7 +196,8 @@ impl LevitatingDevice {
         }
     }
 
-    /// Returns the number of ticks superseded before use; `None` with Flotor's protocol, which has no ticks.
+    /// Returns the number of ticks superseded by a newer tick before use; `None` with Flotor's protocol, which has no
+    /// ticks.
     #[must_use]
     pub fn dropped_ticks(&self) -> Option<u64> {
         match &self.active {

@@ -1,5 +1,6 @@
 //! Sequential reader that never needs the index at the end, so that a truncated file is no special case.
-//! No file can make the reader panic or allocate without bound: a length counts only as far as there are bytes.
+//! No file can make the reader panic or allocate without bound: lengths are checked against the available bytes and the
+//! limit of a record.
 
 use mcap::read::ChunkReader;
 use mcap::records::{MessageHeader, Record, op};
@@ -8,7 +9,8 @@ use mcap::{MAGIC, McapError};
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Length of the longest accepted record, bytes: a quarter of a second at 10 kHz is 2 MB, other tools' chunks are a few.
+/// Length of the longest accepted record, bytes: a quarter of a second at 10 kHz has 2 MB, a chunk of other tools a few
+/// MB.
 const LONGEST_RECORD_BYTES: usize = 32 << 20;
 
 /// Bytes requested from the file at a time.
@@ -42,7 +44,7 @@ pub enum Damage {
     /// The file is compressed; only uncompressed chunks are read.
     #[error("the file is compressed with `{0}`; make a readable copy with `mcap decompress`")]
     Compressed(String),
-    /// The records of a chunk do not fill it.
+    /// A chunk is not filled exactly by schemas, channels and messages.
     #[error("the records of a chunk are shorter than the chunk")]
     Chunk,
 }
@@ -77,20 +79,20 @@ pub struct ChannelInfo<'a> {
     pub schema: &'a str,
 }
 
-/// A message on a chosen channel.
+/// Message on a chosen channel.
 #[derive(Clone, Debug)]
 pub struct Message<T> {
-    /// Value of `choose` for the channel.
+    /// Value that `choose` returned for the channel.
     pub topic: T,
     /// Sequence number given by the writer.
     pub sequence: u32,
-    /// Time of the message, ns.
+    /// Log time of the message, ns.
     pub time_ns: u64,
-    /// The encoded message.
+    /// Message, in the encoding of the channel.
     pub data: Vec<u8>,
 }
 
-/// Reader of the messages of chosen channels.
+/// Reader of the messages of chosen channels, in the order of the file.
 pub struct MessageReader<R, T> {
     source: R,
     reader: LinearReader,
@@ -136,7 +138,7 @@ impl<R: Read + Seek, T: Copy> MessageReader<R, T> {
         &self.library
     }
 
-    /// Returns the completeness of the file, known from the start.
+    /// Returns the completeness of the file, determined by [`Self::open`].
     #[must_use]
     pub fn ending(&self) -> Ending {
         self.ending

@@ -1,7 +1,7 @@
 //! Functions of HDAPI used by the plugin, as declared by its public interface (version 3): names, numbers and types only.
 //! `hdGetError` pops the last error from a stack. Parameters are those of the current device of the process.
 //!
-//! Pointers lead to as many numbers as the parameter has; each is a local of the function here that calls it, so that none
+//! Pointers point to as many numbers as the parameter has, locals of the wrapper functions below, so that no pointer
 //! outlives the call.
 #![allow(unsafe_code)] // calls into the SDK; listed in tests/tests/system/architecture.rs
 
@@ -20,10 +20,10 @@ pub(crate) struct ErrorInfo {
 
 /// Client of the scheduler, which calls it once per tick.
 pub(crate) trait Client: Send + 'static {
-    /// Runs a tick; returns whether to be called again.
+    /// Runs a tick; returns true to be called again.
     fn step(&mut self) -> bool;
 
-    /// Reports a panic of [`Self::step`]; returns whether to be called again.
+    /// Handles a panic of [`Self::step`]; returns true to be called again.
     fn break_off(&mut self) -> bool;
 }
 
@@ -158,7 +158,7 @@ impl<C> Scheduled<C> {
         self.handle != 0xFFFF_FFFF && self.handle != c_ulong::MAX
     }
 
-    /// Frees a client that was unscheduled before the scheduler ended.
+    /// Frees a client; the caller has unscheduled it before the scheduler ended.
     pub(crate) fn free(self, _stopped: &Stopped) {
         // SAFETY: the box of `schedule`, taken back once: nobody calls it any more.
         drop(unsafe { Box::from_raw(self.data) });

@@ -57,7 +57,7 @@ fn fault(code: c_uint) -> Fault {
 }
 
 impl Failed {
-    /// Returns the refusal before a run, with the remedy.
+    /// Returns the error for a failure before the loop runs, with the remedy.
     pub(crate) fn refusal(&self) -> Refusal {
         let remedy = match self.code {
             0x0300 => {
@@ -75,7 +75,7 @@ impl Failed {
     }
 }
 
-/// Open device.
+/// Open device of the SDK; dropping it closes the device.
 pub(crate) struct Hd {
     functions: Functions,
     handle: c_uint,
@@ -158,7 +158,7 @@ impl Hd {
         })
     }
 
-    /// Returns the last error of this thread as a failure, if there is one.
+    /// Checks the error stack of this thread: pops the last error and returns it as a failure of `what`.
     pub(crate) fn check(&self, what: &'static str) -> Result<(), Failed> {
         match self.functions.take_error() {
             0 => Ok(()),
@@ -166,7 +166,7 @@ impl Hd {
         }
     }
 
-    /// Returns the last error of this thread as a failure, also for code 0.
+    /// Pops the last error of this thread and returns it as a failure of `what`, also for code 0.
     pub(crate) fn failure(&self, what: &'static str) -> Failed {
         let code = self.functions.take_error();
         Failed { code, words: self.functions.words(code), what }
@@ -186,7 +186,7 @@ impl Hd {
         format!("{} {}", self.functions.text(MODEL), self.functions.text(SERIAL))
     }
 
-    /// Checks the calibration, after an attempt to update it automatically. Not real-time.
+    /// Updates the calibration automatically if the device requests it, and checks the calibration. Not real-time.
     pub(crate) fn calibrate(&self) -> Result<(), Refusal> {
         self.functions.make_current(self.handle);
         if self.functions.check_calibration() == NEEDS_UPDATE {
@@ -211,8 +211,8 @@ impl Hd {
         )))
     }
 
-    /// Enables or disables the force of the device whose frame is open; on the thread of the scheduler. Errors stay on the stack,
-    /// which the end of the frame checks.
+    /// Enables or disables the force of the device with the open frame; on the thread of the scheduler. Errors stay on
+    /// the error stack, which is checked at the end of the frame.
     pub(crate) fn switch_here(&self, force: Force) {
         match force {
             Force::On => self.functions.enable(FORCE_OUTPUT),

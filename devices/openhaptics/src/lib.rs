@@ -1,4 +1,5 @@
-//! Device plugin for the Touch and Phantom family, over the OpenHaptics that the user has installed: no part of it belongs to Flotor.
+//! Device plugin for the Touch and Phantom family, over the OpenHaptics that the user has installed: no part of
+//! OpenHaptics belongs to Flotor.
 //!
 //! The SDK sets the rate: its scheduler calls the plugin once a millisecond, and the loop takes the newest sample, without
 //! delay if the scene has `pacing = "device"`:

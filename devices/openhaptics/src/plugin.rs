@@ -32,7 +32,7 @@ const SCHEMA: &[Parameter] = &[
     PACE,
 ];
 
-/// Opened device of the family: identified, without force.
+/// Opened Touch or Phantom: identified and calibrated, without force.
 pub struct TouchDevice {
     hd: Arc<Hd>,
     exchange: Arc<Exchange>,
@@ -42,7 +42,7 @@ pub struct TouchDevice {
     values: Vec<f64>,
 }
 
-/// Active device, driven by the scheduler of the SDK.
+/// Active Touch or Phantom, called by the scheduler of the SDK.
 pub struct ScheduledDevice {
     opened: TouchDevice,
     driver: Driver,

@@ -1,7 +1,8 @@
-//! Scheduler of the SDK, shared by all devices of a process, and its callback, which runs once per tick.
+//! Scheduler of the SDK, shared by all devices of a process, and its callback, which runs once per tick of the
+//! scheduler.
 //!
-//! The current device of the SDK is a state of the process, and a frame sets it. Force is therefore switched within a frame, on
-//! the thread of the scheduler: no other device can intervene.
+//! The SDK has one current device per process, which a frame sets. Force is therefore enabled and disabled within a
+//! frame, on the thread of the scheduler: no other device can intervene.
 
 use crate::ffi::{Client, Scheduled, Stopped};
 use crate::hd::{Failed, Force, Hd};

@@ -1,6 +1,6 @@
 //! Non-blocking serial port, shared by device plugins.
 //!
-//! - [`Port`]: a port that never blocks, on any system.
+//! - [`Port`]: a non-blocking port, on every system.
 //! - [`NotOpened`]: error of opening a port, with its remedy.
 //! - [`PORT_HELP`], [`PORT_EXAMPLE`]: help and example of a plugin's parameter `port`.
 
@@ -15,8 +15,9 @@ pub const PORT_HELP: &str = platform::PORT_HELP;
 /// Example of a parameter `port`.
 pub const PORT_EXAMPLE: &str = platform::PORT_EXAMPLE;
 
-/// A non-blocking serial port: a read without data and a write without room return [`io::ErrorKind::WouldBlock`] or
-/// [`io::ErrorKind::TimedOut`]. The shortest timeout of Windows is a millisecond: a write without room takes that long there.
+/// A non-blocking serial port: a read without data and a write to a full buffer return [`io::ErrorKind::WouldBlock`] or
+/// [`io::ErrorKind::TimedOut`]. On Windows the shortest timeout is 1 ms, and a write to a full buffer blocks for that
+/// time.
 #[derive(Debug)]
 pub struct Port(platform::System);
 
@@ -55,7 +56,7 @@ impl fmt::Display for NotOpened {
 impl std::error::Error for NotOpened {}
 
 impl Port {
-    /// Opens the port at a path of the system (`/dev/ttyACM0`, `COM3`) at a speed in baud. Not real-time.
+    /// Opens the port with the system's path or name (`/dev/ttyACM0`, `COM3`) at the rate `baud`. Not real-time.
     ///
     /// # Errors
     /// [`NotOpened`], with the cause and the remedy.
@@ -72,13 +73,13 @@ impl Port {
         Ok(Self(self.0.try_clone_native()?))
     }
 
-    /// Sets the line DTR, if the port has one, to show the other end that a program is connected. Not real-time.
+    /// Sets the modem line DTR, if the port has one, to signal that a program is connected. Not real-time.
     pub fn announce(&mut self) {
         // A port without modem lines (a pseudo terminal) returns an error, and works.
         let _ = self.0.write_data_terminal_ready(true);
     }
 
-    /// Returns the number of bytes received and not yet read. Real-time: bounded, no allocation; one call of the system.
+    /// Returns the number of bytes received and not yet read. Real-time: bounded, no allocation; one system call.
     ///
     /// # Errors
     /// If the port is gone.
@@ -86,7 +87,7 @@ impl Port {
         Ok(usize::try_from(self.0.bytes_to_read()?).unwrap_or(usize::MAX))
     }
 
-    /// Discards the bytes received and not yet read. Real-time: bounded, no allocation; one call of the system.
+    /// Discards the bytes received and not yet read. Real-time: bounded, no allocation; one system call.
     ///
     /// # Errors
     /// If the port is gone.
@@ -94,7 +95,8 @@ impl Port {
         Ok(self.0.clear(ClearBuffer::Input)?)
     }
 
-    /// Returns the descriptor of the port, or the lower half of its handle, as the contract defines.
+    /// Returns the file descriptor of the port, on Windows the lower 32 bits of its handle, for the declaration of an
+    /// independent stop in the plugin contract.
     #[must_use]
     pub fn descriptor(&self) -> i32 {
         platform::descriptor(&self.0)
@@ -117,7 +119,8 @@ impl Write for Port {
     }
 }
 
-/// Converts a write of zero bytes to `WouldBlock`: Windows returns it for a timeout, and `write_all` takes it for a closed port.
+/// Converts a write of zero bytes to `WouldBlock`: Windows writes zero bytes on a timeout, and `write_all` would conclude
+/// that the port is closed.
 fn taken(written: io::Result<usize>) -> io::Result<usize> {
     match written {
         Ok(0) => Err(io::ErrorKind::WouldBlock.into()),

@@ -1,7 +1,7 @@
-//! Conversion of the commanded wrench to the delivered one: coils, amplifiers, field, heat.
+//! Conversion of the commanded wrench to the delivered wrench: coils, amplifiers, field, heat.
 //!
-//! The flotor is driven by six flat coils in the field of magnets on the frame (Lorentz levitation). Each
-//! pushes along one line, in proportion to its current:
+//! The flotor is driven by six flat coils in the field of magnets on the frame (Lorentz levitation). Each coil exerts a
+//! force along one line, in proportion to its current:
 //!
 //! ```text
 //! commanded wrench -> currents -> limit -> amplifiers -> wrench of the currents -> uneven field -> delivered
@@ -11,12 +11,12 @@
 //! - [`thermal`]: temperatures of the coils, and thermal faults.
 //! - [`field`]: error of the vertical force over the height.
 //!
-//! **Limit.** A coil carries 3.5 A at most. Where a wrench needs more, *all six* currents are scaled alike: a spring at its
-//! limit is then softer, but pulls in the right direction. Clipping each coil separately would give a little more force in
-//! another direction, and couple the axes of a loop that was stable in each.
+//! **Limit.** A coil carries 3.5 A at most. If a wrench needs more, *all six* currents are scaled by one factor: a
+//! spring at its limit is then softer, but its force keeps its direction. Clipping each coil separately would give a
+//! little more force, in a wrong direction, and would couple axes that are each stable alone.
 //!
-//! **Amplifiers** follow their command with a first-order lag. The plant takes a constant wrench for a tick, so each coil
-//! gets its mean current over the tick: the momentum of the flotor is exact.
+//! **Amplifiers** follow their command with a first-order lag. The plant takes a constant wrench for a tick, so each
+//! coil gets its mean current over the tick: the momentum of the flotor is exact.
 
 pub mod coils;
 pub mod field;
@@ -30,7 +30,7 @@ use field::FieldError;
 use flotor_hal::Fault;
 use thermal::{Thermal, ThermalParameters};
 
-/// Parameters of the actuation.
+/// Parameters of coils, amplifiers and field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuationParameters {
     /// Placement of the coils.
@@ -54,16 +54,16 @@ impl ActuationParameters {
     };
 }
 
-/// State of the wiring: whether every coil conducts.
+/// Wiring of the coils: intact, or with one open circuit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wiring {
     /// All coils conduct.
     Intact,
-    /// This coil (0 to 5) does not conduct.
+    /// The coil of this index (0 to 5, ring A first) does not conduct.
     Open(usize),
 }
 
-/// Coils and amplifiers in operation.
+/// Amplifiers, coils and field of a running device: currents, temperatures, saturation.
 #[derive(Clone, Debug)]
 pub struct Actuation {
     coils: Coils,
@@ -93,8 +93,8 @@ impl Actuation {
         })
     }
 
-    /// Returns the mean wrench on the flotor over the next `dt_s` (s) for a constant `commanded` (finite) wrench, at a
-    /// height of `z_m` above home.
+    /// Advances currents and temperatures by `dt_s` (s) under a constant `commanded` (finite) wrench; returns the mean
+    /// wrench on the flotor over that time, at a height of `z_m` above home.
     ///
     /// Real-time: bounded, no allocation.
     pub fn drive(&mut self, commanded: &Wrench, wiring: Wiring, z_m: f64, dt_s: f64) -> Wrench {
@@ -124,13 +124,13 @@ impl Actuation {
         delivered
     }
 
-    /// Returns the fault of the coils, if any. Real-time: bounded, no allocation.
+    /// Returns the thermal fault of the coils; `None` within the limits. Real-time: bounded, no allocation.
     #[must_use]
     pub fn fault(&self) -> Option<Fault> {
         self.thermal.fault()
     }
 
-    /// Returns the temperatures and the load of the coils. Real-time: bounded, no allocation.
+    /// Returns the thermal state of the coils. Real-time: bounded, no allocation.
     #[must_use]
     pub fn thermal(&self) -> &Thermal {
         &self.thermal

@@ -1,8 +1,8 @@
 //! Injected faults: failures of a real machine, at a set time or at random.
 //!
-//! Code that drives a device should survive these faults. One kind of fault is chosen per run; it occurs in *episodes*, one
-//! at a set time, or any number at random with a set rate, each of a set length. The random times come from the run's seed:
-//! equal runs have equal faults.
+//! A host should survive these faults. One kind of fault is chosen per run; it occurs in *episodes* of a set length:
+//! one episode at a set time, or random episodes at a set mean rate. The random times come from the run's seed: runs
+//! with equal seeds have equal faults.
 
 use crate::noise::{Noise, Stream};
 use crate::validation::{Domain, InvalidParameter, number};
@@ -19,11 +19,11 @@ pub enum FaultKind {
     DuplicateSample,
     /// No sample arrives; the old one is repeated, marked as old.
     DroppedSample,
-    /// One coordinate (0 to 5: x, y, z and the rotations) is stuck at its value.
+    /// One coordinate (0 to 5: x, y, z and the rotations) keeps its value at the start of the fault.
     StuckAxis(usize),
-    /// One coil (0 to 5) does not conduct.
+    /// The coil of this index (0 to 5) does not conduct.
     CoilOpen(usize),
-    /// The device reports a coil that is too hot.
+    /// The device reports over-temperature of a coil.
     OverTemperature,
     /// The cable is unplugged: no sample, no force.
     CablePull,
@@ -54,16 +54,17 @@ pub struct Faults {
 }
 
 impl Faults {
-    /// Starts the schedule of a run. Real-time: bounded, no allocation.
+    /// Creates the schedule of a run. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If the plan contains a number that is not physical.
+    /// If `rate_per_s` is negative or not finite.
     pub fn new(plan: Option<FaultPlan>, seed: u64) -> Result<Self, InvalidParameter> {
         number("fault_rate_per_s", plan.map_or(0.0, |plan| plan.rate_per_s), Domain::NotNegative)?;
         Ok(Self { plan, noise: Noise::new(seed, Stream::Faults), until_ns: 0 })
     }
 
-    /// Returns the fault at `time_ns`, `dt_s` (s) after the last call. Real-time: bounded, no allocation.
+    /// Returns the fault at `time_ns`, `dt_s` (s) after the previous call; `None` outside episodes. Real-time: bounded,
+    /// no allocation.
     pub fn at(&mut self, time_ns: u64, dt_s: f64) -> Option<FaultKind> {
         let FaultPlan { kind, start_ns, duration_ns, rate_per_s } = self.plan?;
         let active = if rate_per_s > 0.0 {
@@ -79,8 +80,8 @@ impl Faults {
         active.then_some(kind)
     }
 
-    /// Returns a random early sampling time under clock jitter, as a fraction (0 to 1/2) of the period. Real-time: bounded,
-    /// no allocation.
+    /// Draws the time by which a sample is early under clock jitter, as a fraction (0 to 1/2) of the period. Real-time:
+    /// bounded, no allocation.
     pub fn jitter(&mut self) -> f64 {
         0.5 * self.noise.uniform()
     }

@@ -1,6 +1,6 @@
 //! The simulated hand: a spring and a damper between the handle and its intended position.
 //!
-//! A person does not prescribe the position of the handle: they intend a motion, and the handle follows as far as the
+//! A person does not prescribe the position of the handle, but intends a motion, and the handle follows as far as the
 //! object allows. The usual model (for instance van Beek et al. 2015) is an impedance
 //!
 //! ```text
@@ -35,12 +35,12 @@ pub use unsteadiness::Unsteadiness;
 use crate::validation::InvalidParameter;
 pub(crate) use unsteadiness::Wavering;
 
-/// A hand: impedance, intended motion and unsteadiness.
+/// Simulated hand: impedance, intended motion and unsteadiness.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hand {
     /// Mechanical impedance at the handle.
     pub impedance: Impedance,
-    /// Intended motion, and the times of the grip.
+    /// Intended motion, and the times at which the hand holds the handle.
     pub trajectory: Trajectory,
     /// Tremor and noise of force.
     pub unsteadiness: Unsteadiness,
@@ -61,10 +61,10 @@ impl Hand {
         unsteadiness: Unsteadiness::NONE,
     };
 
-    /// Rejects numbers that are not physical. Real-time: bounded, no allocation.
+    /// Checks all parameters. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a parameter is not finite, negative, or no rotation; the error contains its name.
+    /// If a parameter is not finite, out of its range, or no rotation; the error contains its name.
     pub fn check(&self) -> Result<(), InvalidParameter> {
         self.impedance.check()?;
         self.trajectory.check()?;

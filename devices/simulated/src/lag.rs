@@ -1,12 +1,13 @@
-//! First-order lags: exponential decay of a difference.
+//! First-order lags: exponential approach to a constant input.
 
 use flotor_hal::math;
 
-/// First-order lag: an amplifier, a warming coil, a low-pass.
+/// First-order lag, for example of an amplifier, a warming coil or a low-pass filter.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Lag {
     lag_s: f64,
-    /// Last time step, s, with its closed fraction: ticks are mostly of equal length.
+    /// Last time step, s, and the fraction of the step response reached in it, cached: ticks are mostly of equal
+    /// length.
     dt_s: f64,
     closed: f64,
 }
@@ -17,12 +18,14 @@ impl Lag {
         Self { lag_s, dt_s: 0.0, closed: 0.0 }
     }
 
-    /// Creates a low-pass with the corner at `bandwidth_hz` (Hz, above zero). Real-time: bounded, no allocation.
+    /// Creates a low-pass filter with the corner frequency `bandwidth_hz` (Hz, above zero). Real-time: bounded, no
+    /// allocation.
     pub(crate) fn of_bandwidth(bandwidth_hz: f64) -> Self {
         Self::new(1.0 / (std::f64::consts::TAU * bandwidth_hz))
     }
 
-    /// Returns the closed fraction of a gap after `dt_s` (s), `1 - e^(-dt / lag)`, without cancellation for short times.
+    /// Returns the fraction of the step response reached after `dt_s` (s), `1 - e^(-dt / lag)`, without cancellation
+    /// for short times.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -33,7 +36,8 @@ impl Lag {
         self.closed
     }
 
-    /// Returns the mean open fraction of a gap during `dt_s` (s). Real-time: bounded, no allocation.
+    /// Returns the mean remaining difference from the input during `dt_s` (s), as a fraction of the initial difference.
+    /// Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn mean_open(&mut self, dt_s: f64) -> f64 {
         if dt_s > 0.0 { self.lag_s / dt_s * self.closed(dt_s) } else { 1.0 }

@@ -7,9 +7,9 @@
 //! ```
 //!
 //! Each of the six terms is computed independently: kinetic and potential energy from the state, the four works as
-//! integrals of force times velocity along the motion (see `plant::step`). None is the remainder of the others, so an
-//! imbalance is a real error of the integration, not of the accounting. The host compares it with the peak of the
-//! mechanical energy; this detects any closed loop that gains energy without a source.
+//! integrals of force times velocity along the motion (see `plant::step`). No term is the remainder of the others, so
+//! an imbalance is an error of the integration, not of the bookkeeping. The host compares the imbalance with the peak
+//! of the mechanical energy, and so detects every closed loop that gains energy without a source.
 
 use std::ops::AddAssign;
 
@@ -45,7 +45,8 @@ pub struct Work {
 }
 
 impl Work {
-    /// Returns the work that changes the mechanical energy, J. Real-time: bounded, no allocation.
+    /// Returns the sum of all works on the mechanical energy, J: dissipated energy counts negative. Real-time: bounded,
+    /// no allocation.
     #[must_use]
     pub fn net_j(&self) -> f64 {
         self.coils_j + self.feed_forward_j + self.hand_j - self.dissipated_j
@@ -71,7 +72,7 @@ impl AddAssign for Work {
     }
 }
 
-/// Running energy balance since the start of a run.
+/// Running energy balance since the start of a run, or since the flotor was last stopped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ledger {
     start: MechanicalEnergy,
@@ -81,7 +82,7 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// Opens the energy balance of a flotor with the given energy. Real-time: bounded, no allocation.
+    /// Creates an energy balance that starts at the given mechanical energy. Real-time: bounded, no allocation.
     #[must_use]
     pub fn open(start: MechanicalEnergy) -> Self {
         Self { start, now: start, work: Work::default(), peak_j: start.total_j().abs() }
@@ -107,7 +108,7 @@ impl Ledger {
         self.now
     }
 
-    /// Returns the work since the start. Real-time: bounded, no allocation.
+    /// Returns the works since the start of the balance. Real-time: bounded, no allocation.
     #[must_use]
     pub fn work(&self) -> Work {
         self.work

@@ -1,10 +1,11 @@
 //! A simulated magnetic-levitation flotor, held by a simulated hand: everything runs without hardware.
 //!
-//! The plugin steps a [`Simulation`](simulation::Simulation) of flotor and hand by the scheduled length of each
-//! tick: the wrench written in one tick acts, constant, until the next (zero-order hold), as coils do.
+//! The plugin advances a [`Simulation`](simulation::Simulation) of flotor and hand by the scheduled length of each
+//! tick: the wrench written in one tick acts, constant, until the next write (zero-order hold), as with real coils.
 //!
-//! Preset `plain` is only that. Preset `full` adds the machine: the wrench passes through amplifiers, coils and an uneven
-//! field, the pose comes from light spots on noisy cells, delayed and quantised, and faults are injected on request.
+//! Preset `plain` simulates flotor and hand alone. Preset `full` adds actuators and sensors: the wrench passes through
+//! amplifiers, coils and an uneven field; the pose is computed from light spots on noisy position cells, quantised and
+//! delayed; faults are injected on request.
 //!
 //! - [`plant`]: the flotor, a rigid body with six degrees of freedom.
 //! - [`hand`]: impedance and intended motion of the hand.

@@ -1,8 +1,8 @@
-//! Preset `full`: the machine between the controller and the simulated flotor.
+//! Preset `full`: actuators, sensors and faults between the controller and the simulated flotor.
 //!
-//! One cycle: the wrench of the last write passes through amplifiers, coils and field and moves the flotor for the time of
-//! the tick; the cells take a sample, and the sample whose latency has elapsed is returned. Faults act at their place in
-//! the real machine. The flotor continues to move, whatever is reported to the controller.
+//! One cycle: the last commanded wrench passes through amplifiers, coils and field and moves the flotor for the time of
+//! the tick; the cells take a sample, and the sample whose latency has elapsed is returned. Each fault acts where it
+//! would in the real machine. The flotor continues to move, whatever is reported to the controller.
 
 use crate::actuation::coils::Coils;
 use crate::actuation::{Actuation, ActuationParameters, Wiring};
@@ -17,23 +17,24 @@ use flotor_hal::{
     Conditions, Cycle, DeviceState, Fault, Tick, Twist, orientation_from_rotation_vector, rotation_vector,
 };
 
-/// Parameters of a machine.
+/// Parameters of the simulated actuators and sensors of a maglev device, with an optional injected fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MachineParameters {
     /// Amplifiers, coils, field, heat.
     pub actuation: ActuationParameters,
-    /// Light spots, cells, pose finder, velocity.
+    /// Light spots, cells, pose solver, velocity estimator.
     pub sensing: SensingParameters,
     /// Injected fault, if any.
     pub fault: Option<FaultPlan>,
 }
 
 impl MachineParameters {
-    /// The published machine, without a fault.
+    /// The commercial device without a fault: published values, and estimates where none are published.
     pub const MAGLEV: Self =
         Self { actuation: ActuationParameters::MAGLEV, sensing: SensingParameters::MAGLEV, fault: None };
 
-    /// Returns the largest force and torque along one axis alone, N and N·m. Real-time: bounded, no allocation.
+    /// Returns the largest force along each axis, N, and torque about each axis, N·m, with all other components zero.
+    /// Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// If the coils cannot push in all six directions.
@@ -42,21 +43,22 @@ impl MachineParameters {
     }
 }
 
-/// A machine in operation.
+/// Actuators, sensors and fault schedule of a running device.
 #[derive(Clone, Debug)]
 pub struct Machine {
     actuation: Actuation,
     sensing: Sensing,
     faults: Faults,
-    /// Value of the stuck coordinate, m or rad.
+    /// Value of the stuck coordinate, m or rad; `None` while no axis is stuck.
     stuck_at: Option<f64>,
 }
 
 impl Machine {
-    /// Creates a cold machine with the flotor in the state `start`. Real-time: bounded, no allocation.
+    /// Creates a machine with coils at ambient temperature and the flotor in the state `start`. Real-time: bounded, no
+    /// allocation.
     ///
     /// # Errors
-    /// If a number is not physical, the coils are linearly dependent, or the diodes stand in a line.
+    /// If a parameter is not physical, the coils are linearly dependent, or the diodes stand in a line.
     pub fn new(parameters: &MachineParameters, start: &State, seed: u64) -> Result<Self, InvalidParameter> {
         let pose = Pose { position_m: start.position_m, orientation: start.orientation };
         Ok(Self {
@@ -67,8 +69,9 @@ impl Machine {
         })
     }
 
-    /// Moves the flotor for the time of `tick` under the `commanded` wrench (finite) and stores a sample in `state`.
-    /// Real-time: bounded, no allocation.
+    /// Advances the simulation by `tick` under the `commanded` wrench (finite), and writes the sample that arrives to
+    /// `state`. Returns `Fresh`, `Stale` (an injected fault) or the fault; without a valid pose, pose, twist and
+    /// sampling time in `state` stay as they are. Real-time: bounded, no allocation.
     pub fn cycle(
         &mut self,
         simulation: &mut Simulation,
@@ -141,7 +144,7 @@ impl Machine {
         before.stopped || after.stopped
     }
 
-    /// Sets one coordinate of a pose to its value when it got stuck.
+    /// Replaces one coordinate of a pose by its value at the start of the fault.
     fn hold(&mut self, axis: usize, pose: &mut Pose) {
         let mut rotation_rad = rotation_vector(pose.orientation);
         let coordinate = match axis {
@@ -158,7 +161,7 @@ impl Machine {
         }
     }
 
-    /// Returns amplifiers and coils. Real-time: bounded, no allocation.
+    /// Returns the state of amplifiers and coils. Real-time: bounded, no allocation.
     #[must_use]
     pub fn actuation(&self) -> &Actuation {
         &self.actuation

@@ -1,14 +1,14 @@
-//! Seeded randomness: the same seed gives the same noise on every machine.
+//! Seeded pseudorandom numbers: the same seed gives the same noise on every machine.
 //!
-//! The generator is PCG (O'Neill 2014), named and fixed so that an update of a library cannot change a run. Every source of
-//! noise has its own stream: switching one on or off does not change the others.
+//! The generator is PCG (O'Neill 2014), fixed here so that an update of a library cannot change a run. Every source of
+//! noise has its own stream: switching a source on or off does not change the others.
 
 use flotor_hal::math;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
 
-/// Stream of random numbers, one per source of noise.
+/// Source of noise; each has its own stream of random numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stream {
     /// Noise of the position cells.
@@ -19,7 +19,7 @@ pub(crate) enum Stream {
     Hand = 3,
 }
 
-/// A stream of random numbers.
+/// Generator of one stream of random numbers.
 #[derive(Clone, Debug)]
 pub(crate) struct Noise {
     generator: Pcg64Mcg,
@@ -33,14 +33,14 @@ impl Noise {
         Self { generator: Pcg64Mcg::seed_from_u64(mixed) }
     }
 
-    /// Returns a uniform number from 0 (included) to 1 (excluded). Real-time: bounded, no allocation.
+    /// Draws a sample of the uniform distribution from 0 (included) to 1 (excluded). Real-time: bounded, no allocation.
     pub(crate) fn uniform(&mut self) -> f64 {
         /// 2^-53: the 53 highest bits fill the mantissa.
         const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.generator.next_u64() >> 11) as f64 * STEP
     }
 
-    /// Returns two independent normal numbers, mean 0 and deviation 1 (Box and Muller 1958).
+    /// Draws two independent samples of the standard normal distribution (Box and Muller 1958).
     ///
     /// Real-time: bounded, no allocation.
     pub(crate) fn normal_pair(&mut self) -> [f64; 2] {

@@ -19,7 +19,7 @@ use std::path::Path;
 /// Prefix of the documentation of parameters used only by preset `full`.
 const OF_FULL: &str = "Full:";
 
-/// Rejects a parameter without effect: one of the machine under preset `plain`.
+/// Rejects parameters of preset `full` under preset `plain`, where they have no effect.
 ///
 /// # Errors
 /// If such a parameter is set; the error contains its name and the preset that uses it.
@@ -78,8 +78,8 @@ fn flotor(settings: &Settings<'_>) -> FlotorParameters {
     flotor
 }
 
-/// Returns the impedance of the configured grip, else of the script's grip, else of a firm one; single numbers override the
-/// grip.
+/// Returns the impedance of the hand: the configured grip, else the grip of the script, else the firm grip; stiffness,
+/// damping and mass override those of the grip if set.
 fn impedance(settings: &Settings<'_>, trajectory: &Trajectory) -> Impedance {
     let of_script = match trajectory {
         Trajectory::Scripted(script) => script.grip(),
@@ -135,7 +135,8 @@ fn three(settings: &Settings<'_>, ids: [&str; 3], base: DVec3, scale: f64) -> DV
     DVec3::new(x.unwrap_or(base.x), y.unwrap_or(base.y), z.unwrap_or(base.z))
 }
 
-/// Returns the effective value of the parameter at `index` of the schema, in the units of the schema.
+/// Returns the effective value of the parameter at `index` of the schema, in the units of the schema; NaN for an index
+/// out of range.
 pub(crate) fn in_force(setup: &Setup, settings: &[f64], index: usize) -> f64 {
     let Some(parameter) = SCHEMA.get(index) else { return f64::NAN };
     let FlotorParameters { mass_kg, inertia_kg_m2, centre_of_mass_m, gravity_m_per_s2, drag, .. } =

@@ -1,10 +1,11 @@
 //! The flotor as a rigid body with six degrees of freedom.
 //!
-//! The moving part of the device is a bowl with a handle that hangs in a magnetic field: one rigid body, no friction, no
-//! transmission. Four loads act on it: the coils' wrench and eddy-current drag, both at the origin of the flotor frame (the
-//! centre of the bowl); gravity and its compensation, at the centre of mass; and the hand, at the origin, the place of the
-//! handle. With `y` the position of the centre of mass,
-//! `x = y - R c` that of the origin and `w` the angular velocity in the flotor frame:
+//! The moving part of the device is a bowl with a handle that floats in a magnetic field: one rigid body, no friction,
+//! no transmission. Four loads act on it: the coils' wrench and eddy-current drag, both at the origin of the flotor
+//! frame (the centre of the bowl); gravity and its compensation, at the centre of mass; and the hand, at the origin,
+//! the place of the handle. Let `y` be the position of the centre of mass, `c` its position in the flotor frame,
+//! `x = y - R c` the position of the origin, `q` the orientation (as a matrix: `R`), `w` the angular velocity in the
+//! flotor frame, `b` and `d` the drag coefficients and `f` the compensation force; `h` marks the hand:
 //!
 //! ```text
 //! m y'' = F_coils - b x' + F_hand + (f - m g) z          F_hand = F_h + K (x_h - x) + B (x_h' - x')
@@ -12,11 +13,12 @@
 //! q' = q w / 2
 //! ```
 //!
-//! **Time.** A coil wrench is constant from one tick to the next, so during a step the translation is a linear oscillator
-//! under constant or linearly growing force, and `plant::translation` solves it exactly. The rotation is nonlinear and
-//! integrated by a Runge-Kutta method of order six. With the centre of mass off the origin the two are coupled, and
-//! `plant::step` integrates the coupling in the Runge-Kutta method and the oscillator exactly (an integrating factor):
-//! sixth order in general, exact to rounding when nothing rotates or the centre of mass is at the origin.
+//! **Time.** A coil wrench is constant from one tick to the next, so during a step the translation is a linear
+//! oscillator under a constant or linearly growing force, and `plant::translation` solves it exactly. The rotation is
+//! nonlinear and integrated by a Runge-Kutta method of order six. With the centre of mass off the origin, translation
+//! and rotation are coupled, and `plant::step` integrates the coupling with the Runge-Kutta method and the oscillator
+//! exactly (an integrating factor): the translation is of order six in general, and exact to rounding if nothing
+//! rotates or the centre of mass is at the origin.
 //!
 //! **A hand with mass** moves rigidly with the handle: the plant then integrates flotor and hand as one body, with the hand
 //! a point mass at the origin whose weight the person carries. The reported state is always that of the flotor.
@@ -47,20 +49,20 @@ use flotor_hal::glam::BVec3;
 use motion::Motion;
 use scheme::Scheme;
 
-/// Placeholder without a hand (the impedance is zero then).
+/// Placeholder for the intention if there is no hand (its impedance is zero then).
 const NO_INTENTION: Intention = Intention::resting(Pose::HOME);
 
-/// Result of a piece of motion.
+/// Result of [`Plant::advance`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outcome {
-    /// Regular motion, with the work done.
+    /// The flotor moved, and this work was done on it.
     Moved(Work),
     /// The motion exceeded the physical limits (for example with a wrench of 1e30 N): the flotor was stopped at its last
     /// pose.
     Stopped,
 }
 
-/// The flotor, free or held by a hand, in motion.
+/// Integrator of the flotor, free or held by a hand, with its state of motion.
 #[derive(Clone, Debug)]
 pub struct Plant {
     motion: Motion,
@@ -93,7 +95,8 @@ impl Plant {
         Self::yielding(flotor, impedance, &[BVec3::FALSE], state, nominal_ns)
     }
 
-    /// Creates a flotor for a hand that at times yields along a set of axes, else like [`Self::new`]. Not real-time.
+    /// Creates a flotor as [`Self::new`] does, for a hand that may have no stiffness along one of the sets of axes
+    /// `yieldings`. Not real-time.
     ///
     /// # Errors
     /// Errors of [`Self::new`].
@@ -136,8 +139,9 @@ impl Plant {
         self.free.body().energy(&self.motion)
     }
 
-    /// Advances by `piece_ns` (clamped to [`MAX_PIECE_NS`]) under a constant finite `coils` wrench, held by a hand whose
-    /// intention starts as given and moves at its velocity, or free.
+    /// Advances by `piece_ns` (clamped to [`MAX_PIECE_NS`]) under a constant finite `coils` wrench; `hand` is the
+    /// intention at the start, whose position moves at its velocity; `None`: the flotor is free. The hand has no
+    /// impedance if its set of yielding axes was not given at creation.
     ///
     /// Splitting a piece into smaller ones gives the same motion: to rounding in translation, to the error of the
     /// Runge-Kutta method (order 6) in rotation.

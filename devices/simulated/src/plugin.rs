@@ -18,10 +18,10 @@ use flotor_hal::{
 };
 use std::time::Duration;
 
-/// The opened simulated flotor: parameters are checked, nothing moves.
+/// Opened device: the parameters are checked, the simulation has not started.
 pub struct SimulatedFlotor {
     setup: Setup,
-    /// Machine between controller and flotor; `None` with preset `plain`.
+    /// Actuators and sensors between controller and flotor; `None` with preset `plain`.
     machine: Option<MachineParameters>,
     /// Values of all parameters, set or default, in the order of the schema.
     values: Vec<f64>,
@@ -30,7 +30,7 @@ pub struct SimulatedFlotor {
     stop: StopFlag,
 }
 
-/// The running simulated flotor.
+/// Active device: the simulation, with the last commanded wrench.
 pub struct RunningFlotor {
     simulation: Simulation,
     machine: Option<Box<Machine>>,
@@ -45,9 +45,9 @@ pub struct RunningFlotor {
     height_m: f64,
 }
 
-/// Fastest change of force, N/s: full scale in a millisecond. An estimate; no figure is published.
+/// Maximum slew rate of the force, N/s: full scale in a millisecond. An estimate; no value is published.
 const FORCE_SLEW_N_PER_S: f64 = 55.0e3;
-/// Fastest change of torque, N·m/s: full scale in a millisecond. An estimate; no figure is published.
+/// Maximum slew rate of the torque, N·m/s: full scale in a millisecond. An estimate; no value is published.
 const TORQUE_SLEW_NM_PER_S: f64 = 6.3e3;
 /// Period of the device's own controller, s: a loop at its nominal rate.
 const NOMINAL_PERIOD_S: f64 = 1.0e-3;
@@ -137,8 +137,8 @@ impl Device for SimulatedFlotor {
 }
 
 impl SimulatedFlotor {
-    /// Returns the largest stiffness that is stable with this latency, with the damping of the boundary mode in both
-    /// directions, and at most the published one.
+    /// Returns the largest stable stiffness with this latency and the damping of the boundary mode in both directions,
+    /// at most the published stiffness.
     fn largest_stiffness_n_per_m(&self, latency_s: f64) -> f64 {
         let sampled = SampledLoop { period_s: NOMINAL_PERIOD_S, latency_s };
         let drag_ns_per_m = self.setup.flotor.drag.translational_ns_per_m;
@@ -253,7 +253,7 @@ impl EnergyLedgerDevice for RunningFlotor {
 }
 
 impl IndependentStopDevice for SimulatedFlotor {
-    /// Returns a stop without its own means: the device is part of the host's process and ends with it.
+    /// Returns a stop to zero force without delay: the simulation is part of the host's process and ends with it.
     fn independent_stop(&self) -> IndependentStop {
         IndependentStop::by_itself(StoppedState::Zero, 0)
     }

@@ -1,9 +1,9 @@
-//! Sampling at a fixed rate by the machine's clock, for a loop paced by the simulated flotor.
+//! Simulated sampling at a fixed rate of the system clock, for a loop paced by the simulated device.
 
 use flotor_hal::SampleWait;
 use std::time::{Duration, Instant};
 
-/// Clock with a sample every period from the first wait on.
+/// Clock with one sample per period, from the first wait on.
 pub(crate) struct SampleClock {
     period: Duration,
     started: Option<Instant>,
@@ -16,7 +16,8 @@ impl SampleClock {
         Self { period: Duration::from_nanos(period_ns.max(1)), started: None, reported: 0 }
     }
 
-    /// Sleeps until an unreported sample is available, or until `timeout`.
+    /// Sleeps until a sample is available that no earlier call has counted, or until `timeout`; returns the number of
+    /// such samples.
     pub(crate) fn wait(&mut self, timeout: Duration) -> SampleWait {
         let since = self.started.get_or_insert_with(Instant::now).elapsed();
         let next = Duration::from_nanos(self.nanoseconds(self.reported + 1));

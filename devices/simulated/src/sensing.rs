@@ -1,16 +1,13 @@
-//! Conversion of the true motion to the controller's sample: light spots, noise, steps, delay, velocity.
+//! Conversion of the true motion to the controller's sample: light spots, noise, quantisation, velocity, delay.
 //!
-//! Three light-emitting diodes on the flotor are imaged on three position cells of the frame. Two coordinates each make six
-//! numbers, from which the pose is found by iteration:
-//! ```text
-//! pose -> light spots -> bandwidth -> edge nonlinearity -> noise -> steps -> pose found -> delay -> velocity
-//! ```
+//! Three light-emitting diodes on the flotor are imaged on three position cells of the frame. Each cell measures two
+//! coordinates; the pose is computed iteratively from all six:
 //!
 //! - [`optics`]: layout of the diodes, light spots of a pose, pose from six spot coordinates.
 //! - [`velocity`]: three estimators of velocity from a sequence of poses.
 //!
-//! The pose finder corrects none of the errors, like that of the real machine. Sizes of noise and steps are given at the
-//! diode; the lens scales them to the cell.
+//! The pose solver corrects none of these errors, like the solver of the real machine. Noise and quantisation step are
+//! given as displacements of the diode; the lens scales them to the cell.
 
 pub mod optics;
 pub mod velocity;
@@ -24,10 +21,10 @@ use flotor_hal::glam::DVec3;
 use optics::{Optics, OpticsGeometry, Spots};
 use velocity::{Estimator, EstimatorKind, Velocity};
 
-/// Number of stored samples: 32 ms at 10 kHz, the newest and one more for a late sample.
+/// Number of stored samples: 32 ms at 10 kHz, the newest sample, and one more for a late sample.
 const KEPT_SAMPLES: usize = 322;
 
-/// Parameters of the sensing.
+/// Parameters of optics, cells, converters, delay and velocity estimation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensingParameters {
     /// Layout of diodes, lenses and cells.
@@ -36,20 +33,21 @@ pub struct SensingParameters {
     pub noise_m: f64,
     /// Quantisation step of the converters, at the diode, m; 0 for none.
     pub step_m: f64,
-    /// Error of a cell at its edge, as a fraction of its half width; grows with the cube of the distance.
+    /// Position error of a cell at its edge, as a fraction of its half width; grows with the cube of the distance from
+    /// the centre.
     pub edge_nonlinearity: f64,
-    /// Bandwidth of cells and amplifiers, Hz; 0 for no limit.
+    /// Bandwidth of the cells with their amplifiers, Hz; 0 for no limit.
     pub bandwidth_hz: f64,
-    /// Time between a sample and its arrival, ns, at most 32 ms at 10 kHz.
+    /// Time between a sample and its arrival, ns; at most 320 ticks (32 ms at 10 kHz).
     pub latency_ns: u64,
     /// Velocity estimator.
     pub estimator: EstimatorKind,
 }
 
 impl SensingParameters {
-    /// The commercial device: steps of 2 µm (brochure); noise of 1 µm, edge error of 1 % and one tick of delay are usual
-    /// for lateral-effect cells and a bus, not published. Velocity as in the University of Utah's control program: a
-    /// low-pass of 200 Hz.
+    /// The commercial device: quantisation of 2 µm (brochure); noise of 1 µm, edge error of 1 % and one tick of delay
+    /// are usual for lateral-effect cells and a bus, not published. Velocity as in the University of Utah's control
+    /// program: a low-pass filter of 200 Hz.
     pub const MAGLEV: Self = Self {
         geometry: OpticsGeometry::MAGLEV,
         noise_m: 1.0e-6,
@@ -72,22 +70,22 @@ impl SensingParameters {
 /// Sample that arrives at the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Sampling time, ns.
+    /// Sampling time, ns since the start of the run.
     pub taken_ns: u64,
-    /// Pose; `None` if a spot left its cell or the iteration failed.
+    /// Estimated pose; `None` if a spot was outside its cell or the iteration failed.
     pub pose: Option<Pose>,
     /// Estimated velocity.
     pub velocity: Velocity,
 }
 
-/// Cells, converters and pose finder in operation.
+/// Sensor model of a running device: cells, converters, pose solver, velocity estimator, delay.
 #[derive(Clone, Debug)]
 pub struct Sensing {
     parameters: SensingParameters,
     optics: Optics,
     noise: Noise,
     estimator: Estimator,
-    /// Last pose found, the start of the next iteration.
+    /// Last estimated pose, the initial guess of the next solve.
     found: Pose,
     bandwidth: Option<Lag>,
     /// Spots after the bandwidth limit; `None` before the first sample.
@@ -98,10 +96,11 @@ pub struct Sensing {
 }
 
 impl Sensing {
-    /// Creates the sensing before its first sample; the iteration starts at `start`. Real-time: bounded, no allocation.
+    /// Creates the sensors; `start` is the initial guess of the pose solver, and at rest the value of all samples
+    /// before the first. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a number is not physical or the diodes do not determine the pose (they stand in a line).
+    /// If a parameter is not physical or the diodes do not determine the pose (they stand in a line).
     pub fn new(parameters: &SensingParameters, seed: u64, start: &Pose) -> Result<Self, InvalidParameter> {
         parameters.check()?;
         let empty = Sample { taken_ns: 0, pose: Some(*start), velocity: Velocity::ZERO };
@@ -135,8 +134,8 @@ impl Sensing {
         }
     }
 
-    /// Returns the delay of a sample in ticks of `dt_ns`, and the time of sampling before the end of its tick (ns):
-    /// together the latency. Real-time: bounded, no allocation.
+    /// Splits the latency into whole ticks of `dt_ns` and the remainder, ns: the time between sampling and the end of
+    /// the tick. Real-time: bounded, no allocation.
     #[must_use]
     pub fn latency(&self, dt_ns: u64) -> (usize, u64) {
         let (whole, rest_ns) = match dt_ns {
@@ -146,7 +145,8 @@ impl Sensing {
         (usize::try_from(whole).unwrap_or(usize::MAX), rest_ns)
     }
 
-    /// Returns the sample `age` ticks before the newest, or the oldest stored. Real-time: bounded, no allocation.
+    /// Returns the sample `age` ticks before the newest, at most the oldest stored sample. Real-time: bounded, no
+    /// allocation.
     #[must_use]
     pub fn arrived(&self, age: usize) -> Sample {
         let length = self.samples.len();
@@ -159,7 +159,8 @@ impl Sensing {
         })
     }
 
-    /// Returns true for noise of at least a converter step, which changes every sample. Real-time: bounded, no allocation.
+    /// Returns true if the noise is at least one quantisation step, so that almost every sample differs. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn is_noisy(&self) -> bool {
         let SensingParameters { noise_m, step_m, .. } = self.parameters;

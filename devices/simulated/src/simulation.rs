@@ -1,9 +1,10 @@
 //! Flotor, hand and energy balance on one clock.
 //!
-//! The clock counts integer nanoseconds, so a run can be interrupted at any of them and continues bit-identically. The
-//! hand's intention is a smooth curve sampled once a millisecond and interpolated linearly, on a grid of the clock instead
-//! of the servo: the hand is the same for ticks of any length, regular or not. Each tick is split at the grid and at the
-//! moment the hand releases the handle; within a piece the plant is exact (see `plant`).
+//! The clock counts integer nanoseconds: time accumulates no rounding error, and equal calls give bit-identical
+//! results. The intention of the hand is a smooth curve, sampled once per millisecond of this clock (not per tick) and
+//! interpolated linearly: the motion of the hand does not depend on the length of the ticks. Each tick is split at
+//! these sampling times and at the release of the handle; each piece has constant or linearly growing forces, as the
+//! integrator requires (see `plant`).
 
 use crate::hand::guidance::NotGuiding;
 use crate::hand::{Aim, Follower, Guidance, Hand, Intention, Pose, Trajectory, Wavering};
@@ -14,14 +15,14 @@ use crate::validation::InvalidParameter;
 use crate::workspace::SensorRange;
 use flotor_hal::glam::DVec3;
 
-/// Longest time of one call of [`Simulation::advance`], ns: ten ticks of the slowest servo (100 Hz). Bounds the cost of a
-/// tick after a delay of the host.
+/// Longest time simulated by one call of [`Simulation::advance`], ns: ten ticks of the slowest loop (100 Hz). Bounds
+/// the computing time of a tick after a delay of the host.
 pub const MAX_ADVANCE_NS: u64 = 100_000_000;
 
 /// Sampling interval of the hand's intention, ns.
 const GRID_NS: u64 = MAX_PIECE_NS;
 
-/// Parameters of a simulation.
+/// Flotor, hand, initial state, tick length and seed of a simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setup {
     /// Physical parameters of the flotor.
@@ -66,7 +67,7 @@ impl Incidents {
     }
 }
 
-/// A running simulation.
+/// Simulation of flotor and hand, with its clock and energy balance.
 #[derive(Clone, Debug)]
 pub struct Simulation {
     setup: Setup,
@@ -97,7 +98,8 @@ impl Simulation {
         })
     }
 
-    /// Resets to the start: time 0, first state, new energy balance. Real-time: bounded, no allocation.
+    /// Resets to the start: time 0, initial state, no guide, new energy balance; the hand of the latest
+    /// [`Self::set_hand`] stays. Real-time: bounded, no allocation.
     pub fn reset(&mut self) {
         self.plant.place(&self.setup.start);
         self.ledger = Ledger::open(self.plant.energy());
@@ -106,7 +108,7 @@ impl Simulation {
         self.stroke = Stroke::at(0, &self.setup.hand.trajectory, &self.wavering);
     }
 
-    /// Replaces the hand from now on; the times of its trajectory count from the start of the run.
+    /// Replaces the hand and ends the guidance; the times of the hand's trajectory count from the start of the run.
     ///
     /// Not real-time.
     ///
@@ -122,8 +124,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Takes or holds the hand for the client `guide` (see [`guidance`](crate::hand::guidance)); 0 releases the hand.
-    /// Real-time: bounded, no allocation.
+    /// Starts the guidance of the hand by client `guide` (its number), or resets the timeout of this client's guidance
+    /// (see [`guidance`](crate::hand::guidance)); 0 ends the guidance by any client. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// [`NotGuiding`] while another client guides.
@@ -132,7 +134,8 @@ impl Simulation {
         self.guidance.take(guide, self.time_ns, start)
     }
 
-    /// Moves the target of the guide along an axis (0 to 2: x, y, z of the device frame), m. Real-time: bounded, no allocation.
+    /// Sets the target of the guide along an axis (0 to 2: x, y, z of the device frame), m. Real-time: bounded, no
+    /// allocation.
     ///
     /// # Errors
     /// [`NotGuiding`] if the client of the latest [`Self::guide`] does not guide.
@@ -146,7 +149,8 @@ impl Simulation {
         self.guidance.guide()
     }
 
-    /// Advances by `dt_ns` under a coil wrench that is constant over that time (zero-order hold).
+    /// Advances by `dt_ns` (at most [`MAX_ADVANCE_NS`]) under a constant coil wrench (zero-order hold); returns the
+    /// incidents.
     ///
     /// Splitting a tick changes nothing but rounding in translation and the Runge-Kutta error in rotation. A non-finite
     /// wrench counts as zero. Real-time: bounded, no allocation.
@@ -189,20 +193,22 @@ impl Simulation {
         self.plant.state()
     }
 
-    /// Returns the present visibility of the flotor to the sensors. Real-time: bounded, no allocation.
+    /// Returns whether the present pose is within the range of the sensors. Real-time: bounded, no allocation.
     #[must_use]
     pub fn sensor_range(&self) -> SensorRange {
         let state = self.plant.state();
         SensorRange::of(state.position_m, state.orientation)
     }
 
-    /// Returns the trajectory's present aim; `None` while the hand is off the handle. Real-time: bounded, no allocation.
+    /// Returns the present aim of the trajectory, without tremor, force noise and guidance; `None` while the trajectory
+    /// has the hand off the handle. Real-time: bounded, no allocation.
     #[must_use]
     pub fn aim(&self) -> Option<Aim> {
         self.setup.hand.trajectory.aim(self.time_ns)
     }
 
-    /// Returns the energy balance since the start. Real-time: bounded, no allocation.
+    /// Returns the energy balance since the start of the run, or since the flotor was last stopped. Real-time: bounded,
+    /// no allocation.
     #[must_use]
     pub fn ledger(&self) -> &Ledger {
         &self.ledger
@@ -245,7 +251,7 @@ fn plant(setup: &Setup, state: &State) -> Result<Plant, InvalidParameter> {
     Plant::yielding(flotor, &hand.impedance, &hand.trajectory.yieldings(), state, *tick_ns)
 }
 
-/// Aims of the hand at two adjacent grid points of the clock.
+/// Aims of the hand at two adjacent sampling times of the intention.
 #[derive(Clone, Copy, Debug)]
 struct Stroke {
     start_ns: u64,
@@ -259,7 +265,7 @@ struct Stroke {
 }
 
 impl Stroke {
-    /// Returns the stroke that contains a time.
+    /// Returns the stroke that contains the time `time_ns`.
     fn at(time_ns: u64, trajectory: &Trajectory, wavering: &Wavering) -> Self {
         let start_ns = time_ns - time_ns % GRID_NS;
         let end_ns = start_ns.saturating_add(GRID_NS);
@@ -276,7 +282,7 @@ impl Stroke {
         self.is_guided = false;
     }
 
-    /// Moves the end of this stroke by the guide; the handle is in `state` at its start.
+    /// Replaces the aim at the end of this stroke by the guided aim; `state` is the state of the handle at the start.
     #[cold] // hands mostly follow their trajectory
     fn be_guided(&mut self, guidance: &mut Guidance, state: &State) {
         let (scripted, dt_s) = (self.end, seconds(GRID_NS));
@@ -292,7 +298,8 @@ impl Stroke {
         self.scripted = scripted;
     }
 
-    /// Returns the intended motion of the hand at the end of the stroke, where a guide begins. Without a grip, the motion of the handle.
+    /// Returns the intended motion of the hand at the end of the stroke, the initial motion of a guide; off the handle,
+    /// the motion of the handle.
     #[cold] // clients take the hand rarely
     fn follower(&self, state: &State) -> Follower {
         self.drawn(self.end_ns).map_or_else(
@@ -334,7 +341,7 @@ impl Stroke {
     }
 }
 
-/// Returns an aim with tremor and force noise.
+/// Adds tremor and force noise to an aim.
 #[inline]
 fn wavered(aim: &Aim, wavering: &Wavering, time_s: f64) -> Aim {
     let pose = Pose { position_m: aim.pose.position_m + wavering.offset_m(time_s), ..aim.pose };

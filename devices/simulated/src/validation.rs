@@ -1,7 +1,7 @@
 //! Validation of physical parameters before the simulation starts.
 //!
 //! A negative mass or a stiffness of NaN is rejected by name when the device is opened, so that the equations of motion
-//! never contain one.
+//! never contain an unphysical number.
 
 use flotor_hal::glam::DVec3;
 use std::fmt;
@@ -40,11 +40,11 @@ pub enum InvalidParameter {
         /// Length of the quaternion.
         length: f64,
     },
-    /// Six coils that cannot push in all six directions.
+    /// Linearly dependent wrenches of the six coils: some wrenches cannot be produced.
     DependentCoils,
     /// Three diodes that do not determine all six coordinates of a pose.
     DiodesInALine,
-    /// Rates of flotor and hand above the resolution of the integrator.
+    /// Rates of flotor and hand too fast for the integrator.
     TooStiff {
         /// Required steps per millisecond.
         steps_per_ms: f64,

@@ -5,17 +5,18 @@
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::math;
 
-/// Range of translation of the sensors, in all directions about the origin, m (thesis section 2: ±12 mm).
+/// Largest distance from the origin within the range of the sensors, in all directions, m (thesis section 2: ±12 mm).
 pub const TRANSLATION_RANGE_M: f64 = 12.0e-3;
 
-/// Range of rotation of the sensors, in all directions, rad (thesis section 2: ±7 degrees).
+/// Largest rotation within the range of the sensors, about all axes, rad (thesis section 2: ±7 degrees).
 pub const ROTATION_RANGE_RAD: f64 = 7.0 * std::f64::consts::PI / 180.0;
 
-/// Largest force of each axis, N. The thesis (section 2) gives 55 to 140 N "depending on the axis", without the axes; the
-/// vertical is assumed to be the strong one, as in any six-coil bowl that meets both numbers.
+/// Largest force along each axis, N. The thesis (section 2) gives 55 to 140 N "depending on the axis", without the
+/// axes; the vertical is assumed to be the strong axis, as in any six-coil bowl that meets both numbers.
 pub const FORCE_LIMIT_N: DVec3 = DVec3::new(55.0, 55.0, 140.0);
 
-/// Largest torque of each axis, N·m. The thesis (section 2) gives 6.3 to 12.2 N·m; yaw is assumed to be the strong axis.
+/// Largest torque about each axis, N·m. The thesis (section 2) gives 6.3 to 12.2 N·m; yaw is assumed to be the strong
+/// axis.
 pub const TORQUE_LIMIT_NM: DVec3 = DVec3::new(6.3, 6.3, 12.2);
 
 /// Largest stiffness of a rendered contact in translation, N/m (thesis section 2: about 25 N/mm).
@@ -24,12 +25,12 @@ pub const STIFFNESS_LIMIT_N_PER_M: f64 = 25.0e3;
 /// Largest stiffness of a rendered contact in rotation, N·m/rad (thesis section 2).
 pub const ROTATIONAL_STIFFNESS_LIMIT_NM_PER_RAD: f64 = 50.0;
 
-/// Visibility of the flotor to the sensors.
+/// Pose of the flotor relative to the range of the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorRange {
-    /// All three light spots are on their cells.
+    /// Translation and rotation are within range: all three light spots are on their cells.
     Inside,
-    /// The flotor left the range: its pose is invalid.
+    /// The flotor is out of range, or the pose is not finite: the pose is invalid.
     Outside,
 }
 

@@ -1,13 +1,13 @@
 //! Motion of the handle from the deflection of the puck.
 //!
-//! Deflection is speed: at full deflection the pose moves at its greatest speed, in between in proportion, and not at
-//! all inside the dead zone, which hides the noise of a released puck. Position and rotation stay inside a ball
-//! each; at its surface motion continues along it.
+//! Rate control: the velocity of the pose is proportional to the deflection beyond a dead zone, which suppresses the
+//! noise of a released puck. Position and rotation are limited to a ball each; at its surface the motion continues
+//! along the surface.
 
 use crate::report::{FULL_DEFLECTION, Report};
 use flotor_hal::{DQuat, DVec3, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
 
-/// Gains and limits from deflection to motion.
+/// Gains and limits of the conversion from deflection to motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// Speed at full deflection, m/s.
@@ -22,7 +22,8 @@ pub struct Gains {
     pub range_rad: f64,
 }
 
-/// Deflection of the puck, as fractions of full deflection in the host's frame (x right, y away from the user, z up).
+/// Deflection of the puck, as fractions of full deflection along and about the axes of the host's frame (x right, y
+/// away from the user, z up), -1 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deflection {
     translation: DVec3,
@@ -30,7 +31,7 @@ pub struct Deflection {
 }
 
 impl Deflection {
-    /// Updates the deflection from a report. Real-time: bounded, no allocation.
+    /// Updates the deflection from a report; a report of buttons changes nothing. Real-time: bounded, no allocation.
     pub fn update(&mut self, report: &Report) {
         match report {
             Report::Translation(axes) => self.translation = share(*axes),
@@ -43,7 +44,8 @@ impl Deflection {
     }
 }
 
-/// Converts axes of the puck (y towards the user, z down) to fractions in the host's frame, half a turn about x; rotations likewise.
+/// Converts readings of the puck (y towards the user, z down) to fractions of full deflection in the host's frame,
+/// rotated by half a turn about x; rotations likewise.
 fn share([x, y, z]: [i16; 3]) -> DVec3 {
     let full = f64::from(FULL_DEFLECTION);
     let share = DVec3::new(f64::from(x), -f64::from(y), -f64::from(z)) / full;
@@ -53,13 +55,13 @@ fn share([x, y, z]: [i16; 3]) -> DVec3 {
 /// Motion requested in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotionRequest {
-    /// Move with the deflection.
+    /// Move at the velocity that the deflection sets.
     Follow(Deflection),
-    /// Go home, at full speed.
+    /// Move home at the speed of full deflection.
     Home,
 }
 
-/// Pose of the handle.
+/// Pose of the handle, moved by the puck; at home by default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     position_m: DVec3,
@@ -73,7 +75,8 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// Advances the pose by a time step; returns the velocity of the actual motion, limits included. Real-time: bounded, no allocation.
+    /// Advances the pose by `dt_s` (s); returns the velocity of the actual motion, limits included, m/s and rad/s.
+    /// Real-time: bounded, no allocation.
     pub fn advance(&mut self, request: &MotionRequest, gains: &Gains, dt_s: f64) -> Twist {
         if dt_s <= 0.0 {
             return Twist::ZERO;

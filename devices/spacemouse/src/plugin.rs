@@ -9,7 +9,8 @@ use flotor_hal::{
     Refusal, SetParameterError, Settings, Simple, SimpleDevice, Tick, Wrench, export_device,
 };
 
-/// Limit on reports read in a tick: a puck sends one or two every 8 ms or slower. Further reports wait for the next tick.
+/// Limit on reports read in a tick: a puck sends one or two every 8 ms or slower. Further reports stay pending until
+/// the next tick.
 const REPORTS_PER_TICK: usize = 8;
 /// Longest time step of the motion, s: after a longer pause the pose does not catch up.
 const LONGEST_TIME_S: f64 = 0.1;
@@ -65,7 +66,8 @@ impl Values {
     }
 }
 
-/// Puck whose reports move the pose. The source of reports is a type parameter so that tests can supply their own.
+/// Opened puck, with the pose that its reports move. The source of reports is a type parameter so that tests can supply
+/// their own.
 pub struct SpaceMouse<S = HidPuck> {
     source: S,
     values: Values,
@@ -96,7 +98,7 @@ impl<S: Reports> SimpleDevice for SpaceMouse<S> {
         Ok(Opened { device, capabilities, stop: NothingToStop })
     }
 
-    /// Starts the motion of the pose from home.
+    /// Resets the pose to home and the deflection to zero.
     fn activate(&mut self, _config: &LoopConfig) -> Result<(), Refusal> {
         (self.deflection, self.motion, self.buttons) = Default::default();
         Ok(())

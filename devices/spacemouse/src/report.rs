@@ -12,7 +12,7 @@
 //! right, y towards the user, z down, rotations about them by the right-hand rule. Other reports (battery, keys by
 //! code) are ignored.
 
-/// Reading along or about an axis at the mechanical stop.
+/// Reading of an axis at the mechanical stop.
 pub const FULL_DEFLECTION: i16 = 350;
 
 /// Parsed report.
@@ -29,14 +29,14 @@ pub enum Report {
         /// Rotation x, y, z.
         rotation: [i16; 3],
     },
-    /// Buttons, one bit each; those beyond 32 are dropped.
+    /// Buttons, one bit each; buttons beyond the 32nd are dropped.
     Buttons(u32),
     /// Report of another kind, or too short.
     Other,
 }
 
 impl Report {
-    /// Parses a report that begins with its number. Real-time: bounded, no allocation.
+    /// Parses a report, whose first byte is its number. Real-time: bounded, no allocation.
     #[must_use]
     pub fn parse(bytes: &[u8]) -> Self {
         match bytes {

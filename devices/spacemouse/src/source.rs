@@ -4,9 +4,10 @@ use crate::platform::{ACCESS_REMEDY, PATH_EXAMPLE, is_refused};
 use flotor_hal::Refusal;
 use hidapi::{HidApi, HidDevice, HidError};
 
-/// USB vendors: 3Dconnexion, and Logitech, which sold the older pucks.
+/// USB vendor IDs: 3Dconnexion, and Logitech, which sold the older pucks.
 const VENDORS: [u16; 2] = [0x256f, 0x046d];
-/// Logitech products that are 3Dconnexion's pucks: from the SpaceMouse Plus (c603) to the SpaceMouse Pro (c62b).
+/// USB product IDs of 3Dconnexion's pucks under Logitech's vendor ID: from the SpaceMouse Plus (c603) to the SpaceMouse
+/// Pro (c62b).
 const PRODUCTS_OF_LOGITECH: std::ops::RangeInclusive<u16> = 0xc603..=0xc62b;
 /// HID usage of a six-axis puck: a multi-axis controller of the generic desktop page.
 const PAGE: u16 = 0x01;
@@ -15,11 +16,11 @@ const MULTI_AXIS_CONTROLLER: u16 = 0x08;
 /// Buffer size of a report, bytes.
 pub const REPORT_BYTES: usize = 64;
 
-/// The puck is gone: unplugged, or switched off.
+/// Error: the puck is gone (unplugged, or switched off).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gone;
 
-/// Source of reports.
+/// Source of the puck's reports.
 pub trait Reports: Sized + Send + 'static {
     /// Opens the puck at a device path, or the first puck found. Not real-time.
     ///
@@ -27,15 +28,15 @@ pub trait Reports: Sized + Send + 'static {
     /// A [`Refusal`] with the cause and the remedy.
     fn open(path: Option<&str>) -> Result<Self, Refusal>;
 
-    /// Reads the next pending report and returns its length; 0 without one. Real-time: bounded, no allocation; one call of the
-    /// system.
+    /// Reads the next pending report and returns its length; 0 if none is pending. Never waits. Real-time: bounded, no
+    /// allocation; one call of the system.
     ///
     /// # Errors
     /// If the puck is gone.
     fn next(&mut self, report: &mut [u8; REPORT_BYTES]) -> Result<usize, Gone>;
 }
 
-/// Puck opened as a HID device of the system.
+/// Puck opened as a HID device through hidapi.
 pub struct HidPuck(HidDevice);
 
 fn refused(path: &str, error: &HidError) -> Refusal {

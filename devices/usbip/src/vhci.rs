@@ -5,21 +5,22 @@ use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixStream;
 
 const FOLDER: &str = "/sys/devices/platform/vhci_hcd.0";
-/// USB speed of a device, as the kernel numbers it.
+/// USB speed of a device, with the number of the kernel (`enum usb_device_speed`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Speed {
-    /// 12 Mbit/s: packets every millisecond.
+    /// Full speed, 12 Mbit/s: frames of 1 ms.
     Full = 2,
-    /// 480 Mbit/s: packets every 125 µs.
+    /// High speed, 480 Mbit/s: microframes of 125 µs.
     High = 3,
 }
 
 /// State of a port without a device (`VDEV_ST_NULL`).
 const FREE: &str = "004";
-/// Bus number of the device's far end; an arbitrary value.
+/// Bus number at the remote end of the device; an arbitrary value.
 const FAR_BUS: u32 = 1 << 16;
 
-/// Attaches the USB/IP device at the other end of the stream to a free port, at this speed.
+/// Attaches the USB/IP device at the other end of `stream` to a free virtual port; the kernel then enumerates the device
+/// at `speed`.
 ///
 /// # Errors
 /// Errors of the system: usually the module `vhci_hcd` is not loaded, or the user has no permission.

@@ -18,21 +18,21 @@ const TAKEN_BACK: i32 = -104;
 /// Request of the host controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Message {
-    /// Start a transfer.
+    /// Request to start a transfer.
     Submit(Transfer),
-    /// Cancel a transfer.
+    /// Request to cancel a pending transfer.
     Unlink {
-        /// Number of this message.
+        /// Sequence number of this request.
         number: u32,
-        /// Number of the transfer.
+        /// Sequence number of the transfer to cancel.
         transfer: u32,
     },
 }
 
-/// Pending transfer.
+/// Transfer that the host controller has submitted.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Transfer {
-    /// Number of the transfer.
+    /// Sequence number, which assigns the completion to the transfer.
     pub number: u32,
     /// Address of the endpoint, with the direction in bit 7.
     pub endpoint: u8,
@@ -40,7 +40,7 @@ pub struct Transfer {
     pub length: usize,
     /// Setup packet of a control transfer.
     pub setup: [u8; 8],
-    /// Data of the host; empty for transfers towards the host.
+    /// Data sent by the host; empty for transfers towards the host.
     pub data: Vec<u8>,
 }
 
@@ -48,7 +48,7 @@ pub struct Transfer {
 pub const INPUT: u8 = 0x80;
 
 impl Message {
-    /// Reads one message from a stream.
+    /// Reads the next request from a stream; blocks until the request is complete.
     ///
     /// # Errors
     /// Errors of the stream; `InvalidData` for an unknown message or too much data.
@@ -78,7 +78,7 @@ impl Message {
     }
 }
 
-/// Completes a transfer: with data towards the host, or with all bytes of the host accepted.
+/// Reports a transfer as complete: with `data` towards the host, or with all bytes from the host accepted.
 ///
 /// # Errors
 /// Errors of the stream.
@@ -88,7 +88,7 @@ pub fn complete(stream: &mut impl Write, transfer: &Transfer, data: &[u8]) -> io
     end(stream, SUBMITTED, transfer.number, 0, u32::try_from(actual).unwrap_or(0), data)
 }
 
-/// Completes a transfer as stalled: the device refuses it.
+/// Reports a transfer as stalled: the device does not support the request.
 ///
 /// # Errors
 /// Errors of the stream.
@@ -96,7 +96,7 @@ pub fn stall(stream: &mut impl Write, transfer: &Transfer) -> io::Result<()> {
     end(stream, SUBMITTED, transfer.number, STALLED, 0, &[])
 }
 
-/// Replies to an unlink request: the transfer was cancelled, or had completed before.
+/// Replies to the unlink request `number`: the transfer was cancelled (`in_time`), or was complete before.
 ///
 /// # Errors
 /// Errors of the stream.

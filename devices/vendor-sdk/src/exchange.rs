@@ -9,13 +9,13 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Validity of a wrench without renewal: longer than the delays of a loop, too short for the hand to be carried far.
+/// Watchdog timeout of a wrench without renewal: longer than the delays of a loop, too short to move the hand far.
 pub const VALID: Duration = Duration::from_millis(20);
 /// Timeout of the wait for the other side in lockstep.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Longest sleep of the thread of the SDK in lockstep.
 const SLICE: Duration = Duration::from_millis(1);
-/// Timeout of a stop while zero is not sent yet.
+/// Timeout of [`Exchange::stop`], which waits until zero is sent.
 const STOP_WITHIN: Duration = Duration::from_millis(20);
 /// Poll interval of a stop.
 const LOOK: Duration = Duration::from_micros(100);
@@ -93,7 +93,7 @@ impl Exchange {
 
     // ------------------------------------------------------------ the thread of the SDK
 
-    /// Publishes a new sample. On the thread of the SDK.
+    /// Publishes a new sample. Called by the thread of the SDK.
     pub fn publish(&self, sample: &Sample) {
         let mut words = [0; SAMPLE_WORDS];
         let Sample { pose, twist, delivered, buttons, conditions } = sample;
@@ -110,13 +110,15 @@ impl Exchange {
         self.tell();
     }
 
-    /// Reports a fault that ends the operation; the first fault stays. On the thread of the SDK.
+    /// Reports a fault that ends the operation; only the first fault is stored. Called by the thread of the SDK.
     pub fn fail(&self, fault: Fault) {
         let _ = self.fault.compare_exchange(0, fault as u32, Ordering::AcqRel, Ordering::Acquire);
         self.tell();
     }
 
-    /// Returns the wrench to send. In lockstep, waits for the loop. On the thread of the SDK.
+    /// Returns the wrench to send: the newest wrench of the loop, or zero after [`Self::stop`] or [`Self::end`], and,
+    /// in real pace, if the loop has not renewed the wrench within [`VALID`]. In lockstep, waits for the loop, a second
+    /// at most. Called by the thread of the SDK.
     pub fn next_wrench(&self, cursor: &mut CommandCursor) -> Wrench {
         if self.pace == Pace::Lockstep {
             self.wait_for_command(cursor.seen);
@@ -146,12 +148,13 @@ impl Exchange {
         }
     }
 
-    /// Records a sent wrench. On the thread of the SDK.
+    /// Records that `wrench` was sent; zero ends the wait in [`Self::stop`]. Called by the thread of the SDK.
     pub fn note_sent(&self, wrench: &Wrench) {
         self.is_quiet.store(*wrench == Wrench::ZERO, Ordering::SeqCst);
     }
 
-    /// Records that the thread of the SDK sends no more wrenches, with the force disabled.
+    /// Records that the thread of the SDK sends no more wrenches and the force is disabled, which ends the wait in
+    /// [`Self::stop`].
     pub fn note_silence(&self) {
         self.is_quiet.store(true, Ordering::SeqCst);
     }
@@ -164,7 +167,8 @@ impl Exchange {
 
     // ------------------------------------------------------------ the loop and other threads
 
-    /// Resets wrench, fault and stop; the sample count continues. The result is for the thread of the SDK. Not real-time.
+    /// Resets wrench, fault and stop for a new run; the sample count continues. Returns the cursor for the thread of
+    /// the SDK. Not real-time.
     #[must_use]
     pub fn begin(&self) -> CommandCursor {
         self.command.put(&[0; 6]);
@@ -181,7 +185,8 @@ impl Exchange {
         self.tell();
     }
 
-    /// Stops the force, from any thread; returns once zero is sent, after 20 ms at the latest. No lock, no allocation.
+    /// Stops the force, from any thread, until the next [`Self::begin`]; returns once zero is sent, after 20 ms at the
+    /// latest. No lock, no allocation.
     pub fn stop(&self) {
         self.is_stopped.store(true, Ordering::SeqCst);
         let since = Instant::now();
@@ -211,7 +216,8 @@ impl Exchange {
         Fault::from_code(self.fault.load(Ordering::Acquire))
     }
 
-    /// Returns the newest sample and the number of samples so far.
+    /// Returns the newest sample and the number of samples so far; `None` before the first sample, or if a writer was
+    /// suspended while writing.
     pub(crate) fn newest(&self) -> Option<(u64, DeviceState)> {
         let (count, words) = self.sample.get()?;
         let numbers = words.map(f64::from_bits);
@@ -228,7 +234,7 @@ impl Exchange {
         (count > 0).then_some((count, state))
     }
 
-    /// Sets the wrench of the loop.
+    /// Publishes the wrench of the loop.
     pub(crate) fn command(&self, wrench: &Wrench) {
         let ([x, y, z], [rx, ry, rz]) = (wrench.force_n, wrench.torque_nm);
         self.command.put(&[x, y, z, rx, ry, rz].map(f64::to_bits));
@@ -237,12 +243,12 @@ impl Exchange {
         }
     }
 
-    /// Waits until there are more than `seen` samples, or a fault, or until the timeout.
+    /// Waits for more than `seen` samples or a fault, at most for `patience`.
     pub(crate) fn wait_for_sample(&self, seen: u64, patience: Duration) {
         self.wait(patience, || self.samples() > seen || self.fault().is_some());
     }
 
-    /// Returns true if nothing but the SDK paces its thread, which then must not spin.
+    /// Returns true if the thread does not wait for the loop, and must limit its own rate.
     #[must_use]
     pub fn runs_free(&self) -> bool {
         self.pace == Pace::Real || self.is_stopped()

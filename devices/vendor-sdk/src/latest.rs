@@ -1,14 +1,14 @@
-//! The newest of a few numbers, from one thread to another: neither waits.
+//! Latest value of a few words, from one writer thread to readers; no thread waits for another.
 //!
-//! A version that is odd while the numbers are written; a reader that sees it change reads once more (a sequence lock whose
-//! words are atomic, so that it needs no `unsafe`).
+//! Sequence lock with atomic words, and so without `unsafe`: the version is odd while the words are written; a reader
+//! retries if the version changes during the read.
 
 use std::sync::atomic::{AtomicU64, Ordering, fence};
 
-/// How often a reader tries: a writer needs tens of nanoseconds unless it is put to sleep in the middle.
+/// Number of attempts of a reader: a write takes tens of nanoseconds, unless the writer is suspended during it.
 const TRIES: usize = 64;
 
-/// The newest `N` numbers, as words.
+/// Latest value of `N` words.
 #[derive(Debug)]
 pub(crate) struct Latest<const N: usize> {
     version: AtomicU64,
@@ -20,7 +20,7 @@ impl<const N: usize> Latest<N> {
         Self { version: AtomicU64::new(0), words: [const { AtomicU64::new(0) }; N] }
     }
 
-    /// Replaces them; by one thread at a time. Real-time: bounded, no allocation.
+    /// Replaces the words; by one thread at a time. Real-time: bounded, no allocation.
     pub(crate) fn put(&self, words: &[u64; N]) {
         let version = self.version.load(Ordering::Relaxed);
         self.version.store(version + 1, Ordering::Relaxed);
@@ -29,8 +29,8 @@ impl<const N: usize> Latest<N> {
         self.version.store(version + 2, Ordering::Release);
     }
 
-    /// How often they were replaced, and they themselves; `None` if a writer sleeps in the middle. Real-time: bounded, no
-    /// allocation.
+    /// Returns the number of replacements and the words; `None` if a writer was suspended during a write. Real-time:
+    /// bounded, no allocation.
     pub(crate) fn get(&self) -> Option<(u64, [u64; N])> {
         for _ in 0..TRIES {
             let before = self.version.load(Ordering::Acquire);
@@ -45,7 +45,7 @@ impl<const N: usize> Latest<N> {
         None
     }
 
-    /// How often they were replaced, or are just being.
+    /// Returns the number of completed replacements.
     pub(crate) fn count(&self) -> u64 {
         self.version.load(Ordering::Acquire) / 2
     }

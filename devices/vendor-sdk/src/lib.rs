@@ -1,7 +1,8 @@
 //! Shared parts of device plugins over a vendor's SDK.
 //!
-//! Such a plugin contains nothing of the vendor: it opens the library that the user has installed. A thread that follows the SDK
-//! (the SDK's own scheduler, or a thread paced by blocking calls) drives the device, not the loop:
+//! Such a plugin contains nothing of the vendor: it opens the library that the user has installed. The device is driven
+//! not by the loop, but by a thread that follows the SDK (the SDK's own scheduler, or a thread paced by blocking
+//! calls):
 //!
 //! ```text
 //!  user's library -> Library -> functions of the plugin -> thread -> Exchange -> LoopEnd -> loop
@@ -11,7 +12,7 @@
 //! - [`Exchange`]: newest sample one way, newest wrench the other, and removal of the force if either side fails.
 //! - [`LoopEnd`]: the loop's side of an exchange, for the contract.
 //! - [`parameters`]: parameters that the plugins have in common.
-//! - [`without_signals`]: keeps signals of the host away from the threads of a library.
+//! - [`without_signals`]: blocks signals of the host in the threads of a library.
 
 mod exchange;
 mod latest;

@@ -1,4 +1,4 @@
-//! The user's own library, opened at run time and never closed, because SDKs leave threads and handlers behind.
+//! Library of the SDK, opened at run time and never closed, because SDKs leave threads and handlers behind.
 #![allow(unsafe_code)] // libloading; listed in tests/tests/system/architecture.rs
 
 use crate::platform::{self, Loaded};
@@ -14,9 +14,9 @@ const MARKER: &[u8] = b"flotor_dropin\0";
 /// Policy for Flotor's own drop-in libraries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DropInPolicy {
-    /// Refuse them: no simulated device without consent.
+    /// Reject drop-in libraries: no simulated device without consent.
     Refuse,
-    /// Accept them as simulated devices.
+    /// Accept drop-in libraries as simulated devices.
     Accept,
 }
 
@@ -28,8 +28,8 @@ pub struct Library {
 }
 
 impl Library {
-    /// Opens the library: the file `chosen`, else the first fitting file in the folders of SDK and system. Not
-    /// real-time; runs the constructors of the library.
+    /// Opens the library: the file `chosen`, else the first library for this processor in the folders of SDK and
+    /// system. Not real-time; runs the constructors of the library.
     ///
     /// # Errors
     /// [`LibraryProblem`] with the cause and the remedy.
@@ -100,10 +100,10 @@ pub unsafe fn static_text(text: *const c_char) -> String {
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
-/// Declares functions of an SDK: a struct with a pointer for each, and `load`, which looks all of them up. A function marked
-/// `safe` has no precondition and takes any numbers: it gets a safe method, by the name before the equals sign. Functions marked
-/// `optional` may be missing. For use in an FFI module with the declarations that the SDK documents: the caller of
-/// a function guarantees its arguments.
+/// Declares functions of an SDK: a struct with a pointer for each, and `load`, which looks up all functions. A function
+/// marked `safe` has no precondition and takes any numbers: it gets a safe method, by the name before the equals sign.
+/// Functions marked `optional` may be missing. For use in an FFI module with the declarations that the SDK documents:
+/// the caller of a function guarantees its arguments.
 #[macro_export]
 macro_rules! sdk_functions {
     (
@@ -123,7 +123,7 @@ macro_rules! sdk_functions {
         }
 
         impl $table {
-            /// Looks up all functions. Not real-time.
+            /// Looks up all functions; fails if a function that is not optional is missing. Not real-time.
             $visibility fn load(library: &$crate::Library) -> Result<Self, $crate::LibraryProblem> {
                 let missing = |function| $crate::LibraryProblem::MissingFunction {
                     path: library.path().to_path_buf(),

@@ -1,11 +1,11 @@
-//! Loop's side of an exchange, as required by the contract.
+//! The loop's side of an exchange: the calls of the device contract.
 
 use crate::exchange::Exchange;
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, SafeStop, SampleWait, Tick, Wrench};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Stop of the force, usable from any thread.
+/// Stop that removes the force of an exchange, from any thread.
 #[derive(Clone, Debug)]
 pub struct StopSwitch(pub Arc<Exchange>);
 
@@ -23,21 +23,23 @@ pub struct LoopEnd {
     most: [f64; 2],
     timeout: Duration,
     seen: u64,
-    /// Number of samples reported by waits.
+    /// Number of samples counted by earlier waits.
     awaited: u64,
     fresh: Instant,
     state: DeviceState,
 }
 
 impl LoopEnd {
-    /// Creates the loop's side of an exchange that has begun; no sample within `timeout` is a fault. Not real-time.
+    /// Creates the loop's side of an exchange that has begun. `most` limits the magnitude of force, N, and torque, N·m;
+    /// `timeout` without a sample is a fault. Not real-time.
     #[must_use]
     pub fn new(exchange: Arc<Exchange>, most: [f64; 2], timeout: Duration) -> Self {
         let seen = exchange.begun_at();
         Self { exchange, most, timeout, seen, awaited: seen, fresh: Instant::now(), state: DeviceState::HOME }
     }
 
-    /// Reads the newest sample. Real-time: bounded, no allocation; in lockstep it waits.
+    /// Writes the newest sample to `state`; without a new sample, the last one, as [`Cycle::Stale`] or, after the
+    /// timeout, [`Fault::Timeout`]. Real-time: bounded, no allocation; in lockstep it waits, a second at most.
     pub fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         if let Some(patience) = self.exchange.lockstep_patience() {
             self.exchange.wait_for_sample(self.seen, patience);
@@ -57,7 +59,8 @@ impl LoopEnd {
         cycle
     }
 
-    /// Limits a wrench to the device's range and sets it. Real-time: bounded, no allocation.
+    /// Publishes the wrench, limited in magnitude; a force or torque that is not finite counts as zero. Real-time:
+    /// bounded, no allocation.
     pub fn write(&mut self, wrench: &Wrench) -> Cycle {
         let [force_n, torque_nm] = [wrench.force(), wrench.torque()];
         let within = |vector: DVec3, most: f64| {
@@ -69,7 +72,8 @@ impl LoopEnd {
         self.exchange.fault().map_or(Cycle::Fresh, Cycle::Fault)
     }
 
-    /// Waits for a sample after those of earlier waits. Real-time except for the wait: no allocation.
+    /// Waits until the exchange has a sample that no earlier call has counted, or until the timeout; returns the number
+    /// of new samples, and 1 after a fault, which the next read returns. Apart from the wait real-time: no allocation.
     pub fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
         self.exchange.wait_for_sample(self.awaited, Duration::from_nanos(timeout_ns));
         let samples = self.exchange.samples();

@@ -31,12 +31,12 @@ pub enum LibraryProblem {
     Architecture {
         /// Path of the file.
         path: PathBuf,
-        /// Bits and processor of the library.
+        /// Word size and processor of the library.
         found: String,
-        /// Bits and processor of this program.
+        /// Word size and processor of this program.
         needed: String,
     },
-    /// The system's loader refuses the library, usually because of a missing dependency.
+    /// The system's loader rejects the library, usually because of a missing dependency.
     Refused {
         /// Path of the file.
         path: PathBuf,

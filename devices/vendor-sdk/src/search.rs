@@ -20,8 +20,8 @@ pub struct Sdk {
 }
 
 impl Sdk {
-    /// Returns the candidate files, in order, with absolute paths: a relative folder is relative to the folder in which the
-    /// program was started, as for the loader of the system. Not real-time.
+    /// Returns the candidate files in search order, as absolute paths: a relative folder is relative to the working
+    /// directory of the program, as for the loader of the system. Not real-time.
     pub(crate) fn places(&self, said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
         let folders = platform::folders(self.variables, said).into_iter();
         let folders = folders.filter_map(|folder| std::path::absolute(folder).ok()); // `absolute` drops empty ones
@@ -30,7 +30,7 @@ impl Sdk {
     }
 }
 
-/// Checks that a file is a library for this program; `None` if there is no file. Not real-time.
+/// Checks that a file is a library for this program; `None` if the file does not exist. Not real-time.
 pub(crate) fn looked_at(path: &Path) -> Option<Result<(), LibraryProblem>> {
     let mut head = Vec::new();
     let read = File::open(path).and_then(|file| file.take(platform::HEAD as u64).read_to_end(&mut head));
@@ -43,7 +43,7 @@ pub(crate) fn looked_at(path: &Path) -> Option<Result<(), LibraryProblem>> {
     }
 }
 
-/// Checks by the first bytes of a file that it is a library for this program.
+/// Checks the first bytes of a file for a library of this program's word size and processor.
 fn fits(path: &Path, head: &[u8]) -> Result<(), LibraryProblem> {
     let path = path.to_path_buf();
     let maker = if cfg!(target_arch = "aarch64") { "ARM" } else { "x86" };

@@ -1,4 +1,5 @@
-//! `flotor.device/1`: function table of a device, and its implementation for a [`Device`], whose phases are types.
+//! `flotor.device/1`: function table of a device, and its implementation for the trait [`Device`], which has one type per
+//! phase.
 
 use super::Message;
 use super::entry::{CallStatus, Instance};
@@ -17,7 +18,7 @@ use std::marker::PhantomData;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct CycleCode {
-    /// 0: fresh; 1: stale; 256 + code of a fault.
+    /// 0: fresh; 1: stale; 256 plus the code of a [`crate::Fault`]: fault.
     pub(super) code: u32,
 }
 
@@ -37,7 +38,7 @@ impl From<Cycle> for CycleCode {
 
 #[cfg(feature = "loader")]
 impl CycleCode {
-    /// Returns the result that the code stands for, if any.
+    /// Converts the code to a result; `None` for a code outside the contract.
     #[inline]
     pub(super) const fn cycle(self) -> Option<Cycle> {
         match self.code {
@@ -66,7 +67,7 @@ pub struct DeviceTable {
     pub parameters: *const Parameter,
     /// Id, name and description of the device, constant.
     pub info: DeviceInfo,
-    /// Opens a device. May block. Not real-time.
+    /// Opens a device with explicitly set values and writes the instance to `out`. May block. Not real-time.
     pub open: Option<
         unsafe extern "C" fn(
             values: *const ParameterValue,
@@ -77,7 +78,7 @@ pub struct DeviceTable {
     >,
     /// Closes the device; deactivates an active device first. Not real-time.
     pub close: Option<unsafe extern "C" fn(instance: Instance)>,
-    /// Writes the capabilities of the device. Not real-time.
+    /// Writes the capabilities of an opened device to `out`. Not real-time.
     pub capabilities: Option<unsafe extern "C" fn(instance: Instance, out: *mut Capabilities) -> u32>,
     /// Energises the device at zero wrench. Not real-time.
     pub activate: Option<
@@ -85,21 +86,23 @@ pub struct DeviceTable {
     >,
     /// Commands zero wrench and returns to the opened phase. Not real-time.
     pub deactivate: Option<unsafe extern "C" fn(instance: Instance) -> u32>,
-    /// Reads the newest sample. Real-time.
+    /// Reads the newest sample of an active device into `state`. Real-time.
     pub read: Option<
         unsafe extern "C" fn(instance: Instance, tick: *const Tick, state: *mut DeviceState) -> CycleCode,
     >,
-    /// Commands the wrench on the hand until the next write. Real-time.
+    /// Commands the wrench on the hand until the next write; of an active device only. Real-time.
     pub write: Option<
         unsafe extern "C" fn(instance: Instance, tick: *const Tick, wrench: *const Wrench) -> CycleCode,
     >,
-    /// Makes the actuators safe at once. Any thread, any time, also during `read` and `write`.
+    /// Sets the actuators to zero (or starts a controlled landing) at once, until the next activation. May be called from
+    /// any thread at any time, also during `read` and `write`.
     pub safe_stop: Option<unsafe extern "C" fn(instance: Instance)>,
-    /// Changes a live parameter at a tick boundary. Real-time. May be null.
+    /// Changes the live parameter at `index` at a tick boundary (for a choice, `value` is its index). Real-time. May be
+    /// null.
     pub set_parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32, value: f64) -> u32>,
-    /// Returns the current value of a parameter. May be null.
+    /// Returns the current value of the parameter at `index` of an opened device; NaN if unknown. May be null.
     pub parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32) -> f64>,
-    /// Writes the reason of the last failure. Not real-time. May be null.
+    /// Writes the message of the last failure to `message`; empty if there is none. Not real-time. May be null.
     pub last_message: Option<unsafe extern "C" fn(instance: Instance, message: *mut Message)>,
 }
 
@@ -159,7 +162,7 @@ impl<D: Device> Phase<D> {
     }
 }
 
-/// Returns the refusal of a call that is valid in the opened phase only.
+/// Builds the refusal for a call outside the opened phase.
 pub(crate) fn not_opened() -> Refusal {
     Refusal::broken("the device is not in the opened phase")
 }
@@ -196,7 +199,7 @@ unsafe extern "C" fn deactivate<D: Device>(instance: Instance) -> u32 {
     unsafe { call::<DeviceAdapter<D>>(instance, Phase::deactivate) }
 }
 
-/// Runs one cycle of an active device.
+/// Runs `body` on an active device; returns [`Fault::Broken`] in another phase and after a panic.
 ///
 /// # Safety
 /// As for every table call.

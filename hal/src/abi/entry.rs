@@ -11,18 +11,18 @@ pub const MAGIC: [u8; 8] = *b"FLOTOR\r\n";
 pub const CONTRACT: &str = "1.0-rc";
 /// Major version of the contract; contracts of different major versions are incompatible.
 pub const ABI_MAJOR: u16 = 1;
-/// Minor version of the contract; a later minor version only adds.
+/// Minor version of the contract; a later minor version only adds to the contract.
 pub const ABI_MINOR: u16 = 0;
-/// 1 in a release candidate of the version, 0 after its release.
+/// 1 for a release candidate of this contract version, 0 for the release.
 pub const ABI_CANDIDATE: u32 = 1;
 
 /// Kind of a plugin, by its main interface.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PluginKind {
-    /// Offers `flotor.force/1`.
+    /// Force model: offers `flotor.force/1`.
     Model = 1,
-    /// Offers `flotor.device/1`.
+    /// Device: offers `flotor.device/1`.
     Device = 2,
 }
 
@@ -37,7 +37,7 @@ impl PluginKind {
         }
     }
 
-    /// Returns the name of the kind in metadata and lists.
+    /// Returns the name of the kind in metadata and lists: `model` or `device`.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -47,10 +47,10 @@ impl PluginKind {
     }
 }
 
-/// Opaque instance, created and owned by a plugin.
+/// Opaque pointer to an instance of a model or device, created and owned by a plugin.
 pub type Instance = *mut c_void;
 
-/// Status of one call through a table.
+/// Status returned by a table function.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CallStatus {
@@ -58,9 +58,9 @@ pub enum CallStatus {
     Ok = 0,
     /// The plugin panicked, now or earlier; the instance is disabled.
     Panicked = 1,
-    /// The call is not allowed in this phase (real-time call on a device that is not active).
+    /// The call is not allowed in the current phase of the device (such as `capabilities` of an active device).
     WrongPhase = 2,
-    /// A value is out of range.
+    /// A value, an index or a capacity is out of range, or the parameter cannot be changed now.
     OutOfRange = 3,
     /// The plugin does not offer this function.
     Unsupported = 4,
@@ -81,7 +81,7 @@ impl CallStatus {
     }
 }
 
-/// [`Host::flags`] bit: the plugin has its own Rust runtime and may silence its panic hook.
+/// [`Host::flags`] bit: the plugin has its own Rust runtime and may replace its panic hook by a silent one.
 pub const HOST_QUIET_PANICS: u32 = 1;
 
 /// Host information that a plugin receives once, before any other call.
@@ -106,10 +106,11 @@ layout! {
     FieldLayout { name, offset, size }
 }
 
-/// A second, independent proof of layouts, by abi_stable; absent (null) in C plugins and in a plain build.
+/// Second, independent check of the layouts, by abi_stable; null in C plugins and in builds without the feature
+/// `layout-proof`.
 #[repr(C)]
 pub struct LayoutProof {
-    /// Bytes of this struct.
+    /// Size of this struct in the plugin's build, bytes.
     pub(crate) size: u32,
     /// Reserved, 0.
     pub(crate) reserved: u32,
@@ -143,11 +144,11 @@ pub struct Entry {
     pub(crate) layout_count: u32,
     /// Reserved, 0.
     pub(crate) reserved: u32,
-    /// Called once after loading. May be null.
+    /// Called once after loading, before any other function. May be null.
     pub(crate) init: Option<unsafe extern "C" fn(host: *const Host)>,
     /// Returns the table of an interface id, or null if not offered.
     pub(crate) get_interface: Option<unsafe extern "C" fn(id: Str) -> *const c_void>,
-    /// A second proof of the layouts, or null.
+    /// Second check of the layouts, or null.
     pub(crate) layout_proof: *const LayoutProof,
 }
 

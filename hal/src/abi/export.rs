@@ -46,14 +46,15 @@ pub const fn model_entry<M: ForceModel>() -> Entry {
     model_entry_with::<M, ()>()
 }
 
-/// Returns the entry of a model plugin with extensions; used by [`crate::export_model!`].
+/// Returns the entry of a model plugin with the extensions `E`; used by [`crate::export_model!`].
 #[must_use]
 pub const fn model_entry_with<M: ForceModel, E: Extensions<M>>() -> Entry {
     entry(PluginKind::Model, model_interface::<M, E>)
 }
 
-/// Exports a [`crate::ForceModel`] as a plugin: `export_model!(Spring);`. The extensions that the type implements follow by their
-/// names in [`crate::extension`]: `export_model!(Spring, centerline, variant, details);`. One per crate.
+/// Exports a [`crate::ForceModel`] as a plugin: `export_model!(Spring);`. The extensions implemented by the type are
+/// listed after the type, by their module names in [`crate::extension`]:
+/// `export_model!(Spring, centerline, variant, details);`. One call per crate.
 #[macro_export]
 macro_rules! export_model {
     ($model:ty $(, $extension:ident)* $(,)?) => {
@@ -71,14 +72,15 @@ pub const fn device_entry<D: Device>() -> Entry {
     device_entry_with::<D, ()>()
 }
 
-/// Returns the entry of a device plugin with extensions; used by [`crate::export_device!`].
+/// Returns the entry of a device plugin with the extensions `E`; used by [`crate::export_device!`].
 #[must_use]
 pub const fn device_entry_with<D: Device, E: Extensions<D>>() -> Entry {
     entry(PluginKind::Device, device_interface::<D, E>)
 }
 
-/// Exports a [`crate::Device`] as a plugin: `export_device!(SpaceMouse);`. The extensions that the type implements follow by
-/// their names in [`crate::extension`]: `export_device!(SimulatedFlotor, calibration, pacing);`. One per crate.
+/// Exports a [`crate::Device`] as a plugin: `export_device!(SpaceMouse);`. The extensions implemented by the type are
+/// listed after the type, by their module names in [`crate::extension`]:
+/// `export_device!(SimulatedFlotor, calibration, pacing);`. One call per crate.
 #[macro_export]
 macro_rules! export_device {
     ($device:ty $(, $extension:ident)* $(,)?) => {

@@ -1,5 +1,5 @@
-//! Plugin instances and the common part of all table functions: catch panics, disable an instance after a panic, and
-//! write results to the caller's memory.
+//! Plugin instances and the common part of all table functions: catching panics, disabling an instance after a panic, and
+//! writing results to the caller's memory.
 
 use super::entry::{CallStatus, Instance};
 use super::{Message, panics};
@@ -8,7 +8,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Adapter of a plugin type for the function tables.
 pub(crate) trait PluginAdapter: 'static {
-    /// State for the thread that uses an instance.
+    /// State used by one thread at a time.
     type State;
     /// State that any other thread may use concurrently.
     type Shared: Sync;
@@ -194,7 +194,8 @@ pub(super) unsafe extern "C" fn destroy<P: PluginAdapter>(instance: Instance) {
     guarded(|| drop(slot));
 }
 
-/// Checks a live value against the schema, then runs `body`; returns a [`CallStatus`] code.
+/// Checks a live value against the schema, then runs `body`; returns a [`CallStatus`] code, `OutOfRange` for an unknown
+/// index, a fixed parameter or an illegal value.
 ///
 /// # Safety
 /// As for [`work`].
@@ -225,7 +226,7 @@ pub(super) unsafe fn parameter<P: PluginAdapter>(
     unsafe { work::<P>(instance) }.call(body).unwrap_or(f64::NAN)
 }
 
-/// Writes the reason of the last failure.
+/// Writes the message of the last panic to `message`; empty without a panic.
 pub(super) unsafe extern "C" fn last_message<P: PluginAdapter>(instance: Instance, message: *mut Message) {
     // SAFETY: the contract of every table call; `message` is valid for a write.
     unsafe { message.write(work::<P>(instance).message) };

@@ -1,5 +1,5 @@
-//! Interfaces of a plugin: function tables by id. Only this crate builds tables, each for the type whose instances its
-//! functions take, so that safe code cannot pass a wrong table to a host.
+//! Interfaces of a plugin: function tables by id. Only this crate builds tables, and the type of a table includes the
+//! type of its instances, so that safe code cannot pass a host a table for instances of another type.
 
 use super::Str;
 use std::ffi::c_void;
@@ -42,7 +42,8 @@ macro_rules! table {
 }
 pub(crate) use table;
 
-/// Function table for instances of `P`. Only the `offer` function of an extension constructs an `Interface`:
+/// Function table for instances of `P`, with its interface id. Only the `offer` function of an extension constructs an
+/// `Interface`:
 ///
 /// ```compile_fail,E0624
 /// use flotor_hal::abi::{Interface, MAGIC};
@@ -61,7 +62,7 @@ impl<P> Interface<P> {
     }
 }
 
-/// Extensions of a plugin type, implemented by the export macros.
+/// List of the extensions of a plugin type `P`, implemented by the export macros.
 pub trait Extensions<P: 'static>: 'static {
     /// Function tables, one per extension.
     const LIST: &'static [Interface<P>];

@@ -1,8 +1,8 @@
-//! The layout table of this build: the rows of every struct and function table of the contract. Every plugin carries a table, in C
-//! too, and the host compares it with its own.
+//! The layout table of this build: the rows of every struct and function table of the contract. Every plugin, also in C,
+//! contains such a table, and the host compares the table of the plugin with its own.
 //!
-//! With feature `layout-proof` a plugin carries a second, independent proof by abi_stable, which also covers function
-//! signatures. The call path does not use the proof, and a plugin without a proof is only "not proven".
+//! With feature `layout-proof` a plugin contains a second, independent proof by abi_stable, which also covers function
+//! signatures. The call path does not use the proof; a plugin without a proof is loaded and reported as not proven.
 
 use super::FieldLayout;
 use crate::{device, extension, frame, model, parameter};
@@ -34,7 +34,7 @@ const fn count(groups: &[&[FieldLayout]]) -> usize {
     total
 }
 
-/// The layout table of this build.
+/// Layout table of this build: the rows that every plugin must have, then the rows of the extensions.
 pub static LAYOUTS: [FieldLayout; COUNT] = {
     let mut table = [FieldLayout::new("", 0, 0); COUNT];
     let (lists, mut at, mut list) = ([CORE, extension::LAYOUTS], 0, 0);

@@ -1,11 +1,11 @@
 //! Plugin metadata as TOML text in a section of the file, readable without running the plugin.
 //!
 //! The text is assembled at compile time by `export_model!` and `export_device!`; a C plugin writes it with
-//! one macro of the header. It survives `strip` and the linker's garbage collection.
+//! one macro of the header. The section survives `strip` and the linker's garbage collection.
 
 use super::{CONTRACT, PluginKind};
 
-/// Name of the ELF section.
+/// Name of the metadata section in ELF and PE files.
 pub const SECTION: &str = ".flotor";
 
 /// Contents of the metadata text.

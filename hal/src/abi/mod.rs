@@ -1,4 +1,4 @@
-//! The binary contract: `#[repr(C)]` tables, one exported entry, text in a section of the file.
+//! The binary contract: `#[repr(C)]` tables, one exported entry, metadata text in a section of the file.
 //!
 //! Plugin authors do not need this module: they implement [`crate::ForceModel`] or [`crate::Device`] and write one
 //! `export_*!` line. C authors include `include/flotor.h`, which is generated from these files.

@@ -20,9 +20,9 @@ pub struct ForceTable {
     pub parameter_count: u32,
     /// Parameter schema, constant.
     pub parameters: *const Parameter,
-    /// Declaration of the model: id, texts, and demands and memory over all settings; constant.
+    /// Declaration of the model: id, texts, and the demands and path dependence that cover all settings; constant.
     pub info: ModelInfo,
-    /// Creates an instance from explicitly set values. Not real-time.
+    /// Creates an instance from explicitly set values and writes the instance to `out`. Not real-time.
     pub create: Option<
         unsafe extern "C" fn(
             values: *const ParameterValue,
@@ -37,10 +37,11 @@ pub struct ForceTable {
     pub prepare: Option<
         unsafe extern "C" fn(instance: Instance, config: *const LoopConfig, message: *mut Message) -> u32,
     >,
-    /// Computes the wrench for a pose. Real-time: no allocation, lock, system call or unwinding.
+    /// Computes the output (wrench, energy, status) for an input. Real-time: no allocation, lock, system call or
+    /// unwinding.
     pub step:
         Option<unsafe extern "C" fn(instance: Instance, input: *const Input, output: *mut Output) -> u32>,
-    /// Computes the wrenches for `count` poses in order. Real-time per pose. May be null: the host then calls `step`.
+    /// Computes the outputs for `count` inputs in order. Real-time per input. May be null: the host then calls `step`.
     pub step_batch: Option<
         unsafe extern "C" fn(
             instance: Instance,
@@ -49,13 +50,14 @@ pub struct ForceTable {
             outputs: *mut Output,
         ) -> u32,
     >,
-    /// Changes a live parameter at a tick boundary. Real-time. May be null.
+    /// Changes the live parameter at `index` at a tick boundary (for a choice, `value` is its index). Real-time. May be
+    /// null.
     pub set_parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32, value: f64) -> u32>,
-    /// Returns the current value of a parameter. Real-time. May be null.
+    /// Returns the current value of the parameter at `index`; NaN if unknown. Real-time. May be null.
     pub parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32) -> f64>,
-    /// Clears the history. Real-time. May be null.
+    /// Clears the history, keeps the parameters. Real-time. May be null.
     pub reset: Option<unsafe extern "C" fn(instance: Instance) -> u32>,
-    /// Writes the reason of the last failure. Not real-time. May be null.
+    /// Writes the message of the last failure to `message`; empty if there is none. Not real-time. May be null.
     pub last_message: Option<unsafe extern "C" fn(instance: Instance, message: *mut Message)>,
 }
 

@@ -86,7 +86,7 @@ impl fmt::Debug for Str {
     }
 }
 
-/// A constant list of words, made by [`crate::choices!`].
+/// Constant list of words, built by [`crate::choices!`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -110,7 +110,7 @@ impl Choices {
         Self { ptr: texts.as_ptr(), len: texts.len() }
     }
 
-    /// Returns the texts; empty if null or longer than memory.
+    /// Returns the texts; empty if null or if the length exceeds the address space.
     #[must_use]
     pub const fn as_slice(&self) -> &[Str] {
         if self.ptr.is_null() || self.len > isize::MAX as usize / size_of::<Str>() {
@@ -144,7 +144,8 @@ impl fmt::Debug for Choices {
 /// Capacity of a [`Message`], bytes.
 pub const MESSAGE_BYTES: usize = 508;
 
-/// Message text for people, written by the callee to memory of the caller: nothing to allocate or to free.
+/// Message for users, at most [`MESSAGE_BYTES`] bytes of UTF-8, written by the callee to memory of the caller: nothing to
+/// allocate or to free.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -169,7 +170,7 @@ impl Message {
         std::str::from_utf8(bytes).is_err().then(|| "a message that is not UTF-8".to_owned())
     }
 
-    /// Stores as much of `text` as fits, cut at a character. Real-time: bounded, no allocation.
+    /// Stores `text`, truncated at a character boundary to [`MESSAGE_BYTES`] bytes. Real-time: bounded, no allocation.
     #[allow(clippy::cast_possible_truncation)] // at most MESSAGE_BYTES
     pub fn set(&mut self, text: &str) {
         let mut len = text.len().min(MESSAGE_BYTES);
@@ -192,7 +193,7 @@ impl Message {
         }
     }
 
-    /// Returns the text up to the first null, for a terminal: bytes that are not UTF-8 become replacement characters,
+    /// Returns the text up to the first NUL byte, for a terminal: bytes that are not UTF-8 become replacement characters,
     /// control characters are escaped. Not real-time.
     #[cfg(feature = "loader")]
     pub(crate) fn for_people(&self) -> String {

@@ -13,7 +13,7 @@ use crate::{DVec3, ForceModel};
 pub enum RegionShape {
     /// The model may act at any position: it is never inactive.
     Everywhere,
-    /// Ball; `half_sides` is its radius three times.
+    /// Ball; each of its half extents is the radius.
     Sphere,
     /// Box with sides along the axes of the model frame.
     Box,
@@ -23,7 +23,7 @@ pub enum RegionShape {
 ///
 /// Outside the region wrench and stored energy are **zero at every orientation and velocity**, and the model has
 /// **no history**: the first step inside is as after [`ForceModel::reset`]. The region may be larger than
-/// necessary, never smaller; the host checks nothing and skips the step.
+/// necessary, never smaller: the host skips the step outside without a check.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -39,13 +39,13 @@ impl ActiveRegion {
     pub const EVERYWHERE: Self =
         Self { shape: 0, reserved: 0, center_m: [0.0; 3], half_sides_m: [f64::INFINITY; 3] };
 
-    /// Returns a ball about `center_m`.
+    /// Builds a ball about `center_m` (m, model frame).
     #[must_use]
     pub const fn sphere(center_m: [f64; 3], radius_m: f64) -> Self {
         Self { shape: 1, reserved: 0, center_m, half_sides_m: [radius_m; 3] }
     }
 
-    /// Returns a box about `center_m` from half its sides, along the axes of the model frame.
+    /// Builds a box about `center_m` from its half extents, both in m, with sides along the axes of the model frame.
     #[must_use]
     pub const fn cuboid(center_m: [f64; 3], half_sides_m: [f64; 3]) -> Self {
         Self { shape: 2, reserved: 0, center_m, half_sides_m }
@@ -66,13 +66,13 @@ impl ActiveRegion {
         }
     }
 
-    /// Returns the centre, m.
+    /// Returns the centre, m, model frame; zero for a region without limits.
     #[must_use]
     pub fn center(&self) -> DVec3 {
         DVec3::from_array(self.center_m)
     }
 
-    /// Returns half the sides of the bounding box, m (for a ball, the radius three times).
+    /// Returns the half extents of the bounding box, m (for a ball, each is the radius).
     #[must_use]
     pub fn half_sides(&self) -> DVec3 {
         DVec3::from_array(self.half_sides_m)

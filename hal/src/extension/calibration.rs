@@ -16,7 +16,7 @@ use crate::{Device, Refusal};
 pub const CALIBRATION_COEFFICIENTS: usize = 8;
 
 /// Smallest and largest plausible ratio of delivered to commanded force. An uneven field is off by tens of percent at
-/// most; a ratio beyond is a mistake, and would multiply the command.
+/// most; a ratio beyond is an error, and the command would multiply it.
 const PLAUSIBLE_SHARE: [f64; 2] = [0.5, 2.0];
 /// Largest distance from the centre in a calibration, m.
 const MOST_RANGE_M: f64 = 1.0;
@@ -24,7 +24,7 @@ const MOST_RANGE_M: f64 = 1.0;
 /// Number of heights at which a calibration is checked: enough for a polynomial of degree seven.
 const CHECKED_HEIGHTS: u32 = 256;
 
-/// Ratio of delivered to commanded vertical force, as a polynomial of the height. 80 bytes.
+/// Ratio of delivered to commanded vertical force, as a polynomial of the height in m. 80 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -36,7 +36,7 @@ pub struct VerticalCalibration {
 /// Reason why a calibration is invalid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InvalidCalibration {
-    /// Range not finite, empty, upside down or implausibly large, m.
+    /// Range of heights that is not finite, empty, reversed or beyond 1 m from the centre, m.
     Range([f64; 2]),
     /// Number of coefficients: none, or more than [`CALIBRATION_COEFFICIENTS`].
     Count(usize),

@@ -1,7 +1,8 @@
 //! Extension `flotor.centerline/1`: centreline of a slender deformable body, for visualisation.
 //!
-//! An observer creates its own instance of the model with the same parameters and queries it at its own rate; the servo
-//! never calls this. A curve with a frame along it draws a rod, a rope or (with turns) a coil spring.
+//! An observer creates its own instance of the model with the same parameters and queries the instance at its own rate;
+//! the servo loop never calls this extension. A curve with a frame along it draws a rod, a rope or (with turns) a coil
+//! spring.
 
 use crate::abi::instance::{call, fill};
 use crate::abi::interface::table;
@@ -95,9 +96,10 @@ pub struct CenterlineTable {
     pub size: u32,
     /// Reserved, 0.
     pub reserved: u32,
-    /// Writes the drawing style of the body.
+    /// Writes the drawing style of the body; returns a [`crate::abi::CallStatus`] code.
     pub info: Option<unsafe extern "C" fn(instance: Instance, out: *mut CenterlineInfo) -> u32>,
-    /// Fills up to `capacity` points; writes the number of valid points to `count`.
+    /// Fills up to `capacity` points from the fixed end to the handle and writes the number of valid points to `count`;
+    /// returns a [`crate::abi::CallStatus`] code.
     pub centerline: Option<
         unsafe extern "C" fn(
             instance: Instance,
@@ -170,7 +172,8 @@ impl Centerline<'_> {
         self.model.calls.query(self.table.info, CenterlineInfo::default())
     }
 
-    /// Returns the centreline at an input, in at most `capacity` points; `None` if the model failed.
+    /// Returns the centreline at an input, from the fixed end to the handle, in at most `capacity` points; `None` if the
+    /// model failed.
     #[must_use]
     pub fn points(&mut self, input: &Input, capacity: usize) -> Option<Vec<Pose>> {
         let (ask, room) = (self.table.centerline?, u32::try_from(capacity).ok()?);

@@ -7,7 +7,7 @@ use crate::abi::layout::layout;
 #[cfg(feature = "loader")]
 use crate::abi::loader::{Plugin, static_list};
 
-/// Access path to a USB device, as a closed set. In C, a number of this value.
+/// Access path to a USB device, as a closed set. In C, a `uint32_t` with these values.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UsbAccess {
@@ -56,13 +56,13 @@ impl UsbKind {
         Self::new(vendor, 0, access)
     }
 
-    /// Returns the vendor id.
+    /// Returns the vendor id (`idVendor`).
     #[must_use]
     pub const fn vendor(&self) -> u16 {
         self.vendor
     }
 
-    /// Returns the product id; `None` for all products of the vendor.
+    /// Returns the product id (`idProduct`); `None` for all products of the vendor.
     #[must_use]
     pub const fn product(&self) -> Option<u16> {
         if self.product == 0 { None } else { Some(self.product) }
@@ -75,7 +75,7 @@ impl UsbKind {
     }
 }
 
-/// Device that declares its connection.
+/// Device that declares its USB identities, so that a host can diagnose the connection before opening the device.
 ///
 /// ```
 /// # use flotor_hal::*;

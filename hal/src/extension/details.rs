@@ -2,7 +2,7 @@
 //!
 //! A model that iterates, switches branches or rolls on its seat has internal numbers beyond the wrench. The model
 //! declares the numbers once; a caller reads them after a step, and `flotor eval --details` prints them as columns. The
-//! servo never calls this.
+//! servo loop never calls this extension.
 
 use crate::abi::instance::call;
 use crate::abi::interface::table;
@@ -24,31 +24,31 @@ pub struct Detail {
 }
 
 impl Detail {
-    /// Declares a number, in SI. `unit` is for people ("rad", "1" for none).
+    /// Declares a number in SI units; `unit` is the unit to display ("rad", "1" for none).
     #[must_use]
     pub const fn number(id: &'static str, unit: &'static str, doc: &'static str) -> Self {
         Self { id: Str::new(id), unit: Str::new(unit), doc: Str::new(doc), words: Choices::EMPTY }
     }
 
-    /// Declares one of a fixed list of words; the value is its index.
+    /// Declares a word from a fixed list; the value is the index of the word.
     #[must_use]
     pub const fn word(id: &'static str, words: Choices, doc: &'static str) -> Self {
         Self { id: Str::new(id), unit: Str::EMPTY, doc: Str::new(doc), words }
     }
 
-    /// Declares a flag: `1` or `0`.
+    /// Declares a flag, with the value 1 or 0.
     #[must_use]
     pub const fn flag(id: &'static str, doc: &'static str) -> Self {
         Self::word(id, choices!["0", "1"], doc)
     }
 
-    /// Returns the name of the column.
+    /// Returns the id, which is the column name in `flotor eval --details`.
     #[must_use]
     pub const fn id(&self) -> &str {
         self.id.as_str()
     }
 
-    /// Returns the unit for people; empty for a word.
+    /// Returns the unit to display; empty for a word or a flag.
     #[must_use]
     pub const fn unit(&self) -> &str {
         self.unit.as_str()
@@ -114,8 +114,9 @@ pub struct DetailsTable {
     pub detail_count: u32,
     /// Diagnostic numbers, constant.
     pub details: *const Detail,
-    /// Writes the values of the last step to `capacity` places, `detail_count` at most; NaN for a missing value.
-    /// Real-time: no allocation, lock, system call or unwinding.
+    /// Writes the `detail_count` values of the last step, NaN for a missing value; returns a [`crate::abi::CallStatus`]
+    /// code, `OutOfRange` if `capacity` is smaller than `detail_count`. Real-time: no allocation, lock, system call or
+    /// unwinding.
     pub values: Option<unsafe extern "C" fn(instance: Instance, values: *mut f64, capacity: u32) -> u32>,
 }
 
@@ -155,8 +156,8 @@ impl Model {
         table.map_or(&[], |table| unsafe { static_list(table.details, table.detail_count) })
     }
 
-    /// Writes the values of the last step, one for each of [`Self::details`]; NaN for a missing value. Real-time:
-    /// bounded by the model, no allocation.
+    /// Writes the values of the last step to `values`, which needs an element for each of [`Self::details`]; NaN for a
+    /// missing value. Real-time: bounded by the model, no allocation.
     pub fn read_details(&mut self, values: &mut [f64]) -> CallStatus {
         let Some(read) = self.extensions.details.and_then(|table| table.values) else {
             return CallStatus::Unsupported;

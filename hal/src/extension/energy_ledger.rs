@@ -10,30 +10,30 @@ use crate::{ActiveDevice, Device};
 
 /// Balance of the mechanical energy of a device with a known plant (a simulation), J since activation. 56 bytes.
 ///
-/// Every term is integrated on its own, none is the difference of others:
-/// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j` is a check, not a definition.
+/// Every term is integrated separately, none is the difference of others, so that this balance is a check:
+/// `stored_j - initial_j = actuators_j + feedforward_j + hand_j - dissipated_j`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct EnergyLedger {
-    /// Kinetic and potential energy now.
+    /// Kinetic and potential energy now, J.
     pub stored_j: f64,
-    /// Kinetic and potential energy at activation.
+    /// Kinetic and potential energy at activation, J.
     pub initial_j: f64,
-    /// Work done by the actuators for the commanded wrench.
+    /// Work done on the handle by the actuators for the commanded wrench, J.
     pub actuators_j: f64,
-    /// Work done by the actuators for gravity compensation.
+    /// Work done on the handle by the actuators for gravity compensation, J.
     pub feedforward_j: f64,
-    /// Work done by the hand.
+    /// Work done on the handle by the hand, J.
     pub hand_j: f64,
-    /// Energy turned into heat by damping.
+    /// Energy turned into heat by damping, J.
     pub dissipated_j: f64,
-    /// Largest mechanical energy (kinetic plus potential above its lowest point) so far: the scale of an error.
+    /// Largest mechanical energy so far (kinetic, plus potential above its lowest point), J: the scale of the residual.
     pub peak_j: f64,
 }
 
 impl EnergyLedger {
-    /// Returns the residual of the balance, J.
+    /// Returns the residual of the balance, J: the stored minus the explained energy, 0 except for integration errors.
     #[must_use]
     pub fn residual_j(&self) -> f64 {
         let explained = self.actuators_j + self.feedforward_j + self.hand_j - self.dissipated_j;

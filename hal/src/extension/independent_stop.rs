@@ -20,7 +20,7 @@ const BY_ITSELF: i32 = -1;
 /// Value of `within_ns` for a device without any independent stop, ns.
 const NEVER_NS: u64 = u64::MAX;
 
-/// Final state of a stopped device. In C, a number of this value.
+/// Final state of a stopped device. In C, a `uint32_t` with these values.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StoppedState {
@@ -30,20 +30,20 @@ pub enum StoppedState {
     Landed = 1,
 }
 
-/// Independent stop of a device, without its host. 88 bytes.
+/// Stop of a device that does not depend on the host's process. 88 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct IndependentStop {
-    /// Time from the end of the host's commands, or from the message, until the device is in its safe state, ns; with
-    /// descriptor -1 the largest number for a device without an independent stop.
+    /// Time from the end of the host's commands, or from the message, until the device is in its safe state, ns. The
+    /// largest number with descriptor -1: no independent stop.
     pub(crate) within_ns: u64,
     /// File descriptor of the host's process, open for writing until the device is closed; the host duplicates the
-    /// descriptor. On Windows the lower 32 bits of a handle. -1: the device stops by itself when no command comes.
+    /// descriptor. On Windows the lower 32 bits of a handle. -1: the device stops by itself without commands.
     pub(crate) descriptor: i32,
     /// Length of the message, bytes, 1 to 64; 0 with descriptor -1.
     pub(crate) length: u32,
-    /// Message written to the descriptor, up to three times: the same bytes at any time, also after half a command.
+    /// Message written to the descriptor, up to three times: stops the device at any time, also after a partial command.
     pub(crate) message: [u8; STOP_MESSAGE_BYTES],
     /// Code of a [`StoppedState`].
     pub(crate) state: u32,
@@ -52,8 +52,8 @@ pub struct IndependentStop {
 }
 
 impl IndependentStop {
-    /// Declares a stop by a message to a descriptor, which is open for writing until the device is closed. The host
-    /// rejects a message that is too long.
+    /// Declares a stop by a message to a descriptor, which is open for writing until the device is closed; the device is
+    /// in `state` at most `within_ns` after the message. The host rejects an empty message and one of more than 64 bytes.
     #[must_use]
     pub fn by_message(descriptor: i32, message: &[u8], state: StoppedState, within_ns: u64) -> Self {
         let mut bytes = [0; STOP_MESSAGE_BYTES];
@@ -69,7 +69,7 @@ impl IndependentStop {
         Self { within_ns, descriptor: BY_ITSELF, length: 0, message, state: state as u32, reserved: 0 }
     }
 
-    /// Declares no independent stop, as without this extension: for plugins with several kinds of devices.
+    /// Declares no independent stop, as a plugin without this extension: for a plugin with several kinds of devices.
     #[must_use]
     pub const fn none() -> Self {
         Self::by_itself(StoppedState::Zero, NEVER_NS)

@@ -26,16 +26,16 @@ pub struct LinearField {
     pub wrench: Wrench,
     /// Rows: force x, y, z (N), torque x, y, z (N·m); columns: position x, y, z (m), rotation x, y, z (rad).
     pub stiffness: [[f64; 6]; 6],
-    /// Range of validity about the anchor, m. Beyond, a host uses the wrench at that distance.
+    /// Radius of validity about the anchor, m; beyond, a host uses the wrench at that distance in the same direction.
     pub valid_m: f64,
-    /// Range of validity in rotation, rad.
+    /// Largest valid rotation from the orientation of the anchor, rad.
     pub valid_rad: f64,
     /// Loop time for which the field was computed, ns.
     pub time_ns: u64,
 }
 
 impl LinearField {
-    /// Field without force.
+    /// Field of zero wrench, valid everywhere.
     pub const NONE: Self = Self {
         anchor: Pose::HOME,
         wrench: Wrench::ZERO,
@@ -45,7 +45,8 @@ impl LinearField {
         time_ns: 0,
     };
 
-    /// Builds a field of a force that depends on position only; `slope_n_per_m` is its derivative along x, y and z.
+    /// Builds the field of a force that depends on position only, with the anchor at the pose of `input`. `slope_n_per_m`
+    /// has the derivatives of the force along x, y and z; the stiffness is their negative.
     #[must_use]
     pub fn of_force(input: &Input, force_n: DVec3, slope_n_per_m: [DVec3; 3], valid_m: f64) -> Self {
         let mut stiffness = [[0.0; 6]; 6];
@@ -66,7 +67,8 @@ impl LinearField {
         }
     }
 
-    /// Returns true if every number that enters a wrench is finite. Real-time: bounded, no allocation.
+    /// Returns true if anchor, wrench and stiffness are finite and the range of validity is neither negative nor NaN.
+    /// Real-time: bounded, no allocation.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.anchor.is_finite()
@@ -76,8 +78,8 @@ impl LinearField {
             && self.valid_rad >= 0.0
     }
 
-    /// Returns the wrench at a pose, and true if the pose is within the range of validity; beyond, the wrench is that
-    /// at the edge in the same direction. Real-time: bounded, no allocation.
+    /// Returns the wrench at a pose, and true if the pose is within the range of validity; beyond, the wrench is
+    /// taken at the edge of this range in the same direction. Real-time: bounded, no allocation.
     #[must_use]
     pub fn at(&self, pose: &Pose) -> (Wrench, bool) {
         let (position_m, is_near) = shortened(pose.position() - self.anchor.position(), self.valid_m);
@@ -182,7 +184,7 @@ impl Model {
         self.extensions.linear_field.is_some_and(|table| table.linear_field.is_some())
     }
 
-    /// Computes the field at an input. Not real-time. `field` is only meaningful for [`CallStatus::Ok`].
+    /// Computes the field at an input; `field` is valid only if the result is [`CallStatus::Ok`]. Not real-time.
     pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> CallStatus {
         let Some(ask) = self.extensions.linear_field.and_then(|table| table.linear_field) else {
             return CallStatus::Unsupported;

@@ -1,5 +1,6 @@
-//! Extensions: optional interfaces of a plugin beside its main interface. Each is one file, named like its trait, its table, its
-//! id and its name in [`crate::export_model!`] or [`crate::export_device!`]; one line here makes a host look for it.
+//! Extensions: optional interfaces of a plugin beside its main interface. Each is one file, named like its trait, its
+//! table, its id and its name in [`crate::export_model!`] or [`crate::export_device!`]; one line in this module makes a
+//! host look for the extension.
 #![allow(unsafe_code)]
 
 pub mod active_region;

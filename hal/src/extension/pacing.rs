@@ -14,7 +14,7 @@ use crate::{ActiveDevice, Device};
 pub enum SampleWait {
     /// The device does not set the pace.
     NotPaced,
-    /// No sample came in time.
+    /// No sample arrived before the timeout.
     TimedOut,
     /// A sample is ready to be read.
     Arrived {
@@ -24,7 +24,7 @@ pub enum SampleWait {
 }
 
 impl SampleWait {
-    /// Returns the number of samples for the plugin boundary; 0 after a timeout.
+    /// Returns the number of samples for the plugin boundary; 0 if no sample arrived.
     const fn samples(self) -> u64 {
         match self {
             Self::NotPaced | Self::TimedOut => 0,
@@ -74,7 +74,7 @@ impl SampleWait {
 /// ```
 pub trait PacingDevice: ActiveDevice {
     /// Waits for a sample that no earlier wait has reported, for `timeout_ns` at most. Called before each `read` of a
-    /// run that the device paces. Real-time but for the waiting: no allocation.
+    /// run that the device paces. Real-time except for the wait: no allocation.
     fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait;
 }
 
@@ -89,7 +89,7 @@ pub struct PacingTable {
     pub reserved: u32,
     /// Waits for a sample that no earlier wait has reported, for `timeout_ns` at most; writes the number of samples
     /// taken since the last successful wait, 0 after a timeout. Returns a [`crate::abi::CallStatus`] code. Real-time
-    /// but for the waiting: no allocation.
+    /// except for the wait: no allocation.
     pub wait_for_sample:
         Option<unsafe extern "C" fn(instance: Instance, timeout_ns: u64, samples: *mut u64) -> u32>,
 }
@@ -129,7 +129,7 @@ impl loader::OpenedDevice {
 
 #[cfg(feature = "loader")]
 impl loader::ActiveDevice {
-    /// Waits for the device's next sample, for `timeout_ns` at most. Real-time but for the waiting: no allocation.
+    /// Waits for the device's next sample, for `timeout_ns` at most. Real-time except for the wait: no allocation.
     pub fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
         let pacing = self.extensions().and_then(|extensions| extensions.pacing);
         let Some(wait) = pacing.and_then(|table| table.wait_for_sample) else { return SampleWait::NotPaced };

@@ -1,8 +1,8 @@
 //! Extension `flotor.shape/1`: shape of a body that is not slender, for visualisation.
 //!
 //! Primitives (plane, sphere, box, cylinder) for rigid bodies and for the tool, and one triangle surface with normals
-//! and one scalar per vertex, which a name and a unit explain. As with a centreline, an observer creates its own
-//! instance of the model and queries it at its own rate; the servo never calls this.
+//! and one scalar per vertex, whose name and unit are declared. As with a centreline, an observer creates its own
+//! instance of the model and queries the instance at its own rate; the servo loop never calls this extension.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -14,11 +14,11 @@ use crate::{DVec3, ForceModel, Input, Pose};
 #[cfg(feature = "loader")]
 use std::ptr::null;
 
-/// Form of a [`Primitive`]. In C, a number of this value.
+/// Form of a [`Primitive`]. In C, a `uint32_t` with these values.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Rectangle across z at the pose; the solid is below the rectangle.
+    /// Rectangle normal to the z axis of the pose; the solid is on the side of negative z.
     Plane = 0,
     /// A ball.
     Sphere = 1,
@@ -28,7 +28,7 @@ pub enum Form {
     Cylinder = 3,
 }
 
-/// Role of a [`Primitive`]: touched body or tool. In C, a number of this value.
+/// Role of a [`Primitive`]: touched body or tool. In C, a `uint32_t` with these values.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
@@ -49,19 +49,19 @@ pub struct Primitive {
     part: u32,
     /// Centre (m, model frame) and orientation.
     pose: Pose,
-    /// Half sides along the axes of the pose, m.
+    /// Half extents along the axes of the pose, m.
     half_sides_m: [f64; 3],
 }
 
 impl Primitive {
-    /// Builds a body from half its sides, m: a plane has no third side, a sphere three equal ones (its radius), a
-    /// cylinder its radius twice and half its height.
+    /// Builds a body from its half extents: of a plane only the first two count, of a sphere each is the radius, of a
+    /// cylinder the first two are the radius and the third is half the height.
     #[must_use]
     pub const fn new(form: Form, part: Part, pose: Pose, half_sides_m: [f64; 3]) -> Self {
         Self { form: form as u32, part: part as u32, pose, half_sides_m }
     }
 
-    /// Builds a ball.
+    /// Builds a sphere with its centre at the position of `pose`.
     #[must_use]
     pub const fn sphere(part: Part, pose: Pose, radius_m: f64) -> Self {
         Self::new(Form::Sphere, part, pose, [radius_m; 3])
@@ -91,7 +91,7 @@ impl Primitive {
         self.pose
     }
 
-    /// Returns the half sides along the axes of the pose, m.
+    /// Returns the half extents along the axes of the pose, m.
     #[must_use]
     pub const fn half_sides_m(&self) -> [f64; 3] {
         self.half_sides_m
@@ -107,11 +107,11 @@ pub struct SurfaceVertex {
     pub position_m: [f64; 3],
     /// Outward unit normal.
     pub normal: [f64; 3],
-    /// Value of the field at this vertex, in its unit; 0 without a field.
+    /// Value of the scalar field at this vertex, in the unit of [`ScalarField`]; 0 without a field.
     pub value: f64,
 }
 
-/// Visible sides of a surface. In C, a number of this value.
+/// Visible sides of a surface. In C, a `uint32_t` with these values.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sides {
@@ -132,10 +132,10 @@ pub struct ScalarField {
 }
 
 impl ScalarField {
-    /// No field: the numbers are not shown.
+    /// No field: the vertex values are not displayed.
     pub const NONE: Self = Self::new("", "");
 
-    /// Declares a field by texts for people: "contact pressure", "kPa".
+    /// Declares a field by display name and unit, such as "contact pressure" and "kPa".
     #[must_use]
     pub const fn new(name: &'static str, unit: &'static str) -> Self {
         Self { name: Str::new(name), unit: Str::new(unit) }
@@ -166,7 +166,7 @@ impl PartialEq for ScalarField {
     }
 }
 
-/// Triangle surface; empty for none.
+/// Triangle mesh with normals and one scalar per vertex; empty if the model has no surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Surface {
     /// Vertices of the triangles.
@@ -237,8 +237,9 @@ pub struct Shape {
 /// assert_eq!(shape.primitives[1].pose(), Pose::HOME);
 /// ```
 pub trait ShapeModel: ForceModel {
-    /// Returns the shape with the handle at an input, with the current parameters. The model stores the shape until the next call, so that
-    /// a picture allocates nothing. A model with a history shows its rest state for a handle that stays at the input.
+    /// Returns the shape with the handle at an input, with the current parameters. The model stores the shape until the
+    /// next call, so that repeated calls need not allocate. A model with a history returns its equilibrium for a handle
+    /// held at the input.
     fn shape(&mut self, input: &Input) -> &Shape;
 }
 
@@ -337,7 +338,7 @@ table!(ShapeTable: "flotor.shape/1", M: [ShapeModel] {
 pub enum InvalidShape {
     /// The model failed.
     Failed,
-    /// More vertices, triangles or primitives than the limit.
+    /// 2^20 or more vertices, triangles or primitives.
     TooLarge,
     /// Neither a primitive nor a triangle.
     Empty,
@@ -367,7 +368,7 @@ impl std::fmt::Display for InvalidShape {
 
 impl std::error::Error for InvalidShape {}
 
-/// Maximum number of vertices, triangles or primitives.
+/// Exclusive limit on the number of vertices, triangles or primitives.
 #[cfg(feature = "loader")]
 const MOST: u32 = 1 << 20;
 /// Maximum length of a name or unit, bytes.
@@ -375,7 +376,8 @@ const MOST: u32 = 1 << 20;
 const MOST_TEXT_BYTES: usize = 64;
 
 impl Shape {
-    /// Checks a shape from another source. Not real-time.
+    /// Checks that the shape is not empty, its numbers are finite, no side is negative and no index is out of range. Not
+    /// real-time.
     ///
     /// # Errors
     /// [`InvalidShape`] if the shape is empty or has an invalid number or index.

@@ -1,8 +1,8 @@
 //! Extension `flotor.soft-range/1`: range in which a live parameter of a model is usefully changed by hand.
 //!
-//! The legal range of a parameter covers all that a model can compute, often many powers of ten. A slider over it is of
-//! no use and does harm: a few pixels are a change no hand expects. A slider covers the soft range instead, and a host
-//! changes a live parameter at a rate derived from it. A value beyond the soft range is legal, and is typed.
+//! The legal range of a parameter often spans many powers of ten. A slider over the legal range would be useless and
+//! dangerous: a few pixels could change the force abruptly. A slider covers the soft range instead, and a host changes a
+//! live parameter at a rate derived from the soft range. A value beyond the soft range is legal, but has to be typed.
 //!
 //! For a parameter without a declared soft range, a host uses [`SoftRange::around`] the current value.
 
@@ -32,14 +32,17 @@ impl SoftRange {
     /// Number of steps of an undeclared range.
     const STEPS: f64 = 100.0;
 
-    /// Declares the soft range of a parameter: smallest and largest number, and the step of a key, in its unit.
+    /// Declares the soft range of a parameter: smallest and largest number, and the step per key press, in the
+    /// parameter's unit.
     #[must_use]
     pub const fn new(id: &'static str, min: f64, max: f64, step: f64) -> Self {
         Self { id: Str::new(id), min, max, step }
     }
 
-    /// Returns a range for a parameter without a declared one: from a third of a value to three times the value, and about zero a
-    /// twentieth of the legal range to both sides; never beyond the legal range. `None` unless a number with a range.
+    /// Returns a soft range about `value`, within the legal range, for a parameter without a declared one. For a positive
+    /// value of a parameter that cannot be negative: from a third of the value to three times the value. Otherwise
+    /// the range extends to both sides of the value by twice its magnitude, at least by a twentieth of the legal range.
+    /// `None` for a parameter that is not a number with a finite range.
     #[must_use]
     pub fn around(parameter: &'static Parameter, value: f64) -> Option<Self> {
         let value = if value.is_finite() { value } else { parameter.default() };
@@ -53,7 +56,8 @@ impl SoftRange {
         Self::new(parameter.id(), low, high, (high - low) / Self::STEPS).within(parameter)
     }
 
-    /// Returns the legal part of the range; `None` for a parameter that is not a number, and if no part is legal.
+    /// Returns the legal part of the range; `None` for a parameter that is not a number, if no part is legal, or if the
+    /// step is not positive.
     #[must_use]
     pub fn within(self, parameter: &'static Parameter) -> Option<Self> {
         let is_number = matches!(parameter.kind(), ParameterKind::Real);
@@ -68,19 +72,19 @@ impl SoftRange {
         self.id.as_str()
     }
 
-    /// Returns the smallest number, in the parameter's unit.
+    /// Returns the lower end of the soft range, in the parameter's unit.
     #[must_use]
     pub const fn min(&self) -> f64 {
         self.min
     }
 
-    /// Returns the largest number, in the parameter's unit.
+    /// Returns the upper end of the soft range, in the parameter's unit.
     #[must_use]
     pub const fn max(&self) -> f64 {
         self.max
     }
 
-    /// Returns the step of a key, in the parameter's unit.
+    /// Returns the step per key press, in the parameter's unit.
     #[must_use]
     pub const fn step(&self) -> f64 {
         self.step

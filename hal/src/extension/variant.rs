@@ -9,7 +9,7 @@ use crate::abi::layout::layout;
 use crate::abi::{Instance, ModelAdapter};
 use crate::{Demand, ForceModel, Memory};
 
-/// Demands and memory of one instance; constant over its life. 8 bytes.
+/// Demands that one instance serves, and its path dependence; constant over the life of the instance. 8 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -19,7 +19,7 @@ pub struct VariantInfo {
 }
 
 impl VariantInfo {
-    /// Declares demands and memory; `serves` is at most the demands of [`crate::ModelInfo::serving`] for all settings.
+    /// Declares demands and path dependence; a host ignores demands beyond those of [`crate::ModelInfo::serving`].
     #[must_use]
     pub const fn new(serves: Demand, memory: Memory) -> Self {
         Self { serves, memory: memory as u32 }

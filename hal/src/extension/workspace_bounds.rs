@@ -1,7 +1,8 @@
 //! Extension `flotor.workspace-bounds/1`: workspace limits of a force model.
 //!
 //! A spring ends where its coils touch, a table of measured forces at the last measurement. Beyond, the model still
-//! returns a wrench, but not that of the real object. A host puts a wall at these limits, if its own is farther out.
+//! returns a wrench, but not that of the real object. A host renders a wall at these limits if its own wall is farther
+//! out.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
@@ -24,7 +25,7 @@ impl WorkspaceBounds {
     /// Bounds without a limit on any axis.
     pub const UNBOUNDED: Self = Self { lower_m: [f64::NEG_INFINITY; 3], upper_m: [f64::INFINITY; 3] };
 
-    /// Builds bounds from `lower_m` to `upper_m`; infinite for no limit.
+    /// Builds bounds from `lower_m` to `upper_m` (m, model frame); infinite for no limit.
     #[must_use]
     pub const fn between(lower_m: [f64; 3], upper_m: [f64; 3]) -> Self {
         Self { lower_m, upper_m }
@@ -36,8 +37,8 @@ impl WorkspaceBounds {
         [self.lower_m, self.upper_m]
     }
 
-    /// Returns true if there is any limit. A box with home outside, or with a NaN limit, bounds nothing: a wall there
-    /// would throw the handle out of the start position of a run.
+    /// Returns true if any axis has a limit; false for a box that excludes home or has a NaN limit, because a wall there
+    /// would push the handle away from the start position of a run.
     #[must_use]
     pub fn is_bounded(&self) -> bool {
         let (lower, upper) = (DVec3::from_array(self.lower_m), DVec3::from_array(self.upper_m));

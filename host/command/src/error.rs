@@ -1,7 +1,8 @@
 //! Errors of commands, and their exit codes.
 //!
-//! Exit codes are a contract: 0 ok, 2 usage or configuration, 3 a plugin was refused, 4 device fault, 1 else;
-//! 130 after the third signal that requests an end, or the first one before anything is energised.
+//! Exit codes are a contract: 0 success, 2 invalid usage or configuration, 3 a plugin was refused or failed, 4 device fault or
+//! emergency stop, 1 any other error; 130 after the third signal that requests an end, or after the first signal if no device has
+//! been energised.
 
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
@@ -18,18 +19,18 @@ pub enum CommandError {
     /// The command line or a configuration is invalid.
     #[error("{0}")]
     Usage(String),
-    /// A run could not start.
+    /// A run could not start or be carried out.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A device faulted.
+    /// A device faulted; for commands without path and message of the device.
     #[error("device fault: {}", .0.advice())]
     DeviceFault(Fault),
-    /// A device faulted in a run.
+    /// A device faulted, with its path and message.
     #[error("{}: device fault: {}{}", path.display(), before_advice(words), fault.advice())]
     RunFault {
-        /// The plugin's file.
+        /// Path of the device plugin's shared library.
         path: PathBuf,
-        /// Kind of fault, with its advice.
+        /// Kind of fault.
         fault: Fault,
         /// Message of the device; may be empty.
         words: String,
@@ -37,7 +38,7 @@ pub enum CommandError {
     /// A run ended, not in order.
     #[error("{}", ended(*.0))]
     RunEnded(RunEnd),
-    /// The device sets the pace, at a rate above the scene's.
+    /// The device sets the pace, at a rate above the loop rate of the scene.
     #[error(
         "the device paces the loop with {samples_per_s} samples a second, above the scene's `rate_hz = {rate_hz}`: ramps would be \
          too short and slew limits too high; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
@@ -48,7 +49,7 @@ pub enum CommandError {
         /// Loop rate of the scene, Hz.
         rate_hz: f64,
     },
-    /// A plugin was refused.
+    /// A plugin was refused, with the reason.
     #[error("{0}")]
     PluginRefused(String),
     /// A file could not be written or read.
@@ -64,10 +65,10 @@ pub enum CommandError {
     /// A recording could not be written or read.
     #[error(transparent)]
     Record(#[from] RecordError),
-    /// A recording could not be replayed.
+    /// A recording could not be read.
     #[error(transparent)]
     Read(#[from] flotor_record::ReadError),
-    /// A failure with its message.
+    /// Any other failure, with its message.
     #[error("{0}")]
     Failed(String),
 }
@@ -131,7 +132,7 @@ impl CommandError {
     }
 }
 
-/// Returns the message of a device, to precede the advice for its fault; empty without a message.
+/// Formats the message of a device for the place before the advice on its fault: with a trailing semicolon, or empty without a message.
 #[must_use]
 pub fn before_advice(words: &str) -> String {
     if words.is_empty() { String::new() } else { format!("{words}; ") }

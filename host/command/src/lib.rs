@@ -1,14 +1,14 @@
 //! Command line library shared by Flotor's programs.
 //!
 //! - [`CommandError`]: errors of commands, with the exit code that is a contract.
-//! - [`options`]: options of several commands, and their parsers.
-//! - [`say!`], [`print_result`], [`write_json`], [`write_text`]: results for people and for machines.
+//! - [`options`]: options that several commands have, and parsers of option values.
+//! - [`say!`], [`print_result`], [`write_json`], [`write_text`]: output of results, human-readable or as JSON.
 //! - [`tables`]: results as tables.
-//! - [`supervised`]: a command in its own process, of which no unreported end counts as success.
-//! - [`PluginProcess`]: a process for the code of plugins, which ends with the command.
+//! - [`supervised`]: execution of a command in a child process, whose end counts as an error unless the host has reported success.
+//! - [`PluginProcess`]: a process that runs plugin code and ends with the command.
 //! - [`stopping`]: signals and keys that end a run.
-//! - [`separate`]: programs beside this one that carry out a command.
-//! - [`reference()`]: every command with its arguments, for the book; [`whole_program`]: the parser with all of them, for man pages.
+//! - [`separate`]: separate programs in the folder of this one, which execute some commands.
+//! - [`reference()`]: every command with its arguments, for the book; [`whole_program`]: the parser of all commands, for man pages.
 //!
 //! Not real-time throughout.
 

@@ -1,4 +1,4 @@
-//! Options of several commands, and their parsers.
+//! Options that several commands have, and parsers of option values.
 
 use crate::CommandError;
 use clap::{Args, Command, CommandFactory, Parser, Subcommand, ValueEnum};
@@ -17,12 +17,12 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Size of the smallest stack on which the description of all options fits in every build, bytes.
+/// Smallest stack size with which the parser of all options works in every build, bytes.
 const LEAST_STACK_BYTES: u64 = 1 << 20;
 
-/// Parses the arguments of this process. A negative number is the value of its option, whose parser checks it: without
-/// this, clap takes it for another option. Ends the process if its stack is too small for the parser. Restores the default
-/// action of interrupts first: a shell ignores them for its commands in the background. Not real-time.
+/// Parses the arguments of this process; ends the process after an invalid argument, `--help` or `--version`, and if the stack is
+/// too small for the parser. A negative number counts as the value of an option, not as another option. First restores the default
+/// action of interrupts, which a shell ignores for commands in the background. Not real-time.
 pub fn arguments<T: Parser>() -> T {
     crate::platform::accept_interrupts();
     if let Some(bytes) = crate::platform::stack_limit_bytes().filter(|bytes| *bytes < LEAST_STACK_BYTES) {
@@ -49,13 +49,13 @@ struct SeparateArguments<C: Subcommand> {
     command: C,
 }
 
-/// Returns the parser of a program that `flotor` starts for these commands. Not real-time.
+/// Returns the parser of a separate program that `flotor` starts for the commands `C`. Not real-time.
 #[must_use]
 pub fn parser_of<C: Subcommand>() -> Command {
     SeparateArguments::<C>::command()
 }
 
-/// Parses the command of this process, a program that `flotor` starts; as [`arguments`] does.
+/// Parses the command of this process, a separate program that `flotor` starts, as [`arguments`] does.
 pub fn command_of<C: Subcommand>() -> C {
     arguments::<SeparateArguments<C>>().command
 }
@@ -91,13 +91,13 @@ pub struct SceneOptions {
 }
 
 impl SceneOptions {
-    /// Returns the strength that `--allow-strong` selects.
+    /// Returns the strength permitted to devices: above the host's ceiling with `--allow-strong`.
     #[must_use]
     pub fn strength(&self) -> Strength {
         if self.allow_strong { Strength::Strong } else { Strength::UnderCeiling }
     }
 
-    /// Adds the folders of plugins and the consent to a shared control group to a scene.
+    /// Adds the plugin folders and the consent to a shared control group to a scene.
     pub fn apply(&self, scene: &mut Scene) {
         self.plugin_path.put_before_those_of(scene);
         self.control_group.apply(&mut scene.limits);
@@ -130,18 +130,18 @@ pub struct ControlGroupOption {
 }
 
 impl ControlGroupOption {
-    /// Adds the consent to that of a scene.
+    /// Sets the consent in the limits of a scene, if it was given on the command line.
     pub fn apply(self, limits: &mut Limits) {
         limits.accept_shared_control_group |= self.accept_shared_control_group;
     }
 
-    /// Returns true if the consent was given.
+    /// Returns true if the consent was given on the command line.
     #[must_use]
     pub fn is_accepted(self) -> bool {
         self.accept_shared_control_group
     }
 
-    /// Returns the option, if it was given, for another process of Flotor.
+    /// Returns the option as an argument for another process of Flotor; none if it was not given.
     pub fn arguments(self) -> impl Iterator<Item = &'static str> {
         self.accept_shared_control_group.then_some("--accept-shared-control-group").into_iter()
     }
@@ -162,18 +162,18 @@ impl PluginPathOption {
         &self.folders
     }
 
-    /// Returns a registry of the plugins in the given folders and in the default ones. Not real-time.
+    /// Searches the given folders, then the default folders, and returns the registry of their plugins. Not real-time.
     #[must_use]
     pub fn registry(&self) -> Registry {
         Registry::search(&self.folders)
     }
 
-    /// Inserts the folders before those that the scene names.
+    /// Inserts the given folders before the plugin folders of the scene.
     pub fn put_before_those_of(&self, scene: &mut Scene) {
         scene.plugin_folders.splice(0..0, self.folders.iter().cloned());
     }
 
-    /// Returns the option with its values, for another process of Flotor.
+    /// Returns the option with its folders as arguments for another process of Flotor.
     pub fn arguments(&self) -> impl Iterator<Item = &OsStr> {
         self.folders.iter().flat_map(|folder| [OsStr::new("--plugin-path"), folder.as_os_str()])
     }
@@ -189,13 +189,13 @@ pub struct JsonOption {
 }
 
 impl JsonOption {
-    /// Returns the file for the JSON, `-` for standard output; `None` without the option.
+    /// Returns the path of the JSON file, `-` for standard output; `None` without the option.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         self.json.as_deref()
     }
 
-    /// Returns true if the JSON is all that appears on standard output.
+    /// Returns true if the JSON goes to standard output, which then has no other output.
     #[must_use]
     pub fn is_on_standard_output(&self) -> bool {
         self.file().is_some_and(|file| file.as_os_str() == "-")
@@ -205,7 +205,7 @@ impl JsonOption {
 /// Parses a duration in seconds from `10`, `10s`, `500ms`, `2min` or `1h`.
 ///
 /// # Errors
-/// If the text is no duration, or not from 0 to 1 year.
+/// If the text is not a duration from 0 to 1 year.
 pub fn duration_s(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let split = text.find(|c: char| c.is_ascii_alphabetic()).unwrap_or(text.len());
@@ -227,15 +227,15 @@ pub fn duration_s(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Parses a loop rate in Hz.
+/// Parses a loop rate in Hz, with or without the unit.
 ///
 /// # Errors
-/// If the text is no rate, or not from 100 to 10000 Hz.
+/// If the text is not a rate from 100 to 10000 Hz.
 pub fn rate_hz(text: &str) -> Result<f64, String> {
     number("Hz", "rate", 100.0..=10_000.0)(text)
 }
 
-/// Returns the parser of a number in a unit, which may be left out; its errors call the number `what`.
+/// Returns a parser of numbers in the range `legal`, with or without the unit; the parser's error messages call the number `what`.
 pub fn number(
     unit: &'static str,
     what: &'static str,
@@ -250,7 +250,7 @@ pub fn number(
     }
 }
 
-/// Returns the parser of a whole number in a range.
+/// Returns a parser of whole numbers in the range `legal`.
 pub fn count<T: FromStr + PartialOrd + Display + Clone>(
     legal: RangeInclusive<T>,
 ) -> impl Fn(&str) -> Result<T, String> + Clone {
@@ -273,26 +273,27 @@ pub fn new_file(text: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Parses the path of a picture.
+/// Parses the path of a picture to write, `.svg` or without extension.
 ///
 /// # Errors
-/// If the file cannot be written, or its name has the extension of another kind of file.
+/// If the path has no file name or another extension, or its folder does not exist.
 pub fn svg_file(text: &str) -> Result<PathBuf, String> {
     file_of(text, "svg")?.ok_or_else(|| "the picture is an SVG; name it FILE.svg".to_owned())
 }
 
-/// Parses the path of a recording.
+/// Parses the path of a recording to write, `.mcap` or without extension.
 ///
 /// # Errors
-/// If the file cannot be written, or its name has the extension of another kind of file.
+/// If the path has no file name or another extension, or its folder does not exist.
 pub fn mcap_file(text: &str) -> Result<PathBuf, String> {
     file_of(text, "mcap")?.ok_or_else(|| "the recording is an MCAP file; name it FILE.mcap".to_owned())
 }
 
-/// Parses the path of a JSON file. Its name ends in `.json`: an option with an optional file would otherwise overwrite the next argument.
+/// Parses the path of a JSON file to write. The extension has to be `.json`, except for a pipe or a device: an option with an
+/// optional file would otherwise overwrite the file named by the next argument.
 ///
 /// # Errors
-/// If the file cannot be written, or its name has the extension of another kind of file.
+/// If the path has no file name or another extension, or its folder does not exist.
 pub fn json_file(text: &str) -> Result<PathBuf, String> {
     let file = new_file(text)?;
     let is_json = file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
@@ -309,7 +310,7 @@ fn json_output(text: &str) -> Result<PathBuf, String> {
     json_file(text).map_err(|problem| format!("{problem}, or write - for standard output"))
 }
 
-/// Parses the path of a folder.
+/// Parses the path of an existing folder.
 ///
 /// # Errors
 /// If the folder does not exist.
@@ -318,16 +319,16 @@ pub fn folder(text: &str) -> Result<PathBuf, String> {
     if folder.is_dir() { Ok(folder) } else { Err("no such folder".to_owned()) }
 }
 
-/// Returns the path of a new file if it has this extension or none.
+/// Parses the path of a file to write; `None` if it has an extension other than `kind`.
 fn file_of(text: &str, kind: &str) -> Result<Option<PathBuf>, String> {
     let file = new_file(text)?;
     Ok(file.extension().is_none_or(|extension| extension.eq_ignore_ascii_case(kind)).then_some(file))
 }
 
-/// Parses a number, such as a share.
+/// Parses a number, such as a fraction.
 ///
 /// # Errors
-/// If the text is no number.
+/// If the text is not a number.
 pub fn real(text: &str) -> Result<f64, String> {
     text.trim().parse().map_err(|_| "write a number such as 0.75".to_owned())
 }
@@ -335,7 +336,7 @@ pub fn real(text: &str) -> Result<f64, String> {
 /// Parses a seed, at most [`LARGEST_SEED`].
 ///
 /// # Errors
-/// If the text is no whole number in this range.
+/// If the text is not a whole number in this range.
 pub fn seed(text: &str) -> Result<u64, String> {
     let number = text.trim().parse().ok().filter(|seed| *seed <= LARGEST_SEED);
     number.ok_or_else(|| {
@@ -346,14 +347,14 @@ pub fn seed(text: &str) -> Result<u64, String> {
 /// Parses the number of a processor core.
 ///
 /// # Errors
-/// If the text is no number, or the system has no core with this number.
+/// If the text is not a number, or the system cannot address a core with this number.
 pub fn core(text: &str) -> Result<Core, String> {
     let number =
         text.trim().parse().map_err(|_| format!("invalid core number `{text}`; write a whole number"))?;
     Core::new(number).ok_or_else(|| format!("no core {number} on this machine"))
 }
 
-/// Checks the values `KEY=VALUE` of an option, such as `--set`, against the schema of a plugin.
+/// Parses the values `KEY=VALUE` of an option, such as `--set`, with the parameter schema of a plugin.
 ///
 /// # Errors
 /// If the schema has no such parameter, or the value is invalid.

@@ -1,4 +1,4 @@
-//! Output of commands, for people and for machines.
+//! Output of commands: human-readable text, JSON and errors.
 
 use crate::platform::results_apart;
 use crate::style::for_terminal;
@@ -10,14 +10,15 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::OnceLock;
 
-/// Prints a line; a closed pipe (`flotor plugins | head`) ends the program without a message.
+/// Prints a formatted line on standard output; a closed pipe (`flotor plugins | head`) ends the program without a message, with
+/// exit code 0.
 #[macro_export]
 macro_rules! say {
     ($($text:tt)*) => { $crate::print_line(format_args!($($text)*)) };
 }
 
-/// Returns the exit code of a command, prints its error, and reports its end to the supervisor. Ends the process itself if a plugin's
-/// code has not returned, because the exit handlers of the process might wait for that code. Not real-time.
+/// Prints the error of a command, reports the exit code to the supervisor and returns it. Ends the process at once if a call of a
+/// plugin has not returned, because the exit handlers of the process might wait for that call. Not real-time.
 pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
     let code = match result {
         Ok(()) => 0,
@@ -34,10 +35,10 @@ pub fn exit_code_of(result: Result<(), CommandError>) -> ExitCode {
     ExitCode::from(code)
 }
 
-/// Standard output, if it is reserved for results.
+/// Duplicate of standard output, if that is reserved for results.
 static RESULTS: OnceLock<File> = OnceLock::new();
 
-/// Reserves standard output for results of this program: what a plugin prints there goes to standard error. Not real-time.
+/// Reserves standard output for results of this program: output of plugins to standard output goes to standard error. Not real-time.
 ///
 /// # Errors
 /// Errors of the system.
@@ -59,7 +60,8 @@ fn write_line(line: std::fmt::Arguments<'_>) -> std::io::Result<()> {
     }
 }
 
-/// Prints the line of `say!`.
+/// Prints a line on standard output, with control characters escaped, for `say!`. Ends the process if the line cannot be written:
+/// with code 0 for a closed pipe, otherwise 1.
 pub fn print_line(line: std::fmt::Arguments<'_>) {
     if let Err(error) = write_line(format_args!("{}", for_terminal(line))) {
         let code = if error.kind() == std::io::ErrorKind::BrokenPipe { 0 } else { 1 };
@@ -68,15 +70,16 @@ pub fn print_line(line: std::fmt::Arguments<'_>) {
     }
 }
 
-/// Prints a line for people where the command has more to do, or an exit code of its own: a closed pipe does not end the program.
+/// Prints a human-readable line without ending the program at a closed pipe: for commands that continue afterwards, or have an exit
+/// code of their own.
 ///
 /// # Errors
-/// If standard output cannot be written; a closed pipe is no error.
+/// If standard output cannot be written; a closed pipe is not an error.
 pub fn report_line(line: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
     report_text(format_args!("{}", for_terminal(line)))
 }
 
-/// Prints a text for machines, unchanged; a closed pipe is no error.
+/// Prints a machine-readable text unchanged; a closed pipe is not an error.
 fn report_text(text: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
     match write_line(text) {
         Err(cause) if cause.kind() != std::io::ErrorKind::BrokenPipe => {
@@ -86,17 +89,18 @@ fn report_text(text: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
     }
 }
 
-/// Prints a line for people on standard error. Unlike `eprintln!` it does not panic on a closed pipe, which would lose the exit code.
+/// Prints a human-readable line on standard error. Unlike `eprintln!` it does not panic on a closed pipe, after which the exit code
+/// would be wrong.
 pub fn print_error_line(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(std::io::stderr(), "{}", for_terminal(line));
 }
 
-/// Prints a note on standard error; it changes no exit code.
+/// Prints a note on standard error, without effect on the exit code.
 pub fn note(text: impl std::fmt::Display) {
     print_error_line(format_args!("{} {text}", style::warning("note:")));
 }
 
-/// Returns the first error, which determines the exit code and which the caller prints last; prints the others.
+/// Prints all errors except the first, and returns the first, which determines the exit code and which the caller prints last.
 ///
 /// # Errors
 /// The first error of the results.
@@ -109,7 +113,7 @@ pub fn first_error(results: impl IntoIterator<Item = Result<(), CommandError>>) 
     first.map_or(Ok(()), Err)
 }
 
-/// Writes a result for machines to a file, `-` for standard output.
+/// Writes a result as JSON to a file, `-` for standard output.
 ///
 /// # Errors
 /// If the file or standard output cannot be written.
@@ -123,7 +127,7 @@ pub fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<(), Com
         .map_err(|cause| CommandError::file(path, "cannot write the JSON", cause))
 }
 
-/// Prints a result as text, unless JSON is requested on standard output.
+/// Writes a result as JSON if `json` is given (`-` for standard output), and prints it as text unless the JSON goes to standard output.
 ///
 /// # Errors
 /// If the file or standard output cannot be written.
@@ -139,7 +143,7 @@ pub fn print_result<T: serde::Serialize>(
     first_error([printed, json.map_or(Ok(()), |path| write_json(path, value))])
 }
 
-/// Writes a picture or a table to the given file, `-` for standard output.
+/// Writes a picture or a table to a file, `-` for standard output; does nothing without a path.
 ///
 /// # Errors
 /// If the file or standard output cannot be written.

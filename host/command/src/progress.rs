@@ -7,7 +7,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Creates a progress line on a terminal, nothing in a pipe.
+/// Creates a progress line on standard error, with a template of `indicatif`; hidden if standard error is not a terminal.
 #[must_use]
 pub fn progress_bar(length: u64, template: &str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
@@ -15,7 +15,7 @@ pub fn progress_bar(length: u64, template: &str) -> ProgressBar {
     bar
 }
 
-/// Runs lengthy preparations, and shows their elapsed time on a terminal: `{what}: prepares`.
+/// Runs `work` and returns its result; meanwhile shows `{what}: prepares` with the elapsed time on a terminal.
 pub fn while_preparing<T>(what: &str, work: impl FnOnce() -> T) -> T {
     let spinner = progress_bar(0, "{spinner} {msg} {elapsed}");
     spinner.set_message(format!("{}: prepares", for_terminal(what)));
@@ -26,14 +26,14 @@ pub fn while_preparing<T>(what: &str, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Thread that redraws a progress line until this is dropped.
+/// Thread that redraws a progress line; dropping it ends the thread.
 pub struct Redrawn {
     until: Option<Sender<Infallible>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Redrawn {
-    /// Redraws a progress line in steps of this length; never in a pipe, nor if the system refuses the thread.
+    /// Starts a thread that redraws `line` every `step`; without a terminal, or if the system cannot start a thread, nothing is redrawn.
     #[must_use]
     pub fn every(step: Duration, line: &ProgressBar) -> Self {
         if line.is_hidden() {
@@ -58,5 +58,5 @@ impl Drop for Redrawn {
     }
 }
 
-/// Interval between two frames of the spinner; short preparations show none.
+/// Interval between two frames of the spinner; shorter work shows none.
 const SPINNER_STEP: Duration = Duration::from_millis(300);

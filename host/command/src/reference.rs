@@ -3,8 +3,8 @@
 use clap::{Arg, Command};
 use std::fmt::Write;
 
-/// Returns a program with the arguments of the commands that `separate` programs carry out; their help retains its first line
-/// from the program. Not real-time.
+/// Returns the parser `program` completed with the arguments of the commands that separate programs execute, from the parsers
+/// `separate` of these programs. The one-line descriptions remain those of `program`. Not real-time.
 #[must_use]
 pub fn whole_program(program: Command, separate: &[Command]) -> Command {
     let described = |command: Command| match separate
@@ -19,12 +19,12 @@ pub fn whole_program(program: Command, separate: &[Command]) -> Command {
     program
 }
 
-/// Removes the command `help` on all levels, which would repeat every other command.
+/// Removes the command `help`, which would repeat every other command, on all levels.
 fn without_help_command(command: Command) -> Command {
     command.disable_help_subcommand(true).mut_subcommands(without_help_command)
 }
 
-/// Returns one chapter in Markdown for each command that the help of a program lists. Not real-time.
+/// Returns a Markdown text with a chapter for each command that the help of a program lists. Not real-time.
 #[must_use]
 pub fn reference(program: &Command) -> String {
     let mut text = String::new();
@@ -36,13 +36,13 @@ fn offered(command: &Command) -> impl Iterator<Item = &Command> {
     command.get_subcommands().filter(|command| !command.is_hide_set())
 }
 
-/// Appends the chapter of a command, and below it those of its subcommands.
+/// Appends the chapter of a command, and below it the chapters of its subcommands.
 fn chapter(command: &Command, above: &str, depth: usize, text: &mut String) {
     let name = format!("{above} {}", command.get_name());
     let about = command.get_long_about().or(command.get_about()).map(ToString::to_string).unwrap_or_default();
     // Writing to a string cannot fail.
     let _ = write!(text, "{} `{name}`\n\n{}.\n\n", "#".repeat(depth), about.trim_end_matches('.'));
-    // Every command has the other two.
+    // Every command has `--help` and `--version`.
     let is_own = |argument: &&Arg| !["help", "version"].contains(&argument.get_id().as_str());
     let arguments: Vec<&Arg> =
         command.get_arguments().filter(|argument| !argument.is_hide_set()).filter(is_own).collect();

@@ -1,7 +1,7 @@
-//! Separate programs in the folder of this one: parts that are too heavy to build with the core.
+//! Separate programs in the folder of this one, with dependencies too large to be built with the core.
 //!
-//! A program with its own workspace is built into its own folder below the core's `target`: file names of plugin libraries have no hash,
-//! so that two workspaces in one folder would overwrite each other's plugins.
+//! A program with its own workspace is built into its own folder below the core's `target`: file names of plugin libraries have no
+//! hash, so two workspaces with the same target folder would overwrite each other's plugins.
 
 use crate::CommandError;
 use crate::platform::{ask_to_end, become_program};
@@ -9,36 +9,36 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 
-/// Origin of a separate program.
+/// Workspace in which a separate program is built.
 pub enum Built {
     /// Built in the workspace of this program.
     WithThis,
-    /// Built in its own workspace, into this folder below `target`.
+    /// Built in its own workspace, with the target folder of this name below `target`.
     OwnWorkspace(&'static str),
 }
 
-/// Separate program in the folder of this one.
+/// Separate program in the folder of this one, which executes commands of `flotor`.
 pub struct SeparateProgram<'a> {
     /// File name, without the suffix of executables.
     pub program: &'a str,
-    /// Workspace, which determines its folder.
+    /// Workspace, which determines the folder of the executable.
     pub built: Built,
-    /// Command that builds it.
+    /// Command line that builds the program, for the error if it is missing.
     pub build: &'a str,
 }
 
 impl SeparateProgram<'_> {
-    /// The viewer, built by name because of its graphics stack.
+    /// Viewer, not part of the default build because of its graphics dependencies.
     pub const VIEWER: SeparateProgram<'static> = SeparateProgram {
         program: "flotor-viewer",
         built: Built::WithThis,
         build: "cargo build --release -p flotor-viewer",
     };
 
-    /// Returns a command that starts the program.
+    /// Finds the executable and returns a command that starts it.
     ///
     /// # Errors
-    /// [`CommandError::Usage`] with the command that builds the program, if it is missing.
+    /// [`CommandError::Usage`] with the command line that builds the program, if the program is missing.
     pub fn command(&self) -> Result<Command, CommandError> {
         let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
         let (beside, own_build) = self.places(&own);
@@ -48,7 +48,7 @@ impl SeparateProgram<'_> {
         Err(CommandError::Usage(self.missing(&own)))
     }
 
-    /// Returns the message for a missing program, with its remedy: a build in Flotor's sources, or a copy to an installation.
+    /// Returns the message for a missing program, with the remedy: a build in Flotor's sources, or a copy to the installation.
     fn missing(&self, own: &Path) -> String {
         let (beside, own_build) = self.places(own);
         let build = match (&own_build, profile_of(own)) {
@@ -65,7 +65,8 @@ impl SeparateProgram<'_> {
         }
     }
 
-    /// Returns the possible paths: beside this program, and in cargo's target folder, if this program is in one.
+    /// Returns the possible paths of the executable: in the folder of this program, and in the target folder of the program's own
+    /// workspace, if this program is in a target folder.
     fn places(&self, own: &Path) -> (PathBuf, Option<PathBuf>) {
         let name = format!("{}{}", self.program, std::env::consts::EXE_SUFFIX);
         let target = profile_of(own).and(own.parent()).and_then(Path::parent);
@@ -78,7 +79,7 @@ impl SeparateProgram<'_> {
         (own.with_file_name(name), own_build)
     }
 
-    /// Replaces this process by the program, with a command and its arguments.
+    /// Replaces this process by the separate program, with a command and its arguments; returns only on an error.
     ///
     /// # Errors
     /// If the program is missing or cannot be started.
@@ -86,7 +87,7 @@ impl SeparateProgram<'_> {
         self.become_with(&[&[command.into()], arguments].concat())
     }
 
-    /// Replaces this process by the separate program, which gives output and exit code.
+    /// Replaces this process by the separate program, which then determines output and exit code; returns only on an error.
     ///
     /// # Errors
     /// If the program is missing or cannot be started.
@@ -96,18 +97,19 @@ impl SeparateProgram<'_> {
     }
 }
 
-/// Returns the profile with which cargo has built a program, if the program is in a target folder.
+/// Returns the profile with which cargo has built a program; `None` if the program is not in a target folder.
 fn profile_of(program: &Path) -> Option<&'static str> {
     let folder = program.parent()?;
     ["debug", "release"].into_iter().find(|profile| folder.ends_with(profile))
 }
 
-/// Running separate program. Drop sends SIGTERM, so that the program removes its socket, and waits for its end.
+/// Running separate program. Dropping it sends SIGTERM (on Windows, kills the program), so that the program removes its socket, and
+/// waits for its end.
 pub struct Running(pub Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // The id of a process that has ended and been waited for may belong to another process by now.
+        // The id of a process that has ended and been waited for may have been reused for another process.
         if self.0.try_wait().ok().flatten().is_none() {
             ask_to_end(&mut self.0);
         }

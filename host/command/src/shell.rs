@@ -1,12 +1,12 @@
-//! Command lines that are printed for people to repeat.
+//! Command lines that are printed for users to copy.
 
-/// Returns a command line that a shell parses into these arguments of `flotor`.
+/// Returns a command line of `flotor` with the arguments quoted for a POSIX shell.
 pub fn command_line<W: AsRef<str>>(arguments: impl IntoIterator<Item = W>) -> String {
     let words = arguments.into_iter().map(|word| format!(" {}", quoted(word.as_ref())));
     format!("flotor{}", words.collect::<String>())
 }
 
-/// Quotes a word for a shell, if necessary.
+/// Quotes a word for a POSIX shell, if necessary.
 #[must_use]
 pub fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "-_./=,:@+%".contains(c);

@@ -1,10 +1,12 @@
-//! Requests of a person to end a run: Ctrl-C for an orderly end; the space bar or `kill -USR1` for an emergency stop.
+//! Requests of a user to end a run: Ctrl-C for an orderly end; the space bar or `kill -USR1` for an emergency stop.
 //!
-//! If an orderly end takes too long, the user repeats the signal: the second one is an emergency stop, the
-//! third ends the process, as does the second one some seconds later. Before anything is energised, the first one ends the process.
+//! If an orderly end takes too long, the user repeats the signal: the second signal is an emergency stop, the third ends the
+//! process. The process also ends if it is still running 5 s after the second signal. Before a device is energised, the first
+//! signal ends the process.
 //!
-//! A dedicated thread waits for requests. On Linux these are signals, blocked in every other thread, so that a plugin which installs
-//! handlers or blocks signals takes none of them away. On Windows they are events of the console, and Ctrl-Break is an emergency stop.
+//! A dedicated thread waits for requests. On Linux these are signals, blocked in every other thread, so that a plugin that installs
+//! handlers or blocks signals cannot intercept them. On Windows they are events of the console, and Ctrl-Break is an emergency
+//! stop.
 
 use super::{CommandError, note, print_error_line};
 use crate::platform::{INTERRUPTED, KeyTerminal, Request, Requests, is_orphaned, outlive_requests};
@@ -15,18 +17,18 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Interval within which signals count as one request: `timeout` signals its child and then the child's group, and a closing
-/// terminal signals the shell, which signals its jobs. A person takes longer.
+/// terminal signals the shell, which signals its jobs. A user cannot repeat a signal faster.
 const ONE_REQUEST: Duration = Duration::from_millis(100);
 
 /// Grace period of a run after an emergency stop, before the process is ended by force.
 const LAST_PATIENCE: Duration = Duration::from_secs(5);
-/// Timeout of a call of the loop after a request to end, and the poll interval for it. A run that names the call itself waits for
-/// one second.
+/// Timeout of a plugin call in the loop after a request to end, and poll interval for the call. Longer than the one second after
+/// which a run itself reports the call.
 const CALL_PATIENCE: Duration = Duration::from_millis(1500);
 const LOOK: Duration = Duration::from_millis(100);
-/// Poll interval of the switch while no signal was taken here.
+/// Poll interval of the stop switch while no signal has been received.
 const UNASKED_LOOK: Duration = Duration::from_millis(400);
-/// Time for devices to stop when a process is left.
+/// Time limit for stopping the devices before the process is ended.
 const STOP_PATIENCE: Duration = Duration::from_millis(50);
 
 /// Effect of the first signal.
@@ -34,29 +36,30 @@ const STOP_PATIENCE: Duration = Duration::from_millis(50);
 enum First {
     /// Orderly end.
     InOrder,
-    /// Orderly end, once a run has energised something; before, the process ends.
+    /// Orderly end, once a run has energised a device; before, the process ends.
     InOrderOnceEnergised,
 }
 
-/// Returns a switch that the first signal of `ENDING` uses for an orderly end and the second for an emergency stop (the third ends
-/// the process), and `SIGUSR1` for an emergency stop. Called before there are other threads.
+/// Starts the thread that handles signals, and returns the stop switch that it operates: the first signal that requests an end
+/// (such as Ctrl-C) leads to an orderly end, the second to an emergency stop, the third ends the process; `SIGUSR1` leads to an
+/// emergency stop. To be called before other threads start.
 ///
 /// # Errors
-/// If the system refuses the signals or a thread.
+/// If the system cannot block the signals or start a thread.
 pub fn stop_on_signals() -> Result<StopSwitch, CommandError> {
     take_signals(First::InOrder)
 }
 
-/// Returns such a switch for a run that is yet to be prepared: as long as nothing has been energised, the first signal ends the
-/// process, even while a plugin's code runs.
+/// Returns the switch of [`stop_on_signals`] for a run that is yet to be prepared: as long as no device has been energised, the
+/// first signal ends the process, even while a plugin's code runs.
 ///
 /// # Errors
-/// If the system refuses the signals or a thread.
+/// If the system cannot block the signals or start a thread.
 pub fn stop_run_on_signals() -> Result<StopSwitch, CommandError> {
     take_signals(First::InOrderOnceEnergised)
 }
 
-/// Ignores all requests to end this process: it ends by itself.
+/// Makes this process, which ends by itself, ignore all requests to end; prints a note if the system does not permit it.
 pub fn outlive_signals() {
     if let Err(error) = outlive_requests() {
         note(format_args!("cannot block signals: {error}"));
@@ -78,13 +81,13 @@ fn take_signals(first: First) -> Result<StopSwitch, CommandError> {
     Ok(stop)
 }
 
-/// Processes signals as long as the process lives.
+/// Handles signals as long as the process runs.
 fn attend(requests: &Requests, first: First, stop: &StopSwitch, exit: &Exit) {
-    // Above a loop that hogs its core.
+    // Above the priority of a loop that occupies its core.
     enter_guard_priority();
     let (mut insistence, mut hang) = (Insistence::default(), Hang::default());
     loop {
-        // A thread that does not block a signal may have taken it: then only the switch shows the request.
+        // A thread that does not block a signal may have received it: then only the switch shows the request.
         let is_asked = || insistence.last.is_some() || stop.is_stop_requested();
         let patience = if is_asked() { LOOK } else { UNASKED_LOOK };
         let Some(request) = requests.next(patience) else {
@@ -120,7 +123,7 @@ fn attend(requests: &Requests, first: First, stop: &StopSwitch, exit: &Exit) {
     }
 }
 
-/// Forced end of a process: a thread that stops the devices, started early because the system may refuse one later.
+/// Forced end of a process: a thread that stops the devices, started early because starting a thread may fail later.
 struct Exit {
     stop: SyncSender<()>,
     stopped: Receiver<()>,
@@ -140,7 +143,7 @@ impl Exit {
         Ok(Self { stop, stopped })
     }
 
-    /// Stops the devices and ends the process without its exit handlers, which may hang, as may the stop of a device.
+    /// Stops the devices, waiting at most 50 ms, and ends the process without its exit handlers, which may hang.
     fn take(&self) -> ! {
         let _ = self.stop.try_send(());
         let _ = self.stopped.recv_timeout(STOP_PATIENCE);
@@ -170,7 +173,7 @@ impl Insistence {
         })
     }
 
-    /// Returns true if an end was requested within the grace period.
+    /// Returns true if the last request to end is more recent than the grace period.
     fn is_younger_than_patience(&self, now: Instant) -> bool {
         self.last.is_some_and(|(since, _)| now.duration_since(since) < LAST_PATIENCE)
     }
@@ -187,7 +190,7 @@ impl Insistence {
     }
 }
 
-/// Detector of calls that do not return: the calls of the loops at the last poll, and the time of the first sight of one.
+/// Detector of plugin calls that do not return: the calls of the loops at the last poll, and the time since which one of them has lasted.
 #[derive(Default)]
 struct Hang {
     seen: Vec<(String, Stuck)>,
@@ -195,7 +198,7 @@ struct Hang {
 }
 
 impl Hang {
-    /// Returns a call that has lasted longer than the timeout.
+    /// Returns a call that has lasted for the timeout, with the name of the plugin; `None` if there is none.
     fn look(&mut self, calls: Vec<(String, Stuck)>, now: Instant) -> Option<(String, Stuck)> {
         let lasting = calls.iter().find(|call| self.seen.contains(call)).cloned();
         let since = *self.since.get_or_insert(now);
@@ -211,17 +214,18 @@ impl Hang {
     }
 }
 
-/// Keyboard input without a line end, until this is dropped.
+/// Keyboard control of a run; dropping it restores the mode of the terminal.
 pub struct Keys {
     _terminal: KeyTerminal,
 }
 
 impl Keys {
-    /// Starts reading keys: space is the emergency stop, `q` an orderly end. `None` without a terminal: in a pipe, in the background.
+    /// Starts a thread that reads keys: space triggers the emergency stop, `q` requests an orderly end. `None` without a terminal
+    /// (a pipe), in the background, or if the system cannot start a thread.
     pub fn listen(stop: &StopSwitch) -> Option<Self> {
         let terminal = KeyTerminal::take()?;
         let stop = stop.clone();
-        // Ends with the process: nothing can interrupt its read.
+        // The thread ends with the process: its read cannot be interrupted.
         let thread = std::thread::Builder::new().name("flotor-keys".to_owned());
         let listening = thread.spawn(move || {
             for key in stdin().lock().bytes().map_while(Result::ok) {
@@ -237,7 +241,7 @@ impl Keys {
     }
 }
 
-/// Returns the request of a key; the largest key is the emergency stop.
+/// Returns the request of a key; the space bar, the largest key, is the emergency stop.
 fn request_of(key: u8) -> Option<Request> {
     match key {
         b' ' => Some(Request::Emergency),

@@ -1,11 +1,11 @@
 //! Colours, on terminals only; control characters in names and messages are escaped.
 //!
-//! A text contains its colours as marks, noncharacters of Unicode, which are replaced by terminal sequences when the text is printed.
+//! Colours in a text are marks, noncharacters of Unicode, which are replaced by terminal escape sequences when the text is printed.
 
 use flotor_hal::terminal::escaped;
 use std::io::IsTerminal;
 
-/// Marks in a text, each with its sequence for the terminal.
+/// Marks in a text, each with its terminal escape sequence.
 const MARKS: [(char, &str); 4] =
     [(ERROR, "\x1b[1;31m"), (WARNING, "\x1b[33m"), (TITLE, "\x1b[1m"), (PLAIN, "\x1b[0m")];
 const ERROR: char = '\u{fdd0}';
@@ -18,26 +18,26 @@ fn painted(mark: char, text: &str, terminal: bool) -> String {
     if wanted { format!("{mark}{text}{PLAIN}") } else { text.to_owned() }
 }
 
-/// Returns a text for people as a terminal may receive it: [escaped], with the terminal sequences of its styles.
+/// Formats a text for a terminal: control characters are [escaped], and colour marks are replaced by terminal escape sequences.
 #[must_use]
 pub fn for_terminal(text: impl std::fmt::Display) -> String {
     let escaped = escaped(&text.to_string());
     MARKS.iter().fold(escaped, |shown, (mark, sequence)| shown.replace(*mark, sequence))
 }
 
-/// Returns a text in red and bold, for the first word of an error.
+/// Returns a text in red and bold, for the first word of an error; unchanged if standard error is not a terminal or `NO_COLOR` is set.
 #[must_use]
 pub fn error(text: &str) -> String {
     painted(ERROR, text, std::io::stderr().is_terminal())
 }
 
-/// Returns a text in yellow, for the first word of a warning.
+/// Returns a text in yellow, for the first word of a warning; unchanged if standard error is not a terminal or `NO_COLOR` is set.
 #[must_use]
 pub fn warning(text: &str) -> String {
     painted(WARNING, text, std::io::stderr().is_terminal())
 }
 
-/// Returns a text in bold, for titles.
+/// Returns a text in bold, for titles; unchanged if standard output is not a terminal or `NO_COLOR` is set.
 #[must_use]
 pub fn title(text: &str) -> String {
     painted(TITLE, text, std::io::stdout().is_terminal())

@@ -1,8 +1,8 @@
 //! Supervision of a command that runs plugin code in a child process: the supervisor waits for the child and returns its exit code.
 //!
 //! A plugin can end its process without a message and with exit code 0: `_exit`, `exec`, a thread that crashes before the host's
-//! handlers are installed. The supervisor runs no plugin. It forwards signals, and an end without the end report of the host
-//! ([`flotor_servo::last_stop::report_end`]) fails with a message. If the supervisor is killed, the command is requested to end.
+//! handlers are installed. The supervisor runs no plugin code. It forwards signals, and reports an error if the child ends without
+//! an end report of the host ([`flotor_servo::last_stop::report_end`]). If the supervisor is killed, the child is requested to end.
 //!
 //! On Windows the process is not divided.
 
@@ -15,10 +15,10 @@ use std::sync::atomic::AtomicU32;
 
 /// Exit code of a plugin that failed.
 const PLUGIN_FAILED: u8 = 3;
-/// Exit code of a process that something else has killed.
+/// Exit code if something other than a plugin has killed the process.
 const KILLED: u8 = 1;
 
-/// Part of a divided process in which a call returns.
+/// Process in which [`divide`] returns.
 pub(crate) enum Side {
     /// The process is not divided.
     Undivided,
@@ -33,20 +33,21 @@ pub(crate) enum Side {
     Supervisor(End),
 }
 
-/// End of a supervised process.
+/// Kind of end of a supervised process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum End {
-    /// Reported, with this exit code.
+    /// Reported end, with this exit code.
     Reported(u8),
-    /// By a signal that requests an end.
+    /// Killed by a signal that requests an end.
     Asked(i32),
-    /// Without a report, with this exit code.
+    /// Exit without a report, with this exit code.
     Left(u8),
-    /// By another signal, before its report or after one of success.
+    /// Killed by another signal, before the process reported or after it reported success.
     Killed(i32),
 }
 
-/// Carries out a command under a supervisor and returns its exit code. Called while the process has one thread. Not real-time.
+/// Executes a command in a supervised child process (on Windows, in this process), and returns the exit code in both processes. To
+/// be called while the process has only one thread. Not real-time.
 pub fn supervised(command: impl FnOnce() -> Result<(), CommandError>) -> ExitCode {
     match divide() {
         Ok(Side::Undivided) => exit_code_of(command()),

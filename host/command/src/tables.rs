@@ -1,8 +1,8 @@
-//! Tables of results: for people, and as CSV for other programs.
+//! Tables of results: human-readable, and as CSV for other programs.
 
 use serde::Serialize;
 
-/// Returns the lines of a table for people: the first column is aligned left, the others right.
+/// Formats a human-readable table, one line for the header and one per row: the first column is aligned left, the others right.
 #[must_use]
 pub fn table<const N: usize>(head: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> Vec<String> {
     let lines: Vec<[String; N]> = [head.map(str::to_owned)].into_iter().chain(rows).collect();
@@ -18,7 +18,7 @@ pub fn table<const N: usize>(head: [&str; N], rows: impl IntoIterator<Item = [St
     lines.iter().map(line).collect()
 }
 
-/// Formats rows as CSV; without `head`, the field names are the header.
+/// Formats rows as CSV with the header `head`; if `head` is empty, the field names of `T` are the header.
 #[must_use]
 pub fn to_csv<'h, T: Serialize>(
     head: impl IntoIterator<Item = &'h str>,

@@ -15,9 +15,9 @@ pub struct Change {
     pub subject: ChangeSubject,
     /// Id of the parameter; `weight` for a weight, the id of the new plugin for a replacement.
     pub parameter: String,
-    /// The value as a person would type it.
+    /// Value as text, as a user would type it.
     pub value: String,
-    /// Value passed to the plugin; for a choice, its index.
+    /// Value passed to the plugin as a number; for a choice, its index.
     pub number: f64,
     /// Result of the change.
     pub outcome: ChangeOutcome,
@@ -27,8 +27,8 @@ pub struct Change {
 }
 
 impl Change {
-    /// Returns true if both changes are about the same parameter and have the same outcome, so that the later one replaces the earlier.
-    /// A rejected value implies nothing about the present one.
+    /// Returns true if both changes concern the same parameter and have the same outcome, so that the later change
+    /// replaces the earlier. A rejected value implies nothing about the present value.
     #[must_use]
     pub fn is_of_the_same(&self, other: &Self) -> bool {
         let of = |change: &Self| (change.subject, change.outcome);
@@ -42,9 +42,10 @@ impl Change {
 pub enum ChangeSubject {
     /// A parameter of its schema.
     Parameter,
-    /// The blend weight of its wrench, which the host applies: it moves to the new value at the rate of its fade.
+    /// The blend weight of the plugin's wrench, which the host applies: it moves to the new value at the rate of the
+    /// fade.
     Weight,
-    /// The plugin itself was replaced: `parameter` is the id of the new one, `value` its version.
+    /// The plugin was replaced: `parameter` is the id of the new plugin, `value` its version.
     Plugin,
 }
 
@@ -54,7 +55,8 @@ pub enum ChangeSubject {
 pub enum ChangeOutcome {
     /// The value is in force from this tick on.
     Applied,
-    /// The plugin rejected the value, which does not fit its other values. The old one remains.
+    /// The plugin rejected the value, for example because it does not fit the other values; the old value stays in
+    /// force.
     Refused,
     /// The plugin panicked on the change.
     Broke,

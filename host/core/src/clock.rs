@@ -1,11 +1,11 @@
-//! Clock that drives a loop, and times in nanoseconds.
+//! Clock that drives a loop, and conversion of times to nanoseconds.
 
 /// Clock that drives the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
     /// The machine's monotonic clock.
     Real,
-    /// Simulated time without waiting: the next tick is due when the last one is done. Bit-exact.
+    /// Simulated time without waiting: the next tick starts when the last one is done. Runs repeat bit by bit.
     Virtual,
 }
 
@@ -20,13 +20,13 @@ impl Clock {
     }
 }
 
-/// Returns a time in nanoseconds, rounded; 0 for a negative time and for NaN.
+/// Converts a time from s to whole ns, rounded and saturated: 0 for a negative time and for NaN.
 #[must_use]
 pub fn to_ns(time_s: f64) -> u64 {
     rounded(time_s * 1.0e9)
 }
 
-/// Returns the period of a rate in nanoseconds, rounded.
+/// Converts a rate in Hz to its period in whole ns, rounded and saturated.
 #[must_use]
 pub fn period_ns(rate_hz: f64) -> u64 {
     rounded(1.0e9 / rate_hz)

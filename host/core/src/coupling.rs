@@ -5,7 +5,7 @@ use crate::mapping::MappingConfig;
 /// Treatment of energy that a port generates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum PassivityMode {
-    /// The energy is measured.
+    /// The energy is only measured.
     #[default]
     Observe,
     /// The energy is measured, and the passivity controller removes it.
@@ -15,11 +15,11 @@ pub enum PassivityMode {
 /// Virtual spring and damper between two devices, and the delay between them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingConfig {
-    /// Stiffness against displacement, N/m.
+    /// Stiffness of translation, N/m.
     pub stiffness_n_per_m: f64,
     /// Damping of relative motion, N·s/m.
     pub damping_ns_per_m: f64,
-    /// Stiffness against rotation, N·m/rad.
+    /// Stiffness of rotation, N·m/rad.
     pub stiffness_nm_per_rad: f64,
     /// Damping of relative rotation, N·m·s/rad.
     pub damping_nms_per_rad: f64,
@@ -51,7 +51,7 @@ impl Default for CouplingConfig {
     }
 }
 
-/// One end of a coupling.
+/// Device at one end of a coupling, with its mapping to the shared frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CouplingEnd {
     /// Index of the device in the scene.
@@ -60,25 +60,26 @@ pub struct CouplingEnd {
     pub mapping: MappingConfig,
 }
 
-/// Largest relative rounding error of the gain of a coupling whose scales cancel: above that of three quotients.
+/// Tolerance of an energy gain of 1: above the relative rounding error of three quotients.
 const GAIN_ROUNDING: f64 = 1.0e-12;
 
 /// Locations of the ends of a coupling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CouplingEnds {
-    /// Both in this run.
+    /// Both ends are in this run.
     Here([CouplingEnd; 2]),
-    /// One here, the other on another host, whose scene gives the coupling the same name.
+    /// One end is in this run, the other on another host, whose scene has a coupling of the same name.
     Remote(CouplingEnd),
 }
 
 impl CouplingEnds {
-    /// Returns the largest ratio of the energy that one hand gets to the energy that the other has put in: 1 if the coupling
-    /// amplifies nothing, and never less.
+    /// Returns the largest ratio of the energy that one hand receives to the energy that the other hand has put in; at
+    /// least 1, which means that the coupling amplifies no energy.
     ///
-    /// An end turns one joule of the shared frame into `force_scale / motion_scale` joules at its hand. A tank limits the energy of the
-    /// shared frame, so energy that crosses the coupling is scaled by the ratio of both ends, up in one direction if they differ. The
-    /// scales of a remote end are unknown here: the ratio is that to an end without scales. Not real-time.
+    /// An end converts one joule of the shared frame to `force_scale / motion_scale` joules at its hand. A tank limits
+    /// the energy of the shared frame, so energy that crosses the coupling is scaled by the ratio of both ends, up in
+    /// one direction if they differ. The scales of a remote end are unknown here: the ratio assumes a remote end
+    /// without scales. Not real-time.
     #[must_use]
     pub fn energy_gain(&self) -> f64 {
         let scale = |end: &CouplingEnd| end.mapping.force_scale / end.mapping.motion_scale;
@@ -100,14 +101,14 @@ impl CouplingEnds {
     }
 }
 
-/// A coupling of a run.
+/// Description of a coupling in a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CouplingDescription {
     /// Name in the scene.
     pub name: String,
     /// Spring, damper, delay.
     pub config: CouplingConfig,
-    /// Coupled ends.
+    /// Device and mapping of each end in this run; the other end may be on another host.
     pub ends: CouplingEnds,
 }
 

@@ -1,4 +1,4 @@
-//! Outputs of models that a run needs: those that reach the hand, and those that observers request.
+//! Outputs of models that a run needs: outputs that reach the hand, and outputs that observers request.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -7,7 +7,7 @@ use flotor_hal::Demand;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Returns the outputs that reach a hand at a device: force, and torque if device and scene allow any.
+/// Returns the outputs that reach the hand at a device: force, and torque if its bound allows any.
 #[must_use]
 pub fn hand_demand(torque_nm: &Bound) -> Demand {
     if torque_nm.longest() > 0.0 { Demand::WRENCH } else { Demand::FORCE }
@@ -21,7 +21,8 @@ pub struct TickDemand {
 }
 
 impl TickDemand {
-    /// Creates the demand from the outputs felt at a device and those that only observers request. Real-time: bounded, no allocation.
+    /// Creates the demand from the outputs that reach the hand and the outputs that only observers request. Real-time:
+    /// bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn new(at_hand: Demand, observed: Demand) -> Self {
@@ -35,7 +36,7 @@ impl TickDemand {
         self.at_hand
     }
 
-    /// Returns the outputs that reach the hand or an observer.
+    /// Returns the outputs that the models compute, for the hand or an observer.
     #[inline]
     #[must_use]
     pub const fn computed(self) -> Demand {
@@ -46,9 +47,10 @@ impl TickDemand {
 /// Counted outputs, each with the increment of one request in the word of counts.
 const COUNTS: [(Demand, u64); 2] = [(Demand::TORQUE, 1), (Demand::ENERGY, 1 << 32)];
 
-/// Outputs that observers of a run request: a count of requests for each, in one word that the loop reads every tick.
+/// Outputs that observers of a run request: the number of requests for each output, in one word that the loop reads
+/// every tick.
 ///
-/// A clone counts the same requests. Force is always computed and never counted.
+/// Clones share their requests. Force is always computed and not counted.
 #[derive(Clone, Debug, Default)]
 pub struct ObserverDemand {
     counts: Arc<AtomicU64>,
@@ -80,7 +82,7 @@ impl ObserverDemand {
     }
 }
 
-/// Request of one observer, withdrawn when dropped.
+/// Request of one observer; dropping it withdraws the request.
 #[derive(Debug)]
 #[must_use = "a request is withdrawn when it is dropped"]
 pub struct DemandRequest {

@@ -8,7 +8,7 @@
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between its two ends.
 //! - [`guidance`]: the parameters that guide a simulated hand.
 //! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: its number in the run.
-//! - [`words`]: words of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
+//! - [`words`]: encoding of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
 //!
 //! The crate reads no files, starts no threads and, apart from [`lock()`], makes no system calls.
 #![forbid(unsafe_code)]
@@ -41,7 +41,7 @@ pub use plugin_index::PluginIndex;
 pub use quantile::quantile;
 pub use random::Random;
 
-/// Largest seed that commands and files accept: every program reads whole numbers up to this one exactly from JSON.
+/// Largest seed that commands and files accept: every program reads whole numbers up to this limit exactly from JSON.
 pub const LARGEST_SEED: u64 = 1 << 53;
 /// Largest number of devices in a run.
 pub const MAX_DEVICES: u16 = 8;

@@ -2,7 +2,7 @@
 
 use crate::coupling::PassivityMode;
 
-/// Bound of a vector, in its unit: a norm in any direction, and a largest component along each axis. Both apply together.
+/// Bound of a vector, in its unit: a largest norm, and a largest component along each axis. Both apply together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bound {
     norm: f64,
@@ -13,13 +13,13 @@ impl Bound {
     /// Bound that allows every vector.
     pub const NONE: Self = Self { norm: f64::INFINITY, axes: [f64::INFINITY; 3] };
 
-    /// Creates a ball: vectors no longer than `norm`.
+    /// Creates a ball: the bound of vectors no longer than `norm`.
     #[must_use]
     pub const fn ball(norm: f64) -> Self {
         Self { norm, axes: [norm; 3] }
     }
 
-    /// Creates a box: no component larger than that of its axis.
+    /// Creates a box: the bound of vectors whose components are at most `axes` in magnitude.
     #[must_use]
     pub const fn box_of(axes: [f64; 3]) -> Self {
         Self { norm: f64::INFINITY, axes }
@@ -33,19 +33,20 @@ impl Bound {
         Self { norm, axes: std::array::from_fn(axis) }
     }
 
-    /// Returns the norm that no vector exceeds; infinity for a box.
+    /// Returns the largest norm; infinity for a box.
     #[must_use]
     pub const fn norm(&self) -> f64 {
         self.norm
     }
 
-    /// Returns the largest component along each axis, at most the norm.
+    /// Returns the largest magnitude of each component, at most the norm.
     #[must_use]
     pub const fn axes(&self) -> [f64; 3] {
         self.axes
     }
 
-    /// Returns the length of the longest vector within the bound: the corner of the box, or the norm if that is less. Not real-time.
+    /// Returns the length of the longest vector within the bound: the length to a corner of the box, or the norm if
+    /// that is less. Not real-time.
     #[must_use]
     pub fn longest(&self) -> f64 {
         let corner = self.axes.iter().map(|axis| axis * axis).sum::<f64>().sqrt();
@@ -53,11 +54,11 @@ impl Bound {
     }
 }
 
-/// Ceiling of the host for a device that does not declare itself simulated: 20 N and 1 N·m in any direction. More than a
-/// hand wants of an object on a table, less than throws an arm; the hand of an adult resists it.
+/// Ceiling of the host for a device that does not declare itself simulated: 20 N and 1 N·m in any direction. More than
+/// an object on a table needs, too little to throw an arm; the hand of an adult can resist it.
 pub const CEILING: Ceiling = Ceiling { force_n: 20.0, torque_nm: 1.0 };
 
-/// Largest norms that a host sends.
+/// Largest force and torque that a host sends to a device, in any direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ceiling {
     /// Force, N.
@@ -66,16 +67,16 @@ pub struct Ceiling {
     pub torque_nm: f64,
 }
 
-/// Limits of a scene; those that the device declares apply too, whichever are tighter.
+/// Limits of a scene; the limits that the device declares apply too, so that the tighter limit counts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Largest force, N.
     pub force_n: Bound,
     /// Largest torque, N·m.
     pub torque_nm: Bound,
-    /// Fastest change of force, N/s: the norm of the change.
+    /// Maximum slew rate of the force, N/s (norm of the change).
     pub force_slew_n_per_s: f64,
-    /// Fastest change of torque, N·m/s: the norm of the change.
+    /// Maximum slew rate of the torque, N·m/s (norm of the change).
     pub torque_slew_nm_per_s: f64,
     /// Velocity above which no force accelerates the handle, m/s.
     pub velocity_m_per_s: Bound,
@@ -89,9 +90,11 @@ pub struct Limits {
     pub emergency_buttons: u32,
     /// Treatment of energy that the port generates.
     pub passivity: PassivityMode,
-    /// True to reject a device that nothing stops once the host's process is gone.
+    /// True to reject a device without an independent stop, which nothing would stop after the end of the host's
+    /// process.
     pub require_independent_stop: bool,
-    /// True if a device that only the watchdog process stops may run although a kill of one control group ends both processes.
+    /// True to accept a device that only the watchdog process can stop, although a kill of one control group would end
+    /// both the host and the watchdog process.
     pub accept_shared_control_group: bool,
 }
 
@@ -129,7 +132,7 @@ impl Default for Limits {
     }
 }
 
-/// A spring-damper wall a little inside the device's range.
+/// Spring-damper wall a little inside the device's range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Boundary {
     /// Least distance of the wall inside the device's range, m.
@@ -138,7 +141,7 @@ pub struct Boundary {
     pub margin_rad: f64,
     /// Stiffness of the wall, N/m.
     pub stiffness_n_per_m: f64,
-    /// Damping inside the wall, N·s/m.
+    /// Damping of outward motion in the wall, N·s/m.
     pub damping_ns_per_m: f64,
     /// Rotational stiffness, N·m/rad.
     pub stiffness_nm_per_rad: f64,

@@ -1,8 +1,8 @@
 //! Mapping between the device frame and a model's frame: the only place that scales motion, force and torque.
 //!
-//! With `x_model = m R x_device`, scaling the energy by `f / m` gives the device the force `f R^T F` and the
-//! torque `(f / m) R^T M`: gradients of one energy, so a conservative model stays conservative at the hand
-//! (PHYSICS D6). The stiffness the hand feels is `f m k`.
+//! With `x_model = m R x_device`, `m` the motion scale and `f` the force scale, scaling the energy by `f / m` gives the
+//! device the force `f R^T F` and the torque `(f / m) R^T M`: gradients of one energy, so a conservative model stays
+//! conservative at the hand (PHYSICS D6). The stiffness at the hand is `f m k`.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -27,14 +27,14 @@ impl Default for MappingConfig {
     }
 }
 
-/// Blending of a model with the others of its scene.
+/// Weight, priority and fade time of a model among the models of its scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {
     /// Weight of its wrench, 0 to 1.
     pub weight: f64,
-    /// Priority: a model with a force silences models of lower priority.
+    /// Priority: a model with a force suppresses the models of lower priority.
     pub priority: u8,
-    /// Time the weight takes from 0 to 1, s.
+    /// Time in which the weight changes from 0 to 1, s.
     pub fade_s: f64,
 }
 
@@ -45,17 +45,17 @@ impl Default for Blend {
     }
 }
 
-/// Timing of the linear fields of an asynchronous model.
+/// Rate and latency of the linear fields of an asynchronous model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldTiming {
     /// Rate of new fields, Hz.
     pub rate_hz: f64,
-    /// Time from the sample of the handle to the field computed from it, s. Exact on the virtual clock; on a real one, the time that
-    /// the model takes.
+    /// Time from the sample of the handle to the field computed from it, s. Exact on the virtual clock; on the real
+    /// clock, the computing time of the model.
     pub latency_s: f64,
 }
 
-/// Frames and scales of one model on one device, in one place.
+/// Mapping between a device and one instance of a model: frames, scales and home position.
 #[derive(Clone, Copy, Debug)]
 pub struct Mapping {
     home_m: DVec3,
@@ -66,7 +66,7 @@ pub struct Mapping {
     energy_scale: f64,
 }
 
-/// Rotation from the device frame to the model frame. Most scenes have none, which saves the products.
+/// Rotation from the device frame to the model frame. Most scenes have none, which saves the multiplications.
 #[derive(Clone, Copy, Debug)]
 enum Turn {
     None,
@@ -131,33 +131,35 @@ impl Mapping {
         }
     }
 
-    /// Returns the mapping with the model's home at this place, m, device frame, instead of the device's home. Not real-time.
+    /// Returns the mapping with the home of the model at the position `home_m` (m, device frame) instead of the
+    /// device's home. Not real-time.
     #[must_use]
     pub fn at(self, home_m: [f64; 3]) -> Self {
         Self { home_m: DVec3::from_array(home_m), ..self }
     }
 
-    /// Returns the factor from the model's stiffness to the stiffness at the hand.
+    /// Returns the ratio of the stiffness at the hand to the stiffness of the model.
     #[must_use]
     pub fn stiffness_scale(&self) -> f64 {
         self.force_scale * self.motion_scale
     }
 
-    /// Returns the factor from the model's energy to energy at the device.
+    /// Returns the ratio of energy at the device to energy of the model.
     #[inline]
     #[must_use]
     pub fn energy_scale(&self) -> f64 {
         self.energy_scale
     }
 
-    /// Returns true if forces and torques at the hand are gradients of one energy, provided that those of the model are.
+    /// Returns true if the mapping conserves energy: forces and torques at the hand are gradients of one energy if
+    /// those of the model are.
     #[must_use]
     pub fn is_conservative(&self) -> bool {
         let conservative = self.energy_scale();
         (self.torque_scale - conservative).abs() <= 4.0 * f64::EPSILON * conservative
     }
 
-    /// Maps a pose into the model frame. Real-time: bounded, no allocation.
+    /// Maps a pose from the device frame to the model frame. Real-time: bounded, no allocation.
     #[inline(always)] // as `wrench_to_device`
     #[must_use]
     pub fn pose_to_model(&self, pose: &Pose) -> Pose {
@@ -173,7 +175,7 @@ impl Mapping {
         self.home_m + self.vector_to_device(position_m)
     }
 
-    /// Maps a vector between positions from the model frame to the device frame. Real-time: bounded, no allocation.
+    /// Maps a difference of positions from the model frame to the device frame. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn vector_to_device(&self, vector_m: DVec3) -> DVec3 {
@@ -187,8 +189,8 @@ impl Mapping {
         length_m / self.motion_scale
     }
 
-    /// Returns half the sides of the box along the device's axes that encloses a box along the model's. Real-time: bounded, no
-    /// allocation.
+    /// Returns the half extents, m, of the bounding box along the device axes of a box along the model axes. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn half_sides_to_device(&self, half_sides_m: DVec3) -> DVec3 {
         let turn = self.model_from_device;
@@ -196,7 +198,8 @@ impl Mapping {
         side(DVec3::X, half_sides_m.x) + side(DVec3::Y, half_sides_m.y) + side(DVec3::Z, half_sides_m.z)
     }
 
-    /// Returns the input of a model for a tick: the motion in its own frame, and the demanded outputs. Real-time: bounded, no allocation.
+    /// Returns the input of a model for a tick: the motion in the model frame, and the demanded outputs. Real-time:
+    /// bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn input(&self, tick: &Tick, state: &DeviceState, demand: Demand) -> Input {
@@ -211,7 +214,7 @@ impl Mapping {
         }
     }
 
-    /// Maps a twist into the model frame. Real-time: bounded, no allocation.
+    /// Maps a twist from the device frame to the model frame. Real-time: bounded, no allocation.
     #[inline(always)] // as `wrench_to_device`
     #[must_use]
     pub fn twist_to_model(&self, twist: &Twist) -> Twist {
@@ -219,7 +222,7 @@ impl Mapping {
         Twist::new(turn.there(twist.linear()) * self.motion_scale, turn.there(twist.angular()))
     }
 
-    /// Maps a wrench into the device frame. Real-time: bounded, no allocation.
+    /// Maps a wrench from the model frame to the device frame. Real-time: bounded, no allocation.
     #[inline(always)] // 5 ns: a call returns it in memory, and the reader waits for that
     #[must_use]
     pub fn wrench_to_device(&self, wrench: &Wrench) -> Wrench {
@@ -230,7 +233,8 @@ impl Mapping {
         )
     }
 
-    /// Maps a wrench into the model frame: the inverse of [`Self::wrench_to_device`]. Real-time: bounded, no allocation.
+    /// Maps a wrench from the device frame to the model frame: the inverse of [`Self::wrench_to_device`]. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn wrench_to_model(&self, wrench: &Wrench) -> Wrench {
         let turn = self.model_from_device;

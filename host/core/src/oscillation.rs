@@ -1,9 +1,9 @@
-//! Detection of a force that alternates between its limits: the sign of an unstable loop, for example of a stiffness that the device
-//! cannot render. The force is damped first; if the oscillation goes on, the run ends.
+//! Detection of a force that alternates between its limits: the sign of an unstable loop, for example of a stiffness
+//! that the device cannot render. The force is reduced first; if the oscillation continues, the run ends.
 //!
-//! Reversals at the limits are counted: a limited force points against the force limited before, and the handle has moved in
-//! between. A hand between two stiff walls causes a few in a second; an unstable loop causes tens. Noise of a model reverses the
-//! force in every tick and moves the handle by micrometres: only the limits apply to it.
+//! Reversals at the limits are counted: a limited force points against the previous limited force, and the handle has
+//! moved in between. A hand between two stiff walls causes a few reversals per second; an unstable loop causes tens.
+//! Noise of a model reverses the force in every tick and moves the handle by micrometres: only the limits apply to it.
 
 use flotor_hal::{DQuat, DVec3, Pose, Wrench};
 
@@ -11,10 +11,10 @@ use flotor_hal::{DQuat, DVec3, Pose, Wrench};
 const REVERSALS: usize = 10;
 /// Time window of these reversals, ns: 10 Hz and more, which no hand reaches against the full force of a device.
 const WINDOW_NS: u64 = 500_000_000;
-/// Least displacement, m, or rotation, rad, of the handle between two reversals that count.
+/// Smallest displacement, m, or rotation, rad, of the handle between two reversals that count.
 const LEAST_WAY_M: f64 = 0.1e-3;
 const LEAST_TURN_RAD: f64 = 1.0e-3;
-/// Gain of the force while an oscillation is damped.
+/// Gain of the force while an oscillation is being damped.
 const DAMPED: f64 = 0.25;
 /// Time for damping to take effect before the run is ended, ns.
 const TRIED_NS: u64 = 250_000_000;
@@ -70,7 +70,7 @@ fn has_moved(from: &Pose, to: &Pose) -> bool {
     way_m >= LEAST_WAY_M || turn_rad >= LEAST_TURN_RAD
 }
 
-/// Stage of the reaction to an oscillation.
+/// Stage of the response to an oscillation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
     Whole,
@@ -90,11 +90,12 @@ pub struct Oscillation {
 }
 
 impl Oscillation {
-    /// Detector without reversals so far.
+    /// Detector without recorded reversals.
     pub const NONE: Oscillation =
         Oscillation { force: Swing::NONE, torque: Swing::NONE, stage: Stage::Whole };
 
-    /// Records a wrench and the handle's pose; `cut` flags a limited force and a limited torque. Real-time: bounded, no allocation.
+    /// Records a wrench with the pose of the handle, and reduces the force at an oscillation; `cut` flags a limited
+    /// force and a limited torque. Real-time: bounded, no allocation.
     #[inline(never)] // seldom called
     pub fn note(&mut self, wrench: &Wrench, cut: [bool; 2], pose: &Pose, now_ns: u64) {
         let [cuts_force, cuts_torque] = cut;
@@ -118,7 +119,8 @@ impl Oscillation {
         };
     }
 
-    /// Returns the gain of the force, 0 to 1; `None` for all of it. Real-time: bounded, no allocation.
+    /// Returns the gain of force and torque, 0 to 1; `None` without damping. The gain returns to 1 after a time without
+    /// reversals. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn gain(&mut self, now_ns: u64) -> Option<f64> {
@@ -137,7 +139,8 @@ impl Oscillation {
         }
     }
 
-    /// Returns true if the oscillation went on in spite of damping: the run has to end. Real-time: bounded, no allocation.
+    /// Returns true if the oscillation continued in spite of the damping: the run has to end. Real-time: bounded, no
+    /// allocation.
     #[inline]
     #[must_use]
     pub fn is_given_up(&self) -> bool {

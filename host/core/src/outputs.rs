@@ -1,13 +1,13 @@
-//! Outputs of the models in a tick; those that were not requested are absent.
+//! Outputs of the models in a tick; outputs that were not requested are absent.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
 use flotor_hal::{DVec3, Demand, Wrench};
 
-/// Outputs of models and couplings together at one device, device frame.
+/// Sum of the outputs of all models and couplings at one device, device frame.
 ///
-/// An output that was not computed is absent. One that is present and not finite was computed for an observer alone and
-/// reached no hand.
+/// An output that was not computed is absent. An output that is present but not finite was computed for an observer
+/// alone and did not reach the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelOutputs {
     wrench: Wrench,
@@ -26,7 +26,8 @@ impl ModelOutputs {
         Self { wrench, energy_j, computed: Demand::ALL }
     }
 
-    /// Returns the outputs with those beyond `demand` absent; force stays. Real-time: bounded, no allocation.
+    /// Returns the outputs without those outside `demand`, which become absent; force is always present. Real-time:
+    /// bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn limited_to(self, demand: Demand) -> Self {

@@ -18,12 +18,12 @@ pub struct PeerState {
 /// Energy tank of an end, for reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TankState {
-    /// Energy available, J; below zero if more has come out than had gone in.
+    /// Energy available, J; below zero if more energy has come out than had gone in.
     pub level_j: f64,
-    /// Lowest level so far, J: with the controller on, below zero only by the energy that came out while a force acted for longer
-    /// than a period, in ticks late or missed, or on a handle faster than expected.
+    /// Lowest level so far, J. With the controller on, it is below zero only by the energy that came out while a force
+    /// acted for longer than a period (late or missed ticks), or on a handle faster than expected.
     pub lowest_j: f64,
-    /// Energy that the hand has put in so far less energy that has come out, J.
+    /// Energy that the hand has put in so far, less the energy that has come out, J.
     pub gone_in_j: f64,
     /// Energy that was put in and then discarded, J.
     pub discarded_j: f64,
@@ -32,13 +32,13 @@ pub struct TankState {
 /// Peer state with the data for its transport to another host.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dispatch {
-    /// Sending run: its start, ns since 1970. Each run counts its energy from zero.
+    /// Sending run, identified by its start, ns since 1970. Each run counts its energy from zero.
     pub run: u64,
-    /// Run that the sender takes for its partner; 0: none. The message, with its energy, is for this run alone.
+    /// Run of the sender's partner; 0: none. The message, with its energy, is for this run alone.
     pub partner: u64,
-    /// First tick with this partner: energy passed on before was for another run.
+    /// First tick of the sender with this partner: energy passed on before belongs to another run.
     pub since: u64,
-    /// Tick of the sender: of two dispatches of a run, the higher is the newer.
+    /// Tick of the sender; of two dispatches of a run, the dispatch with the higher tick is newer.
     pub tick: u64,
     /// The peer state.
     pub state: PeerState,
@@ -46,9 +46,9 @@ pub struct Dispatch {
     pub tank: TankState,
 }
 
-/// 64-bit words of a [`Dispatch`].
+/// Number of 64-bit words of a [`Dispatch`].
 pub const DISPATCH_WORDS: usize = 4 + MOTION_WORDS + 5;
-/// Bytes of an encoded [`Dispatch`]: a mark with the version, then [`DISPATCH_WORDS`] words, all little endian.
+/// Length of an encoded [`Dispatch`], bytes: a mark with the version, then [`DISPATCH_WORDS`] words, all little-endian.
 pub const DISPATCH_BYTES: usize = 8 * (1 + DISPATCH_WORDS);
 /// First word of an encoded dispatch; the digit is the version.
 const MARK: u64 = u64::from_le_bytes(*b"flotnew2");

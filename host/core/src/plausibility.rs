@@ -1,9 +1,9 @@
 //! Plausibility checks of samples, between a device and all users of its samples.
 //!
-//! A finite pose may still be a kilometre away, be no rotation, have jumped farther than a hand can move, or be a minute old; a
-//! model would respond to it with all the force that the envelope lets pass. An implausible sample is not used: the last plausible
-//! one stays in use, as when a sample is missing. [`Trust`] gives the consequence: one is tolerated, several in a short time remove
-//! the force, more are a fault of the device.
+//! A finite pose may still be a kilometre away, be no rotation, have jumped farther than a hand can move, or be a
+//! minute old; a model would respond with all the force that the envelope permits. An implausible sample is not used:
+//! the last plausible sample stays in use, as if a sample were missing. [`Trust`] gives the consequence: a single
+//! implausible sample is tolerated, several in a short time remove the force, more are a fault of the device.
 //!
 //! No real handle exceeds a bound: a sample within the bounds may still be wrong, and the envelope limits its effect.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
@@ -13,7 +13,7 @@ use flotor_hal::{Axes, Capabilities, Conditions, DQuat, DVec3, DeviceState, Pose
 
 /// Tolerance of the length of a quaternion: a hundred times the error of six decimals.
 const LENGTH_TOLERANCE: f64 = 1.0e-3;
-/// Rounding error of the squared length of a unit quaternion: that of its four numbers and of the sum.
+/// Rounding error of the squared length of a unit quaternion: of its four numbers and of their sum.
 const LENGTH_ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Largest pose, as a multiple of the device's range: a device also reports handles that have left the range.
 const RANGES: f64 = 2.0;
@@ -32,8 +32,8 @@ const TWIST_OVERSHOOT: f64 = 2.0;
 const SLACK_M: f64 = 2.0e-4;
 const SLACK_STEPS: f64 = 4.0;
 const SLACK_RAD: f64 = 4.0e-3;
-/// Tolerance of the time of a sample against the loop's, beyond periods and the device's latency, ns: ahead, for a device that
-/// stamps when a late tick reads, and behind.
+/// Tolerance of the time of a sample relative to the time of the loop, beyond periods and the device's latency, ns:
+/// ahead, for a device that takes its timestamp when a late tick reads, and behind.
 const AHEAD_NS: u64 = 10_000_000;
 const BEHIND_NS: u64 = 100_000_000;
 /// Tolerance of the time of a sample, in periods.
@@ -41,7 +41,7 @@ const AHEAD_PERIODS: u64 = 2;
 const BEHIND_PERIODS: u64 = 40;
 /// Time without a usable sample after which the force is zero, ns: the hand may have moved by 3 mm (10 Hz, amplitude 5 mm).
 const STALE_LIMIT_NS: u64 = 10_000_000;
-/// Least number of consecutive lost samples that is tolerated at any rate: one is normal.
+/// Smallest number of consecutive lost samples that is tolerated at any rate: one lost sample is normal.
 const STALE_TICKS_BORNE: u64 = 2;
 /// Timeout of a noisy pose without any changed bit, as a multiple of the sample timeout.
 const STUCK_TIMES: u32 = 5;
@@ -57,15 +57,15 @@ pub enum Implausible {
     NotFinite,
     /// The length of the orientation is not one.
     Quaternion,
-    /// The pose is farther out than twice the range.
+    /// The pose is outside twice the range of the device.
     Range,
-    /// The velocity, reported or since the last sample, is higher than that of any handle.
+    /// The velocity, reported or since the last sample, is higher than a handle can have.
     Speed,
-    /// The velocity changes faster than that of any handle.
+    /// The acceleration is higher than a handle can have.
     Acceleration,
-    /// The sample was taken in the future, too long ago or before the last one, or is repeated too often.
+    /// The sample was taken in the future, too long ago or before the last sample, or is repeated too often.
     Time,
-    /// A noisy pose has not changed in any bit.
+    /// A noisy pose has not changed in any bit for many samples.
     Stuck,
 }
 
@@ -96,7 +96,7 @@ impl Implausible {
     }
 }
 
-/// Implausible samples of a device in a run.
+/// Counts of the implausible samples of a device in a run, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImplausibleSamples {
     /// Counts in the order of [`Implausible::ALL`].
@@ -143,7 +143,7 @@ impl std::fmt::Display for ImplausibleSamples {
 /// Trust in the samples of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trust {
-    /// Samples are used.
+    /// Samples are plausible, or implausible ones are tolerated.
     Full,
     /// Too many samples were implausible: no force for a while.
     Withdrawn,
@@ -162,7 +162,7 @@ struct Believed {
     over_s: f64,
 }
 
-/// Poses that a device may report: two ellipsoids, of twice its range in position and in rotation.
+/// Bounds of the poses that a device may report: two ellipsoids, of twice its range in position and in rotation.
 #[derive(Clone, Copy, Debug)]
 pub struct PoseBounds {
     /// Reciprocal bounds, per m from home and per sine of half a rotation: a scaled vector longer than one is outside.
@@ -171,7 +171,8 @@ pub struct PoseBounds {
 }
 
 impl PoseBounds {
-    /// Returns the bounds of a device; an axis without a range has 10 m and every rotation. Not real-time.
+    /// Returns the bounds of a device; an axis without a declared range has 10 m, or no bound of rotation. Not
+    /// real-time.
     #[must_use]
     pub fn of(device: &Capabilities) -> Self {
         let reach_m = device.range_m.map(|range_m| if range_m > 0.0 { RANGES * range_m } else { ROOM_M });
@@ -209,7 +210,8 @@ pub struct PlausibilityCheck {
 }
 
 impl PlausibilityCheck {
-    /// Creates the check for a device with these capabilities, in a loop of this period. Not real-time.
+    /// Creates the check for a device with the capabilities `device`, in a loop with the period `period_ns`. Not
+    /// real-time.
     #[must_use]
     pub fn new(device: &Capabilities, period_ns: u64) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // some seconds
@@ -230,10 +232,11 @@ impl PlausibilityCheck {
         }
     }
 
-    /// Checks a new sample against the bounds and the last plausible one, and replaces that if it is plausible.
+    /// Checks a new sample against the bounds and the last plausible sample, and updates the trust; a plausible sample
+    /// becomes the last plausible sample.
     ///
     /// # Errors
-    /// If the sample is implausible, the reason.
+    /// The reason, if the sample is implausible.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -262,7 +265,7 @@ impl PlausibilityCheck {
         }
     }
 
-    /// Returns the implausible samples so far. Real-time: bounded, no allocation.
+    /// Returns the counts of implausible samples so far. Real-time: bounded, no allocation.
     #[must_use]
     pub fn found(&self) -> ImplausibleSamples {
         self.found
@@ -338,7 +341,7 @@ impl PlausibilityCheck {
         Ok(())
     }
 
-    /// Checks velocity and acceleration since the last sample, over this time, s; returns displacement, m, and time, s.
+    /// Checks velocity and acceleration since the last sample, `over_s` (s) ago; returns displacement, m, and time, s.
     #[inline]
     fn moved(&self, last: &Believed, pose: &Pose, over_s: f64) -> Result<(DVec3, f64), Implausible> {
         let way = pose.position() - last.pose.position();
@@ -367,23 +370,25 @@ impl PlausibilityCheck {
     }
 }
 
-/// Returns the number of ticks without a usable sample that is tolerated in a loop of this period. Not real-time.
+/// Returns the number of consecutive ticks without a usable sample that is tolerated in a loop with the period
+/// `period_ns`. Not real-time.
 #[must_use]
 pub fn stale_ticks_limit(period_ns: u64) -> u32 {
     let ticks = (STALE_LIMIT_NS / period_ns.max(1)).max(STALE_TICKS_BORNE);
     u32::try_from(ticks).unwrap_or(u32::MAX)
 }
 
-/// Returns true if the length of a quaternion is one within 1e-3: the tolerance for orientations of devices, peers and scenes.
-/// Real-time: bounded, no allocation.
+/// Returns true if the length of a quaternion is 1 within 1e-3, the tolerance for orientations of devices, peers and
+/// scenes. Real-time: bounded, no allocation.
 #[inline]
 #[must_use]
 pub fn is_rotation(quaternion: DQuat) -> bool {
     (quaternion.length_squared() - 1.0).abs() <= 2.0 * LENGTH_TOLERANCE // false for NaN
 }
 
-/// Returns a pose with its orientation scaled to length one, as a model may reject any other. An orientation of length one
-/// within rounding, and one that [`is_rotation`] rejects, keeps its bits. Real-time: bounded, no allocation.
+/// Normalises the orientation of a pose, as a model may reject an orientation of another length. An orientation of
+/// length 1 within rounding, and one that [`is_rotation`] rejects, is returned unchanged. Real-time: bounded, no
+/// allocation.
 #[inline]
 #[must_use]
 pub fn normalised(pose: &Pose) -> Pose {
@@ -395,7 +400,8 @@ pub fn normalised(pose: &Pose) -> Pose {
     Pose::new(pose.position(), orientation / squared.sqrt())
 }
 
-/// Returns true if no handle is that fast, or a number is NaN. Real-time: bounded, no allocation.
+/// Returns true if a twist is faster than a device may report (10 m/s or 100 rad/s), or a number is NaN. Real-time:
+/// bounded, no allocation.
 #[inline]
 #[must_use]
 pub fn is_too_fast(twist: &Twist) -> bool {

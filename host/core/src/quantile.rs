@@ -1,7 +1,7 @@
 //! Quantiles of samples.
 
-/// Sorts the samples and returns the quantile for a share, 0 to 1, by linear interpolation (type 7 of Hyndman and Fan, as in R and
-/// NumPy); NaN without samples. Not real-time.
+/// Sorts the samples and returns the quantile for the fraction `share`, 0 to 1, by linear interpolation (type 7 of
+/// Hyndman and Fan, as in R and NumPy); NaN without samples. Not real-time.
 pub fn quantile(samples: &mut [f64], share: f64) -> f64 {
     samples.sort_by(f64::total_cmp);
     let Some(last) = samples.len().checked_sub(1) else { return f64::NAN };

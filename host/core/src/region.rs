@@ -14,7 +14,8 @@ pub struct Region {
     radius: f64,
     /// Square of the radius, finite.
     radius_squared: f64,
-    /// Square of the radius of a ball within both, with room for rounding; 0 if there is none.
+    /// Square of the radius of a ball inside both the ball and the box, with a margin for rounding; 0 if an axis of the
+    /// box has no extent.
     inner_squared: f64,
 }
 
@@ -40,8 +41,8 @@ impl Region {
         self.bound
     }
 
-    /// Returns true if a vector is in the region; false for NaN. One comparison suffices for most vectors, which are well inside; a
-    /// tick calls this function five times.
+    /// Returns true if a vector is in the region; false for NaN. One comparison suffices for most vectors, which are
+    /// far inside; a tick calls this function five times.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -52,8 +53,9 @@ impl Region {
             || (vector.abs().cmple(self.half_sides).all() && squared <= self.radius_squared)
     }
 
-    /// Returns the longest vector in the region of the same direction, not longer than `vector`; zero for one that is not finite. Axes
-    /// with a half side of zero are left out, and do not shorten the others. Real-time: bounded, no allocation.
+    /// Shortens a vector to the region in its direction: returns `vector` if it is inside, zero if it is not finite.
+    /// Components along axes with a half side of zero are set to zero, and do not shorten the others. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn shrink(&self, vector: DVec3) -> DVec3 {
         let vector = DVec3::select(self.half_sides.cmpeq(DVec3::ZERO), DVec3::ZERO, vector);
@@ -69,7 +71,8 @@ impl Region {
         if self.holds(shrunk) { shrunk } else { shrunk * SURELY_INSIDE }
     }
 
-    /// Returns the ratio of a vector to the longest one of its direction in the region. Real-time: bounded, no allocation.
+    /// Returns the ratio of the length of a vector to the longest vector of its direction in the region: above 1
+    /// outside. Real-time: bounded, no allocation.
     #[must_use]
     pub fn excess(&self, vector: DVec3) -> f64 {
         // By the largest component: the square of a length may overflow.
@@ -79,8 +82,8 @@ impl Region {
         (vector.abs() / self.half_sides).to_array().into_iter().chain([of_radius]).fold(0.0, f64::max)
     }
 
-    /// Returns true if `shrink` reduced a component along a driven axis; pairing has already reported the other axes. Real-time:
-    /// bounded, no allocation.
+    /// Returns true if [`Self::shrink`] reduced a component along a driven axis; the start of a session has already reported
+    /// the other axes. Real-time: bounded, no allocation.
     #[must_use]
     pub fn has_cut(&self, before: DVec3, after: DVec3) -> bool {
         (before.cmpne(after) & self.half_sides.cmpne(DVec3::ZERO)).any()

@@ -1,4 +1,4 @@
-//! Boundary wall as a loop renders it on a device: as stiff as is stable, and far enough inside the range.
+//! Boundary wall as a loop renders it on a device: at most as stiff as is stable, and far enough inside the range.
 
 use crate::limits::{Bound, Boundary};
 use flotor_hal::{Capabilities, Damper, SampledLoop};
@@ -7,10 +7,10 @@ use std::fmt::{self, Display, Formatter};
 /// Force that the wall withstands inside the range of a device, N, if device and scene allow that much.
 pub const DESIGN_FORCE_N: f64 = 5.0;
 
-/// Ratio of the depth of a suddenly applied weight to its depth at rest.
+/// Ratio of the depth under a suddenly applied force to the depth under the same force at rest.
 const SWING: f64 = 2.0;
 
-/// Least part of the range that is free of the wall.
+/// Smallest fraction of the range that is free of the wall.
 const LEAST_SHARE_OF_RANGE: f64 = 0.5;
 
 /// Boundary wall of one device.
@@ -22,18 +22,19 @@ pub struct RenderedBoundary {
     pub begins_rad: [f64; 3],
     /// Stiffness, N/m.
     pub stiffness_n_per_m: f64,
-    /// Damping outwards, N·s/m.
+    /// Damping of outward motion, N·s/m.
     pub damping_ns_per_m: f64,
     /// Rotational stiffness, N·m/rad.
     pub stiffness_nm_per_rad: f64,
-    /// Rotational damping outwards, N·m·s/rad.
+    /// Damping of outward rotation, N·m·s/rad.
     pub damping_nms_per_rad: f64,
-    /// Weight that the wall holds inside the range, N; [`DESIGN_FORCE_N`] or the limit of force, unless half of the range is too short.
-    /// A weight applied at once is held too, if the limit of force is twice that.
+    /// Static force that the wall withstands inside the range, N: [`DESIGN_FORCE_N`] or the limit of force, less if
+    /// half of the range is too short. A suddenly applied force is withstood too, if the limit of force is twice as
+    /// large.
     pub holds_n: f64,
     /// Force that the wall should withstand, N.
     wanted_n: f64,
-    /// The scene's stiffness, N/m and N·m/rad; the second is 0 on a device without torque.
+    /// Stiffness requested by the scene, N/m and N·m/rad; the second is 0 on a device without torque.
     requested: [f64; 2],
     /// Latency of the device, s.
     latency_s: f64,
@@ -78,7 +79,8 @@ impl RenderedBoundary {
         }
     }
 
-    /// Returns a sentence if the wall differs from that of the scene, or withstands less force than it should. Not real-time.
+    /// Returns a sentence for users if the wall differs from the scene's wall, or withstands less force than it should;
+    /// `None` otherwise. Not real-time.
     #[must_use]
     pub fn notice(&self) -> Option<String> {
         let [stiffness, rotational] = self.requested;
@@ -106,7 +108,7 @@ impl RenderedBoundary {
     }
 }
 
-/// Limits of the wall and the place at which it begins.
+/// Prints the stable stiffness of the wall, its beginning and the force that it withstands.
 impl Display for RenderedBoundary {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { period_s, latency_s, stiffness_n_per_m, holds_n, .. } = *self;
@@ -127,7 +129,7 @@ impl Display for RenderedBoundary {
 /// Wall along one axis.
 struct Room {
     begins_m: f64,
-    /// Force that the wall withstands, as a share of the wanted force; at most 1.
+    /// Force that the wall withstands, as a fraction of the wanted force; at most 1.
     taken_share: f64,
 }
 
@@ -141,7 +143,7 @@ impl Room {
     }
 }
 
-/// Returns the place at which a wall with this margin inside a range begins; infinity without a range.
+/// Returns the distance from home at which a wall with this margin begins; infinity without a range.
 fn begins(range: f64, margin: f64) -> f64 {
     if range > 0.0 { (range - margin).max(range * LEAST_SHARE_OF_RANGE) } else { f64::INFINITY }
 }

@@ -34,7 +34,7 @@ events! {
     FORCE_LIMITED = 2 "force_limited",
     /// The torque was limited.
     TORQUE_LIMITED = 3 "torque_limited",
-    /// The change since the last tick was limited.
+    /// The slew rate was limited.
     SLEW_LIMITED = 4 "slew_limited",
     /// The handle was outside the boundary and was pushed back.
     BOUNDARY = 5 "boundary",
@@ -82,11 +82,11 @@ impl Events {
     /// No events.
     pub const NONE: Events = Events { bits: 0 };
 
-    /// Faults: each ends or disables a part of the run.
+    /// Events that end the run or disable a part of it.
     pub const FAULTS: Events =
         Self::EMERGENCY_STOP.with(Self::DEVICE_FAULT).with(Self::MODEL_FAULT).with(Self::OSCILLATION_DAMPED);
 
-    /// Limits and other restrictions of a tick.
+    /// Events that restrict a tick, such as limits and missing data.
     pub const LIMITS: Events = Self::FORCE_LIMITED
         .with(Self::TORQUE_LIMITED)
         .with(Self::BOUNDARY)
@@ -105,7 +105,7 @@ impl Events {
         Self { bits: self.bits | other.bits }
     }
 
-    /// Returns each event of the set with its name for people. Not real-time.
+    /// Returns each event of the set with its human-readable name. Not real-time.
     pub fn named(self) -> impl Iterator<Item = (Events, String)> {
         let each = (0..).zip(Self::NAMES).map(|(bit, name)| (Self::from_bits(1 << bit), name));
         each.filter(move |(event, _)| self.intersects(*event))
@@ -118,21 +118,21 @@ impl Events {
         self.bits |= other.bits;
     }
 
-    /// Returns true if any of `other` happened. Real-time: bounded, no allocation.
+    /// Returns true if the sets have an event in common. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub const fn intersects(self, other: Events) -> bool {
         self.bits & other.bits != 0
     }
 
-    /// Returns the set as a number.
+    /// Returns the set as a bit mask, in the order of [`Self::NAMES`].
     #[inline]
     #[must_use]
     pub const fn bits(self) -> u32 {
         self.bits
     }
 
-    /// Creates the set from a number.
+    /// Creates the set from a bit mask.
     #[inline]
     #[must_use]
     pub const fn from_bits(bits: u32) -> Self {
@@ -145,7 +145,7 @@ impl Events {
 pub struct TickRecord {
     /// Number of the tick, below 2^46: 2200 years at 1 kHz.
     pub tick: u64,
-    /// Index of the device in the scene: each tick yields one record for each device, in this order.
+    /// Index of the device in the scene: each tick yields one record per device, in the order of the devices.
     pub device: u16,
     /// Scheduled time since the loop started, ns.
     pub time_ns: u64,
@@ -155,17 +155,17 @@ pub struct TickRecord {
     pub pose: Pose,
     /// Velocity of the handle, m/s and rad/s.
     pub twist: Twist,
-    /// Outputs of models and couplings, in the device frame and scaled to the device.
+    /// Sum of the outputs of models and couplings, in the device frame and scaled to the device.
     pub model: ModelOutputs,
     /// Wrench sent to the device after the envelope, N and N·m.
     pub commanded: Wrench,
     /// Wrench delivered since the previous tick, as the device reports it, N and N·m.
     pub delivered: Wrench,
-    /// Energy the hand has put into the device's port so far less what has come out, J.
+    /// Energy that the hand has put into the device's port so far, less the energy that has come out, J.
     pub port_energy_j: f64,
     /// Events of the tick.
     pub events: Events,
-    /// Buttons of the device.
+    /// Buttons of the device, one bit each.
     pub buttons: u32,
     /// Delay of the start of the tick, ns; 0 on the virtual clock. Not part of the digest.
     pub lateness_ns: u64,
@@ -173,9 +173,9 @@ pub struct TickRecord {
     pub compute_ns: u64,
 }
 
-/// 64-bit words of a record; the last [`TIMING_WORDS`] depend on the machine and are left out of digests.
+/// Number of 64-bit words of a record; the last [`TIMING_WORDS`] depend on the machine and are excluded from digests.
 pub const RECORD_WORDS: usize = 39;
-/// Words at the end of a record that hold measured times.
+/// Number of words with measured times, at the end of a record.
 pub const TIMING_WORDS: usize = 2;
 
 /// Bits of the first word that hold the number of the tick; the flags of absent outputs come next, then the device.

@@ -18,12 +18,12 @@ pub struct Encoder<const N: usize> {
 }
 
 impl<const N: usize> Encoder<N> {
-    /// Creates an encoder of a record with zeros.
+    /// Creates an encoder of a record that is zero so far.
     pub const fn of_zeros() -> Self {
         Self { words: [0; N], count: 0 }
     }
 
-    /// Appends words; drops those beyond the record.
+    /// Appends words; drops words beyond the end of the record.
     pub fn words<const M: usize>(&mut self, words: [u64; M]) -> &mut Self {
         let rest = self.words.iter_mut().skip(self.count);
         rest.zip(words).for_each(|(place, word)| *place = word);
@@ -31,7 +31,7 @@ impl<const N: usize> Encoder<N> {
         self
     }
 
-    /// Appends numbers.
+    /// Appends numbers as their bit patterns.
     pub fn numbers<const M: usize>(&mut self, numbers: [f64; M]) -> &mut Self {
         self.words(numbers.map(f64::to_bits))
     }
@@ -55,7 +55,7 @@ impl<const N: usize> Encoder<N> {
         self.numbers([field.valid_m, field.valid_rad]).words([field.time_ns])
     }
 
-    /// Returns the record.
+    /// Returns the words of the record; zero where nothing was appended.
     pub const fn finish(&self) -> [u64; N] {
         self.words
     }

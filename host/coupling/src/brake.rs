@@ -1,20 +1,23 @@
-//! Protection from a partner on another host that throws a handle here out of the range of its device.
+//! Protection against a partner on another host whose force would drive the local handle out of the range of its
+//! device.
 //!
-//! Even accepted energy may come from a partner with false claims, and a spring that is pulled to and fro at the right moments
-//! collects that energy in the handle. So the position is extrapolated by the velocity: if that leaves the range, no force pulls the
-//! handle outwards, and a damper slows it down. Inside the range both dissipate energy. Hands are not that fast near an edge.
+//! Even accepted energy may come from a partner with false claims, and a spring whose end is moved back and forth at
+//! the right moments transfers that energy to the handle. So the position is extrapolated with the velocity: if it
+//! leaves the range, no force acts outwards, and a damper slows the handle down. Inside the range both measures
+//! dissipate energy. Hands do not move that fast near an edge.
 
 use super::Reach;
 use flotor_hal::{DVec3, DeviceState, Wrench, rotation_vector};
 
-/// Time by which the position is extrapolated, s. A handle that moves straight outwards may cover the remaining distance in that
-/// time; the damper, 50 N·s/m at 1 kHz, slows handle and hand (1.1 kg) to that with damping ratio `sqrt(50 * 0.05 / (4 * 1.1)) = 0.75`.
+/// Time over which the position is extrapolated, s. A handle that moves straight outwards may cover the remaining
+/// distance in that time; the damper, 50 N·s/m at 1 kHz, slows handle and hand (1.1 kg) to that speed with damping
+/// ratio `sqrt(50 * 0.05 / (4 * 1.1)) = 0.75`.
 const AHEAD_S: f64 = 0.05;
 /// Mass and moment of inertia of the lightest handle and hand, kg and kg m²: the damper stops half of its motion in a period.
 const LIGHTEST_KG: f64 = 0.1;
 const LIGHTEST_KG_M2: f64 = 1.0e-4;
 
-/// Brake for a handle that could not be stopped before the edge.
+/// Brake for a handle that would leave the range of its device.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Brake {
     reach: Reach,
@@ -29,7 +32,8 @@ impl Brake {
         Self { reach, damping_ns_per_m: half * LIGHTEST_KG, damping_nms_per_rad: half * LIGHTEST_KG_M2 }
     }
 
-    /// Limits a wrench (device frame) and adds damping. Real-time: bounded, no allocation.
+    /// Removes the outward part of a wrench (device frame) and adds damping, if the extrapolated pose is out of range;
+    /// else returns the wrench unchanged. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn braked(&self, wrench: &Wrench, state: &DeviceState) -> Wrench {
         let Reach { range_m, range_rad } = self.reach;
@@ -43,7 +47,8 @@ impl Brake {
     }
 }
 
-/// Returns the braked force at a place within an ellipsoid of these semi-axes. An axis without a range (0) is ignored.
+/// Returns the braked force at a position within an ellipsoid with the semi-axes `range`. An axis without a range (0)
+/// is ignored.
 #[inline]
 fn slowed(force: DVec3, place: DVec3, speed: DVec3, range: [f64; 3], damping: f64) -> DVec3 {
     let range = DVec3::from_array(range);

@@ -1,9 +1,10 @@
-//! Limits on the claims of a partner on another host: only what a hand on a device like ours could have done.
+//! Limits on the claims of a partner on another host, to what a hand on a device like the local one could do.
 //!
-//! A message is a claim. One with an impossible position, orientation or velocity is not used at all. Otherwise
-//! the pose counts within the range of this device, and moves no faster than a hand. The energy claimed as passed on counts up to
-//! the amount that can be checked here: the energy that this end has passed on itself, and the work of a hand that moved as the claimed
-//! pose did, against the coupling, with the power of a hand. The excess is cut and counted; a partner with too much excess is rejected.
+//! The content of a message is a claim. A message with an impossible position, orientation or velocity is ignored.
+//! Otherwise its pose is limited to the range of the local device and to the speed of a hand. The energy that the
+//! partner claims to have passed on is accepted up to the amount that can be checked here: the energy that this end has
+//! passed on itself, and the work, against the coupling and with the power of a hand, of a hand that moved as the
+//! claimed pose did. The excess is cut and counted; a partner with too much excess is rejected.
 
 use flotor_core::coupling::CouplingConfig;
 use flotor_core::mapping::Mapping;
@@ -11,13 +12,13 @@ use flotor_core::peer::PeerState;
 use flotor_core::plausibility::{is_rotation, is_too_fast, normalised};
 use flotor_hal::{DVec3, DeviceState, Pose, Twist, orientation_from_rotation_vector, rotation_vector};
 
-/// Range of the device here, device frame: semi-axes of an ellipsoid of positions (m) and of one of rotation vectors (rad).
-/// An axis without a range (0) is ignored.
+/// Range of the local device, device frame: semi-axes of an ellipsoid of positions (m) and of an ellipsoid of rotation
+/// vectors (rad). An axis without a range (0) is ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reach {
-    /// Along each axis, m.
+    /// Semi-axes of the positions, m.
     pub range_m: [f64; 3],
-    /// About each axis, rad.
+    /// Semi-axes of the rotation vectors, rad.
     pub range_rad: [f64; 3],
 }
 
@@ -26,33 +27,34 @@ pub struct Reach {
 pub struct ClaimExcess {
     /// Energy, J, in the shared frame.
     pub energy_j: f64,
-    /// Distance by which the claimed position moved too fast, m, device frame.
+    /// Distance by which the claimed position moved farther than a hand could, m, device frame.
     pub path_m: f64,
-    /// Angle by which the claimed orientation turned too fast, rad.
+    /// Angle by which the claimed orientation rotated farther than a hand could, rad.
     pub turn_rad: f64,
 }
 
-/// Largest speed of a hand, m/s and rad/s: several times that of a hand that holds a handle.
+/// Largest speed of a hand, m/s and rad/s: several times the speed of a hand that holds a handle.
 const FASTEST_M_PER_S: f64 = 2.0;
 const FASTEST_RAD_PER_S: f64 = 30.0;
-/// Motion accepted at once because a message may be late, as time of the fastest motion, s.
+/// Allowance for motion at once, because a message may be late: duration of motion at the largest speed, s.
 const AT_ONCE_S: f64 = 0.01;
-/// Largest mean power of a hand, W, over longer than [`BURST_S`]; at once, the work of that time at this power.
+/// Largest mean power of a hand, W, averaged over more than [`BURST_S`]; within a shorter time the hand may do the work
+/// of [`BURST_S`] at this power.
 const HAND_W: f64 = 1.0;
 const BURST_S: f64 = 0.2;
 /// Largest age of a peer state for which the coupling is useful, s: the partner's spring is longer by the motion in that time.
 const OLDEST_S: f64 = 0.1;
 /// Ratio of the largest work that the partner's hand may have done to the work estimated here.
 const MORE: f64 = 2.0;
-/// Largest energy of a partner at its first message, J: a full reserve and as much in its spring. It counts as work of its hand,
-/// so that repeated connections add no energy.
+/// Largest energy of a partner at its first message, J: a full reserve, and the same amount in its spring. This energy
+/// counts as work of the partner's hand, so that repeated connections add no energy.
 const AT_FIRST_J: f64 = 0.02;
-/// Limits of the excess within some [`MEMORY_S`]; a partner above one of them is rejected.
+/// Limits on the recent excess, which decays with [`MEMORY_S`]; a partner above one of them is rejected.
 const TOO_MUCH: ClaimExcess = ClaimExcess { energy_j: 0.05, path_m: 0.25, turn_rad: 12.5 };
 /// Time constant with which the recent excess decays, s.
 const MEMORY_S: f64 = 1.0;
-/// Largest distance of a partner from home, in the shared frame of devices that are not scaled, m: the range of its device
-/// is not known here; that of the largest arms is less.
+/// Largest distance of a partner from home, in the shared frame of devices that are not scaled, m: more than the
+/// largest arms reach, as the range of the partner's device is unknown here.
 const FARTHEST_M: f64 = 2.0;
 
 /// Check of the claims of one partner. Energies in the shared frame.
@@ -65,7 +67,8 @@ pub(super) struct Claims {
     last: Option<[DVec3; 2]>,
     /// Energy that the partner claims to have passed on, J.
     claimed_j: f64,
-    /// Total accepted energy of all partners, J: with the energy put in by the hand here, the most that can come out.
+    /// Total energy accepted from all partners, J. The energy delivered to the local hand is at most this energy plus
+    /// the energy that the local hand put in.
     pub(super) accepted_j: f64,
     /// Energy that the partner may still claim, and energy that its hand may still have put in, J.
     open_j: f64,
@@ -102,7 +105,8 @@ impl Claims {
         }
     }
 
-    /// Returns true if a device could have this pose and velocity; other messages are ignored. Real-time: bounded, no allocation.
+    /// Returns true if a device could have the pose and velocity of a message; other messages are ignored. Real-time:
+    /// bounded, no allocation.
     #[inline]
     pub(super) fn can_be(&self, peer: &PeerState, mapping: &Mapping) -> bool {
         // From metres of a device to the shared frame; the partner's scale may differ, but then is not less than one.
@@ -116,8 +120,8 @@ impl Claims {
             && !is_too_fast(&unscaled)
     }
 
-    /// Starts the claims of a partner at this state: energy passed on before was for another run. A partner that is not new stays
-    /// accountable for earlier claims. Real-time: bounded, no allocation.
+    /// Starts the check of a partner at this state: energy that the partner passed on before belongs to another run.
+    /// The excess of earlier claims still counts unless `is_another`. Real-time: bounded, no allocation.
     pub(super) fn meet(&mut self, peer: &PeerState, is_another: bool) {
         self.last = None;
         if is_another {
@@ -127,7 +131,8 @@ impl Claims {
         (self.claimed_j, self.open_j, self.hand_j) = (peer.passed_on_j, had_j, self.hand_j - had_j);
     }
 
-    /// Forgets the partner's pose after a silence: the next one is accepted as a start. Real-time: bounded, no allocation.
+    /// Drops the partner's pose after a silence: the next pose is accepted as a start. Real-time: bounded, no
+    /// allocation.
     pub(super) fn forget_place(&mut self) {
         self.last = None;
     }
@@ -150,8 +155,9 @@ impl Claims {
         self.is_cut = false;
     }
 
-    /// Returns the accepted part of a claim, with the handle here at `here` (device frame) and the last message `silent_s` ago; its
-    /// energy is the running total of accepted energy. Real-time: bounded, no allocation.
+    /// Returns the accepted part of a claim. `here` is the state of the local handle (device frame), `silent_s` the
+    /// time since the last message; the energy in the result is the running total of accepted energy. Real-time:
+    /// bounded, no allocation.
     #[inline]
     pub(super) fn accept(
         &mut self,
@@ -207,7 +213,7 @@ impl Claims {
         PeerState { pose, twist: bounded_twist(&peer.twist, mapping), passed_on_j }
     }
 
-    /// Returns the accepted energy: the total so far, J.
+    /// Accepts a claim of energy as far as it can be checked; returns the total accepted so far, J.
     fn energy(
         &mut self,
         passed_on_j: f64,
@@ -253,7 +259,7 @@ impl Claims {
     }
 }
 
-/// Limits a twist to that of a hand, in the frame of the device.
+/// Limits a twist to the speeds of a hand; they are limits in the frame of the device.
 fn bounded_twist(twist: &Twist, mapping: &Mapping) -> Twist {
     let most_m_per_s = FASTEST_M_PER_S / mapping.length_to_device(1.0);
     Twist::new(

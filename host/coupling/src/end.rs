@@ -1,4 +1,4 @@
-//! One end of a coupling: pulls its handle to the last known position of the partner.
+//! One end of a coupling: a spring and a damper pull its handle to the last known position of the partner.
 
 use super::brake::Brake;
 use super::{CouplingConfig, PassivityMode, Pull, Tank};
@@ -7,17 +7,18 @@ use flotor_core::mapping::{Mapping, MappingConfig};
 use flotor_core::peer::PeerState;
 use flotor_hal::{DVec3, DeviceState, Pose, Wrench, rotation_vector};
 
-/// Energy of the tank that stays in reserve, J: the cost of an unexpected motion of 20 µm at 1 N. With it, a hand that starts
-/// faster than expected does not take the tank below zero.
+/// Energy of the tank that is held in reserve, J: the energy of an unexpected motion of 20 µm at 1 N. With this
+/// reserve, a hand that starts faster than expected does not take the tank below zero.
 const SURPRISE_J: f64 = 2.0e-5;
 
-/// Share of the available energy that a tick may take: a force that drains the tank falls within ten ticks or more, and not in one.
+/// Fraction of the available energy that a tick may take: a force that drains the tank decays over ten ticks or more,
+/// instead of one.
 const DRAWN: f64 = 0.1;
-/// Time in which a force that was reduced for want of energy returns, s. At once it would draw more than there is
-/// in the next tick again, and switch on and off from tick to tick: a hand feels that as a rattle.
+/// Time over which a force that was reduced for lack of energy returns, s. Returning at once, it would drain the tank
+/// again in the next tick, and switch on and off from tick to tick: the hand feels a rattle.
 const RETURN_S: f64 = 0.1;
 
-/// One end of a coupling.
+/// Local end of a coupling: virtual spring and damper at one device, limited by an energy tank.
 pub struct End {
     config: CouplingConfig,
     mapping: Mapping,
@@ -26,12 +27,13 @@ pub struct End {
     tank: Tank,
     bounce: Bounce,
     partner: Option<PeerState>,
-    /// Share of the requested wrench, 0 to 1: below one while the tank has been too low.
+    /// Fraction of the requested wrench, 0 to 1: below one after the tank was too low.
     part: f64,
 }
 
 impl End {
-    /// Creates an end at rest without a peer state; until it receives one, it requests no force. Not real-time.
+    /// Creates an end with an empty tank and without a peer state; until it receives a peer state, it requests no
+    /// force. Not real-time.
     ///
     /// `mapping` maps from the device's frame to the shared one; `period_s` is the time between ticks.
     #[must_use]
@@ -55,7 +57,8 @@ impl End {
         }
     }
 
-    /// Books the energy that has crossed the port since the last tick, while `held` was applied (both in the device frame).
+    /// Adds the energy that has crossed the port since the last tick to the tank; `held` is the wrench applied
+    /// meanwhile (state and wrench in the device frame). Call once per tick, first.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -66,15 +69,16 @@ impl End {
         self.controller.follow(&state.twist);
     }
 
-    /// Returns the state for the partner, with a part of the energy in the tank. Call once a tick. Real-time: bounded, no
-    /// allocation.
+    /// Passes a fraction of the energy in the tank on to the partner; returns the state for the partner, shared frame.
+    /// Call once per tick. Real-time: bounded, no allocation.
     #[inline]
     pub fn send_state(&mut self, state: &DeviceState) -> PeerState {
         let passed_on_j = self.tank.pass_on(self.bounce_j());
         self.peer_state(state, passed_on_j)
     }
 
-    /// Returns the state for a partner that may not be there, to which no energy is passed on. Real-time: bounded, no allocation.
+    /// Returns the state for a partner that may not be connected, and passes no energy on. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub(super) fn call(&self, state: &DeviceState) -> PeerState {
         self.peer_state(state, self.tank.passed_on_j())
@@ -89,7 +93,8 @@ impl End {
         }
     }
 
-    /// Stores the newest peer state; those of earlier ticks may be missing. Real-time: bounded, no allocation.
+    /// Stores the newest peer state and adds the energy that the partner has passed on; states of earlier ticks may be
+    /// missing. Real-time: bounded, no allocation.
     #[inline]
     pub fn receive(&mut self, peer: &PeerState) {
         self.tank.receive(peer.passed_on_j);
@@ -107,7 +112,9 @@ impl End {
         &self.mapping
     }
 
-    /// Returns the wrench that this end requests. Real-time: bounded, no allocation.
+    /// Returns the wrench that this end requests, device frame; zero without a peer state. Discards energy in the tank
+    /// above the needs of spring, reserve and walls; with [`PassivityMode::Control`], reduces the wrench to the
+    /// available energy. Call once per tick. Real-time: bounded, no allocation.
     #[inline]
     pub fn pull(&mut self, state: &DeviceState) -> Pull {
         let pull = self.whole_pull(state);
@@ -115,8 +122,8 @@ impl End {
         pull
     }
 
-    /// Returns a part of the pull, 0 to 1, limited by the brake: it takes no more energy than the whole would. Real-time: bounded,
-    /// no allocation.
+    /// Returns the fraction `part`, 0 to 1, of the pull, limited by the brake: it takes no more energy than the whole
+    /// pull. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn pull_part(&mut self, state: &DeviceState, part: f64, brake: &Brake) -> Pull {
         let whole = self.whole_pull(state);
@@ -158,7 +165,7 @@ impl End {
         Pull { wrench: given, energy_j: 0.5 * stored_j * scale, is_damped: given != wrench }
     }
 
-    /// Reduces a wrench to the energy in the tank, and to the share that has returned so far.
+    /// Reduces a wrench to the energy in the tank, and to the fraction that has returned so far.
     #[inline]
     fn affordable(&mut self, whole: &Wrench, state: &DeviceState) -> Wrench {
         let part = (self.part + self.controller.period_s() / RETURN_S).min(1.0);
@@ -182,7 +189,8 @@ impl End {
     }
 }
 
-/// Returns the ratio of a reduced wrench to the whole along it, 0 to 1; the smaller one of force and torque.
+/// Returns the component of a reduced wrench along the whole wrench, as a fraction of the whole, 0 to 1; the smaller
+/// fraction of force and torque.
 #[inline]
 fn part_along(less: &Wrench, whole: &Wrench) -> f64 {
     let of = |less: DVec3, whole: DVec3| {
@@ -192,19 +200,19 @@ fn part_along(less: &Wrench, whole: &Wrench) -> f64 {
     of(less.force(), whole.force()).min(of(less.torque(), whole.torque()))
 }
 
-/// Energy stored in springs other than the coupling's: the walls at the boundary. It will come out at this end, and must not be
-/// passed on before.
+/// Energy stored in springs other than the coupling's, namely the walls at the boundary. It will return to the hand at
+/// this end, and must not be passed on before.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bounce {
     observer: PortObserver,
     /// Wrench that the coupling requested last, device frame.
     asked: Wrench,
-    /// Upper bound of the stored energy, J, as the device feels it.
+    /// Upper bound of the stored energy, J, scaled to the device.
     stored_j: f64,
 }
 
 impl Bounce {
-    /// Rounding error of sums of forces, N; of torques a tenth of it, N·m.
+    /// Rounding error of sums of forces, N; a tenth of this number for sums of torques, N·m.
     const NOTHING_N: f64 = 1.0e-9;
 
     /// Integrates the work of the wrench beyond the requested one; zero as long as there is no such wrench.

@@ -1,22 +1,23 @@
 //! Virtual coupling of two devices by a spring and a damper: bilateral teleoperation.
 //!
-//! Each device has an [`End`]. An end receives the state of its partner: pose, velocity and the energy it has
-//! passed on ([`PeerState`], some ticks old), and pulls its own handle there. It has an energy tank ([`Tank`]): the energy
-//! that its hand puts in, less the energy that comes out, plus the energy that the partner has passed on. As long as no tank is
-//! below zero, the pair generates no energy, *whatever the delay*, constant or not, and even if messages get lost: the energy passed
-//! on is sent as a running total. That holds for ends with true claims; the claims of one on another host are accepted only as far
-//! as they can be checked here (`claims`), so that a false claim yields no more energy than that.
+//! Each device has an [`End`]. An end receives the state of its partner: pose, velocity and the energy that the partner
+//! has passed on ([`PeerState`], some ticks old), and pulls its own handle to that pose. It has an energy tank
+//! ([`Tank`]): the energy that its hand puts in, less the energy that comes out, plus the energy that the partner has
+//! passed on. As long as no tank is below zero, the pair generates no energy, *whatever the delay*, constant or not,
+//! and even if messages get lost: the energy passed on is sent as a running total. This holds for ends with true
+//! claims; the claims of a partner on another host are accepted only as far as they can be checked here (`claims`), so
+//! that false claims yield no more energy than that.
 //!
 //! ```text
 //!  hand  <-- wrench --  End   -- PeerState: pose, twist, energy passed on -->  End  -- wrench -->  hand
 //!        -- motion -->  Tank  <-- PeerState ---------------------------------  Tank <-- motion --
 //! ```
 //!
-//! Where frames and scales differ, both ends use one shared frame, with a mapping like a model's.
-//! Energies are those of the shared frame.
+//! If frames or scales differ, both ends use one shared frame, to which each device has a mapping, like the mapping of
+//! a model. Energies are given in the shared frame.
 //!
 //! [`Coupling`] has both ends in one loop with a delay of whole ticks. [`RemoteEnd`] is an end whose partner is on
-//! another host: the same end and peer state, which other threads transport over the [`Line`].
+//! another host; other threads transport its messages over the [`Line`].
 //!
 //! Sources: energy tank and transfer of energy, M. Franken, S. Stramigioli, S. Misra, C. Secchi, A. Macchelli,
 //! "Bilateral telemanipulation with time delays: a two-layer approach combining passivity and transparency", IEEE
@@ -46,27 +47,27 @@ pub use tank::Tank;
 use delay::DelayLine;
 use flotor_hal::{DeviceState, Wrench};
 
-/// State at one of the devices of a coupling in a tick.
+/// Handle state and applied wrench at one device of a coupling in a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct PortSample<'a> {
     /// State of the handle, device frame.
     pub state: &'a DeviceState,
-    /// Wrench applied since the last tick, as far as the coupling had requested it, device frame.
+    /// Part of the wrench applied since the last tick that the coupling had requested, device frame.
     pub held: Wrench,
 }
 
-/// Request of an end in a tick.
+/// Wrench that an end requests in a tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pull {
     /// Wrench on the hand, device frame.
     pub wrench: Wrench,
     /// This end's half of the energy stored in the spring, scaled to the device, J.
     pub energy_j: f64,
-    /// True if the controller has reduced the wrench.
+    /// True if the passivity controller has reduced the wrench.
     pub is_damped: bool,
 }
 
-/// Coupling with both ends in one loop.
+/// Coupling of two devices of one loop.
 pub struct Coupling {
     ends: [End; 2],
     /// Peer states under way to the end with the same index.
@@ -74,7 +75,8 @@ pub struct Coupling {
 }
 
 impl Coupling {
-    /// Creates a coupling at rest, with empty tanks; `period_s` is the time between ticks. Not real-time.
+    /// Creates a coupling with empty tanks and without peer states; `period_s` is the time between ticks. Not
+    /// real-time.
     #[must_use]
     pub fn new(config: &CouplingConfig, ends: &[CouplingEnd; 2], period_s: f64) -> Self {
         Self {
@@ -83,7 +85,8 @@ impl Coupling {
         }
     }
 
-    /// Runs one tick and returns the request of each end. Real-time: bounded, no allocation.
+    /// Runs one tick: both ends exchange their states, `delay_ticks` late; returns the request of each end. Real-time:
+    /// bounded, no allocation.
     #[inline]
     pub fn step(&mut self, samples: [PortSample<'_>; 2]) -> [Pull; 2] {
         let Self { ends: [first, second], ways: [to_first, to_second] } = self;

@@ -2,16 +2,16 @@
 //!
 //! With the wrench held from one sample to the next, the energy that crosses the port between two samples is known
 //! exactly: the applied wrench times the displacement of the handle (the passivity observer of Hannaford and Ryu,
-//! "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and Automation 18(1), 2002, eq. 5).
-//! A spring, a damper, a wall of stored or dissipated energy never gives back more than it received. A loop that does is
-//! active: its model generates energy, or sampling does.
+//! "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and Automation 18(1), 2002, eq. 5). A
+//! passive object (spring, damper, wall) never gives back more energy than it received. A loop that does is active: its
+//! model generates energy, or sampling does.
 //!
-//! The controller predicts the energy that the port may give until the next sample, from the velocity and from the accelerations of
-//! the recent past, and passes the share of the wrench for which the energy is available (the energy tank of Franken and others,
-//! IEEE Trans. Robotics 27(4), 2011, section IV). In place of the rest it injects damping along the motion (the impedance form of the
-//! first paper), unless the handle hardly moves.
+//! The controller predicts the energy that the port may give until the next sample, from the velocity and from the
+//! accelerations of the recent past, and passes the fraction of the wrench for which the energy is available (the
+//! energy tank of Franken and others, IEEE Trans. Robotics 27(4), 2011, section IV). In place of the rest it injects
+//! damping along the motion (the impedance form of the paper of Hannaford and Ryu), unless the handle hardly moves.
 //!
-//! The envelope uses the controller at each device's port, a [coupling](crate::Coupling) at each of its ends.
+//! The envelope uses the controller at each device's port, a [coupling](crate::Coupling) uses it at each of its ends.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -27,7 +27,8 @@ pub struct Displacement {
 }
 
 impl Displacement {
-    /// Returns the work of a constant wrench on the handle, J. Real-time: bounded, no allocation.
+    /// Returns the work of a constant wrench on the handle, J; positive if the wrench acts along the motion. Real-time:
+    /// bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn work_j(&self, wrench: &Wrench) -> f64 {
@@ -35,7 +36,7 @@ impl Displacement {
     }
 }
 
-/// Passivity observer: follows the poses of a handle from sample to sample.
+/// Passivity observer: displacement of a handle, and energy through its port, from sample to sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PortObserver {
     /// Pose at the last sample; `None` before the first.
@@ -43,7 +44,8 @@ pub struct PortObserver {
 }
 
 impl PortObserver {
-    /// Returns the displacement since the last sample; zero at the first. Real-time: bounded, no allocation.
+    /// Stores the pose; returns the displacement since the last sample, zero at the first. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub fn moved(&mut self, pose: &Pose) -> Displacement {
         let now = (pose.position(), pose.orientation());
@@ -51,8 +53,8 @@ impl PortObserver {
         Displacement { linear: now.0 - position_m, angular: small_rotation(now.1 * orientation.conjugate()) }
     }
 
-    /// Returns the energy that has gone into the port since the last sample, while `held` was applied, J; negative: the
-    /// hand received energy.
+    /// Stores the pose; returns the energy that has gone into the port since the last sample, while `held` was applied,
+    /// J; negative: the hand received energy.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -63,25 +65,25 @@ impl PortObserver {
 
 /// Estimate of the largest acceleration of a handle until the next sample, from the recent past.
 ///
-/// A calm handle is assumed to remain calm, so that a hand that presses slowly feels a force from the first energy that it puts in;
-/// a handle that shakes is assumed to go on.
+/// A calm handle is assumed to remain calm, so that a hand that presses slowly feels a force from the first energy that
+/// it puts in; a shaking handle is assumed to continue.
 #[derive(Clone, Copy, Debug)]
 struct RecentMotion {
     last: Option<Twist>,
-    /// m/s² and rad/s².
+    /// Linear and angular acceleration, m/s² and rad/s².
     acceleration: [f64; 2],
 }
 
 impl RecentMotion {
-    /// Least acceleration assumed of a handle: twice that of tremor, 0.1 mm at 10 Hz, and that motion at a lever of a tenth
-    /// of a metre, m/s² and rad/s².
+    /// Smallest acceleration assumed of a handle, m/s² and rad/s²: twice the acceleration of tremor of 0.1 mm at 10 Hz,
+    /// and of the same motion at a lever of a tenth of a metre.
     const CALMEST: [f64; 2] = [0.8, 8.0];
     /// Mass and moment of inertia of the lightest handle and hand, kg and kg m²: a fifth and a tenth of the flotor alone (0.58 kg,
     /// 1e-3 kg m²).
     const LIGHTEST: [f64; 2] = [0.1, 1.0e-4];
-    /// Ratio of an acceleration that may come at once to that of the last period.
+    /// Ratio of the acceleration that is assumed possible at once to the acceleration over the last period.
     const MORE: f64 = 2.0;
-    /// Time constant with which an acceleration is forgotten, s.
+    /// Time constant with which the estimate decays, s.
     const MEMORY_S: f64 = 0.05;
 
     const NONE: Self = Self { last: None, acceleration: Self::CALMEST };
@@ -102,7 +104,7 @@ impl RecentMotion {
     }
 }
 
-/// Passivity controller: limits the energy that a device's port, or an end of a coupling, may give to the available energy.
+/// Passivity controller: limits the energy that a device's port, or an end of a coupling, may give to the hand.
 #[derive(Clone, Copy, Debug)]
 pub struct Controller {
     damping_ns_per_m: f64,
@@ -112,8 +114,8 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// Creates a controller of wrenches that are held for `period_s` seconds; it injects at most this damping, N·s/m and N·m·s/rad.
-    /// Not real-time.
+    /// Creates a controller for wrenches that are held for `period_s` (s); `damping_ns_per_m` (N·s/m) and
+    /// `damping_nms_per_rad` (N·m·s/rad) are the largest injected damping. Not real-time.
     #[must_use]
     pub fn new(damping_ns_per_m: f64, damping_nms_per_rad: f64, period_s: f64) -> Self {
         Self { damping_ns_per_m, damping_nms_per_rad, period_s, motion: RecentMotion::NONE }
@@ -125,14 +127,16 @@ impl Controller {
         self.period_s
     }
 
-    /// Updates the motion with the velocity at a sample; once a tick. Real-time: bounded, no allocation.
+    /// Updates the estimate of the motion with the velocity at a sample; call once per tick. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub fn follow(&mut self, twist: &Twist) {
         self.motion.follow(twist, self.period_s);
     }
 
-    /// Returns the share of the wrench, and damping for the rest, with which the port gives at most `available_j` until the next
-    /// sample, after `held` over the last period; `None` if all of the wrench does.
+    /// Reduces `wrench` so that the port gives at most `available_j` until the next sample, after `held` over the last
+    /// period: passes a fraction of the wrench, with injected damping in place of the rest. `None` if the whole wrench
+    /// is within the limit.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -188,7 +192,7 @@ impl Controller {
     }
 }
 
-/// Bisections of the share of a wrench that passes: to 1 mN of 60 N.
+/// Number of bisection steps for the fraction of a wrench that passes: to 1 mN of 60 N.
 const BISECTIONS: u32 = 16;
 
 /// Translation or rotation over the next period: effort in N or N·m, displacement in m or rad.
@@ -202,21 +206,22 @@ struct Side {
     surprise: f64,
     /// Displacement of the lightest handle per change of the effort.
     way_per_effort: f64,
-    /// Effort with which the port surely gives no energy: the injected damping, or zero.
+    /// Effort with which the port certainly gives no energy: the injected damping, or zero.
     floor: DVec3,
 }
 
 impl Side {
-    /// Adds injected damping if it surely dissipates energy: not on a handle that hardly moves.
+    /// Adds injected damping if it certainly dissipates energy: not on a handle that hardly moves.
     #[inline]
     fn with_floor(self, damping: DVec3) -> Self {
         if self.may_cost_j(damping) < 0.0 { Self { floor: damping, ..self } } else { self }
     }
 
-    /// Returns the most energy that the port may give until the next sample, J; negative if it surely receives some.
+    /// Returns the largest energy that the port may give until the next sample, J; negative if it certainly receives
+    /// energy.
     ///
-    /// An effort against the motion is not assumed to reverse the handle by itself: where that is too much, the loop is unstable, and an
-    /// effort withheld from a handle that goes deeper into a wall comes back larger.
+    /// An effort against the motion is assumed not to reverse the handle within the period: an effort that would is too
+    /// large for a stable loop, and an effort withheld from a handle that goes deeper into a wall comes back larger.
     #[inline]
     fn may_cost_j(&self, effort: DVec3) -> f64 {
         let along_j = effort.dot(self.way);
@@ -227,7 +232,8 @@ impl Side {
         steady_j + (effort - self.held).dot(effort).max(0.0) * self.way_per_effort
     }
 
-    /// Returns this share of the effort, 0 to 1, and damping for the rest; all of an effort that surely dissipates energy.
+    /// Returns the fraction `share` of the effort, 0 to 1, with damping in place of the rest; the whole effort if it
+    /// certainly dissipates energy.
     #[inline]
     fn part(&self, share: f64) -> DVec3 {
         if share >= 1.0 || self.may_cost_j(self.effort) <= 0.0 {

@@ -8,19 +8,19 @@ use flotor_core::trace::Events;
 use flotor_hal::{DeviceState, Tick, Wrench};
 use flotor_sync::{Observer, Publisher, latest};
 
-/// Timeout and fade of a remote end.
+/// Timeout and fade-in time of a remote end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LinkTimeouts {
     /// Time without a message after which the end removes its force, ns.
     pub silence_ns: u64,
-    /// Time over which its force fades in, again or for the first time, ns.
+    /// Time over which the force fades in after the first message and after a timeout, ns.
     pub fade_ns: u64,
 }
 
-/// Connection of an end's loop to a peer link, in both directions. Neither side ever waits for the other: only the
-/// newest state counts.
+/// Connection between an end in the loop and its peer link, in both directions. Neither side waits for the other: only
+/// the newest state counts.
 pub struct Line {
-    /// Last message of this end. Its `run`, `partner` and `since` are 0: the peer link sets them.
+    /// Last message of this end. Its fields `run`, `partner` and `since` are 0: the peer link sets them.
     pub outgoing: Observer<Dispatch, DISPATCH_WORDS>,
     /// Messages for this end, newest last.
     pub incoming: Publisher<Dispatch, DISPATCH_WORDS>,
@@ -31,33 +31,34 @@ pub struct Line {
 /// Statistics of the messages from the partner.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkStatistics {
-    /// Ticks in which a message arrived.
+    /// Number of ticks in which a message was accepted.
     pub ticks: u64,
     /// Number of timeouts of the partner.
     pub silences: u64,
-    /// The longest wait for a message, ns.
+    /// Longest wait for a message, without timeouts, ns.
     pub longest_wait_ns: u64,
-    /// Implausible messages, which were not used.
+    /// Number of implausible messages, which were ignored.
     pub implausible: u64,
-    /// The partner's run; 0 without one so far.
+    /// Run of the last partner; 0 before the first message.
     pub run: u64,
-    /// The partner's energy tank, as received last.
+    /// Energy tank of the partner, as last received.
     pub partner: TankState,
-    /// Accepted energy of partners, J: with the energy put in by the hand here, the most that can have come out here.
+    /// Energy accepted from partners, J. The energy delivered to the local hand is at most this energy plus the energy
+    /// that the local hand put in.
     pub accepted_j: f64,
     /// Rejected part of the partners' claims.
     pub cut: ClaimExcess,
-    /// Ticks in which a claim was cut.
+    /// Number of ticks in which a claim was cut.
     pub cut_ticks: u64,
-    /// Runs rejected because of their claims, whose messages are ignored; 0: no run. When all places are taken, every message is
-    /// ignored.
+    /// Runs rejected because of their claims, whose messages are ignored; 0: free place. Without a free place, all
+    /// messages are ignored.
     pub rejected_runs: [u64; 3],
 }
 
-/// End of a coupling, with the line to its partner.
+/// End of a coupling whose partner is on another host, with the line to its peer link.
 ///
-/// Until the first message of the partner, and after too long a silence, its force is zero: the position of the partner
-/// is unknown. When messages arrive (again) the force fades in.
+/// Before the first message of the partner, and after the timeout, the force is zero: the position of the partner is
+/// unknown. When messages arrive (again), the force fades in.
 pub struct RemoteEnd {
     end: End,
     timeouts: LinkTimeouts,
@@ -65,7 +66,7 @@ pub struct RemoteEnd {
     incoming: Observer<Dispatch, DISPATCH_WORDS>,
     /// Version of the message taken in last.
     version: u64,
-    /// Partner's run, and the tick from which on it has this run as its partner.
+    /// Run of the partner, and the tick since which the partner has this run as its partner.
     partner: Option<(u64, u64)>,
     hold: Hold,
     claims: Claims,
@@ -80,9 +81,9 @@ pub struct RemoteEnd {
 /// State of the connection to the partner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hold {
-    /// The partner's position is unknown.
+    /// Without force: the partner's position is unknown.
     Released,
-    /// Last message at `heard_ns`, and no timeout since `since_ns`.
+    /// Connected: last message at `heard_ns`, no timeout since `since_ns`.
     On { since_ns: u64, heard_ns: u64 },
 }
 
@@ -97,7 +98,8 @@ const NOBODY: Dispatch = Dispatch {
 };
 
 impl RemoteEnd {
-    /// Creates an end at rest, and the line for its peer state. `period_s` is the time between ticks. Not real-time.
+    /// Creates an end without a partner, and the line for its peer link; `reach` is the range of the local device,
+    /// `period_s` the time between ticks. Not real-time.
     #[must_use]
     pub fn new(
         config: &CouplingConfig,
@@ -126,7 +128,8 @@ impl RemoteEnd {
         (end, Line { outgoing: for_partner, incoming: from_partner, silence_ns: timeouts.silence_ns })
     }
 
-    /// Runs one tick and returns the request of this end. Real-time: bounded, no allocation.
+    /// Runs one tick: checks and receives a message or detects a timeout, and publishes the state of this end; returns
+    /// the request of this end. Real-time: bounded, no allocation.
     #[inline]
     pub fn step(&mut self, tick: &Tick, sample: PortSample<'_>) -> Pull {
         self.end.observe(sample.state, &sample.held);
@@ -251,7 +254,7 @@ impl RemoteEnd {
         self.hold = Hold::On { since_ns, heard_ns: now_ns };
     }
 
-    /// Returns the share of the pull, by the time since the first message.
+    /// Returns the fraction of the pull, 0 to 1, by the time since the force began to fade in.
     #[inline]
     fn part_at(&self, held_ns: u64) -> f64 {
         let [held, fade] = [held_ns, self.timeouts.fade_ns].map(|ns| ns as f64);

@@ -1,13 +1,14 @@
-//! The energy tank of one end of a coupling.
+//! Energy tank of one end of a coupling.
 
 use flotor_core::peer::TankState;
 
-/// Share of the level that is passed on in a tick. Ends that share energy have equal levels after a few ticks, so that an end
-/// that is to push has the energy that the other one's hand has put in; energy under way is available to neither end
-/// meanwhile.
+/// Fraction of the level that is passed on in a tick. The levels of two ends that pass energy on to each other become
+/// equal after a few ticks, so that an end that exerts a force has the energy that the hand at the other end has put
+/// in; energy in transit is available to neither end.
 const PASSED_ON: f64 = 0.1;
 
-/// Energy tank: energy of the hand and of the partner that may still come out, J.
+/// Energy tank: energy, put in by the hand or passed on by the partner, that may still come out at this end, J, shared
+/// frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tank {
     level_j: f64,
@@ -20,7 +21,7 @@ pub struct Tank {
 }
 
 impl Tank {
-    /// Books the energy that has crossed the port; negative if it came out. Real-time: bounded, no allocation.
+    /// Adds the energy that has crossed the port; negative if it came out. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn book(&mut self, gone_in_j: f64) {
         self.gone_in_j += gone_in_j;
@@ -28,8 +29,8 @@ impl Tank {
         self.lowest_j = self.lowest_j.min(self.level_j);
     }
 
-    /// Passes on a share of the energy above `kept_j` to the partner; returns the running total, J. Real-time: bounded, no
-    /// allocation.
+    /// Passes a fraction of the energy above `kept_j` on to the partner; returns the running total of energy passed on,
+    /// J. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn pass_on(&mut self, kept_j: f64) -> f64 {
         let part_j = PASSED_ON * (self.level_j - kept_j).max(0.0);
@@ -38,8 +39,8 @@ impl Tank {
         self.passed_on_j
     }
 
-    /// Adds the energy that the partner has passed on since its last message; `passed_on_j` is its running total. An overtaken
-    /// message adds none. Real-time: bounded, no allocation.
+    /// Adds the energy that the partner has passed on since its last message; `passed_on_j` is the partner's running
+    /// total. A message that arrives after a newer one adds no energy. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn receive(&mut self, passed_on_j: f64) {
         if passed_on_j > self.received_j {
@@ -54,7 +55,7 @@ impl Tank {
         self.passed_on_j
     }
 
-    /// Returns the tank in numbers, for reports. Real-time: bounded, no allocation.
+    /// Returns the state of the tank for reports, J. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn state(&self) -> TankState {
@@ -62,7 +63,7 @@ impl Tank {
         TankState { level_j, lowest_j, gone_in_j, discarded_j }
     }
 
-    /// Discards the energy above `most_j`, so that energy dissipated in a damper does not drive anything later.
+    /// Discards the energy above `most_j`, so that energy dissipated in a damper cannot come out later.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]

@@ -1,4 +1,4 @@
-//! Client of a running host.
+//! Client of a running host: connection, events and requests.
 
 use crate::frame::{Frames, Kind, LongFrame, frame, ticks_from_payload};
 use crate::message::{Answer, Ask, End, Greeting, Request};
@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Timeout of a host's greeting.
+/// Timeout for the greeting and the run description of a host.
 const GREETING_WAIT: Duration = Duration::from_secs(2);
 /// Timeout for sending a request.
 const ASK_WAIT: Duration = Duration::from_secs(1);
@@ -22,7 +22,7 @@ const ASK_WAIT: Duration = Duration::from_secs(1);
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LiveError {
-    /// No session is running.
+    /// No session is running in the folder.
     #[error("no running session: start one with `flotor run` (searched in {})", path.display())]
     NoRun {
         /// Folder that was searched.
@@ -33,10 +33,10 @@ pub enum LiveError {
     OtherRuns {
         /// Process id that was given.
         process: u32,
-        /// Process and title of each running session.
+        /// Process id and title of each running session; the id alone if the host does not reply.
         running: Vec<String>,
     },
-    /// The connection broke.
+    /// The connection failed, was closed, or timed out.
     #[error("the host does not reply: {0}; check whether the run has ended")]
     Connection(#[from] io::Error),
     /// The host uses another protocol version.
@@ -44,7 +44,7 @@ pub enum LiveError {
         "the host uses protocol version {host}, this program version {PROTOCOL}; use both from one build"
     )]
     Protocol {
-        /// Protocol version of the host.
+        /// Version of the host's protocol; this program has [`PROTOCOL`].
         host: u32,
     },
     /// A message of the host is malformed.
@@ -58,25 +58,25 @@ impl From<LongFrame> for LiveError {
     }
 }
 
-/// Event received from a run.
+/// Message received from a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// Records of ticks, in order.
+    /// Batch of tick records.
     Ticks {
-        /// Records in the order of ticks.
+        /// Records in the order of the ticks.
         records: Vec<TickRecord>,
-        /// Records dropped for want of room in the queue, since the beginning.
+        /// Number of records dropped since the connection because the client's queue was full.
         dropped: u64,
     },
     /// A parameter changed.
     Change(Change),
-    /// A request was answered.
+    /// Answer to a request.
     Answer(Answer),
-    /// The run is over. Nothing follows.
+    /// End of the run, the last event.
     End(End),
 }
 
-/// Connection to a run.
+/// Connection to a run, which receives its events.
 #[derive(Debug)]
 pub struct Client {
     stream: Stream,
@@ -86,7 +86,7 @@ pub struct Client {
     run: RunDescription,
 }
 
-/// Client for sending requests to a run, from any thread; cheap to clone.
+/// Sender of requests to a run, usable from any thread; clones share the connection.
 #[derive(Clone, Debug)]
 pub struct RequestClient {
     stream: Arc<Mutex<Stream>>,
@@ -94,18 +94,18 @@ pub struct RequestClient {
 }
 
 impl Client {
-    /// Connects to the newest run that answers.
+    /// Connects to the newest run whose host replies. Not real-time.
     ///
     /// # Errors
-    /// [`LiveError::NoRun`], or the error of the newest run if none answers.
+    /// [`LiveError::NoRun`], or the error of the newest run if no host replies.
     pub fn find(directory: &Directory) -> Result<Self, LiveError> {
         Self::first_of(directory, directory.runs())
     }
 
-    /// Connects to the run of a process.
+    /// Connects to the newest run of the process with id `process`. Not real-time.
     ///
     /// # Errors
-    /// Those of [`Client::find`]; [`LiveError::OtherRuns`] if only other processes run sessions.
+    /// The errors of [`Client::find`]; [`LiveError::OtherRuns`] if only other processes run sessions.
     pub fn of_process(directory: &Directory, process: u32) -> Result<Self, LiveError> {
         let (runs, others): (Vec<_>, Vec<_>) =
             directory.runs().into_iter().partition(|run| run.process == process);
@@ -130,10 +130,11 @@ impl Client {
         Err(first.unwrap_or_else(|| LiveError::NoRun { path: directory.path().to_path_buf() }))
     }
 
-    /// Connects to the run of a socket. Ticks arrive only after [`Ask::Watch`].
+    /// Connects to the run of a socket file, and waits up to 2 s for greeting and description. Ticks arrive only after
+    /// [`Ask::Watch`]. Not real-time.
     ///
     /// # Errors
-    /// If the connection fails, or the host's protocol differs.
+    /// If the connection fails or times out, a message is malformed, or the host uses another protocol version.
     pub fn connect(path: &Path) -> Result<Self, LiveError> {
         let mut stream = connect(path)?;
         let mut frames = Frames::default();
@@ -155,19 +156,19 @@ impl Client {
         Ok(Self { stream, frames, request_client, greeting, run })
     }
 
-    /// Returns the greeting of the host.
+    /// Returns the greeting of the host: plugins with their parameters when the client connected, and limits.
     #[must_use]
     pub fn greeting(&self) -> &Greeting {
         &self.greeting
     }
 
-    /// Returns the description of the run.
+    /// Returns the description of the run, as in a recording.
     #[must_use]
     pub fn run(&self) -> &RunDescription {
         &self.run
     }
 
-    /// Returns a client for sending requests.
+    /// Returns a sender of requests over this connection.
     #[must_use]
     pub fn request_client(&self) -> RequestClient {
         self.request_client.clone()
@@ -194,7 +195,7 @@ impl Client {
 }
 
 impl RequestClient {
-    /// Sends a request; returns the number that its answer will contain.
+    /// Sends a request; returns the number that the [`Answer`] will contain. Does not wait for the answer.
     ///
     /// # Errors
     /// [`LiveError::Connection`] if the host has closed the connection, or does not read in time.
@@ -206,7 +207,7 @@ impl RequestClient {
     }
 }
 
-/// Reads frames until `use_of` accepts one; `None` on timeout.
+/// Reads frames until `use_of` returns a result for one; `None` at the deadline `until`.
 fn read_frame<T>(
     stream: &mut Stream,
     frames: &mut Frames,

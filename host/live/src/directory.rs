@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::SystemTime;
 
-/// Extension of a socket's file.
+/// Extension of a run's socket file.
 const SUFFIX: &str = "run";
 
 /// Folder with the sockets of running hosts.
@@ -21,12 +21,12 @@ pub struct Directory {
     path: PathBuf,
 }
 
-/// Run found in the folder.
+/// Run with an open socket in the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FoundRun {
     /// Socket of the run.
     pub path: PathBuf,
-    /// Id of the process that carries out the run.
+    /// Process id of the run, as in the name of the socket file ([`process_number`]).
     pub process: u32,
     /// Start of the run.
     pub since: SystemTime,
@@ -45,7 +45,7 @@ pub enum DirectoryError {
         #[source]
         cause: io::Error,
     },
-    /// Other users may enter the folder: they could change a run.
+    /// Other users may enter the folder, or another user owns it: they could change a run.
     #[error("{}: unsafe permissions: other users may enter the folder and change a run; `chmod 700` the folder, and make yourself its owner", path.display())]
     NotPrivate {
         /// Path of the folder.
@@ -53,15 +53,15 @@ pub enum DirectoryError {
     },
 }
 
-/// Process id set for this process; 0 if none is.
+/// Id set by [`set_process_number`]; 0: none.
 static PROCESS_NUMBER: AtomicU32 = AtomicU32::new(0);
 
-/// Sets the id under which other programs know this process: that of its supervisor, which users see. Not real-time.
+/// Sets the process id that other programs see for this process: the id of its supervisor, which users see too. Not real-time.
 pub fn set_process_number(number: u32) {
     PROCESS_NUMBER.store(number, Ordering::Relaxed);
 }
 
-/// Returns the id under which other programs know this process. Not real-time.
+/// Returns the process id that other programs see: the id from [`set_process_number`], else this process's own. Not real-time.
 #[must_use]
 pub fn process_number() -> u32 {
     match PROCESS_NUMBER.load(Ordering::Relaxed) {
@@ -87,7 +87,7 @@ impl Directory {
         Self { path: runtime.map_or_else(run_folder, |runtime| Path::new(&runtime).join("flotor")) }
     }
 
-    /// Uses another folder.
+    /// Returns a handle of the folder at `path`, without creating the folder.
     #[must_use]
     pub fn at(path: impl Into<PathBuf>) -> Self {
         Self { path: path.into() }
@@ -99,13 +99,13 @@ impl Directory {
         &self.path
     }
 
-    /// Returns true if this user owns the folder. Other folders are not trusted: in `/tmp` any user can create one of this name.
+    /// Returns true if this user owns the folder. Other folders are not trusted: in `/tmp` any user can create a folder of this name.
     #[must_use]
     pub fn is_ours(&self) -> bool {
         std::fs::symlink_metadata(&self.path).is_ok_and(|attributes| is_ours(&attributes))
     }
 
-    /// Returns the files in the folder; none if another user owns it.
+    /// Returns the files in the folder; none if the folder is missing, cannot be read or belongs to another user.
     #[must_use]
     pub fn files(&self) -> Vec<DirEntry> {
         self.list().unwrap_or_default()
@@ -127,10 +127,10 @@ impl Directory {
         self.try_runs().unwrap_or_default()
     }
 
-    /// Returns the runs of [`Directory::runs`], or the error.
+    /// Returns the runs whose sockets are open, the newest first; none without a folder. Removes the files of closed sockets.
     ///
     /// # Errors
-    /// [`DirectoryError::Unusable`] if the folder cannot be read, or another user owns it.
+    /// [`DirectoryError::Unusable`] if the folder cannot be read, or belongs to another user.
     pub fn try_runs(&self) -> Result<Vec<FoundRun>, DirectoryError> {
         let mut runs: Vec<FoundRun> = (self.list().map_err(unusable(&self.path))?.into_iter())
             .filter_map(|entry| {
@@ -147,18 +147,18 @@ impl Directory {
         Ok(runs)
     }
 
-    /// Creates the folder if necessary, for this user alone.
+    /// Creates the folder if necessary, accessible to this user only.
     ///
     /// # Errors
-    /// If the folder is not usable, or other users may enter it.
+    /// If the folder cannot be created, belongs to another user, or other users may enter it.
     pub fn make(&self) -> Result<(), DirectoryError> {
         private(&self.path)
     }
 
-    /// Creates the folder if necessary, and a socket of this process in it.
+    /// Creates the folder if necessary, and in it a listening socket of this process, with a unique file name.
     ///
     /// # Errors
-    /// If the folder is not usable, or other users may enter it.
+    /// If the folder or the socket cannot be created, or other users may enter the folder.
     pub fn listen(&self) -> Result<Listener, DirectoryError> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         private(&self.path)?;
@@ -179,31 +179,30 @@ impl Directory {
     }
 }
 
-/// Socket that other programs can find; removed when dropped.
+/// Listening socket that other programs can find; dropping it removes the file.
 #[derive(Debug)]
 pub struct Listener {
     socket: Arc<Listening>,
     path: PathBuf,
-    /// Metadata of the socket's file after its creation.
+    /// Metadata of the socket file after its creation.
     file: Option<Metadata>,
 }
 
 impl Listener {
-    /// Returns the socket.
     #[must_use]
     pub(crate) fn socket(&self) -> &Arc<Listening> {
         &self.socket
     }
 
-    /// Waits for the next connection, without a timeout.
+    /// Waits for the next connection of a client, without a timeout.
     ///
     /// # Errors
-    /// Errors of the system; `Interrupted` if a client was rejected.
+    /// Errors of the system; `Interrupted` if a client was rejected, `NotConnected` if the socket has been closed.
     pub fn accept(&self) -> io::Result<Stream> {
         self.socket.accept()?.ok_or_else(|| io::ErrorKind::NotConnected.into())
     }
 
-    /// Returns the path of the socket's file.
+    /// Returns the path of the socket file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
@@ -220,7 +219,7 @@ impl Drop for Listener {
     }
 }
 
-/// Creates a folder that only this user may enter, if necessary.
+/// Creates a folder that only this user may enter, if necessary; returns an error if others may.
 pub(crate) fn private(path: &Path) -> Result<(), DirectoryError> {
     make_folder(path).map_err(unusable(path))?;
     let attributes = std::fs::symlink_metadata(path).map_err(unusable(path))?;
@@ -236,7 +235,7 @@ pub(crate) fn unusable(path: &Path) -> impl FnOnce(io::Error) -> DirectoryError 
     move |cause| DirectoryError::Unusable { path, cause }
 }
 
-/// Returns the process id in a socket's file name.
+/// Returns the process id in the name of a run's socket file; `None` for other files.
 fn process_of(path: &Path) -> Option<u32> {
     let name = path.file_stem()?.to_str()?;
     let (process, _) = name.split_once('-')?;

@@ -1,14 +1,14 @@
-//! Frames: encoding of messages in a stream of bytes.
+//! Framing of the messages in a stream of bytes.
 
 use flotor_core::trace::{RECORD_WORDS, TickRecord};
 use flotor_sync::Words;
 use std::io::{self, Read};
 
-/// Longest payload, bytes: a few seconds of ticks. A longer one is malformed.
+/// Maximum length of a payload, bytes: a few seconds of ticks. A longer payload is malformed.
 pub const MAX_PAYLOAD: usize = 1 << 21;
-/// Bytes of length and kind.
+/// Length of a frame's head, bytes: payload length and kind.
 const HEAD: usize = 5;
-/// Bytes of a record.
+/// Length of an encoded record, bytes.
 const RECORD: usize = 8 * RECORD_WORDS;
 
 /// Kind of a frame, which determines its payload.
@@ -18,7 +18,7 @@ pub enum Kind {
     Greeting,
     /// `flotor.Run`.
     Run,
-    /// Records of ticks.
+    /// Records of ticks ([`ticks_from_payload`]).
     Ticks,
     /// [`crate::ChangeMessage`].
     Change,
@@ -28,7 +28,7 @@ pub enum Kind {
     End,
     /// [`crate::Request`].
     Request,
-    /// A kind of a later protocol: to be ignored.
+    /// Kind of a later version of the protocol: to be ignored.
     Unknown(u8),
 }
 
@@ -60,7 +60,7 @@ impl Kind {
     }
 }
 
-/// Error of a frame that is too long: the other side uses another protocol.
+/// Error of a frame with a payload above [`MAX_PAYLOAD`]: the other end uses another protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a frame of {length} bytes exceeds {MAX_PAYLOAD}: protocol mismatch; use both sides from one build")]
 pub struct LongFrame {
@@ -68,7 +68,7 @@ pub struct LongFrame {
     pub length: usize,
 }
 
-/// Encodes a message as a frame. `payload` is at most [`MAX_PAYLOAD`] long.
+/// Encodes a message as a frame. `payload` must not exceed [`MAX_PAYLOAD`].
 #[must_use]
 pub fn frame(kind: Kind, payload: &[u8]) -> Vec<u8> {
     debug_assert!(payload.len() <= MAX_PAYLOAD);
@@ -80,7 +80,7 @@ pub fn frame(kind: Kind, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Decoder of frames from received bytes.
+/// Decoder of frames from a stream of bytes.
 #[derive(Debug, Default)]
 pub struct Frames {
     bytes: Vec<u8>,
@@ -88,10 +88,10 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Reads available bytes; returns their number, 0 at the end of the stream.
+    /// Reads the available bytes into the buffer; returns their number, 0 at the end of the stream.
     ///
     /// # Errors
-    /// Errors of the reader, timeouts included; no bytes are lost then.
+    /// Errors of the reader, timeouts included; no received bytes are lost.
     pub fn fill(&mut self, reader: &mut impl Read) -> io::Result<usize> {
         let mut some = [0; 1 << 14];
         let count = reader.read(&mut some)?;
@@ -99,17 +99,17 @@ impl Frames {
         Ok(count)
     }
 
-    /// Appends received bytes.
+    /// Appends received bytes to the buffer.
     pub fn push(&mut self, bytes: &[u8]) {
         self.bytes.drain(..self.taken);
         self.taken = 0;
         self.bytes.extend(bytes);
     }
 
-    /// Returns the next complete frame; `None` if more bytes are needed.
+    /// Removes the next complete frame from the buffer; returns its kind and payload, `None` if more bytes are needed.
     ///
     /// # Errors
-    /// [`LongFrame`]: the bytes that follow are not usable.
+    /// [`LongFrame`] for a frame that is too long; the rest of the stream cannot be decoded.
     pub fn take(&mut self) -> Result<Option<(Kind, &[u8])>, LongFrame> {
         let Some((head, rest)) = self.bytes[self.taken..].split_first_chunk::<HEAD>() else {
             return Ok(None);
@@ -125,7 +125,7 @@ impl Frames {
     }
 }
 
-/// Encodes the payload of a frame of ticks.
+/// Encodes the payload of a frame of ticks: number of records dropped so far, and the records.
 #[must_use]
 pub fn ticks_to_payload<'a>(dropped: u64, records: impl ExactSizeIterator<Item = &'a TickRecord>) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(8 + RECORD * records.len());
@@ -136,7 +136,8 @@ pub fn ticks_to_payload<'a>(dropped: u64, records: impl ExactSizeIterator<Item =
     bytes
 }
 
-/// Decodes the payload of a frame of ticks: number of records dropped so far, and the records. An incomplete record is left out.
+/// Decodes the payload of a frame of ticks: number of records dropped so far, and the records. An incomplete record at the end is
+/// ignored.
 #[must_use]
 pub fn ticks_from_payload(payload: &[u8]) -> (u64, Vec<TickRecord>) {
     let word = |bytes: &[u8]| u64::from_le_bytes(std::array::from_fn(|i| bytes.get(i).copied().unwrap_or(0)));

@@ -1,11 +1,11 @@
-//! Latch of a machine: an emergency stop that outlasts runs and restarts, until it is released.
+//! Emergency stop latch of a machine: remains pressed across runs and restarts, until it is released.
 //!
-//! The latch is a file in the folder of the run sockets with room for two entries: the last press, and the last release, which names the
-//! press that it releases. Each press or release overwrites its entry with one write. So neither needs a lock, a release
-//! never undoes a press that it did not see, and no restart changes anything. An unreadable entry counts as a press.
+//! The latch is a file in the folder of the run sockets with two entries: the last press, and the last release, which contains the
+//! number of the press that it releases. A press or a release overwrites its entry with one write. So neither needs a lock, a
+//! release never undoes a press that it has not read, and a restart changes nothing. An unreadable entry counts as a press.
 //!
-//! A run opens the file and reserves its space before it energises a device. From then on a press needs neither a free descriptor nor
-//! disk space, and no permission of the folder. Not real-time.
+//! A run opens the file and reserves its space before it energises a device. From then on a press needs neither a free descriptor
+//! nor disk space nor permissions of the folder. Not real-time.
 
 use crate::Directory;
 use crate::directory::{DirectoryError, unusable};
@@ -20,14 +20,14 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// File name of the latch.
 const FILE: &str = "latch";
-/// Size of an entry, bytes: more than the longest one needs.
+/// Size of an entry, bytes: more than the longest entry needs.
 const ENTRY_BYTES: usize = 1024;
-/// Longest name of a source of a press, characters.
+/// Maximum length of the name of a press's source, characters.
 const LONGEST_NAME: usize = 120;
-/// Descriptors that are reserved for an emergency stop: to list the other runs, and to connect to some of them.
+/// Number of descriptors reserved for an emergency stop: to list the other runs, and to connect to some of them.
 const SPARE_DESCRIPTORS: usize = 4;
 
-/// Latch that stops every run of this user on this machine until it is released.
+/// Emergency stop latch of all runs of this user on this machine. Clones share the opened file.
 #[derive(Clone, Debug)]
 pub struct Latch {
     directory: Directory,
@@ -35,7 +35,7 @@ pub struct Latch {
     kept: Arc<Kept>,
 }
 
-/// File of the latch as it was opened.
+/// Opened latch file, the error that prevents writing to the file, and descriptors reserved for an emergency stop.
 #[derive(Debug)]
 struct Kept {
     file: Option<File>,
@@ -46,22 +46,21 @@ struct Kept {
 /// Press of the emergency stop.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pressed {
-    /// Source of the press, in words for people.
+    /// Source of the press, human-readable.
     pub source: String,
-    /// Time of the press by this machine's clock.
+    /// Time of the press on this machine's wall clock.
     pub at: SystemTime,
 }
 
 /// State of the latch.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LatchState {
-    /// Numbers of the last presses, released or not: of the file that was opened, and of one that has replaced it.
+    /// Numbers of the last presses, released or not, in the file that was opened and in a file that has replaced it.
     presses: Vec<u64>,
-    /// Press that is not released; nothing may be energised while there is one.
+    /// Press that is not released; while there is one, no device may be energised.
     pub pressed: Option<Pressed>,
 }
 
-/// Position of an entry in the file.
 #[derive(Clone, Copy)]
 enum Place {
     Press,
@@ -72,19 +71,20 @@ enum Place {
 #[derive(Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 enum Entry {
-    /// `number` is the time in ns since 1970, and larger than that of the press before.
+    /// `number` is the time of the press, ns since 1970, but larger than the number of the previous press.
     Press { number: u64, who: String },
     /// `press` is the number of the released press.
     Release { press: u64, who: String },
 }
 
 impl Directory {
-    /// Opens the latch of the runs whose sockets are in this folder, and reserves its space. Creates the folder if necessary.
+    /// Opens the latch of the runs in this folder, and reserves its disk space and descriptors. Creates the folder if necessary.
+    /// After a failure the latch may be unwritable: [`Latch::problem`].
     #[must_use]
     pub fn latch(&self) -> Latch {
         let path = self.path().join(FILE);
         let problem = self.make().err();
-        // A folder that other users may enter still belongs to this user.
+        // A folder of this user that others may enter has a problem, but the latch in it is used.
         let writable = if self.is_ours() { Some(open(&path)) } else { None };
         let (file, unwritable) = match writable {
             Some(Ok(file)) => (Some(file), None),
@@ -98,7 +98,8 @@ impl Directory {
     }
 }
 
-/// Opens the file and reserves its space. The file only ever grows, so that no press is overwritten.
+/// Opens the file for reading and writing, and extends it to the size of both entries. The extension is only appended, so that no
+/// press is overwritten.
 fn open(path: &Path) -> Result<File, DirectoryError> {
     let open = || {
         let mut file = private_file(OpenOptions::new().append(true).create(true)).open(path)?;
@@ -110,24 +111,24 @@ fn open(path: &Path) -> Result<File, DirectoryError> {
 }
 
 impl Latch {
-    /// Returns the path of the file.
+    /// Returns the path of the latch file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Returns the reason why no emergency stop can be stored here, if any: known before anything is energised.
+    /// Returns the reason why a press cannot be stored reliably, to be checked before a device is energised; `None` without a problem.
     #[must_use]
     pub fn problem(&self) -> Option<&DirectoryError> {
         self.kept.problem.as_ref()
     }
 
-    /// Frees the descriptors that were reserved for an emergency stop.
+    /// Closes the reserved descriptors, to make room for those of an emergency stop.
     pub(crate) fn free_descriptors(&self) {
         lock(&self.kept.spare).clear();
     }
 
-    /// Reserves descriptors for an emergency stop.
+    /// Opens the descriptors that are reserved for an emergency stop.
     pub(crate) fn reserve_descriptors(&self) {
         let file = self.kept.file.iter().cycle().take(SPARE_DESCRIPTORS);
         let spare = file.flat_map(File::try_clone).collect();
@@ -139,7 +140,8 @@ impl Latch {
         &self.directory
     }
 
-    /// Returns the present state. A folder of another user has no latch: others could press it, and this user could not.
+    /// Reads the present state. A file that cannot be read counts as pressed; a folder of another user has no latch, because only
+    /// others could press it.
     #[must_use]
     pub fn state(&self) -> LatchState {
         let mut state = LatchState::default();
@@ -156,10 +158,10 @@ impl Latch {
         state
     }
 
-    /// Presses the latch. A pressed latch does not change.
+    /// Presses the latch, with `who` as the source; a pressed latch does not change.
     ///
     /// # Errors
-    /// If the press does not reach every run, or no later start.
+    /// If the press cannot be written to the opened file, which earlier runs read, or to the file at the path, which later runs read.
     pub fn press(&self, who: &str) -> Result<(), DirectoryError> {
         if self.state().pressed.is_some() {
             return Ok(());
@@ -167,10 +169,10 @@ impl Latch {
         self.write_each(|file| press(file, who))
     }
 
-    /// Releases the present press; returns it, if there was one.
+    /// Releases the latch; returns the press that was released, or `None` if the latch was not pressed.
     ///
     /// # Errors
-    /// If nothing can be written; the latch stays pressed.
+    /// If the release cannot be written; the latch then stays pressed.
     pub fn release(&self, who: &str) -> Result<Option<Pressed>, DirectoryError> {
         let LatchState { presses, pressed } = self.state();
         if pressed.is_some() {
@@ -184,14 +186,14 @@ impl Latch {
         Ok(pressed)
     }
 
-    /// Returns true if the path still leads to the file that was opened.
+    /// Returns true if the file at the path is still the file that was opened.
     fn is_kept(&self) -> bool {
         let kept = self.kept.file.as_ref().and_then(|file| file.metadata().ok());
         let there = std::fs::metadata(&self.path);
         kept.zip(there.ok()).is_some_and(|(kept, there)| is_same_file(&kept, &there))
     }
 
-    /// Writes to the file that was opened, which earlier runs read, and to one that has replaced it, which later runs read.
+    /// Writes to the file that was opened, which earlier runs read, and to a file that has replaced it, which later runs read.
     fn write_each(&self, write: impl Fn(&File) -> std::io::Result<()>) -> Result<(), DirectoryError> {
         let to_kept = self.kept.file.as_ref().map(|file| write(file).map_err(unusable(&self.path)));
         if matches!(to_kept, Some(Ok(()))) && self.is_kept() {
@@ -236,14 +238,14 @@ impl LatchState {
     }
 }
 
-/// Overwrites the last press of a file.
+/// Records a press of the emergency stop in a latch file, in place of the previous press.
 fn press(file: &File, who: &str) -> std::io::Result<()> {
     let before = last_press(file).and_then(|(number, who)| who.is_ok().then_some(number));
     let number = now_ns().max(before.map_or(0, |before| before.saturating_add(1)));
     write(file, Place::Press, &Entry::Press { number, who: short(who) })
 }
 
-/// Returns number and source of the last press of a file; an unreadable one has a hash as its number.
+/// Returns number and source of the last press in a file; a malformed entry has a hash as its number and an error in place of the source.
 fn last_press(file: &File) -> Option<(u64, Result<String, String>)> {
     let text = match read(file, Place::Press) {
         Ok(text) if text.is_empty() => return None,
@@ -262,7 +264,7 @@ fn fingerprint(text: &str) -> u64 {
     text.bytes().fold(0xcbf2_9ce4_8422_2325, hash) >> 8
 }
 
-/// Reads the text of an entry, trimmed; empty beyond the end of the file.
+/// Reads the text of an entry, without surrounding spaces; empty beyond the end of the file.
 fn read(file: &File, place: Place) -> std::io::Result<String> {
     let mut bytes = [b' '; ENTRY_BYTES];
     read_at(file, &mut bytes, place.offset())?;

@@ -1,7 +1,7 @@
 //! Observation and control of a running host by other programs on the same machine: viewer, bridges, scripts.
 //!
-//! A running host listens on a Unix socket in a folder that only its user may enter ([`Directory`]); programs that may open
-//! the socket, and no others, may observe and change the run. [`Publication`] is the host's end, [`Client`] the other:
+//! A running host listens on a Unix socket in a folder that only its user may enter ([`Directory`]); every program that may open
+//! the socket may observe and change the run. [`Publication`] is the host's end, [`Client`] the other:
 //!
 //! ```no_run
 //! use flotor_live::{Ask, Client, Directory, Event};
@@ -19,9 +19,9 @@
 //!
 //! # Protocol 1
 //!
-//! Both directions are a sequence of frames: length of the payload (4 bytes, little endian), kind (1 byte), payload.
-//! Unknown kinds and unknown keys of JSON objects are to be ignored, so that a protocol can grow; [`PROTOCOL`] changes
-//! when that is not enough.
+//! Both directions are a sequence of frames: length of the payload (4 bytes, little endian), kind (1 byte), payload. A client
+//! ignores unknown kinds, and unknown keys of JSON objects, so that the protocol can be extended; [`PROTOCOL`] changes for
+//! incompatible extensions.
 //!
 //! | kind | from | payload |
 //! |---|---|---|
@@ -33,19 +33,19 @@
 //! | 6 end | host | JSON [`End`]: outcome of the run. Last |
 //! | 16 request | client | JSON [`Request`] |
 //!
-//! A record has the words of a run's digest ([`flotor_core::trace::TickRecord`]): tick, time (ns), time since the
-//! last tick (ns) as integers; position (3), quaternion xyzw (4), velocity (3), angular velocity (3), model's force and
-//! torque (6), commanded (6), delivered (6), stored energy, energy of the port as IEEE doubles; events (low half) and buttons
-//! (high half); lateness and compute time (ns). SI units, device frame, little endian.
+//! A record has the same words as in the digest of a run ([`flotor_core::trace::TickRecord`]): tick, time (ns), time since the last
+//! tick (ns) as integers; position (3), quaternion xyzw (4), velocity (3), angular velocity (3), model's force and torque (6),
+//! commanded (6), delivered (6), stored energy, energy of the port as IEEE doubles; events (low half) and buttons (high half);
+//! lateness and compute time (ns). SI units, device frame, little endian.
 //!
-//! **No client can delay the loop.** A host sends only the first two frames until a client requests more, and
-//! does nothing per tick without a client. Between loop and socket lies a queue of fixed length for each client; frames
-//! beyond it are dropped and counted. Requests are answered at most a thousand times a second for each client.
+//! **No client can delay the loop.** A host sends only the first two frames until a client requests more, and does nothing per tick
+//! without a client. Each client has a queue of fixed length between loop and socket; ticks that find the queue full are dropped
+//! and counted. Requests are answered at most a thousand times a second for each client.
 //!
 //! # The latch
 //!
-//! An emergency stop of any run stops every run of the folder and rejects new ones until it is released: [`Latch`], a file beside
-//! the sockets, and a request to each socket, which the run confirms.
+//! An emergency stop of any run stops every run of the folder, and prevents new runs until it is released: by the [`Latch`], a file
+//! beside the sockets, and by a request to each socket, which the run confirms.
 //!
 //! # Couplings
 //!
@@ -78,5 +78,5 @@ pub use pairing::{LinkCounts, Pairing};
 pub use peer_socket::{CALL_PERIOD, FoundCoupling, PeerSocket};
 pub use server::{Publication, PublishError, Serve};
 
-/// Version of the protocol.
+/// Version of the protocol, the same in host and client.
 pub const PROTOCOL: u32 = 1;

@@ -6,34 +6,34 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// First message of a host.
+/// First message of a host: plugins with their parameters, and limits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Greeting {
     /// Version of the protocol: [`crate::PROTOCOL`].
     pub protocol: u32,
     /// Version of the host.
     pub flotor_version: String,
-    /// Process id of the host.
+    /// Process id of the host, as users see it.
     pub process: u32,
     /// Title of the scene.
     pub title: String,
-    /// The device, then the models in the scene's order.
+    /// The devices, then the models, both in the scene's order.
     pub plugins: Vec<PanelPlugin>,
-    /// Limits of force and torque at the hand.
+    /// Largest force and torque that may reach the hand at any device.
     pub limits: WrenchLimits,
 }
 
-/// Limits of force and torque at the hand, along and about each axis of the device frame, and of their norms.
+/// Largest force and torque that may reach the hand, along and about each axis of the device frame, and as norms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WrenchLimits {
-    /// Force, N; `None`: no limit.
+    /// Largest force along each axis, N; `None`: no limit.
     pub force_n: [Option<f64>; 3],
-    /// Torque, N·m; `None`: no limit.
+    /// Largest torque about each axis, N·m; `None`: no limit.
     pub torque_nm: [Option<f64>; 3],
-    /// Norm of the force, N; `None`: no limit.
+    /// Largest norm of the force, N; `None`: no limit.
     #[serde(default)]
     pub force_norm_n: Option<f64>,
-    /// Norm of the torque, N·m; `None`: no limit.
+    /// Largest norm of the torque, N·m; `None`: no limit.
     #[serde(default)]
     pub torque_norm_nm: Option<f64>,
 }
@@ -45,25 +45,25 @@ pub struct PanelPlugin {
     pub name: String,
     /// Id of the plugin.
     pub id: String,
-    /// Path of its library.
+    /// Path of the plugin's shared library.
     pub file: PathBuf,
     /// True for a simulated device, whose force reaches no person.
     #[serde(default)]
     pub is_simulated: bool,
-    /// Parameters in the order of its schema.
+    /// Parameters in the order of the plugin's schema.
     pub parameters: Vec<PanelParameter>,
 }
 
-/// Parameter with its present value.
+/// Parameter of a plugin with its present value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PanelParameter {
     /// Id of the parameter.
     pub id: String,
-    /// Unit for people; empty without one.
+    /// Unit, human-readable; empty for a parameter without a unit.
     pub unit: String,
-    /// Description for people, one sentence.
+    /// Human-readable description, one sentence.
     pub doc: String,
-    /// Type and range of its values.
+    /// Type and range of the values.
     pub shape: ParameterShape,
     /// True if the parameter may change while the loop runs.
     pub live: bool,
@@ -72,19 +72,19 @@ pub struct PanelParameter {
     /// Value at the start of the run, as a person would type it; empty if unknown.
     #[serde(default)]
     pub first: String,
-    /// Range for changes by hand.
+    /// Range of a slider; `None`: no range.
     #[serde(default)]
     pub soft: Option<SoftLimits>,
 }
 
-/// Range for changes of a number by hand: the limits of a slider; numbers beyond have to be typed.
+/// Range of a slider for a number, in the parameter's unit; values beyond this range have to be typed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SoftLimits {
     /// Smallest value.
     pub min: f64,
     /// Largest value.
     pub max: f64,
-    /// Step of a key.
+    /// Change per key press.
     pub step: f64,
 }
 
@@ -98,7 +98,7 @@ impl From<&SoftRange> for SoftLimits {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum ParameterShape {
-    /// A number.
+    /// A number, in the parameter's unit.
     Real {
         /// Smallest valid value.
         min: f64,
@@ -114,14 +114,14 @@ pub enum ParameterShape {
         /// Index of the default choice.
         default: usize,
     },
-    /// Text; only when the plugin is created.
+    /// Text; can be set only when the plugin is created.
     Text,
-    /// A file; only when the plugin is created.
+    /// Path of a file; can be set only when the plugin is created.
     File,
 }
 
 impl Greeting {
-    /// Updates the stored parameter values, for clients that connect later.
+    /// Updates the present value of a parameter after an applied change, for clients that connect later; ignores other changes.
     pub fn keep(&mut self, change: &Change) {
         if change.outcome != ChangeOutcome::Applied || change.subject != ChangeSubject::Parameter {
             return;
@@ -135,7 +135,8 @@ impl Greeting {
 }
 
 impl PanelPlugin {
-    /// Creates the description from a schema, with the present values.
+    /// Creates the description from a schema: `values` are present values by parameter id, which are also the initial values;
+    /// `soft` are slider ranges, in the order of the schema. `is_simulated` is false.
     #[must_use]
     pub fn new(
         name: &str,
@@ -189,7 +190,7 @@ impl ParameterShape {
 /// Request of a client.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Request {
-    /// Number that the answer will contain.
+    /// Number chosen by the client, which the answer repeats.
     pub number: u64,
     /// Requested action.
     #[serde(flatten)]
@@ -197,10 +198,10 @@ pub struct Request {
 }
 
 impl Request {
-    /// Parses a request. An unknown key is an error, except in an emergency stop.
+    /// Parses a request. An unknown key is an error, except in a request for an emergency stop.
     ///
     /// # Errors
-    /// The number of the request, 0 without one, and the error of the parser.
+    /// Number of the request (0 if it has none) and error of the parser.
     pub(crate) fn read(json: &[u8]) -> Result<Self, (u64, serde_json::Error)> {
         let said: Value = serde_json::from_slice(json).map_err(|error| (0, error))?;
         let number = said.get("number").and_then(Value::as_u64).unwrap_or(0);
@@ -216,7 +217,7 @@ impl Request {
     }
 }
 
-/// Finds a JSON key that deserialisation ignored.
+/// Returns a JSON key that deserialisation has ignored; `None` if there is none.
 fn unknown_key(said: &Value, read: &Value) -> Option<String> {
     match (said, read) {
         (Value::Object(said), Value::Object(read)) => {
@@ -236,10 +237,9 @@ fn unknown_key(said: &Value, read: &Value) -> Option<String> {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "ask", rename_all = "kebab-case")]
 pub enum Ask {
-    /// Send ticks whose number is a multiple of `every` (0 counts as 1), with the events of the ticks
-    /// between them.
+    /// Send the ticks with an index that is a multiple of `every` (0 counts as 1), each with the events of the skipped ticks before.
     Watch {
-        /// Divisor of the number of a tick.
+        /// Interval of the sent ticks, in ticks.
         every: u32,
     },
     /// Send no more ticks.
@@ -247,33 +247,33 @@ pub enum Ask {
     Unwatch,
     /// Set new values of live parameters, all before the same tick.
     Set {
-        /// The values.
+        /// New values.
         values: Vec<SetValue>,
     },
     /// Set the blend weight of a model, 0 to 1.
     Weight {
         /// Name of the model in the scene.
         model: String,
-        /// The new weight.
+        /// New weight, 0 to 1.
         weight: f64,
     },
-    /// Hot swap of a model by another plugin, or by the same one rebuilt, faded in while the old one fades out. The new model is
-    /// created before the answer is sent.
+    /// Replace a model by another plugin, or by the same plugin after a rebuild (hot swap): the new model fades in while the old
+    /// model fades out. The answer is sent after the new model has been created.
     Swap {
         /// Name of the model in the scene.
         model: String,
         /// Id of a plugin, or the absolute path of its file; `None`: the plugin of the scene, with the scene's settings.
         #[serde(default)]
         plugin: Option<String>,
-        /// Additional parameters, each with its value as a person would type it.
+        /// Additional parameters, id and value as a person would type it.
         #[serde(default)]
         settings: Vec<(String, String)>,
     },
-    /// Orderly end: the force fades out.
+    /// End the run in order: the force fades out.
     Stop,
-    /// Emergency stop: the force is removed at once, and the run ends.
+    /// Emergency stop: remove the force at once, and end the run.
     EmergencyStop,
-    /// Emergency stop of another run of the machine: like [`Ask::EmergencyStop`], but not passed on.
+    /// Emergency stop because of another run of the machine: as [`Ask::EmergencyStop`], but not forwarded to other runs.
     MachineStop,
 }
 
@@ -293,9 +293,9 @@ pub struct SetValue {
 pub struct Answer {
     /// Number of the request.
     pub number: u64,
-    /// Reason for a rejection, in words; `None` if the request was carried out, or passed on to the loop.
+    /// Human-readable reason for a rejection; `None` if the request was executed, or forwarded to the loop.
     pub refused: Option<String>,
-    /// Kind of reason, if the request was rejected.
+    /// Kind of reason, if the request was rejected; otherwise without meaning.
     #[serde(default)]
     pub cause: RefusalCause,
 }
@@ -304,9 +304,9 @@ pub struct Answer {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RefusalCause {
-    /// The request: an unknown name, or an invalid value.
+    /// The request is wrong: it has an unknown name, or an invalid value.
     Request,
-    /// The plugin named in the request.
+    /// The plugin named in the request has failed or rejected the request.
     Plugin,
     /// Another reason, such as the state of the run.
     #[default]
@@ -316,7 +316,7 @@ pub enum RefusalCause {
 /// Message with the outcome of a run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct End {
-    /// One line for people.
+    /// Human-readable outcome, one line.
     pub words: String,
     /// Kind of outcome.
     #[serde(default)]

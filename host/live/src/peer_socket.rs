@@ -1,12 +1,13 @@
-//! Datagram socket for the peer state of a coupling, between a host and a bridge, beside the socket of the run.
+//! Datagram socket for the peer state of a coupling, between a host and a bridge, in addition to the socket of the run.
 //!
 //! ```text
 //!  host: PeerSocket::listen  <- peer state, or an empty call -  PeerSocket::join :bridge
 //!                            -  peer state                      ->
 //! ```
 //!
-//! Datagrams are used because only the newest state counts: one that finds no room is dropped, and nothing waits behind it. A program
-//! that has joined repeats its subscription every [`CALL_PERIOD`]; the host drops subscribers that stay silent. Not real-time.
+//! Datagrams are used because only the newest state matters: a datagram that finds no room is dropped, and delays no other. A
+//! program that has joined repeats its subscription every [`CALL_PERIOD`]; the host drops subscribers that are silent for a second.
+//! Not real-time.
 
 use crate::Directory;
 use crate::directory::{DirectoryError, private, process_number, unusable};
@@ -21,16 +22,16 @@ use std::time::{Duration, Instant};
 const HOST: &str = "peer";
 /// Extension of a subscriber's socket file.
 const JOINED: &str = "joined";
-/// Interval between calls of a subscriber.
+/// Interval at which a subscriber has to repeat its subscription.
 pub const CALL_PERIOD: Duration = Duration::from_millis(100);
-/// Timeout of a subscription without a call.
+/// Timeout of a subscription that is not repeated.
 const FORGET_AFTER: Duration = Duration::from_secs(1);
-/// Largest number of subscribers of a coupling.
+/// Maximum number of subscribers of a coupling.
 const MAX_JOINED: usize = 8;
 /// Buffer size, bytes, more than any message: a datagram that fills it is malformed.
 const BUFFER_BYTES: usize = 1024;
 
-/// Coupling of a running host whose other end is on another host.
+/// Coupling of a running host with a remote end on another host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FoundCoupling {
     /// Name of the coupling in both hosts' scenes.
@@ -40,7 +41,7 @@ pub struct FoundCoupling {
     path: PathBuf,
 }
 
-/// End of the local connection of a coupling; its file is removed when dropped.
+/// One end of the local connection of a coupling, at the host or at a bridge; dropping it removes the socket file.
 #[derive(Debug)]
 pub struct PeerSocket {
     socket: Datagrams,
@@ -52,12 +53,12 @@ pub struct PeerSocket {
 #[derive(Debug)]
 struct Peer {
     path: PathBuf,
-    /// Time of its last call; `None` for a host, which never times out.
+    /// Time of the peer's last datagram; `None` for a host, which never times out.
     called: Option<Instant>,
 }
 
 impl Directory {
-    /// Returns the couplings of running hosts, and removes the files of closed sockets.
+    /// Returns the couplings of running hosts with a remote end, by name and process; removes the files of closed sockets.
     #[must_use]
     pub fn couplings(&self) -> Vec<FoundCoupling> {
         let mut found: Vec<FoundCoupling> = (self.files().into_iter())
@@ -78,20 +79,21 @@ impl Directory {
 }
 
 impl PeerSocket {
-    /// Creates the host's end for a coupling.
+    /// Creates the host's end for the coupling named `coupling`.
     ///
     /// # Errors
-    /// If the folder is not usable, or other users may enter it.
+    /// If the folder or the socket cannot be created, or other users may enter the folder.
     pub fn listen(directory: &Directory, coupling: &str) -> Result<Self, DirectoryError> {
         private(directory.path())?;
         let path = directory.path().join(format!("{}-{coupling}.{HOST}", process_number()));
         Self::bind(path)
     }
 
-    /// Creates the end of a program that transports the peer state between this host and another.
+    /// Creates the end of a bridge, a program that transports the peer state between this host and another. It receives states only
+    /// after [`Self::subscribe`] or [`Self::send`].
     ///
     /// # Errors
-    /// If the folder is not usable, or other users may enter it.
+    /// If the folder or the socket cannot be created, or other users may enter the folder.
     pub fn join(directory: &Directory, coupling: &FoundCoupling) -> Result<Self, DirectoryError> {
         static NUMBER: AtomicU32 = AtomicU32::new(0);
         private(directory.path())?;
@@ -103,24 +105,25 @@ impl PeerSocket {
     }
 
     fn bind(path: PathBuf) -> Result<Self, DirectoryError> {
-        // A killed process leaves its file.
+        // The file of a killed process may still exist.
         remove_if_dead(&path);
         let socket = Datagrams::bind(&path).map_err(unusable(&path))?;
         Ok(Self { socket, path, peers: Vec::new() })
     }
 
-    /// Returns the path of the socket's file.
+    /// Returns the path of the socket file.
     #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Sends the peer state to all receivers. Drops closed sockets; a full one misses the state.
+    /// Sends the peer state to all receivers, without waiting. Removes receivers that have closed their socket or timed out; a
+    /// receiver with a full socket misses the state.
     pub fn send(&mut self, dispatch: &Dispatch) {
         self.send_bytes(&dispatch.to_bytes());
     }
 
-    /// Subscribes, without a peer state. Returns false if the host has closed its socket.
+    /// Subscribes to the host's states, or renews the subscription. Returns false if the host has closed its socket.
     pub fn subscribe(&mut self) -> bool {
         self.send_bytes(&[]);
         !self.peers.is_empty()
@@ -136,11 +139,11 @@ impl PeerSocket {
         });
     }
 
-    /// Returns the next message, or the error of a malformed one; `None` when all have been read. Does not wait. A caller of a host
-    /// is subscribed from then on.
+    /// Returns the next received state, without waiting; `None` when all have been read. At the host, the sender of a datagram
+    /// becomes a subscriber, up to eight.
     ///
     /// # Errors
-    /// If a message is malformed.
+    /// If a datagram is malformed.
     pub fn receive(&mut self) -> Result<Option<Dispatch>, InvalidDispatch> {
         let mut buffer = [0; BUFFER_BYTES];
         loop {
@@ -174,7 +177,7 @@ impl Drop for PeerSocket {
     }
 }
 
-/// Returns true for an error of a full socket, false for that of a closed one.
+/// Returns true for the error of a full socket, false for the error of a closed socket.
 fn is_passing(kind: ErrorKind) -> bool {
     matches!(kind, ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }

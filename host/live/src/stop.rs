@@ -1,4 +1,4 @@
-//! Emergency stop over the sockets of the other runs, which confirm it; in addition to the latch.
+//! Emergency stop over the sockets of the other runs, which confirm it, in addition to the latch.
 //!
 //! One thread sends the request to all runs and does not block on any. Not real-time.
 
@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 const LOOK_PERIOD: Duration = Duration::from_millis(2);
 
 impl Latch {
-    /// Requests each run of the folder to stop, and waits until all have confirmed or ended, or until the deadline; returns the process
-    /// ids of the others.
+    /// Sends an emergency stop to each run of the folder, and waits until all runs have confirmed or ended, or until the deadline
+    /// `until`; returns the process ids of the runs that have not confirmed.
     ///
     /// # Errors
     /// If the runs cannot be listed.
@@ -39,7 +39,7 @@ impl Latch {
     }
 }
 
-/// Run that has not confirmed yet.
+/// Run that has not confirmed the stop yet.
 struct Stopping {
     run: FoundRun,
     connection: Option<(Stream, Frames)>,
@@ -60,7 +60,7 @@ impl Stopping {
                 Ok(length) if length > 0 => {}
                 Err(error) if error.kind() == ErrorKind::Interrupted => continue,
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return false,
-                // Over, or evicted in favour of another client: the next connection shows which.
+                // The run is over, or this client was evicted in favour of another: the next connection attempt shows which.
                 _ => {
                     self.connection = None;
                     return false;
@@ -82,7 +82,7 @@ impl Stopping {
     }
 }
 
-/// Connects and sends the request.
+/// Connects to a run and sends the stop request.
 fn ask(run: &FoundRun) -> Result<Stream, ErrorKind> {
     let mut stream = connect_now(&run.path).map_err(|error| error.kind())?;
     let request = Request { number: 0, ask: Ask::MachineStop };

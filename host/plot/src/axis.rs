@@ -1,34 +1,34 @@
-//! Axes: their quantity, and the range ([`Domain`]) that they cover.
+//! Axes: quantity, unit, scale, and the range ([`Domain`]) that an axis covers.
 //!
-//! Every value enters the picture through [`Scale::forward`], which rejects values that cannot be drawn. Behind it,
-//! all geometry is linear: a log axis is a linear axis of decimal logarithms.
+//! Every value passes [`Scale::forward`], which rejects values that cannot be drawn. All geometry after that is linear: a log axis
+//! is a linear axis of decimal logarithms.
 
 use super::quantity::Quantity;
 use super::step::NiceStep;
 use super::text;
 
-/// Larger magnitudes are treated like infinity, so that the difference of two values never overflows.
+/// Largest magnitude that is drawn; larger values count as infinite, so that the difference of two values never overflows.
 pub(super) const LARGEST_DRAWABLE: f64 = 1e300;
 
-/// A range narrower than this fraction of its values is a constant plus rounding: it is widened as one.
+/// Relative width below which a range counts as a constant with rounding errors, and is widened as a constant.
 const NARROWEST_RELATIVE_SPAN: f64 = 1e-9;
 
-/// Room between the data and the ends of a padded axis, as a fraction of the data's span.
+/// Space between the data and the ends of a padded axis, as a fraction of the data's span.
 const PADDING: f64 = 0.06;
 
-/// Least range of a logarithmic axis, in decades: smaller differences show as equal.
+/// Least range of a logarithmic axis, in decades: smaller differences are not visible.
 const LEAST_DECADES: f64 = 0.1;
 
-/// Largest distance from a tight axis to a round end, as a fraction of the data's span.
+/// Largest distance from the data to a round value at which a tight axis ends there, as a fraction of the data's span.
 const ROUNDING_REACH: f64 = 0.015;
 
-/// Room under the lowest bar of a histogram on a log axis, so that a single count is visible as a bar.
+/// Space below the top of the lowest bar of a histogram on a log axis, in decades, so that a single count is visible as a bar.
 const LOG_FLOOR_DECADES: f64 = 0.3;
 
-/// Largest distance of data of one sign from zero at which the axis reaches zero, as a fraction of their far end.
+/// Largest distance from zero, for data of one sign, at which the axis is extended to zero, as a fraction of the farthest value.
 const SNAP_TO_ZERO: f64 = 0.25;
 
-/// A quantity with its unit, a linear or logarithmic scale, and an optional fixed range.
+/// Axis of a panel: label, unit, linear or logarithmic scale, and range, automatic by default.
 #[derive(Debug, Clone)]
 pub struct Axis {
     pub(super) label: String,
@@ -54,7 +54,7 @@ impl Axis {
         }
     }
 
-    /// Creates a linear axis in the unit of `quantity`, with its least range.
+    /// Creates a linear axis in the unit of `quantity`, with the least range of `quantity`; values have to be given in that unit.
     pub fn of(label: impl Into<String>, quantity: Quantity) -> Self {
         let (unit, per_si) = quantity.unit();
         Self::linear(label, unit).least_range(quantity.least_range_si() * per_si)
@@ -65,16 +65,16 @@ impl Axis {
         Self { scale: Scale::Log, least: LEAST_DECADES, ..Self::linear(label, unit) }
     }
 
-    /// Fixes the range, in the unit of the axis; the order of the ends does not matter. A range that cannot
-    /// be drawn (not finite, empty, not positive on a log axis) is ignored in favour of the automatic one.
+    /// Fixes the range, in the unit of the axis; the order of the ends does not matter. A range that cannot be drawn (not finite,
+    /// empty, not positive on a log axis) is ignored in favour of the automatic range.
     #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.fixed = Some((low.min(high), low.max(high)));
         self
     }
 
-    /// Widens an automatic range to at least `span`, in the unit of the axis: smaller differences are rounding and no signal. A
-    /// logarithmic axis has a least range of its own.
+    /// Widens an automatic range to at least `span`, in the unit of the axis, so that rounding errors do not look like a signal.
+    /// Ignored on a logarithmic axis, which has a least range of its own.
     #[must_use]
     pub fn least_range(mut self, span: f64) -> Self {
         if self.scale == Scale::Linear && (0.0..LARGEST_DRAWABLE).contains(&span) {
@@ -83,14 +83,14 @@ impl Axis {
         self
     }
 
-    /// Extends an automatic range of a linear axis to zero, so that lengths are in proportion to values.
+    /// Extends an automatic range of a linear axis to zero, so that drawn lengths are proportional to values.
     #[must_use]
     pub fn with_zero(mut self) -> Self {
         self.includes_zero = true;
         self
     }
 
-    /// Places tick labels at these values and nowhere else: the levels of an experiment.
+    /// Places tick labels on an x axis at these values only, for example the levels of an experiment; no values: automatic ticks.
     #[must_use]
     pub fn levels(mut self, levels: impl IntoIterator<Item = f64>) -> Self {
         self.levels = levels.into_iter().collect();
@@ -108,7 +108,7 @@ impl Axis {
         }
     }
 
-    /// Returns label and unit, as far as there are any: `Force (10⁻⁶ N)`.
+    /// Returns label and unit, either of which may be empty: `Force (10⁻⁶ N)`.
     pub(super) fn name(&self, exponent: i32) -> String {
         format!("{} {}", self.label, self.unit_label(exponent)).trim().to_owned()
     }
@@ -153,7 +153,7 @@ impl Scale {
     }
 }
 
-/// Least and greatest coordinate so far; `low > high` if there is none.
+/// Least and greatest coordinate so far; `low > high` without a coordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Extent {
     pub(super) low: f64,
@@ -163,7 +163,7 @@ pub(super) struct Extent {
 impl Extent {
     pub(super) const EMPTY: Self = Self { low: f64::INFINITY, high: f64::NEG_INFINITY };
 
-    /// Returns the range of some coordinates.
+    /// Returns the range of the coordinates.
     pub(super) fn of(coordinates: impl IntoIterator<Item = f64>) -> Self {
         let mut extent = Self::EMPTY;
         coordinates.into_iter().for_each(|coordinate| extent.include(coordinate));
@@ -189,9 +189,9 @@ impl Extent {
 pub(super) enum Fit {
     /// Ends where the data end, or at a round value just beyond: the x axis of lines.
     Tight,
-    /// Room at both ends, but stops at a zero that is near: the y axis of lines, both axes of markers.
+    /// Space at both ends, but stops at zero if zero is near: the y axis of lines, both axes of markers.
     Padded,
-    /// Stands on zero, or below the least value on a log axis: the y axis of bars.
+    /// Begins at zero, or below the least value on a log axis: the y axis of bars.
     OnZero,
 }
 
@@ -242,7 +242,7 @@ fn is_narrow(low: f64, high: f64) -> bool {
     high - low <= NARROWEST_RELATIVE_SPAN * low.abs().max(high.abs()) || high - low < 1.0 / LARGEST_DRAWABLE
 }
 
-/// Moves the ends apart to a span of `least`: upwards where the range stands on zero.
+/// Moves the ends apart to a span of `least`: away from zero for bars on a linear axis, otherwise to both sides.
 fn widened(fit: Fit, scale: Scale, [low, high]: [f64; 2], least: f64) -> (f64, f64) {
     if fit == Fit::OnZero && scale == Scale::Linear {
         return if high > 0.0 { (low, low + least) } else { (high - least, high) };
@@ -251,8 +251,8 @@ fn widened(fit: Fit, scale: Scale, [low, high]: [f64; 2], least: f64) -> (f64, f
     (middle - 0.5 * least, middle + 0.5 * least)
 }
 
-/// Returns a range with a constant in its middle: a tenth of its magnitude to either side and at least half of `least`; around zero
-/// without a least range one unit, a third of a decade on a log axis.
+/// Returns a range with a constant in its middle: a tenth of the constant's magnitude to either side and at least half of `least`;
+/// one unit around zero without a least range; a third of a decade on a log axis.
 fn around_constant(scale: Scale, low: f64, high: f64, least: f64) -> (f64, f64) {
     let middle = 0.5 * low + 0.5 * high;
     let room = match scale {
@@ -276,7 +276,7 @@ impl Domain {
         self.high - self.low
     }
 
-    /// Returns the position of a coordinate: 0 at the low end, 1 at the high end, beyond outside.
+    /// Returns the position of a coordinate: 0 at the low end, 1 at the high end, below 0 or above 1 outside.
     pub(super) fn fraction(&self, coordinate: f64) -> f64 {
         (coordinate - self.low) / self.span()
     }

@@ -3,7 +3,7 @@
 use super::decimate::Point;
 use super::projection::Rect;
 
-/// Returns the parts of a line within `frame`, in order. A line that stays within it is one part, its points unchanged.
+/// Returns the parts of a line within `frame`, in order. A line entirely within `frame` is returned as one part, with unchanged points.
 pub(super) fn clipped(line: &[Point], frame: &Rect) -> Vec<Vec<Point>> {
     if let [only] = line {
         return if frame.contains(*only) { vec![vec![*only]] } else { Vec::new() };
@@ -16,15 +16,15 @@ pub(super) fn clipped(line: &[Point], frame: &Rect) -> Vec<Vec<Point>> {
             Some(part) if reached == Some(start) => part.push(end),
             _ => parts.push(vec![start, end]),
         }
-        // A segment that leaves the frame ends its part.
+        // A segment that leaves the frame ends the current part.
         reached = (end == *to).then_some(end);
     }
     parts
 }
 
-/// Clips a segment to `frame` (Liang and Barsky, "A New Concept and Method for Line Clipping", ACM
-/// Transactions on Graphics 3(1), 1984); ends within the frame keep their bits. Returns `None` if at most one point of the
-/// segment is within, unless the segment is that point.
+/// Clips a segment to `frame` (Liang and Barsky, "A New Concept and Method for Line Clipping", ACM Transactions on Graphics 3(1),
+/// 1984); ends within the frame are returned unchanged, bit for bit. Returns `None` if at most one point of the segment is within
+/// the frame, unless the segment is a single point.
 fn segment_within(from: Point, to: Point, frame: &Rect) -> Option<(Point, Point)> {
     let step = (to.0 - from.0, to.1 - from.1);
     let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);

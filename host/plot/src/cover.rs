@@ -1,15 +1,16 @@
-//! Detection of lines that cover one another. A covered line is drawn wider and paler, so that it is visible beside the others.
+//! Detection of lines that cover one another. A covered line is drawn wider and paler, so that it is visible on both sides of the
+//! covering lines.
 
 use super::decimate::Point;
 use super::projection::Rect;
 
-/// Distance below which two lines look like one.
+/// Distance up to which two lines look like one line.
 const ONE_LINE_PX: f64 = 1.2;
 
-/// Least share of the pixel columns of a line in which another line covers it.
+/// Smallest fraction of a line's pixel columns that another line has to overlap to cover it.
 const COVERING_SHARE: f64 = 0.5;
 
-/// Number of distinct widths of covered lines; more lines over one another share the largest.
+/// Number of distinct widths of covered lines; a line under more lines has the largest width.
 pub(super) const MAX_COVERS: usize = 3;
 
 /// Lowest and highest point of a line in each pixel column of its panel.
@@ -62,8 +63,8 @@ impl Course {
     }
 }
 
-/// Counts, for each of some lines in the order of drawing, the later lines that cover it, at most 3. A line is unbroken runs of points in
-/// pixels, in a frame between two columns.
+/// Returns for each line, in the order of drawing, the number of later lines that cover it, at most 3. A line is a list of unbroken
+/// runs of points, pixels; `[left, right]` are the edges of the frame, pixels.
 #[must_use]
 pub fn covering_lines(lines: &[Vec<Vec<(f64, f64)>>], [left, right]: [f64; 2]) -> Vec<usize> {
     let frame = Rect { left, top: 0.0, width: right - left, height: 0.0 };
@@ -74,10 +75,10 @@ pub fn covering_lines(lines: &[Vec<Vec<(f64, f64)>>], [left, right]: [f64; 2]) -
     courses.iter().enumerate().map(covers).collect()
 }
 
-/// Returns the width of a line under so many others, as a multiple of its normal width, and its opacity.
+/// Returns stroke width, as a multiple of the normal width, and opacity, 0 to 1, of a line that `covers` other lines cover.
 #[must_use]
 pub const fn covered_style(covers: usize) -> (f64, f64) {
-    /// Visible width of a covered line on both sides together, per covering line, in widths of a line.
+    /// Visible width of a covered line on both sides together, per covering line, as a multiple of the normal width.
     const BESIDE: f64 = 2.125;
     if covers == 0 { (1.0, 1.0) } else { (1.0 + BESIDE * covers as f64, 0.45) }
 }

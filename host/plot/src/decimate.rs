@@ -1,18 +1,17 @@
 //! Reduction of long lines to the resolution of a picture.
 //!
-//! The x axis is cut into buckets one pixel wide, and of the samples in a bucket the first, the lowest, the
-//! highest and the last remain. Drawn one pixel per bucket, the reduced line covers the same pixels as the
-//! full one (M4 aggregation: Jugel, Jerzak, Hackenbroich, Markl, "M4: A Visualization-Oriented Time Series
-//! Data Aggregation", PVLDB 7(10), 2014, section 4).
+//! The x axis is divided into buckets one pixel wide, and of the samples in a bucket the first, the lowest, the highest and the
+//! last are kept. Drawn one pixel per bucket, the reduced line covers the same pixels as the full line (M4 aggregation: Jugel,
+//! Jerzak, Hackenbroich, Markl, "M4: A Visualization-Oriented Time Series Data Aggregation", PVLDB 7(10), 2014, section 4).
 
 /// Sample in scale coordinates.
 pub(super) type Point = (f64, f64);
 
 /// Splits `samples` at gaps (`None`) into unbroken runs and reduces each to at most four samples per bucket.
 ///
-/// Buckets start at whole multiples of `bucket_width` counted from x = 0 and not from the first sample, so
-/// that a curve that grows or scrolls keeps its shape. x need not grow: a bucket ends when a sample leaves
-/// it, and a curve that returns starts another.
+/// Buckets start at whole multiples of `bucket_width` counted from x = 0 and not from the first sample, so that a curve that grows
+/// or scrolls keeps its shape. x need not increase: a bucket ends when a sample leaves it, and a curve that returns starts another
+/// bucket.
 pub(super) fn decimate(
     samples: impl IntoIterator<Item = Option<Point>>,
     bucket_width: f64,

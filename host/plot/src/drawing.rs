@@ -10,10 +10,10 @@ use super::projection::Projection;
 use super::series::{Bin, ErrorBar, Series, Shape};
 use super::theme::Slot;
 
-/// Ratio of length to width above which a line crosses itself up and down, so that dashes would hide its peaks.
+/// Ratio of length to width above which a line oscillates so densely that dashes would hide its peaks.
 const BUSY_LENGTH_PER_WIDTH: f64 = 4.0;
 
-/// Size of the squares in each of which only one marker is drawn.
+/// Side of the square cells in each of which only one marker is drawn.
 const MARKER_CELL_PX: f64 = 1.0;
 
 /// Tolerance for a point on the edge of the frame: half of the rounding of coordinates.
@@ -22,14 +22,14 @@ const EDGE_PX: f64 = 0.05;
 /// Drawing of one series.
 #[derive(Debug)]
 pub(super) enum Drawing {
-    /// A line, and the samples that stand alone between gaps (dashes would swallow them); `busy` if it goes
-    /// up and down so much that dashes would hide parts of it. `covers` later lines are over it.
+    /// A line, and `dots` for isolated samples between gaps, which dashes would hide. `busy`: the line oscillates so densely that
+    /// dashes would hide parts of it. `covers`: number of later lines that cover it.
     Line { path: Path, dots: Path, busy: bool, course: Course, covers: usize },
     /// Filled marker outlines.
     Markers(Path),
-    /// A filled outline standing on the axis.
+    /// Filled outlines of bars.
     Bars(Path),
-    /// Upright strokes with caps.
+    /// Vertical strokes with caps.
     Errors(Path),
 }
 
@@ -76,7 +76,7 @@ fn line(samples: impl Iterator<Item = Option<Point>>, slot: Slot, projection: &P
     Drawing::Line { path, dots, busy, course, covers: 0 }
 }
 
-/// Returns true if the lines are much longer than the width that they cover.
+/// Returns true if the line is much longer than the width that it covers.
 fn is_busy(runs: &[Vec<Point>]) -> bool {
     let steps =
         || runs.iter().flat_map(|run| run.windows(2)).filter_map(|pair| pair.first().zip(pair.last()));
@@ -112,7 +112,7 @@ fn markers(samples: &[(f64, f64)], slot: Slot, projection: &Projection) -> Drawi
     Drawing::Markers(path)
 }
 
-/// Draws strokes from the lower to the upper ends, cut at the frame, with a cap at each end within it.
+/// Draws strokes from the lower to the upper ends, clipped to the frame, with a cap at each end within the frame.
 fn errors(bars: &[ErrorBar], projection: &Projection) -> Drawing {
     let mut path = Path::default();
     let frame = projection.frame.grown(EDGE_PX);
@@ -143,7 +143,7 @@ fn bar_outline(bins: &[Bin], projection: &Projection, floor: f64) -> Vec<Option<
     let mut reached: Option<f64> = None;
     let drawable = |bin: &Bin| bin.edges(projection.x.scale).zip(projection.y.scale.forward(bin.height));
     for ((left, right), height) in bins.iter().filter_map(drawable) {
-        // Edges computed two ways may differ by rounding: a hundredth of a pixel is no gap.
+        // Equal edges may differ by rounding errors: a hundredth of a pixel is no gap.
         let touches = reached.is_some_and(|end| (left - end).abs() < 0.01 * projection.column());
         if !touches {
             if let Some(end) = reached {

@@ -1,8 +1,8 @@
 //! Labels outside the plotting area: headings, legends, names of marks.
 //!
-//! No label lies on data. The y axis' name stands over its panel with the legend beside it (or below, when
-//! they do not fit one row); names of horizontal marks stand in a gutter at the right, names of vertical
-//! marks in rows above the plotting area, both kept apart where they would overlap.
+//! No label covers data. The y axis' name is above its panel with the legend beside it (or below, if they do not fit in one row);
+//! names of horizontal marks are in a gutter at the right, names of vertical marks in rows above the plotting area, moved apart
+//! where they would overlap.
 
 use super::Panel;
 use super::axis::Domain;
@@ -26,12 +26,12 @@ const SHORT_SWATCH_PX: f64 = 10.0;
 /// Distance from the sample in a legend to its text.
 const SWATCH_TO_TEXT_PX: f64 = 6.0;
 const LEGEND_GAP_PX: f64 = 18.0;
-/// Longest text in a legend; longer ones end in an ellipsis.
+/// Maximum length of a text in a legend; longer texts end in an ellipsis.
 const LEGEND_TEXT_LIMIT_PX: f64 = 260.0;
 
-/// Distance from the plotting area to the names of horizontal marks: room for the leader.
+/// Distance from the plotting area to the names of horizontal marks: space for the leader line.
 pub(super) const SIDE_LABEL_GAP_PX: f64 = 12.0;
-/// Longest name of a horizontal mark.
+/// Maximum length of the name of a horizontal mark.
 const SIDE_LABEL_LIMIT_PX: f64 = 150.0;
 const SIDE_LABEL_PITCH_PX: f64 = 14.0;
 /// Distance from the pole of a vertical mark to its name.
@@ -42,7 +42,7 @@ const FLAG_OVERHANG_PX: f64 = 20.0;
 /// Distance from the middle of lower-case letters to the baseline, as a fraction of the font size.
 const BASELINE_BELOW_MIDDLE_EM: f64 = 0.34;
 
-/// Panel title and the y axis' name and unit, the first in semi-bold.
+/// Panel title with the y axis' name and unit; the first part in semi-bold.
 #[derive(Debug)]
 pub(super) struct Heading {
     pub(super) strong: String,
@@ -50,7 +50,7 @@ pub(super) struct Heading {
 }
 
 impl Heading {
-    /// Composes the heading of `panel`, whose y tick labels leave out `exponent`, cut to `limit_px`.
+    /// Composes the heading of `panel`, shortened to `limit_px`; `exponent` is the power of ten that the y tick labels leave out.
     pub(super) fn new(panel: &Panel, exponent: i32, limit_px: f64) -> Self {
         let (strong, light) = match panel.title.is_empty() {
             true => (&panel.y.label, panel.y.unit_label(exponent)),
@@ -62,7 +62,7 @@ impl Heading {
     }
 
     fn width_px(&self) -> f64 {
-        // Semi-bold runs about a tenth wider than regular, and a space lies between the two.
+        // Semi-bold is about a tenth wider than regular, and a space separates the two parts.
         1.1 * text::width_px(&self.strong, font_px::HEADING)
             + text::width_px(&self.light, font_px::HEADING)
             + 0.5 * font_px::HEADING
@@ -99,7 +99,7 @@ impl LegendEntry<'_> {
 #[derive(Debug)]
 pub(super) struct Legend<'a> {
     pub(super) entries: Vec<LegendEntry<'a>>,
-    /// Rows that the legend takes below the heading; 0 beside it.
+    /// Number of rows of the legend below the heading; 0: beside the heading.
     pub(super) own_rows: usize,
 }
 
@@ -139,7 +139,7 @@ impl<'a> LegendEntry<'a> {
     }
 }
 
-/// Places entries from `left` on, and starts a new row before one that would pass `right`; returns the number of rows.
+/// Places entries from `left` on, and starts a new row before an entry that would extend beyond `right`; returns the number of rows.
 fn flow(entries: &mut [LegendEntry<'_>], left: f64, right: f64) -> usize {
     let (mut x, mut row) = (left, 0);
     for entry in entries {
@@ -158,11 +158,11 @@ pub(super) struct MarkLabel {
     pub(super) text: String,
     /// Point where the mark meets the frame, in pixels along the mark's axis.
     pub(super) anchor: f64,
-    /// Middle of the name along this axis.
+    /// Centre of the name along the mark's axis, pixels.
     pub(super) middle: f64,
-    /// Half the length of the name.
+    /// Half the length of the name of a vertical mark, pixels.
     half_px: f64,
-    /// Row of the name of a vertical mark above the frame, 0 the nearest.
+    /// Row of the name of a vertical mark above the frame; 0: nearest.
     pub(super) row: usize,
 }
 
@@ -178,12 +178,12 @@ impl MarkLabel {
     }
 }
 
-/// Returns the baseline of text whose middle is at `middle`.
+/// Returns the baseline of text with its vertical centre at `middle`.
 pub(super) fn baseline(middle: f64, font_px: f64) -> f64 {
     middle + BASELINE_BELOW_MIDDLE_EM * font_px
 }
 
-/// Returns the width of the gutter for the names of horizontal marks right of the frame.
+/// Returns the width of the gutter for the names of horizontal marks at the right of the frame.
 pub(super) fn side_gutter_px(marks: &[Mark], y: &Domain) -> f64 {
     visible_marks(marks, Direction::Y, y)
         .map(|(label, _)| text::width_px(&side_text(label), font_px::LABEL) + SIDE_LABEL_GAP_PX)
@@ -201,15 +201,16 @@ pub(super) fn side_labels(marks: &[Mark], projection: &Projection) -> Vec<MarkLa
     labels
 }
 
-/// Places the names of vertical marks: flags to the right of their mark, or to the left at the end of the picture. No pole crosses a
-/// name: rows fill with right flags from the right, as flags in lower rows begin further right, then with left flags from the left.
+/// Places the names of vertical marks as flags to the right of their marks, or to the left at the end of the picture. No pole
+/// crosses a name: rows are filled with right flags from the right, so that flags in lower rows begin further right, then with left
+/// flags from the left.
 pub(super) fn top_labels(marks: &[Mark], x: &Domain, left: f64, right: f64) -> Vec<MarkLabel> {
     let mut named: Vec<(f64, &str)> = visible_marks(marks, Direction::X, x)
         .map(|(label, at)| (left + (right - left) * x.fraction(at), label))
         .collect();
     named.sort_by(|(one, _), (other, _)| other.total_cmp(one));
     let (mut flags, mut left_flags) = (Vec::new(), Vec::new());
-    // A right flag ends before the pole of the first left one, which is in a higher row.
+    // A right flag ends before the pole of the first left flag, which is in a higher row.
     let mut limit = right + FLAG_OVERHANG_PX;
     for (anchor, label) in named {
         let text = text::shorten(label, right - left, font_px::LABEL);
@@ -236,7 +237,7 @@ pub(super) fn top_labels(marks: &[Mark], x: &Domain, left: f64, right: f64) -> V
         }
     }
     for mut flag in left_flags.into_iter().rev() {
-        // Above every flag beside which it has no room, and whose pole would cross it.
+        // Above every flag that it would overlap, or that has a pole that would cross it.
         let meets = |other: &&MarkLabel| {
             other.anchor.max(other.end()) + FLAG_GAP_PX > flag.start()
                 && other.start().min(other.anchor) < flag.anchor
@@ -263,7 +264,7 @@ fn visible_marks<'a>(
         .filter_map(|mark| mark.visible(domain).map(|at| (mark.label.as_str(), at)))
 }
 
-/// Moves sorted labels apart to their pitch: down from `top` first, then up from `bottom`.
+/// Moves sorted labels apart to the pitch: first down from `top`, then up from `bottom`.
 fn spread(labels: &mut [MarkLabel], top: f64, bottom: f64) {
     let mut least = top;
     for label in labels.iter_mut() {

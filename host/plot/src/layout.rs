@@ -1,8 +1,8 @@
-//! Layout: from the model to rectangles, ticks and placed labels.
+//! Layout: computes rectangles, ticks and label positions from the model.
 //!
-//! Three passes, each needing the one before: ranges and y ticks ([`drafts`]), then gutters, which fix the
-//! width of each column ([`columns`]; panels of one column share them, so that their x axes line up), then
-//! rows from top to bottom ([`place_row`]).
+//! Three passes, each based on the previous one: ranges and y ticks ([`drafts`]), then gutters, which determine the width of each
+//! column ([`columns`]; panels of a column have the same gutters, so that their x axes are aligned), then rows from top to bottom
+//! ([`place_row`]).
 
 use super::axis::{Axis, Domain, Extent, Fit};
 use super::labels::{
@@ -19,7 +19,7 @@ use super::{Figure, Panel};
 pub(super) const MARGIN_PX: f64 = 24.0;
 pub(super) const TITLE_LINE_PX: f64 = 24.0;
 pub(super) const SUBTITLE_LINE_PX: f64 = 18.0;
-/// Distance from the frame to the tick labels left of it.
+/// Distance from the frame to the tick labels at its left.
 pub(super) const FRAME_TO_Y_LABEL_PX: f64 = 8.0;
 /// Distance from the frame down to the baseline of the tick labels below it.
 pub(super) const FRAME_TO_X_LABEL_PX: f64 = 17.0;
@@ -59,7 +59,7 @@ pub(super) struct Cell<'a> {
 /// Arranges the whole figure.
 pub(super) fn arrange(figure: &Figure) -> Layout<'_> {
     let inner_px = figure.width_px - 2.0 * MARGIN_PX;
-    // Semi-bold runs about a tenth wider than regular.
+    // Semi-bold is about a tenth wider than regular.
     let title = text::wrap(&figure.title, inner_px / 1.1, font_px::TITLE);
     let mut subtitle = text::wrap(&figure.subtitle, inner_px, font_px::SUBTITLE);
     subtitle.extend(text::wrap(&figure.note(), inner_px, font_px::SUBTITLE));
@@ -141,7 +141,7 @@ impl<'a> Draft<'a> {
         }
         let has_bars = panel.series.iter().any(|series| matches!(series.shape, Shape::Histogram(_)));
         let y = panel.y.domain(extent, if has_bars { Fit::OnZero } else { Fit::Padded });
-        // Numbers beside an axis without data would mislead.
+        // Numbers at an axis without data would be misleading.
         let y_ticks = match extent.is_empty() && panel.y.fixed.is_none() {
             true => Ticks::none(),
             false => Ticks::fit(&y, height_px, Spacing::Vertical { pitch_px: Y_LABEL_PITCH_PX }),
@@ -179,7 +179,7 @@ fn columns(figure: &Figure, drafts: &[Draft<'_>]) -> Vec<Column> {
         .collect()
 }
 
-/// Labels above a panel, and its x ticks: the parts that depend on its column and not on its row.
+/// Labels above a panel, and its x ticks: the parts that depend on the panel's column and not on its row.
 #[derive(Debug)]
 pub(super) struct Head<'a> {
     pub(super) x_ticks: Ticks,
@@ -210,8 +210,7 @@ impl<'a> Head<'a> {
     }
 }
 
-/// Places one row of panels below `top`, headings on one line and frames on another; returns the bottom of
-/// the row.
+/// Places one row of panels below `top`, with aligned headings and aligned frames; returns the bottom of the row.
 fn place_row<'a>(
     row: Vec<Draft<'a>>,
     columns: &[Column],
@@ -219,7 +218,7 @@ fn place_row<'a>(
     top: f64,
     cells: &mut Vec<Cell<'a>>,
 ) -> f64 {
-    // If one panel of a row has x labels, all panels get the room for them.
+    // If one panel of a row has x labels, all panels of the row have them.
     let has_x_labels = row.iter().any(|draft| draft.has_x_labels);
     let foot_px = if has_x_labels { row.iter().map(Draft::foot_px).fold(0.0, f64::max) } else { 0.0 };
     let heads: Vec<Head<'a>> =

@@ -1,22 +1,22 @@
-//! Charts as self-contained SVG text: the source of every picture of the command line.
+//! Charts as self-contained SVG documents, used for all pictures of the command line.
 //!
-//! A [`Figure`] has a title and [`Panel`]s; a panel has axes, [`Series`] of samples and [`Mark`]s (reference
-//! lines). [`Figure::to_svg`] lays them out and writes one SVG document that needs no other
-//! file, is readable on light and dark pages, scales with the page and describes its content in words.
+//! A [`Figure`] has a title and [`Panel`]s; a panel has axes, [`Series`] of samples and [`Mark`]s (reference lines).
+//! [`Figure::to_svg`] lays them out and writes one SVG document that needs no other file, is readable on light and dark pages,
+//! scales with the page and contains a text description for screen readers.
 //!
 //! Design goals:
-//! - **No peak is lost, no file is large.** Lines are reduced to at most four samples per pixel column
-//!   (`decimate`, after Jugel et al., "M4", VLDB 2014), so ten minutes at 1 kHz cost what a second costs. A [`Trace`]
-//!   reduces them while they arrive: its memory does not grow with the run.
-//! - **Rounding is no signal.** An axis covers at least the range below which differences of its [`Quantity`] are rounding.
-//! - **Every series is visible.** A line that later ones cover is wider and paler than they are (`cover`).
-//! - **Bad samples stay local.** NaN, infinity, and anything not positive on a log axis break the line there
-//!   and touch neither the axis range nor the rest of the curve.
+//! - **No peak is lost, no file is large.** Lines are reduced to at most four samples per pixel column (`decimate`, after Jugel et
+//!   al., "M4", VLDB 2014), so the file size for ten minutes at 1 kHz is that for a second. A [`Trace`] reduces samples as they
+//!   arrive: its memory does not grow with the run.
+//! - **Rounding is no signal.** An axis covers at least a range that is far above the rounding errors of its [`Quantity`].
+//! - **Every series is visible.** A line that later lines cover is drawn wider and paler (`cover`).
+//! - **Bad samples stay local.** NaN, infinity, and anything not positive on a log axis break the line there and change neither the
+//!   axis range nor the rest of the curve.
 //! - **Same input, same bytes.** Coordinates are rounded to a tenth of a pixel; nothing depends on time,
 //!   locale or installed fonts.
 //!
-//! Data flows one way: the model (this file, `series`, `mark`, `spans`) -> `axis` and `ticks` (ranges) -> `layout` and
-//! `labels` (places) -> `drawing`, `path` and `svg` (text). `theme` has all matters of taste.
+//! Data flows one way: the model (this file, `series`, `mark`, `spans`) -> `axis` and `ticks` (ranges) -> `layout` and `labels`
+//! (places) -> `drawing`, `path` and `svg` (text). `theme` has colours, fonts and line styles.
 //!
 //! Not real-time: every function here allocates.
 //!
@@ -75,10 +75,10 @@ const WIDTH_PX: f64 = 960.0;
 /// fit one screen.
 const DEFAULT_PANEL_HEIGHT_PX: f64 = 120.0;
 
-/// Picture with a title over panels, which fill a grid row by row; one column by default.
+/// Picture with a title above panels, which fill a grid row by row; one column by default.
 ///
-/// Panels without an x axis of their own share the figure's: one range that covers all of them, its labels
-/// drawn once at the foot of each column.
+/// Panels without an x axis of their own share the figure's x axis: one range covers the data of all these panels, and the labels
+/// are drawn once at the foot of each column.
 #[derive(Debug, Clone)]
 pub struct Figure {
     title: String,
@@ -96,7 +96,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Creates an empty figure whose panels share the x axis `shared_x`.
+    /// Creates an empty figure with the x axis `shared_x` for its panels.
     pub fn new(title: impl Into<String>, shared_x: Axis) -> Self {
         Self {
             title: title.into(),
@@ -121,7 +121,7 @@ impl Figure {
         self
     }
 
-    /// Sets the text behind the panels, large and pale: a restriction that applies to every copy of the picture.
+    /// Sets a large pale text behind the panels, for a restriction that applies to every copy of the picture.
     #[must_use]
     pub fn watermark(mut self, watermark: impl Into<String>) -> Self {
         self.watermark = watermark.into();
@@ -144,8 +144,8 @@ impl Figure {
         self
     }
 
-    /// Sets width and height of the whole picture, each clamped to 200 px to 8000 px; panels share the height that titles and labels
-    /// leave, at least 40 px each.
+    /// Sets width and height of the whole picture, each clamped to 200 px to 8000 px (NaN: 960 px). The plotting areas divide the
+    /// height that titles and labels leave, at least 40 px each.
     #[must_use]
     pub fn size_px(mut self, [width_px, height_px]: [f64; 2]) -> Self {
         let held = |length: f64| if length.is_nan() { WIDTH_PX } else { length.clamp(200.0, 8000.0) };
@@ -153,7 +153,7 @@ impl Figure {
         self
     }
 
-    /// Enlarges the picture by a factor, text and lines included, clamped to 0.1 to 10; NaN changes nothing.
+    /// Sets the magnification of the picture, text and lines included, clamped to 0.1 to 10; NaN changes nothing.
     #[must_use]
     pub fn scale(mut self, scale: f64) -> Self {
         if !scale.is_nan() {
@@ -162,7 +162,7 @@ impl Figure {
         self
     }
 
-    /// Selects light or dark colours, or those of the page that shows the picture.
+    /// Selects light or dark colours, or the colour scheme of the page that shows the picture.
     #[must_use]
     pub fn paper(mut self, paper: Paper) -> Self {
         self.paper = paper;
@@ -176,7 +176,7 @@ impl Figure {
         self
     }
 
-    /// Adds a panel, or a note under the subtitle with a quantity that has no panel and the reason.
+    /// Adds a panel; for an error adds its text, a quantity and the reason why it is not drawn, to a note under the subtitle.
     #[must_use]
     pub fn panel_or_note(mut self, panel: Result<Panel, String>) -> Self {
         match panel {
@@ -186,7 +186,7 @@ impl Figure {
         self
     }
 
-    /// Returns the line with the quantities without a panel; empty if there are none.
+    /// Returns the note on quantities without a panel; empty if there are none.
     fn note(&self) -> String {
         if self.left_out.is_empty() {
             String::new()
@@ -209,7 +209,7 @@ impl Figure {
 /// Background of a picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Paper {
-    /// Light, and dark on pages in dark mode.
+    /// Light, or dark if the reader's browser is in dark mode.
     #[default]
     OfReader,
     /// Light, for print.
@@ -218,7 +218,7 @@ pub enum Paper {
     Dark,
 }
 
-/// Plotting area with its axes, series and marks.
+/// Plotting area with axes, series and marks.
 #[derive(Debug, Clone)]
 pub struct Panel {
     title: String,
@@ -230,7 +230,7 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// Creates an empty panel on the figure's x axis. The y axis' label is the panel's heading.
+    /// Creates an empty panel with the figure's x axis. The label of the y axis is the panel's heading.
     #[must_use]
     pub fn new(y: Axis) -> Self {
         Self {
@@ -249,28 +249,28 @@ impl Panel {
         Self { own_x: Some(x), ..Self::new(y) }
     }
 
-    /// Sets a name before the y axis' label, for grids whose panels differ in their case and not in quantity.
+    /// Sets the first part of the heading, before the label of the y axis, for panels that show the same quantity in different cases.
     #[must_use]
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self
     }
 
-    /// Adds a series; later ones are drawn over earlier ones.
+    /// Adds a series, drawn over the series added before.
     #[must_use]
     pub fn series(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
 
-    /// Adds a reference line.
+    /// Adds a reference line or a fault.
     #[must_use]
     pub fn mark(mut self, mark: Mark) -> Self {
         self.marks.push(mark);
         self
     }
 
-    /// Marks the intervals of x in which a limit acted, as a bar along the foot of the panel.
+    /// Adds a bar along the foot of the panel over the intervals of x in which a limit acted.
     #[must_use]
     pub fn limited(mut self, spans: Spans) -> Self {
         self.limited.push(spans);

@@ -1,9 +1,9 @@
-//! Marks: reference lines under the data, and faults over it.
+//! Marks: reference lines under the data, and faults over the data.
 
 use super::axis::{Domain, Extent, Scale};
 
-/// Reference line under the data, or a fault, with a label outside the plotting area. A mark widens an automatic range so that
-/// it is visible; outside a fixed range it is left out.
+/// Reference line under the data, or a fault, with a label outside the plotting area. An automatic range is widened to include the
+/// mark; a mark outside a fixed range is not drawn.
 #[derive(Debug, Clone)]
 pub struct Mark {
     pub(super) direction: Direction,
@@ -29,7 +29,7 @@ pub(super) enum Direction {
 }
 
 impl Mark {
-    /// Creates a vertical line at `x`, in the unit of the x axis.
+    /// Creates a vertical reference line at `x`, in the unit of the x axis; with an empty label it has no name.
     pub fn at_x(x: f64, label: impl Into<String>) -> Self {
         Self { direction: Direction::X, label: label.into(), look: MarkLook::Reference, at: x }
     }
@@ -39,7 +39,7 @@ impl Mark {
         Self { look: MarkLook::Fault, ..Self::at_x(x, label) }
     }
 
-    /// Creates a horizontal line at `y`, in the unit of the y axis.
+    /// Creates a horizontal reference line at `y`, in the unit of the y axis; with an empty label it has no name.
     pub fn at_y(y: f64, label: impl Into<String>) -> Self {
         Self { direction: Direction::Y, ..Self::at_x(y, label) }
     }
@@ -49,7 +49,7 @@ impl Mark {
         domain.scale.forward(self.at).filter(|at| (domain.low..=domain.high).contains(at))
     }
 
-    /// Widens `extent` by the mark, if it can be drawn.
+    /// Extends `extent` to the mark, if the mark can be drawn.
     pub(super) fn include_in(&self, extent: &mut Extent, scale: Scale) {
         scale.forward(self.at).into_iter().for_each(|at| extent.include(at));
     }

@@ -14,7 +14,7 @@ const ERROR_CAP_PX: f64 = 5.0;
 pub(super) struct Path {
     data: String,
     at: (f64, f64),
-    /// Start and length of a level step at the end of the data, which the next one in the same direction extends.
+    /// Start and length of a horizontal step at the end of the data, which a following step in the same direction extends.
     level: Option<(usize, f64)>,
 }
 
@@ -88,7 +88,7 @@ impl Path {
         }
     }
 
-    /// Adds a closed outline through offsets from (x, y).
+    /// Adds a closed outline through points given as offsets from (x, y).
     pub(super) fn polygon(&mut self, x: f64, y: f64, offsets: &[Point]) {
         self.outline(offsets.iter().map(|&(dx, dy)| (x + dx, y + dy)));
     }
@@ -109,7 +109,7 @@ impl Path {
         self.arcs(x, y, inner, 0);
     }
 
-    /// Adds the end of an error bar.
+    /// Adds the cap at an end of an error bar.
     pub(super) fn error_cap(&mut self, x: f64, y: f64) {
         self.polyline([(x - ERROR_CAP_PX, y), (x + ERROR_CAP_PX, y)]);
     }

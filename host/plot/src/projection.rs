@@ -1,10 +1,10 @@
-//! Places in a picture: rectangles in pixels, and the projection of a panel's coordinates to pixels.
+//! Geometry of a picture: rectangles in pixels, and the projection of a panel's coordinates to pixels.
 
 use super::axis::Domain;
 use super::decimate::Point;
 
-/// Largest distance of coordinates from the plotting area, in sizes of the area. Farther outside, a point only
-/// gives the direction of the line that leaves.
+/// Largest distance of coordinates from the plotting area, in sizes of the area. Points farther outside are moved to this distance:
+/// only the direction of the line that leaves matters.
 const FARTHEST_FRACTION: f64 = 1000.0;
 
 /// Axis-aligned rectangle in pixels, y down.
@@ -35,7 +35,7 @@ impl Rect {
         self.bottom() - self.height * fraction
     }
 
-    /// Returns the rectangle, larger on all sides.
+    /// Returns the rectangle enlarged by `by_px` on all sides.
     pub(super) fn grown(&self, by_px: f64) -> Self {
         let Self { left, top, width, height } = self;
         Self {

@@ -1,6 +1,7 @@
-//! Measured quantities: the units of their axes, and their least axis ranges.
+//! Measured quantities, with the unit and the least range of an axis.
 //!
-//! Differences below the least range come from rounding, and an axis that followed them would draw noise as a signal.
+//! Differences far below the least range are rounding errors, which an automatic axis without a least range would enlarge to an
+//! apparent signal.
 
 /// Quantity that a run or an experiment measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,19 +26,19 @@ pub enum Quantity {
     Stiffness,
     /// The lateness or the duration of a tick.
     Lateness,
-    /// A ratio in per cent.
+    /// A ratio, shown in per cent.
     Percent,
 }
 
 impl Quantity {
-    /// Returns the unit of an axis, and the number of units in one SI unit.
+    /// Returns the unit of an axis, and the factor from SI units to this unit.
     #[must_use]
     pub const fn unit(self) -> (&'static str, f64) {
         let (symbol, per_si, _) = self.entry();
         (symbol, per_si)
     }
 
-    /// Formats a value in the unit of an axis.
+    /// Formats a value given in the unit of the axis.
     pub(super) fn text(self, value: f64) -> String {
         match self {
             Self::Angle | Self::AngularVelocity => format!("{value}{}", self.unit().0),
@@ -51,8 +52,8 @@ impl Quantity {
         self.entry().2
     }
 
-    /// Returns unit, units in one SI unit, and least range in SI units. The ranges lie far below the resolution of hands and devices, and
-    /// far above rounding errors.
+    /// Returns unit, factor from SI units, and least range in SI units. The ranges are far below the resolution of hands and
+    /// devices, and far above rounding errors.
     const fn entry(self) -> (&'static str, f64, f64) {
         const DEGREE: f64 = std::f64::consts::PI / 180.0;
         match self {

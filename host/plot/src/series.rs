@@ -1,14 +1,14 @@
-//! Series: the samples of one curve, their style, and the range they cover.
+//! Series: samples of one curve with their style, and the range that they cover.
 
 use super::axis::{Domain, Extent, Scale};
 use super::theme::{Slot, Weight};
 use super::trace::Trace;
 
-/// Width of a bin that starts at zero on a log axis, where it has no left edge.
+/// Drawn width, in decades, of a bin that starts at zero on a log axis, where its left edge is infinitely far away.
 const OPEN_BIN_DECADES: f64 = 0.5;
 
-/// Named samples and their style. Colour, dash and marker follow from the series' place in its
-/// panel unless [`Series::slot`] sets them.
+/// Labelled samples with their style. Colour, dash and marker depend on the position of the series in its panel unless
+/// [`Series::slot`] or [`Series::axis`] sets them. A series with an empty label is not in the legend.
 #[derive(Debug, Clone)]
 pub struct Series {
     pub(super) label: String,
@@ -26,7 +26,7 @@ enum Look {
     Axis(usize),
 }
 
-/// Samples with the kind of their drawing.
+/// Samples with the kind of drawing.
 #[derive(Debug, Clone)]
 pub(super) enum Shape {
     Line(Vec<(f64, f64)>),
@@ -36,7 +36,7 @@ pub(super) enum Shape {
     Errors(Vec<ErrorBar>),
 }
 
-/// Bar from `low` to `high` at `x`, in the units of the panel's axes.
+/// Error bar from `low` to `high` at `x`, in the units of the panel's axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorBar {
     /// Position, unit of the x axis.
@@ -48,13 +48,13 @@ pub struct ErrorBar {
 }
 
 impl ErrorBar {
-    /// Creates a bar of `error` to each side of `value`.
+    /// Creates an error bar of length `error` to each side of `value`.
     #[must_use]
     pub fn around(x: f64, value: f64, error: f64) -> Self {
         Self { x, low: value - error, high: value + error }
     }
 
-    /// Returns both ends in the coordinates of the scales; `None` if one cannot be drawn.
+    /// Returns both ends in the coordinates of the scales; `None` if an end cannot be drawn.
     pub(super) fn ends(&self, x: Scale, y: Scale) -> Option<[(f64, f64); 2]> {
         let x = x.forward(self.x)?;
         Some([(x, y.forward(self.low)?), (x, y.forward(self.high)?)])
@@ -66,14 +66,15 @@ impl ErrorBar {
 pub struct Bin {
     /// Left edge, unit of the x axis.
     pub from: f64,
-    /// Right edge, unit of the x axis; a bin without width is left out.
+    /// Right edge, unit of the x axis; a bin with zero or negative width is not drawn.
     pub to: f64,
     /// Height, unit of the y axis.
     pub height: f64,
 }
 
 impl Bin {
-    /// Counts values into bars of a quarter octave from `first` up; values below `first` are in the first bar.
+    /// Sums `(value, count)` pairs in bars of a quarter octave, a factor of 2^(1/4), from `first` (positive) upwards; values below
+    /// `first` are in the first bar.
     #[must_use]
     pub fn quarter_octaves(first: f64, counts: impl IntoIterator<Item = (f64, u64)>) -> Vec<Self> {
         const STEP: f64 = 1.189_207_115_002_721; // 2^(1/4)
@@ -111,8 +112,8 @@ impl Bin {
 }
 
 impl Series {
-    /// Creates a line of samples `(x, y)`, joined in the order given; x need not grow. A sample that is not
-    /// finite breaks the line; an isolated one is drawn as a dot.
+    /// Creates a line of samples `(x, y)`, joined in the given order; x need not increase. A sample that is not finite breaks the
+    /// line; an isolated sample is drawn as a dot.
     pub fn line(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(label, Shape::Line(samples.into_iter().collect()))
     }
@@ -123,22 +124,23 @@ impl Series {
         Self { given, ..Self::new(label, Shape::Line(samples)) }
     }
 
-    /// Creates steps of samples `(x, y)` whose y holds until the next x (zero-order hold).
+    /// Creates a step line of samples `(x, y)`: y is constant until the next x (zero-order hold).
     pub fn steps(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(label, Shape::Steps(samples.into_iter().collect()))
     }
 
-    /// Creates a marker for each sample `(x, y)`; markers that coincide within a pixel are drawn once.
+    /// Creates markers at the samples `(x, y)`; markers that coincide within a pixel are drawn once.
     pub fn points(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(label, Shape::Points(samples.into_iter().collect()))
     }
 
-    /// Creates filled bars in order of x. On a log y axis the bars stand on the axis' lower end.
+    /// Creates the filled bars of a histogram; `bins` have to be in order of x. On a log y axis the bars begin at the lower end of
+    /// the axis.
     pub fn histogram(label: impl Into<String>, bins: impl IntoIterator<Item = Bin>) -> Self {
         Self::new(label, Shape::Histogram(bins.into_iter().collect()))
     }
 
-    /// Creates bars with caps at both ends: standard errors, or intervals. Add them after the series of their values.
+    /// Creates error bars with caps at both ends, for standard errors or intervals. To be added after the series of the values.
     pub fn errors(label: impl Into<String>, bars: impl IntoIterator<Item = ErrorBar>) -> Self {
         Self::new(label, Shape::Errors(bars.into_iter().collect()))
     }
@@ -152,22 +154,22 @@ impl Series {
         Self { label: label.into(), slot: None, weight: Weight::Full, shape, given }
     }
 
-    /// Sets the palette entry `slot` (counted from 0), for the same look of a quantity in every
-    /// panel, or of a theory line and its measured points.
+    /// Sets the palette entry `slot` (counted from 0), so that a quantity looks the same in every panel, or a theory line as its
+    /// measured points.
     #[must_use]
     pub fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(Look::Slot(slot));
         self
     }
 
-    /// Sets the colour of vector component 0, 1 or 2 (x, y or z): a solid line in the same colour in every panel and picture.
+    /// Sets the colour of vector component 0, 1 or 2 (x, y or z): the line is solid, with the same colour in every panel and picture.
     #[must_use]
     pub fn axis(mut self, component: usize) -> Self {
         self.slot = Some(Look::Axis(component));
         self
     }
 
-    /// Draws the line thin, solid and pale, as one of many of its kind.
+    /// Draws the line thin, solid and pale, as one of many similar lines.
     #[must_use]
     pub fn faint(mut self) -> Self {
         self.weight = Weight::Faint;
@@ -200,7 +202,8 @@ impl Series {
         boxes.filter(|(x, _)| is_within(x)).map(|(_, y)| y).fold(Extent::EMPTY, Extent::with)
     }
 
-    /// Returns the ranges of x and y of each sample or bar that can be drawn; a bar without a height has no range of y.
+    /// Returns the ranges of x and y of each sample or bar that can be drawn; the range of y is empty for a bar with a height that
+    /// cannot be drawn.
     fn boxes(&self, x_scale: Scale, y_scale: Scale) -> Box<dyn Iterator<Item = (Extent, Extent)> + '_> {
         match &self.shape {
             Shape::Line(samples) | Shape::Steps(samples) | Shape::Points(samples) => {

@@ -2,13 +2,14 @@
 
 use super::axis::LARGEST_DRAWABLE;
 
-/// Largest number of intervals: about one for each pixel column of a figure.
+/// Maximum number of intervals: about one for each pixel column of a figure.
 const CAPACITY: usize = 1024;
 
-/// Largest number of intervals after a reduction.
+/// Number of gap widths in the whole: a reduction merges intervals with gaps up to one width.
 const REDUCED: f64 = 512.0;
 
-/// Intervals of growing x. Beyond 1 024 of them, neighbours nearer than a 512th of the whole are joined: about two pixels.
+/// Intervals with ascending x. Before an interval beyond 1 024 is added, neighbours with gaps up to 1/512 of the whole (about two
+/// pixels) are merged.
 ///
 /// Not real-time: adding an interval may allocate, at most 16 KiB.
 #[derive(Debug, Clone, Default)]
@@ -18,7 +19,7 @@ pub struct Spans {
 }
 
 impl Spans {
-    /// Extends the interval to `x`, or begins one there. An x that is not finite changes nothing.
+    /// Extends the current interval to `x`, or begins an interval at `x` if there is none. An x that is not finite changes nothing.
     pub fn extend(&mut self, x: f64) {
         if x.abs() > LARGEST_DRAWABLE || x.is_nan() {
             return;
@@ -35,7 +36,7 @@ impl Spans {
         self.is_open = true;
     }
 
-    /// Ends the interval.
+    /// Ends the current interval; the next [`Self::extend`] begins another.
     pub fn interrupt(&mut self) {
         self.is_open = false;
     }

@@ -3,7 +3,7 @@
 /// Tolerance of ticks at the ends, as a fraction of the span (rounding of `k * step`).
 pub(super) const END_TOLERANCE: f64 = 1e-9;
 
-/// Step of 1, 2 or 5 times a power of ten.
+/// Step width of 1, 2 or 5 times a power of ten.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NiceStep {
     mantissa: f64,
@@ -26,7 +26,7 @@ impl NiceStep {
         self.mantissa * power_of_ten(self.exponent)
     }
 
-    /// Returns the number of minor steps per step, so that minor ticks are nice as well: 0.2 of 1, 0.5 of 2, 1 of 5.
+    /// Returns the number of minor steps per step, chosen so that minor steps are round too: 0.2 for 1, 0.5 for 2, 1 for 5.
     pub(super) fn subdivisions(self) -> f64 {
         if self.mantissa == 2.0 { 4.0 } else { 5.0 }
     }

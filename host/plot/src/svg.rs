@@ -1,8 +1,8 @@
 //! SVG document of an arranged figure.
 //!
-//! Within a panel, from back to front: grid, reference lines, data, axis. The document has no ids and its style is confined
-//! to `.plot`, so that several pictures fit in one page. It has one `<svg>` and no `<clipPath>`, which programs that convert
-//! pictures to PDF draw badly; data are cut at the frame before they are written (`clip`).
+//! Within a panel, from back to front: grid, reference lines, data, axis. The document has no ids and its styles apply to `.plot`
+//! only, so that a page can contain several pictures. It has one `<svg>` element and no `<clipPath>`, which converters to PDF draw
+//! incorrectly; data are clipped to the frame before they are written (`clip`).
 
 use super::Figure;
 use super::axis::{Domain, Scale};
@@ -22,18 +22,18 @@ use super::spans::Spans;
 use super::text::{self, escape, px};
 use super::theme::{Slot, font_px, style_sheet};
 
-/// Half the size of the cross of a fault, and distance of its middle from the top of the frame.
+/// Half the size of the cross of a fault, and distance of the cross's centre from the top of the frame.
 const FAULT_CROSS_PX: f64 = 4.5;
 const FAULT_CROSS_DEPTH_PX: f64 = 8.0;
 
-/// Height of the bar that marks where a limit acted, and the least width of an interval.
+/// Height of the bar over intervals in which a limit acted, and least drawn width of an interval.
 const LIMITED_BAR_PX: f64 = 5.0;
 const LEAST_STRETCH_PX: f64 = 1.5;
 
 const MAJOR_TICK_PX: f64 = 5.0;
 const MINOR_TICK_PX: f64 = 3.0;
 
-/// Least length of a decade with lines between 1 and 10.
+/// Least length of a decade for which minor grid lines are drawn.
 const MINOR_GRID_DECADE_PX: f64 = 60.0;
 
 /// Writes the figure as an SVG document.
@@ -118,7 +118,7 @@ impl Writer {
         self.raw(&format!("<{name}>{}</{name}>\n", escape(content)));
     }
 
-    /// Writes a line of text with its baseline at `y`; the class decides which end `x` refers to.
+    /// Writes a line of text with its baseline at `y`; `x` is the start, the middle or the end of the text, depending on the class.
     fn text(&mut self, class: &str, x: f64, y: f64, content: &str) {
         self.raw(&format!(
             "<text class=\"{class}\" x=\"{}\" y=\"{}\">{}</text>\n",
@@ -128,11 +128,11 @@ impl Writer {
         ));
     }
 
-    /// Writes a text across the middle of the picture, over most of its width; nothing for an empty one.
+    /// Writes a text across the middle of the picture, over most of its width; nothing for an empty text.
     fn watermark(&mut self, content: &str, width: f64, height: f64) {
         /// Approximate width of a character in units of the font size.
         const CHARACTER: f64 = 0.6;
-        /// Share of the width that the text takes.
+        /// Fraction of the picture's width that the text takes.
         const SHARE: f64 = 0.85;
         if content.is_empty() {
             return;
@@ -208,7 +208,7 @@ impl Writer {
         self.path("fault", &path);
     }
 
-    /// Draws a bar along the foot where a limit acted.
+    /// Draws a bar along the foot over the intervals in which a limit acted.
     fn limited(&mut self, cell: &Cell<'_>) {
         let projection @ Projection { x, frame, .. } = &cell.projection;
         let mut path = Path::default();
@@ -366,7 +366,6 @@ impl Writer {
                 let class = format!("line {} {}", under(*covers), slot.stroke_class()).replace("  ", " ");
                 self.dashed_path(&class, dash, &path);
             }
-            // Without a drawing there is no sample.
             None => {}
         }
         self.text("label", entry.text_x(), baseline(middle, font_px::LABEL), &entry.text);
@@ -389,12 +388,12 @@ impl Writer {
     }
 }
 
-/// Returns the style class of a line under so many others; empty for one that is not covered.
+/// Returns the style class of a line that `covers` other lines cover; empty for an uncovered line.
 fn under(covers: usize) -> String {
     if covers == 0 { String::new() } else { format!("under{covers}") }
 }
 
-/// Returns true if a log axis gets thin lines between its labelled ones, which show that it is logarithmic.
+/// Returns true for a log axis that is long enough for minor grid lines, which show that it is logarithmic.
 fn has_minor_grid(domain: &Domain, length_px: f64) -> bool {
     domain.scale == Scale::Log && length_px >= MINOR_GRID_DECADE_PX * domain.span()
 }

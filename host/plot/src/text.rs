@@ -1,7 +1,7 @@
-//! Text for pictures: escaping, numbers, and estimates of its width without a font.
+//! Text for pictures: escaping, formatting of numbers, and estimates of text widths without a font.
 
-/// Escapes characters that XML and HTML reserve and replaces those that XML 1.0 forbids (control characters, section 2.2), so
-/// that any string is safe as content and as attribute value. Not real-time.
+/// Escapes characters that are reserved in XML and HTML, and replaces characters that XML 1.0 forbids (control characters, section
+/// 2.2), so that any string is safe as element content and as attribute value. Not real-time.
 #[must_use]
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
@@ -62,8 +62,8 @@ pub(super) fn superscript(exponent: i32) -> String {
     exponent.to_string().chars().map(raised).collect()
 }
 
-/// Returns an upper bound of the width of `text` at `font_px`. The advance widths are those of a wide face (DejaVu Sans),
-/// so that a text which fits here fits in the narrower system fonts as well.
+/// Returns an upper bound of the width of `text` at the font size `font_px`. The advance widths are those of a wide typeface
+/// (DejaVu Sans), so that a text that fits with these widths fits in narrower system fonts as well.
 pub(super) fn width_px(text: &str, font_px: f64) -> f64 {
     text.chars().map(advance_em).sum::<f64>() * font_px
 }
@@ -83,7 +83,7 @@ fn advance_em(character: char) -> f64 {
     }
 }
 
-/// Shortens `text` to `limit_px`, with an ellipsis at its end, if necessary.
+/// Shortens `text` to the width `limit_px`, with an ellipsis at its end, if necessary.
 pub(super) fn shorten(text: &str, limit_px: f64, font_px: f64) -> String {
     if width_px(text, font_px) <= limit_px {
         return text.to_owned();

@@ -1,9 +1,8 @@
 //! Theme of pictures: colours, dash patterns, markers, type sizes and the style sheet.
 //!
-//! Series colours are the colour-blind-safe palette of Okabe and Ito ("Color Universal Design", 2008), in an
-//! order that puts strong contrast first. Its yellow is left out (unreadable on white) for the neutral grey
-//! that many tools add to the palette; its black follows the text colour and so turns light on a dark page.
-//! Dash patterns and marker shapes repeat the distinctions of colour.
+//! Series colours are the colour-blind-safe palette of Okabe and Ito ("Color Universal Design", 2008), ordered by contrast. Its
+//! yellow, unreadable on white, is replaced by the neutral grey that many tools add to the palette; its black is the text colour,
+//! and so is light on a dark page. Series also differ in dash pattern or marker shape.
 
 use super::Paper;
 use super::path::Path;
@@ -30,7 +29,7 @@ pub const FAULT_COLORS: (&str, &str) = ("#c4003c", "#ff6082");
 /// Colours of limits on a light and a dark page, the same as in the viewer's window.
 pub const LIMIT_COLORS: (&str, &str) = ("#603400", "#ffe86e");
 
-/// Dash patterns in pixels, lengths of dashes and gaps in turn; the first is solid.
+/// Dash patterns: alternating lengths of dashes and gaps, pixels; the first is solid.
 const DASHES: [&str; 8] = ["", "8 3", "3 2", "9 3 2 3", "15 4", "6 2 1.5 2 1.5 2", "1.5 2", "11 3 4 3"];
 
 /// Colour, dash and marker of a series.
@@ -51,14 +50,14 @@ pub(super) enum Weight {
 }
 
 impl Slot {
-    /// Returns the style of series `index`. After one round of colours the dashes and markers shift by one, so
-    /// that 64 series differ.
+    /// Returns the style of series `index`. After each round of colours the dashes and markers shift by one, so that 64 styles are
+    /// distinct.
     pub(super) fn new(index: usize) -> Self {
         let color = index % PALETTE.len();
         Self { color, cue: (color + index / PALETTE.len()) % DASHES.len(), weight: Weight::Full }
     }
 
-    /// Returns the style of a component, x, y or z: equal in every panel.
+    /// Returns the style of vector component 0, 1 or 2 (x, y or z), the same in every panel.
     pub(super) fn of_axis(component: usize) -> Self {
         let component = component % AXIS_COLORS.len();
         Self { color: PALETTE.len() + component, cue: component, weight: Weight::Full }
@@ -73,7 +72,7 @@ impl Slot {
         self.weight == Weight::Faint
     }
 
-    /// Returns the style classes for a stroke in the colour.
+    /// Returns the style classes for a stroke in the series colour.
     pub(super) fn stroke_class(self) -> String {
         match self.weight {
             Weight::Full => format!("s{}", self.color),
@@ -81,7 +80,7 @@ impl Slot {
         }
     }
 
-    /// Returns the style class for an area in the colour.
+    /// Returns the style class for an area in the series colour.
     pub(super) fn fill_class(self) -> String {
         format!("f{}", self.color)
     }
@@ -104,25 +103,26 @@ impl Slot {
             4 => path.polygon(x, y, &[(0.0, 3.8), (3.7, -2.8), (-3.7, -2.8)]),
             5 => path.polygon(x, y, &plus_outline(3.6, 1.1)),
             6 => path.polygon(x, y, &cross_outline(3.3, 1.2)),
-            // Wide enough to surround another marker.
+            // Ring, wide enough to surround another marker.
             _ => path.ring(x, y, 5.2, 4.1),
         }
     }
 }
 
-/// Returns a plus sign with arms of the given reach and half width: the upper arm and the corner after it, turned by quarters.
+/// Returns the corners of a plus sign with arms of length `reach` and half width `half`: the upper arm with its inner corner,
+/// rotated by quarter turns.
 fn plus_outline(reach: f64, half: f64) -> [(f64, f64); 12] {
     let arm = [(-half, -reach), (half, -reach), (half, -half)];
     std::array::from_fn(|corner| (0..corner / 3).fold(arm[corner % 3], |(x, y), _| (-y, x)))
 }
 
-/// Returns the plus sign turned by an eighth.
+/// Returns the plus sign rotated by an eighth of a turn.
 fn cross_outline(reach: f64, half: f64) -> [(f64, f64); 12] {
     use std::f64::consts::FRAC_1_SQRT_2;
     plus_outline(reach * 1.2, half).map(|(x, y)| (FRAC_1_SQRT_2 * (x - y), FRAC_1_SQRT_2 * (x + y)))
 }
 
-/// Type sizes in pixels. The style sheet repeats them; the layout measures with them.
+/// Font sizes in pixels, used by style sheet and layout.
 pub(super) mod font_px {
     pub(in super::super) const TITLE: f64 = 18.0;
     pub(in super::super) const SUBTITLE: f64 = 12.5;
@@ -134,8 +134,8 @@ pub(super) mod font_px {
 /// Returns the style sheet: all rules are under `.plot`, so that a picture in a page does not affect the page.
 /// Colours are given twice, the second time for pages in dark mode.
 ///
-/// All rules are understood by CairoSVG, svglib, Inkscape, librsvg and browsers: plain colours for `fill` and `stroke`, no inherited
-/// size of type, and no size of the picture, which is in the root's attributes.
+/// CairoSVG, svglib, Inkscape, librsvg and browsers support all rules: plain colours for `fill` and `stroke`, no inherited font
+/// size, and no size of the picture, which is in the attributes of the root.
 pub(super) fn style_sheet(paper: Paper) -> String {
     let light = Page { paper: "#ffffff", ink: "#1f2328", muted: "#59636e", axis: "#8c959f", grid: "#e7eaee" };
     let dark = Page { paper: "#0d1117", ink: "#e6edf3", muted: "#9198a1", axis: "#656c76", grid: "#232a33" };
@@ -180,7 +180,7 @@ pub(super) fn style_sheet(paper: Paper) -> String {
     )
 }
 
-/// Colours of all parts other than series.
+/// Colours of all parts except series, faults and limits.
 struct Page {
     paper: &'static str,
     ink: &'static str,
@@ -190,7 +190,8 @@ struct Page {
 }
 
 impl Page {
-    /// Returns the rules for text, grid and axes, then two for each series: `s0` for strokes, `f0` for areas.
+    /// Returns the rules for text, grid, axes, faults and limits, then two rules for each series colour: `s0` for strokes, `f0` for
+    /// areas.
     fn rules(&self, series_color: impl Fn((&'static str, &'static str)) -> &'static str) -> String {
         let Self { paper, ink, muted, axis, grid } = self;
         let mut rules = format!(

@@ -1,19 +1,19 @@
-//! Ticks: round values along an axis, with labels that agree in their decimals.
+//! Ticks: round values along an axis, with labels of the same number of decimals.
 //!
-//! Linear steps are 1, 2 or 5 times a power of ten (the classic nice numbers: Heckbert, "Nice numbers for
-//! graph labels", Graphics Gems, 1990). Log axes are labelled at decades, at 1-2-5 if there is room, and
-//! like a linear axis if they cover too little for either.
+//! Linear steps are 1, 2 or 5 times a power of ten (the classic nice numbers: Heckbert, "Nice numbers for graph labels", Graphics
+//! Gems, 1990). Log axes have labels at decades, at 1-2-5 if there is room, and as a linear axis if the range is too small for
+//! either.
 
 use super::axis::{Domain, Scale};
 use super::step::{END_TOLERANCE, NiceStep, exponent_of, power_of_ten, to_integer};
 use super::text;
 
-/// Magnitude from which tick labels leave out a power of ten, which the axis label then contains.
+/// Magnitude at and above which tick labels leave out a power of ten, which the axis label then contains.
 const LARGEST_PLAIN: f64 = 1e5;
 /// Magnitude below which tick labels leave out a power of ten, which the axis label then contains.
 const SMALLEST_PLAIN: f64 = 1e-2;
 
-/// Decades labelled in plain digits (0.001 to 10 000); beyond, all labels of the axis are powers.
+/// Decades labelled in plain digits (0.001 to 10 000); if one is outside, all labels of the axis are powers of ten.
 const PLAIN_DECADES: std::ops::RangeInclusive<i32> = -3..=4;
 
 /// Ticks of one axis; positions are fractions of its domain.
@@ -32,12 +32,12 @@ pub(super) struct Tick {
     pub(super) label: String,
 }
 
-/// Room that a label takes along its axis.
+/// Space that a label needs along its axis.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Spacing {
-    /// Labels one below the other, at least this far apart.
+    /// Labels one below the other, at least `pitch_px` apart.
     Vertical { pitch_px: f64 },
-    /// Labels side by side, with at least this gap between their texts.
+    /// Labels side by side, with a gap of at least `gap_px` between their texts.
     Horizontal { gap_px: f64, font_px: f64 },
 }
 
@@ -59,7 +59,7 @@ impl Ticks {
         Self { major: Vec::new(), minor: Vec::new(), exponent: 0 }
     }
 
-    /// Returns the densest ticks whose labels have enough distance on an axis of `length_px`.
+    /// Returns the densest ticks with enough distance between their labels on an axis of `length_px`.
     pub(super) fn fit(domain: &Domain, length_px: f64, spacing: Spacing) -> Self {
         let most = match spacing {
             Spacing::Vertical { pitch_px } => length_px / pitch_px,
@@ -75,7 +75,7 @@ impl Ticks {
         }
     }
 
-    /// Places labels at these values, without minor ticks; those outside the axis are left out.
+    /// Places labels at `values`, without minor ticks; values outside the axis are left out.
     pub(super) fn at(domain: &Domain, values: &[f64]) -> Self {
         let tick = |value: &f64| {
             let position = domain.fraction(domain.scale.forward(*value)?);
@@ -85,7 +85,7 @@ impl Ticks {
         Self { major: values.iter().filter_map(tick).collect(), ..Self::none() }
     }
 
-    /// Places about `most` ticks or fewer.
+    /// Places at most about `most` ticks.
     fn at_most(domain: &Domain, most: f64) -> Self {
         match domain.scale {
             Scale::Linear => linear(domain.low, domain.high, most, |value| domain.fraction(value)),
@@ -124,7 +124,7 @@ fn multiples(low: f64, high: f64, step: f64) -> impl Iterator<Item = f64> {
         .take_while(move |&value| value <= high + tolerance)
 }
 
-/// Returns the power of ten, a multiple of three, that labels of values up to `magnitude` leave out.
+/// Returns the exponent of ten, a multiple of three, that labels of values up to `magnitude` leave out.
 fn left_out_exponent(magnitude: f64) -> i32 {
     if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&magnitude) {
         0
@@ -133,7 +133,7 @@ fn left_out_exponent(magnitude: f64) -> i32 {
     }
 }
 
-/// Places ticks of a log axis: decades, or 1-2-5 in each decade, or linear steps, whichever gives enough labels.
+/// Places ticks of a log axis: at decades, at 1-2-5 in each decade, or in linear steps, whichever gives enough labels.
 fn log(domain: &Domain, most: f64) -> Ticks {
     const DIGITS_1_2_5: [f64; 3] = [1.0, 2.0, 5.0];
     let minor = log_positions(domain, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], 1);
@@ -142,7 +142,7 @@ fn log(domain: &Domain, most: f64) -> Ticks {
         let place = |value: f64| domain.fraction(value.max(f64::MIN_POSITIVE).log10());
         return linear(domain.scale.backward(domain.low), domain.scale.backward(domain.high), most, place);
     }
-    // 2 and 5 split a decade unevenly, so the room for the closest pair (1-2, 0.30 decade) counts.
+    // 2 and 5 divide a decade unevenly: the closest pair (1-2 or 5-10, 0.30 decade) determines whether the labels fit.
     let fits_dense = domain.span() / 0.30 <= most;
     let stride = (1..).find(|&stride| domain.span() / f64::from(stride) <= most).unwrap_or(1);
     let decades = log_positions(domain, &[1.0], stride);

@@ -3,16 +3,16 @@
 use super::axis::LARGEST_DRAWABLE;
 use super::decimate::Point;
 
-/// Largest number of samples of a trace: seventeen for each pixel column of a figure.
+/// Maximum number of stored samples of a trace: seventeen for each pixel column of a figure.
 const CAPACITY: usize = 16_384;
 
-/// Buckets over the whole line after a reduction. Each has at most six samples, so that a reduction frees at
-/// least a quarter of the capacity.
+/// Number of buckets over the whole line in a reduction. Each bucket keeps at most six samples, so that a reduction frees about a
+/// quarter of the capacity.
 const BUCKETS: f64 = 2_048.0;
 
-/// Samples of growing x, added one at a time. Up to 16 384 are stored unchanged; beyond, the line is cut into
-/// 2 048 buckets, and the first, lowest, highest and last sample of each are stored, and one gap. The extremes are
-/// exact, and a picture of the trace differs from that of all samples by less than a pixel.
+/// Line of samples with ascending x, added one at a time. Up to 16 384 samples are stored unchanged; when more are added, the line
+/// is divided into 2 048 buckets, of which the first, lowest, highest and last sample and the gaps (at most two) are kept. The
+/// extremes are exact, and a picture of the trace differs from a picture of all samples by less than a pixel.
 ///
 /// Not real-time: adding a sample may allocate, at most 256 KiB per trace.
 #[derive(Debug, Clone, Default)]
@@ -22,7 +22,7 @@ pub struct Trace {
 }
 
 impl Trace {
-    /// Adds a sample; one that is not finite breaks the line. An x below the last one counts as the last one.
+    /// Adds a sample; a sample that is not finite breaks the line. An x below the previous x is replaced by the previous x.
     pub fn add(&mut self, x: f64, y: f64) {
         if self.samples.len() >= CAPACITY {
             self.reduce();
@@ -38,7 +38,7 @@ impl Trace {
         self.largest().is_some()
     }
 
-    /// Returns the largest magnitude of a sample that can be drawn, if there is one.
+    /// Returns the largest magnitude of y among the samples that can be drawn; `None` if there is no such sample.
     #[must_use]
     pub fn largest(&self) -> Option<f64> {
         self.samples.iter().map(|(_, y)| y.abs()).filter(|size| size.is_finite()).reduce(f64::max)
@@ -49,7 +49,7 @@ impl Trace {
         (self.samples, self.given)
     }
 
-    /// Reduces each bucket to at most six samples: at most 12 294, as x does not fall.
+    /// Reduces each bucket to at most six samples: at most 12 294 in total, because x does not decrease.
     fn reduce(&mut self) {
         let samples = std::mem::take(&mut self.samples);
         let ends = samples.first().zip(samples.last());
@@ -64,7 +64,7 @@ impl Trace {
     }
 }
 
-/// Returns the first, lowest, highest and last finite sample of a bucket, its first gap and one at its end, in their order.
+/// Returns the first, lowest, highest and last finite sample of a bucket, its first gap and a gap at its end, in their order.
 fn kept(bucket: &[Point]) -> impl Iterator<Item = Point> + '_ {
     let finite = || bucket.iter().enumerate().filter(|(_, (_, y))| y.is_finite());
     let place = |found: Option<(usize, &Point)>| found.map(|(place, _)| place);

@@ -1,4 +1,4 @@
-//! Vector quantity over time, collected sample by sample: a panel of three components, or the reason for its absence.
+//! Vector quantity over time, collected sample by sample: yields a panel of three components, or the reason why it is not drawn.
 
 use super::{Axis, Panel, Quantity, Series, Trace};
 
@@ -16,16 +16,18 @@ impl VectorTrace {
         Self { quantity, components: Default::default() }
     }
 
-    /// Adds a sample, in SI units; a component that is not finite breaks its line. May allocate, see [`Trace::add`].
+    /// Adds a sample: `x` in the unit of the x axis, `si` in SI units; a component that is not finite breaks its line. May
+    /// allocate, as [`Trace`] does.
     pub fn add(&mut self, x: f64, si: [f64; 3]) {
         let (_, per_si) = self.quantity.unit();
         self.components.iter_mut().zip(si).for_each(|(trace, value)| trace.add(x, value * per_si));
     }
 
-    /// Returns a panel with the components in their colours. `name` begins with a lower-case letter, which the heading capitalises.
+    /// Returns a panel with one line per component, in the colours of x, y and z. The heading is `name` with its first letter
+    /// capitalised.
     ///
     /// # Errors
-    /// Name and reason, if no sample differs from zero by more than rounding.
+    /// `name` and the reason, if there is no data, or no component differs from zero by more than rounding.
     pub fn panel(self, name: &str) -> Result<Panel, String> {
         let (_, per_si) = self.quantity.unit();
         let least = self.quantity.least_range_si() * per_si;

@@ -18,7 +18,7 @@ use std::path::Path;
 /// Block size for copying the index, bytes.
 const BLOCK_BYTES: usize = 64 << 10;
 
-/// MCAP file written from front to back. Dropped without [`ChunkedFile::finish`], the file is still completed.
+/// MCAP file that is written sequentially. Dropping it without [`ChunkedFile::finish`] also completes the file.
 pub(crate) struct ChunkedFile {
     sink: Checksummed,
     chunk: Chunk,
@@ -42,7 +42,7 @@ enum Phase {
 }
 
 impl ChunkedFile {
-    /// Begins the file at this path.
+    /// Writes the start of an MCAP file; `path` is used for the folder of the temporary index file.
     ///
     /// # Errors
     /// Errors of the system, if the file cannot be written to, or no file for the index can be created.
@@ -64,7 +64,7 @@ impl ChunkedFile {
         Ok(chunked)
     }
 
-    /// Writes metadata, and lists it in the summary.
+    /// Writes a metadata record, and adds it to the summary.
     pub(crate) fn add_metadata(&mut self, metadata: &Metadata) -> io::Result<()> {
         let offset = self.sink.bytes;
         self.write_record(op::METADATA, metadata)?;
@@ -76,7 +76,7 @@ impl ChunkedFile {
         Ok(())
     }
 
-    /// Writes a schema, here and in the summary.
+    /// Writes a schema, and repeats it in the summary.
     pub(crate) fn add_schema(&mut self, header: &SchemaHeader, data: &[u8]) -> io::Result<()> {
         let mut body = little_endian(header)?;
         let length = u32::try_from(data.len()).map_err(io::Error::other)?;
@@ -88,7 +88,7 @@ impl ChunkedFile {
         self.emit(&record)
     }
 
-    /// Writes a channel, here and in the summary.
+    /// Writes a channel, and repeats it in the summary.
     pub(crate) fn add_channel(&mut self, channel: &Channel) -> io::Result<()> {
         let record = encoded(op::CHANNEL, channel)?;
         self.statistics.channel_count += 1;
@@ -113,7 +113,7 @@ impl ChunkedFile {
         self.chunk.append(header, data)
     }
 
-    /// Writes the chunk and its message indexes to the file, and stores its offset for the index.
+    /// Writes the chunk in memory with its message indexes to the file, and adds the chunk to the index.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         if self.chunk.messages.is_empty() {
             return self.flush_sink();
@@ -152,7 +152,8 @@ impl ChunkedFile {
         self.flush_sink()
     }
 
-    /// Writes the last chunk and the summary, and closes the file, which must be the file at the path, in full length.
+    /// Writes the last chunk and the summary, and closes the file; fails unless it is still the file at the path, in
+    /// full length.
     ///
     /// # Errors
     /// Errors of the system, or one around a [`FileError`](crate::FileError).
@@ -161,7 +162,7 @@ impl ChunkedFile {
         self.sink.file.close(path)
     }
 
-    /// Removes the file, unless the path leads to another one by now.
+    /// Removes the file, unless the path leads to another file by now.
     pub(crate) fn remove(mut self, path: &Path) {
         self.phase = Phase::Closed;
         self.sink.file.remove(path);
@@ -246,7 +247,7 @@ impl ChunkedFile {
         self.attempt(flushed)
     }
 
-    /// Returns a result unchanged; after a failure nothing more is written.
+    /// Returns a result unchanged; after an error nothing more is written.
     fn attempt(&mut self, result: io::Result<()>) -> io::Result<()> {
         if result.is_err() {
             self.phase = Phase::Failed;

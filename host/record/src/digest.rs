@@ -5,7 +5,7 @@ use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
 use flotor_sync::Words;
 use xxhash_rust::xxh3::Xxh3;
 
-/// Words of a record that depend on the run alone, not on the machine.
+/// Number of words of a record that depend on the run alone, not on the machine.
 const DIGEST_WORDS: usize = RECORD_WORDS - TIMING_WORDS;
 
 /// Parts of a record that a digest covers.
@@ -31,10 +31,10 @@ impl Coverage {
 
 /// Streaming xxh3-64 over the records of a run, without measured times.
 ///
-/// The hash runs over the 64-bit words of each record, little endian, in the order of [`TickRecord`], so it
-/// depends neither on the machine nor on the batches in which records arrive; a part that the digest does not [cover](Coverage) counts
-/// as zero. Every NaN counts as the same and zero has no sign, because these differ between processors and
-/// compilers. It distinguishes runs; it is no protection against malice.
+/// The hash runs over the 64-bit words of each record, little-endian, in the order of [`TickRecord`], so it depends
+/// neither on the machine nor on the batches in which records arrive; a part that the digest does not [cover](Coverage)
+/// counts as zero. All NaNs count as equal and zero has no sign, because they differ between processors and compilers.
+/// The digest distinguishes runs, but is not cryptographic: it is no protection against forgery.
 #[derive(Clone, Default)]
 pub struct TraceDigest {
     coverage: Coverage,

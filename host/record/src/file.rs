@@ -1,31 +1,30 @@
-//! File of a recording during writing: created by its only writer, and checked against changes by other
-//! programs.
+//! Recording file while it is being written: created exclusively, and checked for changes by other programs.
 
 use same_file::Handle;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Change of a recording's file by another program.
+/// Change of a recording's file by another program, found by its writer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
     /// The file is shorter or longer than the bytes written.
     #[error("another program changed the length of the file from {written} to {found} bytes")]
     Length {
-        /// Bytes written.
+        /// Length as written, bytes.
         written: u64,
-        /// Bytes in the file.
+        /// Length of the file, bytes.
         found: u64,
     },
-    /// The path leads to no file, or to another one.
+    /// The path leads to no file, or to another file.
     #[error("the file was removed or replaced during the run")]
     Replaced,
 }
 
-/// Buffered file that did not exist before.
+/// New file with a write buffer.
 ///
-/// Only one program can create the file of one name, so two writers never share one.
+/// The file is created exclusively, so two writers never share a file.
 pub(crate) struct NewFile {
     buffer: BufWriter<LengthChecked>,
 }
@@ -44,7 +43,7 @@ impl NewFile {
         Self { buffer: BufWriter::new(LengthChecked { file, written: 0 }) }
     }
 
-    /// Writes buffered bytes of the complete file, which must be the file at the path, in full length.
+    /// Writes the buffered bytes; fails unless the file is still the file at the path, in full length.
     ///
     /// # Errors
     /// Errors of the system, or one around a [`FileError`].
@@ -55,7 +54,7 @@ impl NewFile {
         if checked.is_at(path) { Ok(()) } else { Err(io::Error::other(FileError::Replaced)) }
     }
 
-    /// Removes the file, unless the path leads to another one by now.
+    /// Removes the file, unless the path leads to another file by now.
     pub(crate) fn remove(&self, path: &Path) {
         if self.buffer.get_ref().is_at(path) {
             let _ = fs::remove_file(path);
@@ -73,7 +72,7 @@ impl Write for NewFile {
     }
 }
 
-/// File written from front to back, whose length is compared with the bytes written before each further write.
+/// File that is written sequentially; before each write its length is compared with the number of bytes written.
 struct LengthChecked {
     file: File,
     written: u64,

@@ -1,10 +1,9 @@
-//! Path and content hash of files named by parameters of a run, so that a replay can check
-//! whether it has the same files.
+//! Path and content hash of the files that parameters of a run name, so that a replay can check whether it has the same
+//! files.
 //!
-//! A setting is stored as written (`curve = "spring.csv"`), without the folder that it refers to.
-//! Path and hash are stored beside it among the [parameters](crate::PluginDescription::parameters),
-//! under keys that no parameter has (`curve.path`, `curve.xxh3`): readers that do not know them
-//! ignore them.
+//! A setting is stored as written (`curve = "spring.csv"`), without the folder that it refers to. Path and hash are
+//! stored among the [parameters](crate::PluginDescription::parameters), under keys that no parameter has (`curve.path`,
+//! `curve.xxh3`): readers that do not know these keys ignore them.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader};
@@ -17,12 +16,13 @@ const BLOCK_BYTES: usize = 64 * 1024;
 /// Prefix of a hash, equal to that of a run's digest.
 const HASH_PREFIX: &str = "xxh3:";
 
-/// Path and hash of a file at the time of reading.
+/// Path and content hash of a file at the time of reading.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NamedFile {
     /// Absolute path.
     pub path: PathBuf,
-    /// xxh3-64 of the content. It distinguishes files; it is no protection against malice.
+    /// xxh3-64 hash of the content. It distinguishes files, but is not cryptographic: it is no protection against
+    /// forgery.
     pub hash: u64,
 }
 
@@ -30,7 +30,7 @@ impl NamedFile {
     /// Reads a file and computes its hash. Not real-time.
     ///
     /// # Errors
-    /// Errors of the system, and for a file that is not regular: reading a pipe would block, and empty it.
+    /// Errors of the system; `InvalidInput` for a file that is not regular: reading a pipe would block, and empty it.
     pub fn read(path: &Path) -> io::Result<Self> {
         if !fs::metadata(path)?.is_file() {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
@@ -46,14 +46,15 @@ impl NamedFile {
         format!("{HASH_PREFIX}{:016x}", self.hash)
     }
 
-    /// Returns the entries for path and hash, to be stored beside the parameter.
+    /// Returns keys and values of the entries for path and hash of the file that `parameter` names.
     #[must_use]
     pub fn to_parameters(&self, parameter: &str) -> [(String, String); 2] {
         let path = self.path.to_string_lossy().into_owned();
         [(path_key(parameter), path), (hash_key(parameter), self.hash_text())]
     }
 
-    /// Finds the file of a parameter by its stored entries; `None` in recordings of earlier versions.
+    /// Finds path and hash of the file of a parameter among the stored entries; `None` if there are none (recordings of
+    /// earlier versions), or the hash is malformed.
     #[must_use]
     pub fn among(parameters: &[(String, String)], parameter: &str) -> Option<Self> {
         let value = |key: String| parameters.iter().find(|(known, _)| *known == key).map(|(_, value)| value);

@@ -1,9 +1,9 @@
-//! Recordings: all results of a run, in one file that common tools open.
+//! Recordings: all results of a run in one file, in a format that common tools open.
 //!
 //! A separate crate because two programs need it: the host writes recordings, the viewer reads them.
 //!
-//! A recording is an [MCAP](https://mcap.dev/spec) file of protobuf messages. It contains its own schemas, so
-//! Foxglove and Rerun draw it, Python's `mcap-protobuf-support` decodes it, and none of them needs this program:
+//! A recording is an [MCAP](https://mcap.dev/spec) file of protobuf messages. It contains its own schemas, so Foxglove
+//! and Rerun draw it and Python's `mcap-protobuf-support` decodes it, without any part of this program:
 //!
 //! | topic | message | when |
 //! |---|---|---|
@@ -17,8 +17,8 @@
 //! metadata), then [`Recorder::record`] appends ticks; [`Recording`] reads them back, bit for bit. [`TraceDigest`]
 //! is a digest of a run: equal digests, equal runs.
 //!
-//! **Time** is time since the loop started, in nanoseconds, also as MCAP's `log_time` and `publish_time`: a
-//! recording begins at 0 (viewers show 1 January 1970), so that equal runs leave equal times.
+//! **Time** is time since the loop started, in nanoseconds, also as MCAP's `log_time` and `publish_time`: a recording
+//! begins at 0 (viewers show 1 January 1970), so that equal runs have equal times.
 //!
 //! **A killed process** loses at most 250 ms: messages are written in chunks, and a chunk is written as a whole. A
 //! truncated file is read up to its last complete chunk, and marked ([`Ending::CutOff`]).
@@ -62,13 +62,13 @@ pub use writer::{RecordError, Recorder};
 pub enum Severity {
     /// Information.
     Info,
-    /// The run goes on, but not as requested.
+    /// The run continues, but not as requested.
     Warning,
     /// A part of the run failed.
     Error,
 }
 
-/// Event of a run, in words: a fault, a disabled model.
+/// Text event of a run, such as a fault or a disabled model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Note {
     /// Time since the loop started, ns.
@@ -77,6 +77,6 @@ pub struct Note {
     pub severity: Severity,
     /// Source of the event: "device" or the name of a model.
     pub source: String,
-    /// Description of the event, for people.
+    /// Human-readable description of the event.
     pub text: String,
 }

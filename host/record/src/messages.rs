@@ -1,11 +1,11 @@
-//! Ticks and changes as messages of a recording, for transports other than a file.
+//! Ticks and changes as the messages of a recording, for transports other than a file.
 
 use crate::schema::{Change as ChangeMessage, FrameTransform, Missing, Tick};
 use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use prost::Message;
 
-/// Error of bytes that are not a complete message of a recording.
+/// Error: bytes are not a complete message of a recording.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("not a valid message {message}: {reason}")]
 pub struct InvalidMessage {
@@ -13,7 +13,7 @@ pub struct InvalidMessage {
     reason: String,
 }
 
-/// Encoder for the two messages of a tick. Reuses the parts that all ticks share.
+/// Encoder for the two messages of a tick. Reuses the frame names, which are equal for all ticks.
 #[derive(Debug)]
 pub struct TickMessages {
     pose: FrameTransform,
@@ -26,7 +26,8 @@ impl Default for TickMessages {
 }
 
 impl TickMessages {
-    /// Encodes a `foxglove.FrameTransform` and a `flotor.Tick`: together all of a record, to the bit. Not real-time.
+    /// Encodes a record as a `foxglove.FrameTransform` and a `flotor.Tick`, which together contain the whole record,
+    /// bit by bit. Not real-time.
     pub fn encode(&mut self, record: &TickRecord) -> (Vec<u8>, Vec<u8>) {
         self.pose.set(record);
         (self.pose.encode_to_vec(), Tick::new(record).encode_to_vec())
@@ -36,7 +37,7 @@ impl TickMessages {
 /// Decodes the record of a tick from its two messages. Not real-time.
 ///
 /// # Errors
-/// [`InvalidMessage`] if they cannot be decoded, are incomplete, or belong to two different ticks.
+/// [`InvalidMessage`] if a message cannot be decoded or is incomplete, or the messages belong to two different ticks.
 pub fn tick_from_messages(pose: &[u8], tick: &[u8]) -> Result<TickRecord, InvalidMessage> {
     let wrong = |message: &'static str| move |reason: String| InvalidMessage { message, reason };
     let lacks = |Missing(part)| format!("the message has no `{part}`");
@@ -61,7 +62,7 @@ pub fn change_to_bytes(change: &Change) -> Vec<u8> {
 /// Decodes a change from a protobuf message `flotor.Change`, given its time, ns. Not real-time.
 ///
 /// # Errors
-/// [`InvalidMessage`] if it cannot be decoded or is incomplete.
+/// [`InvalidMessage`] if the message cannot be decoded or is incomplete.
 pub fn change_from_bytes(bytes: &[u8], time_ns: u64) -> Result<Change, InvalidMessage> {
     let wrong = |reason: String| InvalidMessage { message: "flotor.Change", reason };
     let message = ChangeMessage::decode(bytes).map_err(|cause| wrong(cause.to_string()))?;

@@ -1,4 +1,4 @@
-//! Reader of recordings: the description of the run, then tick by tick, bit for bit.
+//! Reader of recordings: the description of the run, then the ticks one by one, bit by bit as recorded.
 
 use crate::schema::{
     Change as ChangeMessage, ENCODING, FORMAT, FrameTransform, Log, Missing, Run, Tick, Topic,
@@ -12,17 +12,17 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Suffix of the library name in a repaired file.
+/// Suffix of the library name in the header of a repaired file.
 pub(crate) const REPAIRED: &str = " (repaired)";
 
 /// Damage that prevents further reading of a recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Damage {
-    /// The file is damaged below its messages.
+    /// The structure of the MCAP file is damaged.
     #[error("{0}")]
     File(#[from] flotor_mcap::Damage),
-    /// A message is not well-formed.
+    /// A message cannot be decoded.
     #[error("a message on `{topic}` cannot be decoded: {cause}")]
     Message {
         /// Topic of the message.
@@ -124,7 +124,7 @@ pub enum ReadError {
     },
 }
 
-/// Reader of a recording: an iterator over its ticks.
+/// Reader of a recording: an iterator over its ticks, which ends after an error.
 pub struct Recording {
     path: PathBuf,
     messages: MessageReader<File, Topic>,
@@ -181,13 +181,13 @@ impl Recording {
         &self.run
     }
 
-    /// Returns whether the recording is complete; known from the start.
+    /// Returns whether the recording is complete, known from the start; a repaired recording counts as cut off.
     #[must_use]
     pub fn ending(&self) -> Ending {
         if self.is_repaired() { Ending::CutOff } else { self.messages.ending() }
     }
 
-    /// Returns true if the file has an end, that of a repair included.
+    /// Returns true if the file itself is complete, also after a repair.
     pub(crate) fn has_end(&self) -> bool {
         self.messages.ending() == Ending::Finished
     }
@@ -214,7 +214,7 @@ impl Recording {
         &self.notes
     }
 
-    /// Returns the changes up to the last tick read, since the last call; oldest first.
+    /// Removes and returns the changes up to the last tick read, oldest first.
     pub fn take_changes(&mut self) -> Vec<Change> {
         std::mem::take(&mut self.changes)
     }
@@ -271,7 +271,7 @@ impl Iterator for Recording {
 
 impl std::iter::FusedIterator for Recording {}
 
-/// Returns the topic of a channel with the name, schema and encoding of a recording's.
+/// Returns the topic of a channel with the name, schema and encoding of a recording's channel.
 fn known_topic(channel: ChannelInfo<'_>) -> Option<Topic> {
     let matches = |topic: &Topic| channel.topic == topic.name() && channel.schema == topic.schema();
     Topic::ALL.into_iter().find(matches).filter(|_| channel.encoding == ENCODING)

@@ -23,7 +23,7 @@ pub enum RepairError {
     },
 }
 
-/// Extent of a repaired recording.
+/// Result of a repair: extent of the new file, and damage of the old.
 #[derive(Debug)]
 pub struct Repaired {
     /// Ticks in the new file, counted once for each device.
@@ -41,7 +41,8 @@ pub struct Repaired {
 /// [`Ending::CutOff`](crate::Ending::CutOff). The old file is not changed. Not real-time.
 ///
 /// # Errors
-/// If the recording cannot be read or is complete, or the new file cannot be written; a new file without any message is removed.
+/// If the recording cannot be read, the new file cannot be written, or the recording is complete; for a complete
+/// recording the new file is removed again.
 pub fn repair(from: &Path, to: &Path) -> Result<Repaired, RepairError> {
     let mut recording = Recording::open(from)?;
     let is_truncated = !recording.has_end();

@@ -1,4 +1,4 @@
-//! Description of a run, known before it begins and sufficient to repeat it.
+//! Description of a run, known before the run begins and sufficient to repeat it.
 
 use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Run, Setting, Vector3};
 use flotor_core::Clock;
@@ -8,7 +8,7 @@ use flotor_hal::Demand;
 use prost::Message;
 use std::collections::BTreeMap;
 
-/// Error of bytes that do not describe a run.
+/// Error: bytes do not describe a run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("invalid run description: {0}")]
 pub struct InvalidRun(String);
@@ -24,9 +24,9 @@ pub struct RunDescription {
     pub duration_s: f64,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Real or virtual time.
+    /// Clock of the loop: real or virtual.
     pub clock: Clock,
-    /// The scene as it was written (TOML); the command line may have overruled rate, duration and settings.
+    /// The scene as written (TOML); the command line may have overridden rate, duration and settings.
     pub scene_toml: String,
     /// Plugins: devices first, then the models, both in the order of the scene.
     pub plugins: Vec<PluginDescription>,
@@ -43,25 +43,25 @@ pub struct PluginDescription {
     pub id: String,
     /// Version of the plugin.
     pub version: String,
-    /// Name of the library's file, without folders, which differ between machines.
+    /// File name of the library, without folders, which differ between machines.
     pub file: String,
     /// Role in the run.
     pub role: Role,
-    /// Index of the device; of a model, that of its device.
+    /// Index of the device; for a model, the index of its device.
     pub device: u16,
     /// Home positions of a model in the device frame, m, one for each instance.
     pub places_m: Vec<[f64; 3]>,
-    /// Blending of a model with the others.
+    /// Blending of a model with the other models.
     pub blend: Blend,
-    /// Timing of an asynchronous model.
+    /// Timing of an asynchronous model; `None` for other plugins.
     pub field: Option<FieldTiming>,
     /// Declared latency of a device, s; 0 in recordings of earlier versions.
     pub latency_s: f64,
     /// Outputs of models that reach the hand at a device; force and torque in recordings of earlier versions.
     pub at_hand: Demand,
-    /// Settings of scene and command line, as written, in order: these repeat the run.
+    /// Settings of scene and command line, as written, in order; sufficient to repeat the run.
     pub settings: Vec<(String, String)>,
-    /// All parameters with the values that the run used.
+    /// All parameters with the values that the run used at its start, and path and hash of files that they name.
     pub parameters: Vec<(String, String)>,
 }
 
@@ -141,12 +141,12 @@ impl RunDescription {
         })
     }
 
-    /// Returns the devices, in order.
+    /// Returns the devices, in the order of the scene.
     pub fn devices(&self) -> impl Iterator<Item = &PluginDescription> {
         self.plugins.iter().filter(|plugin| plugin.role == Role::Device)
     }
 
-    /// Returns the description as flat text, for tools that show an MCAP file's metadata.
+    /// Returns the description as keys and values, for tools that show the metadata of an MCAP file.
     pub(crate) fn to_metadata(&self) -> BTreeMap<String, String> {
         let clock = match self.clock {
             Clock::Real => "real",

@@ -1,4 +1,4 @@
-//! Writer of recordings: a complete chunk at a time, at least every quarter of a second.
+//! Writer of recordings: writes a complete chunk at a time, at least every quarter of a second.
 
 use crate::chunked::ChunkedFile;
 use crate::file::{FileError, NewFile};
@@ -23,7 +23,7 @@ const RUN_METADATA: &str = "flotor.run";
 /// Key of the tick channel's metadata that names the bits of `events`, lowest first.
 const EVENT_BITS: &str = "events";
 
-/// Error of beginning or continuing a recording.
+/// Error of creating or writing a recording.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
@@ -102,7 +102,7 @@ impl Recorder {
         Self::begin(path, new_file(path)?, run, REPAIRED)
     }
 
-    /// Begins the file; `suffix` is that of the library's name.
+    /// Writes the start of the file; `suffix` is appended to the library name in its header.
     pub(crate) fn begin(
         path: &Path,
         file: NewFile,
@@ -130,7 +130,7 @@ impl Recorder {
         self.try_record(record).map_err(|cause| write_error(&self.path, cause))
     }
 
-    /// Appends a change, before the first tick with the new value. Not real-time.
+    /// Appends a change; call this before recording the first tick with the new value. Not real-time.
     ///
     /// # Errors
     /// [`RecordError::Write`], after which the recording is over: later calls fail too.
@@ -141,7 +141,7 @@ impl Recorder {
             .map_err(|cause| write_error(&self.path, cause))
     }
 
-    /// Appends an event in words. Not real-time.
+    /// Appends a text event and writes it to the file at once. Not real-time.
     ///
     /// # Errors
     /// [`RecordError::Write`], after which the recording is over: later calls fail too.
@@ -176,7 +176,7 @@ impl Recorder {
         file.finish(&path).map_err(|cause| write_error(&path, cause))
     }
 
-    /// Closes and removes the file, if nothing was recorded. Not real-time.
+    /// Closes the file and removes it, unless the path leads to another file by now. Not real-time.
     pub fn discard(self) {
         let Self { path, file, .. } = self;
         file.remove(&path);
@@ -231,7 +231,8 @@ fn new_file(path: &Path) -> Result<NewFile, RecordError> {
     })
 }
 
-/// Writes the head of the file: its library, the metadata of the run, and schemas and channels of all messages.
+/// Writes the start of the file: header with the library name, metadata of the run, schemas and channels of all
+/// messages.
 fn write_head(path: &Path, file: NewFile, run: &RunDescription, library: String) -> io::Result<ChunkedFile> {
     let mut file = ChunkedFile::create(file, path, library)?;
     file.add_metadata(&Metadata { name: RUN_METADATA.to_owned(), metadata: run.to_metadata() })?;

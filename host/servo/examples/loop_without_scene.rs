@@ -1,4 +1,4 @@
-//! A loop put together by hand, without a scene: a simulated flotor pressed onto a wall for a second of virtual time.
+//! A loop assembled in code, without a scene: a simulated flotor pressed onto a wall for a second of virtual time.
 //!
 //! `cargo run -p flotor-servo --example loop_without_scene`
 
@@ -14,7 +14,7 @@ use flotor_servo::{
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = LoopConfig { period_ns: 1_000_000, seed: 1 };
 
-    // The device, opened and guarded by an envelope.
+    // The device, opened and with its safety envelope.
     let mut device = Plugin::in_process(&flotor_simulated::FLOTOR_ENTRY)?.open_device(&[])?;
     let capabilities = device.capabilities()?;
     let envelope = Envelope::new(&Limits::default(), &Boundary::default(), &capabilities, config.period_ns);
@@ -23,7 +23,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sampled =
         SampledLoop { period_s: config.period_ns as f64 * 1.0e-9, latency_s: capabilities.latency_s };
 
-    // The force model, whose home is that of the handle.
+    // The force model, with its home at the home of the handle.
     let mut model = Plugin::in_process(&flotor_wall::FLOTOR_ENTRY)?.create_model(&[])?;
     model.prepare(&config)?;
     let instances = vec![(Engine::Here(model), Mapping::new(&MappingConfig::default()))];

@@ -1,8 +1,9 @@
-//! Boundary wall at the edge of a device's range: spring and damper that push the handle back, and never pull.
+//! Boundary wall at the edge of a device's range: a spring and a damper that push the handle back and never pull.
 //!
 //! The range is an ellipsoid of positions and one of rotation vectors; equal semi-axes make it the sphere of the thesis's boundary
-//! (section 3.2). The spring pushes along the normal at the nearest point of the ellipsoid, by the distance from it: its force is a
-//! gradient, and no closed path gains energy. Nearly every tick is inside, which is tested first, without a root or an arc.
+//! (section 3.2). The spring force is proportional to the distance from the ellipsoid, along the normal at the nearest point: the
+//! force has a potential, so no closed path gains energy. In most ticks the handle is inside; a cheap test without square root or
+//! arc tangent comes first.
 //!
 //! Stiffness and position of the wall come from a [`RenderedBoundary`].
 
@@ -10,7 +11,7 @@ use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_hal::{DVec3, DeviceState, Wrench, math, rotation_vector};
 use std::f64::consts::PI;
 
-/// The wall of one device.
+/// Boundary wall of one device.
 pub(super) struct BoundaryWall {
     position: Ellipsoid,
     rotation: Ellipsoid,
@@ -34,16 +35,17 @@ impl BoundaryWall {
         }
     }
 
-    /// Returns the push of the wall; `None` inside, and for an unknown position of the handle. Real-time: bounded, no allocation.
+    /// Returns the wrench of the wall on the handle, device frame; `None` inside, and for a state with non-finite numbers.
+    /// Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn push(&self, state: &DeviceState) -> Option<Wrench> {
         if self.surely_holds(state) { None } else { self.push_outside(state) }
     }
 
-    /// Returns true only inside; false close to the edge. Real-time: bounded, no allocation.
+    /// Returns true only for a pose inside; possibly false for a pose inside but close to the edge. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn surely_holds(&self, state: &DeviceState) -> bool {
-        // A rotation vector is the axis times the angle, which is at most pi times the sine of its half.
+        // A rotation vector is the axis times the angle, and an angle is at most pi times the sine of half the angle.
         let at_most_rad = state.pose.orientation().xyz() * PI;
         self.position.surely_holds(state.pose.position()) && self.rotation.surely_holds(at_most_rad)
     }
@@ -68,8 +70,8 @@ impl BoundaryWall {
     }
 }
 
-/// Converts a gradient by the rotation vector to one by a turn about the fixed axes, with the inverse transposed left Jacobian of
-/// SO(3) (Chirikjian, section 10.8.5).
+/// Converts a gradient with respect to the rotation vector to one with respect to rotations about the fixed axes, with the inverse
+/// transposed left Jacobian of SO(3) (Chirikjian, section 10.8.5).
 fn by_turning(rotation_rad: DVec3, gradient: DVec3) -> DVec3 {
     let angle = rotation_rad.length();
     let (sin, cos) = math::sin_cos(angle);
@@ -83,16 +85,16 @@ fn by_turning(rotation_rad: DVec3, gradient: DVec3) -> DVec3 {
     gradient + across * 0.5 + rotation_rad.cross(across) * second
 }
 
-/// Range of translation or rotation, with spring and damper outside. Metres and newtons, or radians and newton metres.
+/// Range of positions (m, N) or of rotation vectors (rad, N·m), with spring and damper outside.
 struct Ellipsoid {
-    /// Infinite on an axis without range, so that no point is outside there.
+    /// Infinite on an axis without a range: such an axis is ignored.
     semi_axes: DVec3,
     /// Reciprocals of the semi-axes.
     per_semi_axis: DVec3,
     shape: Shape,
-    /// Effort per distance.
+    /// Stiffness of the spring, N/m or N·m/rad.
     stiffness: f64,
-    /// Effort per speed.
+    /// Damping, N·s/m or N·m·s/rad.
     damping: f64,
 }
 
@@ -103,9 +105,9 @@ enum Shape {
     Unequal,
 }
 
-/// Place of a point outside an ellipsoid.
+/// Distance and direction of a point outside an ellipsoid.
 struct Beyond {
-    /// Distance from the ellipsoid.
+    /// Distance from the ellipsoid, m or rad.
     depth: f64,
     /// Unit normal at the nearest point.
     outward: DVec3,
@@ -123,13 +125,13 @@ impl Ellipsoid {
         Self { semi_axes, per_semi_axis: semi_axes.recip(), shape, stiffness, damping }
     }
 
-    /// Returns true only inside; false close to the edge.
+    /// Returns true only for a point inside; possibly false for a point inside but close to the edge.
     #[inline]
     fn surely_holds(&self, at: DVec3) -> bool {
         (at * self.per_semi_axis).length_squared() < SURELY_INSIDE // false for NaN
     }
 
-    /// Returns the place of a point outside; `None` inside.
+    /// Returns distance and direction of a point outside; `None` for a point inside.
     fn beyond(&self, at: DVec3) -> Option<Beyond> {
         let has_no_range = self.semi_axes.cmpeq(DVec3::INFINITY);
         let at = DVec3::select(has_no_range, DVec3::ZERO, at);
@@ -149,17 +151,17 @@ impl Ellipsoid {
         })
     }
 
-    /// Returns the push of spring and damper along a direction. Damping acts outwards only: the wall never pulls.
+    /// Returns the force or torque of spring and damper. Only an outward velocity is damped: the wall never pulls.
     fn push(&self, beyond: &Beyond, velocity: DVec3) -> DVec3 {
         let Beyond { depth, outward } = *beyond;
         outward * -(self.stiffness * depth + self.damping * velocity.dot(outward).max(0.0)).max(0.0)
     }
 }
 
-/// Most steps of Newton's method: four reach rounding within a tenth of a semi-axis, twelve a hundred semi-axes away.
+/// Maximum number of Newton steps: four reach rounding accuracy within a tenth of a semi-axis, twelve at a hundred semi-axes.
 const MAX_STEPS: usize = 20;
 
-/// Finds the nearest point of an ellipsoid with these squared semi-axes; `scaled` is the place times the semi-axes.
+/// Finds the nearest point of the ellipsoid with the given squared semi-axes; `scaled` is the point `at` times the semi-axes.
 ///
 /// The nearest point is `a² p / (a² + t)` on each axis, where t makes `|a p / (a² + t)|` one (Eberly). The reciprocal of that
 /// length is concave in t, so Newton's method from t = 0 approaches from below, and takes one step on a sphere.

@@ -2,33 +2,33 @@
 
 use super::clock::monotonic_ns;
 
-/// Tolerated excess of slow ticks over ticks in time. A single slow tick is more likely the machine's fault than the model's; a
-/// model that is slow in most ticks is soon disabled, even if never in many in a row.
+/// Tolerated excess of slow ticks over ticks in time. A single slow tick is more likely caused by the machine than by the model; a
+/// model that is slow in most ticks is soon disabled, even without many slow ticks in a row.
 const TOLERATED_OVERRUNS: u32 = 4;
-/// Time over which a model with too many overruns fades out, ns. It is not stepped meanwhile: its last answer fades.
+/// Time over which a model with too many overruns fades out, ns. The model is not stepped meanwhile: its last output fades.
 const FADE_NS: u64 = 50_000_000;
 
-/// Permission to step a model, with the weight of its answer.
+/// Permission to step a model, with the weight of its output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Allowed {
-    /// Step the model and use its whole answer.
+    /// Step the model and use its output in full.
     Asked,
-    /// Do not step; weight of the last answer, above 0 and up to 1.
+    /// Do not step the model; use its last output with this weight, above 0 and up to 1.
     Fading(f64),
-    /// Disabled.
+    /// Do not step the model: it is disabled.
     Nothing,
 }
 
-/// Presence of an answer at the end of a step.
+/// Presence of an output at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Answer {
-    /// Answered.
+    /// Output received.
     There,
-    /// No reply from a worker that timed out or is still at an earlier step.
+    /// No reply: a worker has timed out or is still busy with an earlier step.
     Missing,
 }
 
-/// Time budget of one model, with its overruns.
+/// Time limit of a model's steps, with a count of the overruns.
 #[derive(Clone, Debug, Default)]
 pub struct TimeBudget {
     /// Time limit of a step, ns; `None`: steps are not timed.
@@ -40,7 +40,7 @@ pub struct TimeBudget {
     longest_ns: u64,
 }
 
-/// Overrun for which a model was disabled.
+/// Reason for which a model was disabled: too many steps longer than the time limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overrun {
     /// Last tick in which the model was stepped.
@@ -52,12 +52,12 @@ pub struct Overrun {
 }
 
 impl TimeBudget {
-    /// Creates a budget with a time limit per step, ns, or without. Not real-time.
+    /// Creates a budget with a time limit per step, ns; `None`: steps are not timed. Not real-time.
     pub fn new(limit_ns: Option<u64>) -> Self {
         Self { limit_ns, ..Self::default() }
     }
 
-    /// Returns the permission to step the model at a time of the run. Real-time: bounded, no allocation.
+    /// Returns the permission to step the model at the run time `now_ns`. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn allowed(&self, now_ns: u64) -> Allowed {
         let Some((_, since_ns)) = self.disabled_at else { return Allowed::Asked };
@@ -68,13 +68,14 @@ impl TimeBudget {
         Allowed::Fading(1.0 - elapsed_ns as f64 / FADE_NS as f64)
     }
 
-    /// Returns the start of a step, ns; `None` if steps are not timed. Real-time: bounded, no allocation.
+    /// Returns the start time of a step on the monotonic clock, ns; `None` if steps are not timed. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn begin(&self) -> Option<u64> {
         self.limit_ns.map(|_| monotonic_ns())
     }
 
-    /// Records a step that began at [`Self::begin`]; returns true if it took too long. Real-time: bounded, no allocation.
+    /// Records the duration of a step since `begun_ns`, the result of [`Self::begin`]; returns true if the step exceeded the limit
+    /// or has no output. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn end(&mut self, begun_ns: u64, answer: Answer, tick: u64, now_ns: u64) -> bool {
         let Some(limit_ns) = self.limit_ns else { return false };
@@ -96,7 +97,7 @@ impl TimeBudget {
         true
     }
 
-    /// Returns the overrun for which the model was disabled, if there was one.
+    /// Returns the overrun for which the model was disabled; `None` if the model is not disabled.
     pub(super) fn overrun(&self) -> Option<Overrun> {
         let ((tick, _), limit_ns) = (self.disabled_at?, self.limit_ns?);
         Some(Overrun { tick, longest_ns: self.longest_ns, limit_ns })

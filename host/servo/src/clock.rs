@@ -1,13 +1,13 @@
-//! Schedule of the ticks: absolute deadlines on the machine's clock, or a virtual clock without waiting.
+//! Schedule of the ticks: absolute deadlines on the monotonic clock, the samples of a device, or a virtual clock without waiting.
 //!
-//! The schedule is the same for both: tick `k` belongs to time `k T`, and a tick whose whole period has
-//! passed is missed, counted and skipped, never caught up in a burst.
+//! The time of a tick is a multiple of the period. A tick whose whole period has passed is counted as missed and skipped, never
+//! caught up in a burst.
 
 pub use crate::platform::clock::{monotonic_ns, sleep_until};
 pub use flotor_core::Clock;
 use flotor_hal::{SampleWait, Tick};
 
-/// The final stretch before a deadline, which is spun and not slept: a sleeping thread wakes late.
+/// Time before a deadline in which the loop spins instead of sleeping: a sleeping thread wakes late.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SpinWindow {
     /// Length of the window, ns.
@@ -19,11 +19,11 @@ impl SpinWindow {
     const SAMPLES: usize = 64;
     /// Length of a measured sleep, ns: long enough for the core to go idle, as between ticks.
     const SAMPLE_SLEEP_NS: u64 = 400_000;
-    /// Narrowest and widest window, ns: a narrower one absorbs no lateness, a wider one burns the core.
+    /// Narrowest and widest window, ns: a narrower one absorbs no lateness, a wider one occupies the core.
     const BOUNDS_NS: [u64; 2] = [20_000, 250_000];
 
-    /// Measures the lateness of this thread's wake-ups; the window is the 95th percentile plus a quarter, at most half the period.
-    /// Not real-time: some 30 ms. Call it on the loop's own thread, with its priority.
+    /// Measures the wake-up latency of the calling thread and returns a window of its 95th percentile plus a quarter, between 20
+    /// and 250 µs and at most half the period. Not real-time: some 30 ms. To be called on the loop thread, with its priority.
     #[must_use]
     pub fn measure(period_ns: u64) -> Self {
         let mut lateness_ns = [0; Self::SAMPLES];
@@ -40,7 +40,7 @@ impl SpinWindow {
     }
 }
 
-/// Schedule of the ticks of a loop.
+/// Schedule of the ticks of a loop, on one of three time bases.
 pub struct Schedule {
     pace: Pace,
     period_ns: u64,
@@ -61,25 +61,26 @@ enum Pace {
     Device { last_ns: u64 },
 }
 
-/// Due tick with its lateness.
+/// Tick to run now, with its lateness and the number of ticks missed before.
 #[derive(Debug)]
 pub struct Due {
-    /// Index, time and step of the tick.
+    /// Index, time and time step of the tick.
     pub tick: Tick,
-    /// Delay after the deadline, ns; `None` on the virtual clock.
+    /// Delay after the deadline, or after the expected arrival of the sample, without missed periods, ns; `None` on the virtual clock.
     pub lateness_ns: Option<u64>,
     /// Number of ticks skipped just before the tick.
     pub missed: u64,
 }
 
-/// Reason why a device that sets the pace gives no next tick.
+/// Error of a device that sets the pace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PaceLost {
-    /// The device does not set the pace after all.
+    /// The device has reported that it does not set the pace.
     NotPaced,
-    /// Samples come faster than the loop counts time: every limit per time would be too high.
+    /// Samples arrive faster than the period that the loop counts for each: in real time, velocities and slew rates would exceed
+    /// their limits.
     TooFast {
-        /// Number of samples so far.
+        /// Number of sample periods counted so far.
         samples: u64,
         /// Time since the start, ns.
         elapsed_ns: u64,
@@ -89,7 +90,7 @@ pub enum PaceLost {
 /// Allowed lead of a device that sets the pace over the machine's clock, ns: samples that the device buffered before the start, or
 /// while the loop was delayed.
 const AHEAD_NS: u64 = 250_000_000;
-/// Allowed further lead, relative to the time since the start: 1/50, 2 %. Two oscillators differ by far less.
+/// Divisor of the time since the start that gives the allowed further lead: 2 %. Two oscillators differ by far less.
 const AHEAD_SHARE: u64 = 50;
 
 /// Result of a wait on the machine's clock.
@@ -97,17 +98,17 @@ const AHEAD_SHARE: u64 = 50;
 struct Woken {
     /// Delay after the deadline of the first period that has not passed, ns.
     late_ns: u64,
-    /// Whole periods that passed before, or unread samples.
+    /// Number of whole periods that had passed, or of unread samples.
     missed: u64,
 }
 
 impl Schedule {
-    /// Creates a schedule on the machine's clock, whose first tick is due one period from now.
+    /// Creates a schedule on the monotonic clock; the first tick is due one period from now.
     pub fn start_real(period_ns: u64, window: SpinWindow) -> Self {
         Self::start(Pace::Clock(window), period_ns, monotonic_ns() + period_ns)
     }
 
-    /// Creates a schedule without waiting, whose first tick is at time 0.
+    /// Creates a schedule on the virtual clock, without waiting.
     pub fn start_virtual(period_ns: u64) -> Self {
         Self::start(Pace::Virtual, period_ns, 0)
     }
@@ -126,7 +127,7 @@ impl Schedule {
     /// Real-time: sleeps, then spins; no allocation.
     ///
     /// # Errors
-    /// [`PaceLost`] if the device does not set the pace, or too fast a one.
+    /// [`PaceLost`] if the device does not set the pace, or sends samples too fast.
     pub fn wait(&mut self, wait_for_sample: impl FnOnce(u64) -> SampleWait) -> Result<Due, PaceLost> {
         let woken = match self.pace {
             Pace::Virtual => None,
@@ -165,7 +166,7 @@ impl Schedule {
             now = monotonic_ns();
         }
         let late = now - deadline;
-        // Whole periods that have passed belong to ticks that are of no use any more.
+        // Ticks whose whole period has passed are missed.
         let missed = late / self.period_ns;
         Woken { late_ns: late - missed * self.period_ns, missed }
     }
@@ -191,8 +192,8 @@ impl Schedule {
         Ok(Woken { late_ns, missed: periods - 1 })
     }
 
-    /// Waits for the end of the last tick's period; returns the time since the start, ns. Whole periods of delay are left out, as
-    /// for a tick: the run was over before.
+    /// Returns the duration of the run, ns. On the monotonic clock first waits for the end of the last tick's period; whole periods
+    /// of delay after that end do not count.
     pub fn finish(mut self) -> u64 {
         match self.pace {
             Pace::Virtual => self.next_time_ns(),
@@ -201,12 +202,12 @@ impl Schedule {
         }
     }
 
-    /// Returns the index of the next tick, from 0 and without a gap.
+    /// Returns the index of the next tick; indices count from 0, without gaps for missed ticks.
     pub fn next_index(&self) -> u64 {
         self.next_index
     }
 
-    /// Returns the scheduled time of the next tick, ns.
+    /// Returns the scheduled time of the next tick, ns after the start of the run.
     pub fn next_time_ns(&self) -> u64 {
         self.slot * self.period_ns
     }

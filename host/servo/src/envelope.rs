@@ -1,13 +1,13 @@
 //! Safety envelope: the stages between models and device that every command passes.
 //!
-//! Order: guard (a number that is not finite becomes zero) -> gate (the start-up ramp and the other
-//! [states of the run](super::state)) -> velocity limit -> [boundary wall](super::boundary) -> force and torque limits
-//! -> [damping of an oscillation](flotor_core::oscillation) -> [passivity](super::passivity), and the limits once more if it took something
-//! away -> slew limit.
+//! Order: guard (a number that is not finite becomes zero) -> gate (the start-up ramp and the other [states of the
+//! run](super::state)) -> velocity limit -> [boundary wall](super::boundary) -> force and torque limits -> [damping of an
+//! oscillation](flotor_core::oscillation) -> [passivity](super::passivity), and the limits once more if the controller has changed
+//! the wrench -> slew limit.
 //!
-//! The [slew limit](slew) is last, so that no fault upstream, not even the loss of a model, makes the force jump; only the part
-//! that accelerates the handle may fall faster. The limits hold after the slew limit too: where it changes the wrench, the limited
-//! [regions](flotor_core::region) apply once more.
+//! The [slew limit](slew) is last, so that no fault upstream, not even the loss of a model, makes the force jump; only the force
+//! component that accelerates the handle may fall faster. The limits hold after the slew limit too: a wrench that it has changed is
+//! limited to the [regions](flotor_core::region) once more.
 
 mod slew;
 
@@ -26,13 +26,13 @@ use slew::SlewLimit;
 /// Effect of a stage of the envelope over a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct StageEffect {
-    /// Time in which the stage changed the wrench, ns.
+    /// Total time of the ticks in which the stage changed the wrench, ns.
     pub active_ns: u64,
     /// Work of the change on the hand, J; negative: the stage removed energy.
     pub work_j: f64,
 }
 
-/// Effects of the stages that store or remove energy.
+/// Effects of the passivity controller and the slew limit over a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnvelopeEffects {
     /// Effect of the passivity controller.
@@ -41,9 +41,10 @@ pub struct EnvelopeEffects {
     pub slew: StageEffect,
 }
 
-/// Limits of force, torque and their change, with a wall at the edge of the range.
+/// Safety envelope of one device: limits of force, torque, velocity and slew rate, boundary wall, damping of oscillations, and
+/// passivity controller.
 pub struct Envelope {
-    /// Largest force and torque, N and N·m.
+    /// Limits of force and torque, N and N·m.
     force: Region,
     torque: Region,
     /// Velocity (m/s, rad/s) above which force components along it are scaled down.
@@ -60,7 +61,7 @@ pub struct Envelope {
 }
 
 impl Envelope {
-    /// Combines the limits of the scene with those of the device; the tighter ones apply. Not real-time.
+    /// Creates the envelope from the limits of scene and device, of which the tighter apply, for ticks of `period_ns`. Not real-time.
     #[must_use]
     pub fn new(limits: &Limits, boundary: &Boundary, device: &Capabilities, period_ns: u64) -> Self {
         let force_n = limits.force_n.and(Bound::box_of(device.max_force_n));
@@ -97,7 +98,9 @@ impl Envelope {
         [self.force.bound(), self.torque.bound()]
     }
 
-    /// Limits the request of the models to the wrench for the device. Real-time: bounded, no allocation.
+    /// Passes the requested wrench through all stages; returns the wrench to command, device frame, and adds the events of the
+    /// stages that acted. Also records the energy since the last sample: to be called once per tick. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub fn apply(
         &mut self,
@@ -128,7 +131,7 @@ impl Envelope {
         self.passivity.energy_j()
     }
 
-    /// Returns the effects of the stages that store or remove energy. Real-time: bounded, no allocation.
+    /// Returns the effects of the passivity controller and the slew limit so far. Real-time: bounded, no allocation.
     #[must_use]
     pub fn effects(&self) -> EnvelopeEffects {
         self.effects
@@ -165,7 +168,7 @@ impl Envelope {
         )
     }
 
-    /// Adds the push of the boundary wall.
+    /// Adds the wrench of the boundary wall.
     #[inline]
     fn add_boundary(&self, wrench: Wrench, gate: Gate, state: &DeviceState, events: &mut Events) -> Wrench {
         let Some(push) = self.wall.push(state) else { return wrench };
@@ -189,7 +192,7 @@ impl Envelope {
         Wrench::new(force, torque)
     }
 
-    /// Scales the force down while it oscillates between its limits.
+    /// Scales the wrench down while the force or torque oscillates between its limits.
     #[inline]
     fn limit_oscillation(
         &mut self,
@@ -207,7 +210,7 @@ impl Envelope {
         bounded * gain
     }
 
-    /// Damps a wrench for which the port lacks the energy, if the scene has a passivity controller.
+    /// Reduces or damps a wrench that would take more energy from the port than it has, if the scene enables the passivity controller.
     #[inline]
     fn limit_energy(
         &mut self,
@@ -236,8 +239,8 @@ impl Envelope {
         Wrench::new(self.force.shrink(limited.force()), self.torque.shrink(limited.torque()))
     }
 
-    /// Returns the time that a change of the wrench may take, ns: a tick after missed ones may change it no more than one on time,
-    /// because the hand felt nothing in between.
+    /// Returns the time for which the slew limit allows a change, ns: at most one period even after missed ticks, because the
+    /// wrench was constant in between.
     #[inline]
     fn slew_time_ns(&self, tick: &Tick) -> u64 {
         if tick.dt_ns == 0 { self.period_ns } else { tick.dt_ns.min(self.period_ns) }
@@ -254,8 +257,8 @@ fn guard(request: &Wrench, events: &mut Events) -> Wrench {
     Wrench::ZERO
 }
 
-/// Returns the force without the part along the velocity that accelerates the handle: the part shrinks from all at an excess of 1
-/// to nothing at 2. A request near the largest double that cannot be split yields zero.
+/// Reduces the force component along the velocity if it accelerates the handle: in full up to an excess of 1, then linearly down to
+/// zero at 2. Returns zero for a force too large to be split into components without overflow.
 fn without_drive(force: DVec3, velocity: DVec3, excess: f64) -> DVec3 {
     let along = velocity.normalize_or_zero();
     let drive = force.dot(along).max(0.0);

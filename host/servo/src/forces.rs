@@ -19,15 +19,15 @@ use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
 pub struct Port {
     /// Last valid state of the handle.
     pub state: DeviceState,
-    /// Command, held until the next tick.
+    /// Wrench commanded to the device, applied until the next tick.
     pub commanded: Wrench,
     /// Model outputs that reach the hand at this device.
     at_hand: Demand,
     /// Model outputs computed in this tick.
     computed: Demand,
-    /// Request of models and couplings, as far as it reaches the hand.
+    /// Wrench requested by models and couplings, without the models' torque if the device exerts none.
     pub requested: Wrench,
-    /// Part of `requested` that the models alone request.
+    /// Part of `requested` from the models.
     by_models: Wrench,
     /// Torque of the models that does not reach the hand, N·m; computed for observers that request it.
     unfelt_torque_nm: DVec3,
@@ -67,7 +67,7 @@ impl Port {
         ModelOutputs::new(wrench, *energy_j).limited_to(*computed)
     }
 
-    /// Stores the request of the models; an output that only observers request goes no further than their record.
+    /// Stores the request of the models; an output that only observers request is recorded, but not part of the request.
     #[inline]
     fn take(&mut self, demand: TickDemand, wrench: Wrench, energy_j: f64) {
         (self.by_models, self.unfelt_torque_nm) = if self.at_hand.contains(Demand::TORQUE) {
@@ -128,7 +128,8 @@ pub enum Coupled {
 }
 
 impl Coupled {
-    /// Creates a coupling, with the line for the peer state if one end is remote; `reach` is the local device's. Not real-time.
+    /// Creates a coupling; if one end is remote, returns the line of the peer link as well. `reach` is the range of the local
+    /// device. Not real-time.
     pub fn new(
         description: &CouplingDescription,
         period_s: f64,
@@ -218,7 +219,8 @@ pub struct Forces {
 }
 
 impl Forces {
-    /// Creates the force sources; `layers` are the scene's models, each with its device number. Not real-time.
+    /// Creates the force sources of `devices` devices; `layers` are the models in the scene's order, each with the number of its
+    /// device. Not real-time.
     pub fn new(devices: usize, layers: Vec<(usize, Layer)>, couplings: Vec<Coupled>) -> Self {
         let mut on_device: Vec<Vec<(usize, Layer)>> =
             std::iter::repeat_with(Vec::new).take(devices).collect();
@@ -235,8 +237,9 @@ impl Forces {
         }
     }
 
-    /// Steps all models and couplings at the states of the ports, one for each device; `observed` is the demand of observers.
-    /// Real-time: bounded by the models that are near, no allocation.
+    /// Steps all couplings and models at the states of the ports, and stores the requested wrenches, energies and events in the
+    /// ports; one port per device. `observed`: outputs that observers demand. Real-time: bounded by the models that are near, no
+    /// allocation.
     pub fn step(&mut self, tick: &Tick, ports: &mut [Port], observed: Demand, heartbeat: &Heartbeat) {
         // Couplings first: the held wrench is still the last request of couplings and models.
         self.couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
@@ -268,7 +271,8 @@ impl Forces {
         self.stacks.iter_mut().flat_map(|stack| &mut stack.slots)
     }
 
-    /// Changes a live parameter of the model numbered `model`. Real-time: bounded by its objects, no allocation.
+    /// Changes a live parameter of the current layer of the model numbered `model`; unsupported if there is no such model.
+    /// Real-time: bounded by its objects, no allocation.
     pub fn set_parameter(&mut self, model: usize, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
         match self.stack_of(model) {
             Some((stack, place)) => stack.set_parameter(place, tick, parameter, value),
@@ -276,21 +280,23 @@ impl Forces {
         }
     }
 
-    /// Moves the weight of the model numbered `model` to a new value, at its rate. Real-time: bounded, no allocation.
+    /// Sets the target weight of the model numbered `model`, 0 to 1; the weight moves there at the model's fade rate. Real-time:
+    /// bounded, no allocation.
     pub fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
         let Some(slot) = self.slot_of(model) else { return CallStatus::Unsupported };
         slot.set_weight(tick, weight);
         CallStatus::Ok
     }
 
-    /// Returns the number of replacements of the model numbered `model`. Real-time: bounded, no allocation.
+    /// Returns the generation of the model numbered `model`, the number of its replacements; `None` if there is no such model.
+    /// Real-time: bounded, no allocation.
     #[inline]
     pub fn generation(&mut self, model: usize) -> Option<u16> {
         self.slot_of(model).map(|slot| slot.generation())
     }
 
-    /// Replaces a model; the new layer fades in from this tick on. Returns a layer that had to go before it had faded out; the
-    /// caller drops it outside the loop.
+    /// Replaces a model; the new layer fades in from this tick on. Returns an older layer that was still fading out (or the new
+    /// layer if there is no such model), to be dropped outside the loop.
     ///
     /// Real-time: bounded by the objects of the model, no allocation.
     pub fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Box<Layer>> {
@@ -301,7 +307,8 @@ impl Forces {
         }
     }
 
-    /// Removes a layer that has faded out; returns it with its model number. Real-time: bounded by the models, no allocation.
+    /// Removes a layer that has faded out; returns the layer with its model number, or `None` if no layer has. Real-time: bounded
+    /// by the models, no allocation.
     #[inline]
     pub fn take_faded(&mut self, tick: &Tick) -> Option<(usize, Box<Layer>)> {
         let take = |slot: &mut Slot| Some((slot.number, slot.take_faded(tick)?));
@@ -313,13 +320,13 @@ impl Forces {
         self.stacks.iter().any(|stack| stack.slots.iter().any(Slot::is_fading))
     }
 
-    /// Returns reports on all layers in place or fading out; calls `on_query` with the model number before it queries a model's last
-    /// message. Not real-time.
+    /// Returns a report on every current layer and every layer that is fading out; calls `on_query` with the model number before it
+    /// queries a model's last message. Not real-time.
     pub fn reports(&mut self, on_query: impl Fn(usize)) -> Vec<LayerReport> {
         self.slots().flat_map(|slot| slot.reports(&on_query)).collect()
     }
 
-    /// Returns all layers, each with its model number. Not real-time.
+    /// Returns all current layers and layers that are fading out, each with its model number. Not real-time.
     pub fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
         self.stacks.into_iter().flat_map(|stack| stack.slots).flat_map(Slot::into_layers)
     }

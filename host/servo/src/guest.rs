@@ -4,23 +4,23 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Handling of signals in a guest.
+/// Handling of signals in guest mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Signals {
-    /// All signals stay with the program: no handler is installed, none is restored.
+    /// The other program handles all signals: the host installs no handler and restores none.
     Program = 1,
-    /// Fatal signals stop the devices first; then the program's own handler runs, if it had one.
+    /// Fatal signals stop the devices first; then the other program's handler runs, or the default action.
     StopFirst = 2,
 }
 
-/// Code of [`Signals`]; 0: the process is the host's own.
+/// Code of [`Signals`]; 0: not a guest.
 static GUEST: AtomicU8 = AtomicU8::new(0);
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
-/// Declares the runs of this process guests of another program: its memory is not locked, and its signals are handled as in
-/// `signals`. `program` is the `flotor` executable for the processes that a run starts, if one was found. To be called before the
-/// first session; only the first call counts. Not real-time.
+/// Enters guest mode: the memory of this process is not locked, and its signals are handled as in `signals`. `program` is the
+/// `flotor` executable for the processes that a run starts, if one was found. To be called before the first session; later calls
+/// have no effect. Not real-time.
 pub fn be_guest(signals: Signals, program: Option<PathBuf>) {
     if let Some(program) = program {
         let _ = PROGRAM.set(program);
@@ -28,18 +28,18 @@ pub fn be_guest(signals: Signals, program: Option<PathBuf>) {
     let _ = GUEST.compare_exchange(0, signals as u8, Ordering::AcqRel, Ordering::Acquire);
 }
 
-/// Returns true in a process that belongs to another program.
+/// Returns true in guest mode, after [`be_guest`].
 #[must_use]
 pub fn is_guest() -> bool {
     GUEST.load(Ordering::Acquire) != 0
 }
 
-/// Returns true if all signals stay with the other program.
+/// Returns true in guest mode with [`Signals::Program`].
 pub(crate) fn program_handles_signals() -> bool {
     GUEST.load(Ordering::Acquire) == Signals::Program as u8
 }
 
-/// Returns the `flotor` executable of a guest.
+/// Returns the `flotor` executable set by [`be_guest`]; `None` if none is set.
 #[must_use]
 pub fn program() -> Option<&'static PathBuf> {
     PROGRAM.get()

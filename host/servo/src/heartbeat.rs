@@ -1,4 +1,4 @@
-//! The heartbeat of the loop: one word with the tick and the running code, which other threads read.
+//! Heartbeat of the loop: one word with the tick and the running code, which other threads read.
 
 use super::clock::{monotonic_ns, sleep_until};
 use super::platform::last_stop::TakenSignals;
@@ -6,11 +6,11 @@ use flotor_core::{MAX_DEVICES, PluginIndex};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
 
-/// Longest duration of a command to a device that does not hang, and the interval between two polls of it, ns.
+/// Time limit for a command in progress to complete, and poll interval meanwhile, ns.
 const LONGEST_COMMAND_NS: u64 = 1_000_000;
 const COMMAND_LOOK_NS: u64 = 20_000;
 
-/// Code that the loop is running.
+/// Code that the loop is running: host code, or a call of a plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Between two ticks.
@@ -19,16 +19,16 @@ pub enum Place {
     DeviceWait(u16),
     /// `read` of a device, by device number.
     DeviceRead(u16),
-    /// `step` of a model, by its place in the scene.
+    /// `step` of a model, by its number in the scene.
     Model(usize),
-    /// Code of the host.
+    /// Code of the host in a tick.
     Host,
     /// `write` of a device, by device number.
     DeviceWrite(u16),
 }
 
 impl Place {
-    /// Codes: 0 and 1, then the waits for devices, their reads, their writes, the models.
+    /// First codes: 0 and 1 are waiting and host, then follow waits for devices, reads, writes, and models.
     const FIRST_WAIT: u64 = 2;
     const FIRST_READ: u64 = Self::FIRST_WAIT + MAX_DEVICES as u64;
     const FIRST_WRITE: u64 = Self::FIRST_READ + MAX_DEVICES as u64;
@@ -59,7 +59,7 @@ impl Place {
         }
     }
 
-    /// Returns true if the code belongs to a plugin.
+    /// Returns true for a call of a plugin.
     pub(crate) const fn is_a_plugins(self) -> bool {
         !matches!(self, Self::Waiting | Self::Host)
     }
@@ -99,15 +99,15 @@ pub struct Heartbeat {
 
 #[derive(Debug, Default)]
 struct Shared {
-    /// Low 48 bits of the tick above 16 bits of the place.
+    /// Code of the place in the low 16 bits, low 48 bits of the tick above.
     beat: AtomicU64,
     /// True once the loop is over: no more beats are due.
     done: AtomicBool,
     /// Beat at which the watchdog stopped the device, plus one; 0: not stopped.
     fired: AtomicU64,
-    /// Signals of the host that a plugin took while the loop ran, one bit each.
+    /// Signals of the host whose action a plugin replaced, or which it blocked, while the loop ran; one bit each.
     taken: AtomicU64,
-    /// True once another thread stops the devices: the loop sends no more commands.
+    /// True once another thread is about to stop the devices: the loop sends no more commands.
     silenced: AtomicBool,
 }
 
@@ -116,13 +116,14 @@ const PLACE_BITS: u32 = 16;
 const PLACE_MASK: u64 = (1 << PLACE_BITS) - 1;
 
 impl Heartbeat {
-    /// Records the code that runs next. Real-time: bounded, no allocation.
+    /// Records the tick and the code that the loop runs next. Real-time: bounded, no allocation.
     #[inline]
     pub fn enter(&self, tick: u64, place: Place) {
         self.shared.beat.store(tick << PLACE_BITS | place.code() & PLACE_MASK, Ordering::Release);
     }
 
-    /// Returns the place of the loop when the watchdog stopped the device; `None` if it has not. Real-time: bounded, no allocation.
+    /// Returns tick and code of the loop at the moment when the watchdog stopped the devices; `None` if it has not stopped them.
+    /// Real-time: bounded, no allocation.
     #[inline]
     pub fn fired_at(&self) -> Option<Stuck> {
         match self.shared.fired.load(Ordering::Acquire) {
@@ -131,16 +132,17 @@ impl Heartbeat {
         }
     }
 
-    /// Reports the end of the loop to the watchdog.
+    /// Marks the loop as ended; the watchdog thread then ends too.
     pub fn finish(&self) {
         self.shared.done.store(true, Ordering::Release);
     }
 
-    /// Ends the commands of the loop before another thread stops the devices, so that no force follows a stop. Waits for a command
-    /// in progress, but not for one that hangs. Safe in a signal handler.
+    /// Prevents further commands of the loop before another thread stops the devices, so that no force follows a stop. Waits for a
+    /// command in progress, up to a millisecond. Safe in a signal handler.
     pub(crate) fn silence(&self) {
         self.shared.silenced.store(true, Ordering::Relaxed);
-        // The loop records its command, then reads the flag; here it is the other way round, so that one of both sees the other.
+        // The loop records its command, then reads the flag; here the flag is set first, then the record is read: at least one side
+        // sees the other's store.
         fence(Ordering::SeqCst);
         let (beat, until_ns) = (self.beat(), monotonic_ns() + LONGEST_COMMAND_NS);
         let commands = matches!(Stuck::at(beat).place, Place::DeviceWrite(_));
@@ -149,26 +151,27 @@ impl Heartbeat {
         }
     }
 
-    /// Returns true if the loop, which has just recorded a command, may not send it. Real-time: bounded, no allocation.
+    /// Returns true if the loop, which has just recorded a command, must not send the command. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn is_silenced(&self) -> bool {
         fence(Ordering::SeqCst);
         self.shared.silenced.load(Ordering::Relaxed)
     }
 
-    /// Returns the current place of the loop. Real-time: bounded, no allocation.
+    /// Returns the current tick and code of the loop. Real-time: bounded, no allocation.
     #[must_use]
     pub fn now(&self) -> Stuck {
         Stuck::at(self.beat())
     }
 
-    /// Returns the signals of the host that a plugin took while the loop ran, and that the watchdog has restored.
+    /// Returns the signals of the host whose action a plugin replaced, or which it blocked, while the loop ran; the watchdog has
+    /// restored them.
     #[must_use]
     pub fn signals_taken(&self) -> TakenSignals {
         TakenSignals::from_bits(self.shared.taken.load(Ordering::Relaxed))
     }
 
-    /// Adds signals that a plugin took.
+    /// Adds signals to [`Self::signals_taken`].
     pub(crate) fn add_taken(&self, taken: TakenSignals) {
         self.shared.taken.fetch_or(taken.bits(), Ordering::Relaxed);
     }
@@ -186,7 +189,7 @@ impl Heartbeat {
     }
 }
 
-/// Place where a loop got stuck.
+/// Tick and code of a loop at one moment, for example when the watchdog found the loop stuck.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stuck {
     /// Index of the tick.

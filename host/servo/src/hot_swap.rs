@@ -1,4 +1,4 @@
-//! Hot swap of models: owned boxes move into a running loop and back through wait-free queues, created and dropped outside.
+//! Hot swap of models: boxed layers, created and dropped outside the loop, move into the running loop and back through wait-free queues.
 //!
 //! The loop takes a model out of a queue and puts it in place between two ticks; the replaced model fades out and returns through
 //! another queue. Nothing in the loop allocates or frees.
@@ -11,27 +11,27 @@ use rtrb::{Consumer, Producer, RingBuffer};
 /// Layer that is no longer needed, with its model number.
 pub(crate) type Retired = (usize, Box<Layer>);
 
-/// Loop side of the queues.
+/// Loop side of the hot swap: scheduled replacements, and both queues.
 pub struct LoopSwaps {
-    /// Scheduled replacements in order of time, ns; each place is emptied when its time comes.
+    /// Scheduled replacements in order of their run time, ns; `None` once a replacement has been applied.
     schedule: Box<[(u64, Option<Replacement>)]>,
     next: usize,
     arriving: Consumer<Replacement>,
     retired: Producer<Retired>,
 }
 
-/// Host side of the queues.
+/// Host side of the hot swap.
 pub struct HostSwaps {
-    /// Replacements for the loop.
+    /// Sender of replacements to the loop.
     pub leaving_for_the_loop: Producer<Replacement>,
-    /// Layers that the loop no longer needs.
+    /// Receiver of layers that the loop no longer needs, to be dropped by the host.
     pub retired: Consumer<Retired>,
 }
 
-/// Creates both sides for a number of models. Not real-time.
+/// Creates both sides for `models` models; `schedule` has replacements, each with the run time from which it is due, ns. Not real-time.
 pub fn swap_queues(models: usize, mut schedule: Vec<(u64, Replacement)>) -> (LoopSwaps, HostSwaps) {
     schedule.sort_by_key(|(time_ns, _)| *time_ns); // stable: equal times keep the scene's order
-    // One replacement of each model may be pending; on the way back there may be that one, the one before, and the scheduled ones.
+    // One replacement of each model may be pending. The return queue has room for two layers of each model and for the scheduled ones.
     let (leaving_for_the_loop, arriving) = RingBuffer::new(models.max(1));
     let (retired, taken_back) = RingBuffer::new(2 * models + schedule.len() + 1);
     let schedule = schedule.into_iter().map(|(time_ns, replacement)| (time_ns, Some(replacement))).collect();
@@ -50,7 +50,8 @@ impl LoopSwaps {
         self.schedule.get(self.next).is_some_and(|(time_ns, _)| *time_ns <= tick.time_ns)
     }
 
-    /// Returns faded layers to the host and applies the replacements that are due; calls `report` with model and generation.
+    /// Returns faded layers to the host and applies the replacements that are due; calls `report` with model number and generation
+    /// of each. A replacement waits while the return queue is full.
     ///
     /// Real-time: bounded by the models and the schedule, no allocation.
     #[inline]

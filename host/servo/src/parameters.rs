@@ -4,8 +4,8 @@
 //! together are applied together. Each one is reported before the record of its tick; a change that could not be reported is not
 //! applied, so a recording holds every change.
 //!
-//! A number may be sent with a rate: it then moves to its new value over many ticks, because a hand feels a jump. Each step is a
-//! change with its own report, so a replay needs no rate.
+//! A number may be sent with a rate: it then moves to its new value over many ticks, because a hand would feel a jump. Each step is
+//! a change with its own report, so a replay needs no rate.
 
 mod change;
 mod gradual;
@@ -32,7 +32,7 @@ fn outcome(status: CallStatus) -> ChangeOutcome {
     }
 }
 
-/// Change scheduled for a time.
+/// Parameter change scheduled for a time of the run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduledChange {
     /// Time of the change, ns; applied before the first tick at this time or later.
@@ -41,12 +41,12 @@ pub struct ScheduledChange {
     pub change: ParameterChange,
 }
 
-/// Sender of changes to the loop.
+/// Sender of changes to the loop; room for 256 pending changes.
 pub type ChangeSender = Producer<ParameterChange>;
-/// Receiver of the loop's reports.
+/// Receiver of the loop's reports on changes.
 pub type ReportReceiver = Consumer<ChangeReport>;
 
-/// Loop side of parameter changes.
+/// Loop side of parameter changes: the schedule, changes sent by other threads, gradual changes, and reports.
 pub struct ParameterQueue {
     /// Scheduled changes in order of time.
     schedule: Box<[ScheduledChange]>,
@@ -60,7 +60,7 @@ pub struct ParameterQueue {
 impl ParameterQueue {
     /// Creates a queue with a schedule; returns it with the sender of changes and the receiver of reports. Not real-time.
     ///
-    /// `replacements` is the number of reports to reserve beside those of the schedule.
+    /// `replacements`: number of model replacements for which to reserve reports, beside those of the schedule.
     pub fn new(
         mut schedule: Vec<ScheduledChange>,
         replacements: usize,
@@ -73,19 +73,19 @@ impl ParameterQueue {
         (Self { schedule: schedule.into(), next: 0, sent, movements, reports }, sender, receiver)
     }
 
-    /// Returns the number of pending changes. Real-time: bounded, no allocation.
+    /// Returns the number of sent changes that are not applied yet. Real-time: bounded, no allocation.
     #[inline]
     pub fn waiting(&mut self) -> usize {
         self.sent.slots()
     }
 
-    /// Returns true if a change is due at this tick. Real-time: bounded, no allocation.
+    /// Returns true if a scheduled, sent or gradual change is due at this tick. Real-time: bounded, no allocation.
     pub fn is_due(&self, tick: &Tick) -> bool {
         let is_scheduled = self.schedule.get(self.next).is_some_and(|due| due.time_ns <= tick.time_ns);
         is_scheduled || self.movements.moving() > 0 || !self.sent.is_empty()
     }
 
-    /// Reports that a plugin was replaced. Real-time: bounded, no allocation.
+    /// Reports that a plugin was replaced, and ends gradual changes of its other generations. Real-time: bounded, no allocation.
     pub fn report_replaced(&mut self, tick: &Tick, plugin: PluginIndex, generation: u16) {
         self.movements.forget_others(plugin, generation);
         let value = f64::from(generation);

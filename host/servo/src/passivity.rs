@@ -1,4 +1,4 @@
-//! Energy stage of the envelope: the energy balance of a device's port, and the optional passivity controller.
+//! Passivity stage of the envelope: the energy balance of a device's port, and the optional passivity controller.
 //!
 //! Port energy and the controller that ports and couplings share: [`flotor_coupling::port_energy`].
 
@@ -6,19 +6,21 @@ use flotor_core::coupling::PassivityMode;
 use flotor_coupling::port_energy::{Controller, Displacement};
 use flotor_hal::{DVec3, DeviceState, Twist, Wrench};
 
-/// Acceleration of a handle from rest that the reserve covers, m/s²: 40 N on 0.58 kg are 69 m/s², of which a hand takes most.
+/// Acceleration of a handle from rest that the reserve covers, m/s²: 40 N on 0.58 kg would give 69 m/s², but a hand takes most of
+/// the force.
 const RESERVE_ACCELERATION_M_PER_S2: f64 = 50.0;
 /// Stiffness that the reserve covers, N/m.
 const RESERVE_STIFFNESS_N_PER_M: f64 = 100.0;
 
-/// Returns the energy that the port may give beyond the energy received, J: that of a spring of 100 N/m over the distance of a
-/// handle with 50 m/s² in a period, `K a² T⁴ / 8`. Without a reserve, an empty port could never exert a force. Not real-time.
+/// Returns the energy that the port may deliver beyond the energy received, J: the energy of a spring of 100 N/m over the distance
+/// that a handle covers at 50 m/s² in a period, `K a² T⁴ / 8`. Without a reserve, an empty port could never exert a force. Not
+/// real-time.
 fn reserve_j(period_s: f64) -> f64 {
     let way_m = 0.5 * RESERVE_ACCELERATION_M_PER_S2 * period_s * period_s;
     0.5 * RESERVE_STIFFNESS_N_PER_M * way_m * way_m
 }
 
-/// Observer, and on request limiter, of the energy at one port.
+/// Passivity observer of one port, with an optional passivity controller.
 pub(super) struct Passivity {
     mode: PassivityMode,
     controller: Controller,
@@ -31,7 +33,7 @@ pub(super) struct Passivity {
 }
 
 impl Passivity {
-    /// Creates the stage for a port with at most this force and torque. Not real-time.
+    /// Creates the stage for a port with the force and torque limits `most`, N and N·m. Not real-time.
     pub(super) fn new(mode: PassivityMode, controller: Controller, most: [DVec3; 2]) -> Self {
         let driven = most.map(|most| DVec3::select(most.cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO));
         let reserve_j = reserve_j(controller.period_s());
@@ -54,8 +56,8 @@ impl Passivity {
         self.energy_j
     }
 
-    /// Returns a wrench with which the port gives no more energy than it has, the reserve included; `None` if the wrench may pass.
-    /// Only motion along driven axes counts: along the others no force can damp.
+    /// Returns a wrench with which the port delivers no more energy than it has, the reserve included; `None` if the wrench may
+    /// pass unchanged. Only motion along driven axes counts: along the other axes no force can damp.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]

@@ -4,8 +4,8 @@ use rtrb::RingBuffer;
 pub use rtrb::{Consumer, Producer};
 use std::mem::MaybeUninit;
 
-/// Creates a queue for `capacity` records and touches its memory: a loop that may not lock its memory would otherwise pay for a
-/// page fault at each new page. Not real-time.
+/// Creates a queue for `capacity` records and touches its memory: a loop without locked memory would otherwise have a page fault at
+/// each new page. Not real-time.
 pub fn queue<T: Copy>(capacity: usize) -> (Producer<T>, Consumer<T>) {
     let (mut sender, receiver) = RingBuffer::new(capacity);
     if let Ok(mut slots) = sender.write_chunk_uninit(capacity) {
@@ -14,8 +14,8 @@ pub fn queue<T: Copy>(capacity: usize) -> (Producer<T>, Consumer<T>) {
     (sender, receiver)
 }
 
-/// Takes all records that are pending at this moment, oldest first. Later ones stay for the next call, so that a busy sender cannot
-/// block the receiver. Each record's slot is free before `take` runs.
+/// Passes all records that are pending at the call to `take`, oldest first. Later records wait for the next call, so that a busy
+/// sender cannot block the receiver. A record's slot is free before `take` runs.
 ///
 /// Real-time: at most one call of `take` per slot, no allocation of its own.
 pub fn drain<T>(receiver: &mut Consumer<T>, take: impl FnMut(T)) {

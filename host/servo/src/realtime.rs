@@ -1,4 +1,4 @@
-//! Real-time privileges of threads: priority, core and locked memory, with a report on refusals.
+//! Real-time privileges of threads: priority, pinning to a core and locked memory, with a report on refusals.
 
 use crate::guest::is_guest;
 use crate::platform::Duty;
@@ -6,12 +6,13 @@ use crate::platform::scheduling::{
     self, CORE_ADVICE, MAX_CORES, MEMORY_ADVICE, THREAD_ADVICE, priority_advice,
 };
 
-/// Core of the machine, by its number in the system.
+/// Processor core, by its number in the system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Core(usize);
 
 impl Core {
-    /// Returns the core of this number; `None` beyond the system's range. A core that the machine lacks is found when pinning.
+    /// Returns the core with this number; `None` for a number that the system cannot address. Pinning fails if the machine lacks
+    /// the core.
     #[must_use]
     pub const fn new(number: usize) -> Option<Self> {
         if number < MAX_CORES { Some(Self(number)) } else { None }
@@ -24,7 +25,7 @@ impl std::fmt::Display for Core {
     }
 }
 
-/// Outcome of a request to the system.
+/// Outcome of a request for a privilege.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Privilege {
     /// Granted by the system.
@@ -45,14 +46,14 @@ impl Privilege {
     }
 }
 
-/// Real-time privileges of the loop.
+/// Outcomes of the loop's requests for real-time privileges.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RealTimeReport {
     /// Real-time scheduling, [`PRIORITY_NAME`](crate::PRIORITY_NAME).
     pub fifo: Privilege,
-    /// Memory locked against paging.
+    /// Lock of the process's memory against paging.
     pub memory_lock: Privilege,
-    /// Pinning to the core named for the loop.
+    /// Pinning of the loop thread to a core.
     pub core: Privilege,
 }
 
@@ -82,7 +83,8 @@ impl RealTimeReport {
     }
 }
 
-/// Requests real-time priority for the calling thread, and a core if one is named, and locks the process's memory. Not real-time.
+/// Requests real-time priority for the calling thread, pins the thread to `core` if given, and locks the memory of the process
+/// except in a guest. Not real-time.
 pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
     // The memory of a guest belongs to another program: locked, its next allocation might fail.
     let memory_lock = match is_guest() {
@@ -99,13 +101,14 @@ fn pin(Core(number): Core) -> Result<(), String> {
         .map_err(|_| format!("--core {number}: the machine lacks this core, or this process may not use it"))
 }
 
-/// Requests the priority of a worker for the calling thread. Not real-time; without it the worker is only slower.
+/// Locks the memory of the process and requests the priority of a worker, just below the loop, for the calling thread. Refusals are
+/// ignored: the worker is then only slower. Not real-time.
 pub fn enter_worker_priority() {
     let _ = scheduling::lock_memory();
     let _ = enter_priority(Duty::Worker);
 }
 
-/// Requests the priority of a guard, which stops devices in the end, for the calling thread. Not real-time; best effort.
+/// Requests the priority of a watchdog, above the loop if possible, for the calling thread. A refusal is ignored. Not real-time.
 pub fn enter_guard_priority() {
     let _ = enter_priority(Duty::Watchdog);
 }
@@ -115,7 +118,8 @@ fn enter_priority(duty: Duty) -> Privilege {
     Privilege::of(scheduling::enter_priority(duty))
 }
 
-/// Probes the privileges on a thread of its own, so that the caller's priority does not change. Not real-time.
+/// Requests the privileges in a new thread, so that the caller's priority does not change, and unlocks the memory afterwards. Not
+/// real-time.
 pub fn probe_real_time() -> RealTimeReport {
     let asked = std::thread::Builder::new().spawn(|| {
         let report = enter_real_time(None);

@@ -1,10 +1,10 @@
-//! The loop: ticks until the duration is over, a stop is requested, or a device faults.
+//! Loop of a run: ticks until the duration is over, a stop is requested, or a fault occurs.
 
 use crate::{Place, RunEnd, Schedule, Servo, StopSwitch};
 use flotor_core::trace::TickRecord;
 use flotor_hal::SampleWait;
 
-/// Loop over a servo and its schedule, the same for both clocks.
+/// Loop of a servo with its schedule, the same on the real and the virtual clock.
 pub struct Loop {
     servo: Servo,
     schedule: Schedule,
@@ -15,20 +15,21 @@ pub struct Loop {
 }
 
 impl Loop {
-    /// Creates a loop before its first tick. Not real-time.
+    /// Creates a loop before its first tick, for a run of at most `duration_ns`. Not real-time.
     #[must_use]
     pub fn new(servo: Servo, schedule: Schedule, duration_ns: u64) -> Self {
         Self { servo, schedule, duration_ns, release_ns: u64::MAX, end: None }
     }
 
-    /// Fades the force out at the end of the duration, so that it does not drop abruptly. Unnecessary on the virtual clock, which
-    /// has no hand.
+    /// Makes the loop fade the force out over the ramp time before the end of the duration, so that the force does not drop
+    /// abruptly. Unnecessary on the virtual clock, which has no hand.
     #[must_use]
     pub fn releasing(self) -> Self {
         Self { release_ns: self.duration_ns.saturating_sub(self.servo.ramp_ns()), ..self }
     }
 
-    /// Waits for and runs the next tick, or sets `end`; passes the tick's records to `on_record`. Real-time: bounded, no allocation.
+    /// Waits for the next tick and runs it, passing its records to `on_record`; or ends the run ([`Self::end`]). Real-time after
+    /// the wait: bounded, no allocation.
     #[inline]
     pub fn advance(&mut self, stop: &StopSwitch, on_record: impl FnMut(&TickRecord)) {
         if self.schedule.next_time_ns() >= self.duration_ns {
@@ -70,12 +71,13 @@ impl Loop {
         self.end
     }
 
-    /// Returns the servo with its devices and models.
+    /// Returns the servo, with its devices and models.
     pub fn servo(&mut self) -> &mut Servo {
         &mut self.servo
     }
 
-    /// Waits for the end of the last tick's period; returns the servo, the end of the run and its duration, ns. Not real-time.
+    /// Returns the servo, the end of the run ([`RunEnd::Stopped`] if the loop was still running) and the duration, ns. On the real
+    /// clock first waits for the end of the last tick's period. Not real-time.
     #[must_use]
     pub fn finish(self) -> (Servo, RunEnd, u64) {
         (self.servo, self.end.unwrap_or(RunEnd::Stopped), self.schedule.finish())

@@ -1,6 +1,6 @@
-//! The servo: runs the ticks, each `changes -> device -> mapping -> models -> envelope -> device`.
+//! Servo: runs the ticks, each `changes -> device -> mapping -> models -> envelope -> device`.
 //!
-//! A scene may have several devices: each has its own models and envelope; all share the tick and the run state.
+//! A scene may have several devices: each device has its own models and envelope; all devices share the tick and the run state.
 //!
 //! Nothing in a tick allocates, locks, formats or waits on another thread. A tick produces a [`TickRecord`] for each device;
 //! clients get the records through a queue, off the loop.
@@ -20,14 +20,14 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Tick, Wrench};
 
-/// Run-wide loop settings.
+/// Settings of the loop for one run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunConfig {
     /// Nominal time between ticks, ns.
     pub period_ns: u64,
-    /// Time over which force fades in and out, ns.
+    /// Time over which the force fades in and out, ns.
     pub ramp_ns: u64,
-    /// Longest gap between two ticks, ns. After a longer one the run ends: the process was suspended while the hand moved.
+    /// Longest gap between two ticks, ns. After a longer gap the run ends: the process was suspended while the hand moved.
     pub longest_gap_ns: u64,
     /// Bit mask of the buttons that are emergency stops.
     pub emergency_buttons: u32,
@@ -54,7 +54,8 @@ pub struct Servo {
 }
 
 impl Servo {
-    /// Creates a servo without a last stop. Not real-time.
+    /// Creates a servo without a [`LastStop`], the emergency stop on process death ([`crate::Standby::activate`] attaches one). Not
+    /// real-time.
     pub fn new(
         stations: Vec<Station>,
         forces: Forces,
@@ -81,12 +82,12 @@ impl Servo {
         }
     }
 
-    /// Registers the calling thread as the loop thread, in place of the one that energised the devices. Not real-time.
+    /// Registers the calling thread as the loop thread, in place of the thread that energised the devices. Not real-time.
     pub fn register_loop_thread(&self) {
         self._last_stop.iter().for_each(LastStop::register_loop_thread);
     }
 
-    /// Attaches the last stop, which stops the devices if the process dies. Not real-time.
+    /// Attaches the last stop, the emergency stop on process death. Not real-time.
     pub(crate) fn guarded_by(mut self, last_stop: Option<(Unwound, LastStop)>) -> Self {
         (self._unwound, self._last_stop) = last_stop.unzip();
         self
@@ -167,7 +168,8 @@ impl Servo {
         (events, compute_ns)
     }
 
-    /// Fades the force out from this tick on and then ends the run. Real-time: bounded, no allocation.
+    /// Fades the force out from this tick on and then ends the run; does nothing while samples are lost and there is no force.
+    /// Real-time: bounded, no allocation.
     pub fn release(&mut self, tick: &Tick) {
         // While holding there is no force: the run ends without a fade.
         if self.run != RunState::Holding {
@@ -175,7 +177,7 @@ impl Servo {
         }
     }
 
-    /// Returns the time over which force fades in and out, ns.
+    /// Returns the time over which the force fades in and out, ns.
     pub fn ramp_ns(&self) -> u64 {
         self.config.ramp_ns
     }
@@ -287,7 +289,7 @@ impl Servo {
         }
     }
 
-    /// Ends the loop and returns its parts and measurements, without running plugin code. Not real-time.
+    /// Takes the servo apart into its parts and measurements, without running plugin code. Not real-time.
     pub fn dismantle(self) -> Dismantled {
         let device = |station: Station| {
             let reported = station.reported();
@@ -312,7 +314,7 @@ impl Servo {
         &self.heartbeat
     }
 
-    /// Iterates over the devices in order, each with its report.
+    /// Iterates over the devices in the scene's order, each with its report.
     pub fn devices(&mut self) -> impl Iterator<Item = (&mut ActiveDevice, Reported)> {
         self.stations.iter_mut().map(|station| {
             let reported = station.reported();
@@ -328,11 +330,11 @@ impl Servo {
 
 /// Parts of a stopped servo. Dropping them runs plugin code.
 pub struct Dismantled {
-    /// Devices in order, still energised, each with its report.
+    /// Devices in the scene's order, still energised, each with its report.
     pub devices: Vec<(ActiveDevice, Reported)>,
-    /// Last stop, for plugin code that ends the process while devices are closed and models are freed.
+    /// [`LastStop`] to keep until devices are closed and models are freed: plugin code may end the process meanwhile.
     pub last_stop: Option<LastStop>,
-    /// Models and couplings.
+    /// Models and couplings of the run.
     pub forces: Forces,
     /// Pending model replacements.
     pub swaps: LoopSwaps,
@@ -340,7 +342,7 @@ pub struct Dismantled {
     pub timing: Timing,
 }
 
-/// Ranks sample events: the highest of all devices decides the run state.
+/// Returns the rank of a sample event: the event of highest rank among the devices decides the run state.
 const fn severity(sample: RunEvent) -> u8 {
     match sample {
         RunEvent::Failed(_) => 3,

@@ -1,11 +1,11 @@
-//! Timer for the stages of a tick, which reads the processor's time counter.
+//! Timer for the stages of a tick, which reads the processor's time-stamp counter.
 //!
 //! Reading the system's clock waits for all earlier instructions and delays all later ones, which costs a tick twice the time of
-//! the reading. The counter is read without that. Its rate is measured once against the system's clock; a processor without a
-//! steady counter uses the system's clock.
+//! the reading. Reading the counter does not. Its rate is measured once against the system's clock; a processor without a steady
+//! counter uses the system's clock.
 //!
-//! `quanta` measures the rate, too, but trusts its first pair of readings: a process suspended for 4 ms between them gets times 2 %
-//! wrong as long as it lives. Here each reading of the counter lies between two of the clock, which bound its error, and the
+//! `quanta` measures the rate, too, but trusts its first pair of readings: in a process suspended for 4 ms between these readings,
+//! all times are wrong by 2 %. Here each reading of the counter lies between two of the clock, which bound its error, and the
 //! measurement continues until the bound is small enough.
 //!
 //! Deadlines and lateness use the system's clock alone (`clock.rs`).
@@ -20,15 +20,15 @@ use super::clock::monotonic_ns;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Moment(u64);
 
-/// Time counter with the length of its counts.
+/// Time-stamp counter with the length of a count.
 pub(super) struct StageTimer {
     counter: Clock,
     count: CountLength,
 }
 
 impl StageTimer {
-    /// Creates a timer. Not real-time: the first one of a process measures the rate of the counter, in two or three milliseconds on
-    /// an idle machine, and in 0.4 s at most, plus interruptions, on a busy one.
+    /// Creates a timer. Not real-time: the first timer of a process measures the rate of the counter, in two or three milliseconds
+    /// on an idle machine, and in 0.4 s at most, plus interruptions, on a busy machine.
     pub(super) fn new() -> Self {
         static COUNT: OnceLock<CountLength> = OnceLock::new();
         let counter = Clock::new();
@@ -42,7 +42,7 @@ impl StageTimer {
         Moment(self.counter.raw())
     }
 
-    /// Returns the time from one moment to another, ns; 0 if the second was before the first. Real-time: bounded, no allocation.
+    /// Returns the time between two moments, ns; 0 if `to` is before `from`. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn between_ns(&self, from: Moment, to: Moment) -> u64 {
         self.count.times_ns(to.0.saturating_sub(from.0))
@@ -58,8 +58,8 @@ struct ClockReading {
 }
 
 impl ClockReading {
-    /// Longest step of a clock or a counter, ns: between two steps its time is in the past. Hyper-V's clock has 100 ns, a counter
-    /// of 24 MHz 42 ns.
+    /// Coarsest resolution of a clock or a counter, ns: the time read may be older by this step. Hyper-V's clock has 100 ns, a
+    /// counter of 24 MHz 42 ns.
     const STEP_NS: u64 = 100;
 
     fn at(counter: &Clock) -> Self {
@@ -86,7 +86,7 @@ impl CountLength {
     const ENOUGH: f64 = 100e-6;
     /// Time after which the measurement ends in any case, with its best result, ns: the longest that `quanta` takes.
     const LONGEST_NS: u64 = 200_000_000;
-    /// Number of first readings, of which the one with the least uncertainty counts.
+    /// Number of initial readings, of which the reading with the least uncertainty is used.
     const FIRST_LOOKS: usize = 32;
 
     /// Measures the length of a count. Not real-time.
@@ -96,15 +96,15 @@ impl CountLength {
             let next = poll();
             first = if next.uncertainty_ns() < first.uncertainty_ns() { next } else { first };
         }
-        // Zero length, should the counter never advance.
+        // Zero length if the counter never advances.
         let (mut least_uncertainty, mut best) = (f64::INFINITY, Self { parts: 0 });
         loop {
             let last = poll();
-            // Twice the time from the middle of the one reading to the middle of the other.
+            // Twice the time from the middle of the first reading to the middle of the last.
             let twice_ns = (last.before_ns - first.before_ns) + (last.after_ns - first.after_ns);
             let uncertainty = (first.uncertainty_ns() + last.uncertainty_ns()) as f64 / twice_ns as f64;
-            // Counters of two cores may differ, and the process may have moved from the one to the other. Only a difference of more
-            // than the elapsed time is visible.
+            // The counters of two cores may differ, and the process may have moved to another core. Only a difference larger than
+            // the elapsed time can be detected.
             if uncertainty < least_uncertainty && last.count > first.count {
                 (least_uncertainty, best) = (uncertainty, Self::of(twice_ns, 2 * (last.count - first.count)));
             }
@@ -114,7 +114,7 @@ impl CountLength {
         }
     }
 
-    /// Returns the length of a count from so many counts in so many ns.
+    /// Returns the length of a count from the number of counts in `ns`.
     #[allow(clippy::cast_possible_truncation)] // some 2³², or the counter is slower than a wall clock
     fn of(ns: u64, counts: u64) -> Self {
         Self { parts: ((u128::from(ns) << Self::PARTS_PER_NS_LOG2) / u128::from(counts)) as u64 }

@@ -1,4 +1,4 @@
-//! Parts of a servo, with devices open and not yet energised.
+//! Parts of a servo before its start: devices are opened, not yet energised.
 
 use crate::{Envelope, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
 use flotor_core::demand::ObserverDemand;
@@ -30,7 +30,7 @@ pub struct Standby {
 }
 
 impl Standby {
-    /// Combines the parts of a servo. Not real-time.
+    /// Creates a standby from its parts, with a new heartbeat and no demand of observers. Not real-time.
     pub fn new(
         devices: Vec<Guarded>,
         forces: Forces,
@@ -48,7 +48,7 @@ impl Standby {
         self.heartbeat.clone()
     }
 
-    /// Returns the demand of observers for model outputs.
+    /// Returns the shared demand of observers for model outputs.
     pub fn observers(&self) -> ObserverDemand {
         self.observers.clone()
     }
@@ -65,24 +65,24 @@ impl Standby {
         })
     }
 
-    /// Replaces the envelopes of the devices, in order; a device without a new one keeps its own. Not real-time.
+    /// Replaces the envelopes of the devices, in order; a device without a new envelope keeps its own. Not real-time.
     pub fn guard_with(&mut self, envelopes: Vec<Envelope>) {
         for (guarded, envelope) in self.devices.iter_mut().zip(envelopes) {
             guarded.envelope = envelope;
         }
     }
 
-    /// Returns a stopper for each device, to be used from any thread.
+    /// Returns a stopper for each device, usable from any thread.
     pub fn stoppers(&self) -> Vec<Stopper> {
         self.devices.iter().map(|guarded| guarded.device.stopper()).collect()
     }
 
-    /// Energises the devices, in order, on the thread that will run the loop. `names` are those of the devices, then of the models,
-    /// for the message if the process dies; `enters` is called with each device's number before that device is energised. Not
-    /// real-time; may block.
+    /// Energises the devices, in order, and returns the servo with its last stop; to be called on the loop thread. `names`: names
+    /// of the devices, then of the models, for the message if the process dies; `enters` is called with each device's number before
+    /// that device is energised. Not real-time; may block.
     ///
     /// # Errors
-    /// Number and [`Refusal`] of the device that refused; then none stays energised.
+    /// Number and [`Refusal`] of the device that refused; all devices are then stopped.
     pub fn activate(self, names: Vec<String>, enters: impl Fn(usize)) -> Result<Servo, (usize, Refusal)> {
         let stoppers = self.stoppers();
         let last_stop = LastStop::arm(stoppers.clone(), names, self.heartbeat());

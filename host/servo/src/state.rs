@@ -1,4 +1,4 @@
-//! State machine of a run, which decides how much force may reach the hand.
+//! State machine of a run, which determines the fraction of the force that may reach the hand.
 //!
 //! ```text
 //!            ramp over            samples lost
@@ -19,7 +19,7 @@
 //!  Only an emergency stop leaves Faulted. Stopped and EmergencyStopped are final.
 //! ```
 //!
-//! While the position of the hand is unknown there is no force, and none to fade out: neither the models' nor the boundary's.
+//! While the position of the hand is unknown, neither models nor boundary exert a force, and no force has to fade out.
 //!
 //! A run ends in the last three states, and an emergency stop latches: force returns only with a new run, which opens and activates
 //! the device anew. A fault may still become an emergency stop, never the other way round.
@@ -104,7 +104,7 @@ pub enum RunState {
 /// Event that may change the state of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RunEvent {
-    /// Time has advanced.
+    /// Passage of time: a fade may have ended.
     Time,
     /// No usable sample for longer than a hand may be trusted to stay in place.
     SamplesLost,
@@ -123,7 +123,7 @@ pub enum RunEvent {
 pub struct Gate {
     /// Fraction of the models' force.
     pub models: f64,
-    /// Fraction of the boundary's force, which acts at once, while the models fade in.
+    /// Fraction of the boundary's force, which acts in full while the models fade in.
     pub boundary: f64,
 }
 
@@ -138,7 +138,7 @@ impl RunState {
     /// First state of a run.
     pub const START: RunState = RunState::Ramping { since_ns: 0 };
 
-    /// Returns the state after an event at a time. Real-time: bounded, no allocation.
+    /// Returns the state after an event at the run time `now_ns`, with fades of `ramp_ns`. Real-time: bounded, no allocation.
     #[must_use]
     pub fn after(self, event: RunEvent, now_ns: u64, ramp_ns: u64) -> Self {
         match (self, event) {
@@ -168,7 +168,7 @@ impl RunState {
         }
     }
 
-    /// Returns the opening of the gate. Real-time: bounded, no allocation.
+    /// Returns the fractions of force that may pass at the run time `now_ns`, with fades of `ramp_ns`. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn gate(self, now_ns: u64, ramp_ns: u64) -> Gate {

@@ -11,7 +11,7 @@ use flotor_core::trace::Events;
 use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Axes, Capabilities, Conditions, Cycle, Demand, Fault, Tick};
 
-/// Command timeout as a multiple of the sample timeout; the last command stays applied meanwhile.
+/// Timeout for a device that takes no commands, as a multiple of the sample timeout; the last command stays applied meanwhile.
 const UNTAKEN_TIMES: u32 = 10;
 
 /// Device with its sample check and safety envelope.
@@ -21,7 +21,7 @@ pub struct Station {
     /// Model outputs that reach the hand at this device.
     pub(super) at_hand: Demand,
     plausibility: PlausibilityCheck,
-    /// Stale ticks tolerated; unlimited for a device that senses no axis.
+    /// Tolerated number of consecutive ticks without a usable sample; unlimited for a device that senses no axis.
     stale_ticks_limit: u32,
     stale_ticks: u32,
     untaken_ticks_limit: u32,
@@ -41,7 +41,7 @@ pub struct Reported {
     pub is_own_fault: bool,
     /// Implausible samples of the device.
     pub implausible: ImplausibleSamples,
-    /// Consecutive commands not taken by the device at the end.
+    /// Number of consecutive commands that the device had not taken when the run ended.
     pub untaken: u32,
     /// Effects of the envelope's passivity controller and slew limit.
     pub effects: EnvelopeEffects,
@@ -60,7 +60,8 @@ impl Reported {
 }
 
 impl Station {
-    /// Creates the station of a device in a loop of this period. Not real-time.
+    /// Creates the station of a device in a loop of `period_ns`; samples are checked against the declared capabilities `told`. Not
+    /// real-time.
     pub fn new(device: ActiveDevice, envelope: Envelope, told: &Capabilities, period_ns: u64) -> Self {
         let stale_ticks = stale_ticks_limit(period_ns);
         let [_, torque_nm] = envelope.most();
@@ -78,8 +79,8 @@ impl Station {
         }
     }
 
-    /// Reads the newest sample into the port, its orientation normalised, and returns the consequence for the run. A stale or
-    /// implausible sample leaves the port as it was.
+    /// Reads the newest sample into the port, with a normalised orientation, and returns the event for the run state. A stale or
+    /// implausible sample does not change the port.
     ///
     /// Real-time: bounded by the device, no allocation.
     pub(super) fn read(&mut self, tick: &Tick, port: &mut Port) -> RunEvent {
@@ -115,7 +116,7 @@ impl Station {
         }
     }
 
-    /// Maps the trust in the device to a run event.
+    /// Returns the run event for the trust in the device; samples that are implausible for too long are a fault.
     #[inline]
     fn trust_event(&mut self, port: &mut Port) -> RunEvent {
         match self.plausibility.trust() {
@@ -131,7 +132,8 @@ impl Station {
         *commanded = self.envelope.apply(requested, gate, state, tick, events);
     }
 
-    /// Sends the command; returns a run event on failure. Real-time: bounded by the device, no allocation.
+    /// Sends the command; returns a run event if the device faults or has not taken commands for too long. Real-time: bounded by
+    /// the device, no allocation.
     pub(super) fn write(&mut self, tick: &Tick, port: &mut Port) -> Option<RunEvent> {
         match self.device.write(tick, &port.commanded) {
             Cycle::Fresh => {
@@ -158,7 +160,7 @@ impl Station {
         }
     }
 
-    /// Records a fault that the host found and the device has not reported.
+    /// Records a fault found by the host, not reported by the device.
     #[inline(never)] // once in a run
     fn found_faulty(&mut self, fault: Fault, port: &mut Port) -> RunEvent {
         self.is_own_fault &= self.fault.is_some();

@@ -1,4 +1,4 @@
-//! Stop switch, with which the rest of the process ends a run: in order, or at once.
+//! Stop switch: orderly end or emergency stop of a run, from any thread of the process.
 
 use super::platform::clock;
 use super::state::EmergencySource;
@@ -6,14 +6,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Switch that ends a run from any thread or signal handler. Clones share their state.
+/// Switch that ends a run from any thread, or through its flags from a signal handler. Clones share their state.
 ///
 /// A request to stop cannot be taken back.
 #[derive(Clone, Debug, Default)]
 pub struct StopSwitch {
     in_order: Arc<AtomicBool>,
     by_signal: Arc<AtomicBool>,
-    /// First source of an emergency stop apart from the flag: its index in [`EmergencySource::ALL`] plus one; 0: none.
+    /// First source of an emergency stop, except the flag of a signal handler: index in [`EmergencySource::ALL`] plus one; 0: none.
     pressed: Arc<AtomicU32>,
     /// Time of the first press on the monotonic clock, ns; 0: none.
     pressed_ns: Arc<AtomicU64>,
@@ -25,7 +25,7 @@ impl StopSwitch {
         self.in_order.store(true, Ordering::Relaxed);
     }
 
-    /// Presses the emergency stop and wakes the threads that wait for it. The first source counts. Real-time: one system call,
+    /// Triggers the emergency stop and wakes the threads that wait for it. The first source is kept. Real-time: one system call,
     /// after the last tick.
     pub fn press(&self, source: EmergencySource) {
         let place = EmergencySource::ALL.iter().position(|other| *other == source);
@@ -37,8 +37,8 @@ impl StopSwitch {
         clock::wake_all(&self.pressed);
     }
 
-    /// Sleeps until [`StopSwitch::press`], or until the timeout. The flag of a signal handler does not end the sleep; the loop
-    /// presses the switch in the tick that reads this flag. Not real-time.
+    /// Sleeps until [`StopSwitch::press`], or until the timeout; may return earlier. The flag of a signal handler does not end the
+    /// sleep: the run has to press the switch when it reads the flag. Not real-time.
     pub fn sleep_until_pressed(&self, timeout: Duration) {
         clock::sleep_while_zero(&self.pressed, timeout);
     }
@@ -50,7 +50,7 @@ impl StopSwitch {
         self.in_order.load(Ordering::Relaxed)
     }
 
-    /// Returns the source of the emergency stop; `None` if not pressed. Real-time: bounded, no allocation.
+    /// Returns the source of the emergency stop; `None` without an emergency stop. Real-time: bounded, no allocation.
     #[inline]
     #[must_use]
     pub fn emergency(&self) -> Option<EmergencySource> {
@@ -59,7 +59,8 @@ impl StopSwitch {
         place.and_then(|place| EmergencySource::ALL.get(place).copied()).or_else(by_signal)
     }
 
-    /// Returns the time of the first [`StopSwitch::press`] on the monotonic clock, ns. Real-time: bounded, no allocation.
+    /// Returns the time of the first [`StopSwitch::press`] on the monotonic clock, ns; `None` if there was none. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn pressed_ns(&self) -> Option<u64> {
         Some(self.pressed_ns.load(Ordering::Relaxed)).filter(|pressed_ns| *pressed_ns > 0)

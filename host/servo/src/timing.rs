@@ -1,9 +1,9 @@
-//! Timing statistics of the loop: histograms of lateness and compute time, in fixed memory, always on.
+//! Timing statistics of the loop: histograms of lateness and compute time, in fixed memory, always recorded.
 
 use hdrhistogram::Histogram;
 use serde::Serialize;
 
-/// Upper limit of a histogram, ns; longer times count as this one.
+/// Upper limit of a histogram, ns; longer times count as this limit.
 const LONGEST_NS: u64 = 100_000_000_000;
 
 /// Two significant digits: a bin is at most 1 % wide, and the whole histogram is some 16 kB.
@@ -12,13 +12,13 @@ const DIGITS: u8 = 2;
 /// Percentiles of one histogram, ns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Percentiles {
-    /// Median.
+    /// Median, ns.
     pub p50: u64,
-    /// 99th percentile.
+    /// 99th percentile, ns.
     pub p99: u64,
-    /// 99.9th percentile.
+    /// 99.9th percentile, ns.
     pub p999: u64,
-    /// Largest value.
+    /// Largest value, ns.
     pub max: u64,
 }
 
@@ -26,7 +26,7 @@ pub struct Percentiles {
 pub struct Durations(Histogram<u32>);
 
 impl Durations {
-    /// Creates an empty histogram with all its memory. Not real-time.
+    /// Creates an empty histogram with preallocated memory. Not real-time.
     #[must_use]
     pub fn new() -> Self {
         // The arguments are constants that satisfy the constructor's conditions (low >= 1, high >= 2 low, digits <= 5).
@@ -34,12 +34,12 @@ impl Durations {
         Self(histogram.unwrap_or_else(|_| unreachable!("constant, legal bounds")))
     }
 
-    /// Counts one duration. Real-time: bounded, no allocation.
+    /// Counts one duration; a duration above 100 s counts as 100 s. Real-time: bounded, no allocation.
     pub fn record(&mut self, duration_ns: u64) {
         self.0.saturating_record(duration_ns.min(LONGEST_NS));
     }
 
-    /// Returns the non-empty bins: duration, ns, and count. Not real-time.
+    /// Returns the non-empty bins, each as its largest duration, ns, and its count. Not real-time.
     #[must_use]
     pub fn bins(&self) -> Vec<(u64, u64)> {
         self.0
@@ -66,16 +66,16 @@ impl Default for Durations {
     }
 }
 
-/// Stage of a tick.
+/// Stage of a tick with a histogram of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Reading the device.
+    /// Applying parameter changes, and reading the devices.
     Read,
     /// Mapping and stepping the models.
     Models,
-    /// Limiting the wrench.
+    /// Limiting the wrenches.
     Envelope,
-    /// Writing the device.
+    /// Writing the commands to the devices.
     Write,
 }
 
@@ -85,17 +85,17 @@ pub(super) const STAGE_SAMPLING: u64 = 16;
 /// Timing statistics of a loop.
 #[derive(Default)]
 pub struct Timing {
-    /// Delays of the ticks after their deadlines.
+    /// Delays of the ticks after their deadlines; empty on the virtual clock.
     pub lateness: Durations,
-    /// Durations of whole ticks.
+    /// Compute times of whole ticks, without the wait before.
     pub compute: Durations,
     /// Durations of the stages, in the order of [`Stage`].
     pub stages: [Durations; 4],
     /// Number of ticks.
     pub ticks: u64,
-    /// Ticks that started later than a tenth of the period.
+    /// Number of ticks that started late by more than a tenth of the period.
     pub late: u64,
-    /// Ticks that were skipped because their whole period had passed.
+    /// Number of ticks that were skipped because their whole period had passed.
     pub missed: u64,
 }
 

@@ -1,4 +1,4 @@
-//! The watchdog: a thread that stops all devices when the loop no longer ticks, and reports the place where the loop is stuck.
+//! Watchdog: a thread that stops all devices when the loop no longer ticks, and records the tick and the code in which the loop is stuck.
 //!
 //! It polls the [heartbeat](Heartbeat) several times per limit. A beat unchanged for longer than the limit means that a call does not
 //! return; the watchdog then stops the devices without the loop's help.
@@ -12,20 +12,21 @@ use super::watchdog_process::HeartbeatSender;
 use flotor_hal::abi::loader::Stopper;
 use std::thread::JoinHandle;
 
-/// Polls of the watchdog per limit.
+/// Number of polls of the watchdog per limit.
 const LOOKS: u64 = 8;
 /// Longest poll interval, ns: the delay of an emergency stop while the loop is stuck.
 const LONGEST_LOOK_NS: u64 = 1_000_000;
-/// Polls for which a process may be dying: half a second.
+/// Number of polls after which a process that is being ended is ended by the watchdog: half a second.
 const DYING_LOOKS: u32 = 500;
-/// Heartbeats for the watchdog process per limit; its timeout expires when one is late by the limit.
+/// Number of heartbeats for the watchdog process per limit; the timeout there expires when a heartbeat is late by the limit.
 const SIGNS_OF_LIFE: u64 = 4;
-/// Polls between two checks of the host's signals: a tenth of a second.
+/// Number of polls between two checks of the host's signals: a tenth of a second.
 const SIGNAL_LOOKS: u64 = 100;
 
-/// Starts the watchdog's thread, which uses the `stoppers` of all devices when `heartbeat` has not changed for `limit_ns`, or when the
-/// emergency stop is pressed. While running, the thread sends heartbeats (`signs`) to the watchdog process, if there is one. Not
-/// real-time; ends with [`Heartbeat::finish`].
+/// Starts the watchdog thread: it stops all devices with `stoppers` when `heartbeat` has not changed for `limit_ns`, or when the
+/// emergency stop `stop` is triggered. The thread also sends heartbeats (`signs`) to the watchdog process, if there is one, and
+/// restores signal actions that a plugin has replaced. It ends after [`Heartbeat::finish`], or after it has stopped a stuck loop's
+/// devices. Not real-time.
 ///
 /// # Errors
 /// If the system cannot start a thread.

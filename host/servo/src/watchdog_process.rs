@@ -1,10 +1,10 @@
-//! Watchdog process: stops the devices of a host that has ended for any reason: SIGKILL, `_exit`, `exec`, a limit of the machine.
+//! Watchdog process: stops the devices of a host that has ended for any reason, such as SIGKILL, `_exit`, `exec` or a resource limit.
 //!
-//! The host starts its own program once more, as `flotor watchdog`, and passes a handle and a device-specific message for each
-//! device over the socket that is the process's standard input (extension `flotor.independent-stop/1`). The process runs no plugin
-//! code. It writes the messages when the socket closes without an orderly end, when the host's process or the thread of its loop
-//! has ended, and when the host, stopped or traced, sends no heartbeat within the timeout. It has a session of its own, leaves the
-//! control groups of the host where possible, and receives no signal that requests its end: it ends with its host, right after.
+//! The host starts a second process of its own program, `flotor watchdog`, and passes a handle and a device-specific message for
+//! each device over the socket that is the process's standard input (extension `flotor.independent-stop/1`). The process runs no
+//! plugin code. It writes the messages when the socket closes without an orderly end, when the host's process or its loop thread
+//! has ended, and when the host, suspended or traced, sends no heartbeat within the timeout. It has a session of its own and leaves
+//! the control groups of the host where possible, so that it receives no signal that ends the host; it ends right after its host.
 
 pub use crate::platform::watchdog_process::{
     HeartbeatSender, WatchdogProcess, is_offered, probe_shared_group, serve,

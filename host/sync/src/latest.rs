@@ -1,9 +1,9 @@
-//! The latest-value cell: one writer, any number of readers, only the newest value counts.
+//! Latest-value cell: one writer, any number of readers; only the newest value is available.
 //!
-//! The cell is a sequence lock. The writer makes the sequence odd, writes the words, and makes the sequence even again. A
-//! reader notes the sequence, copies the words, and loads the sequence once more: even and unchanged means
-//! that no write ran in between, so the copy is whole. The writer never reads the readers' state and so never
-//! waits for them; a reader that was overtaken retries, a few times.
+//! The cell is a sequence lock. The writer makes the sequence odd, writes the words, and makes the sequence even again.
+//! A reader loads the sequence, copies the words, and loads the sequence once more: if it is even and unchanged, no
+//! write ran in between, so the copy is consistent. The writer never reads the readers' state and so never waits for a
+//! reader; a reader that overlapped with a write retries, a few times.
 //!
 //! Source: H.-J. Boehm, "Can seqlocks get along with programming language memory models?", MSPC 2012
 //! (the variant with atomic data and fences).
@@ -29,7 +29,8 @@ struct Cell<const N: usize> {
     words: AtomicWords<N>,
 }
 
-/// Creates a latest-value cell that holds `initial` as version 0. Not real-time: allocates, once.
+/// Creates a latest-value cell with the value `initial` as version 0; returns its writing and its reading end. Not
+/// real-time: allocates, once.
 #[must_use]
 pub fn latest<T: Words<N>, const N: usize>(initial: T) -> (Publisher<T, N>, Observer<T, N>) {
     let words = AtomicWords::new(initial.to_words());
@@ -38,7 +39,7 @@ pub fn latest<T: Words<N>, const N: usize>(initial: T) -> (Publisher<T, N>, Obse
     (publisher, Observer { cell, record: PhantomData })
 }
 
-/// Writing end of a cell. There is only one: it is not `Clone`, and publishing takes it mutably.
+/// Writing end of a cell. A cell has only one: the type is not `Clone`, and publishing takes it mutably.
 #[derive(Debug)]
 pub struct Publisher<T, const N: usize> {
     cell: Arc<Cell<N>>,
@@ -78,10 +79,10 @@ pub struct Observer<T, const N: usize> {
 }
 
 impl<T: Words<N>, const N: usize> Observer<T, N> {
-    /// Returns the newest value and its version: the number of values published so far. For one reader versions never
-    /// go back; an unchanged version means an unchanged value.
+    /// Returns the newest value and its version: the number of values published before, 0 for the initial value. For
+    /// one reader versions never decrease; an unchanged version means an unchanged value.
     ///
-    /// Returns `None` if a publish was under way in each of a few attempts; retry later.
+    /// Returns `None` if each of a few attempts overlapped with a write; retry later.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -90,7 +91,7 @@ impl<T: Words<N>, const N: usize> Observer<T, N> {
         (0..READ_ATTEMPTS).find_map(|_| self.attempt())
     }
 
-    /// Copies the value once; returns `None` if a write ran meanwhile.
+    /// Copies the value once; returns `None` if the copy overlapped with a write.
     #[inline]
     fn attempt(&self) -> Option<(u64, T)> {
         // Acquire, pairs with the release store that ends a publish: the words read below are at least as new

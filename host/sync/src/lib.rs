@@ -1,9 +1,9 @@
-//! Wait-free passing of the newest value from one thread to others.
+//! Wait-free transfer of the newest value from one thread to others.
 //!
-//! The servo runs a thousand times a second or more and must not be delayed: not by a mutex another thread
-//! holds, not by the allocator, not by the kernel. [`latest`] makes a latest-value cell: a slow reader misses
-//! values, never the newest. Where every record counts (ticks for the recorder, commands for the servo) the host uses a
-//! bounded queue of the crate `rtrb`.
+//! The servo runs a thousand times a second or more and must not be delayed: not by a mutex that another thread holds,
+//! not by the allocator, not by the kernel. [`latest`] creates a latest-value cell: a slow reader misses values, but
+//! never the newest. Where every record counts (ticks for the recorder, commands for the servo) the host uses a bounded
+//! queue of the crate `rtrb`.
 //!
 //! A *record* is any plain value that can be written as a fixed number of 64-bit words: see [`Words`].
 //!

@@ -7,8 +7,8 @@ use crate::shim::{AtomicU64, Ordering};
 
 /// Plain record that can be encoded as `N` words and decoded again: numbers, bit patterns, flags.
 ///
-/// `from_words(&r.to_words())` must give `r` again. Both run in real-time code: keep them bounded, without
-/// allocation, and free of panics. `f64::to_bits` and `f64::from_bits` carry a float without loss.
+/// `from_words(&r.to_words())` must equal `r`. Both run in real-time code: they must be bounded, without allocation,
+/// and free of panics. `f64::to_bits` and `f64::from_bits` encode a float without loss.
 pub trait Words<const N: usize>: Sized {
     /// Encodes the record as words.
     fn to_words(&self) -> [u64; N];
@@ -17,7 +17,7 @@ pub trait Words<const N: usize>: Sized {
     fn from_words(words: &[u64; N]) -> Self;
 }
 
-/// Identity: words encode themselves.
+/// Identity: an array of words is its own encoding.
 impl<const N: usize> Words<N> for [u64; N] {
     #[inline]
     fn to_words(&self) -> [u64; N] {

@@ -38,7 +38,7 @@ pub struct Candidate {
 /// Fitted calibration with its confidence.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// Fitted curve.
+    /// Fitted ratio of delivered to commanded force over the height.
     pub calibration: VerticalCalibration,
     /// Degree of the curve.
     pub degree: usize,
@@ -55,11 +55,10 @@ pub struct Fit {
     pub residuals_n: Vec<f64>,
 }
 
-/// Fits a calibration to the readings.
+/// Fits a calibration to the readings. Not real-time.
 ///
-/// # Errors
-/// [`CalibrationError::TooFew`] unless there are two forces and more heights than coefficients;
-/// [`CalibrationError::Implausible`] if the curve is not a valid calibration.
+/// # Errors [`CalibrationError::TooFew`] with fewer than two forces, or with no more heights than a curve of
+/// [`MAX_DEGREE`] has coefficients; [`CalibrationError::Implausible`] if the curve is not a valid calibration.
 pub fn fit(readings: &[Reading]) -> Result<Fit, CalibrationError> {
     let stops = distinct(readings.iter().map(|reading| u64::from(reading.stop)));
     let forces = distinct(readings.iter().map(|reading| reading.commanded_n.to_bits()));
@@ -186,7 +185,8 @@ fn predict(reading: &Reading, solution: &Solution, scale: &Scale, degree: usize)
     row(reading, scale, degree).iter().zip(&solution.x).map(|(a, b)| a * b).sum()
 }
 
-/// Predicts each height from all others; `None` if the others do not determine the curve.
+/// Returns the prediction error of a degree, where each height is predicted from all others; `None` if the others do
+/// not determine the curve.
 fn cross_validate(readings: &[Reading], stops: &[u64], scale: &Scale, degree: usize) -> Option<Candidate> {
     let mut squares = Vec::new();
     for stop in stops {

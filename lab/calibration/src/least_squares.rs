@@ -9,11 +9,11 @@ pub(super) struct Solution {
     pub(super) x: Vec<f64>,
     /// Sum of the squared residuals.
     pub(super) residual_squares: f64,
-    /// Triangle `R` of `rows = Q R`, row by row: the covariance of `x` is `s² (RᵀR)⁻¹`.
+    /// Upper triangular factor `R` of `rows = Q R`, row by row: the covariance of `x` is `s² (RᵀR)⁻¹`.
     triangle: Vec<Vec<f64>>,
 }
 
-/// Solves the system; `None` if the rows do not determine every unknown.
+/// Solves the least-squares problem by QR decomposition; `None` if the rows do not determine every unknown.
 pub(super) fn solve(rows: &[Vec<f64>], values: &[f64]) -> Option<Solution> {
     /// Smallest diagonal entry relative to the largest, above rounding errors.
     const RANK_TOLERANCE: f64 = 1.0e-12;

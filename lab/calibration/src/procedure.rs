@@ -16,7 +16,7 @@ pub struct Plan {
     pub step_m: f64,
     /// Number of steps down.
     pub steps: u32,
-    /// Readings of the force sensor at each height.
+    /// Number of readings of the force sensor at each height.
     pub readings: u32,
 }
 
@@ -55,7 +55,8 @@ pub struct Reading {
     pub force_n: f64,
 }
 
-/// Measures all readings of a plan; `stopped` is called after each stop.
+/// Measures all readings of a plan; repeats the readings of a stop if the sensor moved during them. Calls `stopped`
+/// after each stop. Not real-time.
 ///
 /// # Errors
 /// [`CalibrationError`], from the rig.

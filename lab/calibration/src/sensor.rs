@@ -1,4 +1,4 @@
-//! Force sensor of a calibration: a device plugin that measures, read synchronously.
+//! Force sensor of a calibration: device plugin that only measures, read synchronously.
 
 use super::CalibrationError;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
@@ -21,7 +21,7 @@ pub struct ForceSensor {
 }
 
 impl ForceSensor {
-    /// Opens the sensor of a plugin at a port, with its other settings. Not real-time.
+    /// Opens the force sensor of a plugin at the serial port `port`, with further settings. Not real-time.
     ///
     /// # Errors
     /// [`CalibrationError`] if there is no sensor, or the plugin has no parameter `port`.
@@ -41,7 +41,7 @@ impl ForceSensor {
     /// # Errors
     /// [`CalibrationError::Sensor`] if no reading arrives.
     pub fn read_n(&mut self) -> Result<f64, CalibrationError> {
-        // Discard the reading that began before.
+        // The first reading may have begun before this call: discard it.
         self.next_n()?;
         self.next_n()
     }

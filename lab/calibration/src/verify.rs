@@ -18,7 +18,7 @@ pub const PROBE_N: f64 = 11.0;
 /// Ratio of delivered to commanded force at heights from bottom to top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorCurve {
-    /// Height, m, and ratio.
+    /// Height, m, and ratio; 1 without error.
     pub ratios: Vec<(f64, f64)>,
 }
 

@@ -50,7 +50,8 @@ unsafe fn map(place: usize, length: usize, access: ProtFlags) -> *mut u8 {
     mapped.map_or(null_mut(), <*mut c_void>::cast)
 }
 
-/// Allocates a zeroed block; null on failure or for an impossible size.
+/// Allocates a zeroed block that ends at a guard, or without one beyond [`MOST_GUARDED`] blocks; null on failure or for
+/// an impossible size.
 fn allocate(size: usize, alignment: usize) -> *mut c_void {
     let needed = size.checked_add(HEAD + alignment).and_then(|bytes| bytes.checked_next_multiple_of(PAGE));
     let Some((length, whole)) = needed.and_then(|bytes| Some((bytes, bytes.checked_add(PAGE)?))) else {

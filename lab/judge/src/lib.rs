@@ -47,7 +47,7 @@ impl Size {
     }
 }
 
-/// Receives the progress of a measurement, from any thread. `()` ignores it.
+/// Receiver of the progress of a measurement, called from any thread. `()` ignores it.
 pub trait Progress: Sync {
     /// Begins a measurement of `steps` steps.
     fn begin(&self, name: &str, steps: u64);

@@ -15,7 +15,8 @@ pub struct Plant {
 }
 
 impl Plant {
-    /// Returns position and velocity after a period of constant force, as coefficients of the initial position, velocity and force.
+    /// Returns the discrete-time model for a zero-order hold of the force over a period. Rows: position, m, and
+    /// velocity, m/s, at the end; columns: coefficients of initial position, m, initial velocity, m/s, and force, N.
     ///
     /// Exact: the state `(x, x', u)` obeys a linear equation with constant coefficients, whose exponential over a
     /// period contains both the free motion and the response to the force.
@@ -36,7 +37,8 @@ impl Plant {
 
 type Matrix = [[f64; 3]; 3];
 
-/// Returns the exponential of a small matrix by scaling, Taylor series and squaring (Moler and Van Loan 2003, method 3).
+/// Returns the exponential of a small matrix by scaling and squaring of the Taylor series (Moler and Van Loan 2003,
+/// method 3).
 fn exponential(matrix: Matrix) -> Matrix {
     /// Limit of the scaled entries, 2^-4, at which 14 terms leave an error below 1e-16.
     const LARGEST_ENTRY: f64 = 0.0625;
@@ -79,7 +81,7 @@ const MASS_KG: f64 = 0.58;
 /// Moments of inertia of the simulated flotor (the real ones were never published), kg m².
 const INERTIA_KG_M2: [f64; 3] = [3.35e-3, 3.35e-3, 3.65e-3];
 
-/// Flotor in the model frame, without gravity and with light drag, to isolate the effect of the loop.
+/// Flotor in the model frame, with drag but without gravity, to isolate the effect of the loop.
 pub struct Flotor {
     position_m: DVec3,
     velocity_m_per_s: DVec3,
@@ -107,7 +109,8 @@ impl Hold {
 }
 
 impl Flotor {
-    /// Creates a flotor at rest at a pose. The rotational drag is the translational drag at a lever arm.
+    /// Creates a flotor at rest at `pose`. The rotational damping is that of the translational damping at the lever arm
+    /// `lever_m`.
     #[must_use]
     pub fn at_rest(pose: Pose, damping_ns_per_m: f64, lever_m: f64, period_s: f64) -> Self {
         let angular_damping = damping_ns_per_m * lever_m * lever_m;
@@ -121,7 +124,7 @@ impl Flotor {
         }
     }
 
-    /// Advances one period under a constant wrench.
+    /// Advances the flotor by one period under a constant wrench in the model frame.
     pub fn advance(&mut self, wrench: &Wrench) {
         let mut shift_m = [0.0; 3];
         let mut turn_rad = [0.0; 3];
@@ -139,13 +142,13 @@ impl Flotor {
         self.pose = Pose::new(self.position_m, (turn * self.pose.orientation()).normalize());
     }
 
-    /// Returns the pose.
+    /// Returns the pose at the end of the last period, in the model frame.
     #[must_use]
     pub fn pose(&self) -> Pose {
         self.pose
     }
 
-    /// Returns the twist.
+    /// Returns the twist at the end of the last period, in the model frame.
     #[must_use]
     pub fn twist(&self) -> Twist {
         Twist::new(self.velocity_m_per_s, self.angular_rad_per_s)

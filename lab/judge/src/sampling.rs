@@ -27,7 +27,7 @@ pub struct Sobol {
 }
 
 impl Sobol {
-    /// Builds the sequence of a seed.
+    /// Creates the sequence, shifted by the seed.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         let mut directions = [[0; DIGITS]; DIMENSIONS];
@@ -49,7 +49,7 @@ impl Sobol {
         Self { directions, shift }
     }
 
-    /// Returns point `index`, strictly inside the unit cube. Stateless: any order.
+    /// Returns point `index`, strictly inside the unit cube. The points may be computed in any order.
     #[must_use]
     pub fn point(&self, index: u64) -> [f64; DIMENSIONS] {
         std::array::from_fn(|dimension| {

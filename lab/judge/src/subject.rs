@@ -148,7 +148,7 @@ impl<'a> Subject<'a> {
     /// Returns the answer at a pose, after a walk there if the model has memory.
     ///
     /// # Errors
-    /// The failure to answer.
+    /// [`Trouble`] with the kind of the failure and its pose.
     pub fn answer_at(&mut self, pose: Pose) -> Result<Output, Trouble> {
         match self.memory() {
             Memory::Stateless => self.step(&self.at_rest(pose)),
@@ -159,7 +159,7 @@ impl<'a> Subject<'a> {
     /// Walks to a pose; calls `on_the_way` after every step.
     ///
     /// # Errors
-    /// The failure to answer.
+    /// [`Trouble`] with the kind of the failure and its pose.
     pub fn walk(&mut self, end: Pose, on_the_way: &mut dyn FnMut()) -> Result<Output, Trouble> {
         let from = self.at;
         let way_m = end.position() - from.position();
@@ -177,7 +177,7 @@ impl<'a> Subject<'a> {
     /// Runs one tick of a loop: the pose `dt_ns` after the previous one.
     ///
     /// # Errors
-    /// The failure to answer.
+    /// [`Trouble`] with the kind of the failure and its pose.
     pub fn advance(&mut self, pose: Pose, twist: Twist, dt_ns: u64) -> Result<Output, Trouble> {
         let input = self.input(pose, twist, dt_ns);
         if pose.is_finite() {
@@ -192,7 +192,7 @@ impl<'a> Subject<'a> {
         Input { demand: self.demand, ..Input::at_rest(pose) }
     }
 
-    /// Returns the input of the next tick.
+    /// Returns the input of the next tick, `dt_ns` after the previous one; advances tick and time of this subject.
     pub fn input(&mut self, pose: Pose, twist: Twist, dt_ns: u64) -> Input {
         let Self { time_ns, tick, demand, .. } = *self;
         let input = Input { twist, time_ns, dt_ns, tick, demand, ..Input::at_rest(pose) };
@@ -205,7 +205,7 @@ impl<'a> Subject<'a> {
     /// instance.
     ///
     /// # Errors
-    /// The failure to answer.
+    /// [`Trouble`] with the kind of the failure and its pose.
     pub fn step(&mut self, input: &Input) -> Result<Output, Trouble> {
         let trouble = |kind| Err(Trouble { kind, pose: input.pose });
         let output = match call(&mut self.model, input) {

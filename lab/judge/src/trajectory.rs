@@ -32,12 +32,12 @@ pub struct Trajectory {
     pub rotation: Series,
 }
 
-/// Mean and sines of three coordinates.
+/// Sum of a mean and sines, for three coordinates.
 pub struct Series {
-    /// Mean of the coordinates.
+    /// Mean of the coordinates, in the unit of the series.
     pub mean: DVec3,
     terms: Vec<Term>,
-    /// Angle of a rate of one per unit of the parameter, rad.
+    /// Angle per rate and parameter, rad: 1 for angular frequencies over time, 2π for whole periods per lap.
     scale: f64,
 }
 
@@ -73,7 +73,7 @@ impl Series {
         Self { mean, terms: cosines.into_iter().enumerate().map(term).collect(), scale: TAU }
     }
 
-    /// Returns the value, and its derivative by the parameter.
+    /// Returns the value, and its derivative with respect to the parameter.
     fn at(&self, parameter: f64) -> (DVec3, DVec3) {
         let terms = self.terms.iter();
         terms.fold((self.mean, DVec3::ZERO), |(sum, slope), Term { rate, sine, cosine }| {
@@ -99,7 +99,7 @@ impl Trajectory {
         self.at(parameter).0
     }
 
-    /// Returns the pose with derivatives by the parameter: of the position, m, and of the rotation as an angular
+    /// Returns the pose with derivatives with respect to the parameter: of the position, m, and of the rotation as an angular
     /// velocity, rad.
     #[must_use]
     pub fn at(&self, parameter: f64) -> (Pose, DVec3, DVec3) {

@@ -45,7 +45,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     flotor_core::lock(mutex)
 }
 
-/// Guard: while it exists, this thread is in a call.
+/// Guard of a call: while it exists, its thread counts as being in a step.
 pub struct CallGuard(());
 
 /// Marks this thread as being in `step` with these inputs, until the result is dropped. Takes some tens of nanoseconds.
@@ -101,7 +101,7 @@ pub fn start(limit: Duration, on_stuck: impl FnOnce(StuckStep) + Send + 'static)
     Ok(())
 }
 
-/// Returns a step that has exceeded its limit. `seen`: call of each thread.
+/// Returns a step that has exceeded its limit; `None` if there is none. `seen`: call of each thread at the last poll.
 fn stuck(seen: &mut BTreeMap<usize, LongCall<u64>>, limit: Duration) -> Option<StuckStep> {
     let callers: Vec<Arc<Caller>> = {
         let mut all = locked(&CALLERS);

@@ -39,7 +39,7 @@ impl Handle {
 pub struct Answer {
     /// Force and torque on the hand, N and N·m; zero where there is no answer.
     pub wrench: Wrench,
-    /// Stored energy, J, if the model has one.
+    /// Stored energy, J; `None` if the model reports none.
     pub energy_j: Option<f64>,
     /// Status of the answer.
     pub status: StepStatus,

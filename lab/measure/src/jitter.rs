@@ -23,7 +23,7 @@ pub struct LoopTiming {
     pub lateness_ns: Percentiles,
     /// Number of ticks run.
     pub ticks: u64,
-    /// Number of ticks that started later than a tenth of the period.
+    /// Number of ticks that started late by more than a tenth of the period.
     pub late_ticks: u64,
     /// Number of ticks skipped because their whole period had passed.
     pub missed_ticks: u64,
@@ -60,7 +60,7 @@ pub struct JitterReport {
 pub struct MissedMore {
     /// Missed ticks of the servo less those of the bare loop.
     pub ticks: f64,
-    /// Standard error of `ticks`; grows with the root of the time. `None` for a single pair.
+    /// Standard error of `ticks`; grows with the square root of the time. `None` for a single pair.
     pub standard_error: Option<f64>,
 }
 
@@ -157,7 +157,8 @@ impl Pairs {
         self.sum_of_squares += difference * difference;
     }
 
-    /// Returns the sum; the pairs count as independent: the standard error of a sum of `n` is that of one times the root of `n`.
+    /// Returns the sum over the pairs with its standard error: √n times that of one pair, as the n pairs count as
+    /// independent.
     fn missed_more(&self) -> MissedMore {
         let variance = (self.sum_of_squares - self.sum * self.sum / self.count) / (self.count - 1.0);
         let standard_error = (self.count > 1.0).then(|| (self.count * variance.max(0.0)).sqrt());

@@ -1,4 +1,5 @@
-//! `--bless`: replaces expected numbers in test files by measured ones; prints each change, and each failure beyond its reach.
+//! `--bless`: replaces expected numbers in test files by measured ones; prints each change, and each failure that a new
+//! number cannot remove.
 
 use crate::bound::Bound;
 use crate::case::{Case, Check};
@@ -30,7 +31,7 @@ pub(crate) fn bless(
         let own: Vec<usize> =
             (0..cases.len()).filter(|index| std::ptr::eq(cases[*index].file, file)).collect();
         let mut text = file.text.clone();
-        // From the end on: earlier positions stay valid after a change.
+        // From the end on, so that earlier positions stay valid after a change.
         let mut near: Vec<&Expectation> =
             file.expect.iter().filter(|expected| matches!(expected.bound, Bound::Near { .. })).collect();
         near.sort_by_key(|expected| std::cmp::Reverse(expected.at));

@@ -18,7 +18,8 @@ pub(crate) enum Bound {
 }
 
 impl Bound {
-    /// Parses a bound; `None` for a table without keys of a bound, which is a level of the path.
+    /// Parses a bound; `None` for a table without a key of a bound, which is a level of the path. The error is a
+    /// message.
     pub(crate) fn read(value: &toml::Value) -> Result<Option<Self>, String> {
         const KEYS: [&str; 4] = ["min", "max", "value", "within"];
         let table = match value {

@@ -299,7 +299,8 @@ fn stress(flotor: &Flotor, file: &TestFile, models: &[Model], outcome: &mut Outc
     failing
 }
 
-/// Returns the failure of a stress test's measure whose verdict does not meet the demand or is missing.
+/// Returns the failure of a stress test's measure whose verdict does not meet the demand or is missing; `None` if it
+/// meets the demand.
 fn measure(json: &Value, id: &str, demand: MeasureDemand) -> Option<Failure> {
     let measures = json.get("measures").and_then(Value::as_array);
     let has_id = |measure: &&Value| measure.get("id").and_then(Value::as_str) == Some(id);

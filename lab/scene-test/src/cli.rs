@@ -246,7 +246,8 @@ fn probe<'f>(flotor: &Flotor, jobs: usize, cases: &[Case<'f>]) -> Result<Vec<Kno
     Ok(known)
 }
 
-/// Evaluates a trial run: an error if the file is wrong, the reason if the plugin is.
+/// Evaluates a trial run. Returns an error if the file is wrong, and the reason why the models are unknown if a plugin
+/// fails.
 fn models_of(
     file: &TestFile,
     answer: Result<ProcessResult, String>,
@@ -283,8 +284,8 @@ fn models_of(
     Ok(Ok(models(&json)))
 }
 
-/// Applies `work` to each item on `jobs` threads; returns the results in order. If threads cannot be started, this one
-/// does the rest.
+/// Applies `work` to each item on `jobs` threads; returns the results in order. If threads cannot be started, the
+/// calling thread processes the remaining items.
 fn in_parallel<T: Sync, R: Send>(jobs: usize, items: &[T], work: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let next = AtomicUsize::new(0);
     let done = Mutex::new(Vec::new());

@@ -48,7 +48,7 @@ pub(crate) struct Expectation {
     pub(crate) bound: Bound,
 }
 
-/// Other settings that must give equal numbers.
+/// Other settings, and the numbers that must agree between both runs.
 #[derive(Debug)]
 pub(crate) struct Reference {
     pub(crate) set: Vec<(String, String)>,

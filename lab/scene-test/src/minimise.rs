@@ -8,9 +8,9 @@ use serde_json::Value;
 /// Longest run in the search for a crash, ticks: a crashed run has no summary with its length.
 const LONGEST: u64 = 1 << 20;
 
-/// Returns the arguments of the shortest run of a case, with its settings, that has the same fault: the run did not
-/// end, ended early, or has a plugin in another health. `None` for a number, which depends on the whole run, and for a
-/// run that timed out, which is not repeated.
+/// Returns the arguments of the shortest run of a case, with its settings, that has the same fault: the run crashed or
+/// ended early, or the health of a plugin is not as expected. `None` for a failed number, which depends on the whole
+/// run, and for a run that timed out, which is not repeated.
 pub(crate) fn shortest(
     flotor: &Flotor,
     case: &Case<'_>,
@@ -24,7 +24,7 @@ pub(crate) fn shortest(
     let fails = |duration: &str| {
         let judged = run(flotor, case, *seed, set, Some(duration));
         judged.failures.iter().any(|other| {
-            // A shorter run may stop before its end.
+            // A shorter run may stop early for another reason.
             let is_same_word = other.what != "end" || other.got == failure.got;
             is_same_word && (&other.what, &other.expected) == (&failure.what, &failure.expected)
         })
@@ -44,7 +44,8 @@ fn is_fault(failure: &Failure) -> bool {
     is_of_the_run || ended_early || failure.what.starts_with("plugins.") && failure.what.ends_with(".health")
 }
 
-/// Returns the smallest number of ticks that fails.
+/// Returns the smallest number of ticks that fails, by bisection below `whole` or, without it, by doubling up to
+/// [`LONGEST`].
 fn first_failing(whole: Option<u64>, mut fails: impl FnMut(u64) -> bool) -> Option<u64> {
     if fails(1) {
         return Some(1);

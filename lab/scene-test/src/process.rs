@@ -20,28 +20,29 @@ pub(crate) struct ProcessResult {
     /// Exit code; `None` if a signal ended the process.
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
-    /// Last line of standard error, or the process's end if it is empty.
+    /// Last line of standard error that starts with `error: `, else the last line, else the end of the process.
     pub(crate) error: String,
 }
 
 impl ProcessResult {
-    /// Parses the JSON on standard output.
+    /// Parses the JSON on standard output; `None` if it is not valid.
     pub(crate) fn json(&self) -> Option<Value> {
         serde_json::from_str(&self.stdout).ok()
     }
 }
 
 impl Flotor {
-    /// Program beside this one.
+    /// `flotor`, in the folder of this program.
     const PROGRAM: SeparateProgram<'static> =
         SeparateProgram { program: "flotor", built: Built::WithThis, build: "cargo build --release" };
 
-    /// Checks that the program exists, for one error instead of one in every case.
+    /// Creates a runner with a timeout per process. Checks that the program exists, so that a missing program is one
+    /// error, not an error of every case.
     pub(crate) fn with_limit(limit: Duration) -> Result<Self, CommandError> {
         Self::PROGRAM.command().map(|_| Self { limit })
     }
 
-    /// Runs a command.
+    /// Runs `flotor` with `arguments`, and `input` on standard input; kills the process after the time limit.
     ///
     /// # Errors
     /// A message if the program could not be started, or timed out and was killed.
@@ -59,10 +60,10 @@ impl Flotor {
         })
     }
 
-    /// Runs a command and reads its answer from the JSON on standard output.
+    /// Runs `flotor` with `arguments` and parses the JSON on its standard output.
     ///
     /// # Errors
-    /// The reason without an answer: see [`Flotor::run`], or the process's last error.
+    /// A message: see [`Flotor::run`], or the last line of standard error if there is no valid JSON.
     pub(crate) fn answer<T: DeserializeOwned, I: AsRef<OsStr>>(
         &self,
         arguments: impl IntoIterator<Item = I>,

@@ -11,15 +11,15 @@
 
 use crate::{Real, polynomial};
 
-/// Versine `1 - cos` of 60 degrees: beyond it the measures only continue smoothly.
+/// Versine `1 - cos` of 60 degrees: above it the measures are smooth but no longer equal to the angle.
 pub const TRUSTED_VERSINE: f64 = 0.5;
 
 /// Coefficients of `angle² / c` by powers of `c = 1 - cos`: `2^(n+2) / ((n+1)² binomial(2n+2, n+1))`, `n = 0, 1, ...`.
 const SQUARE_SERIES: [f64; 6] = series(2.0, true);
-/// Coefficients of `angle / sin` by powers of `c`: `2^n n!² / (2n+1)!`. Two more terms than above give the same accuracy.
+/// Coefficients of `angle / sin` by powers of `c`. Two more terms than in [`SQUARE_SERIES`] give the same accuracy.
 const TWIST_SERIES: [f64; 8] = series(1.0, false);
 
-/// Computes either series from the quotients of successive coefficients.
+/// Computes a series from the quotients of successive coefficients.
 const fn series<const TERMS: usize>(first: f64, is_square: bool) -> [f64; TERMS] {
     let mut coefficients = [first; TERMS];
     let mut i = 1;
@@ -37,7 +37,7 @@ const fn series<const TERMS: usize>(first: f64, is_square: bool) -> [f64; TERMS]
 pub struct SquaredAngle<R = f64> {
     /// Squared angle `angle²` (rad²).
     pub value: R,
-    /// Derivative by `1 - cos angle`, two at zero.
+    /// Derivative of `value` with respect to `1 - cos angle`; 2 at zero.
     pub slope: R,
 }
 
@@ -46,7 +46,7 @@ pub struct SquaredAngle<R = f64> {
 pub struct Twist<R = f64> {
     /// Angle (rad); odd, and zero again at half a turn.
     pub value: R,
-    /// Derivative by the true angle, one at zero.
+    /// Derivative of `value` with respect to the true angle; 1 at zero.
     pub slope: R,
 }
 

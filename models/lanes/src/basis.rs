@@ -108,7 +108,7 @@ impl Legendre {
     }
 }
 
-/// Returns node `i`, ascending, and its weight of the Gauss rule with `count` nodes on -1..1.
+/// Returns node `i`, in ascending order, and its weight in the Gauss-Legendre rule with `count` nodes on -1..1.
 pub fn gauss_legendre(count: usize, i: usize) -> (f64, f64) {
     let legendre = |t| {
         let mut polynomial = Legendre::at(t);

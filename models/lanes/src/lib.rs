@@ -10,7 +10,7 @@
 //!
 //! [`angle`] computes squared angles and twists, [`arctangent`] angles from sides, [`saturation`] limits a quantity below a pole:
 //! polynomials over [`Real`], without the functions of a math library. [`entire`] and [`stability`] are the functions of a loaded column.
-//! [`chebyshev`] fits polynomials, [`basis`] has those of a field along a rod, and [`matrix`] solves small symmetric systems.
+//! [`chebyshev`] fits polynomials, [`basis`] has polynomials of a field along a rod, and [`matrix`] solves small symmetric systems.
 //!
 //! The lanes come from the crate `pulp`, which detects the instruction set of the machine at run time.
 
@@ -27,16 +27,17 @@ pub mod matrix;
 pub mod saturation;
 pub mod stability;
 
-/// Marks functions `#[inline(always)]`. Only inlined into code compiled for an instruction set do lane functions use
-/// its instructions. With `#[inline]` alone a batch takes ten times as many (`energy` 3436 a pose instead of 326,
-/// `closed-form` 1961 instead of 192, tests/instructions); this applies to the laws over [`Real`] as well.
+/// Marks functions `#[inline(always)]`. Lane functions use the instructions of an instruction set only if they are
+/// inlined into code compiled for that set. With `#[inline]` alone a batch executes ten times as many instructions (per
+/// pose 3436 instead of 326 for `energy`, 1961 instead of 192 for `closed-form`; tests/instructions). The same applies
+/// to the laws over [`Real`].
 macro_rules! in_lanes {
     ($($(#[$meta:meta])* $visibility:vis fn $name:ident $arguments:tt -> $result:ty $body:block)*) => {
         $($(#[$meta])* #[inline(always)] $visibility fn $name $arguments -> $result $body)*
     };
 }
 
-/// Real number, or one per lane. All methods are real-time: bounded, no allocation.
+/// Real number, or one real number per lane. All methods are real-time: bounded, no allocation.
 pub trait Real:
     Copy
     + Neg<Output = Self>
@@ -51,7 +52,7 @@ pub trait Real:
     /// Truth value per lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
 
-    /// Fills as many lanes as `self` has with a value.
+    /// Returns `value` in every lane of `self`.
     #[must_use]
     fn like(self, value: f64) -> Self;
 
@@ -382,8 +383,9 @@ impl<R: Real> Real for Pair<R> {
     }
 }
 
-/// Evaluates a polynomial, by powers from the constant on, and its derivative: four terms or more, an even number. Even
-/// and odd powers separately: short dependency chains. Real-time: bounded, no allocation, no branch.
+/// Returns a polynomial and its derivative at `x`. `powers`: coefficients from the constant on, an even number of at
+/// least four. Even and odd powers are summed separately, for short dependency chains. Real-time: bounded, no
+/// allocation, no branch.
 #[inline(always)]
 #[must_use]
 pub fn polynomial<R: Real, const TERMS: usize>(x: R, powers: &[f64; TERMS]) -> [R; 2] {

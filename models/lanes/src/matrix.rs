@@ -1,4 +1,4 @@
-//! Small symmetric matrix as a product `L D Lᵀ`, with the number of its negative eigenvalues.
+//! Factorisation `L D Lᵀ` of a small symmetric matrix, with the number of its negative eigenvalues.
 //!
 //! By Sylvester's law of inertia the signs of the pivots `D` are those of the eigenvalues. The number of
 //! negative ones of a second variation is the Morse index of the equilibrium: zero where it is stable.
@@ -9,9 +9,9 @@
 /// Steps of inverse iteration: they give the smallest eigenvalue to a few percent.
 const INVERSE_ITERATIONS: u32 = 3;
 
-/// Factors of a symmetric matrix of order `N`.
+/// Factors `L D Lᵀ` of a symmetric matrix of order `N`.
 ///
-/// The triangle is stored by columns and by rows, each padded with zeros: both substitutions then read consecutive
+/// The triangle `L` is stored by columns and by rows, each padded with zeros: both substitutions then read consecutive
 /// memory over a length known to the compiler.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Factored<const N: usize> {
@@ -27,7 +27,7 @@ impl<const N: usize> Factored<N> {
         Self { column: [[0.0; N]; N], row: [[0.0; N]; N], inverse_pivot: [1.0; N], negative: 0 }
     }
 
-    /// Factors `matrix + shift * unit`; reads only the lower triangle. Real-time: bounded, no allocation.
+    /// Factorises `matrix + shift * unit`; reads only the lower triangle. Real-time: bounded, no allocation.
     pub fn new(matrix: &[[f64; N]; N], shift: f64) -> Self {
         let mut rest = *matrix;
         let mut factored = Self::unit();
@@ -53,8 +53,8 @@ impl<const N: usize> Factored<N> {
         factored
     }
 
-    /// Returns an upper bound of the smallest eigenvalue of a definite matrix, close to it, by inverse iteration from
-    /// the direction of the smallest pivot. Real-time: bounded, no allocation.
+    /// Returns an upper bound of the smallest eigenvalue of a positive definite matrix, within a few percent, by
+    /// inverse iteration from the direction of the smallest pivot. Real-time: bounded, no allocation.
     pub fn smallest_eigenvalue(&self) -> f64 {
         let largest = |(a, x): (usize, f64), (b, y): (usize, f64)| if y > x { (b, y) } else { (a, x) };
         let (softest, _) = self.inverse_pivot.iter().copied().enumerate().fold((0, 0.0), largest);
@@ -69,12 +69,13 @@ impl<const N: usize> Factored<N> {
         1.0 / inverse
     }
 
-    /// Returns the number of negative eigenvalues.
+    /// Returns the number of negative pivots, which is that of negative eigenvalues. Real-time: bounded, no allocation.
     pub fn negative(&self) -> usize {
         self.negative
     }
 
-    /// Returns Newton's step against a slope: minus the solution. Real-time: bounded, no allocation.
+    /// Returns the Newton step for the gradient `slope`: minus the solution of the system. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub fn step_down(&self, slope: &[f64; N]) -> [f64; N] {
         let mut step = self.solve(slope);
@@ -84,7 +85,7 @@ impl<const N: usize> Factored<N> {
         step
     }
 
-    /// Solves the system. Real-time: bounded, no allocation.
+    /// Solves the system for the right-hand side `right`. Real-time: bounded, no allocation.
     #[inline]
     pub fn solve(&self, right: &[f64; N]) -> [f64; N] {
         let mut x = *right;
@@ -107,7 +108,7 @@ impl<const N: usize> Factored<N> {
     }
 }
 
-/// Multiplies a matrix and a vector.
+/// Returns the product of a matrix and a vector.
 #[inline]
 pub fn product<const N: usize, const R: usize>(matrix: &[[f64; N]; R], vector: &[f64; N]) -> [f64; R] {
     std::array::from_fn(|row| dot(&matrix[row], vector))

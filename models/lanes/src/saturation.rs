@@ -10,7 +10,7 @@ use crate::Real;
 pub struct Saturated<R: Real = f64> {
     /// Saturated quantity.
     pub value: R,
-    /// Derivative of `value` by the original quantity.
+    /// Derivative of `value` with respect to the original quantity.
     pub slope: R,
     /// True where the quantity was changed.
     pub saturated: R::Mask,

@@ -29,7 +29,7 @@ impl<R: Real> StabilityFunctions<R> {
     pub fn at(z: R) -> Self {
         let f = EntireFunctions::at(z);
         let inverse = f.g0.inverse();
-        // Computes bow C0 / G0 and sway G1 / G0, and the slope of sway by z from dG0/dz = -G1 / 6 and dG1/dz = -G2 / 10.
+        // Computes bow C0 / G0 and sway G1 / G0, and the derivative of sway with respect to z from dG0/dz = -G1 / 6 and dG1/dz = -G2 / 10.
         let (bow, sway) = (f.c0 * inverse, f.g1 * inverse);
         let sway_slope = sway * sway * (1.0 / 6.0) - f.g2 * inverse * 0.1;
         let regular = Self { bow, sway, writhe: writhe(bow, sway), sway_slope };
@@ -51,9 +51,8 @@ impl<R: Real> StabilityFunctions<R> {
         (self.bow_slope() * self.sway + self.bow * self.sway_slope) * -0.5
     }
 
-    /// Evaluates the functions at a far negative argument through `x coth x`, which does not overflow; nothing cancels
-    /// there.
-    /// once `x coth x` is far from one.
+    /// Evaluates the functions at a large negative argument through `x coth x`, which does not overflow. Nothing
+    /// cancels, as `x coth x` is far from one there.
     #[inline(always)]
     #[must_use]
     pub fn in_strong_tension(z: R) -> Self {

@@ -17,7 +17,7 @@ use flotor_hal::{
     StepStatus, Wrench, choices, math,
 };
 
-/// Workspace limit along each axis, m; beyond it the answer is that at the edge, with status `Clamped`.
+/// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
 const REACH_M: f64 = 1.0;
 
 const KINDS: Choices = choices!["felt", "exerted"];
@@ -31,7 +31,7 @@ pub enum Kind {
     Exerted,
 }
 
-/// Load of one handle.
+/// Load on one handle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Load {
     kind: Kind,
@@ -46,13 +46,13 @@ const DRAWN_HANDLE_M: [f64; 2] = [8.0e-3, 1.0e-3];
 const DRAWN_HALF_M: f64 = 10.0e-3;
 
 impl Load {
-    /// Creates a load of `force_n` newtons; `onset_m`: depth over which a resistance rises.
+    /// Creates a load of `force_n` newtons. `onset_m`: depth `d0` over which the force of a resistance rises, m.
     #[must_use]
     pub fn new(kind: Kind, force_n: f64, onset_m: f64) -> Self {
         Self { kind, force_n, onset_m, drawn: Shape::default() }
     }
 
-    /// Returns the force along z at a height, N. Real-time: bounded, no allocation.
+    /// Returns the force on the hand along z, N, at a height above home, m. Real-time: bounded, no allocation.
     #[must_use]
     pub fn force_n(&self, height_m: f64) -> f64 {
         match self.kind {
@@ -62,7 +62,7 @@ impl Load {
         }
     }
 
-    /// Returns the energy stored at a height, J. Real-time: bounded, no allocation.
+    /// Returns the energy stored at a height above home, J; zero at home. Real-time: bounded, no allocation.
     #[must_use]
     pub fn energy_j(&self, height_m: f64) -> f64 {
         match self.kind {

@@ -3,7 +3,7 @@
 //! The slopes at the knots are Fritsch and Butland's weighted harmonic means (SIAM J. Sci. Stat. Comput. 5:300, 1984):
 //! between two knots the curve is monotone if they are, so the interpolation adds no bump that was not measured.
 
-/// Defect of a list of knots.
+/// Error in a list of knots.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CurveError {
     /// Number of knots below three or above [`Curve::MOST_KNOTS`].
@@ -34,7 +34,7 @@ impl Piece {
     }
 }
 
-/// Curve through knots.
+/// Monotone curve of force over compression, with its energy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     pieces: Vec<Piece>,
@@ -79,14 +79,14 @@ impl Curve {
         Ok(Self { pieces, deepest_m, end: (force_n, slopes[slopes.len() - 1], energy_j) })
     }
 
-    /// Returns the compression of the last knot, the end of the measurement, m.
+    /// Returns the largest measured compression, that of the last knot, m.
     #[must_use]
     pub fn deepest_m(&self) -> f64 {
         self.deepest_m
     }
 
     /// Returns the force against compression, N, and the stored energy, J: along the tangent beyond the last knot, zero
-    /// above the first. Real-time: bounded, no allocation.
+    /// without compression. Real-time: bounded, no allocation.
     #[must_use]
     pub fn at(&self, compression_m: f64) -> (f64, f64) {
         if compression_m <= 0.0 {

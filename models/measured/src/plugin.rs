@@ -11,7 +11,7 @@ use std::path::Path;
 /// Default table: spring 1 of the thesis, 0.68 N/mm, straight over 12 mm.
 const SPRING_1: &str = "compression_mm,force_n\n0,0\n6,4.08\n12,8.16\n";
 
-/// Workspace limit along each axis, m; beyond it the answer is that at the edge, with status `Clamped`.
+/// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
 const REACH_M: f64 = 1.0;
 
 /// Assumed shape of the drawn spring, not in a table of forces: turns, and wire over coil, of spring 1.
@@ -28,7 +28,8 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Returns force along z, N, energy, J, and status at a height. Real-time: bounded, no allocation.
+    /// Returns force on the hand along z, N, stored energy, J, and status, at a height above home, m. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn at(&self, height_m: f64) -> (f64, f64, StepStatus) {
         let reached_m = height_m.clamp(-REACH_M, REACH_M);

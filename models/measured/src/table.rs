@@ -16,10 +16,10 @@ use flotor_hal::{HashLines, Table, TextProblem};
 /// Header line of a table.
 pub const HEADER: &str = "compression_mm,force_n";
 
-/// Parses knots and builds their curve. Not real-time.
+/// Parses a table and builds the curve through its knots. Not real-time.
 ///
 /// # Errors
-/// A [`TextProblem`] with the line that is wrong.
+/// A [`TextProblem`] with the line and the problem.
 pub fn parse(text: &str) -> Result<Curve, TextProblem> {
     let table = Table::parse(text, HashLines::Comments)?;
     if table.columns().join(",") != HEADER {

@@ -14,7 +14,8 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// Pushes the masses of a block out of the ball; returns the force on the ball, N. Real-time: bounded, no allocation.
+    /// Adds the contact forces of the ball to the masses of a block; returns the force on the ball, N. Real-time:
+    /// bounded, no allocation.
     #[inline]
     pub(crate) fn push(
         &self,

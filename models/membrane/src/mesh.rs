@@ -39,7 +39,7 @@ pub struct Sheet {
     pub mass_kg: f64,
     /// Stiffness of a spring, N/m.
     pub stiffness_n_per_m: f64,
-    /// Length of a spring over its rest length; 1 is a slack sheet.
+    /// Initial length of a spring over its rest length; 1 is a slack sheet.
     pub stretch: f64,
 }
 

@@ -17,7 +17,7 @@ use crate::regions::Regions;
 use crate::vectors::Vectors;
 use flotor_hal::DVec3;
 
-/// Forces on every mass from outside the network.
+/// Gravity, drag and contact stiffness: forces on every mass from outside the network.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surroundings {
     /// Gravity downwards, m/s².
@@ -144,8 +144,8 @@ impl Network {
         self.state.regions.activate_all();
     }
 
-    /// Takes one step of `step_s`, at most [`Self::longest_step_s`]; returns the force on the ball, N. Real-time:
-    /// bounded, no allocation.
+    /// Advances the network by a step of `step_s`, at most [`Self::longest_step_s`]; returns the force on the ball, N.
+    /// Real-time: bounded, no allocation.
     pub fn step(&mut self, step_s: f64, ball: Option<&Ball>) -> DVec3 {
         let Self { state: State { positions_m, velocities_m_per_s, regions }, forces_n, .. } = self;
         if let Some(ball) = ball {
@@ -184,7 +184,7 @@ impl Network {
         })
     }
 
-    /// Steps without drag until the masses rest against a ball, at most `most_steps` times; resets all velocities after
+    /// Steps without drag until the masses rest against a ball, at most `most_steps` times. Resets all velocities after
     /// each peak of the kinetic energy (kinetic damping, Cundall 1976). Returns true if the masses rest. Not real-time.
     pub fn relax(&mut self, ball: &Ball, most_steps: usize) -> bool {
         /// Largest movement in a step, in radii of the ball, that counts as rest (root sum of squares of all masses): a

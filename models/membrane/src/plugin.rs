@@ -10,7 +10,7 @@ use flotor_hal::{
 };
 use std::path::Path;
 
-/// Workspace limit along each axis, m; beyond it the answer is that at the edge, with status `Clamped`.
+/// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
 const REACH_M: f64 = 1.0;
 /// Longest time between two steps that is simulated, s: after a longer one the network stands still.
 const LONGEST_TIME_S: f64 = 0.02;
@@ -82,7 +82,7 @@ pub struct Membrane {
 }
 
 impl Membrane {
-    /// Returns the centre of the ball for a position of the handle; at home the ball lies on the sheet.
+    /// Returns the centre of the ball for a position of the handle, m; at home the ball lies on the sheet.
     fn centre_m(&self, handle_m: DVec3) -> DVec3 {
         handle_m + DVec3::Z * self.radius_m
     }

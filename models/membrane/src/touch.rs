@@ -1,10 +1,10 @@
-//! Ball of a hand that moves through a network, and its force field for a faster loop.
+//! Ball in the hand that moves through a network, and its local linear model for a faster loop.
 
 use crate::ball::Ball;
 use crate::network::{Network, State};
 use flotor_hal::DVec3;
 
-/// Network with the ball that touches it.
+/// Network and the ball that touches it.
 #[derive(Debug)]
 pub struct Touch {
     network: Network,
@@ -16,7 +16,7 @@ pub struct Touch {
     after: State,
 }
 
-/// Force on the ball, and its change with the end point of the ball's movement.
+/// Force on the ball, and its derivative with respect to the end point of the ball's movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ForceSlope {
     /// Force on the ball, N.
@@ -26,7 +26,7 @@ pub struct ForceSlope {
 }
 
 impl Touch {
-    /// Creates a ball of a radius, centred at `start_m`. Not real-time.
+    /// Places a ball of radius `radius_m` in a network, centred at `start_m`. Not real-time.
     #[must_use]
     pub fn new(network: Network, radius_m: f64, start_m: DVec3) -> Self {
         let state = network.state().clone();
@@ -45,7 +45,7 @@ impl Touch {
         &mut self.network
     }
 
-    /// Returns the number of steps for a duration.
+    /// Returns the number of network steps for a duration, s; at least 1.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand, see the plugin
     pub fn steps_in(&self, duration_s: f64) -> u32 {
@@ -66,10 +66,10 @@ impl Touch {
         force_n
     }
 
-    /// Moves the ball as [`Self::advance`] does, and measures the slope of the force: repeats the time three times,
+    /// Moves the ball as [`Self::advance`] does, and measures the slope of the force: repeats the movement three times,
     /// each with the ball ending `probe_m` farther along one axis, in its direction of motion. So the slope contains
     /// the network's inertia and compliance over this time, and upcoming contacts. A short probe mistakes the impact of
-    /// a single mass for stiffness. Bounded by four times [`Self::steps_in`], no allocation.
+    /// a single mass for stiffness. Real-time: bounded by four times [`Self::steps_in`], no allocation.
     pub fn measure_slope(&mut self, centre_m: DVec3, duration_s: f64, probe_m: f64) -> ForceSlope {
         let from_m = self.ball.centre_m;
         let way_m = centre_m - from_m;

@@ -25,7 +25,7 @@ pub enum TouchedBody {
     Block {
         /// Dimensions, m.
         size: Size,
-        /// Energy ratios on top (|x|, |y|), on the faces across x (|y|, z) and on those across y (|x|, z).
+        /// Energy ratios on the top (|x|, |y|), on the faces normal to x (|y|, z) and on those normal to y (|x|, z).
         ratios: Box<[Volume; 3]>,
         /// Radius of the rounded edges, m.
         rounding_m: f64,
@@ -50,7 +50,7 @@ pub enum TouchedBody {
     },
 }
 
-/// Force law of one sphere.
+/// Force law of one sphere, for a Young's modulus of 1 Pa.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Atlas {
     /// Radius of the sphere, m.
@@ -65,13 +65,13 @@ pub struct Atlas {
     pub body: TouchedBody,
 }
 
-/// Width over which the energy ratio levels off behind the deepest solved depth, as root of depth over radius.
+/// Width over which the energy ratio levels off behind the deepest solved depth, in `sqrt(d / R)`.
 const RATIO_END: f64 = 0.022;
 
 /// Width over which the stiffness falls to zero behind the deepest solved depth, radii.
 const DEEPEST_FADE: f64 = 0.1;
 
-/// Square of a distance below which it counts as zero, m2: its reciprocal would not be finite.
+/// Square of a distance below which the distance counts as zero, m²: its reciprocal would not be finite.
 const NOTHING_M2: f64 = 1.0e-30;
 
 /// Depth of a contact with its energy ratio.
@@ -84,10 +84,10 @@ struct Touch {
 /// Number of square roots in the smooth minimum of [`least`]; its power is two to this number.
 const SHARPNESS_ROOTS: u32 = 3; // 2^3 = 8
 
-/// Energy, J, its gradient, N, and depth, m, of a contact.
+/// Energy of a contact with its gradient, and depth of the contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
-    /// Stored energy and its gradient.
+    /// Stored energy, J, with its gradient, N; the force on the sphere is minus the gradient.
     pub energy: Jet,
     /// Depth of the undeformed face inside the sphere, m; not positive without contact.
     pub depth_m: f64,
@@ -103,7 +103,8 @@ impl Answer {
 }
 
 impl Atlas {
-    /// Returns the energy of a sphere whose centre is at `centre_m` (finite). Real-time: bounded, no allocation.
+    /// Returns energy, force and depth of the contact with a sphere centred at `centre_m` (finite). Real-time: bounded,
+    /// no allocation.
     #[must_use]
     pub fn answer(&self, centre_m: [f64; 3]) -> Answer {
         let centre = [0, 1, 2].map(|axis| Jet::variable(centre_m[axis], axis));
@@ -129,8 +130,9 @@ impl Atlas {
         Answer { energy: self.unbounded(touch.depth_m) * touch.ratio, depth_m, is_extrapolated }
     }
 
-    /// Returns the energy of the top face of a block alone: zero beyond its edges, fading in over half a radius inside
-    /// them. Its force grows with the depth; that of [`Self::answer`] does not where another face is nearer. Real-time:
+    /// Returns the contact with the top face of a block alone: its energy is zero beyond the edges of the face and
+    /// fades in over half a radius inside them. The force of this contact grows with the depth; that of
+    /// [`Self::answer`] does not where another face is nearer. On other bodies the same as [`Self::answer`]. Real-time:
     /// bounded, no allocation.
     #[must_use]
     pub fn top(&self, centre_m: [f64; 3]) -> Answer {
@@ -156,7 +158,7 @@ impl Atlas {
         [across(0), across(1), self.root(depth_m, ratio)]
     }
 
-    /// Returns the root of depth over radius, limited to the range of the energy ratio.
+    /// Returns the square root of depth over radius, limited to the range of the energy ratio.
     fn root(&self, depth_m: Jet, ratio: &Volume) -> Jet {
         let value = (depth_m.value / self.radius_m).sqrt();
         ease_at(depth_m.chain(value, 0.5 * value / depth_m.value), ratio.range(2).1, RATIO_END)

@@ -1,4 +1,4 @@
-//! One-dimensional tools: nodes of finite elements, quadrature rules, Lagrange polynomials.
+//! One-dimensional numerics: nodes of finite elements, quadrature rules, Lagrange polynomials.
 
 /// Quadrature rule on -1..1.
 #[derive(Clone, Debug)]
@@ -42,7 +42,7 @@ fn roots(count: usize, function: impl Fn(f64) -> f64) -> Vec<f64> {
     found
 }
 
-/// Returns Gauss's rule, exact for polynomials of degree `2 count - 1`; `count` at least 2. Not real-time.
+/// Returns the Gauss-Legendre rule, exact for polynomials of degree `2 count - 1`; `count` at least 2. Not real-time.
 #[must_use]
 pub fn gauss(count: usize) -> Rule {
     let points = roots(count, |x| legendre(count, x).0);

@@ -18,7 +18,7 @@ use crate::table::Table;
 /// Number of forces solved for at once.
 const BATCH: usize = 8;
 
-/// Body with its factored stiffness.
+/// Body with the Cholesky factors of its stiffness matrix.
 #[derive(Debug)]
 pub struct Body<'a> {
     mesh: &'a Mesh,
@@ -48,10 +48,11 @@ pub fn unevenness_m(mesh: &Mesh) -> f64 {
     above.chain(beside).fold(0.0, f64::max)
 }
 
-/// Solves for a plate bonded to the touched face of a mesh; returns also the estimated relative error. Not real-time.
+/// Solves for the stiffness of a plate bonded to the touched face of a mesh; returns also its estimated relative error.
+/// Not real-time.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn plate(mesh: &Mesh, lame: Lame) -> Result<(RigidPatch, f64), NotPositive> {
     let (patch, displacement) = plate_modes(mesh, lame)?;
     let errors = twice_error_j(&MeshStiffness { mesh, lame }, &displacement, MODES);
@@ -60,10 +61,11 @@ pub fn plate(mesh: &Mesh, lame: Lame) -> Result<(RigidPatch, f64), NotPositive> 
     Ok((patch, error))
 }
 
-/// Solves for a plate bonded to a mesh's touched face; returns also all nodal displacements by mode. Not real-time.
+/// Solves for the stiffness of a plate bonded to a mesh's touched face; returns also all nodal displacements by mode.
+/// Not real-time.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn plate_modes(mesh: &Mesh, lame: Lame) -> Result<(RigidPatch, Vec<f64>), NotPositive> {
     let mut hold: Vec<Hold> = mesh.fixed.iter().map(|&f| if f { Hold::Fixed } else { Hold::Free }).collect();
     mesh.touched
@@ -74,10 +76,10 @@ pub fn plate_modes(mesh: &Mesh, lame: Lame) -> Result<(RigidPatch, Vec<f64>), No
 }
 
 impl<'a> Body<'a> {
-    /// Factors the stiffness of a mesh. Not real-time.
+    /// Assembles and factorises the stiffness matrix of a mesh. Not real-time.
     ///
     /// # Errors
-    /// [`NotPositive`] if the numbers do not describe a solid.
+    /// [`NotPositive`] if the parameters do not describe an elastic solid.
     pub fn new(mesh: &'a Mesh, solid: HalfSpace) -> Result<Self, NotPositive> {
         let lame = Lame::new(solid.youngs_modulus_pa, solid.poisson_ratio);
         let fixed = mesh.fixed.iter().map(|&fixed| [fixed; 3]).collect();
@@ -110,7 +112,8 @@ impl<'a> Body<'a> {
         best
     }
 
-    /// Tabulates the remainder between all points of a grid, each moved onto the face by `nearest`. Not real-time.
+    /// Tabulates the remainder, m/N, for all pairs of points of a grid; `nearest` moves each point onto the face. Not
+    /// real-time.
     #[must_use]
     pub fn table(&self, nodes_m: [Vec<f64>; 2], nearest: impl Fn([f64; 2]) -> [f64; 2]) -> Table {
         let points: Vec<[f64; 2]> =
@@ -150,7 +153,7 @@ impl<'a> Body<'a> {
             .collect()
     }
 
-    /// Returns the remainder at all nodes of three unit forces at each source.
+    /// Returns the remainder displacement of all nodes, m/N, under unit forces along x, y and z at each source.
     fn displacement(&self, sources_m: &[[f64; 2]]) -> Vec<f64> {
         let columns = 3 * sources_m.len();
         let mut values = vec![0.0; 3 * self.mesh.nodes_m.len() * columns];

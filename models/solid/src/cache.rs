@@ -71,7 +71,7 @@ fn kept(description: &str) -> Option<Vec<f64>> {
     latest.iter().find(|(other, _)| other == description).map(|(_, numbers)| numbers.clone())
 }
 
-/// Returns the numbers of a description, if cached and intact.
+/// Returns the numbers of a description; `None` if they are not cached, or damaged. Not real-time.
 #[must_use]
 pub fn load(description: &str) -> Option<Vec<f64>> {
     if let Some(numbers) = kept(description) {
@@ -80,7 +80,7 @@ pub fn load(description: &str) -> Option<Vec<f64>> {
     decode(description, &fs::read(file(description)?).ok()?)
 }
 
-/// Stores numbers in memory and on disk. Ignores a failure: the next start prepares again.
+/// Stores numbers in memory and on disk. Ignores a failure: the next start prepares again. Not real-time.
 pub fn store(description: &str, numbers: &[f64]) {
     keep(description, numbers);
     let Some(path) = file(description) else { return };

@@ -93,8 +93,8 @@ impl Kind {
         nodes
     }
 
-    /// Returns the shape functions of all nodes at a point of the reference element, with their slopes. A tetrahedron's
-    /// corners are the origin and the unit points, a brick is -1..1.
+    /// Returns the shape functions of all nodes at a point of the reference element, with their gradients there. The
+    /// corners of the tetrahedron are the origin and the unit points, the brick is -1..1.
     #[must_use]
     pub fn shapes(self, at: [f64; 3]) -> Vec<(f64, [f64; 3])> {
         match self {
@@ -168,8 +168,8 @@ pub struct Geometry<'a> {
 }
 
 impl Geometry<'_> {
-    /// Returns the slopes of the shape functions along x, y, z, 1/m, and the Jacobian determinant, m3: not positive in
-    /// an inverted element.
+    /// Returns the gradients of the shape functions, 1/m, and the Jacobian determinant, m³ (zero or negative in an
+    /// inverted element), at reference coordinates.
     #[must_use]
     pub fn slopes(&self, at: [f64; 3]) -> (Vec<[f64; 3]>, f64) {
         let shapes = self.kind.shapes(at);
@@ -195,7 +195,7 @@ impl Geometry<'_> {
         (slopes, determinant)
     }
 
-    /// Returns the stiffness, N/m: a square matrix by columns, three unknowns to a node.
+    /// Returns the stiffness matrix, N/m: column-major, three degrees of freedom per node.
     #[must_use]
     pub fn stiffness(&self, lame: Lame) -> Vec<f64> {
         let count = self.kind.nodes();
@@ -223,8 +223,8 @@ impl Geometry<'_> {
     }
 }
 
-/// Returns the shape functions of a face (3 corners or 4, then the middles of its edges) with their slopes. A
-/// triangle's corners are the origin and the unit points, a square is -1..1.
+/// Returns the shape functions of a face (3 corners or 4, then the middles of its edges) with their gradients. The
+/// corners of a triangle are the origin and the unit points, a square is -1..1.
 #[must_use]
 pub fn face_shapes(corners: usize, at: [f64; 2]) -> Vec<(f64, [f64; 2])> {
     let [x, y] = at;

@@ -1,4 +1,4 @@
-//! Meshes round cylinders with bricks whose edges follow the rim.
+//! Mesh of a round cylinder: bricks whose edges follow the rim.
 
 use crate::cells::Kind;
 use crate::grid::graded;
@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 impl Mesh {
-    /// Meshes a round cylinder, top touched and about the origin, bottom fixed: bricks whose edges follow the rim, `m`
-    /// times `m` of them in a square in the middle. Lengths in m. Not real-time.
+    /// Meshes a round cylinder with its fixed bottom below and the middle of its touched top at the origin. The bricks
+    /// follow the rim; in the middle there is a square of `m` times `m` bricks. Lengths in m. Not real-time.
     ///
     /// # Errors
     /// [`MeshError::Inverted`] if the numbers do not describe a cylinder.

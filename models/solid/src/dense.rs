@@ -15,8 +15,9 @@ pub struct NotPositive {
     pub pivot: usize,
 }
 
-/// Eliminates the first `eliminated` of `size` unknowns of a symmetric matrix, lower triangle by columns: its first
-/// columns become the Cholesky factor, the rest the Schur complement; above the diagonal is scratch. Not real-time.
+/// Eliminates the first `eliminated` of `size` unknowns of a symmetric matrix, of which the lower triangle is given,
+/// column-major: its first columns become the Cholesky factor, the rest the Schur complement; entries above the
+/// diagonal are overwritten. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] with the first pivot that is zero, negative or NaN.
@@ -54,7 +55,7 @@ fn factor_panel(matrix: &mut [f64], size: usize, first: usize, last: usize) -> R
     Ok(())
 }
 
-/// Subtracts the product of the panel and its transpose from the columns behind it.
+/// Updates the trailing submatrix: subtracts the product of the panel and its transpose (lower triangle only).
 fn update_rest(matrix: &mut [f64], size: usize, first: usize, last: usize, packed: &mut Vec<[f64; TILE]>) {
     let (width, rows) = (last - first, size - last);
     let tiles = rows.div_ceil(TILE);
@@ -93,7 +94,7 @@ fn multiply_tiles(left: &[[f64; TILE]], right: &[[f64; TILE]]) -> [[f64; TILE]; 
     sums
 }
 
-/// Solves `A x = b` with the factor of all of `A`, for one right side in place. Not real-time.
+/// Solves `A x = b` for one right-hand side, in place, with the complete Cholesky factor of `A`. Not real-time.
 pub fn solve(factor: &[f64], size: usize, right: &mut [f64]) {
     for column in 0..size {
         let value = right[column] / factor[column * size + column];

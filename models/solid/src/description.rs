@@ -52,7 +52,7 @@ pub enum Tool {
     },
     /// Plate bonded to the whole of a face.
     Plate,
-    /// The same on linear tetrahedra, for comparison.
+    /// Plate bonded to a face of a body of linear tetrahedra, for comparison.
     LinearPlate,
     /// Flat punch on part of the top face.
     Punch {

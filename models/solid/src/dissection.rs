@@ -8,7 +8,7 @@
 use crate::dense::{self, NotPositive};
 use crate::grid::{Elements, Grid, Lame};
 
-/// Source of elements, their nodes and their stiffness.
+/// Finite-element model to assemble: elements with their nodes and stiffness matrices.
 pub trait Assembly {
     /// Returns the number of nodes.
     fn node_count(&self) -> usize;
@@ -16,9 +16,9 @@ pub trait Assembly {
     fn element_count(&self) -> usize;
     /// Returns the nodes of an element.
     fn nodes(&self, element: usize) -> Vec<usize>;
-    /// Returns the stiffness of an element, N/m: by columns, three unknowns to a node.
+    /// Returns the stiffness matrix of an element, N/m: column-major, three degrees of freedom per node.
     fn stiffness(&self, element: usize) -> Vec<f64>;
-    /// Cuts two or more elements in two.
+    /// Divides a set of two or more elements into two parts.
     fn halves(&self, elements: Vec<usize>) -> [Vec<usize>; 2];
 }
 
@@ -31,7 +31,7 @@ pub struct GridStiffness<'a> {
 }
 
 impl<'a> GridStiffness<'a> {
-    /// Prepares the element integrals. Not real-time.
+    /// Precomputes the element integrals. Not real-time.
     #[must_use]
     pub fn new(grid: &'a Grid, lame: Lame) -> Self {
         Self { grid, elements: Elements::new(grid.order), lame }
@@ -94,19 +94,19 @@ struct Front {
     panel: Vec<f64>,
 }
 
-/// Factored stiffness matrix with fixed unknowns.
+/// Cholesky factors of a stiffness matrix, without the fixed unknowns.
 #[derive(Debug)]
 pub struct Stiffness {
     fronts: Vec<Front>,
     unknowns: usize,
-    /// Fixed components of each node.
+    /// For each node, the components that are fixed.
     fixed: Vec<[bool; 3]>,
 }
 
 /// Stiffness of some elements, condensed to their border.
 struct Rest {
     unknowns: Vec<u32>,
-    /// Lower triangle by columns.
+    /// Lower triangle, column-major.
     matrix: Vec<f64>,
 }
 
@@ -122,10 +122,10 @@ struct Builder<'a, A> {
 }
 
 impl Stiffness {
-    /// Assembles and factors the stiffness. `fixed`: the prescribed components of each node. Not real-time.
+    /// Assembles and factorises the stiffness matrix. `fixed`: prescribed components of each node. Not real-time.
     ///
     /// # Errors
-    /// [`NotPositive`] if the body can move freely, or the material is not elastic.
+    /// [`NotPositive`] if the body can move as a rigid body, or the material is not elastic.
     pub fn new(assembly: &impl Assembly, fixed: Vec<[bool; 3]>) -> Result<Self, NotPositive> {
         let nodes = assembly.node_count();
         let elements: Vec<usize> = (0..assembly.element_count()).collect();
@@ -146,8 +146,8 @@ impl Stiffness {
         Ok(Self { fronts, unknowns: 3 * nodes, fixed })
     }
 
-    /// Solves for `columns` right sides at once, in place: force in, displacement out, all columns of an unknown side
-    /// by side. Fixed unknowns return as zero. Not real-time.
+    /// Solves for `columns` right-hand sides at once, in place: forces, N, are replaced by displacements, m; all
+    /// columns of an unknown lie side by side. Fixed unknowns return as zero. Not real-time.
     pub fn solve(&self, values: &mut [f64], columns: usize) {
         for (node, fixed) in self.fixed.iter().enumerate() {
             for (component, _) in fixed.iter().enumerate().filter(|(_, fixed)| **fixed) {
@@ -304,8 +304,8 @@ fn narrow(index: usize) -> u32 {
 }
 
 /// Subtracts the forces `K u` of a displacement from `forces`, N. With `u` prescribed at fixed nodes, this gives the
-/// right side of a problem whose fixed nodes move; with the whole `u`, the reactions. Elements without displacement are
-/// skipped. Not real-time.
+/// right-hand side of a problem whose fixed nodes move; with the whole `u`, the reactions. Elements without
+/// displacement are skipped. Not real-time.
 pub fn subtract_forces(assembly: &impl Assembly, displacement: &[f64], forces: &mut [f64], columns: usize) {
     for element in 0..assembly.element_count() {
         let nodes = assembly.nodes(element);

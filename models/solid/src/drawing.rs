@@ -74,7 +74,7 @@ pub struct Drawing {
 
 impl Drawing {
     /// Solves for the fields of a picture: none under a sphere, up to a second of work under a punch or a plate.
-    /// `None` if the numbers do not describe a solid.
+    /// `None` if the parameters do not describe an elastic solid.
     #[must_use]
     pub fn new(description: &Description, mesh: Option<&Mesh>) -> Option<Self> {
         let round = match (description.body, description.tool) {

@@ -8,7 +8,7 @@ use crate::mesh::Facet;
 pub struct SurfacePoint {
     /// Position, m.
     pub position_m: [f64; 3],
-    /// Outward normal times area, m2.
+    /// Outward normal times area, m².
     pub normal_m2: [f64; 3],
     /// Weights of the facet's nodes (shape functions).
     pub shares: Vec<f64>,
@@ -58,8 +58,8 @@ impl Facet {
         })
     }
 
-    /// Finds a point given by its x and y: returns the weights of the nodes, and the distance outside the facet (0:
-    /// inside) in the facet's own coordinates. Not real-time.
+    /// Finds a point given by its x and y. Returns the weights of the nodes, and the distance outside the facet (0:
+    /// inside) in the reference coordinates of the facet. Not real-time.
     #[must_use]
     pub fn locate(&self, nodes_m: &[[f64; 3]], at_m: [f64; 2]) -> (Vec<f64>, f64) {
         let mut at = if self.corners == 3 { [1.0 / 3.0; 2] } else { [0.0; 2] };

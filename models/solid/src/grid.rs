@@ -44,7 +44,8 @@ impl Axis {
     }
 }
 
-/// Returns borders from `near` to `far` whose distances grow from `near` by a constant ratio.
+/// Returns the borders of elements from `near` to `far`; each element is longer than the one before by the factor
+/// `ratio`.
 #[must_use]
 pub fn graded(near: f64, far: f64, elements: usize, ratio: f64) -> Vec<f64> {
     let mut step = 1.0;
@@ -97,7 +98,7 @@ impl Lame {
 pub struct Sample {
     /// Indices of the nodes.
     pub nodes: Vec<usize>,
-    /// Shape functions of the nodes at the point.
+    /// Values of the shape functions of the nodes at the point.
     pub shares: Vec<f64>,
 }
 
@@ -184,7 +185,7 @@ impl Grid {
     }
 }
 
-/// Stiffness of single elements from precomputed integrals along each axis.
+/// Stiffness matrices of single elements, from precomputed integrals along each axis.
 #[derive(Clone, Debug)]
 pub struct Elements {
     order: usize,
@@ -217,7 +218,8 @@ impl Elements {
         Self { order, mass, mixed, slope }
     }
 
-    /// Returns the stiffness of a box with sides `size_m`, N/m: square, by columns, three unknowns to a node, nodes x first.
+    /// Returns the stiffness matrix of a box with sides `size_m`, N/m: column-major, three degrees of freedom per node,
+    /// nodes x first.
     #[must_use]
     pub fn stiffness(&self, size_m: [f64; 3], lame: Lame) -> Vec<f64> {
         let side = self.order + 1;

@@ -18,7 +18,7 @@ pub struct HalfSpace {
     pub poisson_ratio: f64,
 }
 
-/// Displacement of three unit forces, with its gradient.
+/// Displacement under three unit forces, with its gradient.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
     /// Displacement along `p`, `q`, `w` (first index) under a unit force along `p`, `q`, `w` (second), m/N; each with
@@ -34,7 +34,7 @@ impl HalfSpace {
         self.youngs_modulus_pa / (2.0 * (1.0 + self.poisson_ratio))
     }
 
-    /// Returns the field of unit forces at the origin, at any other point of the solid.
+    /// Returns the displacement field of unit forces at the origin, evaluated at another point of the solid.
     #[must_use]
     pub fn field(&self, point_m: [f64; 3]) -> Field {
         let nu = self.poisson_ratio;
@@ -62,8 +62,8 @@ impl HalfSpace {
         Field { displacement: displacement.map(|row| row.map(|jet| jet * scale)) }
     }
 
-    /// Returns the displacement of a surface point under a unit *pressure* (N/m2, along each direction) on a polygon, m
-    /// per Pa. `corners_m` run counterclockwise, relative to the point.
+    /// Returns the displacement of a surface point under a uniform traction of 1 Pa along each direction on a polygon,
+    /// m per Pa. `corners_m` run counterclockwise, relative to the point.
     #[must_use]
     pub fn polygon(&self, corners_m: &[[f64; 2]]) -> Block {
         let nu = self.poisson_ratio;

@@ -46,7 +46,7 @@ pub struct Mesh {
     pub nodes_m: Vec<[f64; 3]>,
     /// Volume elements.
     pub elements: Vec<Element>,
-    /// Flag of each node that does not move.
+    /// For each node, true if the node does not move.
     pub fixed: Vec<bool>,
     /// Touched part of the surface.
     pub touched: Vec<Facet>,
@@ -66,7 +66,7 @@ pub enum MeshError {
     Inverted {
         /// Number of the element in the file.
         tag: usize,
-        /// Smallest Jacobian determinant of the element, m3.
+        /// Smallest Jacobian determinant of the element, m³.
         jacobian_m3: f64,
     },
     /// Three elements share a face, or a face of four corners meets two of three.
@@ -350,7 +350,7 @@ fn check_held(elements: &[Element], fixed: &[bool]) -> Result<(), MeshError> {
         .map_or(Ok(()), |index| Err(MeshError::Loose { tag: elements[index].tag }))
 }
 
-/// Stiffness of a mesh of one material.
+/// Stiffness of a mesh of one material, for [`crate::dissection`].
 #[derive(Clone, Copy, Debug)]
 pub struct MeshStiffness<'a> {
     /// Body.

@@ -51,7 +51,7 @@ pub(crate) fn difference(coarse: &RigidPatch, fine: &RigidPatch) -> f64 {
 /// displacement of all nodes under each mode. `X` is relative to the face's centre. Not real-time.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn plate(grid: &Grid, lame: Lame, axis: usize) -> Result<(RigidPatch, Vec<f64>), NotPositive> {
     let last = grid.nodes_along()[axis] - 1;
     let centre = [0, 1, 2].map(|k| {
@@ -86,7 +86,7 @@ pub enum Hold {
 /// real-time.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn plate_on(
     assembly: &impl Assembly,
     hold: impl Fn(usize) -> Hold,

@@ -15,7 +15,7 @@ use flotor_hal::{
 };
 use std::path::Path;
 
-/// Workspace limit along each axis, m; beyond it the wrench is that at the edge, with status `Clamped`.
+/// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
 const REACH_M: f64 = 10.0;
 
 /// Tolerance of an orientation's squared length; equals that of the spring.

@@ -14,7 +14,7 @@ use crate::table::Table;
 const DEEPEST: f64 = 1.2;
 /// Largest solved depth, in radii; a little deeper, so that the law ends smoothly.
 const DEEPEST_SOLVED: f64 = 1.25;
-/// Number of depths, evenly spaced in the root of depth over radius.
+/// Number of depths, evenly spaced in the square root of depth over radius.
 const LEVELS: usize = 14;
 /// Number of depths on the half-space, which is solved once.
 const PROFILE_LEVELS: usize = 30;
@@ -22,7 +22,8 @@ const PROFILE_LEVELS: usize = 30;
 const PROFILE_RINGS: i32 = 10;
 /// Distances of the points of the remainder's table from an edge, in halves of a side.
 const TABLE_SHARES: [f64; 9] = [1.0, 0.8, 0.62, 0.47, 0.34, 0.23, 0.145, 0.08, 0.03];
-/// Positions of the sphere along half a side, from the middle to the end of the ratio's range.
+/// Positions of the sphere along half a side, as fractions of the distance from the middle to the outermost solved
+/// position (twice the rounding before the edge).
 const PLACES: [f64; 9] = [0.0, 0.25, 0.44, 0.59, 0.7, 0.785, 0.86, 0.93, 1.0];
 /// Least distance from the clamped bottom at which the law of a side is solved, in radii: nearer, the elements do not
 /// resolve the bottom's effect on a half-space's compliance.
@@ -49,14 +50,14 @@ pub struct Resolution {
 }
 
 impl Resolution {
-    /// Least preparation.
+    /// Fastest preparation, largest error.
     pub const QUICK: Self = Self { order: 2, rings: 5, bricks: 4 };
-    /// Default.
+    /// Default resolution.
     pub const STANDARD: Self = Self { order: 3, rings: 6, bricks: 6 };
-    /// Least error.
+    /// Slowest preparation, smallest error.
     pub const FINE: Self = Self { order: 4, rings: 8, bricks: 8 };
 
-    /// Returns the elements of the remainder.
+    /// Returns numbers and order of the elements for the remainder.
     #[must_use]
     pub fn fineness(self) -> Fineness {
         Fineness { across: 4, high: 5, order: self.order }
@@ -96,7 +97,7 @@ fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Vec<Contact> {
     contacts
 }
 
-/// Returns the roots of depth over radius at which contacts are solved.
+/// Returns the square roots of depth over radius at which contacts are solved.
 fn roots() -> Vec<f64> {
     (1..=LEVELS).map(|level| DEEPEST_SOLVED.sqrt() * level as f64 / LEVELS as f64).collect()
 }
@@ -138,7 +139,7 @@ fn column(
     ratios
 }
 
-/// Returns Hertz's energy of a sphere of radius one at a root of depth, for a modulus of one.
+/// Returns Hertz's energy of a sphere of radius one at a square root of depth, for a modulus of one.
 fn hertz(poisson_ratio: f64, root: f64) -> f64 {
     8.0 / 15.0 / (1.0 - poisson_ratio * poisson_ratio) * flotor_hal::math::powi(root, 5)
 }
@@ -185,7 +186,7 @@ pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Prepared {
 /// Prepares the law of a sphere on a block. Not real-time: some seconds.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn sphere_on_block(
     poisson_ratio: f64,
     radius_m: f64,
@@ -212,7 +213,7 @@ const BEYOND_PLACES: [f64; 4] = [0.0, 0.4, 0.75, 0.97];
 /// [`crate::several::ExtraCompliance`], for a modulus of 1 Pa. Not real-time: up to some seconds.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn beyond_half_space(
     poisson_ratio: f64,
     size: Size,
@@ -261,7 +262,7 @@ fn around([radius_m, height_m]: [f64; 2]) -> Size {
 /// some seconds.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn sphere_on_mesh(
     mesh: &Mesh,
     body_kind: BodyKind,
@@ -435,7 +436,7 @@ impl Builder<'_> {
         Table::new(self.remainder, face, [&nodes(p), &nodes(q)])
     }
 
-    /// Computes the ratio of the block's energy to that of a half-space, by position and root of depth over radius.
+    /// Computes the ratio of the block's energy to that of a half-space, by position and square root of depth over radius.
     fn ratios(&self, face: Face) -> Volume {
         let [p, q, _] = face.axes();
         let table = self.table(face);

@@ -1,6 +1,6 @@
 //! Flat rigid punch on a half-space or a block: uniform tractions on cells of the contact, refined towards the rim.
 //!
-//! The traction under a rigid punch is singular at its rim, like one over the root of the distance; the cells shrink
+//! The traction under a rigid punch is singular at its rim, like one over the square root of the distance; the cells shrink
 //! with the square of the distance to resolve that. The displacement at the cells' centres is that of the half-space
 //! under uniform tractions, in closed form, plus that of the block's remainder, which is smooth.
 
@@ -140,11 +140,12 @@ impl Outline {
 /// Fineness of the two extrapolated solutions.
 const FINENESS: [usize; 2] = [6, 9];
 
-/// Extrapolates two solutions of [`punch`] at second order. Returns the stiffness at the origin of the surface `z = 0`,
-/// and the relative size of that step, an upper estimate of the error. Not real-time.
+/// Extrapolates two solutions of [`punch`] of different fineness (Richardson, second order). Returns the stiffness at
+/// the origin of the surface `z = 0`, and the relative change by the extrapolation, an upper estimate of the error. Not
+/// real-time.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn extrapolated(
     solid: &HalfSpace,
     remainder: Option<&Table>,
@@ -179,7 +180,7 @@ pub struct Loads {
 /// Solves for the stiffness of a punch at the origin of the surface `z = 0`. Not real-time.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn punch(
     solid: &HalfSpace,
     remainder: Option<&Table>,
@@ -190,10 +191,10 @@ pub fn punch(
     Ok(punch_loads(solid, remainder, outline, bond, fineness)?.0)
 }
 
-/// Solves for the stiffness of a punch like [`punch`], and returns its loads too. Not real-time.
+/// Solves for the stiffness of a punch, as [`punch`] does, and returns the loads of the punch as well. Not real-time.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn punch_loads(
     solid: &HalfSpace,
     remainder: Option<&Table>,

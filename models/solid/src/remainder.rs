@@ -67,7 +67,7 @@ impl Face {
     }
 }
 
-/// Elements along a half side, along the height, and their order.
+/// Numbers of elements along half a side and along the height, and their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fineness {
     /// Elements from the middle to a side.
@@ -85,7 +85,7 @@ const BATCH: usize = 8;
 /// Growth of successive elements from the edges inwards.
 const GRADING: f64 = 1.35;
 
-/// Factored problems of a block.
+/// Factored stiffness matrices of a quarter of a block, one for each parity.
 #[derive(Debug)]
 pub struct Remainder {
     size: Size,
@@ -124,10 +124,10 @@ fn mirror_sign(mirror: usize, axis: usize) -> f64 {
 }
 
 impl Remainder {
-    /// Factors the four problems. Not real-time.
+    /// Factorises the stiffness matrices of the four problems. Not real-time.
     ///
     /// # Errors
-    /// [`NotPositive`] if the numbers do not describe a solid.
+    /// [`NotPositive`] if the parameters do not describe an elastic solid.
     pub fn new(size: Size, solid: HalfSpace, fineness: Fineness) -> Result<Self, NotPositive> {
         let Fineness { across, high, order } = fineness;
         let grid = Grid::new(

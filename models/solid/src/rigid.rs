@@ -23,7 +23,8 @@ impl RigidPatch {
         3 + 3 * i + j
     }
 
-    /// Returns the twelve mode amplitudes of a pose. Real-time: bounded, no allocation.
+    /// Returns the twelve mode amplitudes of a pose: the translation, m, and the entries of `R - I`. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn modes(position_m: DVec3, orientation: DQuat) -> [f64; MODES] {
         let rotation = DMat3::from_quat(orientation);

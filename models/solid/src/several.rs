@@ -1,8 +1,9 @@
 //! Several equal spheres on one handle, each in contact with the same solid.
 //!
-//! Every sphere alone has the energy `E` of [`crate::atlas`]. A contact also lowers the surface under the others: by `C
-//! F` for a vertical force `F`, with the compliance `C` of a half-space between two points of its surface, `(1 - nu^2)
-//! / (pi E r)`, plus the body's addition. With the depressions `w` of the surface under each sphere by all others,
+//! Every sphere alone has the energy `E` of [`crate::atlas`]. A contact also lowers the surface under the other
+//! spheres: by `C F` for a vertical force `F`, with the compliance `C` of a half-space between two points of its
+//! surface, `(1 - nu^2) / (pi E r)`, plus the compliance that the body adds. With the depressions `w` of the surface
+//! under each sphere by all other spheres,
 //!
 //! ```text
 //! F_i = -dE_i/dz (c_i + w_i z),   w_i = sum_j C_ij F_j,   W = sum_i E_i(c_i + w_i z) + 1/2 sum_ij C_ij F_i F_j
@@ -38,14 +39,14 @@ const SECANT_M: f64 = 1.0e-12;
 const ROUNDING: f64 = 1.0e-12;
 
 /// Compliance between places of the top face beyond that of a half-space, for a modulus of 1 Pa: cubic splines through
-/// values between the nodes of a grid.
+/// the values for all pairs of nodes of a grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtraCompliance {
     /// Spline of each node of an axis: one at this node, zero at the others.
     shapes: [Vec<Curve>; 2],
     /// First and last node of each axis, m.
     ends_m: [[f64; 2]; 2],
-    /// Compliance between each two nodes of the grid (x first), m/N.
+    /// Compliance for each pair of nodes of the grid (x first), m/N.
     values: Vec<f64>,
 }
 
@@ -56,7 +57,8 @@ const MOST_NODES: usize = 7;
 type Weights = [[f64; 3]; MOST_NODES * MOST_NODES];
 
 impl ExtraCompliance {
-    /// Interpolates values between each two nodes of a grid (x first); three to seven nodes along an axis. Not real-time.
+    /// Interpolates the values for all pairs of nodes of a grid (x first). `None` unless there are three to seven nodes
+    /// along each axis and a value for each pair. Not real-time.
     #[must_use]
     pub fn new(nodes_m: [&[f64]; 2], values: Vec<f64>) -> Option<Self> {
         let count = nodes_m[0].len() * nodes_m[1].len();
@@ -139,9 +141,10 @@ pub struct Answer {
     pub centres_m: [DVec3; MAX_SPHERES],
     /// Force on each sphere, N.
     pub forces_n: [DVec3; MAX_SPHERES],
-    /// Depth of the face inside each sphere, including the depression by the others; not positive without contact.
+    /// Depth of the face inside each sphere, including the depression by the other spheres, m; not positive without
+    /// contact.
     pub depths_m: [f64; MAX_SPHERES],
-    /// Depression of the surface under each sphere by the others, m.
+    /// Depression of the surface under each sphere by the other spheres, m.
     pub depressions_m: [f64; MAX_SPHERES],
     /// True where the law of some sphere is that of a nearby position.
     pub is_extrapolated: bool,
@@ -150,7 +153,8 @@ pub struct Answer {
 }
 
 impl Spheres {
-    /// Places two to four spheres at the corners of a regular polygon about the handle, across z: two along x. Not real-time.
+    /// Places two to four spheres at the corners of a regular polygon about the handle, normal to z; two spheres lie
+    /// along x. Not real-time.
     #[must_use]
     pub fn new(
         atlas: Atlas,
@@ -230,7 +234,8 @@ impl Spheres {
         answer
     }
 
-    /// Returns the compliance between each two spheres, m/N, and its derivatives by the place of the first.
+    /// Returns the compliance between each two spheres, m/N, and its derivatives with respect to the place of the
+    /// first.
     fn compliance(
         &self,
         centres_m: &[DVec3; MAX_SPHERES],
@@ -267,7 +272,8 @@ impl Spheres {
         (values, slopes)
     }
 
-    /// Solves for the forces on the top alone: returns each sphere's result with the depression under it, and convergence.
+    /// Solves for the forces on the top alone. Returns the contact and the depression of each sphere, and true if the
+    /// forces have converged.
     fn settle(
         &self,
         centres_m: &[DVec3; MAX_SPHERES],
@@ -324,7 +330,7 @@ impl Spheres {
     }
 }
 
-/// Solves a small system with a dominant diagonal by elimination.
+/// Solves a small diagonally dominant linear system by Gaussian elimination, without pivoting.
 fn eliminate(
     mut matrix: [[f64; MAX_SPHERES]; MAX_SPHERES],
     mut right: [f64; MAX_SPHERES],

@@ -48,7 +48,8 @@ impl Focus {
 }
 
 impl Skin {
-    /// Triangulates top and sides of a block, its top about the origin; `steps`: number along x, y, z.
+    /// Triangulates top and sides of a block with the middle of its top at the origin; `steps`: numbers of steps along
+    /// x, y, z.
     #[must_use]
     pub fn block(half_m: [f64; 2], height_m: f64, focus: Focus, steps: [usize; 3]) -> Self {
         let [half_x, half_y] = half_m;
@@ -58,7 +59,8 @@ impl Skin {
         Self::boxed(&x, &y, &z, &[Face::Top, Face::Left, Face::Right, Face::Front, Face::Back])
     }
 
-    /// Triangulates faces of the box between the first and last coordinates, cut at all of them.
+    /// Triangulates the given faces of a box on the grid lines `x`, `y`, `z` (m, ascending); the box spans the first to
+    /// the last line of each.
     #[must_use]
     pub fn boxed(x: &[f64], y: &[f64], z: &[f64], faces: &[Face]) -> Self {
         let mut skin = Self::default();
@@ -104,7 +106,8 @@ impl Skin {
         }
     }
 
-    /// Triangulates a disc about the origin: lines from the focus to even steps of the rim, cut at growing distances.
+    /// Triangulates a disc about the origin: lines from the focus to evenly spaced points of the rim, divided at
+    /// growing distances.
     #[must_use]
     pub fn disc(radius_m: f64, focus: Focus) -> Self {
         /// Largest distance of the focus from the centre, in radii.
@@ -125,7 +128,7 @@ impl Skin {
         skin
     }
 
-    /// Triangulates top and side of a round cylinder, its top about the origin.
+    /// Triangulates top and side of a round cylinder with the middle of its top at the origin.
     #[must_use]
     pub fn cylinder(radius_m: f64, height_m: f64, focus: Focus) -> Self {
         let mut skin = Self::disc(radius_m, focus);
@@ -163,17 +166,17 @@ impl Skin {
 /// Face of a box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Face {
-    /// Upper face across z.
+    /// Upper face, with the normal along z.
     Top,
-    /// Lower face across z.
+    /// Lower face, with the normal along -z.
     Bottom,
-    /// Face across x, positive side.
+    /// Right face, with the normal along x.
     Right,
-    /// Face across x, negative side.
+    /// Left face, with the normal along -x.
     Left,
-    /// Face across y, positive side.
+    /// Back face, with the normal along y.
     Back,
-    /// Face across y, negative side.
+    /// Front face, with the normal along -y.
     Front,
 }
 

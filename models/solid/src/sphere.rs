@@ -1,9 +1,10 @@
 //! Contact solver of a frictionless rigid sphere on a deformed face, on a patch of cells that follows the sphere.
 //!
-//! Each cell carries a pressure along the normal of the sphere *at the displaced cell*, and no cell penetrates:
-//! `|X + u(X) - c| >= R`, `p >= 0`, one of them with equality. The displacement is that of a half-space under uniform loads on square cells, a
-//! table that scales with one over the cell, plus the remainder of the block. A solve alternates between the pressures for
-//! given normals (an active set and a Cholesky factorisation) and the normals for given pressures.
+//! Each cell carries a pressure along the normal of the sphere *at the displaced cell*, and no cell penetrates: `|X +
+//! u(X) - c| >= R`, `p >= 0`, one of them with equality. The displacement is that of a half-space under uniform loads
+//! on square cells, a table inversely proportional to the side of a cell, plus the remainder of the block. A solve
+//! alternates between the pressures for given normals (an active set and a Cholesky factorisation) and the normals for
+//! given pressures.
 
 use crate::dense;
 use crate::half_space::{Block, HalfSpace};
@@ -34,7 +35,7 @@ pub struct Problem<'a> {
     pub smooth: &'a [Block],
 }
 
-/// Result of a solve, and start of the next one.
+/// Result of a solve, and initial guess of the next one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {
     /// Stored energy, J.
@@ -43,7 +44,7 @@ pub struct Contact {
     pub force_n: [f64; 3],
     /// Distance of the farthest cell in contact from the middle, in cells.
     pub reach: f64,
-    /// Largest change of a normal in the last step; zero when converged.
+    /// Largest change of a unit normal in the last step; below 1e-8 when converged.
     pub residual: f64,
     normals: Vec<[f64; 3]>,
     active: Vec<bool>,
@@ -63,7 +64,7 @@ fn times(block: &Block, v: [f64; 3]) -> [f64; 3] {
 }
 
 impl Patch {
-    /// Builds a disc of cells. Not real-time.
+    /// Builds a disc of cells and tabulates the half-space's compliance between them. Not real-time.
     #[must_use]
     pub fn new(solid: &HalfSpace, rings: i32) -> Self {
         let side = -rings..=rings;
@@ -110,8 +111,8 @@ impl Patch {
         &self.kernel[j * (4 * self.rings as usize + 1) + i]
     }
 
-    /// Solves a contact, starting from a nearby one. Without a start it begins with the undeformed contact, and does
-    /// not converge for a sphere deeper than about half its radius. Not real-time.
+    /// Solves a contact, with a nearby solution as initial guess. Without one, the solve starts from the undeformed
+    /// contact, and does not converge for a sphere deeper than about half its radius. Not real-time.
     #[must_use]
     pub fn solve(&self, problem: &Problem<'_>, start: Option<&Contact>) -> Contact {
         let count = self.cells.len();

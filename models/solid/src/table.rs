@@ -3,7 +3,7 @@
 use crate::half_space::Block;
 use crate::remainder::{Face, Remainder};
 
-/// Remainder of a face between all pairs of a grid of points.
+/// Remainder of a face for all pairs of points of a grid.
 #[derive(Clone, Debug)]
 pub struct Table {
     /// Grid coordinates along `p` and `q`, m, ascending.
@@ -19,7 +19,7 @@ pub struct Window {
     shares: [f64; 4],
 }
 
-/// Returns the cubic through the four nodes around a coordinate; constant outside the first and last.
+/// Returns the weights of the cubic through the four nodes around a coordinate; constant outside the first and last.
 #[must_use]
 pub fn window(nodes: &[f64], coordinate: f64) -> Window {
     let count = nodes.len().min(4);
@@ -43,8 +43,8 @@ fn mirrored(half: &[f64]) -> Vec<f64> {
 }
 
 impl Table {
-    /// Solves for all pairs of points. `half_m`: coordinates in the quarter of positive x and y; along `p` from zero
-    /// on, along `q` from zero on (top) or all of them (a side). Not real-time.
+    /// Solves for the remainder of all pairs of grid points. `half_m`: coordinates in the quarter of positive x and y;
+    /// along `p` from zero on, along `q` from zero on (top) or all of them (a side). Not real-time.
     #[must_use]
     pub fn new(remainder: &Remainder, face: Face, half_m: [&[f64]; 2]) -> Self {
         let quarter: Vec<[f64; 2]> =
@@ -87,8 +87,8 @@ impl Table {
         table
     }
 
-    /// Builds a table from the answers at all points of a grid (`p` first) to forces at all of them: by source, then
-    /// target. Not real-time.
+    /// Builds a table from compliances for all pairs of points of a grid (`p` fastest): `answers[source][target]` is
+    /// the displacement of the target per force at the source, m/N. Not real-time.
     #[must_use]
     pub fn of(nodes_m: [Vec<f64>; 2], answers: &[Vec<Block>]) -> Self {
         let mut table = Self { nodes_m, blocks: answers.concat() };

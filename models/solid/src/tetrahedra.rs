@@ -10,7 +10,7 @@ use crate::rigid::RigidPatch;
 /// Not real-time.
 ///
 /// # Errors
-/// [`NotPositive`] if the numbers do not describe a solid.
+/// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub(crate) fn plate(under: &PlateBox, lame: Lame) -> Result<(RigidPatch, f64), NotPositive> {
     let PlateBox { ends_m, axis, cells, .. } = *under;
     let even = |[from, to]: [f64; 2], count: usize| -> Vec<f64> {
@@ -34,7 +34,7 @@ pub(crate) fn plate(under: &PlateBox, lame: Lame) -> Result<(RigidPatch, f64), N
     Ok((own, error))
 }
 
-/// Grid of order one whose cells are six tetrahedra each, about one diagonal.
+/// Grid of order one whose cells are divided into six tetrahedra each, about one diagonal.
 #[derive(Clone, Debug)]
 pub struct Tetrahedra<'a> {
     cells: GridStiffness<'a>,

@@ -37,13 +37,13 @@ impl Default for Batch {
 }
 
 impl Batch {
-    /// Uses the best instruction set of this machine. Not real-time.
+    /// Creates an evaluator with the best instruction set of this machine. Not real-time.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Uses a given instruction set, for comparisons.
+    /// Creates an evaluator with a given instruction set, for comparisons.
     #[must_use]
     pub fn on(instructions: Arch) -> Self {
         Self { instructions }

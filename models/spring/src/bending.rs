@@ -122,13 +122,13 @@ impl Bending {
 #[derive(Clone, Copy)]
 pub(crate) struct BendingEnergy<R: Real> {
     pub(crate) energy_j: R,
-    /// Derivatives by the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
+    /// Derivatives with respect to the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
     pub(crate) by_squares: [R; 3],
-    /// Derivative by the length of the chord.
+    /// Derivative with respect to the length of the chord.
     pub(crate) by_length: R,
     /// Writhe `kt`, see the module.
     pub(crate) writhe: R,
-    /// Derivative of the writhe by the length of the chord.
+    /// Derivative of the writhe with respect to the length of the chord.
     pub(crate) writhe_slope: R,
     /// Lanes in which the argument was saturated short of the pole.
     pub(crate) saturated: R::Mask,

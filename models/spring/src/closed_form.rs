@@ -67,7 +67,7 @@ impl ClosedForm {
 
     /// Returns the wrench on the hand at a pose; this law has no energy. Real-time: bounded, no allocation.
     ///
-    /// Total over all poses:
+    /// Defined for every pose:
     /// - past the solid length the law continues, without coil contact;
     /// - upper plate not above the lower one: the formulas are continued, [`Validity::Clamped`](crate::validity::Validity);
     /// - near buckling (`G0` below 0.3) and past it: the argument is saturated short of the pole, so that the wrench stays

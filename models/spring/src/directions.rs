@@ -7,7 +7,8 @@
 //! S = e - (k + t)/2        D = (t - k)/2        m = 1 + pi²/(pi² - z)
 //! ```
 //!
-//! A bow grows by the magnification `m` as the argument `z` of [`flotor_lanes::entire`] comes close to buckling.
+//! A bow grows by the magnification `m` as the argument `z` of [`flotor_lanes::entire`] comes close to buckling. The
+//! angle by which the upper plate is twisted about its normal is `w`.
 
 use std::f64::consts::PI;
 
@@ -25,7 +26,7 @@ pub(crate) const DEEP_ARGUMENT: f64 = 7.5;
 const UPRIGHT: f64 = 0.4;
 const LYING: f64 = 0.2;
 
-/// Smooth step from 0 to 1 between two bounds of a quantity, with its derivative by the quantity.
+/// Smooth step from 0 to 1 between two bounds of a quantity, with its derivative with respect to the quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Passage {
     pub(crate) value: f64,
@@ -127,9 +128,9 @@ pub(crate) struct Slopes {
 /// Derivatives of a function of the pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gradient {
-    /// Derivatives by the position of the upper plate.
+    /// Derivatives with respect to the position of the upper plate.
     pub(crate) by_position_per_m: DVec3,
-    /// Derivatives by a small rotation of the upper plate about each axis.
+    /// Derivatives with respect to a small rotation of the upper plate about each axis.
     pub(crate) by_rotation_per_rad: DVec3,
 }
 
@@ -204,7 +205,7 @@ impl Directions {
         (product(passages.len()), self.turned(by_chord, by_upper, -twist * self.twist[1], 0.0))
     }
 
-    /// Returns the gradient of a function by the pose.
+    /// Returns the gradient of a function with respect to the pose.
     #[inline(always)]
     pub(crate) fn gradient(&self, slopes: &Slopes) -> Gradient {
         let Slopes { by_sway, by_bow, by_twist, mut by_argument, by_magnification, by_length_per_m } =

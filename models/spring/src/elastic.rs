@@ -95,7 +95,7 @@ impl Elastic {
         }
     }
 
-    /// Returns the weight of the exact rod in a law that blends into it, 0 to 1.
+    /// Returns the weight of the exact rod in a law that blends into it, 0 to 1; `None` for other laws.
     pub(crate) fn rod_share(&self) -> Option<f64> {
         if let Self::RodBlend(held) = self { Some(held.law.share()) } else { None }
     }

@@ -40,7 +40,7 @@ use flotor_lanes::{Real, Vector};
 /// Smallest `1 + k.t`. The twist has no meaning for a plate turned upside down; this is 177.4 degrees.
 const LEAST_OVERTURN: f64 = 1e-3;
 
-/// The conservative law of one spring, its constants prepared.
+/// Conservative law of one spring, with prepared constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyForm {
     free_length_m: f64,
@@ -82,7 +82,7 @@ impl EnergyForm {
 
     /// Returns the wrench on the hand and the stored energy at a pose. Real-time: bounded, no allocation.
     ///
-    /// Total over all poses:
+    /// Defined for every pose:
     /// - past the solid length the law continues, without coil contact;
     /// - beyond [`KNEE`](crate::shape::KNEE) (close to buckling and past it), or where an angle between normals
     ///   and chord or the twist exceeds 60 degrees, up to an upper plate below the lower one: still the
@@ -118,7 +118,7 @@ impl Law for EnergyForm {
         let BendingEnergy { by_squares, writhe, writhe_slope, saturated, .. } = bending;
 
         let Directions { chord: e, upper: t, .. } = directions;
-        // Derivatives by the versines of lower normal to chord, upper normal to chord, lower to upper normal.
+        // Derivatives with respect to the versines of lower normal to chord, upper normal to chord, lower to upper normal.
         let by_lower = by_squares[0] * angles[0].slope;
         let by_upper = by_squares[1] * angles[1].slope;
         let by_plates = by_squares[2] * angles[2].slope;

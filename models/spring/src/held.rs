@@ -49,9 +49,9 @@ impl HeldSpring for EnergyForm {
 pub struct Held<L> {
     /// Law without the effects.
     pub law: L,
-    /// Contact of the coils, for a law without contact of its own.
+    /// Contact of the coils; `None` if they may pass through each other, or the law has contact of its own.
     pub contact: Option<AxialContact>,
-    /// Twist and off-axis ends of the wire.
+    /// Twist and off-axis ends of the wire; `None` to leave these effects out.
     pub wire: Option<Wire>,
 }
 

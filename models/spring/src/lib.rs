@@ -13,7 +13,7 @@
 //!   fourth order in the angles by [`shape`] and [`quartic`]; `remainder` adds what is beyond, fitted to the rod.
 //! - [`rod`]: the exact rod, past buckling too, with a history.
 //! - [`rod_blend`]: blending from the law `energy` to the rod where the tolerance requires it, as one energy;
-//!   `rod_share` computes the weight of the rod, in the measures of `directions`.
+//!   `rod_share` computes the weight of the rod, in the variables of `directions`.
 //! - [`held`]: a law with effects of a real coil: [`contact`] of its coils, and the twist and the off-axis ends of its
 //!   [`wire`].
 //! - [`seat`]: a lower plate that may roll up on its rim and lift off.

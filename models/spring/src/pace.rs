@@ -35,7 +35,8 @@ pub(crate) struct Pace {
 }
 
 impl Pace {
-    /// Returns the response of a tick after as many steps of a law as are due. Real-time: bounded by the law, no allocation.
+    /// Returns the response of a tick, after as many steps of the law as are due. Real-time: bounded by the law, no
+    /// allocation.
     #[inline]
     pub(crate) fn respond(
         &mut self,

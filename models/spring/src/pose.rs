@@ -35,7 +35,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The pose without load.
+    /// Home: the pose without load.
     pub const HOME: Self = Self { position_m: DVec3::ZERO, orientation: DQuat::IDENTITY };
 
     /// Builds a pose from a rotation vector (rad; axis times angle). Real-time: bounded, no allocation.

@@ -6,7 +6,7 @@
 
 use flotor_lanes::Real;
 
-/// Precision selected by a scene.
+/// Storage precision of a law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Precision {
     /// Double throughout.

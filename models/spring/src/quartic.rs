@@ -81,9 +81,9 @@ const PANELS: u32 = 4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct QuarticEnergy<R = f64> {
     pub(crate) energy_j: R,
-    /// Derivatives by the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
+    /// Derivatives with respect to the squared angles lower normal to chord, upper normal to chord, lower to upper normal.
     pub(crate) by_squares: [R; 3],
-    /// Derivative by the length of the chord.
+    /// Derivative with respect to the length of the chord.
     pub(crate) by_length: R,
 }
 
@@ -92,7 +92,7 @@ pub(crate) struct QuarticEnergy<R = f64> {
 pub(crate) struct QuarticForm<R> {
     /// `(c0, c1, c2, c3)`
     coefficients: [R; 4],
-    /// Derivatives of the coefficients by the length.
+    /// Derivatives of the coefficients with respect to the length.
     by_length: [R; 4],
 }
 
@@ -161,7 +161,7 @@ impl Quartic {
     ) -> QuarticEnergy<R> {
         let ([c0, c1, c2, c3], [c0_slope, c1_slope, c2_slope, c3_slope]) =
             (form.coefficients, form.by_length);
-        // The magnification 1 + z_p / (z_p - z) with its pole z_p, and the derivative by z.
+        // The magnification 1 + z_p / (z_p - z) with its pole z_p, and the derivative with respect to z.
         let pole = (z.like(POLE) - z).inverse() * POLE;
         let magnification = pole + 1.0;
         let by_argument = pole * pole * (1.0 / POLE);

@@ -1,7 +1,8 @@
 //! Energy beyond the fourth order, from the exact rod: correction of the law `energy` for large sway of the chord.
 //!
-//! The law is right to fourth order in the angles of bending ([`crate::quartic`]). At 30 degrees of sway the higher orders
-//! contribute millinewtons, at 50 degrees a tenth of a newton. In the measures of [`crate::directions`], with `u = S² - 0.06`,
+//! The law is accurate to fourth order in the angles of bending ([`crate::quartic`]). At 30 degrees of sway the higher
+//! orders contribute millinewtons, at 50 degrees a tenth of a newton. In the variables of [`crate::directions`], with
+//! the angle of twist `w` and `u = S² - 0.06`,
 //!
 //! ```text
 //! W = alpha/L0 u³ (c0 + c1 u + c2 u² + (c3 m² D² + c4 (m S.D)²)/S² + (c5 (2 - 2 cos w) + c6 m sin w k.(S x D))/S⁴)        u > 0
@@ -103,7 +104,7 @@ impl Terms {
 
 impl Remainder {
     /// Computes the coefficients from the rod; `None` for a spring that is too slender, or whose rod has no shape at
-    /// one of the poses. Real-time: bounded, no allocation; 38 searches of the rod.
+    /// one of the poses. Real-time: bounded, no allocation; 38 equilibrium solves of the rod.
     pub(crate) fn new(spring: &Spring, energy: &EnergyForm, rod: &mut Rod) -> Option<Self> {
         let (rigidities, free_length_m) = (spring.rigidities(), spring.geometry().free_length_m);
         let load = Load::new(rigidities);

@@ -9,7 +9,7 @@
 //! - `plate`: the upper plate in coordinates free of trigonometry; `section`: the energy of a section in
 //!   them.
 //! - `functional`: the energy as a function of the coefficients of the polynomials of the shape
-//!   ([`flotor_lanes::basis`]), with all quadratic parts eliminated; its derivatives by the pose are force and torque.
+//!   ([`flotor_lanes::basis`]), with all quadratic parts eliminated; its derivatives with respect to the pose are force and torque.
 //! - `contact`: contact of the coils.
 //! - `curve`: positions of the sections, for drawing.
 //! - `predictor`, `equilibrium`: follow the minimum in time, and count unstable directions ([`flotor_lanes::matrix`]); `start`: first
@@ -118,7 +118,7 @@ impl Effort {
     }
 }
 
-/// The exact rod of one spring, following the pose from tick to tick.
+/// Exact rod of one spring, which follows the pose from tick to tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rod {
     solver: Solver,
@@ -175,8 +175,9 @@ impl Rod {
         Self::solved_by(solver, spring, coils)
     }
 
-    /// Builds the rod at rest with the servo's polynomials and each equilibrium to rounding, so that an answer does not
-    /// depend on the history: for laws that minimise its energy ([`crate::seat`]). Not real-time: allocates.
+    /// Builds the rod at rest with the servo's polynomials and each equilibrium solved to rounding, so that an answer
+    /// does not depend on the history: for laws that minimise the energy of the rod ([`crate::seat`]). Not real-time:
+    /// allocates.
     #[must_use]
     pub fn to_rounding(spring: &Spring, coils: Coils) -> Self {
         let equilibrium = Equilibrium::new(Ratios::new(spring, coils), TO_ROUNDING.with(coils));
@@ -184,8 +185,8 @@ impl Rod {
     }
 
     /// Builds the rod at rest for a law that blends its energy with another ([`crate::rod_blend`]) and finds the
-    /// equilibrium anew at each pose: to rounding while followed, to 1e-10 of the angles when found. Not real-time:
-    /// allocates.
+    /// equilibrium anew at each pose. The equilibrium is solved to rounding while followed, to 1e-10 of the angles when
+    /// found from the pose. Not real-time: allocates.
     #[must_use]
     pub(crate) fn for_a_blend(spring: &Spring) -> Self {
         // A base that lifts off needs two searches in a tick.
@@ -231,15 +232,15 @@ impl Rod {
     }
 
     /// Fills in the sections of the rod after the last tick, from plate to plate, evenly in arc length of the unloaded
-    /// spring. Not real-time: an integration.
+    /// spring. Not real-time: integrates along the rod.
     pub fn sections(&self, sections: &mut [Section]) {
         let free_length_m = self.constants.free_length_m;
         either!(&self.solver, equilibrium => equilibrium.curve().draw(free_length_m, sections));
     }
 
-    /// Returns the wrench on the hand and the stored energy at the pose of this tick.
+    /// Advances the shape by one tick and returns the wrench on the hand and the stored energy at `pose`.
     ///
-    /// Total over all poses and histories:
+    /// Defined for every pose and history:
     /// - in stable equilibrium: [`Validity::Ok`];
     /// - moving to an equilibrium (after a jump of the pose, or where the last equilibrium ceased to be stable):
     ///   [`Validity::NotConverged`], with the wrench of the present shape, which moves a bounded distance per tick.

@@ -86,8 +86,8 @@ impl RodBlend {
         }
     }
 
-    /// Changes the parameters at a tick boundary. Real-time: bounded, no allocation; other proportions need a new
-    /// remainder, and so 38 searches of the rod.
+    /// Changes the parameters at a tick boundary. Real-time: bounded, no allocation; a spring of different proportions
+    /// ([`Spring::is_proportional_to`]) recomputes the remainder, 38 equilibrium solves of the rod.
     pub fn set_spring(&mut self, spring: &Spring) {
         self.set(spring, self.tolerance_n);
     }
@@ -112,7 +112,7 @@ impl RodBlend {
         self.reset_weight();
     }
 
-    /// Returns true if a response may depend on earlier poses: the spring can buckle.
+    /// Returns true if a response may depend on earlier poses, because the spring can buckle.
     #[must_use]
     pub fn remembers(&self) -> bool {
         self.shares.has_buckling()
@@ -130,7 +130,7 @@ impl RodBlend {
         (self.share > 0.0).then(|| self.rod.state())
     }
 
-    /// Returns the rod if its weight is 1.
+    /// Returns the rod if its weight is 1, else `None`.
     pub(crate) fn rod_alone(&mut self) -> Option<&mut Rod> {
         (self.share >= 1.0).then_some(&mut self.rod)
     }
@@ -264,7 +264,8 @@ impl NullaryFnOnce for Answering<'_> {
     }
 }
 
-/// Returns the weight function of the rod beside a law with this remainder.
+/// Returns the weight function that blends the exact rod with the law: with the corrected law if there is a remainder,
+/// with the plain law otherwise.
 fn shares(spring: &Spring, tolerance_n: f64, remainder: Option<&Remainder>) -> RodWeight {
     RodWeight::new(spring, tolerance_n, if remainder.is_some() { Law::Corrected } else { Law::Plain })
 }

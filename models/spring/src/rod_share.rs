@@ -1,7 +1,8 @@
 //! Weight of the exact rod in the default law, a smooth function of the pose.
 //!
-//! The error in the force of [`crate::energy`] with its [`crate::remainder`], relative to `alpha/L0²`, is bounded by a sum in the measures
-//! of [`crate::directions`], with `s = S²`, `b = m² D²`, `w = 2 - 2 cos(twist)` and the relative length `l` of the chord,
+//! The error in the force of [`crate::energy`] with its [`crate::remainder`], relative to `alpha/L0²`, is bounded by a
+//! sum in the variables of [`crate::directions`], with `s = S²`, `b = m² D²`, `w = 2 - 2 cos(twist)` and the relative
+//! length `l` of the chord,
 //!
 //! ```text
 //! (1 + (load/22)⁴) (c0 x²/(x² + 0.01) + c1 w² + c2 b⁴ + c3 m⁸ s⁴ + c4 s¹² + c5 (s/l²)⁴)
@@ -28,8 +29,9 @@ use crate::remainder::ONSET;
 use crate::rigidity::Spring;
 use flotor_lanes::entire::EntireFunctions;
 
-/// Bounds of the error, in tolerances, at which the rod's weight leaves 0 and reaches 1. In between the weight follows
-/// the fourth root of the bound, nearly its logarithm: so the weight rises over the same distance as the bound.
+/// Error bounds, in tolerances, at which the rod's weight leaves 0 and reaches 1. In between the weight is a function
+/// of the fourth root of the bound, close to its logarithm: the bound grows steeply, and a weight linear in the bound
+/// would rise over too short a distance of the handle.
 const FIRST_ERROR: f64 = 0.8;
 const LAST_ERROR: f64 = 6.0;
 
@@ -58,7 +60,7 @@ pub(crate) struct Share {
     pub(crate) is_buckled: bool,
 }
 
-/// Law beside the rod: the energy with its remainder, or alone.
+/// Law that is blended with the rod: the energy with its remainder, or alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Law {
     Corrected,
@@ -80,7 +82,7 @@ struct Measures {
     magnification: f64,
 }
 
-/// Derivatives of a bound by [`Measures`].
+/// Derivatives of a bound with respect to [`Measures`].
 #[derive(Clone, Copy, Debug)]
 struct BoundSlopes {
     by_sway: f64,
@@ -297,7 +299,8 @@ impl RodWeight {
 }
 
 impl Middle {
-    /// Returns the largest middle without remainder and rod: bounds grow with each measure, so the corner decides.
+    /// Returns the largest region that needs neither remainder nor rod: bounds grow with each measure, so its corner
+    /// decides.
     fn new(law: Law, per_tolerance: f64) -> Self {
         let scaled = |factor: f64| Self {
             sway: factor * ONSET,
@@ -331,7 +334,7 @@ impl Middle {
     }
 }
 
-/// Returns the weight by the error alone, with its derivative by the bound in tolerances.
+/// Returns the weight by the error alone, with its derivative with respect to the bound in tolerances.
 fn by_error(bound: f64) -> Passage {
     if bound <= FIRST_ERROR {
         return Passage::NOT_BEGUN;
@@ -341,7 +344,7 @@ fn by_error(bound: f64) -> Passage {
     Passage { value, slope: slope * root / (4.0 * bound) }
 }
 
-/// Returns the weight by the argument alone, with its derivative by the argument.
+/// Returns the weight by the argument alone, with its derivative with respect to the argument.
 fn nearness(argument: f64) -> Passage {
     if argument <= FIRST_ARGUMENT {
         return Passage::NOT_BEGUN;

@@ -260,10 +260,12 @@ impl Seat {
         self.hold < 1.0
     }
 
-    /// Returns the wrench on the hand of the spring on its seat, at the pose of this tick.
+    /// Advances the base by one tick and returns the wrench of the spring on the hand at `pose`.
     ///
-    /// Total where the law is; [`Validity::NotConverged`] while the base is moving, by a bounded tilt per tick.
-    /// Real-time: bounded, no allocation; two to three evaluations of the law while the base moves, one while seated.
+    /// Defined wherever the law is; zero with [`Validity::Ok`] for a lifted or fallen spring.
+    /// [`Validity::NotConverged`] while the base is moving, since its tilt per tick is bounded, and while the spring
+    /// falls over. Real-time: bounded, no allocation; two to three evaluations of the law while the base moves, one
+    /// while seated.
     pub fn step(&mut self, spring: &mut dyn HeldSpring, pose: &Pose, demand: Demand) -> Response {
         if !pose.is_valid() {
             return Response::none(Validity::InvalidInput);

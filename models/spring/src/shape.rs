@@ -44,7 +44,7 @@ pub(crate) fn relative_length(load: f64, excess: f64, z: f64) -> Option<f64> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Lean {
     pub(crate) value: f64,
-    /// Derivative by `u`.
+    /// Derivative with respect to `u`.
     pub(crate) slope: f64,
 }
 
@@ -93,7 +93,7 @@ impl Shape {
 
     /// Returns the lean of the section at `u`, from -1/2 to 1/2: of the sway (`S`) and of the bow (`D`).
     pub(crate) fn lean(&self, u: f64) -> [Lean; 2] {
-        // `theta` of the module documentation and its derivative by `u`.
+        // `theta` of the module documentation and its derivative with respect to `u`.
         let square = u * u;
         let inner = EntireFunctions::at(self.z * square);
         let outer = EntireFunctions::at(4.0 * self.z * square);

@@ -14,10 +14,10 @@
 //! **Yaw.** The source sets `force[5] = -spring_limit[1] * yaw` with a gain from a control panel. The thesis prints
 //! no value of it, so it is zero here.
 //!
-//! **Made total.** The printed code may return NaN or infinity. Here every such output is zero with
+//! **Finite outputs.** The printed code may return NaN or infinity. Here every such output is zero with
 //! [`Validity::OutOfDomain`]:
 //! - both moments (not the forces) where `L == L0` in the arithmetic used, at rest and sheared (0/0);
-//! - everything for `L > L0 (1 + E/G)`, where `q` is the root of a negative number;
+//! - everything for `L > L0 (1 + E/G)`, where `q` is the square root of a negative number;
 //! - everything at `L = 0` if `L_buckling < 0`, where no branch runs and the outputs are uninitialised.
 //!
 //! An invalid pose (NaN, infinity, no unit quaternion) gives zero with [`Validity::InvalidInput`].
@@ -82,8 +82,8 @@ impl Thesis {
         length_mm / MM_PER_M
     }
 
-    /// Returns the wrench on the hand at a pose; this law has no energy. Real-time: bounded, no allocation. Total, see
-    /// the module.
+    /// Returns the wrench on the hand at a pose; this law has no energy. Defined for every pose, see the module.
+    /// Real-time: bounded, no allocation.
     #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         if !pose.is_valid() {

@@ -14,7 +14,7 @@ pub enum Validity {
     NotConverged,
     /// The pose is outside the law's domain (plates in one point, lengths beyond reason). The wrench is zero.
     OutOfDomain,
-    /// The pose has NaN, infinity or no unit quaternion. The wrench is zero.
+    /// The pose has NaN or infinity, or its quaternion is not of unit length. The wrench is zero.
     InvalidInput,
 }
 

@@ -41,7 +41,7 @@ const NODES: usize = 24;
 /// Stiffness in displacement (m) and rotation (rad): rows of force (N) and torque (N·m).
 type Stiffness6 = [[f64; 6]; 6];
 
-/// Correction of one spring's rod for its wire.
+/// Correction of the rod of one spring for its coiled wire.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wire {
     /// `K_wire - K_rod`
@@ -51,7 +51,7 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// Prepares the difference. Real-time: bounded, no allocation; some tens of microseconds.
+    /// Prepares the correction for a spring. Real-time: bounded, no allocation; some tens of microseconds.
     #[must_use]
     pub fn new(spring: &Spring) -> Self {
         let (geometry, material) = (spring.geometry(), spring.material());

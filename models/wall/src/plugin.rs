@@ -9,7 +9,7 @@ use flotor_hal::{
     ShapeModel, SoftRange, SoftRangeModel, StepStatus, Wrench, choices,
 };
 
-/// Workspace limit along each axis, m; beyond it the answer is that at the edge, with status `Clamped`.
+/// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
 const REACH_M: f64 = 1.0;
 
 /// Half the side of the drawn piece of a plane, m: a plane is infinite.

@@ -1,8 +1,8 @@
-//! Emulated device on the USB of this machine: the kernel enumerates it as a real Falcon, and libusb, and with it every program
-//! that drives a Falcon, finds it.
+//! Emulated Falcon on a virtual USB port of this machine (USB/IP): the kernel enumerates the device like a real one, so
+//! libusb and every program for the Falcon find the device.
 //!
-//! A transfer towards the host waits until a packet is due. Needs Linux with the module `vhci_hcd`, and the permission to attach
-//! a device.
+//! A transfer towards the host stays pending until a packet is due. Needs Linux with the module `vhci_hcd`, and the
+//! permission to attach a device.
 
 use crate::in_process::InProcess;
 use crate::machine::STATUS;
@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Addresses of the endpoints.
+/// Addresses of the bulk endpoints.
 const OUT: u8 = 0x02;
 const IN: u8 = 0x81;
 /// Poll interval for due packets: a quarter of the shortest latency timer.
@@ -32,7 +32,7 @@ const STRING: u8 = 3;
 const VENDOR_OUT: u8 = 0x40;
 const VENDOR_IN: u8 = 0xc0;
 
-/// Attached device; dropping it detaches the device.
+/// Emulated device attached to a virtual USB port; dropping it detaches the device.
 pub struct Gadget {
     socket: UnixStream,
     shared: Arc<Shared>,
@@ -52,7 +52,7 @@ struct Bus {
 }
 
 impl Gadget {
-    /// Attaches the device to this machine.
+    /// Attaches the device to a virtual USB port of this machine, and starts the threads that serve it.
     ///
     /// # Errors
     /// Errors of the system: usually the module `vhci_hcd` is not loaded, or the user has no permission.
@@ -99,7 +99,7 @@ impl Shared {
         self.bus.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Completes transfers as packets become due.
+    /// Completes pending transfers as packets become due, until the device is detached.
     fn pace(&self) {
         while !self.is_over.load(Ordering::Acquire) {
             std::thread::sleep(LOOK);

@@ -27,7 +27,7 @@ impl InProcess {
         self.machine.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Returns the time since the device was created.
+    /// Returns the time since the device was wrapped: the clock of [`Machine`].
     #[must_use]
     pub fn now(&self) -> Duration {
         self.started.elapsed()

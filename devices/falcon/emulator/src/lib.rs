@@ -7,10 +7,10 @@
 //! ```
 //!
 //! - [`machine`]: behaviour of the device; pure, with a clock that is passed in.
-//! - [`rig`]: a device in the rig of the vertical calibration, whose motors deliver more or less than the command.
-//! - [`in_process`], [`server`], [`gadget`]: the three connections.
+//! - [`rig`]: a device in the rig for vertical calibration, whose motors deliver more or less force than commanded.
 //!
-//! Contains no firmware of the maker: any bytes load, and the firmware of [`machine`] runs. Not real-time.
+//! Contains no firmware of the maker: any uploaded bytes are accepted, and the emulated firmware of [`machine`] runs.
+//! Not real-time.
 
 #[cfg(target_os = "linux")]
 pub mod gadget;

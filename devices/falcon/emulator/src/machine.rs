@@ -84,8 +84,8 @@ pub enum Motion {
         /// Frequency, Hz.
         frequency_hz: f64,
     },
-    /// Handle held by the stand of a calibration rig, above and below the centre of the range. Time advances by a millisecond with each
-    /// command, so that a delayed host misses no stop.
+    /// Handle held by the stand of a calibration rig, at heights above and below the centre of the range. The clock of
+    /// the stand advances by a millisecond with each command, so that a delayed host skips no height.
     OnStand(Stand),
 }
 
@@ -109,11 +109,11 @@ impl Motion {
     }
 }
 
-/// Emulated device.
+/// Emulated Falcon: FTDI chip, boot loader, firmware and handle.
 #[derive(Clone, Debug)]
 pub struct Machine {
     motion: Motion,
-    /// Delivered over commanded vertical force, by the height above the centre of the range.
+    /// Ratio of delivered to commanded vertical force, by the height above the centre of the range.
     share: VerticalCalibration,
     /// Pressed buttons, one bit each.
     buttons: u32,
@@ -136,7 +136,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Creates a device that was just plugged in, with a motion of its handle.
+    /// Creates a device that was just plugged in, with a motion of its handle and no pressed button.
     #[must_use]
     pub fn new(power: Power, motion: Motion) -> Self {
         let (stage, homed) = match power {
@@ -191,13 +191,14 @@ impl Machine {
         self.commands
     }
 
-    /// Returns true once the device has left the bus.
+    /// Returns true once the device has left the bus ([`Fault::HubReset`]).
     #[must_use]
     pub fn is_gone(&self) -> bool {
         self.is_gone
     }
 
-    /// Returns the force of the motors on the hand, N, in the maker's frame; `None` where the linkage has no posture.
+    /// Returns the force of the motors on the hand under the newest command, N, in the maker's frame; `None` where the
+    /// linkage has no posture.
     #[must_use]
     pub fn force_n(&self, at: Duration) -> Option<DVec3> {
         let place_m = self.motion.place_m(at, self.commands);
@@ -257,7 +258,7 @@ impl Machine {
         }
     }
 
-    /// Receives bytes of the host on the serial line.
+    /// Processes bytes of the host on the serial line: prompt, firmware or commands, whose replies become due packets.
     pub fn output(&mut self, bytes: &[u8], at: Duration) {
         for byte in bytes {
             match (self.stage, self.divisor) {

@@ -1,5 +1,5 @@
-//! Emulated device in the rig of the vertical calibration: the stand holds its handle, its motors deliver more or less than the
-//! command, and a force sensor measures the difference to the weight.
+//! Emulated device in the rig for vertical calibration: a stand holds the handle, the motors deliver more or less force
+//! than commanded, and a force sensor measures the delivered force less the weight of the arms.
 
 use crate::in_process::InProcess;
 use crate::machine::{Machine, Motion, Power};
@@ -8,18 +8,19 @@ use flotor_hal::VerticalCalibration;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
-/// Delivered over commanded force: `1.04 - 0.004 z - 0.0006 z²`, z in mm; an arbitrary curve of this rig.
+/// Ratio of delivered to commanded force: `1.04 - 0.004 z - 0.0006 z²`, z in mm; an arbitrary curve of this rig.
 const SHARE_PER_M: [f64; 3] = [1.04, -4.0, -600.0];
 /// Domain of the curve, m: the travel of the stand. Beyond, the ratio is constant.
 const RANGE_M: [f64; 2] = [-7.0e-3, 7.0e-3];
-/// Weight of handle, plate and screws on the arms, N; arbitrary as well.
+/// Weight of handle, plate and screws on the arms, N; an arbitrary value.
 pub const WEIGHT_N: f64 = 1.5;
 
-/// Difference of the largest and the smallest ratio over the range, percent: `1.04 + 0.004²/(4 0.0006)` at -3.33 mm, less
-/// 0.9826 at 7 mm.
+/// Difference between the largest and the smallest ratio over the range, percent: `1.04 + 0.004²/(4 0.0006)` at -3.33
+/// mm, less 0.9826 at 7 mm.
 pub const ERROR_PERCENT: f64 = 6.406_666_7;
 
-/// Creates a device in the rig and starts its force sensor under a link; returns the device and the path of the sensor's terminal.
+/// Creates a device in the rig and starts its force sensor at a pseudo terminal, to which `link` points; returns the
+/// device and the path of the terminal.
 ///
 /// # Errors
 /// Errors of the pseudo terminal.

@@ -8,16 +8,16 @@ use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::time::Duration;
 
-/// Poll interval for due packets while the host is silent, ns. `poll` is precise enough; a socket's timeout is rounded to the
-/// system's ticks of some milliseconds.
+/// Poll interval for due packets while the host is silent. Uses `poll`, as a socket's read timeout is rounded up to the
+/// kernel tick of several milliseconds.
 const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000 };
 /// Timeout of the write of a packet to the host.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// Serves a host until the host or the device is gone, or the tenure is over.
+/// Serves a host until the host disconnects, the device leaves its bus, or the tenure is over.
 ///
 /// # Errors
-/// Errors of the connection.
+/// Errors of the connection; `TimedOut` if the tenure is over, `InvalidData` for an unknown message.
 pub fn serve(mut stream: TcpStream, device: &InProcess, mut tenure: Tenure<'_>) -> io::Result<()> {
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
@@ -54,7 +54,7 @@ pub fn serve(mut stream: TcpStream, device: &InProcess, mut tenure: Tenure<'_>) 
     }
 }
 
-/// Carries out the first message in a buffer; returns its length, `None` while it is incomplete.
+/// Executes the first message in a buffer; returns its length, `None` while the message is incomplete.
 fn execute(received: &[u8], device: &InProcess) -> io::Result<Option<usize>> {
     let now = device.now();
     match received {

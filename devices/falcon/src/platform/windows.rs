@@ -18,7 +18,7 @@ pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     )
 }
 
-/// Returns the handle of a connection, of which the system uses 32 bits.
+/// Returns the socket handle of a connection; the system uses only its lower 32 bits.
 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // as the contract says
 pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
     stream.as_raw_socket() as i32

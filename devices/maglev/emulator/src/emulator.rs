@@ -12,9 +12,10 @@ use flotor_maglev::transport::{Incoming, LinkLost, Transport};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Simulated mechanics: gets the wrench of a cycle and returns the sample at its end.
+/// Simulated mechanics, advanced by the wrench of each cycle.
 pub trait Plant {
-    /// Advances by `dt_us` under a constant wrench; 0 only returns the current sample.
+    /// Advances the plant by `dt_us` under a constant wrench and returns the sample at the end; 0 only returns the
+    /// current sample.
     fn advance(&mut self, dt_us: u64, wrench: &Wrench) -> Sample;
 
     /// Resets the plant to its initial state.
@@ -32,7 +33,7 @@ pub enum Pace {
     Lockstep,
 }
 
-/// Event for the log.
+/// Event of an emulated controller, for the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The controller has changed its mode.
@@ -41,7 +42,7 @@ pub enum Event {
         mode: Mode,
         /// Faults and active limits.
         condition: Condition,
-        /// Silence of the host before the change, µs.
+        /// Time since the last accepted request, µs.
         silence_us: u64,
         /// The controller's clock, µs.
         at_us: u64,
@@ -78,13 +79,14 @@ impl<P: Plant> Emulator<P> {
         emulator
     }
 
-    /// Returns the controller.
+    /// Returns the emulated controller, with mode, condition and numbers of rejected requests.
     #[must_use]
     pub fn controller(&self) -> &Controller {
         &self.controller
     }
 
-    /// Serves one host until the link is lost, or until `stop`; then switches the coils off.
+    /// Serves one host until the link is lost or `stop` is true, and passes mode changes and the end to `log`; then
+    /// switches the coils off.
     pub fn serve(&mut self, link: &mut dyn Transport, stop: &AtomicBool, log: &mut dyn FnMut(Event)) {
         let before = *self.controller.intake().rejections();
         match self.pace {
@@ -224,7 +226,8 @@ impl<P: Plant> Emulator<P> {
     }
 }
 
-/// Returns the configuration of a controller for a device with these capabilities.
+/// Returns the configuration of a controller for a plant with these capabilities; the limits are the smaller of the
+/// plant's and the published limits.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the wire format is f32, latencies are small
 pub fn controller_config(capabilities: &Capabilities, pace: Pace, serial: &str) -> ControllerConfig {

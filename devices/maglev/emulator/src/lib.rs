@@ -1,9 +1,9 @@
 //! Emulator of the maglev device's controller.
 //!
 //! - [`controller`]: the firmware as a state machine, with the final limits on the coils.
-//! - [`Emulator`]: that controller over a [`Plant`], serving a host on any transport of the plugin.
+//! - [`Emulator`]: the firmware with a [`Plant`], serving a host on any transport of the plugin.
 //! - [`ml_api`]: the controller of the Maglev 200 as seen by its clients.
-//! - `gadget`: that controller as a USB device of this machine's own kernel (Linux).
+//! - `gadget`: the firmware as an emulated USB device of this machine (Linux).
 //!
 //! The crate uses the plugin's protocol and transports.
 

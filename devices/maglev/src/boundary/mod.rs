@@ -1,8 +1,8 @@
-//! Walls at the edge of the sensors' range and limits of rotation: the thesis's, made stable and passive.
+//! Walls at the edge of the sensors' range and limits of rotation: the walls of the thesis, made stable and passive.
 //!
 //! The thesis keeps the flotor in range by a sphere of springs and dampers and limits its tilt to 2.86° (0.05 rad;
 //! Varadharajan 2007, section 3.2 and appendix A). This module differs in three points:
-//! - Damping acts once. The program of the thesis damps rotation always, and a second time beyond the limit.
+//! - Damping acts once. The program of the thesis damps rotation at every angle, and a second time beyond the limit.
 //! - Damping in a wall resists outward motion only: a wall does not hold back a handle that returns by itself.
 //! - Every stiffness is at most [half of the stability limit](SampledLoop::largest_stiffness) for its damping, period and
 //!   latency, and the resulting stiffness is reported.
@@ -23,20 +23,23 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// Returns this wall with a stiffness that is stable in a loop. The wall's damper acts outwards only; the part
-    /// `everywhere` of its damping (N·s/m or N·m·s/rad) acts in both directions.
+    /// Returns this wall with its stiffness reduced, if necessary, to the largest one to render in the loop
+    /// ([`SampledLoop::largest_stiffness`]). The damper of the wall resists outward motion only, except for the part
+    /// `everywhere` of its damping (N·s/m or N·m·s/rad), which acts in both directions.
     #[must_use]
     pub fn stabilised(self, sampled: &SampledLoop, everywhere: f64) -> Self {
         let most = sampled.largest_stiffness(everywhere, Damper::OneWay(self.damping - everywhere));
         Self { stiffness: self.stiffness.min(most), ..self }
     }
 
-    /// Bounds the penetration into the wall of an inertia (kg or kg·m²) under `push` (N or N·m) that arrives at `speed`,
-    /// sampled every `period_s` and answered after a further `delay_s`.
+    /// Returns the penetration into the wall of a handle with `inertia` (kg or kg·m²) that arrives at `speed` (m/s or
+    /// rad/s) under a constant `push` (N or N·m), in a loop with samples every `period_s` and a force that acts `delay_s`
+    /// later.
     ///
-    /// At rest the spring balances the push. Until then push and speed have done work that the spring stores, `F x + m v² /
-    /// 2 = K x² / 2` without any damping; and motion at its fastest is seen a period and a delay late. The damper of a
-    /// [stabilised](Self::stabilised) wall dissipates more than sampling generates (Gil et al. 2009), so this is a bound.
+    /// At rest the spring balances the push. The upper bound is the depth at which the spring has stored the work of the
+    /// push and the kinetic energy, `F x + m v² / 2 = K x² / 2` without any damping, plus the way at the highest speed
+    /// during a period and a delay. The damper of a [stabilised](Self::stabilised) wall dissipates more than sampling
+    /// generates (Gil et al. 2009).
     #[must_use]
     pub fn penetration(
         &self,
@@ -67,9 +70,9 @@ impl Wall {
 /// Penetration into a wall, m or rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Penetration {
-    /// Depth at rest.
+    /// Depth at rest, m or rad.
     pub at_rest: f64,
-    /// Upper bound of the depth on the way to rest.
+    /// Upper bound of the depth on the way to rest, m or rad.
     pub at_most: f64,
 }
 
@@ -84,9 +87,10 @@ pub struct Walls {
     pub tilt: Wall,
     /// Limit of rotation about z.
     pub yaw: Wall,
-    /// Spring of yaw about home, N·m/rad: the thesis's substitute for the yaw torque that its spring lacks.
+    /// Stiffness of a spring about home in yaw, N·m/rad: the thesis's substitute for the yaw torque that its spring model
+    /// lacks.
     pub yaw_spring_nm_per_rad: f64,
-    /// Damping of rotation everywhere, N·m·s/rad; replaces a smaller damping of a wall.
+    /// Damping of rotation at every angle, N·m·s/rad; replaces a smaller damping of `tilt` or `yaw`.
     pub rotation_damping_nms_per_rad: f64,
 }
 
@@ -106,7 +110,7 @@ pub fn thesis_nm_per_rad(gamma_n: f64) -> f64 {
 }
 
 impl Walls {
-    /// Returns the walls of the makers' boundary mode, with a sphere of this radius in m.
+    /// Returns the walls of the makers' boundary mode, with a sphere of `radius_m` and the thesis's angle limit.
     #[must_use]
     pub fn maker(radius_m: f64) -> Self {
         let [stiffness, damping, rotational, rotational_damping] = MAKER;
@@ -136,7 +140,7 @@ impl Walls {
         }
     }
 
-    /// Returns these walls, each stable in a loop.
+    /// Returns these walls with each stiffness at most half of its stability limit in the loop.
     #[must_use]
     pub fn stabilised(mut self, sampled: &SampledLoop) -> Self {
         let everywhere = self.rotation_damping_nms_per_rad;
@@ -152,7 +156,7 @@ impl Walls {
         self
     }
 
-    /// Returns force and torque of all walls on the hand.
+    /// Returns force and torque of all walls on the hand, at the pose and velocity of `state`.
     #[must_use]
     pub fn wrench(&self, state: &DeviceState) -> Wrench {
         let (position, velocity) = (state.pose.position(), state.twist.linear());

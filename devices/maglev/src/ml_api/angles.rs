@@ -2,7 +2,7 @@
 
 use flotor_hal::{DQuat, DVec3, math};
 
-/// Returns the orientation of three angles, rad.
+/// Converts three angles about x, y and z, rad, to an orientation.
 #[must_use]
 pub fn orientation(angles_rad: DVec3) -> DQuat {
     let about = |axis: DVec3, angle: f64| {
@@ -12,7 +12,7 @@ pub fn orientation(angles_rad: DVec3) -> DQuat {
     about(DVec3::Z, angles_rad.z) * about(DVec3::Y, angles_rad.y) * about(DVec3::X, angles_rad.x)
 }
 
-/// Returns the three angles of an orientation, rad; the angle about y is within a quarter turn.
+/// Converts an orientation to three angles about x, y and z, rad; the angle about y is from -π/2 to π/2.
 #[must_use]
 pub fn angles(orientation: DQuat) -> DVec3 {
     let DQuat { x, y, z, w } = orientation;

@@ -6,33 +6,33 @@ use super::values::{AxisValues, Buttons, FaultBits, WirePose};
 /// Number of the event that ends a callback connection, and of the function that requests the end.
 const END: i32 = 71;
 
-/// Events a client can register for.
+/// Kind of an event for which a client can register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EventKind {
-    /// A button changed.
+    /// Change of a button.
     Button = 74,
-    /// A boundary was crossed.
+    /// Crossing of a boundary.
     Boundary = 75,
-    /// A coil is too hot.
+    /// Overheated coil.
     Overtemp = 76,
-    /// The fault bits changed.
+    /// Change of the fault bits.
     Fault = 77,
-    /// A servo interval began.
+    /// Start of a servo interval.
     Tick = 78,
 }
 
-/// An event with its payload.
+/// Event with its payload.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// A button changed.
+    /// Change of a button.
     Button(Buttons),
-    /// A boundary was crossed: for each axis -1 below its range, 1 above, 0 inside; last element: 1 outside the sphere.
+    /// Crossing of a boundary: for each axis -1 below its range, 1 above, 0 inside; last element: 1 outside the sphere.
     Boundary([i32; 7]),
-    /// A coil is too hot: temperatures of all coils, °C.
+    /// Overheated coil: temperatures of all coils, °C.
     Overtemp(AxisValues),
-    /// The fault bits changed.
+    /// Change of the fault bits.
     Fault(FaultBits),
-    /// A servo interval began: the pose at its start.
+    /// Start of a servo interval, with the pose at that time.
     Tick(WirePose),
     /// Last event: the connection ends.
     End,

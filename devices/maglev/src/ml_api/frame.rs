@@ -1,13 +1,13 @@
 //! One frame: its length, its code (function, status or event), and fields of four bytes.
 
-/// Length of the shortest frame: length and code.
+/// Length of the shortest frame, bytes: length and code.
 pub const SHORTEST_BYTES: usize = 8;
-/// Length of the longest frame that a controller accepts, and of the longest event that a client accepts.
+/// Length of the longest frame that a controller accepts, and of the longest event that a client accepts, bytes.
 pub const LONGEST_BYTES: usize = 512;
-/// Length of the longest frame sent by this code: a request with all gains of a set.
+/// Length of the longest frame sent by this code, bytes: a request with all gains of a set.
 const LONGEST_SENT_BYTES: usize = 108;
 
-/// A frame to send.
+/// Encoded frame to send.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Frame {
     bytes: [u8; LONGEST_SENT_BYTES],
@@ -15,7 +15,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Creates a frame with this code and no fields.
+    /// Creates a frame with this code (function, status or event) and no fields.
     #[must_use]
     pub fn new(code: i32) -> Self {
         let mut frame = Self { bytes: [0; LONGEST_SENT_BYTES], length: 4 };

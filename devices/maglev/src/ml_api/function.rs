@@ -4,7 +4,7 @@ use super::event::EventKind;
 
 macro_rules! functions {
     ($($(#[$doc:meta])* $name:ident = $id:literal,)+) => {
-        /// A function of the controller.
+        /// Function of the controller, with its number on the wire; units of [`super`].
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Function {
             $($(#[$doc])* $name = $id,)+
@@ -27,11 +27,11 @@ macro_rules! functions {
 functions! {
     /// Keeps an axis inside a range.
     ConstrainAxis = 1,
-    /// Sets the feed-forward of the normal gains to the stored gravity.
+    /// Sets the feed-forward of the normal gains to the stored gravity wrench.
     DefyGravity = 2,
     /// Ends the session of the client.
     Disconnect = 3,
-    /// Measures the wrench that holds the flotor; takes seconds.
+    /// Measures the gravity wrench, which balances the weight of the flotor; takes seconds.
     FindGravity = 4,
     /// Returns the pose of the flotor.
     GetActualPosition = 5,
@@ -55,7 +55,7 @@ functions! {
     GetForceAxis = 15,
     /// Returns the commanded wrench.
     GetForces = 16,
-    /// Returns the user's frame.
+    /// Returns the frame set by a client.
     GetFrame = 17,
     /// Returns the gains of all axes.
     GetGainVecAxes = 18,
@@ -69,7 +69,7 @@ functions! {
     GetGraspCurrent = 22,
     /// Returns the current limit of the grasp.
     GetGraspCurrentLimit = 23,
-    /// Returns the stored gravity.
+    /// Returns the stored gravity wrench.
     GetGravity = 24,
     /// Returns the range of the position sensors.
     GetLatCellLimit = 25,
@@ -89,7 +89,7 @@ functions! {
     GetVersion = 32,
     /// Sets the flotor down; takes seconds.
     Land = 33,
-    /// Locks an axis at its position.
+    /// Locks an axis at its present position.
     LockAxis = 34,
     /// Registers for changes of the buttons.
     RegisterButton = 36,
@@ -97,11 +97,11 @@ functions! {
     RegisterFault = 37,
     /// Registers for crossings of boundaries.
     RegisterBoundary = 38,
-    /// Registers for coils that are too hot.
+    /// Registers for overheated coils.
     RegisterOvertemp = 39,
     /// Registers for servo intervals.
     RegisterTick = 40,
-    /// Clears the faults without a present cause.
+    /// Clears the faults whose cause has ended.
     ResetFault = 41,
     /// Restores the default gains of a set; takes seconds.
     ResetGainVecAxes = 42,
@@ -111,15 +111,15 @@ functions! {
     SetBoundaryRadius = 44,
     /// Sets the current limit of each coil.
     SetCurrentLimits = 45,
-    /// Sets the current of each coil.
+    /// Commands the current of each coil.
     SetCurrents = 46,
     /// Sets the desired pose of the flotor.
     SetDesiredPosition = 47,
-    /// Sets the force of one axis.
+    /// Commands the force of one axis.
     SetForceAxis = 48,
-    /// Sets the wrench.
+    /// Commands a wrench.
     SetForces = 49,
-    /// Sets the user's frame.
+    /// Sets the frame in which poses and velocities are reported to clients.
     SetFrame = 50,
     /// Sets the gains of all axes.
     SetGainVecAxes = 51,
@@ -133,7 +133,7 @@ functions! {
     SetGraspCurrent = 55,
     /// Sets the current limit of the grasp.
     SetGraspCurrentLimit = 56,
-    /// Stores gravity.
+    /// Stores the gravity wrench, which balances the weight of the flotor.
     SetGravity = 57,
     /// Sets the placement of the position sensors.
     SetLatCellOffset = 58,
@@ -147,7 +147,7 @@ functions! {
     Shutdown = 62,
     /// Lifts the flotor home; takes seconds.
     Takeoff = 63,
-    /// Frees an axis.
+    /// Ends the lock or the constraint of an axis.
     UnlockAxis = 64,
     /// Unregisters from button events.
     UnregisterButton = 65,
@@ -189,19 +189,19 @@ impl Function {
         Self::ALL.iter().copied().find(|function| *function as i32 == id)
     }
 
-    /// Returns the events that the function registers for; `None` for other functions.
+    /// Returns the kind of event for which the function registers a client; `None` for other functions.
     #[must_use]
     pub fn registers(self) -> Option<EventKind> {
         REGISTRATIONS.iter().find(|(_, on, _)| *on == self).map(|(kind, ..)| *kind)
     }
 
-    /// Returns the events that the function unregisters from; `None` for other functions.
+    /// Returns the kind of event from which the function unregisters a client; `None` for other functions.
     #[must_use]
     pub fn unregisters(self) -> Option<EventKind> {
         REGISTRATIONS.iter().find(|(.., off)| *off == self).map(|(kind, ..)| *kind)
     }
 
-    /// Returns true if only the commanding client may call the function. Reading and landing are free to all clients.
+    /// Returns true if only the commanding client may call the function. All clients may read and land.
     #[must_use]
     pub const fn commands(self) -> bool {
         matches!(

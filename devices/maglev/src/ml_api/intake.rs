@@ -16,7 +16,7 @@ pub enum ReadResult {
     Lost,
 }
 
-/// Buffer of received, unused bytes.
+/// Receive buffer that assembles whole frames.
 #[derive(Clone, Debug)]
 pub struct Intake {
     bytes: [u8; LONGEST_BYTES],
@@ -38,7 +38,8 @@ impl Intake {
         self.bytes.get(..self.returned).unwrap_or_default()
     }
 
-    /// Reads the next frame of a stream; one system call at most if the stream does not block.
+    /// Reads the next frame of a stream, until the frame is complete or the stream has no more data. Bounded on a
+    /// non-blocking stream: reads at most [`LONGEST_BYTES`].
     pub fn take(&mut self, stream: &mut impl Read) -> ReadResult {
         self.bytes.copy_within(self.returned..self.filled, 0);
         self.filled -= self.returned;

@@ -4,7 +4,7 @@
 //! request   length i32, function i32, arguments        client to controller, control connection
 //! reply     length i32, status   i32, results          controller to client
 //! event     length i32, event    i32, payload          controller to client, callback connection
-//! answer    8      i32, value    i32                   client to controller
+//! ack       8      i32, value    i32                   client to controller, callback connection
 //! ```
 //!
 //! Little endian, every number 4 bytes, no checksum, no number that pairs a reply with its request: one call is outstanding
@@ -37,5 +37,5 @@ pub use values::{
     WirePose,
 };
 
-/// TCP port of every controller.
+/// TCP port of a controller with the ML API.
 pub const PORT: u16 = 5678;

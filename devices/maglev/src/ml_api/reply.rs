@@ -14,7 +14,7 @@ pub enum Results {
     None,
     /// One number.
     Number(f32),
-    /// Six numbers.
+    /// One number per axis or per coil.
     AxisValues(AxisValues),
     /// A pose of the flotor or a frame.
     Pose(WirePose),
@@ -45,7 +45,7 @@ pub enum Results {
 pub struct Reply {
     /// Status of the call.
     pub status: Status,
-    /// Results, in the variant of the function.
+    /// Results of the function; the function determines the variant.
     pub results: Results,
 }
 
@@ -177,13 +177,14 @@ impl Reply {
         Self { status: Status::OK, results }
     }
 
-    /// Creates a reply of a function without results.
+    /// Creates a reply with this status and no results.
     #[must_use]
     pub const fn status(status: Status) -> Self {
         Self { status, results: Results::None }
     }
 
-    /// Creates a reply with an error and results of zeros; no results without a function.
+    /// Creates a reply with an error status and with zeros as the results of the function; without results for an unknown
+    /// function.
     #[must_use]
     pub fn failed(function: Option<Function>, status: Status) -> Self {
         Self { status, results: function.map_or(Results::None, Results::zero) }

@@ -14,7 +14,7 @@ pub enum Request {
     ConstrainAxis {
         /// Axis to constrain.
         axis: Axis,
-        /// Smallest and largest value.
+        /// Smallest and largest value, m or rad.
         range: [f32; 2],
     },
     /// A function of one axis: read its force, lock or unlock the axis.
@@ -25,7 +25,7 @@ pub enum Request {
     GetGainVecAxis(GainSet, Axis),
     /// Reads one gain.
     GetGainVecSingle(GainSet, Axis, Gain),
-    /// Registers for events or unregisters; with the client's process id.
+    /// Registers for events or unregisters from events; with the client's process id.
     Register(Function, i32),
     /// A function of one number: radius m, voltage V, current A, frequency Hz.
     Number(Function, f32),

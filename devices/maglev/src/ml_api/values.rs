@@ -1,4 +1,4 @@
-//! Types of the fields.
+//! Types of the fields in requests, replies and events.
 
 use std::fmt;
 
@@ -28,7 +28,7 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// All axes, in the order of the wire.
+    /// All axes, in protocol order.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
 }
 
@@ -46,11 +46,11 @@ pub enum GainSet {
 }
 
 impl GainSet {
-    /// All gain sets, in the order of the wire.
+    /// All gain sets, in protocol order.
     pub const ALL: [Self; 4] = [Self::Normal, Self::Locked, Self::Constrained, Self::Boundary];
 }
 
-/// Gain of an axis.
+/// Kind of a gain in the controller of an axis (PID with feed-forward).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gain {
     /// Proportional.
@@ -64,20 +64,20 @@ pub enum Gain {
 }
 
 impl Gain {
-    /// All gains, in the order of the wire.
+    /// All kinds of gains, in protocol order.
     pub const ALL: [Self; 4] = [Self::P, Self::I, Self::D, Self::Ff];
 }
 
-/// Gains of an axis: N/m, N/(m s), N s/m, N; of a rotation N·m/rad, N·m/(rad s), N·m s/rad, N·m.
+/// Gains of a translational or rotational axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pid {
-    /// Proportional.
+    /// Proportional gain, N/m or N·m/rad.
     pub p: f32,
-    /// Integral.
+    /// Integral gain, N/(m s) or N·m/(rad s).
     pub i: f32,
-    /// Derivative.
+    /// Derivative gain, N s/m or N·m s/rad.
     pub d: f32,
-    /// Feed-forward.
+    /// Feed-forward, N or N·m.
     pub ff: f32,
 }
 
@@ -85,7 +85,7 @@ impl Pid {
     /// Gains without any force.
     pub const ZERO: Self = Self { p: 0.0, i: 0.0, d: 0.0, ff: 0.0 };
 
-    /// Returns a reference to one of the gains.
+    /// Returns a mutable reference to the gain of this kind.
     pub fn gain_mut(&mut self, gain: Gain) -> &mut f32 {
         match gain {
             Gain::P => &mut self.p,
@@ -96,12 +96,12 @@ impl Pid {
     }
 }
 
-/// Pose on the wire: m and rad.
+/// Pose in the protocol, m and rad.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WirePose {
     /// True if the flotor is outside the sensors' range.
     pub out_of_range: bool,
-    /// Position, then the angles defined in [`super::angles`].
+    /// Position, m, then the angles defined in [`super::angles`], rad.
     pub at: AxisValues,
 }
 
@@ -120,7 +120,7 @@ pub enum AxisMode {
 }
 
 impl AxisMode {
-    /// All modes, in the order of the wire.
+    /// All modes, in protocol order.
     pub const ALL: [Self; 4] = [Self::Normal, Self::Locked, Self::Constrained, Self::Boundary];
 }
 
@@ -133,23 +133,23 @@ pub struct Buttons {
     pub right: bool,
 }
 
-/// Position of a light spot on a position sensor, m.
+/// Position of a light spot on a position sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cell {
-    /// Coordinate along the sensor.
+    /// Coordinate along the sensor, m.
     pub x: f32,
-    /// Coordinate across the sensor.
+    /// Coordinate across the sensor, m.
     pub y: f32,
     /// True if the spot is on the sensor.
     pub is_valid: bool,
 }
 
-/// Placement of a position sensor: m, m, rad.
+/// Placement of a position sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CellOffset {
-    /// Along x.
+    /// Offset along x, m.
     pub x: f32,
-    /// Along y.
+    /// Offset along y, m.
     pub y: f32,
     /// Rotation, rad.
     pub t: f32,

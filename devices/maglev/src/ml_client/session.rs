@@ -50,7 +50,7 @@ pub(crate) struct TakenOff {
     pub(crate) gravity: AxisValues,
 }
 
-/// Cause of a failed take-off, with the function that failed.
+/// Error of a session: failed call with its function, persistent faults, or missing ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Failed {
     At(Function, NoResults),

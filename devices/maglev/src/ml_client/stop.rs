@@ -17,7 +17,7 @@ pub(crate) struct Stop {
     is_stopped: AtomicBool,
     /// True between a stop and its Land frame.
     is_frame_due: AtomicBool,
-    /// A stop does not wait for the lock: who holds it sends the due frame after unlocking.
+    /// A stop does not wait for the lock: the thread that holds the lock sends the due frame after unlocking.
     line: Mutex<Line>,
     frame: Frame,
 }
@@ -81,14 +81,14 @@ impl Stop {
         }
     }
 
-    /// Describes the stop of the device without its host.
+    /// Declares the independent stop of the device: the Land frame on this connection.
     pub(crate) fn independent(&self) -> IndependentStop {
         let descriptor = self.line.lock().map_or(-1, |line| platform::descriptor(line.stream()));
         IndependentStop::by_message(descriptor, self.frame.bytes(), StoppedState::Landed, LANDING_NS)
     }
 }
 
-/// Lands the flotor, from any thread.
+/// Stop handle that lands the flotor, usable from any thread.
 pub struct LandSwitch(pub(crate) Arc<Stop>);
 
 impl SafeStop for LandSwitch {

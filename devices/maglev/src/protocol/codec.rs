@@ -2,7 +2,7 @@
 
 use super::rejection::Rejection;
 
-/// Length of a frame: one packet of the smallest interrupt endpoint at high speed.
+/// Length of a frame, bytes: one packet of an interrupt endpoint of 64 bytes.
 pub const FRAME_BYTES: usize = 64;
 /// Version of the protocol.
 pub const VERSION: u8 = 1;

@@ -3,21 +3,21 @@
 use super::codec::{Reader, Writer};
 use super::rejection::Rejection;
 
-/// Length of a serial number; shorter ones end in zeros.
+/// Length of a serial number, bytes; shorter numbers are padded with zeros.
 pub const SERIAL_BYTES: usize = 16;
 
 /// Description of a controller. SI units, device frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Description {
-    /// First page.
+    /// First page: axes, resolution, rates, latency, serial number.
     pub axes: AxesPage,
-    /// Second page.
+    /// Second page: ranges, stiffness, slew rates.
     pub ranges: RangesPage,
-    /// Third page.
+    /// Third page: largest force and torque, longest watchdog timeout.
     pub limits: LimitsPage,
 }
 
-/// Axes, resolution, rates, latency, serial number.
+/// First page: axes, resolution, rates, latency, serial number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxesPage {
     /// Sensed axes, one bit each: x, y, z, then rotation about x, y, z.
@@ -26,15 +26,15 @@ pub struct AxesPage {
     pub actuated: u8,
     /// Position resolution, m.
     pub resolution_m: f32,
-    /// Slowest and fastest command rate, Hz.
+    /// Lowest and highest command rate, Hz.
     pub rate_hz: [f32; 2],
     /// Latency from a sample to the resulting force, beyond one period, µs.
     pub latency_us: u32,
-    /// Serial number, ASCII, zeros at the end.
+    /// Serial number, ASCII, padded with zeros.
     pub serial: [u8; SERIAL_BYTES],
 }
 
-/// Ranges, stiffness, slew.
+/// Second page: ranges, stiffness, slew rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangesPage {
     /// Largest displacement along each axis, m.
@@ -43,31 +43,31 @@ pub struct RangesPage {
     pub range_rad: [f32; 3],
     /// Largest stiffness rendered stably, N/m.
     pub max_stiffness_n_per_m: f32,
-    /// Fastest change of force, N/s.
+    /// Maximum slew rate of the force, N/s.
     pub force_slew_n_per_s: f32,
-    /// Fastest change of torque, N·m/s.
+    /// Maximum slew rate of the torque, N·m/s.
     pub torque_slew_nm_per_s: f32,
 }
 
-/// Largest force and torque, longest watchdog time.
+/// Third page: largest force and torque, longest watchdog timeout.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitsPage {
     /// Largest force along each axis, N.
     pub max_force_n: [f32; 3],
     /// Largest torque about each axis, N·m.
     pub max_torque_nm: [f32; 3],
-    /// Longest watchdog time that a host may request, µs.
+    /// Longest watchdog timeout that a host may request, µs.
     pub longest_watchdog_us: u32,
 }
 
 /// One page of a description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Page {
-    /// First page.
+    /// First page, number 0.
     Axes(AxesPage),
-    /// Second page.
+    /// Second page, number 1.
     Ranges(RangesPage),
-    /// Third page.
+    /// Third page, number 2.
     Limits(LimitsPage),
 }
 
@@ -75,7 +75,7 @@ pub enum Page {
 pub const PAGES: u16 = 3;
 
 impl Description {
-    /// Returns a page of the description.
+    /// Returns the page `number` (0 to 2) of the description.
     ///
     /// # Errors
     /// [`Rejection::Kind`] if there is no such page.
@@ -102,7 +102,7 @@ impl Description {
     }
 }
 
-/// Converts a serial number to at most 16 bytes; longer ones are cut.
+/// Converts a serial number to 16 bytes, truncated or padded with zeros.
 #[must_use]
 pub fn serial_bytes(serial: &str) -> [u8; SERIAL_BYTES] {
     let mut bytes = [0; SERIAL_BYTES];
@@ -111,7 +111,7 @@ pub fn serial_bytes(serial: &str) -> [u8; SERIAL_BYTES] {
 }
 
 impl Page {
-    /// Returns the number of the page.
+    /// Returns the number of the page, 0 to 2.
     #[must_use]
     pub const fn number(&self) -> u16 {
         match self {

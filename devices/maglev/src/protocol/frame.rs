@@ -1,4 +1,4 @@
-//! Frames: requests, answers, and their encoding in 64 bytes. Little endian, SI units, `f32`.
+//! Frames: requests, replies, and their encoding in 64 bytes. Little endian, SI units, `f32`.
 //!
 //! ```text
 //!  0 magic u16   2 version u8   3 kind u8   4 sequence u32   8 acknowledged u32   12 time_us u32
@@ -21,14 +21,14 @@ const PAYLOAD: usize = 20;
 pub enum Request {
     /// Request for a page of the description.
     Describe {
-        /// Number of the page.
+        /// Number of the page, from 0.
         page: u16,
     },
     /// Start of a session. The coils stay off.
     Arm {
         /// Time between two commands, µs.
         period_us: u32,
-        /// Watchdog time: longest silence before the controller holds, µs.
+        /// Watchdog timeout: longest time without a request before the controller holds, µs.
         watchdog_us: u32,
     },
     /// Start of levitation; commands are accepted from then on.
@@ -37,7 +37,7 @@ pub enum Request {
     Command {
         /// Force along x, y, z, then torque about x, y, z.
         wrench: [f32; 6],
-        /// Validity, µs; after that the controller holds by itself.
+        /// Validity, µs; after that the controller only damps until the next command.
         valid_us: u16,
     },
     /// Landing, then disarming.
@@ -46,18 +46,18 @@ pub enum Request {
     Disarm,
 }
 
-/// A request with its envelope.
+/// Request of the host, with its envelope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RequestFrame {
     /// Sequence number, incremented with every frame of a session.
     pub sequence: u32,
-    /// Sequence number of the newest answer received by the host.
+    /// Sequence number of the newest reply received by the host; 0 before the first.
     pub acknowledged: u32,
     /// The host's clock, µs, wrapping.
     pub time_us: u32,
     /// Session number chosen by the host when arming; frames of another session are rejected.
     pub session: u32,
-    /// The request itself.
+    /// Request, the payload of the frame.
     pub request: Request,
 }
 
@@ -70,7 +70,7 @@ pub enum Mode {
     Armed = 1,
     /// Executing the commands of the host.
     Levitating = 2,
-    /// Holding by itself after a silence of the host.
+    /// Damping the flotor without commands after the watchdog timeout; then the controller lands.
     Holding = 3,
     /// Setting the flotor down.
     Landing = 4,
@@ -99,7 +99,7 @@ pub struct Condition(u16);
 impl Condition {
     /// No fault and no active limit.
     pub const NONE: Self = Self(0);
-    /// The host was silent for longer than the watchdog.
+    /// The controller received no request within the watchdog timeout.
     pub const WATCHDOG: Self = Self(1);
     /// The link to the host broke.
     pub const LINK_LOST: Self = Self(1 << 1);
@@ -115,9 +115,9 @@ impl Condition {
     pub const EDGE: Self = Self(1 << 6);
     /// The command exceeded the largest wrench or slew rate and was limited. No fault.
     pub const LIMITED: Self = Self(1 << 8);
-    /// The controller's own boundary is active. No fault.
+    /// The controller's own wall exerts a force. No fault.
     pub const BOUNDARY: Self = Self(1 << 9);
-    /// The command has expired; the controller holds until the next. No fault.
+    /// The command has expired; the controller only damps until the next command. No fault.
     pub const EXPIRED: Self = Self(1 << 10);
 
     const FAULTS: u16 = 0x00ff;
@@ -168,7 +168,7 @@ impl std::fmt::Display for Condition {
     }
 }
 
-/// The newest sample and the mode of the controller.
+/// Newest sample and mode of the controller, the reply to most requests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Status {
     /// Mode of the controller.
@@ -177,7 +177,8 @@ pub struct Status {
     pub condition: Condition,
     /// Position of the handle, m.
     pub position_m: [f32; 3],
-    /// Vector part of the unit quaternion whose scalar part is not negative.
+    /// Orientation of the handle: vector part of its unit quaternion, with the sign chosen for a non-negative scalar
+    /// part.
     pub rotation_xyz: [f32; 3],
     /// Velocity, in steps of [`Status::VELOCITY_STEP_M_PER_S`].
     pub velocity_steps: [i16; 3],
@@ -192,19 +193,19 @@ impl Status {
     pub const SPIN_STEP_RAD_PER_S: f64 = 1.0e-3;
 }
 
-/// Answer of the controller.
+/// Reply of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
-    /// Status, the answer to all requests but `Describe`.
+    /// Status, the reply to all requests but `Describe`.
     Status(Status),
-    /// Page of the description.
+    /// Page of the description, the reply to `Describe`.
     Description(Page),
 }
 
-/// An answer with its envelope.
+/// Reply of the controller, with its envelope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnswerFrame {
-    /// Sequence number, incremented with every answer.
+    /// Sequence number, incremented with every reply.
     pub sequence: u32,
     /// Sequence number of the newest accepted request.
     pub acknowledged: u32,
@@ -212,12 +213,12 @@ pub struct AnswerFrame {
     pub time_us: u32,
     /// Current session of the controller; 0: none.
     pub session: u32,
-    /// The answer itself.
+    /// Reply, the payload of the frame.
     pub answer: Answer,
 }
 
 impl RequestFrame {
-    /// Encodes the frame.
+    /// Encodes the frame as the bytes of one packet, with header and checksum.
     #[must_use]
     pub fn encode(&self) -> [u8; FRAME_BYTES] {
         let mut bytes =
@@ -266,7 +267,7 @@ impl RequestFrame {
 }
 
 impl AnswerFrame {
-    /// Encodes the frame.
+    /// Encodes the frame as the bytes of one packet, with header and checksum.
     #[must_use]
     pub fn encode(&self) -> [u8; FRAME_BYTES] {
         let mut bytes =

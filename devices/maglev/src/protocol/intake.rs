@@ -1,4 +1,5 @@
-//! Replay protection: accepts each frame at most once, in order, of the right session; counts the rest.
+//! Replay protection: accepts each frame at most once and in order, and counts rejected frames by reason. The receiver
+//! checks the session.
 
 use super::rejection::{Rejection, Rejections};
 
@@ -10,12 +11,12 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// Clears the last sequence number for a new session. The counts stay.
+    /// Clears the last sequence number for a new session; keeps the counts.
     pub fn restart(&mut self) {
         self.last = None;
     }
 
-    /// Returns true for a sequence number newer than all before; counts a rejection otherwise.
+    /// Returns true for a sequence number newer than the last accepted number; counts a rejection otherwise.
     pub fn accept(&mut self, sequence: u32) -> bool {
         let rejection = match self.last {
             Some(last) if sequence == last => Rejection::Duplicate,
@@ -35,13 +36,13 @@ impl Intake {
         self.rejections.count(rejection);
     }
 
-    /// Returns the newest sequence number; `None` before the first.
+    /// Returns the last accepted sequence number; `None` before the first.
     #[must_use]
     pub fn last(&self) -> Option<u32> {
         self.last
     }
 
-    /// Returns the numbers of rejected frames.
+    /// Returns the numbers of rejected frames, by reason.
     #[must_use]
     pub fn rejections(&self) -> &Rejections {
         &self.rejections

@@ -1,6 +1,6 @@
 //! The wire protocol between host and controller: one frame of 64 bytes, one codec, every transport.
 //!
-//! - [`frame`]: requests and answers, and their encoding.
+//! - [`frame`]: requests and replies, and their encoding.
 //! - [`description`]: description of a controller, on request.
 //! - [`intake`]: replay protection; [`rejection`]: reasons of rejected frames, and their counts.
 //! - [`stream`]: frames on links without packets (serial, TCP), by COBS.

@@ -17,11 +17,11 @@ pub enum Rejection {
     Kind,
     /// A number is NaN or infinite.
     NotFinite,
-    /// Sequence number of the previous frame.
+    /// Sequence number of the last accepted frame.
     Duplicate,
-    /// Sequence number older than the previous one.
+    /// Sequence number older than that of the last accepted frame.
     Old,
-    /// Another session, for example of a host that has been replaced.
+    /// Frame of another session, for example of a host that has been replaced.
     Session,
 }
 
@@ -55,7 +55,7 @@ impl Rejections {
         self.0[rejection as usize]
     }
 
-    /// Returns the differences to an earlier count.
+    /// Returns the numbers of frames rejected since `earlier`, by reason.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self(std::array::from_fn(|index| self.0[index].saturating_sub(earlier.0[index])))

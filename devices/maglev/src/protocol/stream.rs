@@ -4,10 +4,10 @@
 
 use super::codec::FRAME_BYTES;
 
-/// Largest length of a coded frame, its zero included.
+/// Maximum length of a coded frame with its terminating zero, bytes.
 pub const CODED_BYTES: usize = corncobs::max_encoded_len(FRAME_BYTES);
 
-/// Packet completed by a byte.
+/// Result of decoding the bytes up to a zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
     /// A packet of the right length.
@@ -24,7 +24,7 @@ pub fn coded(frame: &[u8; FRAME_BYTES]) -> ([u8; CODED_BYTES], usize) {
     (bytes, length)
 }
 
-/// Decoder of packets from a byte stream.
+/// Decoder of COBS-coded packets from a byte stream.
 #[derive(Clone, Debug)]
 pub struct StreamDecoder {
     bytes: [u8; CODED_BYTES],
@@ -39,7 +39,7 @@ impl Default for StreamDecoder {
 }
 
 impl StreamDecoder {
-    /// Decodes one byte; returns a packet completed by it.
+    /// Decodes one byte; returns the packet that the byte completes, `None` if no packet is complete.
     pub fn push(&mut self, byte: u8) -> Option<Received> {
         match self.bytes.get_mut(self.length) {
             Some(slot) => {
@@ -51,7 +51,7 @@ impl StreamDecoder {
         (byte == 0).then(|| self.finish()).flatten()
     }
 
-    /// Returns the packet before a zero; `None` between two zeros.
+    /// Returns the packet before a zero; `None` without a byte between two zeros.
     fn finish(&mut self) -> Option<Received> {
         let Self { mut bytes, length, overflown } = std::mem::take(self);
         if length <= 1 && !overflown {

@@ -11,12 +11,12 @@ use std::time::Duration;
 /// Size of the receive buffer: one byte more than a frame, to detect longer reports.
 const BUFFER_BYTES: usize = FRAME_BYTES + 1;
 
-/// An open HID device.
+/// Link over an open HID device.
 pub struct HidLink {
     device: HidDevice,
 }
 
-/// Opens a HID device. Not real-time.
+/// Opens the HID device at `vendor:product` or `vendor:product:serial`. Not real-time.
 ///
 /// # Errors
 /// [`OpenError`] if the address is invalid, or no device can be opened there.

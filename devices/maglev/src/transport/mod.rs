@@ -1,4 +1,4 @@
-//! Links for frames, behind one trait that hides the library in use.
+//! Links for frames, behind one trait that hides the library of each transport.
 //!
 //! | | feature | carries |
 //! |---|---|---|
@@ -7,8 +7,8 @@
 //! | `usb` | `usb` | packets on a pair of interrupt or bulk endpoints |
 //! | `hid` | `hid` | packets as reports |
 //!
-//! In a tick a link never waits for data. At most one command is in transit; a busy link drops the new one, because a queue
-//! of commands is a queue of old forces.
+//! In a tick a link never waits for data. At most one command is in transit; a busy link drops the new command, because
+//! queued commands would arrive as outdated forces.
 
 #[cfg(any(feature = "usb", feature = "hid"))]
 pub mod address;
@@ -51,13 +51,14 @@ pub trait Transport: Send {
     /// [`LinkLost`] if the other end is gone.
     fn send(&mut self, frame: &[u8; FRAME_BYTES]) -> Result<(), LinkLost>;
 
-    /// Receives one packet, if available. Real-time: bounded, no allocation; one system call.
+    /// Receives one packet; returns [`Incoming::Nothing`] if no packet is complete. Real-time: bounded by the received
+    /// data, no allocation.
     ///
     /// # Errors
     /// [`LinkLost`] if the other end is gone.
     fn receive(&mut self) -> Result<Incoming, LinkLost>;
 
-    /// Receives one packet, waiting at most `patience`. Not real-time.
+    /// Waits for one packet; returns [`Incoming::Nothing`] after the timeout `patience`. Not real-time.
     ///
     /// # Errors
     /// [`LinkLost`] if the other end is gone.

@@ -36,7 +36,7 @@ impl<S: Read + Write + Send> StreamLink<S> {
         }
     }
 
-    /// Returns true if the other end is open.
+    /// Returns true if the other end is open; may read received bytes into the buffer of the link.
     pub fn is_open(&mut self) -> bool {
         !self.fresh.is_empty() || self.fill().is_ok()
     }

@@ -6,7 +6,7 @@ use std::io::ErrorKind;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
-/// TCP port of a controller with Flotor's own protocol; 5678 is that of the ML API.
+/// TCP port of a controller with Flotor's own protocol; the ML API has port 5678.
 pub const PORT: u16 = 5679;
 /// Timeout of a connection attempt.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(2);

@@ -17,7 +17,7 @@ pub(crate) const PORT_EXAMPLE: &str = "/dev/ttyACM0";
 /// Advice for listing the ports.
 pub(crate) const PORT_LIST: &str = "`ls /dev/serial/by-id` lists the ports";
 
-/// Timeout of reads and writes: none.
+/// Timeout of reads and writes: zero, so that neither blocks.
 pub(crate) const PATIENCE: Duration = Duration::ZERO;
 
 /// Maps an error of opening to its cause.

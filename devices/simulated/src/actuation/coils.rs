@@ -1,10 +1,10 @@
 //! The six coils: placement, wrench of a set of currents, currents for a wrench.
 //!
-//! The published descriptions give force limits per axis but no coil positions. This geometry is synthetic
-//! and meets those limits (55 to 140 N, 6.3 to 12.2 N·m): on a hemisphere of 115 mm radius, ring A holds three
-//! coils 65 degrees from the bottom pole that push along the meridian, ring B three at 45 degrees that push
-//! along the parallel, each ring every 120 degrees. A current of 3.5 A pushes with 51.5 N. The coils move by a
-//! tenth of the radius at most, so their directions at home are used throughout.
+//! The published descriptions give force limits per axis but no coil positions. This geometry is synthetic and meets
+//! these limits (55 to 140 N, 6.3 to 12.2 N·m): on a hemisphere of 115 mm radius, ring A holds three coils 65 degrees
+//! from the bottom pole with forces along the meridian, ring B three coils at 45 degrees with forces along the
+//! parallel; the coils of a ring are 120 degrees apart. A current of 3.5 A gives 51.5 N. The coils move by a tenth of
+//! the radius at most, so their directions at home are used throughout.
 
 use crate::linear::{Matrix6, Vector6, inverse, product};
 use crate::plant::Wrench;
@@ -36,7 +36,7 @@ pub struct CoilGeometry {
 }
 
 impl CoilGeometry {
-    /// Geometry of the module's description.
+    /// Geometry of the module documentation.
     pub const MAGLEV: Self = Self {
         radius_m: 0.115,
         meridian_ring_rad: 65.0 * PI / 180.0,
@@ -64,17 +64,17 @@ impl CoilGeometry {
     }
 }
 
-/// Coil model: two matrices between currents and wrenches about the origin of the flotor frame.
+/// Coil model: matrices from currents to the wrench about the origin of the flotor frame, and back.
 #[derive(Clone, Copy, Debug)]
 pub struct Coils {
-    /// N and N·m per A: a column per coil.
+    /// Wrench per current, N/A and N·m/A: one column per coil.
     wrench_of: Matrix6,
-    /// A per N and N·m.
+    /// Current per wrench, A/N and A/(N·m): one row per coil.
     currents_of: Matrix6,
 }
 
 impl Coils {
-    /// Computes both matrices. Real-time: bounded, no allocation.
+    /// Computes the matrices between currents and wrenches. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// If a number is not physical, or the six coils cannot push in all six directions.
@@ -103,8 +103,8 @@ impl Coils {
         Ok(Self { wrench_of, currents_of })
     }
 
-    /// Returns the currents for a wrench, scaled down together to [`CURRENT_LIMIT_A`], and the fraction of the wrench
-    /// delivered (1 within the limit). Real-time: bounded, no allocation.
+    /// Returns the currents for a wrench, A, and the factor by which all are scaled down to [`CURRENT_LIMIT_A`] (1
+    /// within the limit). Real-time: bounded, no allocation.
     #[must_use]
     pub fn currents(&self, wrench: &Wrench) -> (Currents, f64) {
         let asked_a = product(&self.currents_of, &six(wrench));
@@ -124,7 +124,8 @@ impl Coils {
         Wrench { force_n: DVec3::new(fx, fy, fz), torque_nm: DVec3::new(tx, ty, tz) }
     }
 
-    /// Returns the largest force and torque along one axis alone, N and N·m. Real-time: bounded, no allocation.
+    /// Returns the largest force along each axis, N, and torque about each axis, N·m, with all other components zero.
+    /// Real-time: bounded, no allocation.
     #[must_use]
     pub fn pure_axis_limits(&self) -> Wrench {
         let limit = |axis: usize| {

@@ -13,7 +13,7 @@ const POLYNOMIAL: [f64; 3] = [-0.004_51, -0.025_83, 0.1915];
 /// Half the range over which the variation is measured, mm.
 const HALF_STRETCH_MM: f64 = 7.0;
 
-/// Clamp of the height, mm: the polynomial was fitted to a little more than half of this range.
+/// Limit of the height in the polynomial, mm, which was fitted to a little more than half of this range.
 const RANGE_MM: f64 = 12.0;
 
 /// Relative error of the vertical force: delivered over commanded force is one plus the error.
@@ -27,7 +27,8 @@ impl FieldError {
     /// Error measured in the thesis.
     pub const THESIS: Self = Self { peak_to_peak: 0.1087 };
 
-    /// Returns delivered over commanded vertical force at a height of `z_m` above home. Real-time: bounded, no allocation.
+    /// Returns the ratio of delivered to commanded vertical force at a height of `z_m` above home; constant beyond ±12
+    /// mm. Real-time: bounded, no allocation.
     #[must_use]
     pub fn delivered_share(&self, z_m: f64) -> f64 {
         let z_mm = (z_m * 1.0e3).clamp(-RANGE_MM, RANGE_MM);

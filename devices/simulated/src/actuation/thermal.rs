@@ -1,22 +1,22 @@
 //! Heating of the coils: an I²t model with the two faults reported by the device.
 //!
-//! The load of the last minute and the temperature follow the square of the current with a first-order lag:
+//! The mean square current `L` (load) and the temperature `T` follow the square of the current with a first-order lag:
 //!
 //! ```text
 //! minute:       L' = (i^2 - L) / 60 s        over-current when the square root of L exceeds 2 A
 //! temperature:  T' = (T_ambient + r i^2 - T) / tau      over-temperature above 250 degrees
 //! ```
 //!
-//! The limits (about 2 A over a minute, 250 °C) are those of the public interface of the device. Heating `r` and `tau` were
-//! never published: here a constant 2 A ends at 180 °C, after minutes. So the current fault comes first on a cool device;
-//! the temperature fault needs a hot room, or badly cooled coils.
+//! The limits (about 2 A over a minute, 250 °C) are published in the interface of the device. The heating `r` and the
+//! time constant `tau` were never published; with the values here, a constant 2 A leads to 180 °C after some minutes.
+//! So a cool device reaches the current limit first; the temperature limit needs a hot room, or badly cooled coils.
 
 use super::coils::{COILS, Currents};
 use crate::lag::Lag;
 use crate::validation::{Check, Domain, number};
 use flotor_hal::Fault;
 
-/// Limit of the mean current over a minute, A.
+/// Limit of the root mean square current over a minute, A.
 pub const MEAN_CURRENT_LIMIT_A: f64 = 2.0;
 
 /// Time constant of the mean current, s.
@@ -30,14 +30,14 @@ pub const TEMPERATURE_LIMIT_C: f64 = 250.0;
 pub struct ThermalParameters {
     /// Temperature around the device, °C.
     pub ambient_c: f64,
-    /// Final rise of temperature per square of current, K/A².
+    /// Steady-state temperature rise per square of the current, K/A².
     pub rise_k_per_a2: f64,
     /// Time constant of the rise, s.
     pub lag_s: f64,
 }
 
 impl ThermalParameters {
-    /// An estimate (see the module).
+    /// Estimate (see the module documentation).
     pub const MAGLEV: Self = Self { ambient_c: 20.0, rise_k_per_a2: 40.0, lag_s: 120.0 };
 
     pub(super) fn check(&self) -> Check {
@@ -70,7 +70,7 @@ impl Thermal {
         }
     }
 
-    /// Heats the coils with `currents_a` (A) for `dt_s` (s). Real-time: bounded, no allocation.
+    /// Advances loads and temperatures by `dt_s` (s) with constant `currents_a` (A). Real-time: bounded, no allocation.
     pub fn heat(&mut self, currents_a: &Currents, dt_s: f64) {
         let ThermalParameters { ambient_c, rise_k_per_a2, .. } = self.parameters;
         let (load_share, heat_share) = (self.minute.closed(dt_s), self.warming.closed(dt_s));
@@ -83,8 +83,8 @@ impl Thermal {
         }
     }
 
-    /// Returns the root mean square current over the last minute of the most loaded coil, A. Real-time: bounded, no
-    /// allocation.
+    /// Returns the root mean square current of the most loaded coil, A, weighted exponentially over the past with a
+    /// time constant of a minute. Real-time: bounded, no allocation.
     #[must_use]
     pub fn mean_current_a(&self) -> f64 {
         self.load_a2.iter().copied().fold(0.0, f64::max).sqrt()
@@ -102,7 +102,8 @@ impl Thermal {
         self.temperature_c.iter().copied().fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Returns the thermal fault, if any. Real-time: bounded, no allocation.
+    /// Returns the thermal fault: over-temperature before over-current; `None` within both limits. Real-time: bounded,
+    /// no allocation.
     #[must_use]
     pub fn fault(&self) -> Option<Fault> {
         if self.hottest_c() > TEMPERATURE_LIMIT_C {

@@ -1,4 +1,5 @@
-//! Aim of the hand at one instant and during a piece of time, and the curve of voluntary movements.
+//! Intention of the hand at one instant ([`Aim`]) and during a piece of time ([`Intention`]), and the minimum-jerk
+//! curve of voluntary movements.
 
 use crate::validation::{Check, Domain, InvalidParameter, vector};
 use flotor_hal::glam::{BVec3, DQuat, DVec3};
@@ -40,7 +41,7 @@ impl Pose {
 pub struct Aim {
     /// Intended pose of the handle.
     pub pose: Pose,
-    /// Intended force in addition, N.
+    /// Intended force on the handle, in addition to the force of spring and damper, N.
     pub force_n: DVec3,
     /// Axes with an intended force instead of a position: the hand has no stiffness there.
     pub yielding: BVec3,
@@ -72,9 +73,9 @@ pub struct Intention {
     pub orientation: DQuat,
     /// Intended angular velocity, used by the damping of the hand, rad/s.
     pub angular_velocity_rad_per_s: DVec3,
-    /// Constant intended force in addition, N.
+    /// Constant intended force on the handle, in addition to the force of spring and damper, N.
     pub force_n: DVec3,
-    /// Axes along which the hand has no stiffness.
+    /// Axes with an intended force instead of a position: the hand has no stiffness there.
     pub yielding: BVec3,
 }
 

@@ -1,33 +1,37 @@
-//! Guidance of the hand from outside: a client of the run (a pointer in a window) moves the intended position of the handle.
+//! Guidance of the hand by a client of the run, for example with the mouse: the client sets the intended position of
+//! the handle.
 //!
-//! A guide takes the hand over from its trajectory, sets a target, and releases the hand. The intended position follows the
-//! target like a critically damped oscillator of limited speed, so that a jump of the target causes no jump of the force.
-//! After the release it returns to the trajectory within [`RELEASE_NS`]; where the trajectory does not hold the handle, or
-//! intends a force, it approaches the handle itself, and the grip fades.
+//! A guide replaces the trajectory of the hand by a target, until the guide releases the hand. The intended position
+//! follows the target like a critically damped oscillator of limited speed, so that a jump of the target causes no jump
+//! of the force. After the release the intended position returns to the trajectory within [`RELEASE_NS`]; where the
+//! trajectory does not hold the handle, or intends a force, the intended position approaches the handle itself, and the
+//! force of the grip fades.
 //!
-//! A guide that is silent for [`SILENCE_NS`] has released the hand: a client may end at any time. While one client guides,
-//! no other can. All times are those of the simulation's clock, so equal calls give bit-identical results.
+//! Without a message from the guide for [`SILENCE_NS`], the hand is released: a client may end at any time. While one
+//! client guides, all others are rejected. All times are times of the simulation's clock, so equal calls give
+//! bit-identical results.
 
 use super::{Aim, Pose, minimum_jerk};
 use crate::plant::State;
 use flotor_hal::glam::DVec3;
 
-/// Time without a value from the guide after which the hand is released, ns.
+/// Timeout of a guide: time without a message after which the hand is released, ns.
 pub const SILENCE_NS: u64 = 1_000_000_000;
 
-/// Duration of a release, ns.
+/// Duration of the blending from the guided motion back to the trajectory, ns.
 pub const RELEASE_NS: u64 = 500_000_000;
 
-/// Rate at which the intended position follows the target, 1/s: two thirds of a small step are done in 43 ms.
+/// Natural frequency of the oscillator that follows the target, 1/s: two thirds of a small step are done in 43 ms.
 const FOLLOWING_PER_S: f64 = 50.0;
 
-/// Largest speed of the intended position, m/s: quick for a hand that feels an object, and across the workspace in 0.1 s.
+/// Speed limit of the intended position, m/s: quick for a hand that explores an object, and across the workspace in 0.1
+/// s.
 const SPEED_LIMIT_M_PER_S: f64 = 0.25;
 
-/// Cause of a refusal: another client guides the hand, or none does.
+/// Error: the client does not guide the hand, because another client does, or none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NotGuiding {
-    /// Number of the client that guides; 0 for none.
+    /// Number of the guiding client; 0 for none.
     pub guide: f64,
 }
 
@@ -57,7 +61,7 @@ pub(crate) struct Guidance {
     phase: Phase,
     /// Number of the client that guides.
     guide: f64,
-    /// True if the client that identified itself last is the guide: coordinates are from that client.
+    /// True if the latest [`Self::take`] was from the guiding client; targets are accepted only then.
     is_guide_speaking: bool,
     target_m: DVec3,
     /// Time of the latest value from the guide, ns.
@@ -80,7 +84,8 @@ impl Guidance {
         if matches!(self.phase, Phase::Guided(_)) { self.guide } else { 0.0 }
     }
 
-    /// Takes or holds the hand for the client `guide`; 0 releases the hand. A taken hand begins with the motion `start`.
+    /// Starts the guidance by client `guide` from the motion `start`, or resets the timeout of this client's guidance;
+    /// 0 releases the hand.
     ///
     /// Real-time: bounded, no allocation.
     ///
@@ -102,10 +107,10 @@ impl Guidance {
         self.poll(now_ns)
     }
 
-    /// Moves the target along an axis, m. Real-time: bounded, no allocation.
+    /// Sets the target along an axis (0 to 2: x, y, z), m, and resets the timeout. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// [`NotGuiding`] if the client that identified itself last does not guide.
+    /// [`NotGuiding`] if the latest [`Self::take`] was not from the guiding client.
     pub(crate) fn aim_at(&mut self, axis: usize, target_m: f64, now_ns: u64) -> Result<(), NotGuiding> {
         self.poll(now_ns)?;
         self.target_m[axis.min(2)] = target_m;
@@ -127,8 +132,9 @@ impl Guidance {
         self.is_guide_speaking = false;
     }
 
-    /// Advances by `dt_s` (s) to the time `now_ns`. Returns the aim of the hand and the guide's part of its velocity, m/s,
-    /// for the trajectory's aim `scripted` and the handle at `handle` before.
+    /// Advances by `dt_s` (s) to the time `now_ns`. Returns the aim of the hand, and the contribution of the guide to
+    /// its velocity, m/s. `scripted` is the aim of the trajectory at `now_ns`, `handle` the motion of the handle
+    /// before.
     ///
     /// Real-time: bounded, no allocation.
     pub(crate) fn advance(

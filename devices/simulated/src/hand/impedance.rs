@@ -8,9 +8,9 @@ use serde::Deserialize;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Grip {
-    /// [`Impedance::FIRM`].
+    /// Firm grip: [`Impedance::FIRM`].
     Firm,
-    /// [`Impedance::RELAXED`].
+    /// Relaxed arm: [`Impedance::RELAXED`].
     Relaxed,
 }
 
@@ -67,7 +67,7 @@ impl Impedance {
         mass_kg: 0.5,
     };
 
-    /// Returns this impedance for an intended force: no stiffness along the axes of `yielding`.
+    /// Returns this impedance with no stiffness along the axes of `yielding`, along which the hand intends a force.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
@@ -75,7 +75,7 @@ impl Impedance {
         Self { stiffness_n_per_m: DVec3::select(yielding, DVec3::ZERO, self.stiffness_n_per_m), ..self }
     }
 
-    /// Rejects negative and non-finite numbers. Real-time: bounded, no allocation.
+    /// Checks all parameters. Real-time: bounded, no allocation.
     ///
     /// # Errors
     /// If a number is negative or not finite; the error contains its name.

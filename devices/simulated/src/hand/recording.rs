@@ -1,4 +1,4 @@
-//! Recorded trajectories: the motion of a real hand as the intended motion of the simulated one.
+//! Recorded trajectories: the motion of a real hand as the intended motion of the simulated hand.
 //!
 //! Two kinds of file are supported. A recording of a run (`.mcap`) contains the pose of the handle at every tick. Any other
 //! file is a table of comma-separated values with a header:
@@ -7,8 +7,9 @@
 //! time_s,x_m,y_m,z_m                      or      time_s,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad
 //! ```
 //!
-//! in the device frame, rotation as a rotation vector. Times increase from row to row and count from the first; in between,
-//! the intended pose is interpolated linearly. Before the first and after the last row it is constant.
+//! in the device frame, rotation as a rotation vector. Times increase from row to row and count from the first row;
+//! between two rows, the intended pose is interpolated linearly. Before the first and after the last row it is
+//! constant.
 
 mod mcap_file;
 mod table;
@@ -26,7 +27,7 @@ const MAX_SAMPLES: usize = 1 << 24;
 /// Largest plausible coordinate of a handle, m: ten times the range of the device.
 const FARTHEST_M: f64 = 0.12;
 
-/// A recorded trajectory.
+/// Intended poses of the hand over time, read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording(Arc<[Sample]>);
 
@@ -38,7 +39,7 @@ struct Sample {
     pose: Pose,
 }
 
-/// Error in a recorded trajectory. Prints file, place, and the expected content.
+/// Reason why a file is rejected as a trajectory. Prints file, place, and the expected content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingError {
     /// The file.

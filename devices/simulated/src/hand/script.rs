@@ -2,8 +2,7 @@
 //!
 //! ```toml
 //! title = "Press, feel, let go"
-//! grip = "firm"          # or "relaxed"; hand_grip and the numbers of the scene come before it
-//! repeat = 1             # the whole sequence, so many times
+//! grip = "firm"          # or "relaxed"; hand_grip and the numbers of the scene override the grip
 //!
 //! [[step]]
 //! move = { to_mm = [0, 0, -4], to_deg = [0, 0, 0], duration_s = 0.5 }
@@ -21,11 +20,11 @@
 //! release = {}
 //! ```
 //!
-//! A script starts at home. `move` goes to a place along a minimum-jerk curve (rotations as a rotation vector in the device
-//! frame) and `hold` stays there. `oscillate` swings about the place along a sine that fades in and out in a period, as
-//! people explore softness. `push` sets a force instead of a place: pulses (raised cosines) along which the hand has no
-//! stiffness; start it where the hand is not pulling. `release` opens the hand for good, so it must be the last step. After
-//! the last step the hand holds its place.
+//! A script starts at home. `move` goes to a place along a minimum-jerk curve (rotations as a rotation vector in the
+//! device frame) and `hold` stays there. `oscillate` moves about the place along a sine that fades in and out within a
+//! period, as people explore softness. `push` sets a force instead of a place: pulses (raised cosines) along which the
+//! hand has no stiffness; start `push` where the spring of the hand is relaxed, because its force ends at once.
+//! `release` opens the hand permanently, so it must be the last step. After the last step the hand holds its place.
 
 mod reader;
 
@@ -58,7 +57,7 @@ pub struct Script {
     release_ns: Option<u64>,
 }
 
-/// A movement with its start.
+/// Movement with its start, duration and initial place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Leg {
     start_ns: u64,
@@ -117,7 +116,7 @@ impl Script {
         self.grip
     }
 
-    /// Returns the end of the last movement, ns. Real-time: bounded, no allocation.
+    /// Returns the end of the last movement, ns since the start of the run. Real-time: bounded, no allocation.
     #[must_use]
     pub fn end_ns(&self) -> u64 {
         self.legs.last().map_or(0, |leg| leg.start_ns + leg.duration_ns)
@@ -139,7 +138,8 @@ impl Script {
         Some(leg.map_or(Aim::at(Pose::HOME), |leg| leg.aim(time_ns)))
     }
 
-    /// Returns every set of axes along which a leg yields, and the empty set. Not real-time.
+    /// Returns the sets of axes along which a movement intends a force instead of a position, and the empty set. Not
+    /// real-time.
     pub(super) fn yieldings(&self) -> Vec<BVec3> {
         let mut found = vec![BVec3::FALSE];
         for yielding in self.legs.iter().map(Leg::yielding) {

@@ -1,7 +1,7 @@
 //! The intended motion of the hand over time, with the times of the grip.
 //!
-//! Voluntary movements start and stop smoothly; [`minimum_jerk`] (Flash and Hogan 1985, J. Neurosci. 5:1688) is the usual
-//! curve, and every motion here is composed of minimum-jerk curves and sines.
+//! Voluntary movements start and stop smoothly; [`minimum_jerk`] (Flash and Hogan 1985, J. Neurosci. 5:1688) is the
+//! usual curve. Every motion here, except a recorded one, is composed of minimum-jerk curves and sines.
 
 use super::{Aim, Pose, Recording, Script, minimum_jerk};
 use crate::units::seconds;
@@ -81,7 +81,8 @@ impl Trajectory {
         }
     }
 
-    /// Returns every set of axes along which the hand yields at some time. Not real-time.
+    /// Returns the sets of axes along which the hand, at some time, intends a force instead of a position; includes the
+    /// empty set. Not real-time.
     pub(crate) fn yieldings(&self) -> Vec<BVec3> {
         match self {
             Self::Scripted(script) => script.yieldings(),

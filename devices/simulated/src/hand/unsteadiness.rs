@@ -45,7 +45,7 @@ impl Unsteadiness {
     }
 }
 
-/// Random tremor and force noise of one run.
+/// Generator of the hand's tremor and force noise in one run.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Wavering {
     size: Unsteadiness,
@@ -54,7 +54,7 @@ pub(crate) struct Wavering {
 }
 
 impl Wavering {
-    /// Draws the noise of a run with this seed. Real-time: bounded, no allocation.
+    /// Draws the frequencies and phases of a run from its seed. Real-time: bounded, no allocation.
     pub(crate) fn new(size: Unsteadiness, seed: u64) -> Self {
         let mut noise = Noise::new(seed, Stream::Hand);
         let tremor = [(); 3].map(|()| Waves::new(TREMOR_BAND_HZ, &mut noise));
@@ -71,7 +71,8 @@ impl Wavering {
         DVec3::from_array(self.tremor.map(|waves| waves.at(time_s))) * self.size.tremor_m
     }
 
-    /// Returns an intended force (N) with noise. Real-time: bounded, no allocation.
+    /// Returns the intended force with noise, N, at a time since the start of the run. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub(crate) fn force_n(&self, intended_n: DVec3, time_s: f64) -> DVec3 {
         if self.size.force_share == 0.0 || intended_n == DVec3::ZERO {

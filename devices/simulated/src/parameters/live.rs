@@ -33,7 +33,8 @@ const fn is_same(one: &[u8], other: &[u8]) -> bool {
 /// Changes the live parameter at `index` of the schema. Real-time: bounded, no allocation.
 ///
 /// # Errors
-/// [`OutOfRange`] with the number of the guiding client if the value is from another; `Fixed` for a parameter that is not live.
+/// [`OutOfRange`] if another client guides the hand, or none does, with the number of the guiding client (0: none) as
+/// both limits; `Fixed` for a parameter that is not live.
 pub(crate) fn change(simulation: &mut Simulation, index: usize, value: f64) -> Result<(), SetParameterError> {
     let refused =
         |NotGuiding { guide }| SetParameterError::OutOfRange(OutOfRange { min: guide, max: guide, value });
@@ -46,8 +47,8 @@ pub(crate) fn change(simulation: &mut Simulation, index: usize, value: f64) -> R
     }
 }
 
-/// Applies the values with which a device was opened: a guide among them begins with the first tick. Real-time: bounded, no
-/// allocation.
+/// Applies the initial values of the live parameters: if `hand_guide` is set, its guidance starts with the first tick.
+/// Real-time: bounded, no allocation.
 pub(crate) fn begin(simulation: &mut Simulation, values: &[f64]) {
     let guide = values.get(GUIDE).copied().unwrap_or_default();
     if guide != 0.0 && simulation.guide(guide).is_ok() {

@@ -1,4 +1,4 @@
-//! Preset `full`: conversion of parameters to coils, cells and faults.
+//! Preset `full`: conversion of the settings to parameters of actuators, sensors and faults.
 
 use crate::actuation::ActuationParameters;
 use crate::actuation::coils::CoilGeometry;
@@ -100,7 +100,7 @@ fn fault(settings: &Settings<'_>) -> Option<FaultPlan> {
     })
 }
 
-/// Tick length in which the sensor latency is given, ns: that of the device's own controller.
+/// Unit of the setting `sensor_latency_ticks`, ns: the tick of the device's own controller.
 const TICK_OF_THE_SENSORS_NS: u64 = 1_000_000;
 
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the schema keeps it between 0 and 32

@@ -1,4 +1,4 @@
-//! Parameter schema: every parameter with unit, range, default and a sentence.
+//! Parameter schema: every parameter with unit, range, default and documentation.
 
 use crate::hand::Script;
 use crate::plant::FlotorParameters;

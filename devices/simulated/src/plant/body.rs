@@ -29,8 +29,8 @@ pub(super) struct Body {
     pub(super) feed_forward_n: f64,
     /// Compensation minus weight, device frame, N: exactly zero if set equal.
     pub(super) lift_n: DVec3,
-    /// Distance of the flotor's centre of mass from the common one, relative to the distance of the common one from the
-    /// origin: mass of the hand divided by that of the flotor (law of the lever).
+    /// Distance of the flotor's centre of mass from the common centre of mass, relative to the distance of the common
+    /// centre from the origin: mass of the hand divided by the mass of the flotor (law of the lever).
     pub(super) lift_lever: f64,
     /// Damping of drag and hand together, per axis, N s/m.
     pub(super) damping_ns_per_m: DVec3,

@@ -18,7 +18,7 @@ pub const THESIS_FEED_FORWARD_N: f64 = 7.7;
 pub enum FeedForward {
     /// Exactly the weight: the flotor floats.
     Weight,
-    /// A set force, N; the difference to the weight acts on the flotor.
+    /// Given force, N; its difference from the weight accelerates the flotor.
     Force(f64),
 }
 
@@ -51,12 +51,12 @@ pub struct FlotorParameters {
 impl FlotorParameters {
     /// The thesis's flotor: 580 g (Varadharajan 2007, section 3.2), centre of mass on the axis.
     ///
-    /// The centre of mass lies as deep as the one measured on a sister device ([`Self::UTAH`]). The inertia
-    /// was never published: it is that of a thin hemisphere of 115 mm radius plus a handle that lifts the
-    /// centre of mass to that depth, 3.0 to 3.7 and 3.4 to 3.9 g m² depending on the handle's mass; this is
-    /// the middle. Drag is an estimate too: "damped oscillation" (thesis section 3.2) at 1 kHz needs more
-    /// than half the stiffness times the period, 0.4 to 1.6 N s/m for the thesis's springs (Colgate and
-    /// Schenkel 1997); the rotational one is the same drag spread evenly over the hemisphere, `2/3 b R^2`.
+    /// The centre of mass lies as deep as measured on a sister device ([`Self::UTAH`]). The inertia was never
+    /// published. Estimate: a thin hemisphere of 115 mm radius plus a handle that raises the centre of mass to that
+    /// depth; depending on the handle's mass this gives 3.0 to 3.7 g m² about x and y, and 3.4 to 3.9 g m² about z; the
+    /// values here are the midpoints. Drag is an estimate too: "damped oscillation" (thesis section 3.2) at 1 kHz needs
+    /// more than half the stiffness times the period, 0.4 to 1.6 N s/m for the thesis's springs (Colgate and Schenkel
+    /// 1997); the rotational drag assumes the translational drag spread evenly over the hemisphere, `2/3 b R^2`.
     pub const THESIS: Self = Self {
         mass_kg: 0.580,
         inertia_kg_m2: DVec3::new(3.35e-3, 3.35e-3, 3.65e-3),
@@ -66,8 +66,8 @@ impl FlotorParameters {
         drag: Drag { translational_ns_per_m: 2.0, rotational_nms_per_rad: 0.0176 },
     };
 
-    /// The flotor of the University of Utah's device: mass and centre of mass from its control program
-    /// (repository n-fallahinia/UoU_Soft_V2.0), which compensates 5.674 N. The rest as [`Self::THESIS`].
+    /// The flotor of the University of Utah's device: mass and centre of mass from its control program (repository
+    /// n-fallahinia/UoU_Soft_V2.0), which compensates 5.674 N. All else as in [`Self::THESIS`].
     pub const UTAH: Self =
         Self { mass_kg: 0.555, centre_of_mass_m: DVec3::new(0.614e-3, 1.225e-3, -31.669e-3), ..Self::THESIS };
 
@@ -80,10 +80,10 @@ impl FlotorParameters {
         }
     }
 
-    /// Rejects unphysical numbers. Real-time: bounded, no allocation.
+    /// Checks all parameters. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a parameter is not finite, not positive, or impossible; the error contains its name.
+    /// If a parameter is not finite, out of its range, or physically impossible; the error contains its name.
     pub fn check(&self) -> Result<(), InvalidParameter> {
         number("mass_kg", self.mass_kg, Domain::Positive)?;
         vector("inertia_kg_m2", self.inertia_kg_m2, Domain::Positive)?;

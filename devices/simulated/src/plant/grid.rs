@@ -35,7 +35,7 @@ pub(super) struct Node {
 }
 
 impl Grid {
-    /// Divides a piece into at least so many steps.
+    /// Divides a piece into at least `at_least` steps, at most [`MAX_STEPS`].
     pub(super) fn new(body: &Body, piece_ns: u64, at_least: f64) -> Self {
         let mut steps = 1;
         while f64::from(steps) < at_least && steps < MAX_STEPS {

@@ -1,7 +1,8 @@
 //! Division of pieces of time into steps, with tables for each step length.
 //!
-//! A flotor without rotation and torque is integrated exactly for any step length. A rotating one is integrated in finer
-//! steps, limited by the fastest rate of its rotation and of the forces off its centre of mass.
+//! A flotor without rotation and torque is integrated exactly; its steps are limited only by the series of the
+//! oscillator. A rotating flotor is integrated in finer steps, limited by the fastest rate of its rotation and of the
+//! forces off its centre of mass.
 
 use super::body::Body;
 use super::grid::{Grid, MAX_STEPS};
@@ -23,7 +24,7 @@ const MAX_TURNING_STEP: f64 = 0.1;
 /// Longest piece of one call of [`Plant::advance`](super::Plant::advance), ns. Callers split longer intervals.
 pub const MAX_PIECE_NS: u64 = 1_000_000;
 
-/// A body with the tables of two piece lengths: the nominal and the last other one.
+/// Body with the tables of two piece lengths: the nominal and the last other length.
 #[derive(Clone, Debug)]
 pub(super) struct Scheme {
     body: Body,
@@ -140,12 +141,14 @@ impl Table {
     }
 }
 
-/// Returns the steps of a piece for the series of the oscillator, not rounded up. Real-time: bounded, no allocation.
+/// Returns the number of steps of a piece for the series of the oscillator, not rounded up. Real-time: bounded, no
+/// allocation.
 fn straight_steps(body: &Body, piece_ns: u64) -> f64 {
     body.oscillator.rate_per_s() * seconds(piece_ns) / MAX_STEP_TIMES_RATE
 }
 
-/// Returns the steps of a piece for the accuracy of rotation, not rounded up. Real-time: bounded, no allocation.
+/// Returns the number of steps of a piece for the accuracy of the rotation, not rounded up. Real-time: bounded, no
+/// allocation.
 fn turning_steps(body: &Body, piece_ns: u64) -> f64 {
     let coupled = body.centre_of_mass_m != DVec3::ZERO;
     let coupled_rate_per_s = if coupled { body.oscillator.rate_per_s() } else { 0.0 };

@@ -28,7 +28,7 @@ use crate::hand::Intention;
 use crate::ledger::Work;
 use flotor_hal::glam::{DQuat, DVec3};
 
-/// One step with its constants.
+/// Integration step of the plant: its inputs, start state and precomputed forces.
 pub(super) struct Step<'a> {
     body: &'a Body,
     grid: &'a Grid,
@@ -106,8 +106,8 @@ impl<'a> Step<'a> {
         Some((motion, self.work(&drive, &motion, displacement)))
     }
 
-    /// Returns true if the flotor neither rotates nor is subject to a torque during the step: neither of coils or hand, nor
-    /// of a force beside the centre of mass.
+    /// Returns true if the flotor does not rotate during the step and no torque acts on it: none of coils or hand, and
+    /// none of a force off the centre of mass.
     #[inline]
     fn is_balanced(&self, drive: &Drive) -> bool {
         let (body, start) = (self.body, self.start);
@@ -159,7 +159,7 @@ impl<'a> Step<'a> {
         at
     }
 
-    /// Returns the drive of the oscillator for an initial velocity of the centre of mass, m/s.
+    /// Returns the drive of the oscillator for an initial velocity of the centre of mass (m/s).
     #[inline]
     fn drive(&self, velocity: DVec3) -> Drive {
         let body = self.body;

@@ -21,7 +21,7 @@ use flotor_hal::glam::DVec3;
 /// Limit of rate times step for the series (pure number).
 pub(super) const MAX_STEP_TIMES_RATE: f64 = 0.25;
 
-/// Terms of the series. The first one left out is below `0.41^14 / 18! * 4!`, 1e-20 of the sum: `0.41` is the
+/// Number of terms of the series. The first omitted term is below `0.41^14 / 18! * 4!`, 1e-20 of the sum: `0.41` is the
 /// largest root of `c^2 = B c + K` at `B = 0.25`, `K = 0.0625`.
 const TERMS: usize = 14;
 
@@ -142,8 +142,8 @@ impl Response {
         drive.velocity * *p2 + drive.acceleration * *p3 + drive.jerk * *p4
     }
 
-    /// Returns displacement (m) and velocity (m/s) for those at the start, without a drive. Real-time: bounded, no
-    /// allocation.
+    /// Returns displacement (m) and velocity (m/s) for the given displacement and velocity at the start, without a
+    /// drive. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn carry(
         &self,

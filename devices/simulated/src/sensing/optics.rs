@@ -9,11 +9,12 @@
 //! u = f (q t) / D,      v = f (q z) / D
 //! ```
 //!
-//! **Inverse**: Gauss-Newton from the last pose. A small motion (`dx`, rotation `dr` in the device frame) moves a diode by
-//! `dx + dr x (R p)`; the six linearised equations are solved repeatedly. As long as each step is much shorter than the one
-//! before, the equations of an earlier round are reused: from one tick to the next the flotor moves so little that one set
-//! serves all rounds. After a step of length `s` that follows one of length `r` the residual is about `s s / r`, the
-//! criterion of convergence. The iteration is bounded: it fails after a fixed number of rounds or outside a fixed region.
+//! **Inverse**: Gauss-Newton, with the last pose as initial guess. A small motion (`dx`, rotation `dr` in the device
+//! frame) moves a diode by `dx + dr x (R p)`; the six linearised equations are solved repeatedly. As long as each step
+//! is much shorter than the previous step, the Jacobian of an earlier iteration is reused: from one tick to the next
+//! the flotor moves so little that one Jacobian serves all iterations. After a step of length `s` that follows a step
+//! of length `r`, the error is about `s s / r`, the criterion of convergence. The iteration fails after a fixed number
+//! of rounds, or outside a fixed region.
 
 use crate::hand::Pose;
 use crate::validation::{Domain, InvalidParameter, number};
@@ -21,16 +22,16 @@ use flotor_hal::glam::{DMat3, DQuat, DVec3};
 use flotor_hal::math;
 use std::f64::consts::PI;
 
-/// Largest number of rounds: from home six find any pose visible to the cells.
+/// Largest number of iterations: from home six suffice for every pose within the range of the cells.
 const MAX_ROUNDS: usize = 12;
 
-/// Residual at convergence, m and rad alike.
+/// Error of the pose at convergence, m and rad alike.
 const LEFT: f64 = 3.0e-11;
 
-/// Assumed length of the step before the first one (m and rad alike): the size of the layout.
+/// Assumed length of the step before the first step (m and rad alike): the size of the layout.
 const LAYOUT_SIZE: f64 = 60.0e-3;
 
-/// Largest ratio of successive steps for which the equations are reused.
+/// Largest ratio of successive steps for which the Jacobian is reused.
 const SHRINKAGE: f64 = 0.02;
 
 /// Radius of the region of poses, m: twice the range of motion.
@@ -55,7 +56,7 @@ pub struct OpticsGeometry {
 }
 
 impl OpticsGeometry {
-    /// Layout of the module's description. Cells of 18 mm cover every pose of ±12 mm and ±8 degrees.
+    /// Layout of the module documentation. Cells of 18 mm cover every pose of ±12 mm and ±8 degrees.
     pub const MAGLEV: Self = Self {
         diode_azimuths_rad: [0.0, 2.0 * PI / 3.0, 4.0 * PI / 3.0],
         diode_radius_m: 60.0e-3,
@@ -65,12 +66,12 @@ impl OpticsGeometry {
     };
 }
 
-/// Coordinates of the light spots, m: one component of each vector per diode.
+/// Coordinates of the light spots relative to the centres of their cells, m: one component of each vector per diode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spots {
-    /// Coordinates along the parallel, `u`.
+    /// Tangential coordinates, `u`.
     pub across_m: DVec3,
-    /// Coordinates upwards, `v`.
+    /// Vertical coordinates, `v`, positive for a diode above its lens.
     pub up_m: DVec3,
 }
 
@@ -92,10 +93,11 @@ pub struct Optics {
 }
 
 impl Optics {
-    /// Prepares a layout. Real-time: bounded, no allocation.
+    /// Computes positions and directions of diodes and lenses. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a length is not positive, or the diodes stand in a line, which hides the rotation about that line.
+    /// If a length is not positive, an azimuth is not finite, or the diodes stand in a line: the rotation about that
+    /// line would be unobservable.
     pub fn new(geometry: &OpticsGeometry) -> Result<Self, InvalidParameter> {
         number("led_radius_mm", geometry.diode_radius_m, Domain::Positive)?;
         let gap_m = geometry.lens_radius_m - geometry.diode_radius_m - REGION_M;
@@ -114,7 +116,8 @@ impl Optics {
         optics.equations(&Pose::HOME).map(|_| optics).ok_or(InvalidParameter::DiodesInALine)
     }
 
-    /// Returns the light spots of a pose; `None` if one is outside its cell. Real-time: bounded, no allocation.
+    /// Returns the light spots of a pose; `None` if a spot is outside its cell, or the position is more than 24 mm from
+    /// home. Real-time: bounded, no allocation.
     #[must_use]
     pub fn spots(&self, pose: &Pose) -> Option<Spots> {
         let spots = self.images(pose);
@@ -125,7 +128,8 @@ impl Optics {
         (finite && in_front && largest_m <= self.geometry.cell_half_width_m).then_some(spots)
     }
 
-    /// Returns the spots shifted by the cells' nonlinearity: outwards by `edge` (a fraction of the half width) at the edge.
+    /// Returns the spots with the radial distortion of the cells: outwards by `edge` (a fraction of the half width) at
+    /// the edge.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
@@ -143,7 +147,8 @@ impl Optics {
         self.geometry.image_distance_m / (self.geometry.lens_radius_m - self.geometry.diode_radius_m)
     }
 
-    /// Returns the pose with these spots (m), found by iteration from `near`; `None` without convergence.
+    /// Solves for the pose with these spots (m) by iteration from the initial guess `near`; `None` without convergence,
+    /// or more than 24 mm or 20 degrees from home.
     ///
     /// Real-time: bounded, no allocation.
     #[must_use]
@@ -203,7 +208,7 @@ impl Optics {
         self.geometry.image_distance_m / (self.geometry.lens_radius_m - at.dot(eye.radius))
     }
 
-    /// Returns the linearised equations of the spots at a pose; `None` if the spots do not determine the motion.
+    /// Returns the factorised Jacobian of the spots at a pose; `None` if the spots do not determine the motion.
     #[inline]
     fn equations(&self, pose: &Pose) -> Option<Equations> {
         let attitude = DMat3::from_quat(pose.orientation);
@@ -220,7 +225,7 @@ impl Optics {
         )
     }
 
-    /// Returns the rows of one diode: across and up.
+    /// Returns the rows of the Jacobian for the spot of one diode: the tangential and the vertical coordinate.
     #[inline]
     fn rows(&self, eye: &Eye, position_m: DVec3, attitude: &DMat3) -> (Row, Row) {
         let arm = *attitude * eye.diode;
@@ -238,12 +243,12 @@ impl Optics {
     }
 }
 
-/// Derivative of one spot coordinate by (x, y, yaw) and by (z, pitch, roll).
+/// Derivative of one spot coordinate with respect to (x, y, yaw) and to (z, pitch, roll).
 type Row = (DVec3, DVec3);
 
-/// The six linearised equations in two halves: the spots' motion across their cells depends mostly on `x, y` and yaw, their
-/// motion up mostly on `z`, pitch and roll. The cross terms are small, so that the halves can be solved one after the other
-/// without pivoting.
+/// Factorised Jacobian of the six spot coordinates, in blocks: the tangential coordinates depend mostly on `x, y` and
+/// yaw, the vertical coordinates mostly on `z`, pitch and roll. The cross terms are small, so that the two halves are
+/// solved one after the other without pivoting.
 #[derive(Clone, Copy)]
 struct Equations {
     /// `across = A (x, y, yaw) + B (z, pitch, roll)`, `up = C (x, y, yaw) + D (z, pitch, roll)`.
@@ -255,11 +260,11 @@ struct Equations {
 }
 
 impl Equations {
-    /// Smallest determinant, relative to the one expected from the size of the layout (pure number; three diodes evenly
-    /// around a circle have 2.6).
+    /// Smallest determinant, relative to the determinant expected from the size of the layout (pure number; 2.6 for
+    /// three diodes evenly around a circle).
     const LEAST_DETERMINANT: f64 = 1.0e-3;
 
-    /// Factorises the equations; `across` is `[A, B]`, `up` is `[C, D]`, `sizes` the expected determinants of A and D.
+    /// Factorises the Jacobian; `across` is `[A, B]`, `up` is `[C, D]`, `sizes` the expected determinants of A and D.
     #[inline]
     fn new([a, b]: [DMat3; 2], [c, d]: [DMat3; 2], sizes: [f64; 2]) -> Option<Self> {
         let invertible = |matrix: &DMat3, size: f64| {
@@ -275,7 +280,7 @@ impl Equations {
         invertible(&rest, sizes[1]).then(|| Self { inverse_a, b, c, inverse_rest: rest.inverse() })
     }
 
-    /// Returns the small motion (m, rad) that moves the spots by this much.
+    /// Returns the small motion (m, rad) that displaces the spots by `spots`.
     #[inline]
     fn motion(&self, spots: &Spots) -> Motion {
         let first = self.inverse_a * spots.across_m;

@@ -1,13 +1,13 @@
 //! Velocity from a sequence of poses: three estimators with their trade-offs.
 //!
-//! - **Difference**: change over time. A lag of only half a tick; noise and steps of the sensor are divided by the tick, so
-//!   2 µm at 1 kHz are 2 mm/s. (A public client of the device rejects this: "calculating velocity this way causes
-//!   instability".)
-//! - **Low-pass**: the difference behind a first-order filter. Quieter, with the lag of the filter's time constant.
+//! - **Difference**: difference quotient of successive poses. A lag of only half a tick; noise and quantisation steps of the
+//!   sensor are divided by the tick, so 2 µm at 1 kHz are 2 mm/s. (A public client of the device rejects this method:
+//!   "calculating velocity this way causes instability".)
+//! - **Low-pass**: the difference quotient behind a first-order filter. Less noise, with the lag of the filter's time constant.
 //! - **Kalman**: position and velocity estimated together, under the assumption that acceleration is noise of known
 //!   strength. In the steady state this is the alpha-beta filter with the gains of Kalata (1984, IEEE Trans. Aerosp.
-//!   Electron. Syst. 20:174), the best trade-off of noise and lag. Needs two numbers, noise of the sensor and acceleration
-//!   of the hand.
+//!   Electron. Syst. 20:174), the best trade-off of noise and lag. Needs the noise of the sensor and the acceleration of the
+//!   hand.
 
 use crate::hand::Pose;
 use crate::lag::Lag;
@@ -15,14 +15,14 @@ use crate::validation::{Check, Domain, number};
 use flotor_hal::glam::DVec3;
 use flotor_hal::orientation_from_rotation_vector;
 
-/// Kind of the velocity estimator.
+/// Method of velocity estimation, with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EstimatorKind {
     /// Difference quotient.
     Difference,
     /// Difference quotient behind a first-order low-pass.
     LowPass {
-        /// Corner of the filter, Hz.
+        /// Corner frequency of the filter, Hz.
         bandwidth_hz: f64,
     },
     /// Steady-state Kalman filter.
@@ -35,7 +35,7 @@ pub enum EstimatorKind {
 }
 
 impl EstimatorKind {
-    /// The low-pass of the University of Utah's control program, 200 Hz.
+    /// The low-pass filter of the University of Utah's control program, 200 Hz.
     pub const UTAH: Self = Self::LowPass { bandwidth_hz: 200.0 };
 
     pub(super) fn check(&self) -> Check {
@@ -64,11 +64,11 @@ impl Velocity {
     pub const ZERO: Self = Self { linear_m_per_s: DVec3::ZERO, angular_rad_per_s: DVec3::ZERO };
 }
 
-/// A velocity estimator in operation.
+/// Velocity estimator with its state.
 #[derive(Clone, Copy, Debug)]
 pub struct Estimator {
     kind: EstimatorKind,
-    /// Filter of the low-pass; `None` for the others.
+    /// Filter of the low-pass method; `None` for the others.
     lag: Option<Lag>,
     /// Last pose: measured, or estimated by the Kalman filter; `None` before the first.
     last: Option<Pose>,
@@ -76,7 +76,7 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// Creates an estimator without a pose. Real-time: bounded, no allocation.
+    /// Creates an estimator before its first pose, with zero velocity. Real-time: bounded, no allocation.
     #[must_use]
     pub fn new(kind: EstimatorKind) -> Self {
         let lag = match kind {
@@ -86,13 +86,15 @@ impl Estimator {
         Self { kind, lag, last: None, velocity: Velocity::ZERO }
     }
 
-    /// Resets the estimator (the flotor was out of sight). Real-time: bounded, no allocation.
+    /// Resets the estimator after the flotor has left the range of the sensors; returns the velocity from now on: zero.
+    /// Real-time: bounded, no allocation.
     pub fn restart(&mut self) -> Velocity {
         *self = Self::new(self.kind);
         self.velocity
     }
 
-    /// Updates the estimate with a pose measured `dt_s` (s) after the previous one. Real-time: bounded, no allocation.
+    /// Updates the estimate with a pose measured `dt_s` (s) after the previous pose; returns the velocity, zero after
+    /// the first pose. Real-time: bounded, no allocation.
     pub fn update(&mut self, pose: &Pose, dt_s: f64) -> Velocity {
         let Some(last) = self.last.filter(|_| dt_s > 0.0) else {
             self.last = Some(*pose);

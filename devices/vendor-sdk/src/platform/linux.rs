@@ -21,7 +21,8 @@ pub(crate) fn missing_remedy(path: &Path) -> String {
     format!("`ldd {}` lists the required libraries and the missing ones", path.display())
 }
 
-/// Returns the folders to search, in order: those in the variables of an SDK, then those of the system.
+/// Returns the library search path from environment variables, in order: the folders of the SDK (`variables`),
+/// `LD_LIBRARY_PATH`, the user's `~/.local/lib`, and the library folders of the system.
 pub(crate) fn folders(variables: &[&str], said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
     let machine = std::env::consts::ARCH;
     let of_sdk = variables.iter().filter_map(|variable| said(variable)).flat_map(|folder| {
@@ -36,7 +37,7 @@ pub(crate) fn folders(variables: &[&str], said: impl Fn(&str) -> Option<String>)
     of_sdk.chain(loader).chain(own).chain(system).chain([of_machine]).collect()
 }
 
-/// Returns bits and processor of a library by its first bytes; `None` for another kind of file.
+/// Returns word size and processor of a library, read from its first bytes; `None` for another kind of file.
 pub(crate) fn processor(head: &[u8]) -> Option<String> {
     let [0x7f, b'E', b'L', b'F', class, _, .., low, high] = head.get(..HEAD)? else { return None };
     let bits = if *class == 1 { 32 } else { 64 };
@@ -59,8 +60,8 @@ pub(crate) unsafe fn open(path: &Path) -> Result<Loaded, libloading::Error> {
     unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) }
 }
 
-/// Runs `body` with all signals of this thread blocked, so that threads started by `body` inherit the mask and never take a signal,
-/// which belongs to the host. Not real-time.
+/// Runs `body` with all signals of this thread blocked, so that threads started by `body` inherit the signal mask and
+/// never handle a signal of the host; then restores the mask. Not real-time.
 pub fn without_signals<T>(body: impl FnOnce() -> T) -> T {
     let mut before = MaybeUninit::<libc::sigset_t>::zeroed();
     // SAFETY: two sets on this stack; the first is filled before it is read, the second is written by the system.

@@ -18,8 +18,8 @@ pub(crate) fn missing_remedy(path: &Path) -> String {
     format!("a library that {} needs is missing; install the whole SDK", path.display())
 }
 
-/// Returns the folders to search, in order, by the environment: the SDK, `PATH`, and the system's folder, where drivers install
-/// their libraries.
+/// Returns the library search path from environment variables, in order: the folders of the SDK (`variables`), `PATH`,
+/// and the system folder, where drivers install their libraries.
 pub(crate) fn folders(variables: &[&str], said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
     let of_sdk = variables.iter().filter_map(|variable| said(variable)).flat_map(|folder| {
         let folder = PathBuf::from(folder);
@@ -31,7 +31,7 @@ pub(crate) fn folders(variables: &[&str], said: impl Fn(&str) -> Option<String>)
     of_sdk.chain(path).chain(system).collect()
 }
 
-/// Returns bits and processor of a library by its first bytes; `None` for another kind of file.
+/// Returns word size and processor of a library, read from its first bytes; `None` for another kind of file.
 pub(crate) fn processor(head: &[u8]) -> Option<String> {
     Some(match machine(head)? {
         0x014c => "32-bit x86".to_owned(),

@@ -5,8 +5,8 @@
 
 use crate::{Axes, Capabilities, Refusal};
 
-/// Value of a capability field with its largest plausible value. Zero is allowed; a value beyond `most` is a mistake of
-/// unit or a corrupt memory.
+/// Value of a capability field with its largest plausible value. Zero is allowed; a value above `most` indicates a wrong
+/// unit or corrupt memory.
 struct Number<T> {
     field: &'static str,
     value: T,
@@ -26,7 +26,7 @@ struct Group {
 /// Largest plausible rate, beyond any loop, Hz.
 const MOST_RATE_HZ: f64 = 1.0e7;
 
-/// Refuses numbers that no host can enforce.
+/// Rejects capabilities that no host can enforce.
 pub(super) fn check(declared: &Capabilities) -> Result<(), Refusal> {
     for (field, axes) in [("sensed", declared.sensed), ("actuated", declared.actuated)] {
         if !Axes::ALL.contains(axes) {
@@ -63,7 +63,7 @@ pub(super) fn check(declared: &Capabilities) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Refuses capabilities that differ from those of an earlier call: the envelope is built once.
+/// Rejects capabilities that differ from those of an earlier call: the envelope is built once.
 pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Result<(), Refusal> {
     if before == now {
         return Ok(());
@@ -119,7 +119,7 @@ impl Group {
     }
 }
 
-/// Formats numbers as a scene writes them: a single number plain, several in brackets, very large ones with an exponent.
+/// Formats numbers in scene syntax: a single number plain, several in brackets, very large ones with an exponent.
 fn list(numbers: &[f64]) -> String {
     let words: Vec<String> = numbers.iter().map(|number| format!("{number:?}")).collect();
     match words.iter().map(|word| word.trim_end_matches(".0")).collect::<Vec<_>>()[..] {

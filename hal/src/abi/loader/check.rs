@@ -30,8 +30,8 @@ pub(super) unsafe fn contract(entry: &'static Entry) -> Result<Proof, String> {
     }
 }
 
-/// Describes the first row that differs. An extension struct known to one side only is no difference: that extension is
-/// not offered or not requested.
+/// Describes the first row that differs; `None` if all rows match. An extension struct known to one side only is no
+/// difference: that extension is not offered or not requested.
 fn difference(ours: &[FieldLayout], theirs: &[FieldLayout]) -> Option<String> {
     let named = |rows: &'_ [FieldLayout], name: &str| rows.iter().copied().find(|row| row.name() == name);
     let at = |row: FieldLayout| match row.name().contains('.') {

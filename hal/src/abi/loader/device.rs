@@ -1,4 +1,4 @@
-//! Loaded device, in two types: [`OpenedDevice`] (answers queries) and [`ActiveDevice`] (energised).
+//! Loaded device, one type per phase: [`OpenedDevice`] (not energised) and [`ActiveDevice`] (energised).
 
 use super::capabilities::{check, check_unchanged};
 use super::guarded::{GuardedInstance, INCOMPLETE};
@@ -31,7 +31,7 @@ impl Drop for Handle {
     }
 }
 
-/// Opened device, not energised.
+/// Opened device of a plugin, not energised. The device is closed when this value and all its [`Stopper`]s are dropped.
 pub struct OpenedDevice {
     handle: Arc<Handle>,
     pub(crate) calls: GuardedInstance,
@@ -39,7 +39,7 @@ pub struct OpenedDevice {
     declared: Option<Box<Capabilities>>,
 }
 
-/// Energised device; deactivated on drop.
+/// Energised device of a plugin; dropping deactivates the device.
 pub struct ActiveDevice {
     /// `None` only after `deactivate` has taken the handle.
     handle: Option<Arc<Handle>>,
@@ -53,14 +53,15 @@ pub struct ActiveDevice {
     float_changes_told: u64,
 }
 
-/// Handle that stops a device from any thread, at any time.
+/// Handle that stops a device from any thread, at any time; the device stays open while the handle exists.
 #[derive(Clone)]
 pub struct Stopper {
     handle: Arc<Handle>,
 }
 
 impl Stopper {
-    /// Makes the actuators safe at once. Bounded, no allocation, no lock.
+    /// Sets the actuators to zero (or starts a controlled landing) at once, until the next activation. Real-time:
+    /// bounded, no allocation, no lock.
     pub fn safe_stop(&self) {
         if let Some(safe_stop) = self.handle.table.safe_stop {
             // SAFETY: a live instance (this handle keeps it open); `safe_stop` may come from any thread.
@@ -91,7 +92,7 @@ impl OpenedDevice {
         self.handle.parameters
     }
 
-    /// Returns the current value of the parameter at `index`, presets resolved; NaN if unknown.
+    /// Returns the current value of the parameter at `index`, including values set by a preset; NaN if unknown.
     #[must_use]
     pub fn parameter(&mut self, index: usize) -> f64 {
         self.calls.parameter(self.handle.table.parameter, self.handle.parameters, index)
@@ -117,7 +118,7 @@ impl OpenedDevice {
         Stopper { handle: Arc::clone(&self.handle) }
     }
 
-    /// Energises the device.
+    /// Energises the device at zero wrench. Not real-time.
     ///
     /// # Errors
     /// The opened device and the [`Refusal`], if the device refuses.
@@ -149,7 +150,8 @@ impl OpenedDevice {
 }
 
 impl ActiveDevice {
-    /// Takes the newest sample. Real-time: bounded by the device, no allocation.
+    /// Reads the newest sample into `state`; a result outside the contract counts as [`Fault::Broken`]. Real-time:
+    /// bounded by the device, no allocation.
     #[inline]
     pub fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         let read = self.read;
@@ -174,7 +176,8 @@ impl ActiveDevice {
         self.calls.float_changes
     }
 
-    /// Returns true if a call changed the floating-point environment since the last query. Real-time: bounded, no allocation.
+    /// Returns true if the plugin changed the floating-point environment since the last call of this function. Real-time:
+    /// bounded, no allocation.
     #[inline]
     pub fn has_changed_floats(&mut self) -> bool {
         let is_new = self.calls.float_changes != self.float_changes_told;
@@ -182,7 +185,8 @@ impl ActiveDevice {
         is_new
     }
 
-    /// Commands the wrench on the hand until the next write. Real-time: bounded by the device, no allocation.
+    /// Commands the wrench on the hand until the next write; a result outside the contract counts as [`Fault::Broken`].
+    /// Real-time: bounded by the device, no allocation.
     #[inline]
     pub fn write(&mut self, tick: &Tick, wrench: &Wrench) -> Cycle {
         let write = self.write;
@@ -202,7 +206,8 @@ impl ActiveDevice {
         Some(&self.handle.as_ref()?.extensions)
     }
 
-    /// Returns the device's message about the call that failed, or the result that is outside the contract. Not real-time.
+    /// Returns the device's message about its last failure; after a result outside the contract, a description of that
+    /// result. Not real-time.
     #[must_use]
     pub fn last_message(&mut self) -> String {
         if let Some((function, CycleCode { code })) = self.unknown {

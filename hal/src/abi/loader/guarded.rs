@@ -18,7 +18,7 @@ type SetParameterFn = unsafe extern "C" fn(Instance, u32, f64) -> u32;
 type ParameterFn = unsafe extern "C" fn(Instance, u32) -> f64;
 type LastMessageFn = unsafe extern "C" fn(Instance, *mut Message);
 
-/// Live instance. Each function that a method takes is one of the instance's own tables.
+/// Live instance. Every function passed to a method is from the instance's own tables.
 pub(crate) struct GuardedInstance {
     instance: Instance,
     /// Number of calls that changed the floating-point environment.
@@ -33,7 +33,7 @@ impl GuardedInstance {
         Self { instance, float_changes: 0 }
     }
 
-    /// Creates an instance from settings; `nothing` is the reason of a refusal if the plugin writes no instance.
+    /// Creates an instance from settings; `nothing` is the reason of the refusal if the plugin writes no instance.
     pub(super) fn create(
         create: CreateFn,
         parameters: &'static [Parameter],
@@ -118,7 +118,7 @@ impl GuardedInstance {
         self.call(|instance| unsafe { function(instance, index) })
     }
 
-    /// Returns the message about the call that failed; empty without the function.
+    /// Returns the message about the last failure; empty without the function.
     pub(super) fn last_message(&mut self, function: Option<LastMessageFn>) -> Message {
         let mut message = Message::default();
         if let Some(function) = function {

@@ -34,7 +34,7 @@ pub struct Plugin {
 impl Plugin {
     /// Loads a plugin from a file. Not real-time; runs the plugin's code.
     ///
-    /// The checks find mistakes of an author, not malice. [`super::read_metadata`] runs none of the code.
+    /// The checks find mistakes of an author, not malice. [`super::read_metadata`] runs no code of the plugin.
     ///
     /// ```compile_fail,E0133
     /// # use flotor_hal::abi::loader::Plugin;
@@ -66,8 +66,8 @@ impl Plugin {
     }
 
     /// Wraps a plugin that is linked into this program: for debuggers, sanitizers and tests. Not real-time;
-    /// runs the plugin's code. Safe, because only the functions behind the export macros make an [`Entry`], each for the
-    /// type whose instances its tables take.
+    /// runs the plugin's code. Safe, because only the functions behind the export macros create an [`Entry`], with
+    /// tables for the type of its instances.
     ///
     /// # Errors
     /// [`LoadError`], as for a file.
@@ -148,7 +148,8 @@ impl Plugin {
         &self.metadata
     }
 
-    /// Returns true if abi_stable also proved the layouts; the contract's own layout tables are always compared.
+    /// Returns true if abi_stable confirmed the layouts as well (feature `layout-proof` in host and plugin); the
+    /// contract's own layout tables are always compared.
     #[must_use]
     pub fn layouts_proven(&self) -> bool {
         self.proof == check::Proof::Proven
@@ -178,7 +179,7 @@ impl Plugin {
         }
     }
 
-    /// Creates a model. Not real-time.
+    /// Creates an instance of the model with the given settings; the plugin sets the other parameters. Not real-time.
     ///
     /// # Errors
     /// [`LoadError::OtherKind`] for a device, [`LoadError::Refused`] if the plugin refuses.
@@ -189,7 +190,7 @@ impl Plugin {
         Model::create(tables, self.parameters(), settings).map_err(|refusal| self.refused(refusal))
     }
 
-    /// Opens a device. Not real-time; may block.
+    /// Opens the device with the given settings; the plugin sets the other parameters. Not real-time; may block.
     ///
     /// # Errors
     /// [`LoadError::OtherKind`] for a model, [`LoadError::Refused`] if the plugin refuses.

@@ -7,7 +7,7 @@ use object::{ReadCache, ReadRef};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// Metadata of a plugin.
+/// Metadata of a plugin, from the section `.flotor` of its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Metadata {
     /// Path of the plugin file; empty for a plugin linked into this program.
@@ -24,14 +24,14 @@ pub struct Metadata {
     pub version: String,
     /// Contract version of the plugin's build, in the form of [`CONTRACT`].
     pub abi: String,
-    /// Name of the exported entry.
+    /// Name of the exported entry; empty for a plugin linked into this program.
     pub entry: String,
 }
 
-/// Reads the metadata of a plugin file. Runs and maps none of its code. Not real-time.
+/// Reads the metadata of a plugin file; runs and maps no code of the plugin. Not real-time.
 ///
 /// # Errors
-/// Any [`LoadError`] that can be found without `dlopen`, except a wrong contract version, which a list may want to
+/// Any [`LoadError`] that can be found without `dlopen`, except a different contract version, which a list of plugins may
 /// show: see [`Metadata::check_contract`].
 pub fn read_metadata(path: &Path) -> Result<Metadata, LoadError> {
     let (file, length) = open_regular(path)?;
@@ -54,7 +54,7 @@ pub(super) fn open_regular(path: &Path) -> Result<(File, u64), LoadError> {
 }
 
 impl Metadata {
-    /// Checks that the plugin was built for the contract this host speaks.
+    /// Checks that the plugin was built for the contract version of this host.
     ///
     /// # Errors
     /// [`LoadError::OtherContract`], unless the version is [`CONTRACT`].

@@ -16,7 +16,7 @@ pub(super) struct ModelTables {
     pub(super) extensions: ModelExtensions,
 }
 
-/// Instance of a force model. Used by one thread at a time.
+/// Instance of a force model, used by one thread at a time and destroyed when dropped.
 pub struct Model {
     pub(crate) calls: GuardedInstance,
     /// Copied from the table to save a load in every tick.
@@ -93,7 +93,8 @@ impl Model {
         self.calls.refusable(|instance, message| unsafe { prepare(instance, config, message) })
     }
 
-    /// Computes one step. Real-time: bounded by the model, no allocation. `output` is only meaningful for [`CallStatus::Ok`].
+    /// Computes the output for `input`; `output` is valid only if the result is [`CallStatus::Ok`]. Real-time: bounded by
+    /// the model, no allocation.
     #[inline]
     pub fn step(&mut self, input: &Input, output: &mut Output) -> CallStatus {
         let step = self.step;
@@ -101,7 +102,8 @@ impl Model {
         CallStatus::from_code(self.calls.call(|instance| unsafe { step(instance, input, output) }))
     }
 
-    /// Steps through inputs in order, up to the length of the shorter slice. Real-time per pose.
+    /// Computes the outputs for `inputs` in order, up to the length of the shorter slice; `outputs` are valid only if the
+    /// result is [`CallStatus::Ok`]. Real-time per input.
     pub fn step_batch(&mut self, inputs: &[Input], outputs: &mut [Output]) -> CallStatus {
         let count = inputs.len().min(outputs.len());
         if let Some(step_batch) = self.table.step_batch {
@@ -125,20 +127,21 @@ impl Model {
         self.calls.set_parameter(self.table.set_parameter, self.parameters, index, value)
     }
 
-    /// Returns the current value of the parameter at `index`, presets resolved; NaN if unknown. Real-time.
+    /// Returns the current value of the parameter at `index`, including values set by a preset; NaN if unknown.
+    /// Real-time: bounded, no allocation.
     #[must_use]
     pub fn parameter(&mut self, index: usize) -> f64 {
         self.calls.parameter(self.table.parameter, self.parameters, index)
     }
 
-    /// Clears the history. Real-time: bounded, no allocation.
+    /// Clears the history of the model and keeps its parameters. Real-time: bounded, no allocation.
     pub fn reset(&mut self) -> CallStatus {
         let Some(reset) = self.table.reset else { return CallStatus::Ok };
         // SAFETY: as in `prepare`.
         CallStatus::from_code(self.calls.call(|instance| unsafe { reset(instance) }))
     }
 
-    /// Returns the model's message about the call that failed. Not real-time.
+    /// Returns the model's message about its last failure; empty if there is none. Not real-time.
     #[must_use]
     pub fn last_message(&mut self) -> String {
         self.calls.last_message(self.table.last_message).for_people()

@@ -111,13 +111,13 @@ impl Setting {
         self.index as usize
     }
 
-    /// Returns the number (for a choice, its index; 0 for texts and files).
+    /// Returns the value as a number in the parameter's unit: for a choice, its index; 0 for texts and files.
     #[must_use]
     pub fn value(&self) -> f64 {
         self.number
     }
 
-    /// Returns the value in the form in which a person would type it.
+    /// Formats the value in the syntax that [`Self::parse`] accepts.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // checked indices of a few choices
     pub fn display(&self) -> String {
@@ -178,7 +178,7 @@ fn find(schema: &'static [Parameter], id: &str) -> Result<(u32, &'static Paramet
     })
 }
 
-/// Returns the known word most similar to `word`; `None` below a threshold. Not real-time.
+/// Returns the known word most similar to `word`; `None` if no known word is similar enough. Not real-time.
 pub fn nearest<'k>(word: &str, known: impl Iterator<Item = &'k str>) -> Option<&'k str> {
     // Jaro-Winkler similarity: one wrong, missing or swapped character gives at least 0.9, a different ending (`rz_deg` for
     // `rz_rad`) 0.84; words that only share characters (`jelly` and `wall`: 0.63, `balls` and `wall`: 0.78) score lower.

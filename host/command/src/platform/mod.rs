@@ -1,6 +1,6 @@
 //! Platform layer of commands: requests to end a run, the terminal, standard output, other programs.
 //!
-//! Each system has one module with the same items.
+//! Each operating system has one module with the same items.
 
 mod request;
 #[cfg(not(windows))]

@@ -1,9 +1,9 @@
-//! Requests to end a run.
+//! Kinds of requests to end a run.
 
 /// Request to end a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Request {
-    /// Orderly end; repeated, an emergency stop.
+    /// Orderly end; if repeated, an emergency stop.
     End,
     /// Emergency stop.
     Emergency,

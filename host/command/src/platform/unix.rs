@@ -22,17 +22,17 @@ use std::time::Duration;
 
 pub(crate) use supervision::{accept_interrupts, die_by, divide, is_orphaned};
 
-/// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as shells have it.
+/// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as in shells.
 pub const INTERRUPTED: i32 = 130;
 
-/// Signals that stop a run: the keys of a terminal (Ctrl-C, `Ctrl-\`, Ctrl-Z), its closing, and process managers.
+/// Signals that stop a run: sent by the keys of a terminal (Ctrl-C, `Ctrl-\`, Ctrl-Z), by a closing terminal, and by process managers.
 ///
-/// By itself a terminal would end the process with the device unstopped, or, at Ctrl-Z, suspend the loop and its
-/// watchdog together, with the last force held.
+/// By default they would end the process without stopping the device, or, at Ctrl-Z, suspend the loop and its watchdog together,
+/// with the last force still applied.
 const ENDING: [i32; 5] = [SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP];
 
-/// Signals that suspend a background process which writes to its terminal or reads from it, the loop and its watchdog
-/// together. They are blocked and never taken, so that the progress line is written, and a read fails.
+/// Signals that suspend a background process, loop and watchdog together, when it writes to its terminal or reads from it. They are
+/// blocked and never received, so that the progress line is written, and a read fails.
 const SUSPENDING: [i32; 2] = [SIGTTIN, SIGTTOU];
 
 /// Receiver of the signals that request an end.
@@ -41,21 +41,21 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
-    /// Blocks and collects the signals from now on, in this thread and all that it starts. Not real-time.
+    /// Blocks the signals in this thread and in all threads that it starts, to be received by [`Self::next`]. Not real-time.
     ///
     /// # Errors
     /// Errors of the system.
     pub(crate) fn listen(stop: &StopSwitch) -> io::Result<Self> {
-        // Started with `nohup`, a run must outlive its terminal.
+        // A run that was started with `nohup` has to continue after its terminal closes.
         let signals: Vec<i32> = ENDING
             .into_iter()
             .filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP))
             .chain([SIGUSR1])
             .collect();
         block_signals(&[&signals[..], &SUSPENDING].concat())?;
-        // This thread may wait for a processor while a plugin in the loop keeps it busy.
+        // This thread may not get a processor while a plugin in the loop occupies it.
         block_sent_signals()?;
-        // A thread in which a library has unblocked the signals sets these flags when it takes one.
+        // A thread in which a library has unblocked the signals sets these flags when it receives one.
         for signal in &signals {
             let flag = if *signal == SIGUSR1 { stop.emergency_flag() } else { stop.stop_flag() };
             flag::register(*signal, flag)?;
@@ -72,7 +72,7 @@ impl Requests {
     }
 }
 
-/// Blocks all requests to end this process, in this thread and all that it starts. Not real-time.
+/// Blocks all signals that request the end of this process, in this thread and in all threads that it starts. Not real-time.
 ///
 /// # Errors
 /// Errors of the system.
@@ -81,7 +81,7 @@ pub(crate) fn outlive_requests() -> io::Result<()> {
     block_signals(&[&ENDING[..], &SUSPENDING, &signals].concat())
 }
 
-/// Returns the limit of the first thread's stack, bytes; `None` if it is unlimited.
+/// Returns the limit on the stack size of the main thread (`RLIMIT_STACK`), bytes; `None` if unlimited.
 pub(crate) fn stack_limit_bytes() -> Option<u64> {
     getrlimit(Resource::Stack).current
 }
@@ -94,16 +94,16 @@ fn is_ignored(signal: i32) -> bool {
     (ignored >> (signal - 1)) & 1 == 1 // the lowest bit is signal 1
 }
 
-/// Terminal in a mode that delivers keys without a line end, until this is dropped.
+/// Terminal in a mode that delivers single keys without waiting for a line end; dropping it restores the previous mode.
 pub(crate) struct KeyTerminal {
     before: Termios,
 }
 
 impl KeyTerminal {
-    /// Switches the terminal to single keys; `None` without a terminal: in a pipe, in the background.
+    /// Switches the terminal of standard input to single keys; `None` without a terminal (a pipe), or in the background.
     pub(crate) fn take() -> Option<Self> {
         let terminal = stdin();
-        // In the background the terminal is another program's.
+        // In the background another program controls the terminal.
         if !isatty(&terminal) || !is_in_foreground() {
             return None;
         }
@@ -117,7 +117,7 @@ impl KeyTerminal {
 
 impl Drop for KeyTerminal {
     fn drop(&mut self) {
-        // In the background the terminal is another program's.
+        // In the background another program controls the terminal.
         if is_in_foreground() {
             let _ = tcsetattr(stdin(), OptionalActions::Now, &self.before);
         }
@@ -129,7 +129,8 @@ fn is_in_foreground() -> bool {
     tcgetpgrp(stdin()).is_ok_and(|group| group == getpgrp())
 }
 
-/// Returns standard output for the caller alone, and redirects all other output there to standard error. Not real-time.
+/// Returns a private duplicate of standard output, and redirects the standard output of the process (plugins included) to standard
+/// error. Not real-time.
 ///
 /// # Errors
 /// Errors of the system.
@@ -144,7 +145,7 @@ pub(crate) fn become_program(command: &mut Command) -> io::Error {
     command.exec()
 }
 
-/// Sends a process the request to end in order.
+/// Sends SIGTERM to a child process, the request to end in order.
 pub(crate) fn ask_to_end(child: &mut Child) {
     let process = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
     let _ = process.map(|process| kill_process(process, Signal::TERM));

@@ -1,4 +1,4 @@
-//! Windows: events of the console, its modes, handles.
+//! Windows: events and modes of the console, handles.
 #![allow(unsafe_code)] // calls of the console, and a function that it calls; tests/tests/system/architecture.rs lists it
 
 use super::request::Request;
@@ -18,7 +18,7 @@ use windows_sys::Win32::System::Console::{
     SetConsoleMode, SetStdHandle,
 };
 
-/// Returns the limit of the first thread's stack: none, because the program file defines its size.
+/// Returns `None`: the executable defines the stack size of the main thread.
 pub(crate) fn stack_limit_bytes() -> Option<u64> {
     None
 }
@@ -40,19 +40,19 @@ pub(crate) fn is_orphaned() -> bool {
     false
 }
 
-/// Ends this process; Windows has no signal for that.
+/// Ends this process with [`INTERRUPTED`]: Windows has no signals.
 pub(crate) fn die_by(_: i32) -> ! {
     std::process::exit(INTERRUPTED)
 }
 
-/// Exit code after a third request, when nothing else has ended the process: that of a program ended by Ctrl-C
+/// Exit code after a third request, when nothing else has ended the process: the same as of a program ended by Ctrl-C
 /// (`STATUS_CONTROL_C_EXIT`).
 pub const INTERRUPTED: i32 = 0xc000_013a_u32.cast_signed();
 
-/// Time that a closing console waits: the system ends the process 5 s after the event.
+/// Wait in the handler of a closing console: the system ends the process 5 s after the event.
 const CLOSING: Duration = Duration::from_secs(5);
 
-/// Sender of the console's events.
+/// Sender of console events to [`Requests`].
 static TOLD: Mutex<Option<Sender<Request>>> = Mutex::new(None);
 
 /// Receiver of the console's events that request an end.
@@ -61,7 +61,7 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
-    /// Collects the events from now on. Not real-time.
+    /// Installs a handler that collects the console events. Not real-time.
     ///
     /// # Errors
     /// Errors of the system.
@@ -88,14 +88,14 @@ fn handle(handler: Handler) -> io::Result<()> {
     }
 }
 
-/// Handles a console event, in a thread of its own; returns 1, so that no other handler runs.
+/// Handles a console event, in a thread that the system starts; returns 1, so that no other handler runs.
 unsafe extern "system" fn on_event(event: u32) -> i32 {
     let request = if event == CTRL_BREAK_EVENT { Request::Emergency } else { Request::End };
     if let Some(tell) = &*lock(&TOLD) {
         let _ = tell.send(request);
     }
     if ![CTRL_C_EVENT, CTRL_BREAK_EVENT].contains(&event) {
-        // The console closes, or the user logs off: the process ends when this returns.
+        // The console closes, or the user logs off: the process ends when this handler returns.
         std::thread::sleep(CLOSING);
     }
     1
@@ -105,7 +105,7 @@ unsafe extern "system" fn on_event_of_others(_: u32) -> i32 {
     1
 }
 
-/// Ignores all events of the console that would end this process. Not real-time.
+/// Ignores all console events that would end this process. Not real-time.
 ///
 /// # Errors
 /// Errors of the system.
@@ -113,13 +113,13 @@ pub(crate) fn outlive_requests() -> io::Result<()> {
     handle(on_event_of_others)
 }
 
-/// Console in a mode that delivers keys without a line end, until this is dropped.
+/// Console in a mode that delivers single keys without waiting for a line end; dropping it restores the previous mode.
 pub(crate) struct KeyTerminal {
     before: CONSOLE_MODE,
 }
 
 impl KeyTerminal {
-    /// Switches the console to single keys; `None` without a console: in a pipe.
+    /// Switches the console of standard input to single keys; `None` without a console (a pipe).
     pub(crate) fn take() -> Option<Self> {
         if !stdin().is_terminal() {
             return None;
@@ -143,8 +143,8 @@ fn set_mode(mode: CONSOLE_MODE) -> bool {
     unsafe { SetConsoleMode(GetStdHandle(STD_INPUT_HANDLE), mode) != 0 }
 }
 
-/// Returns standard output for the caller alone, and redirects all other output there to standard error. A C library that has
-/// read the handle before still writes to it. Not real-time.
+/// Returns a private duplicate of standard output, and redirects the standard output of the process (plugins included) to standard
+/// error. A C library that has read the handle before still writes to standard output. Not real-time.
 ///
 /// # Errors
 /// Errors of the system.
@@ -157,9 +157,9 @@ pub(crate) fn results_apart() -> io::Result<File> {
     }
 }
 
-/// Runs a program in place of this one, which waits, and ends with its exit code; returns only on an error.
+/// Runs a program, waits for its end, and ends this process with its exit code; returns only on an error.
 pub(crate) fn become_program(command: &mut Command) -> io::Error {
-    // Events of the console are for the program.
+    // The program handles console events.
     let ran = handle(on_event_of_others).and_then(|()| command.status());
     match ran {
         Ok(status) => std::process::exit(status.code().unwrap_or(1)),
@@ -167,7 +167,7 @@ pub(crate) fn become_program(command: &mut Command) -> io::Error {
     }
 }
 
-/// Kills a process: Windows has no request to end.
+/// Kills a child process: Windows has no signal that requests its end.
 pub(crate) fn ask_to_end(child: &mut Child) {
     let _ = child.kill();
 }

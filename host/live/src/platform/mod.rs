@@ -1,6 +1,6 @@
-//! Platform layer of the live protocol: the sockets of a run, permissions of their folder, and detection of closed sockets.
+//! Platform layer of the live protocol: sockets of a run, permissions of their folder, and detection of closed sockets.
 //!
-//! Each system has one module with the same items.
+//! Each operating system has one module with the same items.
 
 #[cfg(not(windows))]
 mod unix;

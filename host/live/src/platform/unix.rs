@@ -1,4 +1,4 @@
-//! Unix: sockets that are files, and permissions.
+//! Unix: Unix domain sockets and permissions.
 
 use flotor_core::lock;
 use rustix::event::{PollFd, PollFlags, poll};
@@ -19,10 +19,10 @@ use std::os::unix::net::UnixListener;
 /// Connection between client and host.
 pub(crate) use std::os::unix::net::UnixStream as Stream;
 
-/// Mode of a folder that only its owner may enter.
+/// Permissions of a folder that only its owner may enter.
 const PRIVATE: u32 = 0o700;
 
-/// Returns the folder for the runs of this user, if the system defines none.
+/// Returns the folder for the runs of this user if `XDG_RUNTIME_DIR` is no folder.
 pub(crate) fn run_folder() -> PathBuf {
     std::env::temp_dir().join(format!("flotor-{}", getuid().as_raw()))
 }
@@ -37,7 +37,7 @@ pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
     DirBuilder::new().recursive(true).mode(PRIVATE).create(path)
 }
 
-/// Returns true for a folder of this user.
+/// Returns true for a folder that this user owns.
 pub(crate) fn is_ours(attributes: &Metadata) -> bool {
     attributes.is_dir() && attributes.uid() == getuid().as_raw()
 }
@@ -47,15 +47,15 @@ pub(crate) fn is_ours_alone(attributes: &Metadata) -> bool {
     is_ours(attributes) && attributes.mode() & 0o077 == 0
 }
 
-/// Restricts a file to be created to this user.
+/// Restricts the permissions of a new file to this user.
 pub(crate) fn private_file(options: &mut OpenOptions) -> &mut OpenOptions {
     options.mode(0o600)
 }
 
-/// Removes the file of a socket that no process has open; returns true if so. The process id is not used: containers that
-/// share the folder have separate ids.
+/// Removes the socket file if no process has the socket open; returns true if so. The process id is not checked: containers that
+/// share the folder have separate process ids.
 pub(crate) fn remove_if_dead(path: &Path) -> bool {
-    // Works for sockets of any type, and makes no connection to one that listens.
+    // Works for sockets of any type, and does not connect to a listening socket.
     let probed = UnixDatagram::unbound().and_then(|probe| probe.connect(path));
     let is_dead = probed.is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused);
     if is_dead {
@@ -64,7 +64,7 @@ pub(crate) fn remove_if_dead(path: &Path) -> bool {
     is_dead
 }
 
-/// Reads from an offset of a file; bytes beyond its end are not changed.
+/// Reads from an offset of a file; `bytes` beyond the end of the file are not changed.
 pub(crate) fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<usize> {
     FileExt::read_at(file, bytes, offset)
 }
@@ -74,17 +74,17 @@ pub(crate) fn write_all_at(file: &File, bytes: &[u8], offset: u64) -> io::Result
     FileExt::write_all_at(file, bytes, offset)
 }
 
-/// Returns true if both are the same file.
+/// Returns true if both belong to the same file.
 pub(crate) fn is_same_file(one: &Metadata, other: &Metadata) -> bool {
     (one.dev(), one.ino()) == (other.dev(), other.ino())
 }
 
-/// Connects to the run of a socket file.
+/// Connects to the run with this socket file.
 pub(crate) fn connect(path: &Path) -> io::Result<Stream> {
     Stream::connect(path)
 }
 
-/// Connects without waiting for a run that accepts no connections; the connection is non-blocking.
+/// Connects without waiting if the run does not accept the connection now; the connection is non-blocking.
 pub(crate) fn connect_now(path: &Path) -> io::Result<Stream> {
     let socket = rustix::net::socket(AddressFamily::UNIX, SocketType::STREAM, None)?;
     let stream = Stream::from(socket);
@@ -97,10 +97,10 @@ pub(crate) fn connect_now(path: &Path) -> io::Result<Stream> {
 #[derive(Debug)]
 pub(crate) struct Listening {
     socket: UnixListener,
-    /// End of a pair that becomes readable on [`close`](Self::close).
+    /// End of a socket pair, which becomes readable on [`close`](Self::close).
     closed: Stream,
     close: Stream,
-    /// Descriptor reserved for a client of a process without free ones.
+    /// Descriptor reserved for accepting a client if the process has no free descriptor.
     spare: Mutex<Option<UnixListener>>,
 }
 
@@ -113,7 +113,7 @@ impl Listening {
         Ok(Self { socket, closed, close, spare: Mutex::default() })
     }
 
-    /// Ends every [`accept`](Self::accept), now and later.
+    /// Makes every present and later [`accept`](Self::accept) return `None`.
     pub(crate) fn close(&self) {
         let _ = self.close.shutdown(Shutdown::Both);
     }
@@ -148,12 +148,12 @@ pub(crate) fn has_left(stream: &Stream) -> bool {
     peeked.is_ok_and(|(_, available)| available == 0)
 }
 
-/// Datagram socket with the name of a file.
+/// Datagram socket bound to a file name.
 #[derive(Debug)]
 pub(crate) struct Datagrams(UnixDatagram);
 
 impl Datagrams {
-    /// Creates a non-blocking socket: timeouts of the system last some milliseconds at least.
+    /// Creates a non-blocking socket: the shortest timeout of the system is some milliseconds.
     pub(crate) fn bind(path: &Path) -> io::Result<Self> {
         UnixDatagram::bind(path).and_then(|socket| socket.set_nonblocking(true).map(|()| Self(socket)))
     }

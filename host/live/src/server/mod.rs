@@ -5,8 +5,8 @@
 //!  Serve::serve         <-                           its reader thread <- socket <- watcher
 //! ```
 //!
-//! The caller never waits: a full outbox drops new frames and counts them, except the newest change of
-//! each parameter. Without clients, a tick costs one load of a number. Not real-time.
+//! The caller never waits for a client: a full outbox drops new ticks, which it counts, and new answers, but never the newest
+//! change of a parameter. Without watching clients, a tick costs one atomic load. Not real-time.
 
 mod outbox;
 mod threads;
@@ -32,41 +32,41 @@ use std::time::{Duration, Instant};
 use threads::{join_until, thread};
 use watcher::{Handler, PATIENCE, Watcher};
 
-/// Largest number of programs that watch one run: each costs two threads and a queue.
+/// Maximum number of clients that watch one run: each costs two threads and a queue.
 const MAX_WATCHERS: usize = 16;
-/// Largest number of connections. At least one of them does not watch: the one silent for longest is closed in favour of a new
-/// one, so that an emergency stop always finds a place.
+/// Maximum number of connections. Some of them do not watch: the one without a request for longest is closed in favour of a new
+/// connection, so that a client can always connect for an emergency stop.
 const MAX_CONNECTIONS: usize = MAX_WATCHERS + 4;
-/// Largest number of further connections whose threads are ending.
+/// Maximum number of further connections whose threads are ending.
 const MAX_CLOSING: usize = MAX_CONNECTIONS / 2;
-/// Timeout of the end of all connections together, beyond the grace period of the clients.
+/// Timeout for the end of all connections together when the publication is dropped.
 const END_WAIT: Duration = Duration::from_millis(1000);
-/// Pause after a connection that failed for want of resources (mostly descriptors), and longest wait for threads to end.
+/// Pause after a connection that failed for lack of resources (mostly descriptors), and longest wait for threads to end.
 const BREATH: Duration = Duration::from_millis(10);
 
-/// Reason why other programs cannot observe a run.
+/// Reason why a run cannot be published to other programs.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PublishError {
     /// The socket cannot be created.
     #[error(transparent)]
     Directory(#[from] DirectoryError),
-    /// A thread or a second handle to the socket is refused.
+    /// A thread cannot be started.
     #[error("cannot start the telemetry threads: {0}; end other programs of this user")]
     Thread(#[from] io::Error),
 }
 
-/// Handler of clients' requests: the host itself, or a proxy that forwards them.
+/// Handler of the clients' requests: the host itself, or a proxy that forwards requests.
 pub trait Serve: Send + Sync {
-    /// Carries out a request, or passes it on; called in the thread of the client, who alone waits for it. [`Ask::Watch`] and
-    /// [`Ask::Unwatch`] are never passed.
+    /// Executes a request, or forwards it; called in the thread of the client's connection, so that only this client waits.
+    /// [`Ask::Watch`] and [`Ask::Unwatch`] are handled by the server and never passed.
     ///
     /// # Errors
-    /// Kind of reason for a rejection, and the reason in words for people.
+    /// Kind of reason for the rejection, and the human-readable reason.
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)>;
 }
 
-/// Publication of a run to other programs; ends when dropped.
+/// Publication of a run to other programs. Dropping it closes all connections, after at most about 1.5 s.
 pub struct Publication {
     shared: Arc<Shared>,
     acceptor: Option<JoinHandle<()>>,
@@ -76,23 +76,24 @@ pub struct Publication {
 /// State shared by all threads of a publication.
 struct Shared {
     watchers: Mutex<Vec<Watcher>>,
-    /// Clients that have disconnected or were evicted, until their threads have ended.
+    /// Clients that have disconnected or were evicted, whose threads have not ended yet.
     closing: Mutex<Vec<Watcher>>,
-    /// Number of clients that watch: all that a tick reads without any.
+    /// Number of watching clients: if it is zero, a tick reads only this number.
     watching: AtomicUsize,
     greeting: Mutex<Greeting>,
     run: Vec<u8>,
     host: Arc<dyn Serve>,
-    /// Demand for the outputs that watching clients are shown.
+    /// Demand for model outputs, to which a watching client adds all outputs.
     demand: ObserverDemand,
     started: Instant,
 }
 
 impl Publication {
-    /// Publishes a run. While a client watches, it requests all outputs of the models at `demand`.
+    /// Publishes a run on a new socket in `directory`, with requests handled by `host`. While a client watches, all outputs of the
+    /// models are requested at `demand`.
     ///
     /// # Errors
-    /// If the socket or a thread cannot be created; the run goes on without.
+    /// If the socket or a thread cannot be created; the run can continue without observers.
     pub fn open(
         directory: &Directory,
         greeting: Greeting,
@@ -116,13 +117,13 @@ impl Publication {
         Ok(Self { shared, acceptor: Some(acceptor), listener })
     }
 
-    /// Returns the socket that clients connect to.
+    /// Returns the path of the socket file that clients connect to.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.listener.path()
     }
 
-    /// Sends a tick to the watching clients, in order. Does not wait.
+    /// Sends a tick record to the watching clients; ticks have to come in order. Does not wait for clients.
     pub fn observe(&self, record: &TickRecord) {
         if self.shared.watching.load(Ordering::Relaxed) == 0 {
             return;
@@ -132,7 +133,8 @@ impl Publication {
         }
     }
 
-    /// Sends a change to all clients, before the first tick that uses it. Does not wait.
+    /// Sends a change to all clients, and updates the greeting; to be called before the first tick that uses the change. Does not
+    /// wait for clients.
     pub fn change(&self, change: &Change) {
         lock(&self.shared.greeting).keep(change);
         let Ok(payload) = serde_json::to_vec(change) else { return };
@@ -142,7 +144,7 @@ impl Publication {
         }
     }
 
-    /// Notifies all clients of the end of the run and its outcome; no client can connect afterwards.
+    /// Sends the outcome of the run to all clients, and ends the publication: no client can connect afterwards.
     pub fn end(self, words: &str, kind: EndKind) {
         let Ok(payload) = serde_json::to_vec(&End { words: words.to_owned(), kind }) else { return };
         let bytes = frame(Kind::End, &payload);
@@ -168,8 +170,8 @@ impl Shared {
         lock(&self.watchers)
     }
 
-    /// Joins the threads that have ended; waits for some at most [`BREATH`] where too many are ending. Returns whether one more
-    /// connection may close.
+    /// Joins the threads that have ended; if too many are ending, waits for at most [`BREATH`]. Returns true if there is room for
+    /// another connection to close.
     fn has_room_to_close(&self) -> bool {
         let until = Instant::now() + BREATH;
         let mut closing = lock(&self.closing);
@@ -182,12 +184,12 @@ impl Shared {
         }
     }
 
-    /// Stores a client until its threads have ended.
+    /// Stores a client whose threads have not ended yet.
     fn close(&self, watcher: Watcher) {
         lock(&self.closing).push(watcher);
     }
 
-    /// Starts sending ticks to one more client, unless too many watch.
+    /// Starts sending ticks to a client, or changes the interval; an error if too many clients watch.
     fn admit(&self, outbox: &Outbox, every: u32) -> Result<(), String> {
         let watchers = self.watchers();
         if !outbox.wants_ticks() && self.watching.load(Ordering::Relaxed) >= MAX_WATCHERS {
@@ -214,7 +216,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Updates the number of watching clients, after one has started, stopped or disconnected.
+    /// Updates the number of watching clients, after a client has started or stopped watching, or disconnected.
     fn count(&self, watchers: &[Watcher]) {
         let watching = watchers.iter().filter(|watcher| watcher.outbox.wants_ticks()).count();
         self.watching.store(watching, Ordering::Relaxed);
@@ -246,7 +248,7 @@ fn accept(socket: &Listening, shared: &Arc<Shared>) {
             Ok(Some(stream)) => welcome(stream, shared),
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(_) => {
-                // A client without requests may hold the descriptor that is missing.
+                // An idle client may occupy the missing descriptor.
                 if shared.has_room_to_close() {
                     evict_longest_silent(&mut shared.watchers(), shared);
                 }
@@ -256,7 +258,7 @@ fn accept(socket: &Listening, shared: &Arc<Shared>) {
     }
 }
 
-/// Serves a connection, or closes it if threads or places are missing.
+/// Serves a connection, or closes it if no thread can start or there are too many connections.
 fn welcome(stream: Stream, shared: &Arc<Shared>) {
     if has_left(&stream) || !shared.has_room_to_close() {
         return;
@@ -275,7 +277,7 @@ fn welcome(stream: Stream, shared: &Arc<Shared>) {
     watchers.extend(Watcher::start(stream, outbox, Arc::clone(shared), shared.started));
 }
 
-/// Closes the connection of the client that watches nothing and was silent for longest; false if there is none.
+/// Closes the connection of the client that does not watch and has sent no request for longest; returns false if all clients watch.
 fn evict_longest_silent(watchers: &mut Vec<Watcher>, shared: &Shared) -> bool {
     let idle = watchers.iter().enumerate().filter(|(_, watcher)| !watcher.outbox.wants_ticks());
     let longest = idle.min_by_key(|(_, watcher)| watcher.last_request_ms()).map(|(place, _)| place);

@@ -1,4 +1,4 @@
-//! Outbox of one client: a queue of fixed length that drops and counts.
+//! Outbox of one client: a queue of limited length, which drops new ticks (counted) and frames when full.
 
 use crate::{Kind, frame, ticks_to_payload};
 use flotor_core::demand::DemandRequest;
@@ -8,13 +8,13 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Largest number of pending ticks: four seconds at 1 kHz.
+/// Maximum number of pending ticks: four seconds at 1 kHz.
 const MAX_TICKS: usize = 4096;
-/// Largest number of other pending frames, except the newest change of each parameter. A client that sends this many requests and reads
-/// nothing gets no more answers.
+/// Maximum number of other pending frames; the newest change of each parameter is appended even beyond. A client that sends this
+/// many requests and reads nothing gets no more answers.
 const MAX_FRAMES: usize = 256;
 
-/// Largest number of ticks in a frame.
+/// Maximum number of ticks in a frame.
 const MAX_TICKS_IN_A_FRAME: usize = 1024;
 
 #[derive(Default)]
@@ -23,11 +23,11 @@ pub(super) struct Outbox {
     changed: Condvar,
 }
 
-/// Pending frame between ticks.
+/// Pending frame, other than ticks.
 struct WaitingFrame {
-    /// Number of pending ticks that are sent before it.
+    /// Number of pending ticks that are sent before the frame.
     ticks_before: usize,
-    /// Content, if it is a change.
+    /// Content of a change; `None` for other frames.
     change: Option<Arc<Change>>,
     bytes: Vec<u8>,
 }
@@ -36,23 +36,23 @@ struct WaitingFrame {
 struct State {
     /// Pending ticks, in order.
     ticks: Vec<TickRecord>,
-    /// Other pending frames, in order: a change is sent before the first tick that uses it, and after the tick before. Separate from
-    /// the many ticks, so that an earlier change of the same parameter is found without searching them.
+    /// Other pending frames, in order: a change is sent before the first tick that uses it, and after the previous tick. Separate
+    /// from the ticks, so that an earlier change of the same parameter is found without searching the many ticks.
     frames: VecDeque<WaitingFrame>,
     dropped: u64,
-    /// Last frame, sent after all others.
+    /// Final frame, sent after all others.
     last: Option<Vec<u8>>,
-    /// Interval of sent ticks, in ticks; 0 for none.
+    /// Interval of the sent ticks, in ticks; 0: none.
     every: u32,
     /// Request for the outputs of models, while the client watches.
     request: Option<DemandRequest>,
-    /// Events of the ticks skipped since the last sent one.
+    /// Events of the ticks skipped since the last appended tick.
     passed: Events,
     is_closed: bool,
 }
 
 impl State {
-    /// Appends a frame after all pending ones.
+    /// Appends a frame after all pending frames and ticks.
     fn append(&mut self, change: Option<Arc<Change>>, bytes: Vec<u8>) {
         let ticks_before = self.ticks.len();
         self.frames.push_back(WaitingFrame { ticks_before, change, bytes });
@@ -64,14 +64,15 @@ impl Outbox {
         lock(&self.state)
     }
 
-    /// Sends one tick in `every` from now on, and holds the `request` for outputs of models.
+    /// Starts appending every tick with an index that is a multiple of `every`, and stores the `request` for model outputs until
+    /// ticks end.
     pub(super) fn want_ticks(&self, every: u32, request: DemandRequest) {
         let mut state = self.lock();
         (state.every, state.request) = (every, Some(request));
         state.ticks.reserve_exact(MAX_TICKS);
     }
 
-    /// Sends no more ticks, and withdraws the request for outputs of models.
+    /// Appends no more ticks, and withdraws the request for model outputs.
     pub(super) fn want_no_ticks(&self) {
         let mut state = self.lock();
         (state.every, state.request) = (0, None);
@@ -81,7 +82,7 @@ impl Outbox {
         self.lock().every > 0
     }
 
-    /// Appends a tick, if it is wanted and there is room.
+    /// Appends a tick if its index is a multiple of the interval, with the events of skipped ticks; without room, counts it as dropped.
     pub(super) fn tick(&self, record: &TickRecord) {
         let mut state = self.lock();
         if state.every == 0 || state.is_closed {
@@ -101,8 +102,8 @@ impl Outbox {
         self.changed.notify_one();
     }
 
-    /// Appends a change; without room, in place of the earliest pending one of the same parameter. One of each is never dropped, so
-    /// that a client which reads nothing for a while knows the present values afterwards.
+    /// Appends a change. If the queue is full, removes the earliest pending change of the same parameter first; the newest change
+    /// of each parameter is never dropped, so that a slow client ends up with the current values.
     pub(super) fn change(&self, change: Arc<Change>, frame: Vec<u8>) {
         self.update(|state| {
             if state.is_closed {
@@ -120,7 +121,7 @@ impl Outbox {
         });
     }
 
-    /// Appends a frame that is neither tick nor change, if there is room.
+    /// Appends a frame other than a tick or a change; without room, drops the frame.
     pub(super) fn push(&self, frame: Vec<u8>) {
         self.update(|state| {
             if state.frames.len() < MAX_FRAMES && !state.is_closed {
@@ -129,7 +130,7 @@ impl Outbox {
         });
     }
 
-    /// Appends the last frame of all and closes the outbox.
+    /// Sets the final frame and closes the outbox.
     pub(super) fn last(&self, frame: Vec<u8>) {
         self.update(|state| {
             if !state.is_closed {
@@ -153,13 +154,13 @@ impl Outbox {
         self.lock().is_closed
     }
 
-    /// Waits for this long, or until the outbox is closed.
+    /// Waits for `period`, or until the outbox is closed.
     pub(super) fn pause(&self, period: Duration) {
         let state = self.lock();
         let _ = self.changed.wait_timeout_while(state, period, |state| !state.is_closed);
     }
 
-    /// Waits for pending frames and takes all of them; `None` when closed and empty.
+    /// Waits for pending frames, then removes and encodes all of them; `None` if the outbox is closed and empty.
     pub(super) fn take(&self) -> Option<Vec<u8>> {
         let mut state = self.lock();
         while state.ticks.is_empty() && state.frames.is_empty() {
@@ -172,7 +173,7 @@ impl Outbox {
         // The queue of ticks retains its capacity.
         let ticks: Vec<TickRecord> = state.ticks.drain(..).collect();
         let frames = std::mem::take(&mut state.frames);
-        // The caller with the next tick does not wait for the encoding of this one.
+        // Unlocked before the encoding, for which the next tick need not wait.
         drop(state);
         let (mut sent, mut batch) = (0, Vec::new());
         // Ticks share a frame as long as no other frame is between them.

@@ -3,10 +3,10 @@
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Stack size of the threads of the server, bytes: small, because locked memory makes every page of it resident.
+/// Stack size of the threads of the server, bytes: small, because every page of a stack is resident if memory is locked.
 const STACK_BYTES: usize = 256 * 1024;
 
-/// Returns a builder for a thread of the server.
+/// Returns a builder for a thread of the server, with a small stack.
 pub(super) fn thread(name: &str) -> std::thread::Builder {
     std::thread::Builder::new().name(name.to_owned()).stack_size(STACK_BYTES)
 }

@@ -11,37 +11,37 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Pause between two batches: a client draws at most a hundred pictures a second.
+/// Pause between two batches: a client draws at most a hundred frames a second.
 const BATCH_PERIOD: Duration = Duration::from_millis(10);
 /// Timeout of a write, after which the writer checks whether the run is over.
 const WRITE_WAIT: Duration = Duration::from_millis(100);
-/// Pause after each request: limits a flood to a thousand a second, and delays only its sender.
+/// Pause after each request: limits each client to a thousand requests a second, and delays only the sender.
 const REQUEST_PERIOD: Duration = Duration::from_millis(1);
 
-/// Grace period for a client to read the end of a run, and for its requests to be answered.
+/// Grace period at the end of a run for a client to read the last frames, and for its pending requests to be answered.
 pub(super) const PATIENCE: Duration = Duration::from_millis(500);
 
-/// Handler of the requests of all clients, called in their threads.
+/// Handler of the requests of all clients, called in the reader threads.
 pub(super) trait Handler: Send + Sync + 'static {
-    /// Carries out the request in a payload.
+    /// Executes the request in a payload, and returns its answer.
     fn answer(&self, payload: &[u8], outbox: &Outbox) -> Answer;
 
-    /// Notes that a client sends no further request.
+    /// Handles the end of a client's requests.
     fn on_end(&self);
 }
 
 pub(super) struct Watcher {
     pub(super) outbox: Arc<Outbox>,
-    /// Connection, shared with its threads: one descriptor for each client.
+    /// Connection, shared with both threads: one descriptor for each client.
     stream: Arc<Stream>,
     writer: JoinHandle<()>,
     reader: JoinHandle<()>,
-    /// Time of the connection or the last request, ms.
+    /// Time of the connection or the last request, ms since the publication began.
     last_request_ms: Arc<AtomicU64>,
 }
 
 impl Watcher {
-    /// Serves a connection of a publication that began at `since`; `None` if the system refuses a thread.
+    /// Starts the threads of a connection, for a publication that began at `since`; `None` if the system cannot start a thread.
     pub(super) fn start(
         stream: Stream,
         outbox: Arc<Outbox>,
@@ -71,7 +71,7 @@ impl Watcher {
         }
     }
 
-    /// Returns true if the client has closed its end.
+    /// Returns true if the client has closed its end, or the run is over.
     pub(super) fn is_gone(&self) -> bool {
         self.outbox.is_closed()
     }
@@ -81,7 +81,7 @@ impl Watcher {
         self.last_request_ms.load(Ordering::Relaxed)
     }
 
-    /// Reads no further request; the threads end after the requests that have arrived are answered.
+    /// Stops reading requests; the threads end once the requests that have already arrived are answered.
     pub(super) fn evict(&self) {
         let _ = self.stream.shutdown(Shutdown::Read);
     }
@@ -91,17 +91,17 @@ impl Watcher {
         self.writer.is_finished() && self.reader.is_finished()
     }
 
-    /// Waits for both threads.
+    /// Waits for both threads to end.
     pub(super) fn join(self) {
         let _ = self.writer.join();
         let _ = self.reader.join();
     }
 
-    /// Sends pending frames to a client that reads them within [`PATIENCE`], and closes the connection.
+    /// Waits until pending frames are sent (the client has [`PATIENCE`] to read them) or until the deadline, then closes the connection.
     pub(super) fn finish(self, until: Instant) {
         join_until(self.writer, until);
         let _ = self.stream.shutdown(Shutdown::Both);
-        // The reader may be at a request whose answer takes a while.
+        // The reader may be executing a request that takes a while.
         join_until(self.reader, until.min(Instant::now() + PATIENCE));
     }
 }
@@ -119,7 +119,8 @@ fn write(stream: &Stream, outbox: &Outbox) {
     let _ = stream.shutdown(Shutdown::Write);
 }
 
-/// Returns true when all is written; waits for a frozen client as long as the run lasts, and for [`PATIENCE`] after.
+/// Writes all bytes and returns true; false if the client is gone. Waits for a client that does not read as long as the run lasts,
+/// and for [`PATIENCE`] after its end.
 fn write_whole(mut stream: &Stream, mut bytes: &[u8], outbox: &Outbox) -> bool {
     let mut closed_since: Option<Instant> = None;
     while !bytes.is_empty() {

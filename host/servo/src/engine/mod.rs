@@ -15,17 +15,17 @@ use flotor_hal::{
 };
 use process::Worker;
 
-/// Model with its kind of execution.
+/// Model, executed in one of three ways.
 pub enum Engine {
-    /// In the loop thread: fastest, no crash isolation.
+    /// In the loop thread: fastest, without crash isolation.
     Here(Model),
-    /// In a worker process.
+    /// In a worker process: a crash or hang of the model does not stop the loop.
     Process(Worker),
-    /// Asynchronous; the loop evaluates a local linear model.
+    /// Asynchronous, at the model's own rate; the loop evaluates a local linear model.
     Asynchronous(Box<AsynchronousModel>),
 }
 
-/// Calls the same function of the model, whatever executes it.
+/// Calls the same function on every kind of engine.
 macro_rules! each {
     ($engine:expr, $model:ident => $call:expr) => {
         match $engine {
@@ -46,7 +46,7 @@ impl Engine {
         }
     }
 
-    /// Returns true if a step may return without an answer that then comes in a later tick.
+    /// Returns true if the output of a step may arrive in a later tick.
     pub fn may_be_late(&self) -> bool {
         !matches!(self, Self::Here(_))
     }
@@ -56,7 +56,7 @@ impl Engine {
         each!(self, model => model.set_parameter(index, value))
     }
 
-    /// Returns the value of a parameter before the loop starts; NaN for a parameter without one. Not real-time.
+    /// Returns the initial value of a parameter; NaN for a parameter without one. Not real-time.
     pub fn parameter(&mut self, index: usize) -> f64 {
         each!(self, model => model.parameter(index))
     }
@@ -107,7 +107,8 @@ impl Engine {
         }
     }
 
-    /// Prepares the model, its last chance to allocate; a worker or asynchronous model is already prepared. Not real-time.
+    /// Prepares the model for the loop: after this call the model may not allocate. Does nothing for a worker or asynchronous
+    /// model, which is prepared when it starts. Not real-time.
     ///
     /// # Errors
     /// The model's [`Refusal`].
@@ -123,8 +124,8 @@ impl Engine {
         each!(self, model => model.memory())
     }
 
-    /// Returns the number of calls that changed the floating-point environment of the loop thread; 0 for a model elsewhere.
-    /// Real-time: bounded, no allocation.
+    /// Returns the number of calls that changed the floating-point environment of the loop thread; 0 for a model outside that
+    /// thread. Real-time: bounded, no allocation.
     #[inline]
     pub fn float_changes(&self) -> u64 {
         match self {

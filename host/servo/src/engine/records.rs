@@ -1,4 +1,4 @@
-//! Inputs and linear fields as records that two threads or two processes share.
+//! Inputs and linear fields as arrays of words, which two threads or two processes share.
 
 use flotor_core::words::{Decoder, Encoder, FIELD_WORDS, MOTION_WORDS};
 use flotor_hal::{Demand, Input, LinearField};
@@ -12,7 +12,7 @@ pub(super) const DEMANDS: [Demand; 3] = [Demand::FORCE, Demand::TORQUE, Demand::
 
 const NO_DEMAND: Demand = Demand::FORCE.limited_to(Demand::TORQUE);
 
-/// Returns the demands that are flagged, in the order of [`DEMANDS`].
+/// Returns the sum of the flagged demands; flags in the order of [`DEMANDS`].
 pub(super) fn demand_of(flags: [bool; 3]) -> Demand {
     let demands = DEMANDS.iter().zip(flags).filter_map(|(demand, flag)| flag.then_some(*demand));
     demands.fold(NO_DEMAND, Demand::with)

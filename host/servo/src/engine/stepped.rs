@@ -1,15 +1,15 @@
-//! Result of a step.
+//! Result of a model's step.
 
 use flotor_hal::abi::CallStatus;
 
-/// Result of a step.
+/// Result of a model's step, independent of its kind of execution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stepped {
-    /// Answered; the output is not validated yet.
+    /// The model has returned an output, which is not validated yet.
     Answered,
-    /// No answer in time; one may come in a later tick.
+    /// No output in time; it may arrive in a later tick.
     Late,
-    /// No answer for longer than the last one stays valid.
+    /// The newest linear field of an asynchronous model is too old.
     Silent,
     /// The model panicked or violated the contract.
     Broken,

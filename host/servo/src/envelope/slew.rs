@@ -1,26 +1,26 @@
 //! Slew limit, the last stage of the envelope: limits the change of force and torque from tick to tick.
 //!
-//! A limited force lags behind the requested one: it brakes a moving handle too little, and would then push back with the whole
-//! requested force, which generates energy. So the part of a force that accelerates the handle falls as fast as the device permits,
-//! and a ledger records the energy that the requested force would have taken from the hand, and how much less the limited force
-//! took. Until the difference is paid back, a force along the motion is scaled by the ratio of the energy taken to the energy
-//! requested, so that a spring returns exactly the energy that it received.
+//! A limited force lags behind the requested force: it decelerates a moving handle too little, and would then push back with the
+//! full requested force, which generates energy. Therefore the force component that accelerates the handle may fall as fast as the
+//! device permits, and a ledger records the energy that the requested force would have taken from the hand, and how much less the
+//! limited force took. Until the difference is recovered, a force along the motion is scaled by the ratio of the energy taken to
+//! the energy requested, so that a spring returns exactly the energy that it received.
 
 use flotor_core::limits::Limits;
 use flotor_core::region::Region;
 use flotor_coupling::port_energy::Displacement;
 use flotor_hal::{Capabilities, DVec3, Twist, Wrench};
 
-/// A limit of the change of a wrench.
+/// Slew limit of a wrench, with the energy balances of force and torque.
 pub(super) struct SlewLimit {
     force: Side,
     torque: Side,
-    /// Last requested wrench, if another one was applied.
+    /// Last requested wrench; `None` if it was applied unchanged.
     requested: Option<Wrench>,
 }
 
 impl SlewLimit {
-    /// Creates the limit of scene and device; the smaller rate applies. Not real-time.
+    /// Creates the limit from the slew rates of scene and device, of which the smaller apply. Not real-time.
     pub(super) fn new(limits: &Limits, device: &Capabilities) -> Self {
         let side = |scene: f64, device: f64| Side {
             most_per_s: scene.min(device),
@@ -34,7 +34,8 @@ impl SlewLimit {
         }
     }
 
-    /// Records the displacement since the last sample, while `held` was applied; returns the energy that the limit generated, J.
+    /// Records the displacement since the last sample, while `held` was applied; returns the energy that the limit generated, J;
+    /// negative: recovered.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -48,7 +49,8 @@ impl SlewLimit {
     }
 
     /// Moves force and torque from `held` towards the request, no farther in `dt_s` seconds than the limits allow, within the
-    /// regions of both; `None` if the request may pass and nothing is to be paid back. `held` and `request` are within the regions.
+    /// regions of both; `None` if the request may pass unchanged and no generated energy is outstanding. `held` and `request` are
+    /// within the regions.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
@@ -69,7 +71,7 @@ impl SlewLimit {
         self.limit_fast(request, held, twist, dt_s, regions)
     }
 
-    /// Limits a change that is too fast, or any change while energy is to be paid back.
+    /// Limits a change that is too fast, or any change while generated energy is outstanding.
     #[cold]
     fn limit_fast(
         &mut self,
@@ -90,11 +92,11 @@ impl SlewLimit {
     }
 }
 
-/// The limit of force or torque.
+/// Slew limit of force or torque.
 struct Side {
-    /// Fastest change (norm), per second.
+    /// Maximum slew rate (norm of the change), N/s or N·m/s.
     most_per_s: f64,
-    /// Fastest change that the device permits, for the part that accelerates the handle, per second.
+    /// Maximum slew rate of the device, N/s or N·m/s: applies to a decrease of the component that accelerates the handle.
     most_fall_per_s: f64,
     ledger: Ledger,
 }
@@ -105,7 +107,7 @@ impl Side {
         self.ledger.generated_j <= 0.0
     }
 
-    /// Returns true if the change is slow enough and nothing is to be paid back.
+    /// Returns true if the change is slow enough and no generated energy is outstanding.
     #[inline]
     fn allows(&self, request: DVec3, held: DVec3, dt_s: f64) -> bool {
         let most = self.most_per_s * dt_s;
@@ -129,23 +131,23 @@ impl Side {
         let allowed = drive * self.ledger.share();
         let target = request - along * (drive - allowed);
         let fallen = held - along * (held.dot(along) - allowed).max(0.0);
-        // Without its part along the motion a force may be outside of the region; a shorter one in its direction is a fall, too.
+        // A force without its component along the motion may be outside the region; shrinking it is a decrease, too.
         let wanted = region.shrink(step_short_of(fallen, target, most).unwrap_or(target));
         let sent = step_short_of(held, wanted, self.most_fall_per_s * dt_s).unwrap_or(wanted);
         (sent != request).then_some(sent)
     }
 }
 
-/// Energies since the ledger was last settled.
+/// Energy balance of a limit, reset when no generated energy is outstanding.
 struct Ledger {
     /// Energy that the requested force would have taken from the hand, J.
     requested_j: f64,
-    /// Energy that the limited force took less, J: the limit generated it.
+    /// Energy generated by the limit, J: the requested energy less the energy that the limited force took.
     generated_j: f64,
 }
 
 impl Ledger {
-    /// Ledger with nothing to be paid back.
+    /// Ledger without outstanding energy.
     const SETTLED: Self = Self { requested_j: 0.0, generated_j: 0.0 };
 
     /// Records a displacement; returns the energy that the limit generated over it, J.
@@ -159,7 +161,7 @@ impl Ledger {
         generated_j
     }
 
-    /// Returns the factor for a force along the motion that gives the hand no more energy than the limited force took, 0 to 1.
+    /// Returns the factor, 0 to 1, for a force along the motion with which the hand receives no more energy than the limited force took.
     fn share(&self) -> f64 {
         if self.generated_j <= 0.0 {
             return 1.0;

@@ -11,7 +11,7 @@ thread_local! {
     static HAS_HANDLERS: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Installs the crash handlers and their stack in this thread, unless installed. Not real-time.
+/// Installs the crash handlers and their stack for the calling thread; further calls have no effect. Not real-time.
 pub fn prepare_for_calls() {
     if !HAS_HANDLERS.replace(true) {
         install_for_crashes();

@@ -1,9 +1,10 @@
-//! End report of a process, in memory that its supervisor reads; no report means that the host did not end the process.
+//! End report of a process, in memory that its supervisor reads. Without a report, something other than the host's own code ended
+//! the process.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Memory that the supervisor reads; unset in a process without a supervisor.
+/// Word that the supervisor reads; unset in a process without a supervisor.
 static WORD: OnceLock<&'static AtomicU32> = OnceLock::new();
 
 /// Flag of a report with an exit code in the lowest byte.
@@ -14,14 +15,14 @@ const SIGNAL: u32 = 0x200;
 /// End of a process, as reported by the process itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ReportedEnd {
-    /// Exit code; result and errors are written.
+    /// Exit with this code; result and errors are written.
     Code(u8),
-    /// Termination signal; the message is written.
+    /// End by the last stop, after a signal or by a plugin; the message is written.
     Signal,
 }
 
 impl ReportedEnd {
-    /// Returns the end report in a word; `None` if none was set.
+    /// Decodes the end report in a word; `None` if there is none.
     #[must_use]
     pub fn read(word: &AtomicU32) -> Option<Self> {
         match word.load(Ordering::Acquire) {
@@ -32,12 +33,13 @@ impl ReportedEnd {
     }
 }
 
-/// Sets the word for the end report of this process. To be called once per process. Not real-time.
+/// Sets the word for the end report of this process; later calls have no effect. Not real-time.
 pub fn report_end_to(word: &'static AtomicU32) {
     let _ = WORD.set(word);
 }
 
-/// Reports the end of this process; the latest report counts. Safe in a signal handler: takes no lock, allocates nothing.
+/// Reports the end of this process to its supervisor, if there is one; a later report replaces an earlier one. Safe in a signal
+/// handler: takes no lock, allocates nothing.
 pub fn report_end(end: ReportedEnd) {
     if let Some(word) = WORD.get() {
         let report = match end {

@@ -14,7 +14,7 @@ impl Line {
     /// Empty line.
     pub(super) const EMPTY: Self = Self { bytes: [0; BYTES], len: 0 };
 
-    /// Returns the text so far, without a truncated character.
+    /// Returns the text so far, up to an incomplete character at the end.
     pub(super) fn text(&self) -> &str {
         let written = self.bytes.get(..self.len).unwrap_or_default();
         written.utf8_chunks().next().map_or("", |chunk| chunk.valid())

@@ -1,8 +1,8 @@
 //! Stops all energised devices before this process ends by a signal, by `exit`, or by the end of the loop's thread.
 //!
-//! A device holds its last command, some of them for ever. So while a run has energised devices, fatal signals and `exit` are
-//! handled here first: every device's `safe_stop` is called, by contract possible from any thread without lock or allocation; one
-//! line names the code at fault; the process ends with code 3.
+//! Devices hold their last command, some indefinitely. While a run has energised devices, fatal signals and `exit` are therefore
+//! intercepted: every device's `safe_stop` is called, by contract possible from any thread without lock or allocation; one line
+//! names the code at fault; the process ends with code 3, or by the signal that requested the end.
 //!
 //! Ends that cannot be caught (`_exit`, `exec`, SIGKILL, a stack overflow in a thread without an alternate stack) are handled by a
 //! separate process: [`crate::watchdog_process`].
@@ -27,32 +27,32 @@ use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
-/// Exit code after the devices were stopped here: the one of a failed plugin.
+/// Exit code after a last stop, the same as for a failed plugin.
 const ENDED: i32 = 3;
-/// Most runs of one process that are armed at a time; further ones, of parallel simulations, are not.
+/// Maximum number of armed runs in one process; further runs, as of parallel simulations, are not armed.
 const MAX_RUNS: usize = 256;
-/// Number of polls of a second dying thread for the end of the process by the first one, and the poll interval, ns.
+/// Number of polls, and poll interval, ns, of a second thread that has to end the process: it lets the first thread finish.
 const LOOKS: u32 = 50;
 const LOOK_NS: u64 = 10_000_000;
 
-/// A run whose devices are energised.
+/// Run with energised devices.
 struct Armed {
     stoppers: Box<[Stopper]>,
     /// Names of the devices, then of the models, in the scene's order.
     names: Box<[String]>,
     heartbeat: Heartbeat,
-    /// Id of the loop's thread.
+    /// Id of the loop thread.
     thread: AtomicI32,
 }
 
-/// Runs of this process. Locked for a few instructions to begin or end a run; a dying thread only tries the lock: a locked run has
-/// no energised device yet, or none any more.
+/// Runs of this process. Locked for a few instructions to begin or end a run; a thread that ends the process only tries the lock: a
+/// locked run has no energised device yet, or none any more.
 static RUNS: [Mutex<Option<Arc<Armed>>>; MAX_RUNS] = [const { Mutex::new(None) }; MAX_RUNS];
 /// True once a run was armed.
 static WAS_ARMED: AtomicBool = AtomicBool::new(false);
-/// Id of the thread in which this process dies; 0: none.
+/// Id of the thread that ends this process after a fatal event; 0: none.
 static DYING: AtomicI32 = AtomicI32::new(0);
-/// Next device to stop, counted through all runs: a stop that crashes is not retried.
+/// Number of the next device to stop, counted through all runs: a stop that crashes is not retried.
 static NEXT: AtomicUsize = AtomicUsize::new(0);
 
 /// Cause of the end of a process.
@@ -87,7 +87,8 @@ pub fn stop_all() {
     }
 }
 
-/// Returns the running plugin of each loop of this process, with tick and place. Not real-time.
+/// Returns the name of the running plugin of each loop of this process, with tick and call; loops in host code are left out. Not
+/// real-time.
 #[must_use]
 pub fn calls() -> Vec<(String, Stuck)> {
     let runs = RUNS.iter().filter_map(|run| lock(run).clone()).filter(|run| !run.is_over());
@@ -95,7 +96,8 @@ pub fn calls() -> Vec<(String, Stuck)> {
     calls.filter(|(_, at)| at.place.is_a_plugins()).collect()
 }
 
-/// Returns the runs to a dying thread, without ever freeing them: closing a device allocates, and the allocator may have crashed.
+/// Returns the armed runs for a thread that ends the process, without ever freeing them: closing a device allocates, and the
+/// allocator may have crashed.
 fn runs() -> impl Iterator<Item = ManuallyDrop<Arc<Armed>>> {
     RUNS.iter().filter_map(|run| glance(run)?.clone()).map(ManuallyDrop::new)
 }
@@ -108,18 +110,19 @@ fn glance(run: &Mutex<Option<Arc<Armed>>>) -> Option<MutexGuard<'_, Option<Arc<A
     }
 }
 
-/// Guard that arms a run until its devices are closed and its models freed.
+/// Emergency stop on process death: until this guard is dropped, after devices are closed and models freed, the devices of a run
+/// are stopped before the process ends.
 pub struct LastStop {
     place: usize,
 }
 
-/// Guard that stops the devices when a plugin ends the loop's thread. A loop drops it before devices and models: if neither the
-/// loop's end nor a panic is the reason, a plugin called something like `pthread_exit`.
+/// Guard that stops the devices when a plugin or a panic ends the loop thread. A loop drops it before devices and models: if
+/// neither the end of the loop nor a panic is the reason, a plugin has called a function like `pthread_exit`, and the process ends.
 pub struct Unwound(Arc<Armed>);
 
 impl LastStop {
-    /// Arms a run on the thread that will run the loop: its devices stop when the process dies. `names` are those of the devices,
-    /// in the order of `stoppers`, then of the models. `None` if too many runs are armed. Not real-time.
+    /// Arms a run, on the thread that will run the loop: the devices of `stoppers` are stopped when the process dies. `names`:
+    /// names of the devices, in the order of `stoppers`, then of the models. `None` if 256 runs are armed already. Not real-time.
     #[must_use]
     pub fn arm(stoppers: Vec<Stopper>, names: Vec<String>, heartbeat: Heartbeat) -> Option<(Unwound, Self)> {
         let thread = AtomicI32::new(system::thread_number());
@@ -136,7 +139,7 @@ impl LastStop {
         None
     }
 
-    /// Registers the calling thread as the loop's thread of the run. Not real-time.
+    /// Registers the calling thread as the loop thread of the run. Not real-time.
     pub(crate) fn register_loop_thread(&self) {
         if let Some(run) = RUNS.get(self.place).and_then(|run| lock(run).clone()) {
             run.thread.store(system::thread_number(), Ordering::Release);
@@ -178,7 +181,7 @@ impl Armed {
     }
 }
 
-/// Reports this exit code and ends the process at once, without exit handlers. Real-time: never returns.
+/// Reports the exit code to the supervisor and ends the process at once, without exit handlers. Real-time: never returns.
 pub fn exit_process(code: i32) -> ! {
     report_end(ReportedEnd::Code(u8::try_from(code & 0xff).unwrap_or(u8::MAX)));
     system::exit_process(code)
@@ -203,12 +206,12 @@ pub(crate) fn is_in_call() -> bool {
     call::current().is_some()
 }
 
-/// Returns true while a thread stops the devices to end this process.
+/// Returns true once a thread has begun to stop the devices and to end this process.
 pub(crate) fn is_dying() -> bool {
     DYING.load(Ordering::Acquire) != 0
 }
 
-/// Ends a process that dies for too long because a device's stop does not return; stops the other devices.
+/// Stops the remaining devices and ends the process, if a device's stop has not returned in time.
 pub(crate) fn end_dying() -> ! {
     stop_the_rest();
     system::say(b"error: the process was ended, and a device did not return from `safe_stop`\n");
@@ -241,7 +244,7 @@ fn die(death: Death) -> ! {
 fn stop_the_rest() {
     let (own, mut first) = (system::thread_number(), 0);
     for run in runs() {
-        // A loop that dies itself sends no more commands.
+        // If the crash is in the loop's own thread, that loop sends no more commands: only other loops have to be silenced.
         if run.thread.load(Ordering::Acquire) != own {
             run.heartbeat.silence();
         }
@@ -275,7 +278,7 @@ fn describe(line: &mut Line, death: Death, own: i32) {
     let Stuck { tick, place } = run.heartbeat.now();
     let in_loop = is_own(&run);
     let culprit = in_loop && place.is_a_plugins();
-    // A line that is too long loses its end.
+    // A line that is too long is truncated.
     let _ = match (culprit, in_loop) {
         (true, _) => write!(line, "error: `{}` ended the process in {}", run.name(place), place.call()),
         (false, true) => write!(line, "error: the process was ended in {}", place.call()),

@@ -1,9 +1,9 @@
 //! Broad phase: finds the models that can act at the handle, with a uniform grid over their active regions.
 //!
-//! A model declares its active region ([`flotor_hal::ActiveRegion`]); elsewhere its wrench is zero and it is not
-//! stepped. The grid is built before the loop starts, over the box around all regions, with cells about twice the size
-//! of a usual region, so that a region lies in a few cells and a cell holds a few regions. A tick looks up one cell
-//! and compares the handle with the boxes of the objects in it; what lies elsewhere costs nothing.
+//! A model declares its active region ([`flotor_hal::ActiveRegion`]); elsewhere its wrench is zero and it is not stepped. The grid
+//! is built before the loop starts, over the bounding box of all regions, with cells about twice the median size of a region, so
+//! that a region lies in a few cells and a cell holds a few regions. A tick looks up one cell and compares the handle with the
+//! boxes of the objects in it; objects elsewhere cost nothing.
 //!
 //! Objects do not move (their mapping is fixed); an object whose region is changed by a live parameter is checked in every tick
 //! from then on ([`BroadPhase::watch_always`]).
@@ -12,16 +12,16 @@
 
 use flotor_hal::{DVec3, math};
 
-/// Most cells that an object's box may overlap; a larger object is checked in every tick instead.
+/// Maximum number of cells that an object's box may overlap; a larger object is checked in every tick instead.
 const MAX_CELLS_OF_AN_OBJECT: usize = 64;
-/// Most cells along an axis.
+/// Maximum number of cells along an axis.
 const MAX_CELLS_OF_AN_AXIS: f64 = 128.0;
 /// Ratio of a cell's side to the median side of the boxes.
 const CELL_OVER_BOX: f64 = 2.0;
 /// Margin of a box around its region, m: larger than the rounding of the mapping from the model's frame.
 const ROUNDING_M: f64 = 1.0e-9;
 
-/// Box in the device frame around an object's region, m.
+/// Axis-aligned box in the device frame around an object's region, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bounds {
     low_m: DVec3,
@@ -29,13 +29,13 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Creates a box about `center_m` with these half sides and a margin for rounding.
+    /// Creates a box about `center_m` with half extents `half_sides_m` and a margin for rounding.
     pub(super) fn about(center_m: DVec3, half_sides_m: DVec3) -> Self {
         let half_sides_m = half_sides_m + ROUNDING_M;
         Self { low_m: center_m - half_sides_m, high_m: center_m + half_sides_m }
     }
 
-    /// Returns the box around both boxes. Real-time: bounded, no allocation.
+    /// Returns the bounding box of both boxes. Real-time: bounded, no allocation.
     pub(super) fn with(self, other: Self) -> Self {
         Self { low_m: self.low_m.min(other.low_m), high_m: self.high_m.max(other.high_m) }
     }
@@ -47,7 +47,7 @@ impl Bounds {
     }
 }
 
-/// Objects by position. Allocates at construction only.
+/// Lookup of the objects that can act at a position. Allocates at construction only.
 pub(super) struct BroadPhase {
     /// Box of each object; `None` for an object that can act anywhere.
     bounds: Box<[Option<Bounds>]>,
@@ -63,12 +63,12 @@ struct Grid {
     per_m: DVec3,
     /// Cells along each axis.
     counts: [usize; 3],
-    /// Objects of each cell, in order; empty if all cells are.
+    /// Numbers of the objects in each cell, ascending; empty if all cells are empty.
     objects: Box<[Box<[u32]>]>,
 }
 
 impl BroadPhase {
-    /// Sorts objects into the grid, each with the box in which it can act; `None` for everywhere. Not real-time.
+    /// Sorts objects into the grid; `bounds` has the box in which each object can act, `None` for everywhere. Not real-time.
     #[allow(clippy::indexing_slicing)] // the cells of a box are cells of the grid
     pub(super) fn new(bounds: Vec<Option<Bounds>>) -> Self {
         let boxed: Vec<Bounds> = bounds.iter().copied().flatten().collect();
@@ -89,8 +89,8 @@ impl BroadPhase {
         Self { bounds: bounds.into(), always, grid }
     }
 
-    /// Calls `meet` with those of all `objects` that can act with the handle at `position_m`, in order of their numbers: sums do
-    /// not depend on the inactive ones.
+    /// Calls `meet` for each of `objects` that can act on the handle at `position_m`, in order of their numbers: sums do not depend
+    /// on inactive objects.
     ///
     /// Real-time: bounded by the objects that are near or may act anywhere; no allocation.
     #[inline]
@@ -128,7 +128,7 @@ impl BroadPhase {
         }
     }
 
-    /// Changes the box of an object after a live parameter has; the object is checked in every tick from now on.
+    /// Replaces the box of an object after a live parameter has changed it; the object is checked in every tick from now on.
     ///
     /// Real-time: bounded by the number of objects, no allocation.
     pub(super) fn watch_always(&mut self, object: usize, bounds: Option<Bounds>) {
@@ -139,7 +139,7 @@ impl BroadPhase {
         }
     }
 
-    /// Returns the box around all objects' boxes; `None` if an object can act everywhere, or there is no object.
+    /// Returns the bounding box of all objects' boxes; `None` if an object can act everywhere, or there is no object.
     ///
     /// Real-time: bounded by the number of objects, no allocation.
     pub(super) fn hull(&self) -> Option<Bounds> {

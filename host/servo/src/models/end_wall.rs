@@ -1,7 +1,7 @@
-//! Wall at the workspace bounds of a model: spring and damper that push the handle back, and never pull.
+//! Wall at the workspace bounds of a model: a spring and a damper that push the handle back and never pull.
 //!
-//! The wall is part of the model's contribution: it fades, yields and goes with the model. The [boundary](crate) of the device acts
-//! as well; the nearer of both is felt first.
+//! The wall is part of the model's contribution: it fades with the model, yields with it to a higher priority, and is removed with
+//! it. The [boundary](crate) of the device acts as well; the nearer of the two is felt first.
 
 use flotor_core::mapping::Mapping;
 use flotor_hal::{DVec3, Damper, Pose, SampledLoop, Twist, WorkspaceBounds, Wrench};
@@ -12,20 +12,20 @@ const DAMPING_NS_PER_M: f64 = 15.0;
 /// Largest stiffness of the wall, N/m, as of the [boundary](flotor_core::limits::Boundary) at 1 kHz.
 const MAX_STIFFNESS_N_PER_M: f64 = 7_500.0;
 
-/// Returns true if a wall at these bounds would push a handle at the home of its device. Real-time: bounded, no allocation.
+/// Returns true if a wall at these bounds would push the handle at the home pose of its device. Real-time: bounded, no allocation.
 #[must_use]
 pub fn pushes_at_home(bounds: &WorkspaceBounds, mapping: &Mapping) -> bool {
     bounds.is_bounded() && bounds.beyond(mapping.pose_to_model(&Pose::HOME).position()) != DVec3::ZERO
 }
 
-/// The wall of one object.
+/// Wall of one instance of a model.
 pub(super) struct EndWall {
     bounds: WorkspaceBounds,
     stiffness_n_per_m: f64,
 }
 
 impl EndWall {
-    /// Creates a wall as stiff as the loop allows; `None` for a model without bounds. Not real-time.
+    /// Creates a wall with the largest stable stiffness of the loop, up to 7500 N/m; `None` for a model without bounds. Not real-time.
     pub(super) fn new(bounds: &WorkspaceBounds, mapping: &Mapping, sampled: &SampledLoop) -> Option<Self> {
         // The damping of the device is not known.
         let stable_n_per_m = sampled.largest_stiffness(0.0, Damper::OneWay(DAMPING_NS_PER_M));
@@ -37,14 +37,14 @@ impl EndWall {
         })
     }
 
-    /// Moves the wall to new bounds; removes a wall that would push at the home of the device. Real-time: bounded, no allocation.
+    /// Moves the wall to new bounds; removes a wall that would push at the home pose of the device. Real-time: bounded, no allocation.
     pub(super) fn move_to(&mut self, bounds: &WorkspaceBounds, mapping: &Mapping) {
         let is_wall = bounds.is_bounded() && !pushes_at_home(bounds, mapping);
         self.bounds = if is_wall { *bounds } else { WorkspaceBounds::UNBOUNDED };
     }
 
-    /// Returns the push in the device frame on a handle at `pose` in the model's frame, with `twist` in the device frame; `None`
-    /// within bounds. Real-time: bounded, no allocation.
+    /// Returns the wall force on the handle, device frame; `None` within the bounds. `pose` is in the model frame, `twist` in the
+    /// device frame. Real-time: bounded, no allocation.
     pub(super) fn push(&self, pose: &Pose, mapping: &Mapping, twist: &Twist) -> Option<Wrench> {
         let beyond_m = self.bounds.beyond(pose.position());
         if beyond_m == DVec3::ZERO || !beyond_m.is_finite() {

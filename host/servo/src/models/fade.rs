@@ -12,13 +12,13 @@ pub(super) struct Fade {
 }
 
 impl Fade {
-    /// Creates a weight at rest at `at` that takes `fade_s` from 0 to 1.
+    /// Creates a constant weight `at`, which takes `fade_s` seconds for a change from 0 to 1.
     pub(super) fn new(at: f64, fade_s: f64) -> Self {
         let at = at.clamp(0.0, 1.0);
         Self { from: at, target: at, since_ns: 0, rate_per_ns: 1.0e-9 / fade_s }
     }
 
-    /// Sets the target of the weight, to be approached from its present value. Real-time: bounded, no allocation.
+    /// Sets the target of the weight, 0 to 1 (clamped); the weight moves there from its present value. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn set_target(&mut self, target: f64, now_ns: u64) {
         let target = target.clamp(0.0, 1.0);
@@ -27,7 +27,7 @@ impl Fade {
         }
     }
 
-    /// Returns the weight at a time. Real-time: bounded, no allocation.
+    /// Returns the weight at the run time `now_ns`. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn at(&self, now_ns: u64) -> f64 {
         if self.from == self.target {
@@ -39,7 +39,7 @@ impl Fade {
         if moved < way.abs() { self.from + moved.copysign(way) } else { self.target }
     }
 
-    /// Returns true if the weight is 0 and stays so. Real-time: bounded, no allocation.
+    /// Returns true if the weight is 0 and has no other target. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn is_silent(&self, now_ns: u64) -> bool {
         self.target == 0.0 && self.at(now_ns) == 0.0

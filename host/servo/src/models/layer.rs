@@ -1,4 +1,4 @@
-//! One force model with all its instances: the unit that is mixed, faded and replaced.
+//! One force model with all its instances: the unit that is blended, faded and replaced.
 
 use super::broad_phase::{Bounds, BroadPhase};
 use super::end_wall::EndWall;
@@ -12,33 +12,33 @@ use flotor_hal::{
     DVec3, Demand, DeviceState, Input, Memory, Output, RegionShape, SampledLoop, StepStatus, Tick, Wrench,
 };
 
-/// Health counters of a model, over all its instances.
+/// Health counters of a model, summed over its instances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ModelHealth {
-    /// Tick of the first panic; the instance is disabled from then on.
+    /// Tick of the first panic or violation of the contract by an instance; the instance is disabled from then on.
     pub panicked_at: Option<u64>,
-    /// Ticks with an answer that was not finite or violated the contract; each counted as no force.
+    /// Number of outputs with non-finite numbers or an unknown status; each was replaced by no force.
     pub rejected_ticks: u64,
-    /// First rejected tick.
+    /// First tick with a rejected output.
     pub first_rejected: Option<u64>,
     /// Tick at which the process of an instance was found to have ended; the instance is disabled from then on.
     pub lost_at: Option<u64>,
-    /// Ticks in which the last field of an asynchronous model was too old.
+    /// Number of ticks in which the last field of an asynchronous model was too old.
     pub late_ticks: u64,
     /// First late tick.
     pub first_late: Option<u64>,
-    /// Ticks without a reply in time from a worker process. Not a fault by themselves: the time budget limits them.
+    /// Number of ticks without a reply in time from a worker process. Not a fault by themselves: the time budget limits them.
     pub late_answers: u64,
-    /// Overrun for which the model was disabled.
+    /// Overrun for which the model was disabled; `None` if it was not.
     pub overrun: Option<Overrun>,
-    /// Ticks in which the model changed the floating-point environment; the host restored it each time.
+    /// Number of ticks in which the model changed the floating-point environment; the host restored it each time.
     pub float_changes: u64,
     /// First tick with a changed floating-point environment.
     pub first_float_change: Option<u64>,
 }
 
 impl ModelHealth {
-    /// Returns true if there is no problem to report; late replies alone are none.
+    /// Returns true without a problem to report; late replies alone are no problem.
     #[must_use]
     pub fn is_good(&self) -> bool {
         *self == Self { late_answers: self.late_answers, ..Self::default() }
@@ -56,13 +56,13 @@ impl ModelHealth {
 struct Object {
     model: Engine,
     mapping: Mapping,
-    /// Wall at the bounds of the model, if it has any.
+    /// Wall at the bounds of the model; `None` for a model without bounds.
     end: Option<EndWall>,
-    /// Usable answer of the last tick, in the model's frame, if the next one may be late.
+    /// Usable output of the last tick, in the model frame, kept for an engine whose next output may be late.
     last: Option<Output>,
     /// Tick of the last step.
     stepped_at: Option<u64>,
-    /// Calls counted so far that changed the floating-point environment.
+    /// Number of calls so far that changed the floating-point environment.
     float_changes: u64,
     /// True after a panic or process exit: the model is not called any more.
     is_disabled: bool,
@@ -102,8 +102,8 @@ impl Contribution {
     }
 }
 
-/// Returns the answer with NaN in place of each output that was not requested, or that is not finite and reaches an observer alone;
-/// `None` if an output that reaches the hand is not finite, or the status is unknown. Real-time: bounded, no allocation.
+/// Replaces each output that was not requested, or that is not finite and reaches observers only, with NaN. Returns `None` if an
+/// output that reaches the hand is not finite, or the status is unknown. Real-time: bounded, no allocation.
 #[inline(always)] // in the middle of a tick
 fn usable(demand: TickDemand, mut output: Output) -> Option<Output> {
     output.status()?;
@@ -125,7 +125,7 @@ fn usable(demand: TickDemand, mut output: Output) -> Option<Output> {
     Some(output)
 }
 
-/// Force model with all its instances.
+/// Force model with all its instances: the unit of blending and replacement.
 pub struct Layer {
     objects: Box<[Object]>,
     broad: BroadPhase,
@@ -137,9 +137,9 @@ pub struct Layer {
     last: Contribution,
     /// Weight, priority and fade time.
     pub(super) blend: Blend,
-    /// Health of this layer alone; a replacement starts anew.
+    /// Health of this layer alone: a replacement starts with zero counters.
     pub(super) health: ModelHealth,
-    /// Number of replacements of the model when the layer was put in.
+    /// Number of replacements of the model up to this layer; 0 for the first layer.
     pub(super) generation: u16,
 }
 
@@ -147,7 +147,7 @@ pub struct Layer {
 pub struct LayerReport {
     /// Number of the model in the scene.
     pub model: usize,
-    /// Generation of the layer among those of the model.
+    /// Number of replacements of the model up to this layer; 0 for the first layer.
     pub generation: u16,
     /// Health counters of the layer.
     pub health: ModelHealth,
@@ -158,7 +158,7 @@ pub struct LayerReport {
 impl Layer {
     /// Creates a layer from a model's instances, each with its mapping, and their common time budget. Not real-time.
     ///
-    /// A model with workspace bounds gets a wall there, as stiff as the loop allows.
+    /// A model with workspace bounds gets a wall there, with the largest stable stiffness of the loop up to 7500 N/m.
     pub fn new(
         instances: Vec<(Engine, Mapping)>,
         blend: &Blend,
@@ -186,18 +186,19 @@ impl Layer {
         }
     }
 
-    /// Returns the number of replacements of the model when the layer was put in.
+    /// Returns the number of replacements of the model up to this layer; 0 for the first layer.
     pub fn generation(&self) -> u16 {
         self.generation
     }
 
-    /// Returns the box in the device frame in which any object can act; `None` for everywhere. Real-time.
+    /// Returns the bounding box, device frame, in which the objects can act; `None` for everywhere. Real-time: bounded by the
+    /// number of objects, no allocation.
     pub(super) fn bounds(&self) -> Option<Bounds> {
         self.broad.hull()
     }
 
-    /// Returns the contribution of all objects at a state of the device. A model with too many overruns is not stepped any more:
-    /// its last contribution fades out.
+    /// Steps the objects near the handle and returns the sum of their contributions, device frame. A model with too many overruns
+    /// is not stepped any more: its last contribution fades out.
     ///
     /// Real-time: bounded by the objects that are near, no allocation.
     #[inline(always)] // 3 ns: the result stays in registers
@@ -229,7 +230,7 @@ impl Layer {
         }
     }
 
-    /// Steps all objects that can act at the handle; the others are not called.
+    /// Steps all objects that can act at the handle and returns the sum of their contributions; other objects are not called.
     #[inline]
     fn ask(&mut self, context: &StepContext<'_>, events: &mut Events) -> Contribution {
         let StepContext { tick, state, demand } = *context;
@@ -255,7 +256,8 @@ impl Layer {
         share
     }
 
-    /// Changes a live parameter of all objects. Real-time: bounded by their number, no allocation.
+    /// Changes a live parameter of all objects; returns the last status that is not ok. Real-time: bounded by their number, no
+    /// allocation.
     pub(super) fn set_parameter(&mut self, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
         let mut worst = CallStatus::Ok;
         for (index, object) in self.objects.iter_mut().enumerate() {
@@ -281,8 +283,8 @@ impl Layer {
         worst
     }
 
-    /// Returns a report on the layer as model number `model`. Queries the last message of an unhealthy model only, and calls `on_query`
-    /// before. Not real-time.
+    /// Returns a report on the layer of the model numbered `model`. Queries the last message of an unhealthy model only, and calls
+    /// `on_query` before the query. Not real-time.
     pub fn report(&mut self, model: usize, on_query: impl FnOnce()) -> LayerReport {
         let Self { generation, health, .. } = *self;
         let words = if health.is_good() {
@@ -302,7 +304,7 @@ impl Layer {
 }
 
 impl Object {
-    /// Returns the box in the device frame in which the object can act; `None` for everywhere. Real-time: bounded, no allocation.
+    /// Returns the bounding box, device frame, in which the object can act; `None` for everywhere. Real-time: bounded, no allocation.
     fn bounds(&mut self) -> Option<Bounds> {
         let region = self.model.active_region();
         let half_sides_m = match region.shape() {
@@ -313,7 +315,7 @@ impl Object {
         Some(Bounds::about(self.mapping.position_to_device(region.center()), half_sides_m))
     }
 
-    /// Steps the model. Returns the answer in the model's frame if it is usable; otherwise counts the problem in the health.
+    /// Steps the model. Returns the output, model frame, if it is usable; otherwise counts the problem in `health`.
     #[inline(always)] // with the three of `Mapping` and `limit_wrench` 22 ns a tick
     fn answer(
         &mut self,
@@ -326,7 +328,7 @@ impl Object {
         if self.is_disabled {
             return None;
         }
-        // A model that was not stepped in the last tick has no history and is reset.
+        // A path-dependent model that was not stepped in the last tick is reset before its next step.
         let was_inactive = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
         if was_inactive && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
             return self.fail(input.tick, health);
@@ -356,7 +358,7 @@ impl Object {
                 }
                 usable
             }
-            // The last answer replaces one late answer; a second one in a row gets none.
+            // The last output replaces one late output; a second late output in a row has no replacement.
             Stepped::Late => {
                 events.insert(Events::MODEL_OVERRUN);
                 health.late_answers += 1;

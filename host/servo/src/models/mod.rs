@@ -1,8 +1,8 @@
 //! Force models of a device: selects the active ones and adds up their wrenches.
 //!
-//! A scene's models are *layers*. Their wrenches add up, each by its weight; a layer that pushes silences those of lower priority;
-//! weights move at a constant rate, so that the force does not jump when one model yields to another. A layer whose objects cannot
-//! act at the handle, or whose weight is 0, is not stepped.
+//! A scene's models are *layers*. Their wrenches add up, each times its weight; a layer with a nonzero wrench silences the layers
+//! of lower priority; weights move at a constant rate, so that the force does not jump when one model yields to another. A layer
+//! without an object that can act at the handle, or with weight 0, is not stepped.
 
 mod broad_phase;
 mod end_wall;
@@ -23,7 +23,7 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
 use layer::{Contribution, StepContext};
 
-/// Time in which a layer of higher priority silences the others, s: shorter than a hand's reaction, and long enough that the slew
+/// Time over which layers of lower priority fade out and in again, s: shorter than a hand's reaction, and long enough that the slew
 /// limit need not act.
 const SILENCE_S: f64 = 0.02;
 
@@ -32,7 +32,7 @@ pub(crate) struct ModelStack {
     /// Slots of the models, in the scene's order.
     pub(crate) slots: Box<[Slot]>,
     broad: BroadPhase,
-    /// Levels by ascending priority; none if all layers have one priority: then no layer is silenced.
+    /// Levels by ascending priority; empty if all layers have the same priority: then no layer is silenced.
     levels: Box<[Level]>,
     observable: Demand,
 }
@@ -47,21 +47,21 @@ pub struct Replacement {
     pub layer: Box<Layer>,
 }
 
-/// Returns the outputs of the sum of these models: no energy if one part is unknown.
+/// Returns the outputs that the sum of the models has: energy only if every model computes its energy.
 fn observable(slots: &[Slot]) -> Demand {
     if slots.iter().all(Slot::gives_energy) { Demand::ALL } else { Demand::WRENCH }
 }
 
-/// The layers of one priority.
+/// Gain and activity of the layers of one priority.
 struct Level {
     priority: u8,
     gain: Fade,
-    /// True if a layer of this priority pushed in this tick.
+    /// True if a layer of this priority had a nonzero wrench in this tick.
     pushes: bool,
 }
 
 impl ModelStack {
-    /// Creates the stack; each layer comes with the number of its model in the scene. Not real-time.
+    /// Creates the stack from layers, each with the number of its model in the scene. Not real-time.
     pub(crate) fn new(layers: Vec<(usize, Layer)>) -> Self {
         let slots: Box<[Slot]> = layers.into_iter().map(|(number, layer)| Slot::new(number, layer)).collect();
         let broad = BroadPhase::new(slots.iter().map(Slot::bounds).collect());
@@ -76,14 +76,15 @@ impl ModelStack {
         Self { slots, broad, levels: priorities.into_iter().map(level).collect(), observable }
     }
 
-    /// Returns the outputs of the sum of the models: no energy if one model has none. Real-time: bounded, no allocation.
+    /// Returns the outputs that the sum of the models has: energy only if every model computes its energy. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub(crate) fn observable(&self) -> Demand {
         self.observable
     }
 
-    /// Returns the summed wrench of the models in the device frame, and their stored energy, J. An output without demand is
-    /// undefined; one that only an observer demands is NaN where it is not finite.
+    /// Steps the models near the handle; returns the weighted sum of their wrenches, device frame, and of their stored energies, J.
+    /// An output without demand is undefined; an output that only observers demand is NaN if it is not finite.
     ///
     /// Real-time: bounded by the models that are near, no allocation.
     #[inline]
@@ -124,7 +125,8 @@ impl ModelStack {
         (sum.wrench, sum.energy_j)
     }
 
-    /// Changes a live parameter of the model in place `model`. Real-time: bounded by its objects, no allocation.
+    /// Changes a live parameter of the model at index `model` of the stack; unsupported if there is none. Real-time: bounded by its
+    /// objects, no allocation.
     pub(crate) fn set_parameter(
         &mut self,
         model: usize,
@@ -138,8 +140,8 @@ impl ModelStack {
         status
     }
 
-    /// Replaces a model; the new layer fades in from this tick on. Returns a layer that had to go before it had faded out; the
-    /// caller drops it outside the loop.
+    /// Replaces a model; the new layer fades in from this tick on. Returns an older layer that was still fading out (or the new
+    /// layer if there is no such model), to be dropped outside the loop.
     ///
     /// Real-time: bounded by the objects of the model, no allocation.
     pub(crate) fn replace(

@@ -1,8 +1,8 @@
-//! Slot of one model in a scene: its current layer, and the layer that fades out.
+//! Slot of one model in a scene: the current layer, and a layer that is fading out.
 //!
-//! A model is replaced while the loop runs by putting another layer into its slot. Both layers are mixed until the new one has
-//! faded in; then the old one is returned, to be dropped outside the loop. If a third layer comes before that, the oldest is
-//! removed at once and its last contribution fades instead: the force does not jump however soon they follow.
+//! A model is replaced while the loop runs by putting another layer into its slot. Both layers are blended until the new layer has
+//! faded in; then the old layer is returned, to be dropped outside the loop. If a third layer arrives before that, the oldest is
+//! removed at once and its last contribution fades instead: the force does not jump however soon replacements follow each other.
 
 use super::broad_phase::Bounds;
 use super::fade::Fade;
@@ -19,9 +19,9 @@ pub(crate) struct Slot {
     presence: Fade,
     /// Old layer, while it fades out.
     leaving: Option<Box<Layer>>,
-    /// Contribution of a layer removed before it had faded out; fades with `leaving`.
+    /// Last contribution of a layer removed before it had faded out; fades out with `leaving`.
     rest: Option<Contribution>,
-    /// Tick of the last step, and the difference between the old contributions and the current one then.
+    /// Tick of the last step, and the old contributions less the current one in that step.
     gap: Option<(u64, Contribution)>,
     pub(super) weight: Fade,
     pub(super) priority: u8,
@@ -51,7 +51,7 @@ impl Slot {
         self.current.generation
     }
 
-    /// Puts a layer in, which fades in from now on; returns the one that was still fading out.
+    /// Installs a layer, which fades in from this tick on; returns the layer that was still fading out, if there was one.
     ///
     /// Real-time: bounded, no allocation.
     pub(super) fn put(&mut self, mut layer: Box<Layer>, generation: u16, tick: &Tick) -> Option<Box<Layer>> {
@@ -65,7 +65,7 @@ impl Slot {
     }
 
     /// Returns the contribution that would be missing without the leaving layer, as of the last tick; `None` if no layer is
-    /// leaving, or none was stepped then.
+    /// leaving, or the slot was not stepped in the last tick.
     fn missing_without_leaving(&self, tick: &Tick) -> Option<Contribution> {
         let (asked_at, gap) = self.gap?;
         let absence = 1.0 - self.presence.at(tick.time_ns);
@@ -93,8 +93,8 @@ impl Slot {
         self.current.serves.contains(Demand::ENERGY)
     }
 
-    /// Returns the box in the device frame in which the objects can act; `None` for everywhere. Real-time: bounded by their number,
-    /// no allocation.
+    /// Returns the bounding box, device frame, in which the objects can act; `None` for everywhere. Real-time: bounded by their
+    /// number, no allocation.
     pub(super) fn bounds(&self) -> Option<Bounds> {
         // The contribution of a removed layer fades wherever the handle is.
         if self.rest.is_some() {
@@ -104,12 +104,12 @@ impl Slot {
         self.leaving.as_ref().map_or(Some(current), |leaving| Some(current.with(leaving.bounds()?)))
     }
 
-    /// Returns the contribution at a state of the device. Real-time: bounded by the objects that are near, no allocation.
+    /// Steps the current and the leaving layer, and returns the blend of their contributions. Real-time: bounded by the objects
+    /// that are near, no allocation.
     #[inline]
     pub(super) fn step(&mut self, context: &StepContext<'_>, events: &mut Events) -> Contribution {
         let share = self.current.step(context, events);
         let Some(leaving) = &mut self.leaving else { return share };
-        // Mix of the current layer and the leaving one.
         let presence = self.presence.at(context.tick.time_ns);
         let mut before = leaving.step(context, events);
         if let Some(rest) = self.rest {
@@ -119,7 +119,7 @@ impl Slot {
         share.times(presence).plus(before.times(1.0 - presence))
     }
 
-    /// Moves the weight to a new value, at its rate. Real-time: bounded, no allocation.
+    /// Sets the target weight, 0 to 1; the weight moves there at the fade rate. Real-time: bounded, no allocation.
     pub(crate) fn set_weight(&mut self, tick: &Tick, weight: f64) {
         self.weight.set_target(weight, tick.time_ns);
     }

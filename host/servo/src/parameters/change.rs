@@ -5,28 +5,28 @@ use flotor_hal::Tick;
 
 /// Parameter number that stands for the weight of a model.
 pub const WEIGHT: u32 = u32::MAX;
-/// Parameter number that stands for the plugin itself.
+/// Parameter number that stands for the plugin itself, in a report on its replacement; the value is the new generation.
 pub const PLUGIN: u32 = u32::MAX - 1;
 
-/// New value of a parameter. The numbers come from a schema: see `session::Controls`.
+/// New value of a parameter. The numbers of plugin and parameter come from a schema: see `session::Controls`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParameterChange {
     /// Number of the plugin in the run.
     pub plugin: PluginIndex,
-    /// Generation of the plugin that the change was checked against.
+    /// Generation of the plugin that the change was checked against; the loop rejects a change for another generation.
     pub generation: u16,
     /// Index into the plugin's schema, [`WEIGHT`], or in a report [`PLUGIN`].
     pub parameter: u32,
-    /// New value; for a choice, its index.
+    /// New value, in the parameter's unit; for a choice, its index.
     pub value: f64,
-    /// Pace of the change.
+    /// Pace at which the value changes.
     pub pace: Pace,
 }
 
-/// Pace of a change.
+/// Pace of a parameter change: in one step, or at a rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pace {
-    /// Before the next tick.
+    /// In one step, before the next tick.
     AtOnce,
     /// At a rate, from the current value.
     Gradual {
@@ -37,7 +37,7 @@ pub enum Pace {
     },
 }
 
-/// Outcome of a change.
+/// Report on a change of a parameter, or on the replacement of a plugin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChangeReport {
     /// Tick before which the change was applied.
@@ -46,7 +46,7 @@ pub struct ChangeReport {
     pub time_ns: u64,
     /// Reported change.
     pub change: ParameterChange,
-    /// Result of the plugin's call.
+    /// Result of the change.
     pub outcome: ChangeOutcome,
 }
 

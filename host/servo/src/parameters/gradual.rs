@@ -1,4 +1,4 @@
-//! Numbers that move to a new value at a rate, so that a user's slider does not make the force jump.
+//! Gradual changes: numbers move to a new value at a rate, so that a user's slider does not make the force jump.
 
 use super::change::{Pace, ParameterChange};
 use flotor_core::{ChangeOutcome, PluginIndex};
@@ -6,7 +6,7 @@ use flotor_hal::Tick;
 
 /// Longest time step of a movement in a tick, ns: missed ticks are not caught up.
 const LONGEST_STEP_NS: u64 = 10_000_000;
-/// Time for which a plugin may refuse the next value before the movement ends, ns: the queue of an asynchronous model may be full
+/// Time for which a plugin may reject the next value before the movement ends, ns: the queue of an asynchronous model may be full
 /// for a while, and two numbers may have to move together.
 const PATIENCE_NS: u64 = 1_000_000_000;
 
@@ -44,7 +44,7 @@ pub(super) struct Movements {
 }
 
 impl Movements {
-    /// Creates room for this many parameters. Not real-time.
+    /// Creates an empty list with preallocated memory for `parameters` numbers. Not real-time.
     pub(super) fn with_room(parameters: usize) -> Self {
         Self { known: Vec::with_capacity(parameters), moving: 0 }
     }
@@ -55,14 +55,15 @@ impl Movements {
         self.moving
     }
 
-    /// Records a change without a rate, which ends a movement of the number. Real-time: bounded, no allocation.
+    /// Records an applied change without a rate, which ends a movement of the number. Real-time: bounded, no allocation.
     pub(super) fn note(&mut self, change: &ParameterChange, outcome: ChangeOutcome) {
         if outcome == ChangeOutcome::Applied {
             self.keep(change, change.value, None);
         }
     }
 
-    /// Starts a movement; returns false if there is no room. Real-time: bounded, no allocation.
+    /// Starts a movement from the number's recorded value, else from `from`; returns false if there is no room. Real-time: bounded,
+    /// no allocation.
     pub(super) fn begin(&mut self, change: &ParameterChange, from: f64, per_s: f64) -> bool {
         self.keep(change, from, Some((change.value, per_s)))
     }

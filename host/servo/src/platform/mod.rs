@@ -1,7 +1,7 @@
-//! Platform layer of the real-time core. Each system has one module with the same items:
-//! - `clock`: the monotonic clock, and sleeping on it;
+//! Platform layer of the real-time core. Each operating system has one module with the same items:
+//! - `clock`: monotonic clock and sleep;
 //! - `scheduling`: priorities, cores, locked memory;
-//! - `last_stop`: handling of a dying process;
+//! - `last_stop`: stop of the devices when the process dies;
 //! - `shared_memory`, `processes`: resources shared by the loop and worker processes;
 //! - `watchdog_process`: process that stops devices whose host has ended.
 //!
@@ -33,6 +33,6 @@ pub(crate) enum Duty {
     Loop,
     /// Model in a worker process: below the loop, which waits for the model with a timeout.
     Worker,
-    /// Watchdog, which interrupts the loop: above it, or at its priority where the system has none above.
+    /// Watchdog, which stops the devices of a stuck loop: above the loop, or at the same priority if the system has none above.
     Watchdog,
 }

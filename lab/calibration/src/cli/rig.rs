@@ -74,7 +74,8 @@ impl RigArguments {
         Ok(SimulatedRig::new(registry.load(SIMULATED, PluginKind::Device)?, self.seed))
     }
 
-    /// Opens the device and its sensor, and a progress bar over this many stops that shows the next height of the sensor.
+    /// Opens the device and its sensor; returns the rig with a progress bar of `stops` steps, which shows the next
+    /// height of the sensor.
     pub(super) fn device_rig(&self, stops: u64) -> Result<(DeviceRig<Guide>, ProgressBar), CommandError> {
         // Handle signals before a plugin is loaded: a thread that a plugin starts earlier would still receive Ctrl-C.
         let stop = stop_on_signals()?;
@@ -108,7 +109,7 @@ impl RigArguments {
     }
 }
 
-/// Creates the guide; it owns the watch of the latch, which therefore lasts as long as the rig.
+/// Creates the guide. The guide owns the watch of the latch, so that the watch lasts as long as the rig.
 fn guide(progress: &ProgressBar, stop: &StopSwitch, watch: LatchWatch) -> Guide {
     let (progress, stop) = (progress.clone(), stop.clone());
     let redrawn = Redrawn::every(REDRAWN, &progress);

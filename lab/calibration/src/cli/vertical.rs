@@ -83,7 +83,7 @@ struct ErrorRow {
     error_percent: f64,
 }
 
-/// Result of a procedure.
+/// Readings with their fit, and the errors of the corrections under comparison.
 struct Measured {
     serial: String,
     readings: Vec<Reading>,
@@ -131,7 +131,7 @@ fn plan(arguments: &VerticalArguments) -> Result<Plan, CommandError> {
 /// Number of corrections that are compared in the simulated rig.
 const CORRECTIONS: u64 = 4;
 
-/// Correction of the force: by the device, by the command, or none.
+/// Correction of the force by the device, by the command, or none.
 struct Correction<'a> {
     name: &'static str,
     calibration: Option<VerticalCalibration>,

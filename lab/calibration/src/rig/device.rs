@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 /// Poll interval while waiting for the handle to rest at its target.
 const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
-/// Next height of the sensor.
+/// State of the handle while the sensor is moved to its next height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waiting {
     /// Target height of the handle, m.
@@ -30,7 +30,7 @@ pub struct Waiting {
     pub command_n: f64,
 }
 
-/// Conditions of a procedure.
+/// Tolerance, timeout and limits of a procedure with a real device.
 #[derive(Clone, Copy, Debug)]
 pub struct RigOptions {
     /// Largest distance of the handle at rest from its target, m.
@@ -41,9 +41,9 @@ pub struct RigOptions {
     pub limits: Limits,
 }
 
-/// Device in the rig.
+/// Real device in the rig, with its force sensor.
 pub struct DeviceRig<W> {
-    /// Device while not held; `None` while held, and after a loss.
+    /// Device while not held; `None` while held, and after the device was lost.
     opened: Option<OpenedDevice>,
     holder: Option<Holder>,
     /// Largest vertical force that the device accepts and the host sends, N.
@@ -62,8 +62,9 @@ pub struct DeviceRig<W> {
 }
 
 impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
-    /// Opens the device and starts its watchdog process. `waiting` is called with the handle's position until the handle rests at its
-    /// target, then once with `None`. If `waiting` breaks, the handle is lowered; at an emergency stop of `stop` the device is stopped.
+    /// Opens the device and starts its watchdog process. `waiting` is called repeatedly with the position of the handle
+    /// until the handle rests at its target, then once with `None`. If `waiting` breaks, the calibration is aborted and
+    /// the handle lowered. An emergency stop of `stop` stops the device. Not real-time.
     ///
     /// # Errors
     /// [`CalibrationError`] if the device rejects the call, or must not be driven without the user's consent.
@@ -191,7 +192,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
             let report = self.holder()?.look()?;
             let is_close = (report.height_m - target_m).abs() <= close_m;
             if report.state == Holding::Steady(command_n) && is_close && report.moved_m <= REST_M {
-                // Saturation alone may be in another axis: a coil that holds the locked ones, for a tick.
+                // The saturation flag alone proves nothing: for a tick, a coil may saturate that holds a locked axis.
                 if report.saturated > 0 && report.delivered_n < command_n - STEADY_N {
                     let height_mm = report.height_m * 1.0e3;
                     return Err(CalibrationError::Saturated { command_n, height_mm });
@@ -210,7 +211,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
     }
 
     fn still_rests(&mut self, rest: &Rest) -> Result<bool, CalibrationError> {
-        // The means current or next at this point contain the motion during the last reading.
+        // The mean in progress at this point and the next one contain any motion during the last reading.
         let (from, until) = (self.holder()?.look()?.means, Instant::now() + self.options.patience);
         loop {
             let report = self.holder()?.look()?;

@@ -1,8 +1,8 @@
 //! Thread that holds a levitating handle in the rig: all axes but the vertical locked, a force along the vertical.
 //!
-//! The thread continues during other work of the procedure: a device without commands removes its force. A tick neither
-//! allocates nor blocks. As in a run, all commands pass through the envelope, a watchdog stops a device whose call does
-//! not return, and the emergency stop applies to both.
+//! The thread keeps sending commands while the procedure does other work, as a device without commands removes its
+//! force. A tick neither allocates nor blocks. As in a run, all commands pass through the envelope, a watchdog stops a
+//! device whose call does not return, and an emergency stop ends both thread and force.
 
 use super::{AVERAGED_TICKS, Mean, PERIOD_NS, locked};
 use crate::CalibrationError;
@@ -21,7 +21,7 @@ use std::time::{Duration, Instant};
 
 /// Fastest change of the vertical force, N per tick: from 0 to 12 N in half a second.
 const RAMP_STEP_N: f64 = 0.024;
-/// Speed above which the handle is not held by a sensor, m/s: a hand's breadth per second.
+/// Vertical speed above which the handle counts as having lost contact with the sensor, m/s.
 const RUNAWAY_M_PER_S: f64 = 0.1;
 /// Difference of two successive mean heights that counts as rest, m: the resolution of the device (5 to 10 µm;
 /// Varadharajan 2007, section 2.2).
@@ -67,11 +67,11 @@ impl Words<COMMAND_WORDS> for Command {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Report {
     pub(super) state: Holding,
-    /// Mean height of the last ticks, m.
+    /// Last complete mean of the height, m.
     pub(super) height_m: f64,
-    /// Difference to the previous mean height, m.
+    /// Absolute difference to the previous mean height, m; infinite until two means are complete.
     pub(super) moved_m: f64,
-    /// Mean of the delivered vertical force as reported by the device, N.
+    /// Last complete mean of the delivered vertical force as reported by the device, N; 0 until two means are complete.
     pub(super) delivered_n: f64,
     /// Number of completed means so far.
     pub(super) means: u64,
@@ -118,7 +118,7 @@ impl Words<REPORT_WORDS> for Report {
 pub(super) enum Holding {
     /// The force is ramping to its target, or has just reached it.
     Changing,
-    /// The force has had this value for a while, N.
+    /// The force has had this value, N, for at least two complete means.
     Steady(f64),
     /// The handle lost contact and is braked, without vertical force.
     LostContact,
@@ -200,7 +200,8 @@ impl Holder {
         }
     }
 
-    /// Removes the force and lands the device; returns the device unless it has to be reopened.
+    /// Removes the force, ends the thread and deactivates the device; returns the device, `None` if it must be
+    /// reopened.
     pub(super) fn end(mut self) -> Option<OpenedDevice> {
         self.stop().and_then(ActiveDevice::deactivate)
     }
@@ -219,7 +220,7 @@ impl Holder {
     }
 }
 
-/// Lowers the handle however the procedure ends.
+/// Removes the force and deactivates the device however the procedure ends.
 impl Drop for Holder {
     fn drop(&mut self) {
         let _ = self.stop().and_then(ActiveDevice::deactivate);
@@ -235,7 +236,7 @@ fn hold(
     commands: &Observer<Command, COMMAND_WORDS>,
     mut reports: Publisher<Report, REPORT_WORDS>,
 ) -> ActiveDevice {
-    // Without real-time priority the thread holds too: late ticks show in the delivered force.
+    // Real-time priority is optional here: late ticks show in the delivered force.
     let _ = enter_real_time(None);
     let period = Duration::from_nanos(PERIOD_NS);
     let started = Instant::now();
@@ -299,7 +300,7 @@ fn hold(
             Cycle::Fault(fault) => Some(fault),
             Cycle::Fresh | Cycle::Stale => None,
         });
-        // The watchdog has stopped the device, or will within a millisecond.
+        // The watchdog has stopped the device, or will stop it within a millisecond.
         let fault = faulted.or(stop.emergency().map(|_| Fault::EmergencyStop));
         if fault == Some(Fault::EmergencyStop) {
             stop.press(EmergencySource::Device);
@@ -323,10 +324,10 @@ fn hold(
     device
 }
 
-/// Two successive means: the handle is at rest if they agree.
+/// Means of height and delivered force over successive intervals: the handle is at rest if the last two agree.
 #[derive(Default)]
 struct Averages {
-    /// Last complete mean and the one before; `None` until there are two.
+    /// Last two complete means, newest first, each as height, m, and delivered force, N; `None` until there are two.
     full: Option<[(f64, f64); 2]>,
     last: Option<(f64, f64)>,
     height_m: Mean,
@@ -334,12 +335,12 @@ struct Averages {
     samples: u64,
     means: u64,
     restless: u64,
-    /// Saturated ticks of the mean in progress, and of the last two.
+    /// Saturated ticks of the mean in progress, and of the last two complete means.
     saturated: [u64; 3],
 }
 
 impl Averages {
-    /// Discards measurements under another force.
+    /// Discards the means measured under another force.
     fn begin_anew(&mut self) {
         *self = Self { means: self.means, restless: self.restless, ..Self::default() };
     }

@@ -31,13 +31,14 @@ pub trait Rig {
     /// [`CalibrationError`] if the device faults or the handle does not come to rest.
     fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError>;
 
-    /// Reads the force sensor while the handle rests, N.
+    /// Returns a reading of the force sensor while the handle is at `rest`, N: delivered force less the weight of the
+    /// moving part.
     ///
     /// # Errors
     /// [`CalibrationError`] if the sensor does not answer.
     fn read_force_n(&mut self, rest: &Rest) -> Result<f64, CalibrationError>;
 
-    /// Returns true if the handle has rested there until now; always true in a simulation.
+    /// Returns true if the handle has stayed at `rest` during all readings so far; always true in a simulation.
     ///
     /// # Errors
     /// [`CalibrationError`] if the device faults.
@@ -51,7 +52,7 @@ pub trait Rig {
 const PERIOD_NS: u64 = 1_000_000;
 /// Number of ticks averaged for a measured height: the noise of a micrometre falls to a tenth.
 const AVERAGED_TICKS: u64 = 100;
-/// Gains of a locked axis (client of the device's makers: 4800 N/m, 15 N s/m; 50 N·m/rad, 0.15 N·m s/rad).
+/// Gains of a locked axis (from the client of the device's maker: 4800 N/m, 15 N s/m; 50 N·m/rad, 0.15 N·m s/rad).
 const LOCK_N_PER_M: f64 = 4800.0;
 const LOCK_NS_PER_M: f64 = 15.0;
 const LOCK_NM_PER_RAD: f64 = 50.0;

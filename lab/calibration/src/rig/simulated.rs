@@ -15,7 +15,7 @@ pub const SENSOR_NOISE_N: f64 = 0.02;
 
 /// Standard gravity, m/s² (ISO 80000-3).
 const GRAVITY_M_PER_S2: f64 = 9.806_65;
-/// Settling time of the handle, ticks. The slowest motion of the rig falls to 1/e within 10 of them.
+/// Settling time of the handle, ticks. The slowest motion of the rig decays to 1/e within 10 ticks.
 const SETTLE_TICKS: u64 = 200;
 /// Stiffness and damping of the sensor's stand, modelled by the simulated hand.
 const STAND_STIFFNESS_N_PER_M: f64 = 20_000.0;
@@ -26,13 +26,13 @@ const REST_M: f64 = 4.0e-6;
 const ADJUSTMENTS: u32 = 3;
 const CLOSE_M: f64 = 2.0e-6;
 
-/// Simulated flotor under a simulated sensor. Its uneven field acts as on any device: through the contract.
+/// Simulated flotor under a simulated sensor. The plugin is driven through the contract alone, like any device.
 pub struct SimulatedRig {
     plugin: Plugin,
     calibration: Option<VerticalCalibration>,
     noise: Pcg64Mcg,
     seed: u64,
-    /// Number of rests so far: each has its own noise.
+    /// Number of rests so far; each rest has its own noise.
     rests: u64,
 }
 
@@ -121,7 +121,7 @@ impl Rig for SimulatedRig {
     fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError> {
         let mut sensor_m = target_m;
         let mut rest = self.settle(sensor_m, command_n)?;
-        // The stand yields slightly: move it until the handle is at its target.
+        // The stand yields slightly: move the sensor until the handle is at its target.
         for _ in 0..ADJUSTMENTS {
             let off_m = target_m - rest.height_m;
             if off_m.abs() <= CLOSE_M {

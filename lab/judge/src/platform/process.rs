@@ -6,13 +6,13 @@ use std::time::Duration;
 pub(crate) struct Used {
     /// Processor time so far.
     pub(crate) ran: Duration,
-    /// True if the process could run and waits only for its turn.
+    /// True if a thread is running or could run; false if the process is idle by choice.
     pub(crate) wants: bool,
 }
 
 /// Permitted change of a part of the state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(dead_code)] // a system that tells of no files has none that grows
+#[allow(dead_code)] // unused on a system that does not report open files
 pub(crate) enum May {
     /// No change.
     Stay,

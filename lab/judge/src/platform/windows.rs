@@ -27,7 +27,7 @@ pub(crate) fn standard_input() -> io::Result<File> {
     Ok(File::from(io::stdin().as_handle().try_clone_to_owned()?))
 }
 
-/// Returns `None`: no signal ends a process here; the exit code contains the exception.
+/// Returns `None`: on Windows no signal ends a process; an exception is in the exit code.
 pub(crate) fn ending_signal(_: ExitStatus) -> Option<i32> {
     None
 }
@@ -43,7 +43,7 @@ pub(crate) fn processor_time() -> Duration {
     FIRST.get_or_init(Instant::now).elapsed()
 }
 
-/// Returns zero for a process: unknown here, so all its time counts as idle.
+/// Returns zero: the processor time of another process is not read on Windows, so all its time counts as idle.
 pub(crate) fn used(_: u32) -> Used {
     Used { ran: Duration::ZERO, wants: false }
 }

@@ -6,12 +6,13 @@
 //!
 //! Not every loop can: a spring of stiffness `K` is stable only up to `K < b / (T/2 + t_d)` (Gil, Sanchez, Hulin,
 //! Preusche and Hirzinger, J. Comput. Inf. Sci. Eng. 9, 2009; without virtual damping). A release that diverges
-//! although the model was nowhere steeper is an error of the model and fails; where the rule predicts divergence too,
-//! the stiffness is the cause. A release that comes to rest away from home is counted; if the model reports more energy
-//! there than at the start, its force has done work on the device, and the release fails too. A constant pull, as of a
-//! weight, has no rest position: a device that leaves under a pull of constant direction is not judged, because no loop
-//! could hold it. The rule itself is checked near home: the model's wrench is scaled until the loop becomes unstable,
-//! and the stiffness there is reported beside the rule's.
+//! Preusche and Hirzinger, J. Comput. Inf. Sci. Eng. 9, 2009; without virtual damping). A release that diverges
+//! although the stiffness along its path never exceeded this limit is an error of the model and fails; where the rule
+//! predicts divergence too, the stiffness is the cause. A release that comes to rest away from home is counted; if the
+//! model reports more energy there than at the start, its force has done work on the device, and the release fails too.
+//! A constant pull, as of a weight, has no rest position: a device that leaves under a pull of constant direction is
+//! not judged, because no loop could hold it. The rule itself is checked near home: the model's wrench is scaled until
+//! the loop becomes unstable, and the stiffness there is reported beside the limit of the rule.
 
 use super::jacobian::Jacobian;
 use super::measure::{Measure, NO_ANSWER, Verdict};
@@ -58,7 +59,7 @@ const STEADY: f64 = 0.5;
 /// Shortest motion in a tick for a stiffness estimate, m: far above rounding.
 const MOVING_M: f64 = 1.0e-7;
 
-/// Imperfections of a loop.
+/// Damping, delay, sensor resolution and lost ticks of a loop.
 #[derive(Clone, Copy)]
 struct Loop {
     damping_ns_per_m: f64,

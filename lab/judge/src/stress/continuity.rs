@@ -1,10 +1,10 @@
 //! M1, continuity: jumps of the wrench between very close poses.
 //!
-//! Straight lines cross the workspace in pieces of 0.01 mm. On each line the pieces whose change of wrench differs most
-//! from their neighbours' are cut into ten, and the most different of those into ten again, down to 1e-8 mm: bisection,
-//! by tens. The criterion is the second difference of the changes: it vanishes for a smooth slope and curvature, but
-//! not for a step. `J(h)` is the largest change over pieces of length `h`: for a continuous law it falls in proportion
-//! to `h`, at a jump it has a plateau. The thesis's code jumps by 8.6 N at its buckling rule.
+//! Straight lines cross the workspace in pieces of 0.01 mm. On each line, the pieces whose change of wrench differs
+//! most from the changes of their neighbours are divided into ten, the most different of the new pieces into ten again,
+//! and so on down to 1e-8 mm. The criterion is the second difference of the changes: it vanishes for a constant slope
+//! and curvature, but not for a step. `J(h)` is the largest change over pieces of length `h`: for a continuous law it
+//! falls in proportion to `h`, at a jump it has a plateau. The thesis's code jumps by 8.6 N at its buckling rule.
 //!
 //! The length of a piece is that of the motion with angles as lengths at the device's lever arm ([`super::LEVER_M`]).
 
@@ -31,14 +31,15 @@ const SUSPECTS: usize = 3;
 /// Parts of a refined piece; one more on either side serves as neighbour of the outermost.
 const CUTS: usize = 10;
 
-/// Imperceptible step of force, N: below 1 mN more accuracy is not physical (device 5 to 10 um times stiffness).
+/// Largest imperceptible step of force, N: the resolution of the device (5 to 10 µm) times a stiffness; smaller steps
+/// have no physical meaning.
 pub(super) const FELT_N: f64 = 1.0e-3;
-/// Imperceptible step of torque, N·m.
+/// Largest imperceptible step of torque, N·m.
 pub(super) const FELT_NM: f64 = 2.0e-5;
-/// Harmless fraction of an imperceptible step.
+/// Fraction of [`FELT_N`] and [`FELT_NM`] up to which a step passes; a larger but imperceptible one is noted.
 pub(super) const HARMLESS: f64 = 1.0e-3;
 
-/// Largest change over one piece length.
+/// Largest changes of force and torque over all pieces of one length.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Jump {
     /// Length of the piece, mm.
@@ -53,9 +54,9 @@ tally! {
     pub(super) struct Jumps {
         pub(super) force: [Worst; PIECES_MM.len()],
         pub(super) torque: [Worst; PIECES_MM.len()],
-        /// Largest force over the shortest piece inside the workspace proper, without the margin around it.
+        /// Largest change of force over the shortest pieces inside the workspace itself, without the margin around it.
         inside: Worst,
-        /// Largest jump over the shortest piece that drift at rest may hide, in units of the perception limit.
+        /// Largest jump that drift at rest may hide over the shortest pieces, in units of the perception limit.
         possible: f64,
         pieces: u64,
         shortest_pieces: u64,

@@ -32,7 +32,7 @@ const POSES_ABOVE: u32 = 100;
 /// Poses between two updates of the progress line.
 const CHUNK: u64 = 1024;
 
-/// Times calls; returns also their distribution for the picture, ns.
+/// Times calls; returns the measure and the distribution of the times for the picture, ns.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<(Measure, Decades), LoadError> {
     let chunks = setup.share(4_000_000, 0).div_ceil(CHUNK);
     setup.progress.begin(NAME, chunks);

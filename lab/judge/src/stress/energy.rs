@@ -10,8 +10,9 @@
 //! [motion](super::motion), with its velocity, where damping and friction may dissipate energy but nothing may generate it.
 //!
 //! **`energy_j`** of a model that reports it is compared with that work, all along the lap: the stored energy may not
-//! rise by more than the hand's input, and for a stateless model not by less either. One in a thousand of the energy
-//! stored on the lap is tolerated; samples for the trapezoidal rule are doubled until it is met.
+//! rise by more than the hand's input, and for a stateless model not by less either. A difference of 0.1 % of the
+//! energy stored on the lap is tolerated; until it is met, the number of samples for the trapezoidal rule is doubled,
+//! up to [`MOST_SAMPLES`].
 
 use super::Setup;
 use super::lap::{CONSERVATIVE, Dissipation, Lap, Sample};
@@ -38,7 +39,7 @@ const MOVING_SAMPLES: usize = 1024;
 /// Tolerated difference of stored energy and work, relative to the energy stored on a lap.
 const SAME_ENERGY: f64 = 1.0e-3;
 
-/// Samples a lap at a fraction of it, from 0 to 1.
+/// Samples power and stored energy at a fraction of a lap, from 0 to 1; `None` if the model gives no answer.
 fn sample(subject: &mut Subject<'_>, path: &Trajectory, part: f64) -> Option<Sample> {
     let (pose, motion_m, turn_rad) = path.at(part);
     let answer = subject.answer_at(pose).ok()?;
@@ -97,7 +98,7 @@ tally! {
     struct LoopTally {
         laps: u64,
         unanswered: u64,
-        /// Number of laps on which work was exchanged, and of those whose sum is known to the bound.
+        /// Number of laps on which work was exchanged, and number of those whose net work is known to within the bound.
         comparable: u64,
         resolved: u64,
         beyond: u64,

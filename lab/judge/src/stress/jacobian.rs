@@ -1,4 +1,4 @@
-//! Derivative of the wrench by the pose, from finite differences, with its uncertainty.
+//! Derivative of the wrench with respect to the pose, from finite differences, with its uncertainty.
 //!
 //! Coordinates are translations of the handle and small rotations in the model frame (from the left, as angular
 //! velocity), with angles as lengths and torques as forces at the device's lever arm: every entry is a stiffness in

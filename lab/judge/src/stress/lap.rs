@@ -15,7 +15,7 @@ const NO_ENERGY_J: f64 = 1.0e-9;
 /// Sample of a lap.
 #[derive(Clone, Copy)]
 pub(super) struct Sample {
-    /// Power of the model on the hand, J per lap.
+    /// Power of the model's wrench on the hand, J per lap.
     pub(super) power_j: f64,
     /// Upper bound of the power of force and torque on the path, J per lap.
     pub(super) most_j: f64,
@@ -50,7 +50,7 @@ fn mismatch(samples: &[Sample], memory: Memory) -> f64 {
 /// Expectation whether a lap may dissipate energy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Dissipation {
-    /// Conservative: traversed in reverse, the lap would generate that energy.
+    /// The lap must be conservative: energy dissipated on it would be generated in the reverse direction.
     None,
     /// Dissipation by friction or damping is allowed.
     Allowed,
@@ -71,7 +71,7 @@ impl Dissipation {
 pub(super) struct Lap {
     /// Work on the hand, J.
     pub(super) net_j: f64,
-    /// All work exchanged, J.
+    /// Absolute work exchanged with the hand (integral of the magnitude of the power), J.
     pub(super) gross_j: f64,
     /// Uncertainty of the work on the hand, J.
     pub(super) uncertain_j: f64,
@@ -102,7 +102,8 @@ impl Lap {
         Self { mismatch: mismatch(samples, memory), ..Self::from_powers(&powers) }
     }
 
-    /// Returns the lap itself if its uncertainty is within the bound, else its work by [`work`], which samples `powers`.
+    /// Returns the lap unchanged if it is [resolved](Self::is_resolved), otherwise with its work recomputed by [`work`]
+    /// from `powers`; `None` if [`work`] returns none.
     pub(super) fn or_resolved(
         self,
         dissipation: Dissipation,

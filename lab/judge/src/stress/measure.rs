@@ -76,7 +76,7 @@ pub struct PoseRecord {
     /// Rotation vector, rad.
     #[serde(deserialize_with = "numbers_or_none")]
     pub rotation_rad: [f64; 3],
-    /// Original quaternion, if it is not a rotation.
+    /// Original quaternion if it does not describe a rotation, else `None`.
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "quaternion_or_none")]
     pub orientation_xyzw: Option<[f64; 4]>,
 }
@@ -106,7 +106,7 @@ impl From<Pose> for PoseRecord {
     }
 }
 
-/// Line of the score.
+/// Result of one measure: a row of the score.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Measure {
     /// Identifier, "M0" to "M10".
@@ -122,7 +122,7 @@ pub struct Measure {
     pub bound: Option<f64>,
     /// Verdict on the value.
     pub verdict: Verdict,
-    /// Pose of the worst value.
+    /// Pose of the worst value; `None` if there is none.
     pub pose: Option<PoseRecord>,
     /// Comment on the number.
     #[serde(rename = "remark")]

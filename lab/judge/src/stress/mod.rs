@@ -80,7 +80,7 @@ pub struct StressOptions {
     pub seed: u64,
     /// Workspace in the model frame.
     pub reach: Reach,
-    /// Symmetry that the model declares.
+    /// Symmetry to check in M10; `None`: M10 is left out.
     pub symmetry: Option<Symmetry>,
 }
 
@@ -111,8 +111,8 @@ impl<'a> Setup<'a> {
     }
 }
 
-/// Returns the divisor of the full effort, which is about 2e8 calls for a stateless model. A model with memory is
-/// walked, some hundred calls between two poses, and gets a hundredth of the poses.
+/// Returns the divisor of the full effort, which is about 2e8 calls for a stateless model. A model with memory needs
+/// some hundred calls to walk from one pose to the next, and gets a hundredth of the poses.
 fn part_of(size: Size, memory: Memory) -> u64 {
     let by_size = if size == Size::Full { 1 } else { 100 };
     by_size * if memory == Memory::Stateless { 1 } else { 100 }

@@ -43,7 +43,7 @@ impl Motion {
         (pose, motion_m * pace, turn_rad * pace)
     }
 
-    /// Measures the work of a lap.
+    /// Measures the work of a lap, after the model has settled into the motion; `None` if the model gives no answer.
     pub(super) fn lap(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
         subject.restart();
         if subject.memory() == Memory::PathDependent {
@@ -68,8 +68,9 @@ impl Motion {
     }
 }
 
-/// Returns the later lap that generates least: a model in motion may return in one lap energy stored in an earlier one, or,
-/// where friction holds it, a part of it in each of many. So laps follow until one generates no less than the one before.
+/// Returns the lap, after the first, that generates the least energy. A model in motion may return in one lap energy
+/// that it stored in an earlier one, or, held by friction, a part of it in each of many laps. So laps follow until one
+/// generates no less than all before.
 fn least_of_later_laps(mut lap: impl FnMut() -> Option<Lap>) -> Option<Lap> {
     lap()?;
     let mut least = lap()?;
@@ -95,8 +96,8 @@ pub(super) struct Triangle {
 }
 
 impl Triangle {
-    /// Measures the work of a lap, with half of the samples of each edge and with all: the difference bounds the error of a
-    /// smooth force.
+    /// Measures the work of a lap, with half of the samples of each edge and with all: the difference bounds the error
+    /// of a smooth force. `None` if the model gives no answer.
     pub(super) fn lap(&self, subject: &mut Subject<'_>, samples: usize) -> Option<Lap> {
         let coarse = self.sampled(subject, samples / 2)?;
         let fine = self.sampled(subject, samples)?;

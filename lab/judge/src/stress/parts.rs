@@ -19,7 +19,7 @@ use std::io::{self, Read, Seek, Write};
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// Group of measures that one process takes.
+/// Group of measures that are computed in one process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Measure M0.
@@ -73,13 +73,13 @@ impl Part {
         PARTS.iter().find(|(part, ..)| *part == self).map_or("", |(_, word, _)| word)
     }
 
-    /// Finds the part with a name.
+    /// Finds the part with a name; `None` for an unknown name.
     #[must_use]
     pub fn from_word(word: &str) -> Option<Self> {
         PARTS.iter().find(|(_, known, _)| *known == word).map(|(part, ..)| *part)
     }
 
-    /// Finds the part of a measure, "M0" to "M10".
+    /// Finds the part of a measure, "M0" to "M10"; `None` for an unknown measure.
     #[must_use]
     pub fn of_measure(id: &str) -> Option<Self> {
         PARTS.iter().find(|(.., names)| names.iter().any(|[known, _]| *known == id)).map(|(part, ..)| *part)
@@ -191,8 +191,9 @@ pub fn deliver(
     .write()
 }
 
-/// Scores a model with these settings; `program` starts the process of each part, which has to [deliver](deliver). Not
-/// real-time: seconds (short) to minutes (full), on all processors. `only` selects parts; empty: all.
+/// Scores a model with the given settings, each part in a separate process. `program` returns the command of a part's
+/// process, which must call [`deliver`]. `only` selects parts; empty: all. Not real-time: seconds (short) to minutes
+/// (full), on all processors.
 ///
 /// # Errors
 /// [`LoadError`] if the plugin is no model or rejects the settings. A model that fails, hangs or crashes during a

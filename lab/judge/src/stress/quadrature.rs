@@ -18,12 +18,12 @@ const ALLOWED: f64 = 0.1;
 /// Safety factor on the difference of two orders of the rule: at a kink both may have the same error.
 const CAUTION: f64 = 2.0;
 
-/// Work of a lap, or of an interval of it.
+/// Work of a lap, or of an interval of a lap.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Work {
     /// Work on the hand, J.
     pub(super) net_j: f64,
-    /// All work exchanged, J.
+    /// Absolute work exchanged with the hand (integral of the magnitude of the power), J.
     pub(super) gross_j: f64,
     /// Uncertainty of the work on the hand, J.
     pub(super) uncertain_j: f64,
@@ -57,9 +57,9 @@ impl Work {
     }
 }
 
-/// Returns the work of a lap, with an uncertainty of `bound` of all work exchanged if [`MOST_LAPS`] suffice. `powers`
-/// runs a lap and returns the powers (J per lap) at increasing fractions of it, from 0 on and below 1; `None` without
-/// an answer. Not real-time.
+/// Returns the work of a lap. Splits intervals until the uncertainty is at most [`ALLOWED`] times `bound` of the gross
+/// work, or for [`MOST_LAPS`] laps. `powers` runs a lap and returns the powers (J per lap) at increasing fractions of
+/// it, from 0 on and below 1; `None` without an answer. Not real-time.
 pub(super) fn work(bound: f64, mut powers: impl FnMut(&[f64]) -> Option<Vec<f64>>) -> Option<Work> {
     let mut ends: Vec<f64> = (0..=INTERVALS).map(|index| index as f64 / INTERVALS as f64).collect();
     for lap in 1.. {

@@ -7,7 +7,7 @@ use super::{Decades, Setup, Size};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Stability score of a force model. The names are a contract: scripts rely on them.
+/// Stability score of a force model. The field names are a stable interface: scripts rely on them.
 #[derive(Clone, Debug, Serialize)]
 pub struct StressReport {
     /// Id of the model.
@@ -28,7 +28,7 @@ pub struct StressReport {
     pub measures: Vec<Measure>,
     /// Distributions for pictures.
     pub distributions: Distributions,
-    /// First step that did not return, which a measure reports.
+    /// First step that did not return, which a measure reports; `None` if all steps returned.
     #[serde(skip)]
     pub stuck: Option<String>,
 }
@@ -85,7 +85,7 @@ impl StressReport {
         settings.join(", ")
     }
 
-    /// Formats the table for people.
+    /// Formats a human-readable table, with rows for each measure.
     #[must_use]
     pub fn to_text(&self) -> String {
         let width = self.measures.iter().map(|measure| measure.verdict.word().len()).fold(5, usize::max);

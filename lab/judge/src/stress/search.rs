@@ -43,7 +43,8 @@ const TRIES: usize = 240;
 const TRIES_WITH_MEMORY: usize = 60;
 /// Divisor of the tries that are random points, before the best is varied.
 const ANYWHERE: usize = 4;
-/// Size of the first variations, relative to the workspace; least size; growth after a success, taken back by four failures.
+/// Size of the first variations, relative to the workspace; smallest size; growth after a success, cancelled by four
+/// failures.
 const FIRST_SIZE: f64 = 0.3;
 const LEAST_SIZE: f64 = 1.0e-6;
 const GROWTH: f64 = 1.5;

@@ -1,4 +1,4 @@
-//! M2, M3 and M5: measures of the derivative of the wrench by the pose.
+//! M2, M3 and M5: measures of the derivative of the wrench with respect to the pose.
 //!
 //! **M2, Lipschitz constant.** A sampled loop of period `T` is passive on a device with damping `b` as long as the
 //! stiffness does not exceed `2 b / T` (Colgate and Schenkel, J. Robotic Systems 14, 1997, without virtual damping;

@@ -56,9 +56,10 @@ fn write(verdict: &Verdict) -> io::Result<()> {
     standard_input()?.write_all(&serde_json::to_vec(verdict)?)
 }
 
-/// Checks a plugin file against every rule that applies; stops at the first failure that makes the rest pointless. Not
-/// real-time. A rule may take `patience` of processor time, and wait as long; `program` starts this program again, to
-/// check one rule of the file and to [deliver](deliver()) the verdict. `only` selects rules; empty: all.
+/// Checks a plugin file against every rule that applies; stops after a failure that makes further checks pointless.
+/// `program` returns the command of this program that checks one rule of the file and [delivers](deliver()) the
+/// verdict. A rule may use `patience` of processor time, and be idle as long. `only` selects rules, the metadata are
+/// always checked; empty: all. Not real-time.
 #[must_use]
 pub fn validate(
     path: &Path,

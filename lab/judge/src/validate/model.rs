@@ -258,7 +258,8 @@ pub(super) fn activity(model: &mut Model) -> Result<(), Outcome> {
     for position_m in around(&region).filter(|position_m| !region.contains(*position_m)) {
         let outwards = (position_m - region.center()).normalize_or_zero();
         for velocity_m_per_s in [DVec3::ZERO, outwards * 0.1, outwards * -0.1] {
-            // Start from the middle each time: a force inside must have ended outside.
+            // Start each time at the centre, where the model may exert a force: the test is that the force has ended
+            // outside.
             for pose in [Pose::new(region.center(), DQuat::IDENTITY), Pose::new(position_m, turned)] {
                 let tick = ticks.next().unwrap_or(0);
                 let twist = Twist::new(velocity_m_per_s, DVec3::ZERO);

@@ -6,20 +6,20 @@ use flotor_hal::abi::loader::LoadError;
 use flotor_session::THREAD_ADVICE;
 use serde::{Deserialize, Serialize};
 
-/// Outcome of one rule.
+/// Result of one check; the rule holds if there is neither `violation` nor `unchecked`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
     /// Short name of the rule.
     pub rule: &'static str,
     /// Requirement of the rule.
     pub text: &'static str,
-    /// Violation that was found.
+    /// Violation that was found, or description of a step that did not return; `None` if there is neither.
     pub violation: Option<String>,
-    /// Reason why the rule could not be checked here.
+    /// Reason why the rule could not be checked; `None` if it was checked.
     pub unchecked: Option<String>,
-    /// Kind of that reason.
+    /// Category of the reason in `unchecked`; `None` without one.
     pub obstacle: Option<Obstacle>,
-    /// Figures measured by the check.
+    /// Figures measured by the check; `None` for a check that measures none.
     pub figures: Option<Figures>,
 }
 
@@ -65,7 +65,7 @@ impl Finding {
     }
 }
 
-/// Outcome of a rule that is not known to hold.
+/// Reason why a check did not pass: violation, step that did not return, missing requirement, or rule not applicable.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Outcome {
@@ -124,7 +124,7 @@ fn is_told(reason: &str) -> bool {
 pub struct Verdict {
     /// Outcome; `None` if the rule holds.
     pub seen: Option<Outcome>,
-    /// Figures measured by the check.
+    /// Figures measured by the check; `None` for a check that measures none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub figures: Option<Figures>,
 }

@@ -70,7 +70,7 @@ impl Check {
         }
     }
 
-    /// Finds the check with a short name.
+    /// Finds the check with a short name; `None` for an unknown name.
     #[must_use]
     pub fn from_id(id: &str) -> Option<Self> {
         Self::all().find(|check| check.id() == id)

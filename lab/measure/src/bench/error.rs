@@ -1,4 +1,4 @@
-//! Distance of answers from those of the reference.
+//! Error of the computed wrenches relative to the reference.
 
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Pose, StepStatus, Wrench};
@@ -8,7 +8,8 @@ use serde::Serialize;
 /// Number of ticks for a model to converge at the first pose.
 const SETTLING_TICKS: u64 = 500;
 
-/// Error of a case along the path; NaN without a pose to compare. Poses without an answer of both are counted, not compared.
+/// Error of a case relative to the reference along the path; NaN without a pose to compare. A pose at which case or
+/// reference has no valid answer is counted, not compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Distance {
     /// Largest error of the force, N.
@@ -19,7 +20,7 @@ pub struct Distance {
     pub torque_max_nm: f64,
     /// Root mean square of the torque's error, N·m.
     pub torque_rms_nm: f64,
-    /// Number of poses without a valid answer of both.
+    /// Number of poses at which case or reference has no valid answer.
     pub unanswered: usize,
 }
 

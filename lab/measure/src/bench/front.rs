@@ -7,7 +7,7 @@ use flotor_hal::Demand;
 use flotor_hal::abi::loader::Model;
 use serde::Serialize;
 
-/// Cases over one workspace.
+/// Cost and error of the cases over one workspace.
 #[derive(Clone, Debug, Serialize)]
 pub struct Front {
     /// Radius of the workspace, m.
@@ -25,7 +25,7 @@ pub struct FrontRow {
     pub name: String,
     /// Times for force and torque.
     pub times: Times,
-    /// Distance from the reference.
+    /// Error relative to the reference, force and torque.
     pub distance: Distance,
     /// Most accurate case that is no slower and no less accurate; `None` on the Pareto front, and for a case that is
     /// not judged.
@@ -33,7 +33,8 @@ pub struct FrontRow {
 }
 
 impl Front {
-    /// Moves all cases in turns, and the reference, through the workspace.
+    /// Measures the cases, in turns, along a path through the workspace, and compares their answers with those of the
+    /// reference.
     pub(super) fn measure(
         named: &[&str],
         models: &mut [Model],
@@ -88,7 +89,7 @@ impl Point {
     }
 }
 
-/// Returns the index of the most accurate of the points that dominate this one.
+/// Returns the index of the most accurate point that dominates `point`; `None` on the Pareto front.
 fn dominator(point: Point, points: &[Point]) -> Option<usize> {
     let better = points.iter().enumerate().filter(|(_, other)| other.dominates(point));
     better.min_by(|(_, a), (_, b)| a.error_n.total_cmp(&b.error_n)).map(|(index, _)| index)

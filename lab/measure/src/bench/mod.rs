@@ -40,7 +40,7 @@ use flotor_hal::Demand;
 use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_judge::subject::prepared;
 
-/// Setting of the model.
+/// Named settings of the model, or of another model, to be measured.
 #[derive(Clone)]
 pub struct Case {
     /// Name in the table.
@@ -59,14 +59,14 @@ const fn extent(size: Size) -> (usize, usize) {
     }
 }
 
-/// Plan of a measurement.
+/// Cases, reference and motions of a measurement.
 #[derive(Clone)]
 pub struct Plan {
     /// Measured cases.
     pub cases: Vec<Case>,
     /// Index of the baseline case of the times.
     pub baseline: usize,
-    /// Reference case of the errors.
+    /// Reference case of the errors; `None`: no errors are measured.
     pub reference: Option<Case>,
     /// Motion of the hand.
     pub hand: Hand,
@@ -78,7 +78,7 @@ pub struct Plan {
     pub size: Size,
 }
 
-/// Detail that splits calls, and where to measure.
+/// Detail of the answer that splits calls into two kinds, with the cases and workspaces to measure.
 #[derive(Clone)]
 pub struct Split {
     /// Id of the detail: calls with a value above zero, and the others.
@@ -91,7 +91,7 @@ pub struct Split {
 const DEMANDS: [(&str, Demand); 3] =
     [("force", Demand::FORCE), ("wrench", Demand::WRENCH), ("all", Demand::ALL)];
 
-/// Measures the cases of a plan.
+/// Measures the cases of a plan. Not real-time.
 ///
 /// # Errors
 /// [`LoadError`] if the plugin rejects a case or the reference.

@@ -34,7 +34,7 @@ impl Hand {
         Trajectory { position, rotation: Series::sines(ROTATION_RAD, ROTATION_HZ * TAU) }
     }
 
-    /// Returns the poses of the first ticks, at 1 kHz.
+    /// Returns the poses of the first `ticks` ticks, at 1 kHz.
     #[must_use]
     pub fn poses(self, ticks: usize) -> Vec<Pose> {
         let trajectory = self.trajectory();
@@ -62,7 +62,7 @@ impl Workspace {
         Self { radius_m: self.radius_m * factor, rotation_rad: self.rotation_rad * factor }
     }
 
-    /// Returns the poses of the first ticks, at 1 kHz.
+    /// Returns the poses of the first `ticks` ticks, at 1 kHz.
     #[must_use]
     pub fn poses(self, ticks: usize) -> Vec<Pose> {
         let pose = |tick: usize| {
@@ -76,8 +76,8 @@ impl Workspace {
     }
 }
 
-/// Returns a point that spends equal times in equal volumes of the unit ball: the cube of its radius and the cosine of
-/// its polar angle rise and fall linearly, and its azimuth turns at constant speed.
+/// Returns the position of a point that spends equal times in equal volumes of the unit ball: the cube of its radius
+/// and the cosine of its polar angle rise and fall linearly, and its azimuth turns at constant speed.
 fn in_unit_ball(time_s: f64, [radius_hz, polar_hz, azimuth_hz]: [f64; 3]) -> DVec3 {
     let rise_and_fall = |rate_hz: f64| {
         let phase = rate_hz * time_s % 1.0;

@@ -1,9 +1,9 @@
-//! Whole loop: distance of the force on the hand from the reference's force at the true pose.
+//! Whole loop: error of the force on the hand, relative to the reference's force at the true pose.
 //!
 //! A hand moves along the smooth path. The device measures it through its sensor (with a quantum), the model answers,
 //! and the device holds that force, after a delay, until the next answer. Meanwhile the hand moves on, and the true
-//! force changes: that is an error on the hand too. Each cause is measured alone, and all together; model accuracy
-//! beyond the losses of sampling and sensing has no benefit.
+//! force changes: that is an error on the hand too. Each cause is measured alone, and all together; a model far more
+//! accurate than sampling and sensing has no benefit.
 //!
 //! The path is thirty periods of its slowest sine long. Within a period of the loop the squared error is integrated by
 //! Gauss's rule of two points, exact for a force that changes linearly: a held force then has an error of its rate
@@ -16,7 +16,7 @@ use flotor_hal::{DVec3, Pose, Wrench};
 use flotor_judge::trajectory::sensed;
 use serde::Serialize;
 
-/// Sampling of a hand by a device.
+/// Delay and sensor resolution of a loop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sampling {
     /// Whole periods between a sample and its force.
@@ -91,7 +91,8 @@ impl Truth {
         truth
     }
 
-    /// Measures a model: its distance from the reference at the true poses, and the losses with it in the loop.
+    /// Measures a model: its error at the true poses, and the error of the force on the hand with the model in the
+    /// loop.
     pub(super) fn measure(&self, used: &mut Model) -> (Distance, Losses) {
         let Self { sampling, hold_n, delay_n, quantum_n, .. } = *self;
         let distance = self.distance(&walk(used, &self.path));

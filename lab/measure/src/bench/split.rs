@@ -8,12 +8,12 @@ use flotor_hal::{Demand, Pose};
 use flotor_judge::call_timer::overhead_ns;
 use serde::Serialize;
 
-/// Times of calls with a detail above zero, and of the others.
+/// Times of the calls with a detail above zero, and of the other calls.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct SplitTimes {
     /// Fraction of the ticks with the detail above zero, 0 to 1.
     pub share: f64,
-    /// Times of those ticks; `None` if there are none.
+    /// Times of the ticks with the detail above zero; `None` if there are none.
     pub above: Option<Speed>,
     /// Times of the other ticks; `None` if there are none.
     pub others: Option<Speed>,

@@ -13,7 +13,7 @@ pub struct BenchReport {
     pub model: String,
     /// Version of the plugin.
     pub version: String,
-    /// Reference case of the errors.
+    /// Name of the reference case of the errors; `None` without a reference.
     pub reference: Option<String>,
     /// Baseline case of the times.
     pub yardstick: Option<String>,
@@ -34,7 +34,7 @@ pub struct BenchReport {
 pub struct CaseRow {
     /// Name of the case.
     pub name: String,
-    /// Distance from the reference.
+    /// Error relative to the reference; `None` without a reference.
     pub distance: Option<Distance>,
     /// Times for force only, force and torque, and all outputs of the case.
     pub times: [Times; 3],
@@ -68,7 +68,7 @@ fn named<const N: usize, const M: usize>(name: &str, numbers: [f64; M]) -> [Stri
 }
 
 impl BenchReport {
-    /// Formats the tables for people.
+    /// Formats human-readable tables.
     #[must_use]
     pub fn to_text(&self) -> String {
         let tables =
@@ -206,7 +206,8 @@ impl BenchReport {
         )
     }
 
-    /// Draws error over time, a point per case: the lower and the farther left, the better. Without errors, draws the times.
+    /// Draws error over time as SVG, a point per case: the lower and the farther left, the better. Without errors,
+    /// draws the times.
     #[must_use]
     pub fn to_svg(&self) -> String {
         if self.rows.iter().all(|row| row.distance.is_none()) {

@@ -22,7 +22,7 @@ pub struct Times {
     pub of_yardstick: f64,
     /// Mean of a pose in a batch, from the fastest repetitions; `None` for a model with memory.
     pub batch_ns: Option<f64>,
-    /// Speed-up of a batch over tick by tick: median of all turns.
+    /// Speed-up of a batch over tick by tick: median of all turns; `None` for a model with memory.
     pub batch_gain: Option<f64>,
     /// Median of single calls along the path, less the overhead of the clock.
     pub warm_median_ns: f64,

@@ -109,7 +109,7 @@ impl WholeTick {
         }
     }
 
-    /// Times a number of batches.
+    /// Times `batches` batches of ticks, after a warm-up. Not real-time.
     #[must_use]
     pub fn time(&mut self, batches: usize) -> TickCost {
         self.run(WARM_UP);

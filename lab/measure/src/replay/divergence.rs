@@ -11,11 +11,11 @@ use serde::Serialize;
 pub struct Coverage {
     /// First comparable tick: above 0 if the recording began after the start of the run. `None` if there is no tick.
     pub begins_at_tick: Option<u64>,
-    /// Last comparable tick.
+    /// Last comparable tick; `None` if there is no tick.
     pub ends_at_tick: Option<u64>,
     /// Number of missing ticks after the first.
     pub missing_ticks: u64,
-    /// First missing tick.
+    /// First missing tick; `None` if none is missing.
     pub first_missing_tick: Option<u64>,
 }
 

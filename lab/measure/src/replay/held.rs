@@ -1,4 +1,4 @@
-//! User's changes for a replay, which override those of the run.
+//! Changes by the user for a replay, which override the changes of the run.
 
 use flotor_session::scene::{KeyValue, ModelUse, PluginKeyValue, is_named};
 

@@ -77,21 +77,21 @@ pub struct Difference {
     pub ticks: u64,
     /// Number of ticks in which some bit of an output differs.
     pub differing_ticks: u64,
-    /// First differing tick.
+    /// First differing tick; `None` if no tick differs.
     pub first_tick: Option<u64>,
-    /// Last differing tick.
+    /// Last differing tick; `None` if no tick differs.
     pub last_tick: Option<u64>,
     /// Largest difference of force, N.
     pub max_force_n: f64,
-    /// Largest difference of torque, N·m; absent where the recording contains no torque.
+    /// Largest difference of torque, N·m; `None` where the recording contains no torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_torque_nm: Option<f64>,
     /// Root mean square of the difference of force, N.
     pub rms_force_n: f64,
-    /// Root mean square of the difference of torque, N·m; absent where the recording contains no torque.
+    /// Root mean square of the difference of torque, N·m; `None` where the recording contains no torque.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_torque_nm: Option<f64>,
-    /// Largest difference of stored energy, J; absent where the recording contains no energy.
+    /// Largest difference of stored energy, J; `None` where the recording contains no energy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_energy_j: Option<f64>,
 }
@@ -103,7 +103,8 @@ pub struct Compared {
     pub difference: Difference,
     /// Part of the run that the recording covers.
     pub coverage: Coverage,
-    /// Cause of the difference; after a change, a further cause, as far as the recording shows one.
+    /// Cause of the difference; after a change, a further cause. `None` without a difference, or if the recording shows
+    /// no further cause.
     pub why: Option<DivergenceCause>,
     /// End of the recording: complete or cut off.
     pub ending: Ending,
@@ -178,8 +179,8 @@ impl<'r> Replay<'r> {
         &self.plugins
     }
 
-    /// Evaluates the models at every recorded pose. `look` is called with each recorded tick and the models' outputs
-    /// now, limited to the recorded ones.
+    /// Evaluates the models at every recorded pose. `look` is called with each recorded tick and the outputs of the
+    /// models in this replay, limited to the recorded outputs. Not real-time.
     ///
     /// # Errors
     /// [`ReplayError`] at damaged data, or if a plugin swapped in during the run is rejected; the comparison up to

@@ -7,7 +7,7 @@ use flotor_hal::abi::loader::Plugin;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// Point of the grid.
+/// Loop configuration as a point of the grid.
 pub type Case = LoopSetup;
 
 /// Case with its measured and theoretical limits.
@@ -17,7 +17,7 @@ pub struct Row {
     pub period_s: f64,
     /// Delay of a force, whole periods.
     pub delay_ticks: u32,
-    /// Drag of the device, N s/m.
+    /// Viscous damping of the device, N s/m.
     pub plant_damping_ns_per_m: f64,
     /// Virtual damping, N s/m.
     pub virtual_damping_ns_per_m: f64,
@@ -29,7 +29,8 @@ pub struct Row {
     pub k_max_n_per_m: f64,
     /// Limit of the exact sampled-data system with an ideal sensor, N/m.
     pub exact_n_per_m: f64,
-    /// True if one of these two searches ended at its upper end: then that limit is above it.
+    /// True if the search for `k_max_n_per_m` or for `exact_n_per_m` reached its upper end: the limit is then above the
+    /// value.
     pub search_ended: bool,
     /// Limit by Gil's rule, N/m.
     pub gil_n_per_m: f64,
@@ -55,8 +56,8 @@ pub fn worst_deviation(rows: &[Row]) -> Option<f64> {
 }
 
 /// Returns the default grid: virtual damping from none to beyond its optimum at three delays, and single cases with
-/// more drag and a faster servo. Its drag of 0.5 N s/m is a quarter of the simulated flotor's default, which is an
-/// estimate: an unmeasured device may have less.
+/// more device damping and a faster servo. The device damping of 0.5 N s/m is a quarter of the simulated flotor's
+/// default, which is an estimate: an unmeasured device may have less.
 #[must_use]
 pub fn default_cases() -> Vec<Case> {
     const VIRTUAL_DAMPING_NS_PER_M: [f64; 13] =

@@ -55,7 +55,7 @@ pub struct LoopSetup {
     pub period_ns: u64,
     /// Delay of a force before it is written, whole periods.
     pub delay_ticks: u32,
-    /// Drag of the device, N s/m.
+    /// Viscous damping of the device, N s/m.
     pub plant_damping_ns_per_m: f64,
     /// Virtual damping by backward difference, N s/m.
     pub virtual_damping_ns_per_m: f64,

@@ -15,7 +15,7 @@ pub use flotor_judge::plant::Plant;
 use std::convert::Infallible;
 use std::f64::consts::PI;
 
-/// Rendering of a spring by a sampled loop.
+/// Sampling period, delay and damping of a rendered spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rendering {
     /// Time between two samples, s.

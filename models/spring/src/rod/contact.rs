@@ -80,7 +80,7 @@ impl Touching {
 struct Excess {
     /// `e`
     value: f64,
-    /// Derivatives by `p` and by `p'`.
+    /// Derivatives with respect to `p` and `p'`.
     by_lean: [f64; 2],
     by_rate: [f64; 2],
     /// Second derivatives of the rounded `kappa` times the coil radius.
@@ -94,19 +94,20 @@ struct Bend {
     by_rate_twice: [[f64; 2]; 2],
 }
 
-/// Force that makes up for the missing length, with compliance, energy and touching sections.
+/// Solution of [`solve`]: contact force that closes the length constraint, with compliance, energy and touching
+/// sections; dimensionless.
 pub(crate) struct Solution {
     pub(crate) force: DVec3,
-    /// Derivative of the missing length by the force.
+    /// Derivative of the missing length with respect to the force.
     pub(crate) compliance: DMat3,
     /// `(K/2) <e>²`, summed.
     pub(crate) energy: f64,
-    /// The sections that touch.
+    /// Sections that touch.
     pub(crate) touching: Touching,
 }
 
-/// Solves `missing = compliance force + (K/gamma) sum of <e> d`, from the force without contact. Real-time: bounded, no
-/// allocation.
+/// Solves `missing = compliance force + (K/gamma) sum of <e> d` for the force, starting from the force without contact.
+/// Real-time: bounded, no allocation.
 pub(crate) fn solve<const Q: usize>(
     contact: &Contact,
     sections: &Sections<Q>,
@@ -118,7 +119,7 @@ pub(crate) fn solve<const Q: usize>(
     let Contact { compliance: c, stiffness, .. } = *contact;
     let mut solution = Solution { force: free, compliance, energy: 0.0, touching: Touching::NONE };
     for _ in 0..MOST_STEPS {
-        // Sums over the sections that touch: (K/gamma) <e> d, its derivative by the force, and (K/2) <e>².
+        // Sums over the sections that touch: (K/gamma) <e> d, its derivative with respect to the force, and (K/2) <e>².
         let (mut pressed, mut released, mut energy) = (DVec3::ZERO, DMat3::ZERO, 0.0);
         let mut touching = Touching::NONE;
         for (i, weight) in weight.iter().enumerate() {
@@ -162,13 +163,13 @@ impl<const Q: usize> Sections<Q> {
         contact.solid + contact.coil_radius * bend - 1.0 - contact.compliance * force.dot(self.normal_at(i))
     }
 
-    /// Returns `e` of a section with its derivatives; `slope` has those of `n.d` by `p`.
+    /// Returns `e` of a section with its derivatives; `slope`: derivatives of `n.d` with respect to `p`.
     fn excess_slopes(&self, contact: &Contact, load: &Load, slope: [f64; 2], i: usize) -> Excess {
         let p = [self.lean[0][i], self.lean[1][i]];
         let rate = [self.lean_rate[0][i], self.lean_rate[1][i]];
         let (w, square) = (self.scale[i], rate[0] * rate[0] + rate[1] * rate[1]);
         let (w2, w3) = (w * w, w * w * w);
-        // Derivatives of the rounded `kappa` by the lean `p` and its rate.
+        // Derivatives of the rounded `kappa` with respect to the lean `p` and its rate.
         let root = (w2 * square + ROUNDING * ROUNDING).sqrt();
         let r = contact.coil_radius;
         // Derivatives of the square of kappa, w² p'².
@@ -198,7 +199,7 @@ impl<const Q: usize> Sections<Q> {
         }
     }
 
-    /// Adds the derivatives of `(K/2) <e>²` by `p` and by `p'`, times the weight.
+    /// Adds the derivatives of `(K/2) <e>²` with respect to `p` and `p'`, times the weight.
     pub(crate) fn add_contact_slopes(
         &self,
         contact: &Contact,
@@ -219,7 +220,7 @@ impl<const Q: usize> Sections<Q> {
         }
     }
 
-    /// Adds the second derivatives of `(K/2) <e>²`, and those of the length that contact makes up for.
+    /// Adds the second derivatives of `(K/2) <e>²`, and the derivatives of the length that contact contributes.
     pub(crate) fn add_contact_curvatures(
         &self,
         contact: &Contact,

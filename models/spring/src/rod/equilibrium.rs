@@ -420,7 +420,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         if value.touching == Touching::NONE { 0.0 } else { KINK }
     }
 
-    /// Factors the matrix for the coming steps; returns its number of negative eigenvalues.
+    /// Factorises the matrix for the coming steps; returns its number of negative eigenvalues.
     fn keep(&mut self, curvature: &Curvature<N>, plate: &Plate, value: &Value<N, Q>) -> usize {
         self.matrix.neutral = NEUTRAL;
         self.matrix.steps_left = self.effort.matrix_life;

@@ -71,11 +71,11 @@ pub(crate) struct Functional<const K: usize, const N: usize, const Q: usize> {
 /// Energy of a shape between plates and its first derivatives.
 pub(crate) struct Value<const N: usize, const Q: usize> {
     pub(crate) energy: f64,
-    /// Derivatives by the coefficients.
+    /// Derivatives with respect to the coefficients.
     pub(crate) slope: Shape<N>,
-    /// Derivatives by the lean of the upper plate.
+    /// Derivatives with respect to the lean of the upper plate.
     pub(crate) by_lean: DVec2,
-    /// The derivatives by the upper plate's displacement and by its turn are force and torsion.
+    /// The derivatives with respect to the upper plate's displacement and turn are force and torsion.
     pub(crate) load: Load,
     compliance: DMat3,
     /// The sections that touch, and their contact.
@@ -84,27 +84,28 @@ pub(crate) struct Value<const N: usize, const Q: usize> {
     sections: Sections<Q>,
 }
 
-/// Energy and its derivatives by the plate, in units of the bending rigidity and the free length.
+/// Energy and its derivatives with respect to the pose of the plate, in units of the bending rigidity and the free
+/// length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Reading {
     pub(crate) energy: f64,
-    /// Derivative of the energy by the displacement of the upper plate.
+    /// Derivative of the energy with respect to the displacement of the upper plate.
     pub(crate) force: DVec3,
-    /// Derivative by the lean of the plate.
+    /// Derivative with respect to the lean of the plate.
     pub(crate) by_lean: DVec2,
-    /// Derivative by the turn of the plate.
+    /// Derivative with respect to the turn of the plate.
     pub(crate) torsion: f64,
 }
 
 /// Second derivatives of the energy.
 pub(crate) struct Curvature<const N: usize> {
-    /// Second derivatives by the coefficients.
+    /// Second derivatives with respect to the coefficients.
     pub(crate) matrix: [[f64; N]; N],
-    /// Derivatives of the reaction on the plate by the coefficients.
+    /// Derivatives of the reaction on the plate with respect to the coefficients.
     pub(crate) reaction: Reaction<N>,
 }
 
-/// Derivatives of the reaction on the plate by each coefficient, at a fixed plate.
+/// Derivatives of the reaction on the plate with respect to each coefficient, at a fixed plate.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Reaction<const N: usize> {
     pub(crate) force: [[f64; N]; 3],
@@ -185,7 +186,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         }
     }
 
-    /// Returns energy and reaction on the plate, and the slope. Real-time: bounded, no allocation.
+    /// Returns the energy with the reaction on the plate, and the slope. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(crate) fn reading(&self, shape: &Shape<N>, plate: &Plate) -> (Reading, Shape<N>) {
         let Value { energy, slope, by_lean, load, .. } = self.value(shape, plate);
@@ -271,7 +272,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         for (e, part) in parts.iter_mut().enumerate() {
             let (mut by_lean, mut by_rate) = ([0.0; Q], [0.0; Q]);
             for i in 0..Q {
-                // The derivative by p_e and p'_c is that by p'_c and p_e.
+                // The derivative with respect to p_e and p'_c is that with respect to p'_c and p_e.
                 by_lean[i] =
                     field[i] * local.by_lean_twice[c][e][i] + rate[i] * local.by_lean_and_rate[e][c][i];
                 by_rate[i] =

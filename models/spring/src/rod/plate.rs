@@ -45,8 +45,8 @@ impl Plate {
         })
     }
 
-    /// Returns the torque, minus the derivative of the energy by a small rotation about each axis, from the derivatives
-    /// by the lean and by the turn.
+    /// Returns the torque, from the derivatives of the energy with respect to lean and turn: minus the derivative with
+    /// respect to a small rotation about each axis.
     ///
     /// A rotation `w` changes the turn by `w_z + p.w` and the lean by `c (1 - p²)/2 + p (p.c) + w_z (z x p)`,
     /// `c = (w_y, -w_x)`.

@@ -99,7 +99,7 @@ pub(super) struct Sections<S: Simd> {
     rate_squared: Wide<S>,
 }
 
-/// Sums and differences, over mirrored sections, of the first derivatives by `p` and `p'`.
+/// Sums and differences, over mirrored sections, of the first derivatives with respect to `p` and `p'`.
 struct Halves<S: Simd> {
     lean_sum: [Wide<S>; 2],
     lean_difference: [Wide<S>; 2],
@@ -126,7 +126,7 @@ impl<S: Simd> Sections<S> {
         Self { lean, rate, square, scale, area_rate: x * dy - y * dx, rate_squared: dx * dx + dy * dy }
     }
 
-    /// Returns the first derivatives of `l` by `p` and by `p'` ([`super::section`]), each times the weight.
+    /// Returns the first derivatives of `l` with respect to `p` and `p'` ([`super::section`]), each times the weight.
     #[inline(always)]
     fn slopes(&self, load: &Load, weight: Wide<S>) -> [[Wide<S>; 2]; 2] {
         let ([x, y], [dx, dy], w) = (self.lean, self.rate, self.scale);
@@ -275,7 +275,7 @@ impl SearchEnergy {
         }
     }
 
-    /// Returns the slope of the energy by the coefficients. Real-time: bounded, no allocation.
+    /// Returns the derivatives of the energy with respect to the coefficients. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn slope<S: Simd>(&self, simd: S, sections: &AllSections<S>, shared: &Shared) -> Fours<S> {
         let (mut by_lean, mut by_rate) = ([four(simd, [0.0; 4]); FOURS], [four(simd, [0.0; 4]); FOURS]);
@@ -298,7 +298,7 @@ impl SearchEnergy {
         by_lean
     }
 
-    /// Returns the energy and its derivatives by the plate. Real-time: bounded, no allocation.
+    /// Returns the energy and its derivatives with respect to the plate. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(super) fn reading<S: Simd>(&self, simd: S, sections: &AllSections<S>, shared: &Shared) -> Reading {
         let zero = four(simd, [0.0; 4]);

@@ -106,7 +106,7 @@ impl<const Q: usize> Sections<Q> {
         }
     }
 
-    /// Returns the first derivatives of `l` by `p` and by `p'`, each times the weight.
+    /// Returns the first derivatives of `l` with respect to `p` and `p'`, each times the weight.
     #[inline(always)]
     pub(crate) fn slopes(&self, load: &Load, weight: &Along<Q>) -> [[Along<Q>; 2]; 2] {
         let ([x, y], [dx, dy]) = (&self.lean, &self.lean_rate);
@@ -126,7 +126,7 @@ impl<const Q: usize> Sections<Q> {
         [by_lean, by_rate]
     }
 
-    /// Returns the second derivative of `n.d` by `p`.
+    /// Returns the second derivative of `n.d` with respect to `p`.
     #[inline]
     pub(crate) fn level_curvature(
         &self,
@@ -137,14 +137,14 @@ impl<const Q: usize> Sections<Q> {
         i: usize,
     ) -> f64 {
         let (p, force) = ([self.lean[0][i], self.lean[1][i]], [load.force.x, load.force.y]);
-        // Second derivatives of n.d = w (n.(p, 1)) - n_z by p_c and p_e, with dw/dp = -w² p.
+        // Second derivatives of n.d = w (n.(p, 1)) - n_z with respect to p_c and p_e, with dw/dp = -w² p.
         let w2 = self.scale[i] * self.scale[i];
         let same = if c == e { 1.0 } else { 0.0 };
         let scale_curvature = 2.0 * w2 * self.scale[i] * p[c] * p[e] - same * w2;
         -w2 * (force[c] * p[e] + p[c] * force[e]) + potential.level * scale_curvature
     }
 
-    /// Returns the derivative of component `axis` of `d` by `p_c`.
+    /// Returns the derivative of component `axis` of `d` with respect to `p_c`.
     #[inline]
     pub(crate) fn normal_slope(&self, axis: usize, c: usize, i: usize) -> f64 {
         let (w, p) = (self.scale[i], [self.lean[0][i], self.lean[1][i]]);
@@ -155,7 +155,7 @@ impl<const Q: usize> Sections<Q> {
         }
     }
 
-    /// Returns `n.d`, its slope by `p`, and `1 + delta n.d`.
+    /// Returns `n.d`, its derivative with respect to `p`, and `1 + delta n.d`.
     #[inline(always)]
     pub(crate) fn potential(&self, load: &Load, i: usize) -> Potential {
         let (x, y, w, n) = (self.lean[0][i], self.lean[1][i], self.scale[i], load.force);
@@ -189,7 +189,7 @@ impl<const Q: usize> Sections<Q> {
             let Potential { slope, stress, .. } = potential;
             let (w2, w3) = (w * w, w * w * w);
             let scale_slope = [-w2 * p[0], -w2 * p[1]];
-            // Derivatives of p x p' by p and by p'.
+            // Derivatives of p x p' with respect to p and p'.
             let (area_by_lean, area_by_rate) = ([rate[1], -rate[0]], [-p[1], p[0]]);
             for c in 0..2 {
                 for e in 0..2 {

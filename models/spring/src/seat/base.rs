@@ -131,7 +131,7 @@ impl Base {
         (-response.force_n.truncate()).extend(turning_nm / self.lengths.rim_radius_m)
     }
 
-    /// Returns the derivative of the stored energy by the tilt: minus the work of the spring on the moving base.
+    /// Returns the derivative of the stored energy with respect to the tilt: minus the work of the spring on the moving base.
     pub(super) fn slope(&self, pose: &Pose, response: &Response) -> DVec2 {
         let force_n = response.force_n;
         let moment_nm = self.moment_nm(pose, response);

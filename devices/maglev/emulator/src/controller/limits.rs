@@ -2,30 +2,31 @@
 
 use flotor_hal::{DVec3, Wrench, math};
 
-/// Limits and boundary of the controller.
+/// Limits of the wrench, wall and edge of the range of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitConfig {
     /// Largest force along each axis, N.
     pub max_force_n: DVec3,
     /// Largest torque about each axis, N·m.
     pub max_torque_nm: DVec3,
-    /// Fastest change of force, N/s.
+    /// Maximum slew rate of the force, N/s.
     pub force_slew_n_per_s: f64,
-    /// Fastest change of torque, N·m/s.
+    /// Maximum slew rate of the torque, N·m/s.
     pub torque_slew_nm_per_s: f64,
     /// Distance from the origin at which the controller's own wall begins, m.
     pub wall_m: f64,
-    /// Stiffness of that wall, N/m.
+    /// Stiffness of the controller's own wall, N/m.
     pub wall_n_per_m: f64,
-    /// Damping of that wall, N·s/m.
+    /// Damping of the controller's own wall against outward motion, N·s/m.
     pub wall_ns_per_m: f64,
     /// Distance from the origin at which the controller lands, before the sensors lose the flotor, m.
     pub edge_m: f64,
-    /// Prediction time of the distance for `edge_m`, s.
+    /// Time ahead for which the distance is predicted before the comparison with `edge_m`, s.
     pub edge_ahead_s: f64,
-    /// Fraction of the full load allowed permanently; the mean square of the load is compared with its square.
+    /// Limit of the root mean square of the load, as a fraction of full load: the largest ratio of the wrench on an axis
+    /// to its limit.
     pub continuous_load: f64,
-    /// Time over which the load is averaged, s.
+    /// Time constant of the mean square of the load, s.
     pub load_time_s: f64,
 }
 
@@ -93,7 +94,7 @@ impl LimitConfig {
     }
 }
 
-/// Mean square of the load, with the time constant of a coil's temperature: I²t.
+/// Running mean square of the load, with the time constant of a coil's temperature (I²t).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
     mean_square: f64,

@@ -1,4 +1,4 @@
-//! State machine of the controller.
+//! State machine of the controller: modes, session, watchdog, limits.
 
 use super::limits::{LimitConfig, Load};
 use flotor_hal::{DVec3, Pose, Twist, Wrench};
@@ -17,18 +17,18 @@ pub struct ControllerConfig {
     pub hold_us: u64,
     /// Duration of a landing, µs.
     pub landing_us: u64,
-    /// Damping while holding and landing, N·s/m and N·m·s/rad.
+    /// Damping of translation, N·s/m, and rotation, N·m·s/rad, while holding and landing.
     pub hold_damping: [f64; 2],
-    /// Speed of the handle that is a fault, m/s.
+    /// Speed of the handle above which the controller faults, m/s.
     pub max_speed_m_per_s: f64,
 }
 
 /// One sample of the sensors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Pose of the handle.
+    /// Pose of the handle, device frame.
     pub pose: Pose,
-    /// Velocity of the handle.
+    /// Velocity of the handle, m/s and rad/s.
     pub twist: Twist,
     /// False once the flotor is out of range or a sensor failed.
     pub in_range: bool,
@@ -50,7 +50,7 @@ impl Sample {
         Self { pose: Pose::HOME, twist: Twist::ZERO, in_range: true, too_hot: false, buttons: 0 };
 }
 
-/// Kind of a reply.
+/// Reply to a received request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reply {
     /// The status, acknowledging this sequence number.
@@ -69,7 +69,7 @@ struct Command {
     since_us: u64,
 }
 
-/// A controller in operation. Times are µs of its monotonic clock.
+/// Controller of the device as a state machine. Times are µs of the controller's monotonic clock.
 #[derive(Clone, Debug)]
 pub struct Controller {
     config: ControllerConfig,
@@ -216,7 +216,7 @@ impl Controller {
         Some(Reply::Status(frame.sequence))
     }
 
-    /// Switches the coils off at once after the loss of the link.
+    /// Switches the coils off at once after the loss of the link, and ends the session.
     pub fn link_lost(&mut self, now_us: u64) {
         if self.mode != Mode::Disarmed {
             self.disarm(now_us);
@@ -224,13 +224,14 @@ impl Controller {
         }
     }
 
-    /// Stores a sample of the sensors.
+    /// Stores a sample of the sensors, taken at `now_us`.
     pub fn observe(&mut self, now_us: u64, sample: &Sample) {
         self.sample = *sample;
         self.sampled_us = now_us;
     }
 
-    /// Returns the wrench for the coils over the next `dt_us`. Call once per cycle, after a sample.
+    /// Checks timeouts and faults and returns the wrench for the coils over the next `dt_us`, within all limits; zero in
+    /// the modes Disarmed, Armed and Fault. Call once per cycle, after [`Self::observe`].
     pub fn drive(&mut self, now_us: u64, dt_us: u64) -> Wrench {
         self.watch(now_us);
         let sample = self.sample;
@@ -347,7 +348,8 @@ impl Controller {
         self.mode_since_us = now_us;
     }
 
-    /// Returns the newest sample as a reply to the request `acknowledged`.
+    /// Returns a status frame with mode, condition and the newest sample; `acknowledged` is the sequence number of the
+    /// newest accepted request.
     pub fn status(&mut self, acknowledged: u32) -> AnswerFrame {
         let Sample { pose, twist, .. } = self.sample;
         let orientation = pose.orientation();

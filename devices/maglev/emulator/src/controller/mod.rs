@@ -2,19 +2,20 @@
 //!
 //! The controller trusts no host. It accepts one session at a time, each command once and only while valid; limits force,
 //! torque and their slew; keeps the flotor inside its own boundary, and lands before a flotor beyond that leaves the
-//! sensors' range; and when the host falls silent it holds, lands and stays faulted until disarmed.
+//! sensors' range. If no request arrives within the watchdog timeout, the controller holds, lands and stays faulted until
+//! disarmed.
 //!
 //! ```text
 //!            arm            take off              silence               held            down
 //! Disarmed ------> Armed ------------> Levitating -------> Holding ----------> Landing ------> Fault
 //!     ^               |                   |  |                                    |              |
-//!     |    disarm     |      disarm       |  | land                               | (asked for)  | disarm
+//!     |    disarm     |      disarm       |  | land                               | (on request) | disarm
 //!     +---------------+-------------------+  +----------> Landing ----------------+--> Disarmed  |
 //!     +------------------------------------------------------------------------------------------+
 //! ```
 //!
-//! A lost link disarms at once, from any mode. Pure: time and samples in, a wrench out; runs in the emulator and could run
-//! on a microcontroller. Real-time: bounded, no allocation.
+//! A lost link disarms at once, from any mode. Without side effects: time and samples in, a wrench out; runs in the
+//! emulator and could run on a microcontroller. Real-time: bounded, no allocation.
 
 mod limits;
 mod machine;

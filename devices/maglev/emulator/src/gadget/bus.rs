@@ -1,4 +1,4 @@
-//! The device side of the USB bus: answers the host controller and queues packets in both directions.
+//! The device side of the USB bus: replies to the host controller and queues packets in both directions.
 //!
 //! An IN transfer without data waits (on a real bus: NAK) until a packet is available, or until it is unlinked. The start
 //! and end of use by a host are detected per kind of device:
@@ -81,7 +81,7 @@ impl Bus {
         self.personality
     }
 
-    /// Answers the host controller until the cable is unplugged.
+    /// Replies to the host controller until the device is unplugged.
     pub(super) fn serve(&self, requests: &mut impl Read) {
         while let Ok(message) = Message::read(requests) {
             let mut state = self.lock();
@@ -225,7 +225,7 @@ impl Bus {
         waited.unwrap_or_else(PoisonError::into_inner).0
     }
 
-    /// Returns the oldest packet from the host, waiting at most `patience`.
+    /// Waits for the oldest packet from the host; `None` after the timeout `patience`.
     pub(super) fn take(
         &self,
         attachment: Attachment,

@@ -1,4 +1,4 @@
-//! The emulator's end of the cable: packets, or the bytes of a serial port.
+//! The emulator's link to the host program: packets, or the bytes of a serial port.
 
 use super::bus::{Attachment, Bus};
 use super::personality::Personality;

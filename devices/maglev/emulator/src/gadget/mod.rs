@@ -32,7 +32,7 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// A plugged-in device; dropping unplugs the cable.
+/// Emulated USB device, plugged into this machine; dropping unplugs the device.
 pub struct Gadget {
     bus: Arc<Bus>,
     socket: UnixStream,
@@ -40,7 +40,7 @@ pub struct Gadget {
 }
 
 impl Gadget {
-    /// Plugs a device into this machine.
+    /// Plugs an emulated device with this serial number into a virtual USB port of this machine.
     ///
     /// # Errors
     /// Errors of the system: usually the module `vhci_hcd` is not loaded, or this user lacks permission.
@@ -60,13 +60,14 @@ impl Gadget {
         Ok(Self { bus, socket: stream, server: Some(server) })
     }
 
-    /// Returns false once the other end of the cable is unplugged.
+    /// Returns true until the kernel detaches the device.
     #[must_use]
     pub fn is_plugged_in(&self) -> bool {
         self.bus.is_plugged_in()
     }
 
-    /// Waits until a host uses the device and returns the link to the host; `None` on timeout or when unplugged.
+    /// Waits until a host program uses the device and returns the link to the program; `None` on timeout or when
+    /// unplugged.
     #[must_use]
     pub fn wait_for_host(&self, patience: Duration) -> Option<Box<dyn Transport>> {
         let attachment = self.bus.wait_for_host(patience)?;

@@ -55,7 +55,7 @@ pub(super) const REPORT_DESCRIPTOR: [u8; 27] = [
 ];
 
 impl Personality {
-    /// Returns the product id: one per kind, so that no system confuses their drivers.
+    /// Returns the product id: a different id for each kind, so that no system mistakes the driver.
     #[must_use]
     pub const fn product(self) -> u16 {
         match self {
@@ -128,7 +128,7 @@ impl Personality {
         bytes
     }
 
-    /// Returns a string descriptor; number 0 lists the languages.
+    /// Returns the string descriptor `number`; 0 lists the languages, `None` for an unknown number.
     pub(super) fn string(self, number: u8, serial: &str) -> Option<Vec<u8>> {
         let text = match number {
             0 => return Some(vec![4, STRING, 0x09, 0x04]), // American English

@@ -1,4 +1,5 @@
-//! Injected faults: on a connection, on the tick, in the machine; each once, in a given state of the flotor.
+//! Injected faults: on a connection, on the tick, in the machine; each occurs once, in a given state of the flotor,
+//! except for a status in every Nth reply.
 
 use super::controller::Flight;
 use flotor_maglev::ml_api::{FaultBits, Status};
@@ -11,11 +12,11 @@ const MACHINE_FAULT_S: f64 = 0.5;
 /// Treatment of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Deed {
-    /// Normal reply.
+    /// Normal reply to the call.
     Answer,
-    /// No reply to this client, now and later.
+    /// No reply to this call and to later calls of the client.
     Silence,
-    /// Half of the reply, and no more after that.
+    /// First half of the reply, and no reply to later calls of the client.
     HalfFrame,
     /// Orderly close of the client's connections.
     Close,
@@ -32,13 +33,13 @@ pub enum Deed {
 /// Kind of an injected fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InjectedFaultKind {
-    /// This treatment of one call.
+    /// Treatment of one call in place of the normal reply.
     Call(Deed),
-    /// This status in every Nth reply.
+    /// Status in every Nth reply.
     Status(Status, u32),
     /// A tick delayed by 50 ms.
     LateTick,
-    /// A fault of the machine.
+    /// Fault of the machine, for 0.5 s.
     Machine(FaultBits),
 }
 
@@ -53,7 +54,7 @@ pub enum When {
     Ticking,
 }
 
-/// An injected fault with its state and delay.
+/// Injected fault with its state and delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InjectedFault {
     /// Kind of the fault.

@@ -4,7 +4,7 @@
 //! connections -> server -> controller: requests, gains, procedures -> wrench -> plant -> sample -> ticks, events
 //! ```
 //!
-//! - [`controller`]: the machine's behaviour. Pure: requests and samples in, replies and a wrench out.
+//! - [`controller`]: the machine's behaviour. Without side effects: requests and samples in, replies and a wrench out.
 //! - [`server`]: connections, clients, callback connections, events.
 //! - [`injected_fault`]: injected faults.
 //! - [`Machine`]: the servo loop over a [`Plant`](crate::Plant); [`proxy`]: the host's loop over any device.

@@ -55,7 +55,7 @@ const SCHEMA: &[Parameter] = &[
     ),
 ];
 
-/// The controller as a force model.
+/// Controller of the Maglev 200 as a force model, with a server for its clients.
 pub struct MlApiModel {
     hub: Arc<Hub>,
     listen: Option<String>,

@@ -24,7 +24,7 @@ fn patience(late: Duration, period: Duration) -> Duration {
     LENIENCE.saturating_sub(late).max(period / 2)
 }
 
-/// A plant driven by the controller.
+/// Servo loop of the controller over a plant.
 pub struct Machine<P> {
     hub: Arc<Hub>,
     plant: P,
@@ -35,7 +35,7 @@ pub struct Machine<P> {
 }
 
 impl<P: Plant> Machine<P> {
-    /// Creates a machine at rest.
+    /// Creates the loop and passes the first sample of the plant to the controller.
     pub fn new(hub: Arc<Hub>, pace: Pace, mut plant: P) -> Self {
         hub.observe(&plant.advance(0, &Wrench::ZERO));
         Self { hub, plant, pace, now_s: 0.0, now_us: 0 }

@@ -5,7 +5,7 @@ use crate::transport::address::UsbAddress;
 use rusb::{Context, Device, DeviceHandle, Direction, Error, TransferType, UsbContext};
 use std::time::{Duration, Instant};
 
-/// Timeout of a claim: the kernel may configure a device after its node appears (seen: up to 14 ms; udev rules take
+/// Timeout of a claim: the kernel may configure a device after its node appears (measured: up to 14 ms; udev rules take
 /// longer).
 const CLAIM_PATIENCE: Duration = Duration::from_secs(2);
 const CLAIM_NAP: Duration = Duration::from_millis(10);

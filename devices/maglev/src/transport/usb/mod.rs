@@ -1,7 +1,7 @@
 //! USB: packets on a pair of interrupt (or bulk) endpoints, through libusb.
 //!
-//! The endpoints and their kind are read from the descriptors. Alternate settings other than 0 are tried first: the kernel
-//! notifies a device with an empty setting 0 when this process dies.
+//! The endpoints and their kind are read from the descriptors. Alternate settings other than 0 are tried first: with an
+//! empty setting 0 the kernel notifies the device when this process dies.
 //!
 //! Several reads are always pending on the bus, and a write is submitted without a wait (`queue`): a tick only takes
 //! packets already received.
@@ -19,7 +19,7 @@ use rusb::{Context, DeviceHandle, Error};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A claimed USB interface.
+/// Link over a claimed USB interface, which is released when dropped.
 pub struct UsbLink {
     handle: Arc<DeviceHandle<Context>>,
     endpoints: Endpoints,
@@ -27,7 +27,7 @@ pub struct UsbLink {
     queue: Option<Queue>,
 }
 
-/// Opens and claims a USB device. Not real-time.
+/// Opens and claims the USB device at `vendor:product` or `vendor:product:serial`. Not real-time.
 ///
 /// # Errors
 /// [`OpenError`] if the address is invalid, or no device can be claimed there.

@@ -132,7 +132,7 @@ impl Queue {
         })
     }
 
-    /// Returns the oldest packet, if any. Real-time: bounded, no allocation.
+    /// Returns the oldest packet; [`Incoming::Nothing`] if there is none. Real-time: bounded, no allocation.
     pub(super) fn receive(&self) -> Result<Incoming, LinkLost> {
         match self.packets.try_recv() {
             Ok(incoming) => Ok(incoming),
@@ -140,7 +140,7 @@ impl Queue {
         }
     }
 
-    /// Returns the oldest packet, waiting at most `patience`. Not real-time.
+    /// Waits for the oldest packet; returns [`Incoming::Nothing`] after the timeout `patience`. Not real-time.
     pub(super) fn wait(&self, patience: Duration) -> Result<Incoming, LinkLost> {
         match self.packets.recv_timeout(patience) {
             Ok(incoming) => Ok(incoming),

@@ -10,7 +10,7 @@ use std::fmt::{self, Display};
 use std::ops::Range;
 use std::path::Path;
 
-/// Largest script read, bytes: a person writes a few hundred.
+/// Size limit of a script file, bytes: a person writes a few hundred.
 const MAX_BYTES: u64 = 1 << 20;
 /// Limit of movements in a script, repetitions included.
 const MAX_LEGS: usize = 10_000;
@@ -262,7 +262,7 @@ fn movement(step: &StepText, from: &Place) -> Option<(Movement, Duration)> {
     })
 }
 
-/// Builds an error at a place in the text, with its line and the preceding key.
+/// Builds an error for a position in the text, with line number and the key before that position.
 fn complaint(file: &str, text: &str, span: Option<Range<usize>>, message: &str) -> ScriptError {
     let before = text.get(..span.map_or(0, |span| span.start)).unwrap_or(text);
     let line = before.matches('\n').count() + 1;

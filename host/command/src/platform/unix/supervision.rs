@@ -1,4 +1,4 @@
-//! Division of a process: the child carries out the command, the parent supervises it.
+//! Division of a process: the child executes the command, the parent supervises the child.
 #![allow(unsafe_code)] // `fork`, the word that both share, and the sender of a signal; tests/tests/system/architecture.rs lists it
 
 use crate::supervision::{End, Side};
@@ -19,18 +19,18 @@ use std::time::{Duration, Instant};
 /// Poll interval of the supervisor; signals and the end of the child wake it at once.
 const POLL: libc::timespec = libc::timespec { tv_sec: 1, tv_nsec: 0 };
 const AT_ONCE: libc::timespec = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-/// Time that the child may take from its report to its end: functions that plugins have registered with `atexit` run meanwhile.
+/// Time limit for the child to end after its report: functions that plugins have registered with `atexit` run meanwhile.
 const END_PATIENCE: Duration = Duration::from_secs(5);
 /// Signals with which a terminal suspends a process.
 const SUSPENDING: [c_int; 3] = [libc::SIGTSTP, libc::SIGTTIN, libc::SIGTTOU];
 
-/// Signals by which a person or a process manager ends a process, and which a shell ignores for its commands in the background.
+/// Signals with which a user or a process manager ends a process; a shell ignores some of them for commands in the background.
 const INTERRUPTS: [c_int; 3] = [libc::SIGINT, libc::SIGQUIT, libc::SIGTERM];
 
-/// Process id of the supervisor in its child; 0 in a process without one.
+/// Process id of the supervisor, in its child; 0 in a process without a supervisor.
 static SUPERVISOR: AtomicI32 = AtomicI32::new(0);
 
-/// Restores the default action of the signals that end a process, if this process was started with them ignored. A hangup stays
+/// Restores the default action of SIGINT, SIGQUIT and SIGTERM, which this process may have inherited as ignored. SIGHUP stays
 /// ignored, for `nohup`. Not real-time.
 pub(crate) fn accept_interrupts() {
     for signal in INTERRUPTS {
@@ -39,22 +39,22 @@ pub(crate) fn accept_interrupts() {
     }
 }
 
-/// Forks this process, which has one thread. The parent returns once the child has ended. Process 1 is not divided: in a container
-/// its end kills all processes at once, the watchdog process too, and only the descriptors of process 1 are closed before. So the
-/// watchdog process sees the end of a host that is process 1; a child of process 1 is killed with it. `flotor doctor` reports this.
+/// Forks this process, which must have one thread only. In the parent, supervises the child and returns once the child has ended.
+/// Process 1 is not divided: in a container its end kills all other processes at once, the watchdog process too, and only the
+/// descriptors of process 1 are closed before. So the watchdog process still detects the end of a host that is process 1, but would
+/// be killed together with a child of process 1. `flotor doctor` reports this.
 ///
 /// # Errors
-/// If the system refuses a process or a mapping.
+/// If the system cannot create the process or map the shared memory.
 pub(crate) fn divide() -> io::Result<Side> {
     if getpid() == Pid::INIT {
         return Ok(Side::Undivided);
     }
     let report = shared_word()?;
     let parent = getpid();
-    // Inherited from a parent that ignores the end of its children: the end of the child would not be reported.
-    // SAFETY: the default action.
+    // SIGCHLD may have been inherited as ignored: the end of the child would then not be reported. SAFETY: the default action.
     unsafe { libc::signal(libc::SIGCHLD, libc::SIG_DFL) };
-    // Signals wait until there is a child to forward them to.
+    // Signals are pending until there is a child to forward them to.
     let before = set_blocked(&all_but(&[]));
     // SAFETY: this process has one thread, so that no lock is held in the child.
     let child = unsafe { libc::fork() };
@@ -85,7 +85,7 @@ pub(crate) fn is_orphaned() -> bool {
     }
 }
 
-/// Ends this process by the signal that ended its child.
+/// Ends this process by a signal, with its default action.
 pub(crate) fn die_by(signal: c_int) -> ! {
     // SAFETY: the default action, then an initialised set, then no arguments.
     unsafe {
@@ -99,7 +99,7 @@ pub(crate) fn die_by(signal: c_int) -> ! {
 /// Forwards signals to the child, waits for its end and returns it.
 fn supervise(child: Pid, report: &AtomicU32) -> End {
     enter_guard_priority();
-    // A signal of the terminal that arrived before the fork has not reached the child.
+    // A terminal signal that arrived before the fork has not reached the child.
     while let Some(info) = next_signal(AT_ONCE) {
         if info.si_signo != libc::SIGCHLD {
             send(child, &info);
@@ -144,13 +144,13 @@ fn end_of(status: WaitStatus, report: Option<ReportedEnd>) -> End {
     }
 }
 
-/// Returns true for a signal that requests an end, whose sender expects no message.
+/// Returns true for a signal that requests an end: its sender expects no message.
 fn is_request(signal: c_int) -> bool {
     [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGQUIT, libc::SIGPIPE].contains(&signal)
 }
 
-/// Forwards a signal that the child has not received itself. A terminal signals the whole process group, but its closing
-/// reaches only the leader of the session.
+/// Forwards a signal that the child has not received itself. Keys of a terminal signal the whole process group, but a closing
+/// terminal signals only the leader of the session.
 fn forward(child: Pid, info: &siginfo_t) {
     let is_of_a_process = info.si_code <= 0;
     match info.si_signo {
@@ -176,8 +176,8 @@ fn send(child: Pid, info: &siginfo_t) {
     }
 }
 
-/// Suspends this process with a child that the terminal has suspended, as the shell expects, and continues both. Whoever else
-/// has stopped the child continues it.
+/// Suspends this process if the terminal has suspended its child, as the shell expects, and continues the child once this process
+/// is continued. A child stopped by another program is continued by that program.
 fn suspend_with(child: Pid, signal: c_int) {
     if SUSPENDING.contains(&signal) {
         let _ = kill_process(getpid(), Signal::STOP);

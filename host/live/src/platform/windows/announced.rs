@@ -1,4 +1,4 @@
-//! File with a port of this machine and a secret.
+//! File that announces a port of this machine and a secret.
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Write};
@@ -6,18 +6,18 @@ use std::os::windows::fs::OpenOptionsExt;
 use std::path::Path;
 use std::time::Duration;
 
-/// Share mode in which others may read the file, and neither write nor remove it (`FILE_SHARE_READ`).
+/// Share mode (`FILE_SHARE_READ`): others may read the file, but neither write nor remove it.
 const SHARE_READ: u32 = 1;
-/// `FILE_FLAG_DELETE_ON_CLOSE`: the system removes the file with the process, however that ends.
+/// `FILE_FLAG_DELETE_ON_CLOSE`: the system removes the file when the process ends for any reason.
 const REMOVE_AT_END: u32 = 0x0400_0000;
-/// Bytes of a secret in hexadecimal digits.
+/// Length of a secret in hexadecimal digits, bytes.
 pub(super) const SECRET_BYTES: usize = 32;
-/// Attempts to read a file that is not written yet: its writer creates and fills it in two calls.
+/// Number of attempts to read a file that is still empty: the writer creates and fills the file in two calls.
 const LOOKS: u32 = 5;
 /// Pause between two attempts.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// Content of a file.
+/// Content of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Announced {
     pub(super) port: u16,
@@ -25,7 +25,7 @@ pub(super) struct Announced {
 }
 
 impl Announced {
-    /// Combines a port with a new secret: 128 random bits of the system.
+    /// Creates the content for a port, with a new secret of 128 random bits.
     ///
     /// # Errors
     /// If the system returns no random bits.
@@ -35,14 +35,14 @@ impl Announced {
         Ok(Self { port, secret: format!("{:032x}", u128::from_le_bytes(bits)) })
     }
 
-    /// Writes a new file, which is removed when the returned handle is closed.
+    /// Creates and writes the file, which is removed when the returned handle is closed.
     pub(super) fn write(&self, path: &Path) -> io::Result<File> {
         let mut file = create(path)?;
         file.write_all(format!("{} {}\n", self.port, self.secret).as_bytes())?;
         Ok(file)
     }
 
-    /// Reads a file. Waits a little for one that is incomplete.
+    /// Reads the file; waits a few milliseconds for an incomplete file.
     pub(super) fn read(path: &Path) -> io::Result<Self> {
         for _ in 0..LOOKS {
             let text = std::fs::read_to_string(path)?;

@@ -1,7 +1,7 @@
-//! Connections: each client sends the secret first, within a time limit; the host waits for all of them concurrently.
+//! Connections: each client sends the secret first, within a timeout; the host waits for all clients concurrently.
 //!
-//! One thread reads from all clients and blocks on none: a client that sends nothing, or a byte now and then, is rejected after
-//! the time limit, and the end of a run waits for no client.
+//! One thread reads from all clients without blocking: a client that sends nothing, or single bytes, is rejected after the timeout,
+//! and the end of a run waits for no client.
 
 use super::announced::{Announced, SECRET_BYTES};
 use flotor_core::lock;
@@ -18,9 +18,9 @@ pub(crate) use std::net::TcpStream as Stream;
 
 /// Timeout for sending the whole secret.
 const SECRET_WAIT: Duration = Duration::from_secs(1);
-/// Largest number of clients without the secret; for one more, the oldest is rejected.
+/// Maximum number of clients that have not sent the secret; if another connects, the oldest is rejected.
 const MAX_PENDING: usize = 16;
-/// Poll interval of the clients without the secret.
+/// Poll interval of the clients that have not sent the secret.
 const POLL_PERIOD: Duration = Duration::from_millis(2);
 
 /// Listening socket that accepts connections of clients until it is closed.
@@ -29,9 +29,9 @@ pub(crate) struct Listening {
     socket: TcpListener,
     secret: String,
     is_closed: AtomicBool,
-    /// Clients without the secret; locked by the thread that accepts, one at a time.
+    /// Clients that have not sent the secret; locked by the accepting thread.
     pending: Mutex<Vec<Pending>>,
-    /// Open file, which others cannot remove while the run lives.
+    /// Open file, which others cannot remove during the run.
     _file: File,
 }
 
@@ -53,7 +53,7 @@ enum Check {
 }
 
 impl Listening {
-    /// Binds a port, and writes it with a new secret into a file.
+    /// Binds a port of this machine, and writes port and new secret to the file at `path`.
     pub(crate) fn bind(path: &Path) -> io::Result<Self> {
         let socket = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
         let announced = Announced::new(socket.local_addr()?.port())?;
@@ -62,7 +62,7 @@ impl Listening {
         Ok(Self { socket, secret: announced.secret, is_closed, pending: Mutex::default(), _file })
     }
 
-    /// Ends every [`accept`](Self::accept), now and later.
+    /// Makes every present and later [`accept`](Self::accept) return `None`.
     pub(crate) fn close(&self) {
         self.is_closed.store(true, Ordering::Relaxed);
         // Wakes the thread that waits; the port belongs to this socket as long as it is open.
@@ -110,7 +110,7 @@ impl Listening {
     }
 }
 
-/// Connects to the run of a socket file.
+/// Connects to the run that has announced its port in the file at `path`, and sends the secret.
 pub(crate) fn connect(path: &Path) -> io::Result<Stream> {
     let Announced { port, secret } = Announced::read(path)?;
     let mut stream = Stream::connect((Ipv4Addr::LOCALHOST, port))?;
@@ -119,7 +119,7 @@ pub(crate) fn connect(path: &Path) -> io::Result<Stream> {
     Ok(stream)
 }
 
-/// Connects, and makes the connection non-blocking.
+/// Connects as [`connect`] does, and makes the connection non-blocking.
 pub(crate) fn connect_now(path: &Path) -> io::Result<Stream> {
     let stream = connect(path)?;
     stream.set_nonblocking(true).map(|()| stream)
@@ -141,7 +141,7 @@ impl Pending {
         Some(Self { stream, received: [0; SECRET_BYTES], length: 0, since: Instant::now() })
     }
 
-    /// Reads received bytes, none beyond the secret, and checks them.
+    /// Reads received bytes up to the length of the secret, and checks them.
     fn read_secret(&mut self, secret: &str) -> Check {
         let rest = self.received.get_mut(self.length..).unwrap_or_default();
         match self.stream.read(rest) {

@@ -1,4 +1,4 @@
-//! Datagrams between two programs of this user.
+//! Datagrams between two programs of this user, over UDP within this machine.
 
 use super::announced::Announced;
 use flotor_core::lock;
@@ -14,21 +14,21 @@ use std::time::{Duration, Instant};
 pub(crate) struct Address(PathBuf);
 
 impl Address {
-    /// Returns the file of the sender, as given in the datagram.
+    /// Returns the path of the sender's file, as given in the datagram.
     #[allow(clippy::unnecessary_wraps)] // elsewhere a socket may have none
     pub(crate) fn as_pathname(&self) -> Option<&Path> {
         Some(&self.0)
     }
 }
 
-/// Datagram socket, whose file contains its port and its secret. A datagram consists of the receiver's secret, the length of the
-/// name of the sender's file (2 bytes), that name, and the payload.
+/// Datagram socket with a file that announces its port and secret. A datagram consists of the receiver's secret, the length of the
+/// path of the sender's file (2 bytes), the path, and the payload.
 #[derive(Debug)]
 pub(crate) struct Datagrams {
     socket: UdpSocket,
     secret: String,
     path: String,
-    /// Contents of the files of other sockets.
+    /// Cached contents of the files of other sockets.
     known: Mutex<Vec<Known>>,
     /// Open file, which others cannot remove while the socket is open.
     _file: File,
@@ -42,13 +42,13 @@ struct Known {
     seen: Instant,
 }
 
-/// Lifetime of a cached content: a socket recreated under the same path misses datagrams sent in this time.
+/// Lifetime of a cached content: a socket recreated under the same path misses the datagrams of this time.
 const LOOK_PERIOD: Duration = Duration::from_millis(10);
-/// Longest datagram, bytes: longer ones are discarded.
+/// Maximum length of a datagram, bytes: longer datagrams are discarded.
 const LONGEST: usize = 8 * 1024;
 /// Error code of a datagram that is too long (`WSAEMSGSIZE`); its rest is lost.
 const TOO_LONG: i32 = 10040;
-/// Largest number of datagrams discarded in one call, which limits the delay by a flood.
+/// Maximum number of datagrams discarded in one call, which limits the delay by a flood.
 const MAX_DISCARDED: usize = 64;
 
 impl Datagrams {
@@ -69,7 +69,8 @@ impl Datagrams {
     pub(crate) fn send_to(&self, bytes: &[u8], path: &Path) -> io::Result<usize> {
         let mut known = lock(&self.known);
         let place = known.iter().position(|known| known.path == path);
-        // A call checks that the other socket exists; states are sent often, and reading a file takes time.
+        // An empty datagram (subscription) always reads the file, to check that the other socket exists; states are sent often, and
+        // reading a file takes time.
         let is_trusted = |known: &Known| !bytes.is_empty() && known.seen.elapsed() < LOOK_PERIOD;
         let place = match place.filter(|place| known.get(*place).is_some_and(is_trusted)) {
             Some(place) => place,

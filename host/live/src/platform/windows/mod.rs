@@ -1,7 +1,8 @@
-//! Windows: a port of this machine alone and a secret, both in a file of the user's profile.
+//! Windows: a local port and a secret, both announced in a file in the user's profile.
 //!
-//! Every program of this machine can reach the port, but only readers of the file know the secret: by the rights of the
-//! profile that is its user, and administrators. A client that does not send it is rejected, and delays no other.
+//! Every program on this machine can reach the port, but only programs that may read the file know the secret: by the permissions
+//! of the profile, programs of the user and of administrators. A client that does not send the secret is rejected, and delays no
+//! other client.
 //! - `announced`: the file; `connections`: connections of clients; `datagrams`: datagrams of couplings.
 
 mod announced;
@@ -28,27 +29,28 @@ pub(crate) fn is_out_of_descriptors(cause: &io::Error) -> bool {
     cause.raw_os_error() == Some(TOO_MANY_OPEN_FILES)
 }
 
-/// Creates a folder, if necessary. It inherits the rights of its parent: in a profile, those of its user.
+/// Creates a folder, if necessary. The folder inherits the permissions of its parent: in a profile, access for the user.
 pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
     std::fs::create_dir_all(path)
 }
 
-/// Returns true for a folder that is no link.
+/// Returns true for a folder that is not a link; its owner is not checked.
 pub(crate) fn is_ours(attributes: &Metadata) -> bool {
     attributes.is_dir()
 }
 
-/// Returns true for a folder that is no link: the rights of a folder are not checked.
+/// Returns true for a folder that is not a link; its permissions are not checked.
 pub(crate) fn is_ours_alone(attributes: &Metadata) -> bool {
     is_ours(attributes)
 }
 
-/// Changes nothing: a file inherits the rights of its folder.
+/// Changes nothing: a file inherits the permissions of its folder.
 pub(crate) fn private_file(options: &mut OpenOptions) -> &mut OpenOptions {
     options
 }
 
-/// Removes the file of a run whose process has ended; returns true if so. The file of a running one cannot be removed.
+/// Removes the file of a run whose process has ended; returns true if the file is gone. The system prevents the removal while the
+/// process is running.
 pub(crate) fn remove_if_dead(path: &Path) -> bool {
     std::fs::remove_file(path).is_ok() || !path.exists()
 }
@@ -58,7 +60,7 @@ pub(crate) fn is_same_file(_: &Metadata, _: &Metadata) -> bool {
     true
 }
 
-/// Reads from an offset of a file; bytes beyond its end are not changed.
+/// Reads from an offset of a file; `bytes` beyond the end of the file are not changed.
 pub(crate) fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> io::Result<usize> {
     file.seek_read(bytes, offset)
 }

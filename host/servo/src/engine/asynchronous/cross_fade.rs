@@ -1,8 +1,8 @@
-//! Cross-fade between successive fields: a force without steps.
+//! Cross-fade between successive linear fields, so that the force has no steps.
 
 use flotor_hal::{LinearField, Pose, Wrench};
 
-/// Newest field and the one that it replaces.
+/// Newest field, the field that it replaces, and the fade between them.
 pub(super) struct CrossFade {
     old: LinearField,
     new: LinearField,
@@ -22,8 +22,8 @@ impl CrossFade {
         *self = Self::new(self.fade_ns);
     }
 
-    /// Fades a new field in. The old field becomes the present wrench at this pose, so that the force does not jump even if the
-    /// last fade is not over. Real-time: bounded, no allocation.
+    /// Starts the fade to a new field. The old field is re-anchored at `pose` with the present wrench, so that the force does not
+    /// jump even if the last fade is not over. Real-time: bounded, no allocation.
     pub(super) fn take(&mut self, field: LinearField, pose: &Pose, now_ns: u64) {
         let share = self.share(now_ns);
         let (wrench, _) = self.at(pose, now_ns);

@@ -1,4 +1,4 @@
-//! A force model slower than the loop: computed asynchronously, evaluated in the loop as a local linear model.
+//! Force model slower than the loop: computed asynchronously, evaluated in the loop as a local linear model.
 //!
 //! ```text
 //!            pose, velocity                     linear field
@@ -6,9 +6,9 @@
 //!             newest value     own rate          newest value   W0 - K d, faded in over a period
 //! ```
 //!
-//! On a real clock the model has a thread of its own, and neither side waits: without a new field the loop continues with the old
-//! one, up to a limit of age. On the virtual clock the model is computed in the loop's tick, at multiples of its period, and its
-//! field is delayed by the latency in the scene: every run is the same, bit for bit.
+//! On a real clock the model runs in a thread of its own, and neither side waits: without a new field the loop continues with the
+//! old one, up to an age limit. On the virtual clock the model is computed in the loop's tick, at multiples of the model's period,
+//! and each field is delayed by the latency in the scene: all runs are identical, bit for bit.
 
 mod cross_fade;
 mod source;
@@ -23,10 +23,10 @@ use flotor_hal::{Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal
 use source::FieldSource;
 use thread::ModelThread;
 
-/// Age in periods at which the last field is discarded: the handle has moved meanwhile.
+/// Age limit of a field, in periods of the model: later the handle may have moved too far from the sample.
 const OLDEST_PERIODS: u64 = 10;
 
-/// A model that is computed asynchronously.
+/// Model with a rate below the loop's; the loop evaluates the model's newest linear fields.
 pub struct AsynchronousModel {
     computing: Computing,
     fields: CrossFade,
@@ -37,19 +37,19 @@ pub struct AsynchronousModel {
     oldest_ns: u64,
     serves: Demand,
     memory: Memory,
-    /// Value of each parameter before the loop.
+    /// Initial value of each parameter.
     parameters: Vec<f64>,
 }
 
 enum Computing {
-    /// In the loop's tick, on the virtual clock.
+    /// In the tick of the loop, on the virtual clock.
     Inline(Box<Inline>),
-    /// On a thread of its own.
+    /// In a thread of its own, on a real clock.
     Thread(ModelThread),
 }
 
 impl AsynchronousModel {
-    /// Returns the loop settings to prepare the model for: its period is at least the loop's.
+    /// Returns the loop configuration of the model: the period of its own rate, but at least the loop's, and the same seed.
     #[must_use]
     pub fn config(timing: &FieldTiming, config: &LoopConfig) -> LoopConfig {
         LoopConfig { period_ns: period_ns(timing.rate_hz).max(config.period_ns), ..*config }
@@ -88,8 +88,8 @@ impl AsynchronousModel {
         })
     }
 
-    /// Evaluates the newest fields at the handle; `output` is only valid for [`Stepped::Answered`]. Real-time on a real clock:
-    /// bounded, no allocation.
+    /// Evaluates the newest fields at the handle; `output` is only valid for [`Stepped::Answered`], and its energy is NaN. Returns
+    /// [`Stepped::Silent`] after ten periods of the model without a new field. Real-time on a real clock: bounded, no allocation.
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
         let mut field = LinearField::NONE;
         let polled = match &mut self.computing {
@@ -101,7 +101,7 @@ impl AsynchronousModel {
                 self.fields.take(field, &input.pose, input.time_ns);
                 self.newest_ns = Some(field.time_ns);
             }
-            // Passed on, to be rejected as a non-finite answer.
+            // Returned, to be rejected as a non-finite output.
             Stepped::Answered => {
                 *output = field.wrench.into();
                 return Stepped::Answered;
@@ -119,7 +119,8 @@ impl AsynchronousModel {
         Stepped::Answered
     }
 
-    /// Changes a live parameter before the next field. Real-time: bounded, no allocation.
+    /// Changes a live parameter before the next field; unsupported if the thread's command queue is full. Real-time: bounded, no
+    /// allocation.
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         match &mut self.computing {
             Computing::Inline(inline) => inline.source.model.set_parameter(index, value),
@@ -127,12 +128,12 @@ impl AsynchronousModel {
         }
     }
 
-    /// Returns the value of a parameter before the loop.
+    /// Returns the initial value of a parameter; NaN for an unknown one.
     pub fn parameter(&self, index: usize) -> f64 {
         self.parameters.get(index).copied().unwrap_or(f64::NAN)
     }
 
-    /// Returns force and torque as far as the model can compute them: a field has no energy.
+    /// Returns the outputs that the model can compute, force and torque only: a linear field has no energy.
     pub fn serves(&self) -> Demand {
         self.serves.limited_to(Demand::WRENCH)
     }
@@ -142,7 +143,7 @@ impl AsynchronousModel {
         self.memory
     }
 
-    /// Clears history and fields. Real-time: bounded, no allocation.
+    /// Clears the history of the model and the fields: without force until the next field. Real-time: bounded, no allocation.
     pub fn reset(&mut self) -> CallStatus {
         self.fields.clear();
         (self.newest_ns, self.since_ns) = (None, None);
@@ -161,7 +162,7 @@ impl AsynchronousModel {
     }
 }
 
-/// Model computed in the loop at multiples of its period, with delayed fields.
+/// Model computed in the tick of the loop at multiples of the model's period, with delayed fields.
 struct Inline {
     source: FieldSource,
     period_ns: u64,
@@ -177,7 +178,7 @@ impl Inline {
         Self { source: FieldSource::new(model), period_ns, latency_ns, next_ns: 0, held_back: None }
     }
 
-    /// Computes a field if one is due, and takes the field whose latency is over; late if there is none.
+    /// Computes a field if one is due, and copies the field whose latency is over to `field`; returns late if there is none.
     fn poll(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
         let due = self.held_back.take_if(|(ready_ns, _)| input.time_ns >= *ready_ns);
         if input.time_ns >= self.next_ns {
@@ -185,7 +186,7 @@ impl Inline {
             let mut next = LinearField::NONE;
             match self.source.compute(input, &mut next) {
                 Stepped::Answered => self.held_back = Some((input.time_ns + self.latency_ns, next)),
-                // The field may come the next time.
+                // The next computation may yield a field.
                 Stepped::Late | Stepped::Silent => {}
                 Stepped::Broken | Stepped::Gone => return Stepped::Broken,
             }

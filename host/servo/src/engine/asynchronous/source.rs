@@ -1,4 +1,4 @@
-//! Source of linear fields: a model that is computed at times of its own.
+//! Source of linear fields: a model with the time of its last computation.
 
 use crate::{Engine, Stepped};
 use flotor_hal::abi::CallStatus;
@@ -13,12 +13,12 @@ pub(super) struct FieldSource {
 }
 
 impl FieldSource {
-    /// Creates a source without a field so far. Not real-time.
+    /// Creates a source before its first field. Not real-time.
     pub(super) fn new(model: Engine) -> Self {
         Self { demand: model.serves().limited_to(Demand::WRENCH), model, last_ns: None }
     }
 
-    /// Computes the field at an input; `field` is only valid for [`Stepped::Answered`].
+    /// Computes the field at an input, with the time since the last field as `dt_ns`; `field` is only valid for [`Stepped::Answered`].
     pub(super) fn compute(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
         let dt_ns = self.last_ns.map_or(0, |last_ns| input.time_ns.saturating_sub(last_ns));
         self.last_ns = Some(input.time_ns);

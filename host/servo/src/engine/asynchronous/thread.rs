@@ -1,4 +1,4 @@
-//! Model on a thread of its own, at its own rate.
+//! Model in a thread of its own, at its own rate.
 //!
 //! Loop and thread share two latest-value cells, a queue of commands and two flags; neither waits for the other.
 
@@ -32,7 +32,7 @@ struct Flags {
     last_words: OnceLock<String>,
 }
 
-/// Loop side of the model thread.
+/// Loop side of the model thread; dropping it ends the thread after the current field.
 pub(super) struct ModelThread {
     samples: Publisher<SentInput, INPUT_WORDS>,
     fields: Observer<SentField, FIELD_WORDS>,
@@ -73,7 +73,7 @@ impl ModelThread {
         Ok(Self { samples, fields, operations, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
     }
 
-    /// Publishes the input and takes a new field; late if there is none. Real-time: bounded, no allocation.
+    /// Publishes the input and copies a new field to `field`; returns late if there is none. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn poll(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
         self.samples.publish(&SentInput(*input));
@@ -91,12 +91,12 @@ impl ModelThread {
         }
     }
 
-    /// Queues a change of a live parameter. Real-time: bounded, no allocation.
+    /// Queues a change of a live parameter; unsupported if the queue is full. Real-time: bounded, no allocation.
     pub(super) fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         self.enqueue(Operation::Set { index, value })
     }
 
-    /// Queues a reset and drops fields of older samples. Real-time: bounded, no allocation.
+    /// Queues a reset and discards fields of older samples; unsupported if the queue is full. Real-time: bounded, no allocation.
     pub(super) fn reset(&mut self) -> CallStatus {
         self.forgotten_ns = self.now_ns.saturating_add(1);
         self.enqueue(Operation::Reset)
@@ -121,7 +121,7 @@ impl Drop for ModelThread {
     }
 }
 
-/// Thread side, which computes the fields.
+/// Thread side: model and ends of the shared cells and queue.
 struct Computer {
     source: FieldSource,
     samples: Observer<SentInput, INPUT_WORDS>,
@@ -176,7 +176,7 @@ impl Computer {
                 self.fields.publish(&SentField(field));
                 CallStatus::Ok
             }
-            // The field may come the next time.
+            // The next computation may yield a field.
             Stepped::Late | Stepped::Silent => CallStatus::Ok,
             Stepped::Broken | Stepped::Gone => CallStatus::Panicked,
         }

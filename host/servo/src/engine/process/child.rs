@@ -17,8 +17,8 @@ use std::sync::atomic::Ordering;
 /// Poll interval for host liveness while idle, ns.
 const HOST_CHECK_NS: u64 = 500_000_000;
 
-/// Start-up arguments of a worker. Standard input is the shared memory, which also takes the greeting: standard output belongs to
-/// the plugin.
+/// Start-up arguments of a worker. Standard input is the shared memory, through which the greeting is sent too: standard output is
+/// left to the plugin.
 #[derive(Clone, Debug)]
 pub struct WorkerArguments {
     /// Process id of the host.
@@ -33,16 +33,18 @@ pub struct WorkerArguments {
     pub sets: Vec<String>,
 }
 
-/// Loader of a plugin's file; the caller guarantees that the file is trusted.
+/// Function that loads a plugin from its shared library; the caller guarantees that the file is trusted.
 pub type LoadFile = fn(&Path) -> Result<Plugin, LoadError>;
 
-/// Loads the model, sends the greeting and serves the requests of the host. Ends with the host.
+/// Loads the model, sends the greeting and serves the requests of the host. Returns when the host has ended, or after a refusal by
+/// the plugin.
 ///
 /// # Errors
-/// Standard input is not the shared memory: the process was not started as a worker.
+/// If standard input is not the shared memory (the process was not started as a worker), or the system cannot bind this process to
+/// the host.
 pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
-    // Before any plugin code runs: whatever the plugin does, the worker ends with its host, and by a signal that it sends to
-    // itself. The host may have ended before.
+    // Before any plugin code runs: the worker is killed when its host ends, and a fatal signal raised by the plugin ends the worker
+    // even if the signal was inherited as ignored. The host may already have ended.
     ignore_no_signal();
     let host = HostProcess::end_with(arguments.host)?;
     let has_gone = || host.has_gone();
@@ -137,8 +139,9 @@ fn prepare(arguments: &WorkerArguments, load: LoadFile) -> Result<Prepared, Refu
     Ok((model, parameters))
 }
 
-/// Sends the greeting to the host in pieces that fit into a message. Each piece has a number; the next one is sent once the host
-/// has made a request under that number. Returns the last number, from which requests are counted; `None` if the host has ended.
+/// Sends the greeting to the host in pieces that fit into a message. Each piece has a number; the host confirms a piece with a
+/// request under its number, and only then the next piece is sent. Returns the last number, from which requests are counted; `None`
+/// if the host has ended.
 fn greet(memory: &SharedMemory, text: &str, has_gone: impl Fn() -> bool) -> Option<u32> {
     let (mut left, mut number) = (text, 0_u32);
     loop {
@@ -166,7 +169,7 @@ fn greet(memory: &SharedMemory, text: &str, has_gone: impl Fn() -> bool) -> Opti
     }
 }
 
-/// Status of the last piece of a greeting, and of the others.
+/// Status of the last piece of a greeting; [`MORE_TO_COME`] is the status of the earlier pieces.
 pub(super) const WHOLE: CallStatus = CallStatus::Ok;
 const MORE_TO_COME: CallStatus = CallStatus::WrongPhase;
 

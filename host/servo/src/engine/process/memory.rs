@@ -7,21 +7,21 @@ pub(super) use crate::platform::shared_memory::{SharedMemory, create_file};
 use flotor_core::words::FIELD_WORDS;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64};
 
-/// Words of a step's reply: wrench (6), energy, status.
+/// Number of 64-bit words in the reply to a step: wrench (6), energy, status.
 const OUTPUT_WORDS: usize = 8;
-/// Words of an active region: shape, centre, half sides.
+/// Number of words of an active region: shape, centre, half extents.
 const REGION_WORDS: usize = 7;
-/// Words of workspace bounds: lower and upper corner.
+/// Number of words of workspace bounds: lower and upper corner.
 const BOUNDS_WORDS: usize = 6;
 /// Capacity of a message, bytes.
 pub(super) const MESSAGE_BYTES: usize = 508;
 
-/// Page with one request and one reply at a time.
+/// Layout of the shared page, with one request and one reply at a time.
 #[repr(C)]
 pub(crate) struct SharedPage {
     /// Number of the newest request; the worker sleeps on it.
     pub(crate) request: AtomicU32,
-    /// Number of the newest request that is answered; the host sleeps on it.
+    /// Number of the newest request with a reply; the host sleeps on it.
     pub(super) reply: AtomicU32,
     /// Code of the requested operation.
     pub(super) operation: AtomicU32,

@@ -1,11 +1,12 @@
 //! Force model in a worker process: the loop continues without the model when it hangs or crashes.
 //!
-//! The host starts its own program once more, as `flotor worker`, which loads the plugin and creates the model. Both processes
-//! share one page of memory. A step is a request there; the worker sleeps until a request comes, the loop until the reply, but no
-//! longer than the model's timeout. In the first tick without a reply the last force is applied, then none until the worker has
-//! caught up. A worker that is late in five ticks more than in time is disabled, like a model in the loop, and so is an ended one.
+//! The host starts a second process of its own program, `flotor worker`, which loads the plugin and creates the model. Both
+//! processes share one page of memory, through which the loop requests each step. The worker sleeps until a request arrives; the
+//! loop sleeps until the reply, but no longer than the model's timeout. In the first tick without a reply the last force is
+//! applied, then none until the worker has caught up. A worker with five more late ticks than ticks in time is disabled, as a model
+//! with such overruns in the loop is; so is a worker whose process has ended.
 //!
-//! The host loads the library as well, for its schema, but creates no model.
+//! The host loads the library as well, for its parameter schema, but creates no model.
 
 mod child;
 mod memory;
@@ -18,7 +19,7 @@ pub use parent::{Worker, WorkerConfig};
 
 use serde::{Deserialize, Serialize};
 
-/// First message of a worker: one line of JSON in the shared memory.
+/// First message of a worker, JSON text sent through the shared memory.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 enum Greeting {
     /// The model is created and prepared.
@@ -27,7 +28,7 @@ enum Greeting {
         parameters: Vec<Option<f64>>,
         /// Outputs that the model can compute: force, torque, energy.
         serves: [bool; 3],
-        /// True if the answer depends on the path.
+        /// True if the output depends on the path of the handle.
         remembers: bool,
         /// True if the model has a linear field.
         has_field: bool,

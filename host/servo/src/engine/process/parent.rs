@@ -33,11 +33,11 @@ pub struct WorkerConfig<'a> {
     pub config: LoopConfig,
     /// Timeout of a reply, ns.
     pub timeout_ns: u64,
-    /// Timeout of `create` and `prepare`.
+    /// Timeout of the plugin's `create` and `prepare` together.
     pub create_timeout: Duration,
 }
 
-/// Model in a worker process.
+/// Model in a worker process; dropping it kills the process.
 pub struct Worker {
     child: Child,
     memory: SharedMemory,
@@ -54,10 +54,10 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts a worker and waits until its model is ready. Not real-time.
+    /// Starts a worker and waits until its model is ready, at most [`WorkerConfig::create_timeout`]. Not real-time.
     ///
     /// # Errors
-    /// The plugin's [`Refusal`], or the reason why no worker could start.
+    /// The plugin's [`Refusal`], or a refusal with the system's error if no worker could start, or if it ended or timed out.
     pub fn start(config: &WorkerConfig<'_>) -> Result<Self, Refusal> {
         let no_worker =
             |error: io::Error| Refusal::resource(format!("cannot start a worker process: {error}"));
@@ -69,9 +69,9 @@ impl Worker {
         command.args(["--period-ns", &config.config.period_ns.to_string()]);
         command.args(["--seed", &config.config.seed.to_string()]);
         command.args(config.sets.iter().map(|(key, value)| format!("--set={key}={value}")));
-        // Output of the model goes to the host's standard error, where it does no harm.
+        // Output of the plugin goes to the host's standard error, not into results on standard output.
         command.stdin(file).stdout(io::stderr());
-        // Signals of the terminal go to the host alone, which needs the model while the force fades out.
+        // Terminal signals go to the host alone: it needs the model until the force has faded out.
         processes::keep_from_terminal(&mut command);
         let child = spawn(command).map_err(|error| no_worker(with_advice(error)))?;
         let mut worker = Self {
@@ -125,7 +125,7 @@ impl Worker {
         text
     }
 
-    /// Returns the value of a parameter when the model was created; NaN for a parameter without one.
+    /// Returns the initial value of a parameter; NaN for a parameter without one.
     pub fn parameter(&self, index: usize) -> f64 {
         self.parameters.get(index).copied().flatten().unwrap_or(f64::NAN)
     }
@@ -135,7 +135,7 @@ impl Worker {
         self.serves
     }
 
-    /// Steps the model. Real-time: bounded by the reply timeout, no allocation.
+    /// Steps the model; `output` is only valid for [`Stepped::Answered`]. Real-time: bounded by the reply timeout, no allocation.
     #[inline]
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
         let put = |memory: &SharedMemory| memory.put_input(input);
@@ -151,7 +151,8 @@ impl Worker {
         self.has_field
     }
 
-    /// Computes the linear field at an input. Not real-time: bounded by the reply timeout.
+    /// Computes the linear field at an input; `field` is only valid for [`Stepped::Answered`]. Not real-time: bounded by the reply
+    /// timeout.
     pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
         let put = |memory: &SharedMemory| memory.put_input(input);
         let reply = self.request(Operation::Field, put, |memory| {
@@ -171,13 +172,14 @@ impl Worker {
         self.memory.bounds()
     }
 
-    /// Changes a live parameter at a tick boundary. Real-time: bounded by the reply timeout, no allocation.
+    /// Changes a live parameter at a tick boundary; unsupported without a reply in time. Real-time: bounded by the reply timeout,
+    /// no allocation.
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         let put = |memory: &SharedMemory| {
             memory.parameter.store(index as u64, Ordering::Relaxed);
             memory.value.store(value.to_bits(), Ordering::Relaxed);
         };
-        // Without a reply not applied: the next step reports a late or ended worker.
+        // The next step reports a late or ended worker.
         self.request(Operation::SetParameter, put, |memory| memory.status())
             .unwrap_or(CallStatus::Unsupported)
     }
@@ -223,7 +225,7 @@ impl Worker {
         Ok(take(&self.memory))
     }
 
-    /// Distinguishes a late worker from an ended one, with one system call.
+    /// Returns late or gone, after one system call that checks whether the worker has ended.
     fn late(&mut self) -> Stepped {
         self.is_gone = self.child.try_wait().is_ok_and(|end| end.is_some());
         if self.is_gone { Stepped::Gone } else { Stepped::Late }
@@ -249,7 +251,7 @@ impl Drop for Worker {
     }
 }
 
-/// Poll interval while waiting for the greeting, ns.
+/// Interval between checks for the worker's end while waiting for the greeting, ns.
 const LOOK_NS: u64 = 20_000_000;
 
 /// Receives the greeting of a worker piece by piece, and confirms each piece with a request under its number. Returns the last
@@ -260,7 +262,7 @@ pub(super) fn receive_text(
 ) -> Option<(u32, String)> {
     let (mut number, mut text) = (0_u32, String::new());
     loop {
-        // Checked first: a piece may have been sent before the end.
+        // Checked before the memory: a piece may have been sent just before the end.
         let is_over = has_ended();
         if !memory.is_answered(number.wrapping_add(1)) {
             if is_over {
@@ -283,8 +285,8 @@ pub(super) fn receive_text(
 /// Process to start, with the channel for its handle.
 type Start = (Command, Sender<io::Result<Child>>);
 
-/// Starts a process from a thread that lives as long as this process: a worker ends with the *thread* that started it, and a thread
-/// that replaces a model may end before the run.
+/// Starts a process from a thread that lives as long as this process: the system kills a worker when the *thread* that started it
+/// ends, and a thread that replaces a model may end before the run.
 fn spawn(command: Command) -> io::Result<Child> {
     static STARTER: Mutex<Option<Sender<Start>>> = Mutex::new(None);
     let (reply, child) = channel();
@@ -299,7 +301,7 @@ fn spawn(command: Command) -> io::Result<Child> {
     child.recv().map_err(|_| io::Error::other("the thread that starts worker processes has ended"))?
 }
 
-/// Starts the thread that starts worker processes.
+/// Starts the thread that starts the worker processes, and returns the sender to it.
 fn start_starter() -> io::Result<Sender<Start>> {
     let (starter, orders) = channel::<Start>();
     let thread = std::thread::Builder::new().name("flotor-starter".to_owned());
@@ -311,7 +313,7 @@ fn start_starter() -> io::Result<Sender<Start>> {
     Ok(starter)
 }
 
-/// Adds the remedy to the system's refusal of a process or a thread.
+/// Adds advice to the error if a limit of processes or threads is reached (`EAGAIN`).
 fn with_advice(error: io::Error) -> io::Error {
     if error.kind() == io::ErrorKind::WouldBlock {
         io::Error::other(format!("{error}; {THREAD_ADVICE}"))
@@ -320,7 +322,8 @@ fn with_advice(error: io::Error) -> io::Error {
     }
 }
 
-/// Returns the program to run as a worker: this one, or, if an application uses the library, `flotor` in its folder or the one above.
+/// Returns the `flotor` executable for child processes: the one set in guest mode, this program, or `flotor` in this program's
+/// folder or its parent.
 pub(crate) fn program() -> io::Result<PathBuf> {
     if let Some(program) = crate::guest::program() {
         return Ok(program.clone());

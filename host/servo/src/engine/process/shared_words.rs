@@ -35,7 +35,7 @@ impl SharedPage {
         wake(&self.request);
     }
 
-    /// Host side: returns true if the request is answered.
+    /// Host side: returns true if the request with this number has a reply.
     pub(super) fn is_answered(&self, number: u32) -> bool {
         self.reply.load(Ordering::Acquire) == number
     }

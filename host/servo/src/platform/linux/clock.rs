@@ -1,4 +1,4 @@
-//! The monotonic clock, and sleeping on it or until a word of memory changes.
+//! Monotonic clock; sleep until a time, or until a word of memory changes.
 
 use rustix::thread::{ClockId, clock_nanosleep_absolute, futex};
 use rustix::time::{Timespec, clock_gettime};
@@ -25,12 +25,12 @@ pub fn sleep_until(deadline_ns: u64) {
     let _ = clock_nanosleep_absolute(ClockId::Monotonic, &request);
 }
 
-/// Sleeps while a word is zero, until [`wake_all`] or the timeout. Not real-time.
+/// Sleeps until [`wake_all`] or the timeout, if the word is zero. Not real-time.
 pub(crate) fn sleep_while_zero(word: &AtomicU32, timeout: Duration) {
     let _ = futex::wait(word, futex::Flags::PRIVATE, 0, Timespec::try_from(timeout).ok().as_ref());
 }
 
-/// Wakes the threads that sleep on a word. Real-time: one system call.
+/// Wakes all threads that sleep on the word. Real-time: one system call.
 pub(crate) fn wake_all(word: &AtomicU32) {
     let _ = futex::wake(word, futex::Flags::PRIVATE, i32::MAX.cast_unsigned());
 }

@@ -1,8 +1,8 @@
-//! Control groups of a process, and the folders of their files.
+//! Control groups (cgroups) of a process, and the folders of their files.
 
 use std::path::{Path, PathBuf};
 
-/// A control group of a process.
+/// Control group of a process.
 pub(super) struct Group {
     /// Controllers, or name of the hierarchy; empty for version 2.
     hierarchy: String,
@@ -11,7 +11,7 @@ pub(super) struct Group {
     mount: Option<Mount>,
 }
 
-/// Returns the groups in the text of `/proc/PID/cgroup`.
+/// Parses the text of `/proc/PID/cgroup`; a group whose hierarchy is not among `mounts` has no folders.
 pub(super) fn groups(file: &str, mounts: &[Mount]) -> Vec<Group> {
     let group = |line: &str| {
         let mut fields = line.splitn(3, ':').skip(1);
@@ -28,7 +28,7 @@ impl Group {
         self.hierarchy.split(',').any(|own| own == controller)
     }
 
-    /// Returns true for the root of a hierarchy, which is never killed as a group. The root of a container's own view does not count.
+    /// Returns true for the root of a hierarchy, which is never killed as a group; false for the root of a container's own view.
     pub(super) fn is_root(&self) -> bool {
         self.path == "/" && self.mount.as_ref().is_none_or(Mount::is_whole)
     }
@@ -48,7 +48,7 @@ impl Group {
 /// Mount point of a hierarchy of control groups.
 #[derive(Clone)]
 pub(super) struct Mount {
-    /// Group at the folder, as visible to this process.
+    /// Group that is mounted at the folder, as visible to this process.
     root: String,
     folder: PathBuf,
     /// Options of the mount, which include the controllers of version 1, as in [`Group::hierarchy`].
@@ -83,8 +83,8 @@ impl Mount {
         }
     }
 
-    /// Returns true if the folder is the root of the whole hierarchy, which has no events of its own in version 2 and the only
-    /// agent in version 1.
+    /// Returns true if the folder is the root of the whole hierarchy: it has no `cgroup.events` in version 2, and the only
+    /// `release_agent` in version 1.
     fn is_whole(&self) -> bool {
         match self.is_second_version {
             true => !self.folder.join("cgroup.events").exists(),

@@ -1,10 +1,10 @@
-//! Limits of the control groups of this process, each from its tightest group.
+//! Resource limits of the control groups (cgroups) of this process, each from the group with the tightest limit.
 
 use super::control_group::{Group, Mount, groups};
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
 
-/// A limit of a control group.
+/// Resource limit of a control group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroupLimit {
     /// File of the group that sets the limit.
@@ -16,30 +16,30 @@ pub struct GroupLimit {
 /// Kind and value of a limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LimitValue {
-    /// Part of a core for real-time threads of the group; at zero the system refuses real-time priority.
+    /// Fraction of the processor time that real-time threads of the group may use; at zero the system refuses real-time priority.
     RealTimeShare(f64),
-    /// Processor time of the group, cores.
+    /// Processor time that the group may use per time, in cores.
     Cores(f64),
     /// Number of cores that the group may use.
     CoreCount(usize),
-    /// Memory at which the system ends processes of the group, and memory in use, bytes.
+    /// Memory, bytes, above which the system kills processes of the group.
     Memory(Use),
-    /// Memory from which the system delays the group, and memory in use, bytes.
+    /// Memory, bytes, above which the system delays processes of the group.
     DelayingMemory(Use),
-    /// Number of threads of the group, and threads in use.
+    /// Number of threads of the group.
     Threads(Use),
 }
 
-/// Limit with its current use.
+/// Limit with its current use, bytes of memory or number of threads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Use {
-    /// Largest use allowed.
+    /// Limit, bytes or threads.
     pub most: u64,
-    /// Current use.
+    /// Current use, bytes or threads.
     pub now: u64,
 }
 
-/// Bytes from which a limit of version 1 means none, for any page size.
+/// Smallest value, bytes, that means no limit in version 1, for any page size.
 const NO_MEMORY_LIMIT: u64 = 1 << 62;
 
 /// Returns the limits that bind this process through its control groups, from the files below `root`. Not real-time.
@@ -54,17 +54,17 @@ pub fn group_limits(root: &Path) -> Vec<GroupLimit> {
     readers.into_iter().filter_map(|read| tightest(&folders, read)).collect()
 }
 
-/// Returns the file of a control group that gives real-time threads of this process no budget, so that the system refuses real-time
-/// priority. Not real-time.
+/// Returns the file of a control group that leaves real-time threads of this process no processor time, so that the system refuses
+/// real-time priority; `None` if there is no such group. Not real-time.
 pub(crate) fn file_without_real_time() -> Option<PathBuf> {
     let is_none = |limit: &GroupLimit| limit.value == LimitValue::RealTimeShare(0.0);
     group_limits(Path::new("/")).into_iter().find(is_none).map(|limit| limit.file)
 }
 
-/// Reader of a limit of one group: returns the file that sets the limit, and the value.
+/// Reader of a limit of the group in a folder: returns the name of the file that sets the limit, and the value.
 type Reader = fn(&Path) -> Option<(&'static str, LimitValue)>;
 
-/// Returns the limit with the least room; of equal ones the outermost, without which the inner ones change nothing.
+/// Returns the limit with the least unused part; of equal limits the outermost, because raising only an inner limit would have no effect.
 fn tightest(folders: &[PathBuf], read: Reader) -> Option<GroupLimit> {
     let limits = folders.iter().rev().filter_map(|folder| {
         let (file, value) = read(folder)?;

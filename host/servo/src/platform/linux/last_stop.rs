@@ -1,4 +1,4 @@
-//! End of a process on Linux: signals, the alternate stack of their handlers, `exit`.
+//! Last stop on Linux: handlers of fatal signals and of `exit`, with their alternate stack.
 //!
 //! Nothing that runs in a handler allocates, locks or formats into memory of its own.
 #![allow(unsafe_code)] // handlers of deadly signals and of `exit` cannot be made without; tests/tests/system/architecture.rs
@@ -28,12 +28,12 @@ const HARMLESS: [c_int; 9] =
     [SIGKILL, SIGSTOP, SIGTSTP, SIGTTIN, SIGTTOU, SIGCHLD, SIGCONT, SIGURG, SIGWINCH];
 /// Signals that a timer, a limit or another program sends to the process as a whole.
 const SENT: [c_int; 7] = [SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU, SIGIO, SIGPWR];
-/// Signals reserved for the host: those of crashes, requests to end or suspend a run, the emergency stop.
+/// Signals reserved for the host: signals of crashes, requests to end or suspend a run, the emergency stop.
 const KEPT: [c_int; 15] = [
     SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGSYS, SIGTRAP, SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP,
     SIGTTIN, SIGTTOU, SIGUSR1,
 ];
-/// Numbers of signals, 1 to 64; two of them are reserved by the C library.
+/// Length of a table by signal number, 1 to 64; the C library reserves two of the numbers.
 const SIGNALS: usize = 65;
 /// Size of the alternate stack, bytes: frames of a handler with the widest registers take some 12 KiB, a device's stop little.
 const STACK_BYTES: usize = 128 * 1024;
@@ -50,15 +50,15 @@ fn is_own_process() -> bool {
 /// Actions of the signals before our handler.
 static BEFORE: [OnceLock<sigaction>; SIGNALS] = [const { OnceLock::new() }; SIGNALS];
 
-/// Installs handlers for every fatal signal, on this thread's alternate stack, and for `exit`. Repeated for each run, as a plugin
-/// may have installed others. Not real-time.
+/// Installs handlers for every fatal signal, on an alternate stack of this thread, and for `exit`. Repeated for each run, because a
+/// plugin may have installed other handlers. Not real-time.
 pub(crate) fn install() {
     install_for(|signal| !HARMLESS.contains(&signal));
     take_sent();
 }
 
-/// Installs handlers for the signals that this thread raises when it crashes, and for `exit`. Requests to end the process are left
-/// alone: the host has not yet chosen their receiver. Not real-time.
+/// Installs handlers for the signals that this thread raises when it crashes, and for `exit`. Signals that request the end of the
+/// process are not handled: the host has not yet chosen their receiver. Not real-time.
 pub(crate) fn install_for_crashes() {
     install_for(|signal| RAISED.contains(&signal));
 }
@@ -94,8 +94,8 @@ fn install_for(is_wanted: impl Fn(c_int) -> bool) {
     }
 }
 
-/// Blocks fatal signals sent to the whole process in this thread and all that it starts from now on: the loop and the watchdog take
-/// them, which wait for no processor. Not real-time.
+/// Blocks signals that timers, limits or other programs send to the process as a whole, in the calling thread and in all threads
+/// that it starts from now on: the loop and the watchdog, which have real-time priority, handle them. Not real-time.
 ///
 /// # Errors
 /// If the system call fails.
@@ -103,7 +103,7 @@ pub fn block_sent_signals() -> io::Result<()> {
     block_signals(&SENT)
 }
 
-/// Unblocks the sent signals in this thread, unless they belong to another program. Not real-time.
+/// Unblocks the signals of [`block_sent_signals`] in this thread, unless another program handles all signals. Not real-time.
 pub(crate) fn take_sent() {
     if program_handles_signals() {
         return;
@@ -127,12 +127,12 @@ extern "C" fn on_signal(signal: c_int, info: *mut siginfo_t, _: *mut c_void) {
             end_if_in_call(death);
         }
     }
-    // No run: restore the action before our handler.
+    // No run is armed: restore the action from before our handler.
     let before = usize::try_from(signal).ok().and_then(|signal| BEFORE.get(signal)?.get());
     if let Some(before) = before {
         set_action(signal, before);
     }
-    // A failed instruction fails once more where it stands.
+    // A failed instruction is executed once more and raises its signal again.
     if code <= 0 || !RAISED.contains(&signal) {
         raise(signal);
     }
@@ -148,13 +148,14 @@ extern "C" fn at_exit() {
     }
 }
 
-/// Ends the process: by the signal that requested the end, if one did; otherwise with a code.
+/// Ends the process: by the signal that requested the end, if there was one; otherwise with `code`. In a guest the program's own
+/// action for the signal comes first.
 pub(crate) fn end_by(death: Death, code: i32) -> ! {
     if let Death::Signal { signal, .. } = death
         && is_guest()
         && let Some(before) = usize::try_from(signal).ok().and_then(|signal| BEFORE.get(signal)?.get())
     {
-        // The program's own end, be it a handler or the default.
+        // The program's own action: a handler or the default.
         set_action(signal, before);
         raise(signal);
     }
@@ -297,7 +298,8 @@ impl Drop for AlternateStack {
 
 // ---------------------------------------------------------------- signals that stay the host's
 
-/// Blocks signals in the calling thread and in all that it starts from now on; [`wait_for_signal`] takes them. Not real-time.
+/// Blocks signals in the calling thread and in all threads that it starts from now on, to be received by [`wait_for_signal`]. Not
+/// real-time.
 ///
 /// # Errors
 /// If the system call fails.
@@ -310,7 +312,7 @@ pub fn block_signals(signals: &[i32]) -> io::Result<()> {
     }
 }
 
-/// Waits for one of these signals, which are blocked in every thread; `None` after the timeout. Not real-time.
+/// Waits for one of `signals`, which must be blocked in every thread; returns its number, or `None` after the timeout. Not real-time.
 #[must_use]
 pub fn wait_for_signal(signals: &[i32], patience: Duration) -> Option<i32> {
     let set = set_of(signals);
@@ -321,8 +323,8 @@ pub fn wait_for_signal(signals: &[i32], patience: Duration) -> Option<i32> {
     (signal > 0).then_some(signal)
 }
 
-/// Restores the default action of every signal that this process has inherited as ignored, as in the background of a shell: for a
-/// process that runs nothing but a plugin, which a signal of the plugin then ends. Not real-time.
+/// Restores the default action of every fatal signal that this process has inherited as ignored (as background jobs of a shell do),
+/// except SIGPIPE. For a process that only runs a plugin: a signal that the plugin raises then ends the process. Not real-time.
 pub fn ignore_no_signal() {
     let ends = |signal: &c_int| !HARMLESS.contains(signal) && *signal != SIGPIPE; // which Rust programs ignore
     for signal in (1..).take(SIGNALS - 1).filter(ends) {
@@ -351,20 +353,21 @@ pub struct SignalGuard {
     blocked: sigset_t,
 }
 
-/// Signals of the host that a plugin took away.
+/// Signals of the host whose action a plugin has replaced, or which it has blocked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TakenSignals {
     bits: u64,
 }
 
 impl SignalGuard {
-    /// Takes a snapshot of the current actions. Not real-time.
+    /// Takes a snapshot of the current actions and blocked signals. Not real-time.
     #[must_use]
     pub fn take() -> Self {
         Self { actions: KEPT.map(action), blocked: blocked() }
     }
 
-    /// Restores the actions that have changed since, and returns their signals. Not real-time.
+    /// Restores actions and blocked signals that have changed since the snapshot; returns the signals with a changed action or
+    /// newly blocked. Does nothing in a guest. Not real-time.
     pub fn put_back(&self) -> TakenSignals {
         let mut taken = TakenSignals::default();
         if is_guest() {
@@ -390,7 +393,7 @@ impl SignalGuard {
 }
 
 impl TakenSignals {
-    /// Returns true if no signal was taken.
+    /// Returns true if the set is empty.
     #[must_use]
     pub const fn is_none(self) -> bool {
         self.bits == 0
@@ -412,7 +415,7 @@ impl TakenSignals {
     }
 }
 
-/// Writes the names of the signals, with commas.
+/// Writes the names of the signals, separated by commas.
 impl std::fmt::Display for TakenSignals {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let taken = KEPT.into_iter().filter(|signal| self.bits >> (signal - 1) & 1 == 1);
@@ -423,7 +426,7 @@ impl std::fmt::Display for TakenSignals {
 
 // ---------------------------------------------------------------- calls of the system
 
-/// Returns the action of a signal; `None` for a signal of the C library.
+/// Returns the action of a signal; `None` for a signal reserved by the C library.
 fn action(signal: c_int) -> Option<sigaction> {
     let mut found = MaybeUninit::<sigaction>::zeroed();
     // SAFETY: nothing is changed, and the system writes to memory that is there for the call.
@@ -439,7 +442,7 @@ fn set_action(signal: c_int, action: &sigaction) {
     let _ = unsafe { libc::sigaction(signal, action, std::ptr::null_mut()) };
 }
 
-/// Returns the set of these signals.
+/// Returns the set of `signals`.
 #[must_use]
 pub fn set_of(signals: &[i32]) -> sigset_t {
     let mut set = MaybeUninit::<sigset_t>::zeroed();
@@ -455,7 +458,7 @@ pub fn set_of(signals: &[i32]) -> sigset_t {
     set
 }
 
-/// Returns the set of all signals except these.
+/// Returns the set of all signals except `signals`.
 #[must_use]
 pub fn all_but(signals: &[i32]) -> sigset_t {
     let mut set = set_of(&[]);
@@ -468,7 +471,7 @@ pub fn all_but(signals: &[i32]) -> sigset_t {
     set
 }
 
-/// Replaces the set of blocked signals of the calling thread; returns the one before. Not real-time.
+/// Replaces the set of blocked signals of the calling thread; returns the previous set. Not real-time.
 pub fn set_blocked(set: &sigset_t) -> sigset_t {
     let mut before = set_of(&[]);
     // SAFETY: initialised sets that are there for the call.

@@ -1,17 +1,17 @@
-//! Processes beside the host's own.
+//! Worker processes: lifetime, process group and exit status.
 
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 use std::io;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Command, ExitStatus};
 
-/// Host process, with which this process ends.
+/// Host process of this worker.
 pub(crate) struct HostProcess {
     number: Option<Pid>,
 }
 
 impl HostProcess {
-    /// Binds the end of this process to that of its host, which may have ended before. Not real-time.
+    /// Makes the system kill this process when its parent, the host, ends; the host may already have ended. Not real-time.
     ///
     /// # Errors
     /// If the system call fails.
@@ -26,12 +26,12 @@ impl HostProcess {
     }
 }
 
-/// Shields the process to be started from signals of the terminal.
+/// Gives the process to be started a process group of its own, which terminal signals do not reach.
 pub(crate) fn keep_from_terminal(command: &mut Command) {
     command.process_group(0);
 }
 
-/// Returns the signal that ended a process, if one did.
+/// Returns the signal that ended a process; `None` if it exited.
 pub(crate) fn ending_signal(status: ExitStatus) -> Option<i32> {
     status.signal()
 }

@@ -21,7 +21,7 @@ pub(crate) fn priority_advice() -> String {
     file_without_real_time().map_or_else(|| PRIORITY_ADVICE.to_owned(), |file| real_time_budget_advice(&file))
 }
 
-/// Returns advice for users to get real-time priority if this file of a control group gives it no budget.
+/// Returns advice for users to get real-time priority if the control group of `file` leaves real-time threads no processor time.
 #[must_use]
 pub fn real_time_budget_advice(file: &Path) -> String {
     let file = file.display();
@@ -32,12 +32,12 @@ pub fn real_time_budget_advice(file: &Path) -> String {
     )
 }
 
-/// Number of cores that the system can address.
+/// Exclusive upper limit of the core numbers that the system can address.
 pub(crate) const MAX_CORES: usize = CpuSet::MAX_CPU;
 
-/// System's name for the priority of a loop.
+/// System's name for the scheduling of the loop thread.
 pub const PRIORITY_NAME: &str = "SCHED_FIFO";
-/// Advice for users to allow the priority if no control group refuses it.
+/// Advice for users to allow real-time priority, for the case that no control group prevents it.
 const PRIORITY_ADVICE: &str = "allow it with `@realtime - rtprio 99` in /etc/security/limits.conf, or `setcap \
                                    cap_sys_nice+ep` on the executable";
 /// Advice for users to allow locked memory.
@@ -46,14 +46,14 @@ pub(crate) const MEMORY_ADVICE: &str =
 /// Advice for users to find the cores that a process may use.
 pub(crate) const CORE_ADVICE: &str = "`grep Cpus_allowed_list /proc/self/status` lists them";
 
-/// Priority of the loop: below the kernel's own threads (99), above everything ordinary.
+/// Priority of the loop: below the kernel's own threads (99), above all ordinary threads.
 const LOOP_PRIORITY: u8 = 80;
 
 /// Name of the initial user namespace, a constant of the kernel's interface.
 const FIRST_USER_NAMESPACE: &[u8] = b"user:[4026531837]";
 
-/// Locks the memory of the process; future memory as well, unless a limit would then refuse memory to the process. `None` if the
-/// system locks no process. Not real-time.
+/// Locks the current memory of the process, and future memory unless a limit could then make allocations fail. `None` on a system
+/// that cannot lock a process. Not real-time.
 ///
 /// # Errors
 /// If the system call fails.
@@ -62,7 +62,8 @@ pub(crate) fn lock_memory() -> Option<Result<(), String>> {
     Some(mlockall(MlockAllFlags::CURRENT | future).map_err(|error| error.to_string()))
 }
 
-/// Returns true if no limit on locked memory binds this process. A capability lifts the limit in the first user namespace only.
+/// Returns true if no limit on locked memory applies to this process. The capability `CAP_IPC_LOCK` lifts the limit in the initial
+/// user namespace only.
 fn may_lock_any_memory() -> bool {
     let is_first = || {
         readlink("/proc/self/ns/user", Vec::new()).is_ok_and(|name| name.as_bytes() == FIRST_USER_NAMESPACE)
@@ -76,10 +77,10 @@ pub(crate) fn unlock_memory() {
     let _ = rustix::mm::munlockall();
 }
 
-/// Pins the calling thread to the core of this number; other threads of the process are not affected. Not real-time.
+/// Pins the calling thread to the core with number `core`; other threads of the process are not affected. Not real-time.
 ///
 /// # Errors
-/// If there is no such core, or the process may not use it: the system has no other error.
+/// If there is no such core, or the process may not use it.
 pub(crate) fn pin(core: usize) -> std::io::Result<()> {
     let mut set = CpuSet::new();
     set.set(core);

@@ -1,5 +1,5 @@
-//! Shared memory of two processes: an anonymous file, mapped by both. Its length is sealed: a worker has the file as its standard
-//! input, and truncating it would cause a bus error in the host.
+//! Shared memory of two processes: an anonymous file, mapped by both. The length of the file is sealed: a worker has the file as
+//! its standard input, and truncating it would cause a bus error in the host.
 #![allow(unsafe_code)] // a mapping cannot be made without; tests/tests/system/architecture.rs lists it
 
 use crate::engine::process::SharedPage;
@@ -12,7 +12,7 @@ use std::os::fd::{AsFd, OwnedFd};
 use std::ptr::NonNull;
 use std::sync::atomic::AtomicU32;
 
-/// An [`SharedPage`] that another process may have mapped too.
+/// Mapping of a [`SharedPage`] that another process may have mapped too.
 pub(crate) struct SharedMemory {
     page: NonNull<SharedPage>,
 }
@@ -42,10 +42,10 @@ impl SharedMemory {
         Self::map(io::stdin())
     }
 
-    /// Maps a file of [`create_file`]. Not real-time.
+    /// Maps a file created by [`create_file`]. Not real-time.
     ///
     /// # Errors
-    /// If the file is not one of [`create_file`], or a system call fails.
+    /// If the file was not created by [`create_file`], or a system call fails.
     pub(crate) fn map(file: impl AsFd) -> io::Result<Self> {
         // The seal before the length: a length that was read first might be cut before the seal is there. Other files have no seals.
         let is_sealed = fcntl_get_seals(&file).is_ok_and(|seals| seals.contains(SealFlags::SHRINK));
@@ -80,7 +80,7 @@ impl Drop for SharedMemory {
     }
 }
 
-/// Sleeps until `word` is no longer `value`, or for `timeout_ns`; may wake earlier. Real-time: one system call.
+/// Sleeps until [`wake`], or for `timeout_ns`, if `word` is still `value`; may return earlier. Real-time: one system call.
 #[allow(clippy::cast_possible_wrap)] // seconds of a timeout
 pub(crate) fn wait_for_change(word: &AtomicU32, value: u32, timeout_ns: u64) {
     let timeout = Timespec {
@@ -91,7 +91,7 @@ pub(crate) fn wait_for_change(word: &AtomicU32, value: u32, timeout_ns: u64) {
     let _ = futex::wait(word, futex::Flags::empty(), value, Some(&timeout));
 }
 
-/// Wakes the other process, if it sleeps on `word`. Real-time: one system call.
+/// Wakes the other process if it sleeps on `word`. Real-time: one system call.
 pub(crate) fn wake(word: &AtomicU32) {
     let _ = futex::wake(word, futex::Flags::empty(), 1);
 }

@@ -1,13 +1,14 @@
-//! The monotonic clock, and sleeping on it.
+//! Monotonic clock and sleep.
 
 use std::sync::OnceLock;
 use std::sync::atomic::AtomicU32;
 use std::time::{Duration, Instant};
 
-/// Time of the clock at its first reading, ns: no past time is before zero.
+/// Time of the clock at its first reading, ns: no time of the past is negative.
 const BEFORE_NS: u64 = 3_600_000_000_000;
 
-/// Returns the time of the monotonic clock, ns, an hour at the first reading. Real-time: bounded, no allocation (the performance counter).
+/// Returns the time of the monotonic clock, ns; the first reading is one hour. Real-time: bounded, no allocation (the performance
+/// counter).
 #[inline]
 #[must_use]
 pub fn monotonic_ns() -> u64 {
@@ -17,7 +18,7 @@ pub fn monotonic_ns() -> u64 {
 }
 
 /// Sleeps until a time of the monotonic clock. Real-time: a few system calls; the standard library waits for a timer of high
-/// resolution where the system has one (Windows 10, 1803), else in ticks of the system.
+/// resolution where the system has one (Windows 10, 1803), otherwise for the system tick.
 #[allow(clippy::disallowed_methods)] // this is the one place that sleeps
 pub fn sleep_until(deadline_ns: u64) {
     let left_ns = deadline_ns.saturating_sub(monotonic_ns());
@@ -26,7 +27,7 @@ pub fn sleep_until(deadline_ns: u64) {
     }
 }
 
-/// Sleeps for one poll interval of a word, or until the timeout.
+/// Sleeps for one poll interval (5 ms) or the timeout, whichever is shorter, without reading the word: the caller polls.
 #[allow(clippy::disallowed_methods)]
 pub(crate) fn sleep_while_zero(_: &AtomicU32, timeout: Duration) {
     std::thread::sleep(timeout.min(Duration::from_millis(5)));

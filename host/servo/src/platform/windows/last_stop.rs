@@ -1,11 +1,11 @@
-//! End of a process on Windows: unhandled exceptions, and the end by `exit`.
+//! Last stop on Windows: handlers of unhandled exceptions and of `exit`.
 //!
-//! Nothing that runs there allocates, locks or formats into memory of its own. There are no signals: the command line handles
-//! console events, which no plugin can take away.
+//! Nothing that runs in a handler allocates, locks or formats into memory of its own. There are no signals: the command line
+//! handles console events, which no plugin can replace.
 //!
 //! Not caught: `abort` and other immediate terminations (`__fastfail`), heap corruption that the system finds, which bypass all
-//! filters; and `TerminateProcess`. Only the device itself can stop then. The end of the process by `exit` is reported by a
-//! callback of the loader, which Wine 8 does not call for a program: it is not tested.
+//! filters; and `TerminateProcess`. Only the device's own watchdog can stop it then. The end of the process by `exit` is reported
+//! by a callback of the loader, which Wine 8 does not call for a program: it is not tested.
 #![allow(unsafe_code)] // neither filter nor callback can be made without; tests/tests/system/architecture.rs lists it
 
 use crate::guest::program_handles_signals;
@@ -28,13 +28,13 @@ use windows_sys::Win32::System::Threading::{
 
 /// Capacity of a thread's name with its terminator, bytes.
 pub(crate) const NAME_BYTES: usize = 16;
-/// Part of an overflowed stack reserved for the filter, bytes: a device's stop takes little.
+/// Stack reserved for the filter after a stack overflow, bytes: a device's stop takes little.
 const STACK_BYTES: u32 = 64 * 1024;
-/// Result of a filter: the next one is called, which ends the process.
+/// Result of an exception filter: the next filter is called, which ends the process.
 const CONTINUE_SEARCH: i32 = 0;
 
 /// Installs handlers for unhandled exceptions and for `exit`, not for the ends listed in the head of this module. Repeated for each
-/// run, as a plugin may have installed others. Not real-time.
+/// run, because a plugin may have installed other handlers. Not real-time.
 pub(crate) fn install() {
     let mut bytes = STACK_BYTES;
     // SAFETY: a number that is there for the call.
@@ -65,7 +65,7 @@ unsafe extern "system" fn on_exception(exception: *const EXCEPTION_POINTERS) -> 
     CONTINUE_SEARCH
 }
 
-/// Callback of the loader at the end of the process, when this is the only thread left.
+/// Callback of the loader at the end of the process, when all other threads have ended.
 #[used]
 #[unsafe(link_section = ".CRT$XLD")]
 static AT_END: unsafe extern "system" fn(*mut c_void, u32, *mut c_void) = at_end;
@@ -163,7 +163,7 @@ pub fn spawn_unblocked(command: &mut Command) -> io::Result<Child> {
 /// Snapshot of the host's signal actions: empty on this system.
 pub struct SignalGuard;
 
-/// Signals of the host that a plugin took away: none on this system.
+/// Signals of the host whose action a plugin has replaced: none on this system.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TakenSignals(());
 
@@ -181,7 +181,7 @@ impl SignalGuard {
 }
 
 impl TakenSignals {
-    /// Returns true: no signal was taken.
+    /// Returns true: the set is always empty.
     #[must_use]
     pub const fn is_none(self) -> bool {
         true

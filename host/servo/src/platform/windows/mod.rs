@@ -1,5 +1,5 @@
-//! Windows: the performance counter, thread priorities, the end of a process. Worker processes and the watchdog process are not
-//! available yet.
+//! Windows: performance counter, thread priorities, handlers of exceptions and `exit`. Worker processes and the watchdog process
+//! are not available yet.
 
 pub(crate) mod clock;
 pub(crate) mod last_stop;
@@ -8,7 +8,7 @@ pub(crate) mod scheduling;
 pub(crate) mod shared_memory;
 pub(crate) mod watchdog_process;
 
-/// Returns the error for a part that is not on this system yet.
+/// Returns the error for a feature that is not available on this system yet.
 fn not_yet(what: &str) -> std::io::Error {
     std::io::Error::new(std::io::ErrorKind::Unsupported, format!("{what} is not supported on Windows yet"))
 }

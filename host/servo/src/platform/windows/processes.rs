@@ -1,4 +1,4 @@
-//! Processes beside the host's own.
+//! Worker processes: not available yet.
 
 use super::not_yet;
 use std::io;
@@ -8,11 +8,11 @@ use std::process::{Command, ExitStatus};
 /// `CREATE_NEW_PROCESS_GROUP`: console events reach their own group only.
 const NEW_PROCESS_GROUP: u32 = 0x200;
 
-/// Host process, with which this process ends: not available yet.
+/// Host process of this worker: not available yet.
 pub(crate) enum HostProcess {}
 
 impl HostProcess {
-    /// Binds the end of this process to that of its host: not available yet.
+    /// Returns an error: binding the end of this process to the host is not available yet.
     ///
     /// # Errors
     /// Always.
@@ -26,7 +26,7 @@ impl HostProcess {
     }
 }
 
-/// Shields the process to be started from console events.
+/// Gives the process to be started a process group of its own, which console events do not reach.
 pub(crate) fn keep_from_terminal(command: &mut Command) {
     command.creation_flags(NEW_PROCESS_GROUP);
 }

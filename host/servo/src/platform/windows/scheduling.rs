@@ -11,22 +11,22 @@ use windows_sys::Win32::System::Threading::{
 /// Advice for users if the system refuses a thread or a process.
 pub const THREAD_ADVICE: &str = "end other programs";
 
-/// Number of cores that the system can address in one group of processors.
+/// Exclusive upper limit of the core numbers that the system can address in one processor group.
 pub(crate) const MAX_CORES: usize = usize::BITS as usize;
 
-/// System's name for the priority of a loop.
+/// System's name for the priority of the loop thread.
 pub const PRIORITY_NAME: &str = "time-critical priority";
 /// Returns advice for users to allow the priority of a loop.
 pub(crate) fn priority_advice() -> String {
     "Windows refuses this priority only to programs in background mode".to_owned()
 }
 
-/// Advice for users to allow locked memory.
+/// Message for users about locked memory: unavailable on Windows.
 pub(crate) const MEMORY_ADVICE: &str = "Windows cannot lock the whole memory of a program";
 /// Advice for users to find the cores that a process may use.
 pub(crate) const CORE_ADVICE: &str = "the Task Manager lists them under \"Set affinity\"";
 
-/// Returns `None`: this system locks no whole process.
+/// Returns `None`: this system cannot lock the memory of a whole process.
 pub(crate) fn lock_memory() -> Option<Result<(), String>> {
     None
 }
@@ -34,7 +34,7 @@ pub(crate) fn lock_memory() -> Option<Result<(), String>> {
 /// Does nothing: no memory is locked.
 pub(crate) fn unlock_memory() {}
 
-/// Pins the calling thread to the core of this number; other threads of the process are not affected. Not real-time.
+/// Pins the calling thread to the core with number `core`; other threads of the process are not affected. Not real-time.
 ///
 /// # Errors
 /// If there is no such core, or the process may not use it.

@@ -1,4 +1,4 @@
-//! Watchdog process: not available yet; a run with a device that is stopped by a message reports so.
+//! Watchdog process: not available yet; starting it for a device that is stopped by a message returns an error.
 
 use super::not_yet;
 use flotor_hal::Independence;
@@ -26,7 +26,7 @@ impl HeartbeatSender {
 }
 
 impl WatchdogProcess {
-    /// Starts the process for the devices that are stopped by a message; `None` without such devices. Not real-time.
+    /// Returns `None` without a device that is stopped by a message. Not real-time.
     ///
     /// # Errors
     /// If there is such a device.
@@ -48,7 +48,7 @@ impl WatchdogProcess {
         match *self {}
     }
 
-    /// Registers the calling thread as the loop's.
+    /// Registers the calling thread as the loop thread.
     ///
     /// # Errors
     /// None.
@@ -56,7 +56,7 @@ impl WatchdogProcess {
         match *self {}
     }
 
-    /// Watches the host's process alone from now on.
+    /// Unregisters the loop thread.
     ///
     /// # Errors
     /// None.

@@ -5,7 +5,8 @@
 //! waited for no other thread.
 //!
 //! An allocation is a system call too if the C library serves each one from the system, as [`C_LIBRARY`] sets;
-//! otherwise a pair of `malloc` and `free` would leave no trace. The kernel counts reads and writes.
+//! otherwise a pair of `malloc` and `free` would leave no trace. Strict mode permits reads and writes; they are found
+//! by the counters of the kernel.
 
 use crate::validate::Outcome;
 use crate::validate::path::walk;
@@ -112,8 +113,8 @@ fn walk_locked_in(mut model: Model, ready: &Sender<i32>, stage: &AtomicU8) {
     }
 }
 
-/// Ends this process by [`CAUGHT`]. The dead thread may hold the lock of the allocator: no allocation and so no message
-/// is possible; the signal is the message.
+/// Ends this process by [`CAUGHT`]. The dead thread may hold the lock of the allocator, so this thread must not
+/// allocate and cannot write a message; the signal reports the violation.
 fn end_here() -> ! {
     let _ = kill_process(getpid(), CAUGHT);
     std::process::abort()

@@ -17,7 +17,7 @@ use std::time::Duration;
 /// Unit of processor times under /proc: `USER_HZ` is 100 on every Linux.
 const CLOCK_TICK: Duration = Duration::from_millis(10);
 
-/// Creates a file without a name in any folder.
+/// Creates an anonymous file in memory.
 pub(crate) fn anonymous_file(name: &str) -> io::Result<File> {
     Ok(File::from(memfd_create(name, MemfdFlags::CLOEXEC)?))
 }
@@ -43,7 +43,8 @@ pub(crate) fn processor_time() -> Duration {
     Duration::try_from(now).unwrap_or_default()
 }
 
-/// Returns the processor time of a process, and whether it is waiting to run.
+/// Returns the processor time of a process, and whether one of its threads is running, runnable, or waiting for a disk
+/// or a page.
 pub(crate) fn used(process: u32) -> Used {
     let fields_of = |path: String| -> Vec<String> {
         let text = std::fs::read_to_string(path).unwrap_or_default();

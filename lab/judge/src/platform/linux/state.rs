@@ -42,7 +42,7 @@ pub(crate) fn threads() -> Result<usize, Outcome> {
     fs::read_dir("/proc/self/task").map(Iterator::count).map_err(|_| no_files())
 }
 
-/// Checks that this process has loaded a library of that name, preloaded before all others.
+/// Checks that a library of that name is mapped in this process, as after a preload.
 ///
 /// # Errors
 /// [`Outcome::Missing`] if the library is not loaded.
@@ -79,7 +79,7 @@ fn scheduling() -> Vec<String> {
     [("nice", 19), ("real-time priority", 40), ("policy", 41)].map(of).to_vec()
 }
 
-/// Returns the open files, without the folder being read, whose name differs each time.
+/// Returns the open files. Leaves out the descriptor that reads the folder, whose name differs each time.
 fn files() -> Vec<String> {
     let entries = fs::read_dir("/proc/self/fd").into_iter().flatten().flatten();
     let named = entries.filter_map(|entry| Some((entry.file_name(), fs::read_link(entry.path()).ok()?)));

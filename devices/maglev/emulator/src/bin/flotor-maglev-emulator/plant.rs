@@ -1,4 +1,4 @@
-//! A device plugin as the plant, driven by the controller in place of a host.
+//! A device plugin as the plant: the controller takes the role of the host.
 
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting, read_metadata};
@@ -87,7 +87,8 @@ impl LoadedPlant {
         Ok((plant, capabilities))
     }
 
-    /// Attaches a force sensor; the sensor gets the delivered force beyond the weight, as at rest.
+    /// Attaches a force sensor, which receives the delivered vertical force plus the plant's own feed-forward less the
+    /// weight; inertia is neglected.
     pub(crate) fn sense(&mut self, force: crate::rig::SensedForce) -> Result<(), Box<dyn Error>> {
         let mut opened = self.plugin.open_device(&self.settings)?;
         let mut number = |id: &str| {

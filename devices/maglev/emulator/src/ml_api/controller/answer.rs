@@ -1,4 +1,4 @@
-//! Execution of requests: queries, settings, procedures.
+//! Execution of the clients' requests: queries, settings, procedures.
 
 use super::machine::{Command, Controller, Flight, narrow, vector};
 use super::procedure::ProcedureId;
@@ -16,7 +16,7 @@ const AUX_LIMIT_V: f32 = 10.0;
 /// Range of a position sensor, m.
 const CELL_LIMIT_M: f32 = 9.0e-3;
 
-/// Answer to a request.
+/// Reply to a request, or the procedure whose end produces the reply.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Answer {
     /// An immediate reply.
@@ -26,7 +26,8 @@ pub enum Answer {
 }
 
 impl Controller {
-    /// Executes a request. Requests about connections (disconnecting, callbacks) are the server's and only confirmed here.
+    /// Executes a request. Requests about connections (disconnecting, callbacks) are handled by the server; the
+    /// controller only acknowledges them.
     pub fn answer(&mut self, request: &Request) -> Answer {
         match *request {
             Request::Plain(Function::FindGravity) => self.find_gravity(),

@@ -41,7 +41,8 @@ impl CoilSet {
         f64::from(self.limits_a[coil]).min(CURRENT_LIMIT_A)
     }
 
-    /// Returns the currents for a wrench and the resulting wrench, scaled down where a coil is at its limit.
+    /// Returns the coil currents for a wrench, A, and the resulting wrench; both are scaled down if a coil exceeds its
+    /// limit.
     pub(super) fn driven(&self, wanted: &Wrench) -> (Currents, Wrench) {
         let Some(coils) = &self.coils else { return ([0.0; COILS], *wanted) };
         let asked = plant::Wrench { force_n: wanted.force(), torque_nm: wanted.torque() };
@@ -60,7 +61,7 @@ impl CoilSet {
         (currents_a, delivered)
     }
 
-    /// Clips currents to the limits; returns true if one was clipped.
+    /// Clips currents, A, to the limits; returns true if a current was clipped.
     pub(super) fn clipped(&self, asked_a: &AxisValues) -> (AxisValues, bool) {
         #[allow(clippy::cast_possible_truncation)] // an f32 or a limit
         let clip = |(coil, current): (usize, &f32)| {
@@ -73,13 +74,13 @@ impl CoilSet {
         (within, within != *asked_a)
     }
 
-    /// Returns the wrench of the given currents.
+    /// Returns the wrench of the coils at these currents, A.
     pub(super) fn wrench(&self, currents_a: &AxisValues) -> Wrench {
         let made = self.coils.as_ref().map(|coils| coils.wrench(&currents_a.map(f64::from)));
         made.map_or(Wrench::ZERO, |made| Wrench::new(made.force_n, made.torque_nm))
     }
 
-    /// Heats the coils with currents over `dt_s`.
+    /// Stores the coil currents, A, and heats the coils over `dt_s`.
     pub(super) fn carry(&mut self, currents_a: &Currents, dt_s: f64) {
         self.currents_a = *currents_a;
         self.thermal.heat(currents_a, dt_s);

@@ -29,12 +29,12 @@ impl Controller {
         }
     }
 
-    /// Returns the applied wrench: the demanded one within the current limits.
+    /// Returns the applied wrench: the demanded wrench within the current limits of the coils.
     pub(super) fn applied(&self) -> Wrench {
         self.coils.driven(&self.wanted()).1
     }
 
-    /// Returns force or torque of the gains on an axis.
+    /// Returns force or torque that the gains exert on an axis, N or N·m.
     fn held(&self, axis: Axis) -> f64 {
         let index = axis as usize;
         let error = self.error(axis, self.desired[index], 0.0);
@@ -58,8 +58,8 @@ impl Controller {
         AxisError { off: to - self.at[index], speed_off: wanted_speed - self.speed[index] }
     }
 
-    /// Returns the gains on an axis while flying: those of its mode and, beyond the range of a constrained axis, those of
-    /// the constraint. Both add up, because the normal gains compensate the weight.
+    /// Returns the gains that act on an axis while flying: the gains of its mode and, beyond the range of a constrained
+    /// axis, the gains of the constraint. Both add up, because the normal gains compensate the weight.
     pub(super) fn laws(&self, axis: Axis) -> [(Pid, AxisError); 2] {
         let index = axis as usize;
         let wanted_speed = match self.command {

@@ -65,7 +65,8 @@ impl Default for ControllerConfig {
 }
 
 impl ControllerConfig {
-    /// Replacing forces, landing, one commander, half a second, and a floor 9.5 mm below home.
+    /// Default configuration: a force command replaces the gains, the flotor lands after the loss of a client, one client
+    /// commands, the watchdog timeout is 0.5 s, and the stator is 9.5 mm below home.
     pub const DEFAULT: Self = Self {
         force_command: ForceCommand::Replaces,
         silence: Silence::Lands,
@@ -99,7 +100,7 @@ pub(super) enum Command {
     Currents(AxisValues),
 }
 
-/// Faults injected for a test.
+/// Fault bits injected for a test.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Injected(pub FaultBits);
 
@@ -112,7 +113,7 @@ pub(super) const KEPT: usize = 64;
 /// Crossed boundaries: -1, 0, 1 for each constrained axis, then 1 outside the sphere.
 type Sides = [i32; 7];
 
-/// The controller of a Maglev 200.
+/// Emulated controller of a Maglev 200.
 #[derive(Clone, Debug, Default)]
 pub struct Controller {
     pub(super) config: ControllerConfig,
@@ -180,7 +181,7 @@ impl Controller {
         }
     }
 
-    /// Returns the configuration.
+    /// Returns the configuration passed to [`Self::new`].
     #[must_use]
     pub fn config(&self) -> &ControllerConfig {
         &self.config
@@ -192,7 +193,7 @@ impl Controller {
         self.flight
     }
 
-    /// Returns the present faults.
+    /// Returns the fault bits; a fault stays set until a client resets the faults.
     #[must_use]
     pub fn faults(&self) -> FaultBits {
         self.faults
@@ -221,12 +222,12 @@ impl Controller {
         self.injected = injected;
     }
 
-    /// Takes the events since the last call.
+    /// Removes and returns the events since the last call.
     pub fn take_events(&mut self) -> impl Iterator<Item = Event> + '_ {
         self.events.drain(..)
     }
 
-    /// Returns the pose in the clients' frame.
+    /// Returns the pose of the flotor in the frame set by clients.
     #[must_use]
     pub fn pose(&self) -> flotor_maglev::ml_api::WirePose {
         let out_of_range = !self.is_in_range();
@@ -236,20 +237,21 @@ impl Controller {
         flotor_maglev::ml_api::WirePose { out_of_range, at: narrow(position, turn) }
     }
 
-    /// Returns the velocity in the clients' frame.
+    /// Returns the velocity of the flotor in the frame set by clients.
     pub(super) fn velocity(&self) -> AxisValues {
         let user = angles::orientation(three(&self.frame, 3));
         narrow(user * vector(&self.speed, 0), user * vector(&self.speed, 3))
     }
 
-    /// Begins a servo interval of this length, s: stores its first sample, checks for faults and advances procedures.
+    /// Begins a servo interval of `dt_s`: stores its first sample, checks for faults and advances procedures.
     pub fn sense(&mut self, sample: &Sample, dt_s: f64) {
         self.observe(sample);
         self.watch();
         self.advance(dt_s);
     }
 
-    /// Returns the wrench over the interval, s, for the newest command within the limits of the coils.
+    /// Returns the wrench over a servo interval of `dt_s`, for the newest command within the limits of the coils; heats
+    /// the coils and advances the integrals.
     pub fn drive(&mut self, dt_s: f64) -> Wrench {
         let wanted = self.wanted();
         self.integrate(dt_s);
@@ -346,7 +348,7 @@ impl Controller {
         found.map_or(Status::OFF_LINE, |(_, status)| *status)
     }
 
-    /// Returns the temperatures of the coils, °C; a made-up one for an injected over-temperature.
+    /// Returns the temperatures of the coils, °C; 260 °C for the first coil if the over-temperature is injected.
     pub(super) fn temperatures_c(&self) -> AxisValues {
         let mut all = self.coils.temperatures_c();
         if self.is_too_hot() && !self.coils.is_too_hot() {

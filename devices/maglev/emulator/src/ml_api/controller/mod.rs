@@ -1,4 +1,4 @@
-//! The controller of the Maglev 200: gains, locks, constraints, boundary, limits, faults, take-off and landing.
+//! Emulated controller of the Maglev 200: gains, locks, constraints, boundary, limits, faults, take-off and landing.
 //!
 //! Unknown behaviour of the real controller (`[?]` in the book's chapter) is decided here in favour of client programs:
 //! invalid commands are rejected with the closest status, and only a fault switches the coils off.

@@ -2,7 +2,7 @@
 
 use flotor_maglev::ml_api::{GainSet, Pid};
 
-/// Handle of a call that waits for a procedure.
+/// Id of a procedure, for which a call waits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ProcedureId(pub(super) u64);
 

@@ -27,7 +27,7 @@ const FOUND_N: f64 = 2.0e-3;
 const FOUND_NM: f64 = 1.0e-4;
 
 impl Controller {
-    /// Returns the reply to a finished procedure; `None` while in progress.
+    /// Returns the reply of a finished procedure; `None` while in progress, and after many later replies.
     #[must_use]
     pub fn reply(&self, procedure_id: ProcedureId) -> Option<Reply> {
         self.finished.iter().find(|(of, _)| *of == procedure_id).map(|(_, reply)| *reply)
@@ -111,7 +111,7 @@ impl Controller {
         self.finished.push((procedure_id, reply));
     }
 
-    /// Advances the procedure by a cycle, s, and the target of a velocity command.
+    /// Advances the procedure and the target of a velocity command by a cycle of `dt_s`.
     pub(super) fn advance(&mut self, dt_s: f64) {
         if let (Command::Velocity(speeds), Flight::Flying) = (self.command, self.flight) {
             for (desired, speed) in self.desired.iter_mut().zip(speeds) {

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// Age of an unacknowledged tick beyond which the loop no longer waits for it, s.
 const GIVEN_UP_S: f64 = 0.06;
 
-/// Shared state with its lock.
+/// State shared by the connections and the servo loop, behind one lock.
 pub struct Hub {
     state: Mutex<State>,
     changed: Condvar,
@@ -58,7 +58,7 @@ impl Hub {
         std::mem::take(&mut self.state().is_restart_wanted)
     }
 
-    /// Begins a servo interval: stores its sample and queues events for clients.
+    /// Begins a servo interval of `dt_s`: stores its first sample and queues events for clients.
     pub fn begin(&self, sample: &Sample, dt_s: f64) {
         self.state().begin(sample, dt_s, &self.log);
         self.changed.notify_all();
@@ -76,7 +76,7 @@ impl Hub {
         Some(wrench)
     }
 
-    /// Returns the wrench over the interval.
+    /// Returns the wrench over a servo interval of `dt_s`.
     #[must_use]
     pub fn drive(&self, dt_s: f64) -> Wrench {
         self.state().controller.drive(dt_s)

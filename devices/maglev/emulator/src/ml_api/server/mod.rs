@@ -22,14 +22,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-/// Largest number of connections; more are reset.
+/// Maximum number of connections; further connections are reset.
 const CONNECTIONS: usize = 60;
 /// Pause after a failed accept: the process may have no descriptor left.
 const PAUSE: Duration = Duration::from_millis(10);
 /// Write timeout: the longest time for a client to read a reply.
 const WRITE_PATIENCE: Duration = Duration::from_secs(2);
 
-/// A server with its own accept thread.
+/// Server of the ML API with its own accept thread, which runs until the process ends.
 pub struct Server {
     hub: Arc<Hub>,
 }

@@ -8,13 +8,13 @@ use flotor_maglev::ml_api::{
 };
 use std::collections::VecDeque;
 
-/// Callback for log lines.
+/// Callback that receives each log line.
 pub type Log = Box<dyn Fn(std::fmt::Arguments<'_>) + Send + Sync>;
 
 /// Number of a connection; for a callback connection, also the token.
 pub(super) type Id = u64;
 
-/// Largest number of queued events; a client that reads none loses the oldest.
+/// Maximum number of queued events; a client that reads no events loses the oldest.
 pub(super) const EVENTS: usize = 256;
 /// Number of the first connection.
 const FIRST: Id = 101;

@@ -1,8 +1,8 @@
 //! Control groups of the watchdog process. An out-of-memory daemon, a container and a service manager kill all processes of a group
 //! together, so this process leaves the groups of its host.
 //!
-//! There are two ways out: systemd moves the process into a scope of its own, or the process writes its id into an outer group. The
-//! result is read from the kernel afterwards.
+//! There are two ways to leave: systemd moves the process into a scope of its own, or the process writes its id into an outer
+//! group. The result is read from the kernel afterwards.
 
 use super::super::control_group::{Group, Mount, groups};
 use rustix::process::{geteuid, getpid};
@@ -19,7 +19,7 @@ const SCOPE_POLL: Duration = Duration::from_millis(2);
 /// Name of the group created inside an outer group that may not hold processes itself.
 const OWN_GROUP: &str = "flotor-watchdog";
 
-/// Leaves the control groups of the host; returns a group that both processes still share. Not real-time.
+/// Leaves the control groups of the host; returns the path of a group that both processes still share, or `None`. Not real-time.
 pub(super) fn join_separate_group(host: i32) -> Option<String> {
     let processes = Processes::with(host);
     processes.shared_group()?;
@@ -31,7 +31,7 @@ pub(super) fn join_separate_group(host: i32) -> Option<String> {
     processes.shared_group().map(|group| group.path)
 }
 
-/// Host and watchdog process.
+/// Host's process id, with the mounted hierarchies of control groups.
 struct Processes {
     host: i32,
     mounts: Vec<Mount>,
@@ -47,7 +47,7 @@ impl Processes {
         left_groups(&read_to_string("/proc/self/cgroup").unwrap_or_default(), &self.mounts)
     }
 
-    /// Returns a group of the host that this process is in as well, directly or through an inner group.
+    /// Returns a group of the host to which this process also belongs, directly or through an inner group.
     fn shared_group(&self) -> Option<Group> {
         let hosts = read_to_string(format!("/proc/{}/cgroup", self.host)).unwrap_or_default();
         let own = self.own();
@@ -56,8 +56,8 @@ impl Processes {
     }
 }
 
-/// Returns the groups to leave. The memory controller of version 1 is not among them: its killer ends single processes, and the
-/// memory of this process counts where that of the host does.
+/// Returns the groups to leave, without those of the memory controller of version 1: its out-of-memory killer kills single
+/// processes, and the memory of this process stays charged to the host's group.
 fn left_groups(file: &str, mounts: &[Mount]) -> Vec<Group> {
     groups(file, mounts).into_iter().filter(|group| !group.is_of("memory")).collect()
 }
@@ -99,7 +99,7 @@ fn join_scope(processes: &Processes) -> bool {
     })
 }
 
-/// Requests a scope from a manager of systemd over its bus; returns true if accepted in time.
+/// Requests a scope from a systemd manager (`--system` or `--user`) over D-Bus; returns true if accepted in time.
 fn ask_for_scope(manager: &str, started: Instant) -> bool {
     let process = getpid().as_raw_nonzero().to_string();
     let scope = format!("flotor-watchdog-{process}.scope");

@@ -14,29 +14,30 @@ use std::mem::MaybeUninit;
 use std::os::fd::{AsFd, OwnedFd};
 use std::time::Duration;
 
-/// Number of times a message is written: the first may fall into half a command of the host's, the second then starts a new
+/// Number of times a message is written: the first may follow an incomplete command of the host, the second then starts a new
 /// message, the third is a spare.
 const TIMES: u32 = 3;
-/// Pause between two writes, longer than a device takes to process one.
+/// Pause between two writes, longer than a device takes to process a message.
 const PAUSE: Duration = Duration::from_millis(2);
-/// Timeout for a full handle, per write.
+/// Timeout of a write to a handle with a full buffer.
 const PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 5_000_000 };
 
 /// Grace period for a host whose thread has ended to report an orderly end.
 const LAST_WORD: Timespec = Timespec { tv_sec: 0, tv_nsec: 1_000_000 };
 
-/// A device on guard.
+/// Guarded device: its name, the duplicated handle, and the message that stops it.
 struct Guarded {
     name: String,
     handle: OwnedFd,
     message: Vec<u8>,
 }
 
-/// Guards the devices that the host with this process id passes on standard input. Returns when the host has reported its devices
-/// stopped, or after stopping them.
+/// Guards the devices that the host with process id `host` passes over standard input. Returns when the host has reported its
+/// devices stopped, or has ended and the devices are stopped. Not real-time.
 ///
 /// # Errors
-/// Standard input is not such a socket: the process was not started as a watchdog.
+/// If standard input is not a host's socket (the process was not started as a watchdog), the host passes no devices, or there is no
+/// process `host`.
 pub fn serve(host: i32) -> io::Result<()> {
     let link = io::stdin();
     let host_number = Pid::from_raw(host);
@@ -53,7 +54,7 @@ pub fn serve(host: i32) -> io::Result<()> {
                 }
             }
             (Some(Packet::Begin), _) => break,
-            // The host has ended before anything was energised, or is none.
+            // The host has ended before any device was energised, or the other end is no host.
             _ => return Err(io::Error::other("the host passed no devices")),
         }
     }
@@ -72,7 +73,7 @@ pub fn serve(host: i32) -> io::Result<()> {
     let mut watch = Watch { link, process, thread: None, patience: None };
     let event = loop {
         match watch.wait_for_event() {
-            // The host may go on, or be killed later: this process stays.
+            // The host may continue, or be killed later: this process keeps watching.
             Event::HostSilent => {
                 stop(&devices);
                 report("the host is suspended or hangs", &devices);
@@ -94,7 +95,7 @@ fn report(why: &str, devices: &[Guarded]) {
     let _ = writeln!(io::stderr(), "flotor watchdog: {why}; stopped {}", names.join(", "));
 }
 
-/// Event of a host.
+/// Event at the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Event {
     EndedInOrder,
@@ -103,7 +104,7 @@ enum Event {
     HostGone,
 }
 
-/// The watch over a host.
+/// Sources of events at a host.
 struct Watch<L> {
     link: L,
     process: OwnedFd,
@@ -114,8 +115,7 @@ struct Watch<L> {
 }
 
 impl<L: AsFd> Watch<L> {
-    /// Waits until the host reports its end, closes the link or ends, until the thread of its loop ends, or until its heartbeat is
-    /// overdue.
+    /// Waits until the host reports its end, closes the link or ends, until its loop thread ends, or until its heartbeat is overdue.
     fn wait_for_event(&mut self) -> Event {
         loop {
             let Self { link, process, thread, patience } = self;
@@ -153,14 +153,14 @@ fn patience_of(limit_ns: &[u8]) -> Option<Timespec> {
     Timespec::try_from(Duration::from_nanos(u64::from_le_bytes(limit_ns.try_into().ok()?))).ok()
 }
 
-/// Returns a handle of the thread with this id; `None` before Linux 6.9, which has handles of processes only.
+/// Returns a pidfd of the thread with the encoded id; `None` before Linux 6.9, which has pidfds of processes only.
 fn thread_of(number: &[u8]) -> Option<OwnedFd> {
-    // PIDFD_THREAD, which rustix has no name for, is this flag.
+    // `PIDFD_THREAD`, which rustix does not name, has the value of `O_EXCL`.
     let of_thread = PidfdFlags::from_bits_retain(OFlags::EXCL.bits());
     pidfd_open(Pid::from_raw(i32::from_le_bytes(number.try_into().ok()?))?, of_thread).ok()
 }
 
-/// Writes each message several times, each time to all devices.
+/// Writes the message of every device [`TIMES`] times, in rounds over all devices.
 fn stop(devices: &[Guarded]) {
     for Guarded { handle, .. } in devices {
         // The host shares the handle with its flags, but does not run any more.
@@ -196,7 +196,8 @@ fn put(handle: &OwnedFd, message: &[u8]) {
     }
 }
 
-/// Receives the next packet: its kind, the rest, and the attached handle; no kind if the other end is closed.
+/// Receives the next packet: its kind, the bytes after the kind, and the attached handle. No kind if the other end is closed or the
+/// kind is unknown.
 fn receive(link: impl AsFd) -> io::Result<(Option<Packet>, Vec<u8>, Option<OwnedFd>)> {
     let mut bytes = [0; PACKET_BYTES];
     let mut room = [MaybeUninit::uninit(); rustix::cmsg_space!(ScmRights(1))];

@@ -1,4 +1,4 @@
-//! Host side: starts the watchdog process, and ends it.
+//! Host side: start and end of the watchdog process.
 
 use super::{PACKET_BYTES, Packet, bytes_of};
 use crate::engine::process::parent::program;
@@ -17,7 +17,7 @@ use std::process::{Child, Command, Stdio};
 /// Timeout for the watchdog process to be ready.
 const PATIENCE: Timespec = Timespec { tv_sec: 5, tv_nsec: 0 };
 
-/// Watchdog process of this host. Dropping it reports that the devices are stopped, and ends the process.
+/// Watchdog process of this host. Dropping it reports to the process that the devices are stopped, and waits for the process to end.
 pub struct WatchdogProcess {
     child: Child,
     link: OwnedFd,
@@ -25,10 +25,11 @@ pub struct WatchdogProcess {
 }
 
 impl WatchdogProcess {
-    /// Starts the process for the devices that are stopped by a message, each with its name; `None` without such devices. Not real-time.
+    /// Starts the watchdog process for those of `devices` (each with its name) that are stopped by a message, and waits until it is
+    /// ready; `None` without such devices. Not real-time.
     ///
     /// # Errors
-    /// If a system call fails, or the process does not answer.
+    /// If a system call fails, or the process is not ready within 5 s.
     pub fn start<'a>(
         devices: impl IntoIterator<Item = (&'a str, &'a Independence)>,
     ) -> io::Result<Option<Self>> {
@@ -61,7 +62,8 @@ impl WatchdogProcess {
         Ok(process)
     }
 
-    /// Returns the control group that the process shares with the host, because it could not leave: killing the group ends both.
+    /// Returns the control group that the process shares with the host because it could not leave: killing the group ends both.
+    /// `None` if it shares none.
     #[must_use]
     pub fn shared_group(&self) -> Option<&str> {
         self.shared_group.as_deref()
@@ -75,7 +77,8 @@ impl WatchdogProcess {
         Ok(HeartbeatSender { link: self.link.try_clone()? })
     }
 
-    /// Registers the calling thread as the loop's: its end without an orderly end counts as the host's. Not real-time.
+    /// Registers the calling thread as the loop thread: if the thread ends before an orderly end is reported, the watchdog process
+    /// stops the devices, as at the end of the host. Not real-time.
     ///
     /// # Errors
     /// If the watchdog process has ended.
@@ -83,7 +86,7 @@ impl WatchdogProcess {
         self.say(Packet::Thread, &gettid().as_raw_nonzero().get().to_le_bytes())
     }
 
-    /// Watches the host's process alone from now on: the registered thread may end. Not real-time.
+    /// Unregisters the loop thread, which may end from now on; only the host's process is watched. Not real-time.
     ///
     /// # Errors
     /// If the watchdog process has ended.
@@ -106,7 +109,7 @@ impl WatchdogProcess {
         Ok(())
     }
 
-    /// Returns true if the process has ended early, for any reason. Not real-time.
+    /// Returns true if the watchdog process has ended early, for any reason. Not real-time.
     #[must_use]
     pub fn is_gone(&self) -> bool {
         // The process sends nothing more: any event is the end of the link.
@@ -114,7 +117,7 @@ impl WatchdogProcess {
         poll(&mut link, Some(&Timespec { tv_sec: 0, tv_nsec: 0 })).is_ok_and(|seen| seen > 0)
     }
 
-    /// Waits until the process is ready; returns the control group that it could not leave.
+    /// Waits until the process is ready; returns the control group that the process could not leave.
     fn wait_until_ready(&self) -> io::Result<Option<String>> {
         let mut answer = [0; PACKET_BYTES];
         let mut link = [PollFd::new(&self.link, PollFlags::IN)];
@@ -129,13 +132,14 @@ impl WatchdogProcess {
     }
 }
 
-/// Sender of heartbeats to the watchdog process, which stops the devices without them: this process may be stopped or traced.
+/// Sender of heartbeats to the watchdog process, which stops the devices if a heartbeat is overdue, because this process is
+/// suspended or traced. Dropping it announces that no more heartbeats follow.
 pub struct HeartbeatSender {
     link: OwnedFd,
 }
 
 impl HeartbeatSender {
-    /// Sends a heartbeat and announces the next one within `limit_ns`. Bounded: never waits.
+    /// Sends a heartbeat and announces the next heartbeat within `limit_ns`. Bounded: never waits.
     pub(crate) fn give(&self, limit_ns: u64) {
         self.send(&bytes_of(Packet::Alive, &limit_ns.to_le_bytes()));
     }
@@ -152,7 +156,8 @@ impl Drop for HeartbeatSender {
     }
 }
 
-/// Starts a watchdog process without devices and ends it; returns the control group shared with this process. Not real-time.
+/// Starts a watchdog process without devices and ends it; returns the control group that the process shared with this process,
+/// `None` if it shared none. Not real-time.
 ///
 /// # Errors
 /// As for [`WatchdogProcess::start`].

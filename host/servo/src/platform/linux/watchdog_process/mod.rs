@@ -38,7 +38,7 @@ enum Packet {
     Quiet = b'q',
     /// From the process: ready; with the control group shared with the host, if it could not leave one.
     Ready = b'r',
-    /// To the process: the devices are stopped and need no guard any more.
+    /// To the process: the devices are stopped and need not be guarded any more.
     End = b'e',
 }
 
@@ -58,7 +58,7 @@ impl Packet {
     }
 }
 
-/// Encodes a packet; the end of a long one is cut off.
+/// Encodes a packet; a packet longer than [`PACKET_BYTES`] is truncated.
 fn bytes_of(packet: Packet, rest: &[u8]) -> Vec<u8> {
     std::iter::once(packet as u8).chain(rest.iter().copied()).take(PACKET_BYTES).collect()
 }
