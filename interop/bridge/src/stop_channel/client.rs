@@ -10,12 +10,12 @@ use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Retry interval of a hello, and time from a press to a new hello: a flood may lose some datagrams.
+/// Timeouts after a hello and after a press, before a new hello: in a flood, datagrams may be lost.
 const HELLO_WAIT: Duration = Duration::from_millis(50);
 const PRESS_WAIT: Duration = Duration::from_millis(300);
 /// Timeout of the final reply, which includes the hosts' confirmation.
 const ANSWER_WAIT: Duration = Duration::from_secs(5);
-/// Grace period for other endpoints after the first reply: they may be further bridges of that name, or silent.
+/// Grace period after the first confirmation: another endpoint may be a bridge of the same name that refuses.
 const OTHERS_WAIT: Duration = Duration::from_secs(1);
 
 /// Presses the emergency stop by datagrams and by a session in parallel; returns as soon as one path has succeeded.
@@ -86,7 +86,7 @@ fn outcome(answers: &Receiver<Result<Option<String>, String>>) -> Result<(), Str
     }
 }
 
-/// Presses the emergency stop at one endpoint; returns the reason of a refusal.
+/// Presses the emergency stop at one endpoint; returns the reason of a refusal, `None` on success.
 fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Option<String>> {
     let places: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
     let of_family = |is_ipv4: bool, any: &str| {

@@ -206,7 +206,7 @@ export! {
     fn drdTrackGrip(_gap: f64, id: i8) -> c_int [-1] {
         go(id, Goal { position_m: None, angles_rad: None }, Way::Follow)
     }
-    /// Reads position, m, angles, rad, 0 for a gripper, and rotation matrix, by rows.
+    /// Reads position, m, angles, rad, 0 for a gripper, and rotation matrix, row-major.
     fn drdGetPositionAndOrientation(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
