@@ -1,4 +1,4 @@
-//! Tally of a run so far: counts of events, and the largest wrench.
+//! Counts of a run's events so far, and a scale of arrows for its largest wrench.
 
 use crate::scene::ArrowScale;
 use flotor_core::trace::Events;

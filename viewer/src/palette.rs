@@ -1,8 +1,8 @@
 //! Colours, light and dark, distinguishable with any kind of colour vision.
 //!
 //! Lines and plates: after Okabe and Ito, "Color Universal Design" (2008), with a darker green and a lighter blue (on white: darker);
-//! the originals, equal in lightness, look alike without blue cones. Strain: viridis (van der Walt and Smith, 2015),
-//! whose lightness rises all the way, so that it reads in grey as well.
+//! the originals, equal in lightness, look alike without blue cones (tritanopia). Strain: viridis (van der Walt and Smith,
+//! 2015), whose lightness increases monotonically, so that it is readable in greyscale as well.
 
 use clap::builder::Resettable;
 use egui::Color32;

@@ -32,7 +32,7 @@ pub enum StudyKey {
     Digit(u8),
     /// Type the decimal point of a rating.
     Point,
-    /// Delete the last digit.
+    /// Delete the last digit or the decimal point.
     Back,
 }
 
@@ -76,7 +76,7 @@ pub struct Prompt {
 pub struct Waker(Arc<OnceLock<Context>>);
 
 impl Waker {
-    /// Requests a picture.
+    /// Requests a repaint of the window.
     pub fn wake(&self) {
         if let Some(context) = self.0.get() {
             context.request_repaint();
