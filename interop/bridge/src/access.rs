@@ -199,7 +199,7 @@ fn peer_config(folder: &Path, name: &str, members: &Members) -> Value {
     })
 }
 
-/// Returns the metadata that this program reads in a configuration: name, expiry, and stop keys.
+/// Returns the metadata that this program reads in a configuration: name, expiry, and, with members, the path of the stop keys.
 fn metadata(folder: &Path, name: &str, members: &Members) -> Value {
     let expires_s = since_1970().as_secs().saturating_add(members.valid.as_secs());
     if members.peers.is_empty() {

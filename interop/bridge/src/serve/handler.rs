@@ -22,7 +22,7 @@ use zenoh::query::{Query, Queryable};
 
 /// Timeout of a host's reply.
 const ANSWER_WAIT: Duration = Duration::from_secs(2);
-/// Limit on pending requests to the host, which handles some thousand a second. An emergency stop bypasses the queue.
+/// Limit on pending requests to the host, which handles some thousand requests per second. An emergency stop bypasses the queue.
 const MOST_OPEN: usize = 32;
 /// Limit on queued requests and queries.
 const MOST_IN_LINE: usize = 256;

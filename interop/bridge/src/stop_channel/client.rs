@@ -66,7 +66,8 @@ fn press(stop: &StopChannel, bridge: &Name) -> Result<(), String> {
     outcome(&answers)
 }
 
-/// Waits for the replies, after the first one only for a grace period; succeeds with one confirmation and no refusal.
+/// Waits for the replies, after the first confirmation only for a grace period; succeeds with a confirmation and without a
+/// refusal.
 fn outcome(answers: &Receiver<Result<Option<String>, String>>) -> Result<(), String> {
     let mut until = Instant::now() + 2 * ANSWER_WAIT;
     let mut is_done = false;
@@ -105,7 +106,7 @@ fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Optio
     };
     let until = Instant::now() + ANSWER_WAIT;
     let mut pending = message(Content::Hello)?;
-    // Any press may be answered; the reply to the last one comes after the hosts have confirmed.
+    // The bridge replies to each accepted press after the hosts have confirmed; any of these replies counts.
     let mut presses: Vec<Nonce> = Vec::new();
     while Instant::now() < until {
         let datagram =

@@ -14,7 +14,7 @@ const CONSENT: &str = "FLOTOR_SHARED_CONTROL_GROUP";
 pub enum Pace {
     /// The machine's clock; the program runs at its own rate.
     Real,
-    /// The program's commands: one tick each, without waiting, so that a run is repeatable.
+    /// The program's calls that command or wait: they advance the run without delay, so that a run is repeatable.
     Lockstep,
 }
 

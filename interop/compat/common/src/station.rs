@@ -244,7 +244,7 @@ impl Station {
         Ok(())
     }
 
-    /// Returns the rate of commands over the last complete half second, Hz; 0 before.
+    /// Returns the rate of commands over the last complete window of at least half a second, Hz; 0 before.
     #[must_use]
     pub fn command_rate_hz(&self) -> f64 {
         flotor_core::lock(&self.rate).hz

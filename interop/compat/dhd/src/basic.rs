@@ -50,7 +50,7 @@ export! {
     fn dhdOpenID(index: i8) -> c_int [-1] { opened(index) }
     /// Opens a device by number, as [`dhdOpenID`].
     fn drdOpenID(index: i8) -> c_int [-1] { opened(index) }
-    /// Opens the device with a serial number.
+    /// Opens the device with this serial number, which is its number plus one; an error if it is open.
     fn dhdOpenSerial(serial: c_int) -> c_int [-1] { result(open_first(|open| whole(open.number) + 1 == serial)) }
     /// Opens the first device of a type.
     fn dhdOpenType(wanted: c_int) -> c_int [-1] { result(open_first(|open| kind(open.station) == wanted)) }
@@ -58,7 +58,7 @@ export! {
     fn dhdClose(id: i8) -> c_int [-1] { result(close(id)) }
     /// Closes a device, as [`dhdClose`].
     fn drdClose(id: i8) -> c_int [-1] { result(close(id)) }
-    /// Makes a device the default one, with id -1.
+    /// Makes an open device the default device, which id -1 selects.
     fn dhdSetDevice(id: i8) -> c_int [-1] { result(set_default(id)) }
     /// Sets the default device, as [`dhdSetDevice`].
     fn drdSetDevice(id: i8) -> c_int [-1] { result(set_default(id)) }

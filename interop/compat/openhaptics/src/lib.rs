@@ -158,7 +158,7 @@ export! {
 
     /// Starts the scheduler, and enables the force of devices whose force output is enabled.
     fn hdStartScheduler() -> () [()] { raise_unless(scheduler::start(), Code::TimerError, CURRENT.get()) }
-    /// Stops the scheduler and waits for its end: no callback is called afterwards.
+    /// Stops the scheduler and disables force; unless called by a callback, waits for its end: no callback is called afterwards.
     fn hdStopScheduler() -> () [()] { scheduler::stop() }
     /// Sets the rate of the scheduler, 1000 or 500 Hz.
     fn hdSetSchedulerRate(rate_hz: c_ulong) -> () [()] {
