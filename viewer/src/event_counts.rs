@@ -30,7 +30,7 @@ impl EventCounts {
         event_counts
     }
 
-    /// Adds a sample.
+    /// Counts the events of a sample, and enlarges the scale of arrows to fit its wrench.
     pub fn add(&mut self, sample: &Sample) {
         self.since_s.get_or_insert(sample.time_s());
         let bits = sample.events.bits();

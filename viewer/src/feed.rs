@@ -29,9 +29,9 @@ and its watchdog stops the device. Check the terminal, and start the run again";
 pub enum FeedState {
     /// The run continues.
     Running,
-    /// The run has ended, with its reason and kind.
+    /// The run has ended; the values are the reason and the kind of the end.
     Ended(String, EndKind),
-    /// The connection broke off, or the host sent invalid data, with the error.
+    /// The connection was lost, or the host sent invalid data; the value is the error message.
     Lost(String),
 }
 

@@ -40,9 +40,9 @@ pub struct Palette {
     pub components: [Color32; 3],
     /// Cursor at the displayed time.
     pub cursor: Color32,
-    /// Ground and grid lines.
+    /// Surface and grid lines of the ground.
     pub ground: [Color; 2],
-    /// Plate at the handle, plate at the fixed end.
+    /// Plate at the handle, also for tools; plate at the fixed end, also for handles of a second recording.
     pub plates: [Color; 2],
     /// Bodies other than springs.
     pub body: Color,
@@ -50,7 +50,7 @@ pub struct Palette {
     pub force: Color,
     /// Torque arrows.
     pub torque: Color,
-    /// Touching turns of a coil.
+    /// Touching turns of a coil, and marks of contacts.
     pub contact: Color,
     /// Warnings, and limits on the time axis.
     pub warning: Color32,

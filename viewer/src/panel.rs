@@ -100,7 +100,7 @@ impl Panel {
         }
     }
 
-    /// Applies the outcome of a change.
+    /// Applies the outcome of a change: displays the value in force, or the reason for the rejection. Ignores other plugins.
     pub fn apply(&mut self, change: &ChangeMessage) {
         if change.plugin != self.name || change.subject != Subject::Parameter {
             return;

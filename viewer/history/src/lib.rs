@@ -92,7 +92,8 @@ impl History {
         (0..count).map(|device| Self { device, ..Self::new(run.clone(), retention) }).collect()
     }
 
-    /// Reads the history of each device from a recording. Damage after the first tick loses only the ticks after it and becomes a note.
+    /// Reads the history of each device from a recording. If the file is damaged after the first tick, the ticks before the damage are
+    /// kept, and a note describes the damage.
     ///
     /// # Errors
     /// [`ReadError`] if no part of the file is usable.
@@ -139,7 +140,7 @@ impl History {
         self.run.devices().nth(usize::from(self.device)).map_or("", |device| device.name.as_str())
     }
 
-    /// Adds a tick, unless of another device; at the limit of retained samples, removes the oldest sample.
+    /// Adds a tick of this device, and ignores ticks of other devices; at the limit of retained samples, removes the oldest sample.
     pub fn push(&mut self, record: &TickRecord) {
         if record.device != self.device {
             return;

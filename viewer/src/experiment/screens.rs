@@ -1,4 +1,4 @@
-//! Screens for a person in a sitting: few words, large, in the middle, without any hint at the stiffness.
+//! Screens for a person in a sitting: few words, large, in the middle, which give no hint of the stiffness.
 //!
 //! All sizes are fractions of the height, so that a text is readable from the same distance on every display. The keys stand beneath
 //! their text.

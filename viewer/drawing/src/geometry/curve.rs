@@ -17,7 +17,7 @@ type Components = [f64; 7];
 /// Smooth curve with a frame along it, through reported sections at even arc lengths at rest.
 ///
 /// Cubic Hermite pieces whose slopes are differences of fourth order (third at the ends): between 65 sections of a
-/// spring bent by its own length the error is below a thousandth of its wire (a test holds it).
+/// spring bent by its own length the error is below a thousandth of the wire's diameter (tested).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     values: Vec<Components>,

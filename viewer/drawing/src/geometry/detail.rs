@@ -1,4 +1,4 @@
-//! Resolution of meshes: as fine as can be seen, and no finer.
+//! Resolution of meshes, limited to visible detail.
 
 use super::Body;
 use std::f64::consts::PI;
