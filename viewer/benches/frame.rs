@@ -1,7 +1,7 @@
-//! What a picture of a running host costs the processor: the shape of the spring or of a solid of 5 000 triangles, its mesh, and
-//! six traces of ten seconds.
+//! Cost of a picture of a running host: the shape of the spring or of a solid of 5 000 triangles, its mesh, and six traces of ten
+//! seconds.
 //!
-//! Processor time of the thread, not time on the wall: what other programs take meanwhile does not count.
+//! Measured is the processor time of the thread, not wall-clock time: the load of other programs does not count.
 
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, criterion_group, criterion_main};
@@ -155,7 +155,7 @@ fn frame(criterion: &mut Criterion<ProcessorTime>) {
             black_box((mesh.indices.len(), facts))
         });
     });
-    // As while ticks come: each picture has 16 new ones.
+    // As in a running host: 16 new ticks per picture.
     let mut coming = History::new(run("spring"), Retention::Newest(20_000));
     let mut ticks = (0..).map(record);
     ticks.by_ref().take(10_000).for_each(|record| coming.push(&record));
@@ -186,21 +186,21 @@ fn two_devices() -> RunDescription {
     run
 }
 
-/// The whole picture but its rasterising: interface, six traces of ten seconds, 3D scene, and egui's triangles of it all.
+/// Whole picture without rasterisation: interface, six traces of ten seconds, 3D scene, and egui's tessellation.
 fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     let context = egui::Context::default();
     let start = Start::Recording(Recorded {
         at_s: Some(0.0),
         ..Recorded::new(vec![history()], vec![library("spring")])
     });
-    // Drawn by an adapter, whose threads are not this one; without any, by this one.
+    // Drawn by an adapter, on other threads; without an adapter, on this thread.
     let state =
         std::panic::catch_unwind(|| create_render_state(default_wgpu_setup(), Default::default())).ok();
     if state.is_none() {
         eprintln!("there is no adapter: the whole picture includes the 3D scene drawn on the processor");
     }
     let mut viewer = Viewer::new(&context, state.as_ref(), start, Look::Dark);
-    // What a GPU does otherwise, at the size the scene has in this window: not part of the bound.
+    // Usually done by a GPU, at the size that the scene has in this window; not part of the bound.
     let run = history();
     let (mut shapes, _) = shapes_of(run.run(), &[library("spring")]);
     let camera = Camera::experimenter(SceneBuilder::height_mm(&shapes));

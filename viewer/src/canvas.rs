@@ -51,7 +51,7 @@ impl Canvas {
         Self::Cpu { rasterizer: Rasterizer::default(), samples, texture: None }
     }
 
-    /// Draws a mesh and returns the texture.
+    /// Draws a mesh and returns the id of its texture, which the next call draws over.
     pub fn draw(&mut self, context: &Context, mesh: &Mesh, view: &View<'_>) -> TextureId {
         const FILTER: wgpu::FilterMode = wgpu::FilterMode::Nearest;
         match self {

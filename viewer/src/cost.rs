@@ -15,7 +15,7 @@ pub struct Cost {
     pub pictures: u64,
     /// Processor time of all threads.
     pub processor: Duration,
-    /// Memory in use at the end, MiB.
+    /// Resident memory at the end, MiB; 0 if unknown.
     pub resident_mib: u64,
 }
 
@@ -84,7 +84,7 @@ impl Opening {
         Self { opened: now, first: pictures, pictures, last: now, longest: Duration::ZERO }
     }
 
-    /// True until the start-up is over.
+    /// Updates the intervals between pictures; returns true until the start-up is over.
     fn goes_on(&mut self, now: Instant, pictures: u64) -> bool {
         if pictures != self.pictures {
             self.longest = self.longest.max(now - self.last);

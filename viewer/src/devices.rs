@@ -73,7 +73,7 @@ impl Devices {
         &self.seen[self.chosen.min(self.seen.len() - 1)].history
     }
 
-    /// Returns the tally of the chosen device.
+    /// Returns the event counts of the chosen device.
     #[must_use]
     pub fn event_counts(&self) -> &EventCounts {
         &self.seen[self.chosen.min(self.seen.len() - 1)].event_counts
@@ -84,7 +84,7 @@ impl Devices {
         self.seen.iter().map(|seen| (seen.name.as_str(), &seen.history))
     }
 
-    /// Returns the sample of each device at a time, s, in order; `None` before the first tick of every device.
+    /// Returns the sample of each device at a time, s, in order; `None` until every device has a sample.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Option<Vec<Sample>> {
         self.seen.iter().map(|seen| seen.history.at(time_s).copied()).collect()

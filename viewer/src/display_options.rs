@@ -24,7 +24,7 @@ impl DisplayOptions {
         Self { device, traces, force_position, arrow_force_n: None }
     }
 
-    /// Sets the force of an arrow of full length, N.
+    /// Sets the force of an arrow of full length, N; `None`: the largest force of the run.
     #[must_use]
     pub fn with_arrow_force(self, arrow_force_n: Option<f64>) -> Self {
         Self { arrow_force_n, ..self }

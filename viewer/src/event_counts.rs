@@ -1,4 +1,4 @@
-//! Tally of a run so far: counts of events, and the largest wrench.
+//! Counts of a run's events so far, and a scale of arrows for its largest wrench.
 
 use crate::scene::ArrowScale;
 use flotor_core::trace::Events;
@@ -30,7 +30,7 @@ impl EventCounts {
         event_counts
     }
 
-    /// Adds a sample.
+    /// Counts the events of a sample, and enlarges the scale of arrows to fit its wrench.
     pub fn add(&mut self, sample: &Sample) {
         self.since_s.get_or_insert(sample.time_s());
         let bits = sample.events.bits();

@@ -39,10 +39,11 @@ const SCALE: f32 = 2.0;
 /// Height of title and margins, points.
 const TITLE_PT: f32 = 66.0;
 
-/// Writes the shown traces of a device to an unused file name in the working folder. `device` is its name if there are several.
+/// Writes the shown traces of a device to an unused file name in the working folder; returns its path. `device` is the device's
+/// name, if the run has several devices.
 ///
 /// # Errors
-/// [`ExportError`].
+/// [`ExportError`] if the file cannot be written, or a picture is too low for the traces.
 pub fn export(
     history: &History,
     device: Option<&str>,
@@ -57,7 +58,7 @@ pub fn export(
 /// Writes the shown traces of a device to a file.
 ///
 /// # Errors
-/// [`ExportError`].
+/// [`ExportError`] if the file cannot be written, or a picture is too low for the traces.
 pub fn write(
     history: &History,
     device: Option<&str>,

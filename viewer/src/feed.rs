@@ -11,9 +11,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-/// Largest number of buffered ticks: a hidden window takes no ticks, and memory stays bounded.
+/// Largest number of buffered ticks; beyond it the oldest are dropped, because a hidden window reads no ticks.
 const MOST_WAITING: usize = 32_768;
-/// Largest number of buffered answers; above it, only the newest change of each parameter is buffered.
+/// Largest number of buffered answers; with as many buffered changes, only the newest change of each parameter is buffered.
 const MOST_ARRIVALS: usize = 1024;
 /// Timeout of a read, after which the thread checks for its end.
 const READ_WAIT: Duration = Duration::from_millis(200);
@@ -29,9 +29,9 @@ and its watchdog stops the device. Check the terminal, and start the run again";
 pub enum FeedState {
     /// The run continues.
     Running,
-    /// The run has ended, with its reason and kind.
+    /// The run has ended; the values are the reason and the kind of the end.
     Ended(String, EndKind),
-    /// The connection broke off, or the host sent invalid data, with the error.
+    /// The connection was lost, or the host sent invalid data; the value is the error message.
     Lost(String),
 }
 
@@ -101,7 +101,7 @@ impl Feed {
         Ok(Self { waiting, is_over, request_client, greeting, run })
     }
 
-    /// Takes the data received since the last call.
+    /// Returns the data received since the last call, and clears the buffer.
     #[must_use]
     pub fn arrivals(&self) -> Arrivals {
         std::mem::take(&mut lock(&self.waiting).arrivals)
@@ -113,7 +113,7 @@ impl Feed {
         lock(&self.waiting).state.clone()
     }
 
-    /// True if the run continues but no tick came for [`STALE_AFTER`].
+    /// Returns whether the run continues but no tick has arrived for [`STALE_AFTER`].
     #[must_use]
     pub fn is_stale(&self) -> bool {
         let waiting = lock(&self.waiting);

@@ -138,7 +138,7 @@ fn fill(image: &mut ColorImage, clip: Rect, corners: [Vertex; 3], texel: impl Fn
     }
 }
 
-/// True if the centre of a pixel lies in a range.
+/// Returns whether the centre of a pixel lies in the range from `low`, included, to `high`, excluded.
 fn clip_contains(low: f32, high: f32, pixel: usize) -> bool {
     let middle = pixel as f32 + 0.5;
     middle >= low && middle < high

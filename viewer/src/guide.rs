@@ -47,7 +47,7 @@ impl Guide {
         self.hands.get(device).is_some_and(Option::is_some)
     }
 
-    /// Returns the device whose hand is guided.
+    /// Returns the number of the device whose hand is guided; `None` if no hand is.
     #[must_use]
     pub fn held(&self) -> Option<usize> {
         self.held.as_ref().map(|held| held.device)
@@ -58,7 +58,7 @@ impl Guide {
         self.held = self.has_hand(device).then(|| Held { device, target_mm: handle_m * 1.0e3, sent: None });
     }
 
-    /// Moves the target by a vector, m, within the largest coordinates.
+    /// Moves the target by a vector, m; each coordinate is limited to 50 mm from home.
     pub fn move_by(&mut self, by_m: DVec3) {
         if let Some(held) = &mut self.held {
             let target_mm = held.target_mm + by_m * 1.0e3;
@@ -72,7 +72,8 @@ impl Guide {
         Some(Ask::Set { values: vec![self.value(device, GUIDE, "0".to_owned())] })
     }
 
-    /// Returns the request that is due at a time: changed coordinates, or the repetition of an unchanged target.
+    /// Returns the request that is due at a time: changed coordinates, or the repetition of an unchanged target; `None` if no request
+    /// is due.
     pub fn due(&mut self, now: Instant) -> Option<Ask> {
         let held = self.held.as_mut()?;
         let (device, target_mm, sent) = (held.device, held.target_mm, held.sent);

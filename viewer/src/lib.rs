@@ -11,7 +11,7 @@
 //!   by [`flat`].
 //! - [`ui`], [`palette`]: parts of the interface; [`app`]: window with all parts; [`sound`]: acoustic warning.
 //! - [`window`]: opening of the window; [`cost`]: processor time and memory; [`frame_rate`]: pictures per second.
-//! - [`saved_settings`]: settings of the window, saved for the next time.
+//! - [`saved_settings`]: settings of the window, saved for the next window.
 //! - [`experiment`]: a sitting of a perception experiment, and its screens.
 //!
 //! Not real-time.

@@ -268,7 +268,7 @@ fn whole_window(
     write_png(out, &image).map_err(Failure::file)
 }
 
-/// Writes a file of the traces.
+/// Writes the traces of a recording to a file.
 fn traces(arguments: &Arguments, histories: Vec<History>, chosen: &DisplayOptions) -> Result<(), Failure> {
     let Some(out) = &arguments.export else { return Ok(()) };
     let mut devices = Devices::new(histories);

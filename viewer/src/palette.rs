@@ -1,8 +1,8 @@
 //! Colours, light and dark, distinguishable with any kind of colour vision.
 //!
 //! Lines and plates: after Okabe and Ito, "Color Universal Design" (2008), with a darker green and a lighter blue (on white: darker);
-//! the originals, equal in lightness, look alike without blue cones. Strain: viridis (van der Walt and Smith, 2015),
-//! whose lightness rises all the way, so that it reads in grey as well.
+//! the originals, equal in lightness, look alike without blue cones (tritanopia). Strain: viridis (van der Walt and Smith,
+//! 2015), whose lightness increases monotonically, so that it is readable in greyscale as well.
 
 use clap::builder::Resettable;
 use egui::Color32;
@@ -40,9 +40,9 @@ pub struct Palette {
     pub components: [Color32; 3],
     /// Cursor at the displayed time.
     pub cursor: Color32,
-    /// Ground and grid lines.
+    /// Surface and grid lines of the ground.
     pub ground: [Color; 2],
-    /// Plate at the handle, plate at the fixed end.
+    /// Plate at the handle, also for tools; plate at the fixed end, also for handles of a second recording.
     pub plates: [Color; 2],
     /// Bodies other than springs.
     pub body: Color,
@@ -50,7 +50,7 @@ pub struct Palette {
     pub force: Color,
     /// Torque arrows.
     pub torque: Color,
-    /// Touching turns of a coil.
+    /// Touching turns of a coil, and marks of contacts.
     pub contact: Color,
     /// Warnings, and limits on the time axis.
     pub warning: Color32,

@@ -100,7 +100,7 @@ impl Panel {
         }
     }
 
-    /// Applies the outcome of a change.
+    /// Applies the outcome of a change: displays the value in force, or the reason for the rejection. Ignores other plugins.
     pub fn apply(&mut self, change: &ChangeMessage) {
         if change.plugin != self.name || change.subject != Subject::Parameter {
             return;
@@ -157,7 +157,7 @@ impl Panel {
         self.entries.iter_mut().filter(|entry| entry.wanted.is_some()).for_each(PanelEntry::give_up);
     }
 
-    /// Stores the value of a parameter before a change of the user, for undo.
+    /// Stores the value of a parameter before a change of the user, for undo; at most the last hundred changes.
     pub fn begin(&mut self, index: usize, before: Value) {
         const MOST: usize = 100;
         if self.earlier.len() == MOST {
@@ -172,7 +172,8 @@ impl Panel {
         !self.earlier.is_empty()
     }
 
-    /// Restores the displayed value before the last change; returns the index of its parameter, to be sent.
+    /// Restores the displayed value before the last change; returns the index of its parameter, to be sent. `None` without a change,
+    /// or if the parameter is no longer editable.
     pub fn undo(&mut self) -> Option<usize> {
         let (index, before) = self.earlier.pop()?;
         let entry = self.entries.get_mut(index).filter(|entry| entry.editability == Editability::Free)?;
@@ -189,7 +190,7 @@ impl Panel {
         true
     }
 
-    /// Returns the change to send, with the displayed value.
+    /// Marks the displayed value of a parameter as requested; returns the change to send, `None` for an unknown index.
     pub fn change(&mut self, index: usize) -> Option<SetValue> {
         let entry = self.entries.get_mut(index)?;
         entry.wanted = Some(entry.value.clone());
@@ -202,7 +203,7 @@ impl Panel {
 }
 
 impl PanelEntry {
-    /// Sets the value in force. A requested value stays displayed while the loop approaches it, and not if the loop moves away.
+    /// Sets the value in force. A requested value stays displayed while the loop approaches it, but not if the loop moves away from it.
     fn settle(&mut self, now: Value) {
         if let Some(wanted) = &self.wanted
             && (wanted.is_about(&now) || wanted.distance(&now) > wanted.distance(&self.in_force))

@@ -121,7 +121,7 @@ fn least_height_of_px(plots: &PlotStack, scale: f32) -> usize {
 /// Draws a run at one time: 3D view, numbers, traces.
 ///
 /// # Errors
-/// [`PictureError::Empty`], [`PictureError::TooLow`].
+/// [`PictureError::Empty`] without ticks, [`PictureError::TooLow`] if the traces do not fit.
 pub fn picture(
     histories: Vec<History>,
     shapes: &mut [Shape],
@@ -134,7 +134,7 @@ pub fn picture(
 /// Returns the interface that shows a run at one time, for [`draw_without_window`].
 ///
 /// # Errors
-/// [`PictureError::Empty`], [`PictureError::TooLow`].
+/// [`PictureError::Empty`] without ticks, [`PictureError::TooLow`] if the traces do not fit.
 pub fn interface(
     histories: Vec<History>,
     shapes: &mut [Shape],
@@ -225,7 +225,7 @@ pub fn draw_without_window(
 /// Writes a picture as PNG.
 ///
 /// # Errors
-/// [`PictureError::Write`].
+/// [`PictureError::Write`] if the file cannot be written.
 pub fn write_png(path: &Path, image: &ColorImage) -> Result<(), PictureError> {
     let write = || -> Result<(), png::EncodingError> {
         let file = std::io::BufWriter::new(std::fs::File::create(path)?);

@@ -13,7 +13,7 @@ use std::collections::VecDeque;
 /// Keys that may be the emergency stop.
 const STOP_KEYS: [Key; 3] = [key_of(StopKey::Escape), key_of(StopKey::Space), key_of(StopKey::F12)];
 
-/// Splitter for the input of a late picture, at presses and releases.
+/// Queue that splits the input of a late picture at presses and releases.
 #[derive(Debug, Default)]
 pub struct PointerOrder {
     /// Events for later pictures, in order.
@@ -22,7 +22,7 @@ pub struct PointerOrder {
 
 impl PointerOrder {
     /// Limits the input of a picture to the events up to the next press or release; returns true if more events are pending and another
-    /// picture should be made at once.
+    /// picture should be drawn at once.
     pub fn split(&mut self, input: &mut RawInput) -> bool {
         let arrived = std::mem::take(&mut input.events);
         let (ordered, others): (Vec<_>, Vec<_>) = arrived.into_iter().partition(is_in_order);

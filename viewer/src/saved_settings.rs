@@ -71,7 +71,7 @@ impl SavedSettings {
         found
     }
 
-    /// Saves the settings.
+    /// Saves the settings to a file atomically; creates its folder if absent.
     ///
     /// # Errors
     /// If the folder or the file cannot be written.

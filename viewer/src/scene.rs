@@ -16,14 +16,15 @@ use flotor_history::Sample;
 /// Scale of force and torque arrows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArrowScale {
-    /// Force with an arrow as long as the body, N.
+    /// Force drawn as an arrow as long as the body is high, N.
     pub force_n: f64,
-    /// Torque with an arrow of a 3/4 turn, N·m.
+    /// Torque drawn as an arrow of a 3/4 turn, N·m.
     pub torque_nm: f64,
 }
 
 impl ArrowScale {
-    /// Returns the scale at which the largest force and torque of the samples have full arrows.
+    /// Returns the scale at which the largest force and torque of the samples have arrows of full length; a smallest scale for small
+    /// or no samples.
     #[must_use]
     pub fn fitting<'a>(samples: impl Iterator<Item = &'a Sample>) -> Self {
         /// Smallest scale: smaller forces and torques have short arrows.
@@ -53,7 +54,7 @@ impl ArrowScale {
     }
 }
 
-/// Ratio of the body height to the arrow of the largest force: the tip is visible in the default view, also at rest.
+/// Ratio of the body height to the arrow length of the largest force, so that the tip is visible in the default view, also at rest.
 const FULL_FORCE: f64 = 3.6;
 
 /// Data of a scene at one time.
@@ -77,16 +78,16 @@ impl<'a> Moment<'a> {
 #[derive(Default)]
 pub struct SceneBuilder {
     mesh: Mesh,
-    /// Static ground at the start of the mesh, built once.
+    /// Ground at the start of the mesh, rebuilt only when it changes.
     ground: Option<Ground>,
-    /// Number of corners and of indices of the ground in the mesh.
+    /// Number of vertices and of indices of the ground in the mesh.
     bare: [usize; 2],
     corners_made: u64,
     /// Largest value of a surface so far: the end of the colour scale.
     largest: f64,
 }
 
-/// Facts about a scene, for legends and warnings.
+/// Properties of a scene, for legends and warnings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SceneFacts {
     /// Meaning of the colours; `None` without a scale.
@@ -120,7 +121,7 @@ pub struct ArrowKey {
     pub mm_per_n: f64,
     /// Largest force so far, or the chosen force, N.
     pub full_force_n: f64,
-    /// Torque with an arrow of a 3/4 turn, N·m.
+    /// Torque drawn as an arrow of a 3/4 turn, N·m.
     pub torque_nm: f64,
 }
 
@@ -152,7 +153,7 @@ impl SceneBuilder {
         MM_PER_M * if tallest > 0.0 { tallest } else { EMPTY_HEIGHT_M }
     }
 
-    /// Returns the number of corners built so far, without the ground.
+    /// Returns the total number of vertices built so far, without the ground.
     #[must_use]
     pub fn corners_made(&self) -> u64 {
         self.corners_made
@@ -167,7 +168,7 @@ impl SceneBuilder {
         Extent { height_mm, width_mm: MM_PER_M * placing.width_m() }
     }
 
-    /// Builds the scene at one time, for a picture of this height in pixels.
+    /// Builds the scene at one time, for a picture of this height in pixels; returns its mesh and properties.
     #[allow(clippy::too_many_arguments)] // independent arguments with a single call site
     pub fn build(
         &mut self,
@@ -211,7 +212,7 @@ impl SceneBuilder {
                     .map(|shadow| Shadow { center_m: shadow.center_m + place_m.truncate(), ..shadow }),
             );
             let start = self.mesh.vertices.len();
-            // Before the translucent bodies.
+            // Drawn before the translucent bodies.
             compared.iter().for_each(|pose| self.compared_handle(*pose, palette, height_m));
             self.bodies(shapes, (device, sample), palette, pixels_per_mm, &mut facts);
             if shows_arrows {
@@ -302,7 +303,7 @@ impl SceneBuilder {
         }
     }
 
-    /// Moves all corners from an index on.
+    /// Moves all vertices from an index on.
     fn shift(&mut self, from: usize, by_m: DVec3) {
         if by_m == DVec3::ZERO {
             return;
@@ -427,7 +428,7 @@ fn in_scene_frame(first: Option<&Shape>, sample: &Sample) -> (Pose, Wrench) {
     let Some(mapping) = first.map(Shape::mapping) else {
         return (sample.pose, Wrench::new(force_n, torque_nm));
     };
-    // Only the direction turns: an arrow shows the wrench on the hand, not the wrench of the model.
+    // Rotate only: an arrow shows the wrench on the hand, not the wrench of the model.
     let turn = mapping.rotation();
     (mapping.pose_to_model(&sample.pose), Wrench::new(turn * force_n, turn * torque_nm))
 }

@@ -33,20 +33,20 @@ pub enum Rest {
 /// Extent of a body at rest, m.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extent {
-    /// Extent below home.
+    /// Depth of the lowest point below home.
     pub below_m: f64,
-    /// Radius about the vertical axis through home.
+    /// Largest distance from the vertical axis through home.
     pub beside_m: f64,
 }
 
 impl Extent {
-    /// Returns the extent of a shape.
+    /// Returns the extent of the vertices of a shape and of the corners of its primitives.
     #[must_use]
     pub fn of(shape: &flotor_hal::Shape) -> Self {
         let corners = shape.surface.vertices.iter().map(|vertex| DVec3::from_array(vertex.position_m));
         let primitives = shape.primitives.iter().flat_map(|primitive| {
             let (pose, half) = (primitive.pose(), DVec3::from_array(primitive.half_sides_m()));
-            let half = if primitive.form() == Some(Form::Sphere) { half * 0.58 } else { half }; // 1 / root of 3
+            let half = if primitive.form() == Some(Form::Sphere) { half * 0.58 } else { half }; // 1 / square root of 3
             [-1.0, 1.0].into_iter().flat_map(move |x| {
                 [-1.0, 1.0].into_iter().flat_map(move |y| {
                     [-1.0, 1.0].map(|z| pose.position() + pose.orientation() * (half * DVec3::new(x, y, z)))
@@ -196,7 +196,7 @@ impl Shape {
         &self.mapping
     }
 
-    /// Sets a live parameter of the viewer's instance and updates the body at rest.
+    /// Sets a live parameter of the viewer's instance and updates the body at rest; ignores an unknown key.
     pub fn set_parameter(&mut self, key: &str, number: f64) {
         if let Ok(setting) = Setting::number(self.model.parameters(), key, number) {
             self.model.set_parameter(setting.index(), setting.value());

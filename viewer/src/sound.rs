@@ -1,8 +1,8 @@
 //! Acoustic warning.
 //!
 //! Programs that play sound are part of every desktop, and a sound library would bring C and packages of the system into
-//! the build. A short tone goes to the first such program found, else a bell to the terminal. The tone has three
-//! partials far apart, audible through white noise in headphones, and sounds at most once a second.
+//! the build. The first such program found plays a short tone; without one, a bell character goes to the terminal. The tone
+//! has three partials an octave apart, audible through white noise in headphones, and sounds at most once a second.
 
 use std::io::{IsTerminal, Write};
 use std::path::Path;
@@ -58,7 +58,7 @@ fn play(sound: &[u8]) -> Option<Child> {
     let mut command = Command::new(name);
     command.args(arguments).stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::null());
     let mut child = command.spawn().ok()?;
-    // A pipe takes 64 KiB without a reader, so this write does not block.
+    // A pipe buffers 64 KiB without a reader, so this write does not block.
     let _ = child.stdin.take()?.write_all(sound);
     Some(child)
 }

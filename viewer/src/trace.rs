@@ -46,8 +46,8 @@ impl Trace {
         self.visited
     }
 
-    /// Returns the points of each component between two times, at most two for each of `buckets` buckets, with values times
-    /// `per_si`. A component has a list for each stretch without a gap.
+    /// Returns the points of each component between two times, s: at most two points for each of `buckets` buckets, with values
+    /// multiplied by `per_si`. A component has a list of points for each stretch without a gap.
     pub fn points(
         &mut self,
         history: &History,

@@ -110,7 +110,7 @@ fn for_the_next_time(
 /// Opens a window and blocks until it is closed; returns its cost, if `request` has a duration to measure.
 ///
 /// # Errors
-/// [`WindowError`].
+/// [`WindowError`] without a display or an adapter, or if the open window is lost or panics.
 pub fn open(
     start: Start,
     chosen: DisplayOptions,
@@ -199,7 +199,7 @@ struct Kept {
     viewer: Viewer,
     file: Option<PathBuf>,
     kept: SavedSettings,
-    /// Settings before this start, and the options of the command line, for this time only.
+    /// Saved settings at the start, and the options of the command line, which are not saved.
     before: SavedSettings,
     request: WindowOptions,
     chosen: DisplayOptions,
@@ -221,7 +221,7 @@ impl eframe::App for Kept {
         let now =
             SavedSettings { size_pt: size_pt.unwrap_or(self.kept.size_pt), zoom, ..self.viewer.settings() };
         let now = for_the_next_time(now, &self.before, self.request, &self.chosen);
-        // Not with every picture during a drag.
+        // Do not save with every picture during a drag.
         if now != self.kept && !ui.input(|input| input.pointer.any_down()) {
             let _ = now.save(file); // a full disk only loses the settings
             self.kept = now;

@@ -1,4 +1,5 @@
-//! Keys and access control: one command sets up a network whose members are all known, each with its rights.
+//! Keys and access control of a network: certificate, private key, stop key and Zenoh configuration of each member, and the
+//! rights of each.
 
 use crate::keys::{Name, ROOT};
 use crate::request::{ANYONE, Right};
@@ -16,25 +17,26 @@ use std::os::unix::fs::{OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Members of a network.
+/// Hosts of the bridge and members of a network, with the validity of their keys.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Members {
-    /// Names or addresses of the bridge's host.
+    /// Names or addresses of the bridge's host, for its certificate and for the members' endpoints.
     pub hosts: Vec<String>,
-    /// Names of people or machines, each once, with their rights.
+    /// Names of people or machines with their rights; each name once.
     pub peers: Vec<(Name, Right)>,
-    /// Validity of the keys: without a revocation, a leaving member loses access at its end.
+    /// Validity of the keys from now on. A single key cannot be revoked: a former member keeps access until the keys expire, or
+    /// until all keys are replaced.
     pub valid: Duration,
 }
 
-/// Default validity of the keys: a year.
+/// Default validity of the keys: 365 days.
 pub const VALID: Duration = Duration::from_secs(365 * DAY_S);
 const DAY_S: u64 = 86_400;
-/// Configuration key of the member's name.
+/// Key of the member's name in the `metadata` of a configuration.
 pub const MEMBER: &str = "member";
-/// Configuration key of the certificate's expiry, s since 1970.
+/// Key of the certificate's expiry, s since 1970, in the `metadata` of a configuration.
 pub const EXPIRES: &str = "expires_s";
-/// Configuration key of the file of stop keys ([`crate::stop_channel`]).
+/// Key of the path of the stop keys ([`crate::stop_channel`]) in the `metadata` of a configuration.
 pub const STOP_KEYS: &str = "stop_keys";
 
 /// Error of writing keys.
@@ -66,10 +68,11 @@ const BRIDGE: &str = "bridge";
 /// File name of the certificate authority, reserved among the members.
 const AUTHORITY: &str = "authority";
 
-/// Writes certificates, keys and one Zenoh configuration for the bridge and each member; returns the paths of the configurations.
+/// Writes certificate, private key and Zenoh configuration of the bridge and of each member, and the stop keys, to `folder`,
+/// which is created if absent. Returns the paths of the configurations, the bridge's first.
 ///
 /// # Errors
-/// [`AccessError`]; no file is ever replaced.
+/// [`AccessError`]. Existing files are never replaced; files that were written before the error remain.
 pub fn write_keys(folder: &Path, members: &Members) -> Result<Vec<PathBuf>, AccessError> {
     for (at, (name, _)) in members.peers.iter().enumerate() {
         let before = members.peers.iter().take(at).any(|(other, _)| other == name);
@@ -114,8 +117,8 @@ fn write_stop_keys(folder: &Path, members: &Members) -> Result<(), AccessError> 
     if all.is_empty() { Ok(()) } else { write(&folder.join(format!("{BRIDGE}.stop")), &all, Readers::Owner) }
 }
 
-/// Creates the certificate authority of all members, and its certificate. The authority's key is discarded: a new member requires
-/// new keys for all, and nobody can ever add a member secretly.
+/// Creates the certificate authority of all members, and its certificate as PEM. The authority's key is discarded: a new member
+/// requires new keys for all, and nobody can ever add a member secretly.
 fn authority(valid: Duration) -> Result<(Issuer<'static, KeyPair>, String), AccessError> {
     let mut parameters = CertificateParams::default();
     expire(&mut parameters, valid);
@@ -137,8 +140,8 @@ fn member(name: &str, hosts: &[String], valid: Duration) -> Result<CertificatePa
     Ok(parameters)
 }
 
-/// Returns the first file with a private key that others than its owner may read or write: a file named by the TLS section of a
-/// Zenoh configuration, the stop keys, or the configuration itself if it contains a key.
+/// Returns the first file with a private key that users other than its owner can access (any of the mode bits 077): a key file
+/// of the TLS section, the stop keys, or the configuration itself if it contains a key.
 pub(crate) fn exposed_key(tls: &Value, metadata: &Value, config: Option<&Path>) -> Option<PathBuf> {
     let text = |key: &str| tls.get(key).and_then(Value::as_str);
     let ends = ["listen", "connect"];
@@ -152,15 +155,15 @@ pub(crate) fn exposed_key(tls: &Value, metadata: &Value, config: Option<&Path>) 
     named.chain(holding).find(is_exposed)
 }
 
-/// Sets the validity: from yesterday, for clocks that differ, to the chosen time from now.
+/// Sets the validity period: from one day ago, to tolerate clocks that differ, until `valid` from now.
 fn expire(parameters: &mut CertificateParams, valid: Duration) {
     let at = |s: u64| date_time_ymd(1970, 1, 1) + Duration::from_secs(s);
     parameters.not_before = at(since_1970().as_secs().saturating_sub(DAY_S));
-    // Certificates end before year 10000.
+    // The year of a certificate's date has four digits.
     parameters.not_after = at(since_1970().as_secs().saturating_add(valid.as_secs()).min(8000 * 365 * DAY_S));
 }
 
-/// Returns the TLS section of a Zenoh configuration: both ends present certificates.
+/// Returns the TLS section of a Zenoh configuration, with certificates of both ends (mutual TLS).
 fn tls(folder: &Path, name: &str) -> Value {
     let file = |name: &str, kind: &str| folder.join(format!("{name}.{kind}")).display().to_string();
     json!({
@@ -196,7 +199,7 @@ fn peer_config(folder: &Path, name: &str, members: &Members) -> Value {
     })
 }
 
-/// Returns the metadata that this program reads in a configuration: name, expiry, and stop keys.
+/// Returns the metadata that this program reads in a configuration: name, expiry, and, with members, the path of the stop keys.
 fn metadata(folder: &Path, name: &str, members: &Members) -> Value {
     let expires_s = since_1970().as_secs().saturating_add(members.valid.as_secs());
     if members.peers.is_empty() {
@@ -205,7 +208,8 @@ fn metadata(folder: &Path, name: &str, members: &Members) -> Value {
     json!({ MEMBER: name, EXPIRES: expires_s, STOP_KEYS: folder.join(format!("{name}.stop")) })
 }
 
-/// Returns the access control of a bridge without keys: peers are not distinguished, but none can publish as the bridge.
+/// Returns the access control section for a bridge without keys: peers are not distinguished and may send any request, but no
+/// peer can publish the bridge's messages.
 pub(crate) fn of_anyone() -> Vec<(&'static str, Value)> {
     let rules: Vec<Value> = rules().into_iter().chain(asking(&Name::anyone(), Right::Own)).collect();
     let allowed: Vec<Value> = rules.iter().map(|rule| rule["id"].clone()).collect();
@@ -222,7 +226,8 @@ fn rule(id: &str, flow: &str, messages: Value, keys: Vec<String>) -> Value {
     json!({ "id": id, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": keys })
 }
 
-/// Returns the rules for all peers: they receive the bridge's messages; peers with the right to couple publish the hand's state.
+/// Returns the common rules: with `tell` and `listen` a peer receives the bridge's messages, with `couple` it publishes the peer
+/// state of a coupling.
 fn rules() -> Vec<Value> {
     let of_any = |keys: &[&str]| keys.iter().map(|key| format!("{ROOT}/*/{key}")).collect::<Vec<_>>();
     vec![
@@ -242,7 +247,7 @@ fn rules() -> Vec<Value> {
     ]
 }
 
-/// Returns the rules for a member's requests, under the member's own name only: one for each right up to the member's.
+/// Returns the rules that permit a member's requests, on keys with the member's own name only: one rule per right up to `right`.
 fn asking(name: &Name, right: Right) -> Vec<Value> {
     let rights = Right::ALL.into_iter().filter(|other| *other <= right);
     let asks = rights.map(|right| {
@@ -252,7 +257,8 @@ fn asking(name: &Name, right: Right) -> Vec<Value> {
     asks.collect()
 }
 
-/// Returns the access control of a bridge: deny by default; all peers receive, members send requests by their rights.
+/// Returns the access control section for a bridge with members: deny by default; every member receives the bridge's messages,
+/// and sends the requests that its right permits.
 fn access_control(members: &Members) -> Value {
     let mut rules = rules();
     let mut policies = Vec::new();
@@ -260,7 +266,7 @@ fn access_control(members: &Members) -> Value {
         let asking = asking(name, *right);
         let mut allowed = vec![json!("tell"), json!("listen")];
         allowed.extend(asking.iter().map(|rule| rule["id"].clone()));
-        // The other end of a coupling moves the hand here, so it needs the right to operate.
+        // The other end of a coupling exerts force on the hand here, so it needs the right to operate.
         allowed.extend((*right >= Right::Operate).then_some(json!("couple")));
         policies.push(json!({ "rules": allowed, "subjects": [name.to_string()] }));
         rules.extend(asking);

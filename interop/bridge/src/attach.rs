@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Timeout of a message, and poll interval for a stop.
+/// Timeout for the next event, and so the poll interval of the stop flag.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
 /// Error of republishing a remote run.
@@ -25,7 +25,8 @@ pub enum AttachError {
 }
 
 impl Serve for RequestClient {
-    /// Forwards the request to the remote host, and waits for the reply.
+    /// Forwards the request to the remote host and waits for the reply. Rejects a swap; ignores requests that concern this machine
+    /// only.
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
         if matches!(ask, Ask::Swap { .. }) {
             let words = "a remote model cannot be swapped; swap the model on the machine of the host, which has the plugin file";
@@ -36,7 +37,8 @@ impl Serve for RequestClient {
     }
 }
 
-/// Republishes one remote run after the other until stopped. `report_line` receives a line for people at each change.
+/// Republishes each remote run in turn until `stop` is set; `report_line` receives a human-readable line at the start and at the
+/// end of each run. Not real-time.
 ///
 /// # Errors
 /// [`AttachError`] of the network or of this machine.

@@ -1,13 +1,13 @@
-//! Bilateral teleoperation: transports the messages of the two ends of a coupling, between a host here and a remote bridge.
+//! Bilateral teleoperation: forwards the peer state of the two ends of a coupling between a local host and a remote bridge.
 //!
 //! ```text
 //!  host -> peer socket -> couple -> flotor/NAME/couple/COUPLING -> serve -> peer socket -> host
 //!       <-             <-        <- flotor/NAME/news/COUPLING   <-       <-             <-
 //! ```
 //!
-//! Both directions are best effort, and only the newest message counts: without room a message is dropped, here and in Zenoh.
-//! No message is trusted: one that is no [`Dispatch`] is rejected and counted; a host accepts one partner, and checks the partner's
-//! claims as far as possible (`flotor_coupling`).
+//! Both directions are best effort, and only the newest message counts: a full queue drops messages, here and in Zenoh.
+//! Messages are not trusted: a message that is not a valid [`Dispatch`] is rejected and counted; a host accepts one partner, and
+//! checks the partner's claims as far as possible (`flotor_coupling`).
 
 use crate::keys::Name;
 use crate::link::{LinkError, WaitNow};
@@ -24,9 +24,9 @@ use zenoh::pubsub::{Publisher, Subscriber};
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
-/// Poll interval of both sides: half a period at 1 kHz.
+/// Poll interval for messages of the host and of the network: half a tick at 1 kHz.
 const LOOK_PERIOD: Duration = Duration::from_micros(500);
-/// Limit on pending messages from the network; further ones are dropped.
+/// Capacity of the queue of messages from the network; further messages are dropped.
 const MOST_WAITING: usize = 64;
 /// Poll interval for new couplings.
 const FIND_PERIOD: Duration = Duration::from_millis(200);
@@ -62,13 +62,13 @@ impl Side {
 /// Message counts of a coupling.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MessageCounts {
-    /// Messages of the host here, sent to the network.
+    /// Number of messages from the local host that were sent to the network.
     #[serde(rename = "told")]
     pub sent: u64,
-    /// Messages from the network, passed to the host here.
+    /// Number of messages from the network that were forwarded to the local host.
     #[serde(rename = "heard")]
     pub received: u64,
-    /// Malformed messages from the network.
+    /// Number of malformed messages from the network.
     #[serde(rename = "refused")]
     pub rejected: u64,
 }
@@ -79,7 +79,7 @@ struct Counts {
     sent: AtomicU64,
     received: AtomicU64,
     rejected: AtomicU64,
-    /// Run id here, and run id that the other end answers; 0: none, or unknown.
+    /// Run id of the local end, and partner's run id in the newest message of the other end; 0: none, or unknown.
     here: AtomicU64,
     answered: AtomicU64,
 }
@@ -113,7 +113,7 @@ pub enum CoupleError {
     Thread(#[from] std::io::Error),
 }
 
-/// Peer links of all couplings of the hosts that run here.
+/// Peer links of all couplings of this user's running hosts.
 pub struct Couplers {
     session: Session,
     directory: Directory,
@@ -137,7 +137,8 @@ impl Couplers {
         }
     }
 
-    /// Starts links for new couplings and drops those of ended runs, once per poll interval. `report` receives a line for people on each.
+    /// Starts links for new couplings and drops the links of ended runs, at most every 200 ms; in between returns at once. `report`
+    /// receives a human-readable line for each started or ended link.
     ///
     /// # Errors
     /// [`CoupleError`] of a new link.
@@ -180,8 +181,8 @@ impl Couplers {
     }
 }
 
-/// Links the couplings of hosts here to those of the same name behind a bridge, until stopped. `report` receives a line for
-/// people at each change.
+/// Links the couplings of local hosts to the couplings of the same name at a bridge, until `stop` is set. `report` receives a
+/// human-readable line at each change. Not real-time.
 ///
 /// # Errors
 /// [`CoupleError`] of a link.
@@ -218,7 +219,7 @@ pub fn couple(
     Ok(())
 }
 
-/// Peer link of one coupling, in both directions; its thread ends when dropped, or when the host has ended.
+/// Peer link of one coupling, in both directions. Its thread ends when the link is dropped, or when the host has ended.
 struct Coupler {
     counts: Arc<Counts>,
     stop: Arc<AtomicBool>,
@@ -295,7 +296,7 @@ fn carry(
                 return;
             }
         }
-        // Only the last pending message is new. Messages of the host are local: none is rejected.
+        // Forward only the newest pending message. The local host sends no malformed messages, so none is counted as rejected.
         let mut newest = None;
         while let Ok(Some(dispatch)) = socket.receive() {
             newest = Some(dispatch);

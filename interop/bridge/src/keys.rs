@@ -1,21 +1,21 @@
 //! Zenoh keys and the messages on each.
 //!
-//! | key | what | how |
+//! | key | content | transport |
 //! |---|---|---|
 //! | `flotor/NAME/alive` | presence of a bridge | liveliness token |
 //! | `flotor/NAME/status` | JSON [`crate::status::Status`] | published on change, and on query |
 //! | `flotor/NAME/greeting` | JSON [`flotor_live::Greeting`]: plugins, parameters, limits | on query |
-//! | `flotor/NAME/run` | protobuf `flotor.Run` | on query: late joiners miss nothing they need |
-//! | `flotor/NAME/tf` | protobuf `foxglove.FrameTransform` | published, one a tick |
-//! | `flotor/NAME/tick` | protobuf `flotor.Tick` | published, one a tick, after its pose |
+//! | `flotor/NAME/run` | protobuf `flotor.Run` | on query, for late joiners |
+//! | `flotor/NAME/tf` | protobuf `foxglove.FrameTransform` | published once per tick |
+//! | `flotor/NAME/tick` | protobuf `flotor.Tick` | published once per tick, after its pose |
 //! | `flotor/NAME/change` | protobuf `flotor.Change` | published |
 //! | `flotor/NAME/end` | JSON [`flotor_live::End`] | published |
 //! | `flotor/NAME/news/COUPLING` | [`flotor_core::peer::Dispatch`] of this end of a coupling | published, best effort |
 //! | `flotor/NAME/couple/COUPLING` | [`flotor_core::peer::Dispatch`] of the other end | put by the peer, best effort |
 //! | `flotor/NAME/ask/REQUEST/MEMBER` | JSON [`crate::request::NumberedRequest`] | request with a reply |
 //!
-//! The messages are those of a recording. Each request has a key of its own, so that Zenoh's access control decides by key
-//! which member may send it: see [`crate::request::Request::key`].
+//! The protobuf messages are those of a recording. Each kind of request has a key of its own, so that Zenoh's access control
+//! decides by key which member may send it: see [`crate::request::Request::key`].
 
 use std::fmt;
 
@@ -26,13 +26,13 @@ pub const ROOT: &str = "flotor";
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Name(String);
 
-/// The text is no valid name.
+/// Error: the text is not a valid name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("invalid name `{0}`: use letters a to z, digits and hyphens, at most 40")]
 pub struct NoName(String);
 
 impl Name {
-    /// Checks a name: 1 to 40 lower-case letters, digits and hyphens.
+    /// Creates a name from 1 to 40 lower-case ASCII letters, digits and hyphens.
     ///
     /// # Errors
     /// [`NoName`] for any other text.
@@ -50,7 +50,8 @@ impl Name {
         Self(crate::request::ANYONE.to_owned())
     }
 
-    /// Returns the name of this machine, with other characters replaced by hyphens.
+    /// Returns the host name of this machine in lower case, other characters replaced by hyphens, truncated to 40; `host` if there
+    /// is none.
     #[must_use]
     pub fn of_this_machine() -> Self {
         let system = rustix::system::uname();
@@ -60,13 +61,13 @@ impl Name {
         Self::new(&text).unwrap_or_else(|_| Self("host".to_owned()))
     }
 
-    /// Returns the key of a message of this bridge.
+    /// Returns this bridge's key for `what`: `flotor/NAME/what`.
     #[must_use]
     pub fn key(&self, what: &str) -> String {
         format!("{ROOT}/{self}/{what}")
     }
 
-    /// Returns the bridge that a key belongs to.
+    /// Returns the name of the bridge in a key; `None` if the key is not one of this program.
     #[must_use]
     pub fn of_key(key: &str) -> Option<Self> {
         let name = key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?;

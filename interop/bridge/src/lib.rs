@@ -1,4 +1,4 @@
-//! A running host on a network, over [Zenoh](https://zenoh.io): for a remote viewer, recorder or operator.
+//! Access to a running host over a network ([Zenoh](https://zenoh.io)), for remote viewers, recorders and operators.
 //!
 //! ```text
 //!  machine A                                              machine B
@@ -9,7 +9,7 @@
 //!
 //! [`serve`] is one end: a client of the host ([`flotor_live`]) that publishes the host's messages on keys ([`keys`]) in the format
 //! of a recording. [`remote`] is the other end; [`attach`] republishes a remote run locally, and [`record`] records it. [`couple`]
-//! links a hand here to a remote one. Requests take the reverse path ([`request`]); Zenoh's access control decides who may send
+//! couples a local hand to a remote hand. Requests take the reverse path ([`request`]); Zenoh's access control decides who may send
 //! which, by keys and configurations from [`access`]. An emergency stop takes a second path beside Zenoh: [`stop_channel`].
 //!
 //! Not real-time: nothing here runs in the process of a servo.

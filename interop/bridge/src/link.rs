@@ -1,4 +1,4 @@
-//! Session on the network.
+//! Zenoh session of this program: default endpoints, checks of the keys, and the stop channel that belongs to it.
 
 use crate::access;
 use crate::keys::Name;
@@ -12,9 +12,9 @@ use std::ops::Deref;
 use std::path::PathBuf;
 use zenoh::{Config, Session, Wait};
 
-/// Zenoh protocol of Unix sockets.
+/// Prefix of Zenoh endpoints on Unix sockets.
 const UNIX: &str = "unixsock-stream/";
-/// Prefix of the sockets of bridges: `bridge-NAME`.
+/// Prefix of the file names of bridge sockets: `bridge-NAME`.
 const SOCKET: &str = "bridge-";
 
 /// Command line options of a session.
@@ -46,7 +46,7 @@ pub enum LinkError {
         /// Cause.
         reason: String,
     },
-    /// A private key is readable by other users: a reader of the key is a member for as long as the certificate is valid.
+    /// Other users can read a private key: whoever has the key can act as the member until the certificate expires.
     #[error("other users may read the key in {}; `chmod 600 {}`, and make new keys if another user may have read \
     the file", file.display(), file.display())]
     ExposedKey {
@@ -65,7 +65,7 @@ pub enum LinkError {
     /// The session cannot be opened.
     #[error("cannot open the session: {0}; check that the endpoint is free and the peer is running")]
     Open(String),
-    /// The network refuses an operation.
+    /// A network operation has failed.
     #[error("network error: {0}; check the connection and the peer")]
     Network(String),
 }
@@ -76,9 +76,9 @@ impl From<zenoh::Error> for LinkError {
     }
 }
 
-/// Wait for operations that complete at once: all declarations here are local.
+/// Synchronous completion of a Zenoh operation, with its error as [`LinkError`].
 pub(crate) trait WaitNow<T> {
-    /// Waits for the operation.
+    /// Waits for the operation. A declaration is local and completes at once.
     fn wait_now(self) -> Result<T, LinkError>;
 }
 
@@ -100,7 +100,7 @@ pub enum End {
     Visiting,
 }
 
-/// Open session, and the member name of this program.
+/// Open session, with member name, expiry of the keys, and stop channel of this program.
 #[derive(Clone)]
 pub struct Link {
     session: Session,
@@ -111,14 +111,15 @@ pub struct Link {
 }
 
 impl Link {
-    /// Returns whether the keys predate stop keys: a member's emergency stop then relies on a session alone, which a flood of
-    /// connections delays.
+    /// Returns whether the keys lack stop keys, which older versions did not write: a member's emergency stop then relies on a
+    /// session alone, which a flood of connections can delay.
     #[must_use]
     pub fn lacks_stop_keys(&self) -> bool {
         self.lacks_stop_keys
     }
 
-    /// Returns the second path of an emergency stop; `None` if the keys have none.
+    /// Returns the stop channel, the second path of an emergency stop; `None` without a TCP or TLS endpoint, and for a bridge with
+    /// access control but without stop keys.
     #[must_use]
     pub fn stop_channel(&self) -> Option<&StopChannel> {
         self.stop_channel.as_ref()
@@ -130,7 +131,7 @@ impl Link {
         &self.member
     }
 
-    /// Returns the remaining validity of the keys, days.
+    /// Returns the remaining validity of the keys, days: 0 if expired, `None` without an expiry in the configuration.
     #[must_use]
     pub fn days_left(&self) -> Option<u64> {
         Some(self.expires_s?.saturating_sub(since_1970().as_secs()) / 86_400)
@@ -146,8 +147,8 @@ impl Deref for Link {
 }
 
 impl LinkOptions {
-    /// Fills in default endpoints if none are given: sockets in the folder of this user's runs, which no other user may
-    /// enter. A bridge listens on its own socket; visitors connect to all sockets found.
+    /// Fills in default endpoints if neither a configuration nor an endpoint is given: sockets in the folder of this user's runs,
+    /// which no other user can enter. A bridge (`serves`) listens on its own socket; a visitor connects to all sockets found.
     #[must_use]
     pub fn or_this_user(mut self, directory: &Directory, serves: Option<&Name>) -> Self {
         if self.config.is_some() || !self.listen.is_empty() || !self.connect.is_empty() {
@@ -167,7 +168,7 @@ impl LinkOptions {
         self
     }
 
-    /// Returns the first endpoint that other users can reach.
+    /// Returns the first endpoint that other users, of this machine at least, can reach; `None` if all are Unix sockets.
     #[must_use]
     pub fn open_to_others(&self) -> Option<&str> {
         self.listen
@@ -187,7 +188,7 @@ fn is_loopback(endpoint: &str) -> bool {
         || host.parse::<IpAddr>().is_ok_and(|address| address.is_loopback())
 }
 
-/// Opens a session. No multicast search: all peers come from the endpoints.
+/// Opens a session. Without a configuration file, peers are found by the given endpoints only, not by multicast. Not real-time.
 ///
 /// # Errors
 /// [`LinkError`] of the configuration, the keys or the session.
@@ -226,7 +227,7 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     Ok(Link { session, member, expires_s, stop_channel, lacks_stop_keys })
 }
 
-/// Returns a visitor's second path of an emergency stop without opening a session, which may block.
+/// Returns a visitor's stop channel without opening a session, which may block; `None` without a TCP or TLS endpoint.
 ///
 /// # Errors
 /// [`LinkError`] of the configuration.
@@ -234,7 +235,7 @@ pub fn stop_channel(options: &LinkOptions) -> Result<Option<StopChannel>, LinkEr
     stop_channel_of(options, &config_of(options)?, End::Visiting)
 }
 
-/// Returns the stop channel of one end. Without access control all peers have the rights of the bridge, with a public key.
+/// Returns the stop channel of one end. Without stop keys and access control, all peers use one public key.
 fn stop_channel_of(
     options: &LinkOptions,
     config: &Config,
@@ -312,7 +313,7 @@ fn exposed_key(options: &LinkOptions, config: &Config) -> Option<PathBuf> {
     access::exposed_key(&part("transport/link/tls"), &part("metadata"), options.config.as_deref())
 }
 
-/// Collects all endpoints of a configuration, which may list some per mode.
+/// Collects the endpoints in a value of a configuration: one endpoint, a list, or a list per mode.
 fn endpoints_in(value: &Value) -> Vec<String> {
     match value {
         Value::String(endpoint) => vec![endpoint.clone()],

@@ -211,12 +211,12 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Writes a line for people.
+/// Writes a human-readable line to standard error.
 fn report_line(line: &str) {
     eprintln!("{}", escaped(line));
 }
 
-/// Opens the session of a visitor.
+/// Opens the session of a visitor, and warns of its keys.
 fn visit(link: LinkOptions, directory: &Directory) -> Result<Link, LinkError> {
     let link = open(&link.or_this_user(directory, None), End::Visiting)?;
     report_keys(&link);
@@ -295,7 +295,7 @@ fn make_keys(arguments: KeysArguments) -> Result<(), AccessError> {
     Ok(())
 }
 
-/// Warns of keys that expire soon, and of keys without a second path for an emergency stop.
+/// Warns of keys that expire soon, and of missing stop keys.
 fn report_keys(link: &Link) {
     if link.lacks_stop_keys() {
         report_line(

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Timeout of a message, and poll interval for a stop.
+/// Timeout for the next event, and so the poll interval of the stop flag.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
 /// Error of a recording.
@@ -25,9 +25,9 @@ pub enum RecordingError {
 /// Result of a recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Recorded {
-    /// Ticks in the file.
+    /// Number of ticks in the file.
     pub ticks: u64,
-    /// Ticks lost in transit. The recording contains a note at each gap.
+    /// Number of ticks lost on the network or in the queue. The recording contains a note at each gap.
     pub lost: u64,
     /// Cause of the end.
     pub end: RecordingEnd,
@@ -44,7 +44,8 @@ pub enum RecordingEnd {
     Cut,
 }
 
-/// Records one remote run, from now to its end or until stopped.
+/// Waits for a remote run and records it to `file` until the run ends, the bridge disappears, or `stop` is set. Creates no file
+/// if stopped before there is a run. Not real-time.
 ///
 /// # Errors
 /// [`RecordingError`] of the network or of the file.

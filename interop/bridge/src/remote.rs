@@ -18,18 +18,18 @@ use zenoh::query::{ConsolidationMode, QueryTarget, Reply};
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
-/// Limit on queued ticks: eight seconds at 1 kHz. Further ticks are counted as lost.
+/// Length of the queue at which ticks are dropped and counted as lost: eight seconds at 1 kHz.
 const MOST_TICKS: usize = 8192;
-/// Limit on all queued events: a client that is behind with ticks still receives the end.
+/// Length of the queue at which other events are dropped: a client that is behind with ticks still receives the end.
 const MOST_WAITING: usize = 2 * MOST_TICKS;
 /// Timeout of a reply.
 const ANSWER_WAIT: Duration = Duration::from_secs(3);
-/// Timeout of the reply to an emergency stop: until the hosts have confirmed an earlier one, and this one.
+/// Timeout of the reply to an emergency stop, which may wait for the hosts' confirmation of an earlier stop and then of this one.
 const STOP_WAIT: Duration = Duration::from_secs(5);
 /// Timeout and poll interval of the first contact of a new session with a bridge.
 const SEEN_WAIT: Duration = Duration::from_secs(1);
 const SEEN_PERIOD: Duration = Duration::from_millis(20);
-/// Limit on retries of a request because the current run has changed meanwhile.
+/// Limit on attempts to send a request while the current run changes.
 const MOST_LOOKS: u32 = 5;
 /// Poll interval while bridge or run are absent.
 const LOOK_PERIOD: Duration = Duration::from_millis(300);
@@ -37,7 +37,7 @@ const LOOK_PERIOD: Duration = Duration::from_millis(300);
 /// Event of a remote run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RemoteEvent {
-    /// A tick.
+    /// Tick of the run.
     Tick(TickRecord),
     /// A parameter changed.
     Change(Change),
@@ -47,7 +47,7 @@ pub enum RemoteEvent {
     Gone,
 }
 
-/// Client of a bridge on the network.
+/// Subscription to a bridge: events of its runs, and a client for requests.
 pub struct Remote {
     session: Session,
     name: Name,
@@ -58,7 +58,7 @@ pub struct Remote {
     _alive: Subscriber<()>,
 }
 
-/// Client for sending requests, from any thread; clones share the state.
+/// Client that sends requests, from any thread; clones share the request number and the run.
 #[derive(Clone)]
 pub struct RequestClient {
     session: Session,
@@ -67,15 +67,15 @@ pub struct RequestClient {
     member: Name,
     /// Last request number; locked until the request is sent, so that requests leave in the order of their numbers.
     number: Arc<Mutex<u64>>,
-    /// Process of the requested run; 0: the current one.
+    /// Process id of the run that requests are for; 0: the current run.
     run: Arc<AtomicU64>,
 }
 
 impl Remote {
-    /// Subscribes to a bridge, present or not.
+    /// Subscribes to the messages of a bridge, which may also start later.
     ///
     /// # Errors
-    /// If the network refuses.
+    /// If a network operation fails.
     pub fn listen(session: &Link, name: &Name) -> Result<Self, LinkError> {
         let (sender, events) = channel();
         let queue = Queue { sender, waiting: Arc::default(), lost: Arc::default() };
@@ -112,10 +112,10 @@ impl Remote {
         })
     }
 
-    /// Waits for a run; returns its greeting and description, `None` once `stop` is set.
+    /// Waits for a run, and directs later requests to it. Returns its greeting and description; `None` once `stop` is set.
     ///
     /// # Errors
-    /// If the network refuses.
+    /// If a network operation fails.
     pub fn wait_for_run(&self, stop: &AtomicBool) -> Result<Option<(Greeting, RunDescription)>, LinkError> {
         while !stop.load(Ordering::Relaxed) {
             let greeting =
@@ -149,10 +149,10 @@ impl Remote {
         self.queue.lost.load(Ordering::Relaxed)
     }
 
-    /// Requests the status of the bridge; `None` without a reply.
+    /// Requests the status of the bridge; `None` without a valid reply.
     ///
     /// # Errors
-    /// If the network refuses.
+    /// If a network operation fails.
     pub fn status(&self) -> Result<Option<Status>, LinkError> {
         self.requests.status()
     }
@@ -177,7 +177,7 @@ impl RequestClient {
     /// Sends a request and waits for the reply.
     ///
     /// # Errors
-    /// The cause as text: the reason of a refusal, or no reply.
+    /// The cause as text: reason of the refusal, network error, or no reply within the timeout.
     pub fn run(&self, request: Request) -> Result<(), String> {
         let right = request.right();
         if right == Right::Watch {
@@ -197,7 +197,7 @@ impl RequestClient {
             }
             looks += 1;
             match done(&self.send(request.clone(), &status)?) {
-                // Retry: a run has begun or ended since the status.
+                // Retry: a run has begun or ended since the status was read.
                 Err(words)
                     if is_for_the_current && looks < MOST_LOOKS && words == Refusal::Stale.to_string() => {}
                 answered => return answered?.ok_or_else(|| NOBODY_ANSWERS.to_owned()),
@@ -225,7 +225,7 @@ impl RequestClient {
         let wait = if request == Request::EmergencyStop { STOP_WAIT } else { ANSWER_WAIT };
         let numbered = NumberedRequest { session, number: *number, run, ticket, request };
         let get = self.session.get(key).timeout(wait).payload(numbered.to_bytes());
-        // Bridges on two machines may have one name: all of them must have carried out the request.
+        // Bridges on two machines may have the same name: all of them must have carried out the request.
         let get = get.target(QueryTarget::All).consolidation(ConsolidationMode::None);
         get.wait().map_err(|error| LinkError::from(error).to_string())
     }
@@ -269,7 +269,7 @@ fn first(answers: &Answers) -> Option<Vec<u8>> {
     sample.map(|sample| sample.payload().to_bytes().into_owned())
 }
 
-/// Queue from the network's threads to the caller, of bounded length; lost ticks are counted.
+/// Bounded queue from the network's threads to the caller; lost ticks are counted.
 #[derive(Clone)]
 struct Queue {
     sender: Sender<RemoteEvent>,
@@ -286,7 +286,7 @@ impl Queue {
             return;
         }
         self.waiting.fetch_add(1, Ordering::Relaxed);
-        // Fails without a receiver.
+        // Fails only if the receiver was dropped.
         let _ = self.sender.send(event);
     }
 
@@ -333,7 +333,7 @@ impl Decoder {
         serde_json::from_slice(payload).ok().map(RemoteEvent::End)
     }
 
-    /// Decodes a tick if its pose came before it; gaps in the numbers are counted as lost.
+    /// Decodes a tick, whose pose must have arrived before; counts gaps in the numbers and undecodable ticks as lost.
     fn tick(&mut self, payload: &[u8], number: Option<u64>) -> Option<RemoteEvent> {
         if let Some(number) = number {
             let missing = self.number.map_or(0, |last| number.saturating_sub(last).saturating_sub(1));
@@ -349,10 +349,10 @@ impl Decoder {
     }
 }
 
-/// Returns the names of all bridges on the network.
+/// Returns the names of all bridges on the network, sorted, each once.
 ///
 /// # Errors
-/// If the network refuses.
+/// If a network operation fails.
 pub fn bridges(session: &Session) -> Result<Vec<Name>, LinkError> {
     let answers = session.liveliness().get("flotor/*/alive").timeout(ANSWER_WAIT).wait()?;
     let mut names: Vec<Name> = answers

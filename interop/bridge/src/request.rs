@@ -8,18 +8,18 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-/// Limit on the length of a request, bytes; longer ones are rejected unread.
+/// Limit on the length of a request, bytes; longer requests are rejected unread.
 pub const MAX_REQUEST_BYTES: usize = 64 * 1024;
-/// Limit on the sessions per member and right whose last number is stored; above, the least recent session is dropped.
+/// Limit on the stored sessions per member and right; beyond it the least recent session is dropped.
 const MOST_SESSIONS: usize = 256;
-/// Limit on the stored members, many more than our keys have; above, the least recent member is dropped.
+/// Limit on the stored pairs of right and member, far more than a network has; beyond it the least recent pair is dropped.
 const MOST_MEMBERS: usize = 1024;
 /// Maximum ticket age for start and release, ms.
 const FRESH_MS: u64 = 10_000;
 /// Member name of all peers without keys.
 pub const ANYONE: &str = "anyone";
 
-/// Request of a peer.
+/// Request of a remote peer to the host, or to the bridge itself.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "request", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Request {
@@ -37,7 +37,7 @@ pub enum Request {
         /// New weight, 0 to 1.
         weight: f64,
     },
-    /// End the run in order.
+    /// End the run normally: the force fades out.
     Stop,
     /// Start the bridge's scene.
     Start,
@@ -45,7 +45,7 @@ pub enum Request {
     Release,
 }
 
-/// Rights of a member. Each includes the previous ones.
+/// Right of a member; each right includes the lower rights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Right {
@@ -62,7 +62,7 @@ impl Right {
     /// All rights, the least first.
     pub const ALL: [Right; 3] = [Right::Watch, Right::Operate, Right::Own];
 
-    /// Returns the key parts on which this right's own requests arrive; the name of the member comes last.
+    /// Returns the key parts of the requests that this right adds to the lower rights; the member's name follows in the key.
     #[must_use]
     pub const fn keys(self) -> &'static [&'static str] {
         match self {
@@ -109,7 +109,7 @@ impl Request {
         }
     }
 
-    /// Converts a request to a local host; `None` for one that concerns this machine only.
+    /// Converts a request of a local client; `None` for a request that concerns the local machine only.
     #[must_use]
     pub fn of_ask(ask: Ask) -> Option<Self> {
         match ask {
@@ -122,13 +122,13 @@ impl Request {
     }
 }
 
-/// Ticket from the bridge's status on which a request is based: start of the bridge, and time by the bridge's clock.
+/// Time stamp by the bridge's clock: issued in the status and repeated in a request, so that the bridge rejects old requests.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ticket {
     /// Start of the bridge, ns since 1970; requests for another start are rejected.
     pub began: u64,
-    /// Time since the start, ms.
+    /// Time of issue since the start of the bridge, ms.
     pub at_ms: u64,
 }
 
@@ -138,9 +138,9 @@ pub struct Ticket {
 pub struct NumberedRequest {
     /// Session of the member: any text that is unique among the member's sessions. The key names the member.
     pub session: String,
-    /// Number, higher than those of the session's earlier requests.
+    /// Request number, higher than the numbers of the session's earlier requests.
     pub number: u64,
-    /// Process of the requested run, from its greeting; 0: no run.
+    /// Process id of the run that the request is for, from the run's greeting; 0: no run.
     pub run: u32,
     /// Ticket from the bridge's status.
     pub ticket: Ticket,
@@ -190,7 +190,7 @@ pub struct AdmissionControl {
     since: Instant,
     /// Sessions by right and member, so that no member can exhaust numbers or capacity of another.
     members: BTreeMap<(Right, Name), Sessions>,
-    /// Requests of unknown members with an older ticket are rejected, ms.
+    /// Oldest accepted ticket of unknown members, ms: an older request may be a replay of a dropped member.
     forgotten_ms: u64,
     refused: BTreeMap<Refusal, u64>,
 }
@@ -199,7 +199,7 @@ pub struct AdmissionControl {
 #[derive(Debug, Default)]
 struct Sessions {
     last: BTreeMap<String, Last>,
-    /// Requests of unknown sessions with an older ticket are rejected, ms: the session may have been dropped.
+    /// Oldest accepted ticket of unknown sessions, ms: an older request may be a replay of a dropped session.
     forgotten_ms: u64,
     /// Newest ticket of the member, ms.
     asked_ms: u64,
@@ -214,7 +214,7 @@ struct Last {
 
 impl Default for AdmissionControl {
     fn default() -> Self {
-        #[allow(clippy::cast_possible_truncation)] // in the year 2554
+        #[allow(clippy::cast_possible_truncation)] // nanoseconds fit until the year 2554
         Self {
             began: since_1970().as_nanos() as u64,
             since: Instant::now(),
@@ -226,14 +226,15 @@ impl Default for AdmissionControl {
 }
 
 impl AdmissionControl {
-    /// Returns a ticket for new requests.
+    /// Returns the current ticket, for the status.
     #[must_use]
     pub fn ticket(&self) -> Ticket {
         let at_ms = u64::try_from(self.since.elapsed().as_millis()).unwrap_or(u64::MAX);
         Ticket { began: self.began, at_ms }
     }
 
-    /// Admits a request on a key (`flotor/NAME/ask/REQUEST/MEMBER`), while `run` is the current run (0: none).
+    /// Decodes and admits a request that arrived on `key` (`flotor/NAME/ask/REQUEST/MEMBER`); `run` is the process id of the current
+    /// run (0: none).
     ///
     /// # Errors
     /// [`Refusal`], which is counted.
@@ -247,7 +248,7 @@ impl AdmissionControl {
         refusal
     }
 
-    /// Returns the number of refusals, by reason.
+    /// Returns the number of refusals since the start of the bridge, by reason.
     #[must_use]
     pub fn refused(&self) -> &BTreeMap<Refusal, u64> {
         &self.refused
@@ -308,13 +309,13 @@ impl AdmissionControl {
     }
 }
 
-/// Returns whether a payload on its key is an emergency stop; needs no state and no lock of a gate.
+/// Returns whether a payload on its key is an emergency stop; needs neither state nor lock of the [`AdmissionControl`].
 #[must_use]
 pub fn is_emergency_stop(key: &str, payload: &[u8]) -> bool {
     numbered_on(key, payload).is_some_and(|(_, numbered)| numbered.request == Request::EmergencyStop)
 }
 
-/// Parses a request and its member, if it belongs on its key.
+/// Parses a request, and the member in its key; `None` for a malformed request, or one on the key of another kind of request.
 fn numbered_on(key: &str, payload: &[u8]) -> Option<(Name, NumberedRequest)> {
     let numbered = exactly(payload)?;
     let (key, member) = key.rsplit_once('/')?;

@@ -1,11 +1,11 @@
-//! Status of a bridge, with losses and refusals.
+//! Status of a bridge, as published on `flotor/NAME/status`.
 
 use crate::couple::MessageCounts;
 use crate::request::{Refusal, Right, Ticket};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Status of a bridge.
+/// Status of a bridge: state, current run, losses, refusals and couplings.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Status {
     /// State of the bridge.
@@ -18,12 +18,12 @@ pub struct Status {
     pub published: u64,
     /// Number of ticks of this run that the host dropped because the bridge was late.
     pub dropped: u64,
-    /// Number of rejected requests, by reason.
+    /// Number of rejected requests since the bridge started, by reason.
     pub refused: BTreeMap<Refusal, u64>,
     /// Highest right whose requests are accepted.
     #[serde(default)]
     pub allow: Right,
-    /// Current ticket, on which requests are based.
+    /// Current ticket, which requests repeat.
     #[serde(default)]
     pub ticket: Ticket,
     /// Message counts by coupling with another host.

@@ -1,4 +1,5 @@
-//! Linker arguments: name of the library; no unloading, because its threads go on; binding of its own calls within the library.
+//! Linker arguments: soname; no unloading (`nodelete`), because the library's threads keep running; symbolic binding of calls
+//! within the library.
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");

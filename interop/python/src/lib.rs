@@ -15,7 +15,7 @@ mod sweep;
 
 use pyo3::prelude::*;
 
-/// Module with the items above; documented in `_flotor.pyi`.
+/// Native module of the package; documented in `_flotor.pyi`.
 #[pymodule]
 mod _flotor {
     #[pymodule_export]

@@ -48,7 +48,7 @@ impl Parameter {
     }
 }
 
-/// Forces, torques, energies and statuses of many poses.
+/// Forces, N, and torques, N·m, one row of three per pose, and energies, J, and statuses, one per pose.
 type Columns<'py> =
     (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>, Vec<&'static str>);
 
@@ -58,7 +58,7 @@ pub(crate) struct Model {
     plugin: Plugin,
     settings: Vec<Setting>,
     instance: Mutex<flotor_hal::abi::loader::Model>,
-    /// Process of creation: a lock held by another thread at an `os.fork()` is never released in the child.
+    /// Id of the process that created the model: a lock held by another thread at an `os.fork()` is never released in the child.
     process: u32,
 }
 
@@ -187,8 +187,8 @@ impl Model {
 }
 
 impl Model {
-    /// Locks the model. Ignores poisoning: the contract reports panics of a model as a status. Does not wait in a child of
-    /// `os.fork()`.
+    /// Locks the model. Ignores poisoning: the contract reports panics of a model as a status. In a child of `os.fork()` an error
+    /// instead of a wait.
     fn lock(&self) -> PyResult<MutexGuard<'_, flotor_hal::abi::loader::Model>> {
         if self.process == std::process::id() {
             return Ok(flotor_core::lock(&self.instance));

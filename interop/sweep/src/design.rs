@@ -16,7 +16,7 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// Creates a number cell, finite or not.
+    /// Creates a number cell; a non-finite number becomes a missing one.
     #[must_use]
     pub fn number(value: f64) -> Self {
         Self::Number(value.is_finite().then_some(value))
@@ -58,7 +58,7 @@ impl<'a> Design<'a> {
         Self { plan, sobol }
     }
 
-    /// Returns the point of row `row`, from 0; seeds vary fastest, then the last axis.
+    /// Returns the point of row `row`, from 0; seeds vary fastest, then, in a grid, the last axis.
     #[must_use]
     pub fn point(&self, row: u64) -> Point {
         let seeds = self.plan.seeds.len() as u64;

@@ -8,15 +8,16 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// Result of a local execution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
-    /// Number of tasks that were finished before.
+    /// Number of tasks that were already in the store.
     pub found: usize,
-    /// Number of tasks finished now.
+    /// Number of tasks finished by this execution.
     pub done: usize,
     /// True if `stop` ended the execution early.
     pub stopped: bool,
 }
 
-/// Executes every task that is not in the store; calls `on_task` for each finished one (found ones first).
+/// Executes every task that is not in the store, on `jobs` threads, until `stop` is set; calls `on_task` for each finished task,
+/// first for the tasks already in the store.
 ///
 /// # Errors
 /// The first [`StoreError`]; finished tasks stay in the store.
@@ -42,7 +43,7 @@ pub fn execute(
         Ok(())
     };
     std::thread::scope(|scope| {
-        // With too few threads, this one executes the rest.
+        // If threads cannot be created, this thread executes the rest.
         let start = |_| std::thread::Builder::new().spawn_scoped(scope, work).ok();
         let workers: Vec<_> = (1..jobs.get()).filter_map(start).collect();
         let own = std::iter::once(work());

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! PLAN.toml -> plan (axes, seeds, what to run) -> tasks (blocks of points, keyed by content)
-//!           -> executor (threads here, Dask or Ray through the wheel) -> store (a file a finished task)
+//!           -> executor (threads here, Dask or Ray through the wheel) -> store (one file per finished task)
 //!           -> table (Parquet) -> picture (SVG)
 //! ```
 //!

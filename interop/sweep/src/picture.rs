@@ -1,4 +1,4 @@
-//! Overview picture of a sweep: the first results over the first axis, a line for every value of the second.
+//! Overview picture of a sweep: results over the first numeric axis, a line for each value of another axis.
 
 use crate::design::Cell;
 use crate::plan::Plan;
@@ -6,10 +6,10 @@ use crate::table::number;
 use crate::task::{Column, ColumnKind};
 use flotor_plot::{Axis, Figure, Panel, Series};
 
-/// Limit on the lines of a panel: more cannot be distinguished.
+/// Limit on the lines of a panel: more lines cannot be distinguished.
 const MOST_LINES: usize = 6;
 
-/// Draws the results `wanted` (all numeric ones if empty, four at most) of a finished sweep as SVG.
+/// Draws the numeric results in `wanted` (all if empty), at most four, of a finished sweep as SVG.
 #[must_use]
 pub fn draw(plan: &Plan, columns: &[Column], rows: &[Vec<Cell>], wanted: &[String]) -> String {
     let answers = plan.axes.len() + 1;

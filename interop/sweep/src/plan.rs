@@ -128,7 +128,7 @@ pub enum PlanError {
 
 /// Limit on the number of rows: a table of this size can still be written by a machine with 16 GB.
 const MOST_ROWS: u64 = 100_000_000;
-/// Default number of rows per task of evaluations, which are cheap; runs get one.
+/// Default number of rows per task of evaluations, which are cheap; a task of runs has one row by default.
 const EVAL_BLOCK: usize = 4096;
 /// Axis keys that are pose coordinates rather than parameters, in order.
 pub const POSE_COLUMNS: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];

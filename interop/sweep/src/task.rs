@@ -50,9 +50,9 @@ pub struct Column {
 /// Type of the cells of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ColumnKind {
-    /// Double-precision numbers; NaN for missing ones.
+    /// Double-precision numbers; NaN for a missing number.
     Number,
-    /// Words; empty for missing ones.
+    /// Words; empty for a missing word.
     Word,
 }
 
@@ -112,7 +112,8 @@ const EVAL_COLUMNS: [(&str, ColumnKind); 9] = [
 ];
 
 impl Sweep {
-    /// Loads the scene or plugin of a plan and checks the axes, before anything runs. `folders` are searched first.
+    /// Loads the scene or plugin of a plan and checks the axes, before anything runs. Plugins are searched in `folders` first. Not
+    /// real-time.
     ///
     /// # Errors
     /// [`SweepError`] of the plan, the scene, a plugin or an axis.
@@ -186,7 +187,7 @@ impl Sweep {
             .collect()
     }
 
-    /// Returns the hash of the context and of every point: all data that the result depends on, and no other.
+    /// Returns the hash of the context and of every point: all data that the result depends on, and nothing else.
     fn key(&self, first: u64, count: u64) -> String {
         let design = Design::new(&self.plan);
         let mut hash = Xxh3::new();
@@ -202,7 +203,7 @@ impl Sweep {
         format!("{:032x}", hash.digest128())
     }
 
-    /// Executes a task: returns a row per point, axes and seed first. A rejected point is a row with the reason.
+    /// Executes a task: returns a row per point, axes and seed first. The row of a rejected point has the reason in its last cell.
     #[must_use]
     pub fn answer(&self, task: &Task) -> Vec<Vec<Cell>> {
         let design = Design::new(&self.plan);
@@ -249,7 +250,7 @@ impl Sweep {
         Ok(scene)
     }
 
-    /// Evaluates points; consecutive ones with the same parameters share a model, which gets their poses in batches.
+    /// Evaluates points; consecutive points with the same parameters share a model, which receives their poses in batches.
     fn evaluate(&self, points: &[Point], plugin: &Plugin) -> Vec<Vec<Cell>> {
         let mut answers = Vec::with_capacity(points.len());
         for group in points.chunk_by(|a, b| self.parameters(a) == self.parameters(b)) {
@@ -296,7 +297,7 @@ impl Sweep {
         Handle { position_m: DVec3::new(x, y, z), rotation_rad: DVec3::new(rx, ry, rz) }
     }
 
-    /// Rejects the whole plan if its first row has an unknown name.
+    /// Rejects the plan of a scene if a setting, the scene or a plugin is invalid in its first row.
     fn check_first_row(&self) -> Result<(), SweepError> {
         let Subject::Run { scene, folders } = &self.subject else { return Ok(()) };
         let point = Design::new(&self.plan).point(0);

@@ -1,4 +1,4 @@
-//! Blinded results: show differences under codes without revealing the conditions.
+//! Blinded results: codes replace the conditions, so that differences are visible but not their direction.
 
 use super::{Analysis, ResponseRow};
 use flotor_statistics::anova::Effect;
@@ -6,7 +6,7 @@ use flotor_statistics::describe::mean;
 use flotor_study::blinding::Codes;
 use serde::Serialize;
 
-/// Response under a coded condition: a row of the exported table.
+/// Response in a coded condition: a row of the exported table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BlindedRow {
     /// Subject: `sub-01`.
@@ -17,20 +17,20 @@ pub struct BlindedRow {
     pub modality: &'static str,
     /// Code of the base or rated stimulus.
     pub level: usize,
-    /// Threshold as a share of the base, or scaled rating.
+    /// Threshold as a fraction of the base, or normalised rating.
     pub response: f64,
 }
 
-/// Mean under one coded condition.
+/// Mean response in one coded condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BlindedCell {
     /// Code of modality and level: `A2`.
     pub condition: String,
-    /// Mean over subjects, of thresholds as shares of the base or of scaled ratings.
+    /// Mean over subjects of the thresholds as fractions of the base, or of the normalised ratings.
     pub mean: f64,
 }
 
-/// Analysis under codes.
+/// Analysis with coded conditions.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BlindedAnalysis {
     /// Task label: "jnd" or "magnitude".
@@ -47,7 +47,7 @@ pub struct BlindedAnalysis {
 }
 
 impl BlindedAnalysis {
-    /// Replaces the conditions of a result by codes.
+    /// Replaces the conditions of a result with codes.
     #[must_use]
     pub fn of(analysis: &Analysis, codes: &Codes) -> Self {
         let (task, subjects, anova) = match analysis {

@@ -7,7 +7,7 @@ use flotor_study::sitting::Verdict;
 use flotor_study::trial::{Phase, Presented, Response};
 use serde::Serialize;
 
-/// Check results of one subject.
+/// Results of one subject's check trials.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubjectChecks {
     /// Subject: `sub-01`.
@@ -18,13 +18,14 @@ pub struct SubjectChecks {
     pub false_alarms: usize,
     /// Number of pairs with an obvious difference.
     pub obvious_pairs: usize,
-    /// Number of obvious pairs whose larger stimulus was not named.
+    /// Number of obvious pairs answered with the smaller stimulus or "I don't know".
     pub missed_obvious: usize,
-    /// Number of trials presented once more.
+    /// Number of trials that were presented again to check the answer, and have an earlier answer.
     pub repeat_checks: usize,
-    /// Share of repeated trials with the same answer as before; `None` for ratings.
+    /// Fraction of repeated pairs with the same answer as before; `None` without repeated pairs.
     pub agreement: Option<f64>,
-    /// Deviation of a single rating between the two presentations, as a share of the subject's mean rating; `None` for pairs.
+    /// Standard deviation of a single rating, from the differences of repeated ratings (Dahlberg's formula), as a fraction of
+    /// the subject's mean rating; `None` without repeated ratings.
     pub retest_deviation: Option<f64>,
 }
 
@@ -65,13 +66,13 @@ impl SubjectChecks {
         }
     }
 
-    /// Returns the share of catch trials with a false alarm; `None` without catch trials.
+    /// Returns the fraction of catch trials with a false alarm; `None` without catch trials.
     #[must_use]
     pub fn false_alarm_share(&self) -> Option<f64> {
         (self.catch_trials > 0).then(|| self.false_alarms as f64 / self.catch_trials as f64)
     }
 
-    /// Returns the share of obvious pairs missed; `None` without obvious pairs.
+    /// Returns the fraction of obvious pairs missed; `None` without obvious pairs.
     #[must_use]
     pub fn missed_obvious_share(&self) -> Option<f64> {
         (self.obvious_pairs > 0).then(|| self.missed_obvious as f64 / self.obvious_pairs as f64)
@@ -105,7 +106,8 @@ fn names_the_larger(event: &TrialEvent) -> bool {
     matches!(event.trial.presented, Presented::Pair(pair) if Some(pair.larger_at) == named)
 }
 
-/// Returns the earlier answer to a repeated trial: the last counted one in the same track or replication.
+/// Returns the earlier answer to a repeated trial: the last counted answer to the same stimuli in the same track, replication
+/// and modality.
 fn first_time(record: &SubjectRecord, place: usize, check: &TrialEvent) -> Option<Response> {
     let same = |event: &&TrialEvent| {
         let (one, other) = (&event.trial, &check.trial);

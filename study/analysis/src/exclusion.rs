@@ -1,4 +1,4 @@
-//! Applies the exclusion rules to complete sittings.
+//! Application of the exclusion rules to complete sittings.
 
 use crate::large::wrong_at_large;
 use crate::{Estimator, SubjectChecks, SubjectRecord, conditions};
@@ -9,12 +9,12 @@ use flotor_study::trial::{Modality, Presented, Response, Trial};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// Result of applying the rules.
+/// Result of applying the exclusion rules.
 #[derive(Clone, Debug, Default)]
 pub struct Applied {
-    /// Remaining data for the analysis.
+    /// Data that no rule has excluded.
     pub kept: Vec<SubjectRecord>,
-    /// Excluded data with the reasons.
+    /// Excluded trials, tracks and sittings with rule and value.
     pub excluded: Vec<Exclusion>,
     /// Rules that could not be applied.
     pub not_applied: Vec<NotApplied>,
@@ -25,7 +25,7 @@ pub struct Applied {
 pub struct NotApplied {
     /// Name of the rule in the study file.
     pub rule: &'static str,
-    /// Missing information.
+    /// Reason: the information that the rule needs and the data lack.
     pub why: &'static str,
     /// Subjects concerned.
     pub subjects: Vec<SubjectNumber>,
@@ -38,7 +38,8 @@ impl std::fmt::Display for NotApplied {
     }
 }
 
-/// Applies the rules to complete sittings; `rate_hz` is the servo rate, `None` without a scene.
+/// Applies the rules to the complete sittings of `subjects`. A sitting with a condition that has no result left is excluded as
+/// a whole. `rate_hz` is the servo rate, Hz; `None` without a scene.
 #[must_use]
 pub fn apply(
     rules: &ExclusionRules,
@@ -177,7 +178,7 @@ impl Applied {
         }
     }
 
-    /// Returns the warnings for rules that excluded something and depend on more than the subject.
+    /// Returns the warnings of all rules that have excluded something and depend on more than the subject.
     pub fn warnings(&self) -> impl Iterator<Item = &'static str> {
         let mut rules: Vec<&str> = self.excluded.iter().map(|exclusion| exclusion.rule).collect();
         rules.sort_unstable();
@@ -185,7 +186,7 @@ impl Applied {
         rules.into_iter().filter_map(ExclusionRules::warning)
     }
 
-    /// Formats the exclusions with their rules.
+    /// Formats a table of the exclusions, of the rules without exclusions and of the rules that could not be applied.
     #[must_use]
     pub fn to_text(&self, rules: &ExclusionRules) -> String {
         let mut lines = vec![
@@ -210,7 +211,8 @@ impl Applied {
     }
 }
 
-/// Returns the share of ticks missed while stimuli were felt.
+/// Returns the number of missed ticks as a fraction of the ticks while stimuli were felt; `None` without stored movements or a
+/// servo rate.
 fn missed_share(counted: &[&TrialEvent], rate_hz: Option<f64>) -> Option<f64> {
     let felt = counted.iter().filter(|event| !event.exploration.kinematics.is_empty());
     let time_s =
@@ -229,7 +231,8 @@ fn without(record: &SubjectRecord, excluded: &[Exclusion]) -> SubjectRecord {
     kept
 }
 
-/// Finds a condition without a result, because rules excluded all of it or no track reached a threshold.
+/// Returns a text about the first condition without a result, because rules have excluded all of its data or no track reached a
+/// threshold; `None` if every condition has a result.
 fn emptied(protocol: &Protocol, estimator: Estimator, kept: &SubjectRecord) -> Option<String> {
     let level = |event: &TrialEvent| match event.trial.presented {
         Presented::Pair(pair) => pair.base,

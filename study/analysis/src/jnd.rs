@@ -16,7 +16,7 @@ use flotor_study::protocol::JndProtocol;
 use flotor_study::trial::Modality;
 use serde::Serialize;
 
-/// Values for the two modalities.
+/// Values for the two modalities, such as Weber fractions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WeberFractions<T> {
     /// Vision and haptics.
@@ -53,7 +53,7 @@ pub struct ThresholdCell {
     pub threshold: MeanInterval,
 }
 
-/// Result of a difference experiment. The field names are a stable interface for scripts.
+/// Analysis of a difference experiment. The field names are a stable interface for scripts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct JndAnalysis {
     /// Task label: "jnd".
@@ -62,17 +62,18 @@ pub struct JndAnalysis {
     pub subjects: usize,
     /// Estimator of the thresholds.
     pub estimator: Estimator,
-    /// Mean threshold as a share of the base.
+    /// Mean Weber fraction: threshold divided by base.
     pub weber: WeberFractions<f64>,
-    /// Mean threshold as a share of the base, with its variation and 95 % confidence interval.
+    /// Mean Weber fraction with standard deviation, standard error and 95 % confidence interval over subjects.
     pub weber_detail: WeberFractions<MeanInterval>,
-    /// Paired t-test between the modalities, positive if haptics alone is worse.
+    /// Paired t-test of the Weber fractions between the modalities; positive if the threshold with haptics alone is larger.
     pub t: Outcome<TTest>,
-    /// Effects on thresholds in the unit of the stimulus: order x modality x base.
+    /// Effects of order, modality and base, and their interactions, on thresholds in the unit of the stimulus.
     pub anova: Vec<Effect>,
-    /// Effect of the base on thresholds as shares of the base, within each modality; `None` for a single base.
+    /// Effect of the base on the Weber fraction, within each modality; `None` for a single base.
     pub constancy: WeberFractions<Option<Effect>>,
-    /// R² of the linear trend of thresholds over bases (all modalities); NaN (`null` in JSON) without three bases, or with equal means.
+    /// R² of the linear trend of thresholds over bases (mean of both modalities); NaN (`null` in JSON) without three bases, or
+    /// with equal means.
     pub linear_r2: f64,
     /// Thresholds by condition.
     pub thresholds: Vec<ThresholdCell>,
@@ -95,7 +96,7 @@ pub struct JndAnalysis {
 /// Analyses the thresholds of a study.
 ///
 /// # Errors
-/// [`AnalysisError`] if a subject has no threshold in some condition.
+/// [`AnalysisError`] if a subject has no threshold in some condition, or there are too few subjects.
 pub fn analyse_jnd(
     protocol: &JndProtocol,
     subjects: &[SubjectRecord],
@@ -141,7 +142,7 @@ pub fn analyse_jnd(
     })
 }
 
-/// Thresholds of a subject as shares of the base, averaged over replications.
+/// Weber fractions of a subject by base, averaged over replications.
 type Fractions = WeberFractions<Vec<f64>>;
 
 impl Fractions {
@@ -161,7 +162,7 @@ impl Fractions {
         Self::try_each(|modality| protocol.bases.iter().map(|base| of(modality, *base)).collect())
     }
 
-    /// Returns the means of both modalities, by base.
+    /// Returns the means of the two modalities, by base.
     fn of_both(&self) -> Vec<f64> {
         means_of_both(&self.vh, &self.h)
     }
@@ -174,14 +175,14 @@ impl Fractions {
     }
 }
 
-/// Returns the mean threshold over the replications with a threshold.
+/// Returns the mean threshold, as a fraction of the base, over the replications with a threshold; `None` without one.
 fn mean_of_tracks(record: &SubjectRecord, modality: Modality, base: f64) -> Option<f64> {
     let tracks = record.tracks.iter().filter(|track| track.modality == modality && track.base == base);
     let thresholds: Vec<f64> = tracks.filter_map(|track| track.threshold).collect();
     (!thresholds.is_empty()).then(|| mean(&thresholds))
 }
 
-/// Returns the most likely threshold given all answers at a base.
+/// Returns the most likely threshold, as a fraction of the base, given all answers at a base; `None` without answers.
 fn map_of_trials(
     protocol: &JndProtocol,
     record: &SubjectRecord,

@@ -1,7 +1,8 @@
-//! Analysis of movements: mean speed, acceleration and force along the vertical, over stimulus and modality.
+//! Analysis of movements: effects of stimulus and modality on mean speed, acceleration and force along the vertical.
 //!
-//! Of a pair, only the base is analysed. An adaptive procedure presents larger comparisons where thresholds are larger, and the
-//! same hand moves a larger stimulus differently: the comparisons would add an effect of the threshold to each modality.
+//! For pairs, only the movement with the base is analysed. An adaptive procedure presents larger comparisons where thresholds
+//! are larger, and the same hand moves a larger stimulus differently: the comparisons would add an effect of the threshold to
+//! each modality.
 
 use super::{
     AnalysisError, AnalysisOptions, CONFIDENCE, SubjectRecord, conditions, means_of_both, within_factors,
@@ -16,7 +17,7 @@ use serde::Serialize;
 /// Name and accessor of a movement measure.
 type Measure = (&'static str, fn(&StimulusKinematics) -> f64);
 
-/// The measures of CMU-RI-TR-07-21, section 4.3.
+/// Movement measures of CMU-RI-TR-07-21, section 4.3.
 const MEASURES: [Measure; 3] = [
     ("mean speed", |one| one.mean_speed_m_per_s),
     ("mean acceleration", |one| one.mean_acceleration_m_per_s2),
@@ -26,20 +27,21 @@ const MEASURES: [Measure; 3] = [
 /// Analysis of one movement measure.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct KinematicMeasure {
-    /// Name of the measure, in SI units.
+    /// Name of the measure: "mean speed" (m/s), "mean acceleration" (m/s²) or "mean force" (N).
     pub measure: &'static str,
-    /// Effects of modality x stimulus.
+    /// Effects of modality, stimulus and their interaction.
     pub anova: Vec<Effect>,
     /// Mean over subjects and modalities at each level of the stimulus, in order.
     pub means: Vec<f64>,
     /// Standard error of each mean over subjects.
     pub standard_errors: Vec<f64>,
-    /// Mean over subjects of the exponent of a power law of the stimulus: 1 for direct, -1 for inverse proportionality; `None` for
-    /// a single level.
+    /// Mean over subjects of the exponent of a power law in the stimulus: 1 for direct, -1 for inverse proportionality; `None`
+    /// for a single level, or if a subject's mean is not above 0.
     pub exponent: Option<MeanInterval>,
 }
 
-/// Analyses movements over the levels of the stimulus (bases, or rated stimuli). Empty if a measurement is missing.
+/// Analyses movements over the levels of the stimulus (bases, or rated stimuli). Empty if a subject has no movement data in a
+/// condition.
 pub(super) fn measures(
     levels: &[f64],
     subjects: &[SubjectRecord],
@@ -74,8 +76,8 @@ fn standard_error(rows: &[Vec<f64>], level: usize, levels: usize) -> f64 {
     deviation(&means) / (means.len() as f64).sqrt()
 }
 
-/// Returns the least-squares slope of a subject's log measure, averaged over modalities, over the log stimulus; `None` for a single
-/// level, or if a mean is not above 0.
+/// Returns the exponent of a power law for one subject: the least-squares slope of the log measure, averaged over modalities,
+/// over the log stimulus; `None` for a single level, or if a mean is not above 0.
 fn exponent(levels: &[f64], row: &[f64]) -> Option<f64> {
     let (vh, h) = row.split_at_checked(levels.len())?;
     let x: Vec<f64> = levels.iter().map(|level| libm::log(*level)).collect();
@@ -87,7 +89,7 @@ fn exponent(levels: &[f64], row: &[f64]) -> Option<f64> {
     slope.is_finite().then_some(slope)
 }
 
-/// Returns the means of one subject, modality by level; `None` if a condition was never measured.
+/// Returns a measure's means for one subject, modality by level; `None` if a condition was never measured.
 fn cells(levels: &[f64], record: &SubjectRecord, value: fn(&StimulusKinematics) -> f64) -> Option<Vec<f64>> {
     let cell = |(modality, level)| {
         let here = record.counted().filter(|event| event.trial.modality == modality);
@@ -98,7 +100,8 @@ fn cells(levels: &[f64], record: &SubjectRecord, value: fn(&StimulusKinematics) 
     conditions(levels).map(cell).collect()
 }
 
-/// Returns the movements with the rated stimulus, or with the base of a pair, at this level, repetitions included.
+/// Returns the movements with the rated stimulus or the base of a pair, if it is `level`; repeated presentations within the
+/// trial included.
 fn with_level(event: &TrialEvent, level: f64) -> impl Iterator<Item = &StimulusKinematics> {
     let (of_trial, place, stimuli) = match event.trial.presented {
         Presented::One { value } => (value, 0, 1),

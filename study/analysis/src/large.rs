@@ -4,17 +4,17 @@ use crate::SubjectRecord;
 use flotor_study::protocol::JndProtocol;
 use flotor_study::trial::Judgement;
 
-/// Answers to large differences.
+/// Counts of answers to large differences.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct AtLarge {
-    /// Number of answers.
+    /// Number of answers, "I don't know" included.
     pub(crate) answers: usize,
     /// Number of wrong answers.
     pub(crate) wrong: usize,
 }
 
 impl AtLarge {
-    /// Returns the share of wrong answers; `None` without answers.
+    /// Returns the fraction of wrong answers; `None` without answers.
     pub(crate) fn share(self) -> Option<f64> {
         (self.answers > 0).then(|| self.wrong as f64 / self.answers as f64)
     }

@@ -43,7 +43,8 @@ const CONFIDENCE: f64 = 0.95;
 /// Placeholder of the table's name in [`SCRIPT_R`].
 const TABLE_IN_R: &str = "\"trials.csv\"";
 
-/// Returns the R script that reproduces the tables from [`flotor_study::dataset::trials_csv`], for a table of this name in the same folder.
+/// Returns the R script that reproduces the tables from [`flotor_study::dataset::trials_csv`], stored in the script's folder as
+/// `table_name`.
 #[must_use]
 pub fn script_in_r(table_name: &str) -> String {
     let escaped = table_name.replace('\\', "\\\\").replace('"', "\\\"");
@@ -64,7 +65,7 @@ pub struct SubjectRecord {
 }
 
 impl SubjectRecord {
-    /// Copies the data of a log.
+    /// Extracts the trials and tracks of a sitting from its log.
     #[must_use]
     pub fn of_log(log: &SittingLog) -> Self {
         let subject = log.begin.subject;
@@ -83,7 +84,7 @@ impl SubjectRecord {
         self.trials.iter().filter(counts)
     }
 
-    /// Returns the counted trials with a judged pair, with the observation and the base of each.
+    /// Returns the counted trials with a judged pair: event, observation and base.
     pub fn judged(&self) -> impl Iterator<Item = (&TrialEvent, Observation, f64)> {
         self.counted().filter_map(|event| match (event.trial.presented, event.verdict) {
             (Presented::Pair(pair), Verdict::Judged { judgement, .. }) => {
@@ -93,7 +94,7 @@ impl SubjectRecord {
         })
     }
 
-    /// Returns the counted judgements of pairs in one condition.
+    /// Returns the observations of the counted pairs in one condition.
     fn observations(&self, modality: Modality, base: f64) -> Vec<Observation> {
         let here = self.judged().filter(|(event, _, at)| event.trial.modality == modality && *at == base);
         here.map(|(_, observation, _)| observation).collect()
@@ -122,7 +123,7 @@ pub struct AnalysisOptions {
     pub estimator: Estimator,
 }
 
-/// Reason for a missing result.
+/// Reason why a study cannot be analysed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnalysisError {
@@ -155,18 +156,18 @@ pub enum AnalysisError {
     Statistics(#[from] StatisticsError),
 }
 
-/// Result of a study.
+/// Analysis of a study, by experiment.
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Analysis {
-    /// Just noticeable difference.
+    /// Difference experiment (just noticeable difference, JND).
     Jnd(Box<JndAnalysis>),
-    /// Magnitude estimation.
+    /// Magnitude estimation experiment.
     Magnitude(Box<MagnitudeAnalysis>),
 }
 
 impl Analysis {
-    /// Analyses the complete sittings of a study.
+    /// Analyses a study from the records of its complete sittings.
     ///
     /// # Errors
     /// [`AnalysisError`] for too few subjects, missing thresholds, or ratings that cannot be normalised.
@@ -195,7 +196,7 @@ impl Analysis {
         }
     }
 
-    /// Formats the result as a text page.
+    /// Formats the result as text, beside the thesis's results where they are comparable.
     #[must_use]
     pub fn to_text(&self) -> String {
         match self {
@@ -205,7 +206,7 @@ impl Analysis {
     }
 }
 
-/// Returns a note if the model has no effect of the order of modalities.
+/// Returns a note if `effects` lack the effect of the order of modalities.
 #[must_use]
 pub fn order_note(effects: &[Effect]) -> Option<&'static str> {
     effects.iter().all(|effect| effect.effect != "order").then_some(
@@ -224,11 +225,11 @@ pub struct ResponseRow {
     pub modality: Modality,
     /// Base or rated stimulus, in the unit of the stimulus.
     pub stimulus: f64,
-    /// Threshold in the unit of the stimulus, or scaled rating.
+    /// Threshold in the unit of the stimulus, or normalised rating.
     pub response: f64,
 }
 
-/// Converts `responses[subject][modality by level]` to rows.
+/// Converts `responses[subject][modality by level]` to rows of the exported table.
 fn response_rows(subjects: &[SubjectRecord], levels: &[f64], responses: &[Vec<f64>]) -> Vec<ResponseRow> {
     let of = |(record, row): (&SubjectRecord, &Vec<f64>)| {
         let row = conditions(levels).zip(row).map(|((modality, stimulus), response)| ResponseRow {
@@ -243,24 +244,23 @@ fn response_rows(subjects: &[SubjectRecord], levels: &[f64], responses: &[Vec<f6
     subjects.iter().zip(responses).flat_map(of).collect()
 }
 
-/// Returns the factors within a subject: modality, and the level of the stimulus if there are several.
+/// Returns the within-subject factors: modality and, if there are several levels, the level of the stimulus.
 fn within_factors(name: &str, levels: &[f64]) -> Vec<WithinFactor> {
     let factor = |name: &str, levels| WithinFactor { name: name.to_owned(), levels };
     let by_level = (levels.len() > 1).then(|| factor(name, levels.len()));
     [factor("modality", Modality::ALL.len())].into_iter().chain(by_level).collect()
 }
 
-/// Returns modality by level, in the order of the cells of a subject's row.
+/// Returns all pairs of modality and level, in the order of the cells of a subject's row: level varies fastest.
 fn conditions(levels: &[f64]) -> impl Iterator<Item = (Modality, f64)> {
     Modality::ALL.into_iter().flat_map(|modality| levels.iter().map(move |level| (modality, *level)))
 }
 
-/// Returns a column of `rows`.
 fn column(rows: &[Vec<f64>], index: usize) -> Vec<f64> {
     rows.iter().filter_map(|row| row.get(index).copied()).collect()
 }
 
-/// Returns the means of both modalities.
+/// Returns the mean of both modalities at each level.
 fn means_of_both(vh: &[f64], h: &[f64]) -> Vec<f64> {
     vh.iter().zip(h).map(|(vh, h)| 0.5 * (vh + h)).collect()
 }
@@ -276,7 +276,8 @@ fn mean_responses(
     conditions(levels).enumerate().map(cell).collect()
 }
 
-/// Returns the factor of the first modality; empty if all subjects started with the same one, or there are too few subjects to test it.
+/// Returns the between-subject factor of the first modality; empty if all subjects started with the same modality, or there are
+/// fewer than three subjects.
 fn order_factor(subjects: &[SubjectRecord]) -> Vec<BetweenFactor> {
     let groups: Vec<usize> = subjects.iter().map(|subject| subject.first_modality as usize).collect();
     let both = groups.contains(&0) && groups.contains(&1);

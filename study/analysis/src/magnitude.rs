@@ -19,13 +19,13 @@ use serde::Serialize;
 pub struct RatingCell {
     /// Modality of the condition.
     pub modality: Modality,
-    /// Stimulus, in its unit.
+    /// Stimulus, in the unit of its parameter.
     pub stimulus: f64,
     /// Mean normalised rating over subjects.
     pub rating: MeanInterval,
 }
 
-/// Result of a magnitude experiment. The field names are a stable interface for scripts.
+/// Analysis of a magnitude experiment. The field names are a stable interface for scripts.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MagnitudeAnalysis {
     /// Task label: "magnitude".
@@ -38,13 +38,13 @@ pub struct MagnitudeAnalysis {
     pub linear_r2: f64,
     /// Linear trend of the mean ratings, averaged over modalities.
     pub trend: Outcome<LinearTrend>,
-    /// Effects on normalised ratings: order x modality x stimulus.
+    /// Effects of order, modality and stimulus, and their interactions, on normalised ratings.
     pub anova: Vec<Effect>,
     /// Ratings by condition.
     pub ratings: Vec<RatingCell>,
     /// Mean number of counted ratings per subject.
     pub trials_per_subject: f64,
-    /// Number of presentations repeated because the handle left its range.
+    /// Number of presentations, over all subjects, repeated because the handle left its range.
     pub repeated: usize,
     /// Pairwise comparisons of the modalities at each stimulus.
     pub post_hoc: Vec<PostHoc>,
@@ -61,7 +61,7 @@ pub struct MagnitudeAnalysis {
 /// Analyses the ratings of a study.
 ///
 /// # Errors
-/// [`AnalysisError`] if ratings cannot be normalised as requested.
+/// [`AnalysisError`] if ratings cannot be normalised as requested, a stimulus was never rated, or there are too few subjects.
 pub fn analyse_magnitude(
     protocol: &MagnitudeProtocol,
     subjects: &[SubjectRecord],

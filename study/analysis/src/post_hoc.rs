@@ -10,7 +10,7 @@ use serde::Serialize;
 /// Comparison of two conditions over subjects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PostHoc {
-    /// Compared conditions: `h - vh, base 26`.
+    /// Compared conditions, as minuend and subtrahend: `h - vh, base 26`.
     pub comparison: String,
     /// Test of the difference.
     #[serde(flatten)]
@@ -22,14 +22,15 @@ pub struct PostHoc {
 pub struct PairTest {
     /// Paired t-test of the difference.
     pub t: TTest,
-    /// p-value after Holm's correction for all comparisons of the same kind.
+    /// p-value after Holm's correction over all comparisons of the same kind (modalities, or levels).
     pub p_holm: f64,
-    /// Cohen's d of the pairs with its 95 % interval.
+    /// Cohen's d of the pairs with its 95 % confidence interval.
     pub d: EffectSize,
 }
 
-/// Compares pairs of conditions, each given by its name and the responses in both conditions by subject. A difference that does not vary
-/// between subjects cannot be tested; it counts in the family with a p of 1, so that a tie does not lower the p of another comparison.
+/// Compares pairs of conditions, each given by its name and the responses of all subjects in the first and in the second
+/// condition; differences are first minus second. A difference that does not vary between subjects cannot be tested; it counts
+/// in the family with a p of 1, so that a tie does not lower the p of another comparison.
 pub(super) fn compare(pairs: impl IntoIterator<Item = (String, Vec<f64>, Vec<f64>)>) -> Vec<PostHoc> {
     let tested = pairs.into_iter().map(|(comparison, first, second)| (comparison, paired(&first, &second)));
     let tested: Vec<(String, Result<TTest, StatisticsError>)> = tested.collect();
@@ -41,7 +42,8 @@ pub(super) fn compare(pairs: impl IntoIterator<Item = (String, Vec<f64>, Vec<f64
     tested.into_iter().zip(holm(&p)).map(of).collect()
 }
 
-/// Compares the modalities at each level, from `responses[subject][modality by level]`.
+/// Compares the modalities at each level (haptics alone minus vision and haptics), from
+/// `responses[subject][modality by level]`.
 pub(super) fn modalities(name: &str, levels: &[f64], responses: &[Vec<f64>]) -> Vec<PostHoc> {
     compare(levels.iter().enumerate().map(|(index, level)| {
         let text = format!("h - vh, {name} {}", (level * 1.0e4).round() / 1.0e4);
@@ -49,7 +51,7 @@ pub(super) fn modalities(name: &str, levels: &[f64], responses: &[Vec<f64>]) -> 
     }))
 }
 
-/// Compares each pair of levels, from `responses[subject][level]`.
+/// Compares each pair of levels (higher minus lower index), from `responses[subject][level]`.
 pub(super) fn levels(name: &str, levels: &[f64], responses: &[Vec<f64>]) -> Vec<PostHoc> {
     let pair = |(low, high): (usize, usize)| {
         let text = format!("{name} {} - {}", levels[high], levels[low]);

@@ -1,7 +1,7 @@
 //! Power of a difference experiment: simulates whole studies without apparatus and counts significant differences between the modalities.
 //!
-//! The test is the paired t-test of `flotor analyse`. With equal observers in both modalities the share is the rate of false
-//! alarms, which must equal the level of the test.
+//! The test is the paired t-test of `flotor analyse`. With equal observers in both modalities the fraction of significant
+//! studies is the type I error rate, which must equal the significance level.
 
 use crate::{AnalysisError, AnalysisOptions, SubjectRecord, analyse_jnd};
 use flotor_study::log::TrialEvent;
@@ -14,22 +14,23 @@ use serde::Serialize;
 /// Significance level of the test.
 pub const LEVEL: f64 = 0.05;
 
-/// Power of a study with a given number of subjects.
+/// Statistical power of a study with a given number of subjects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Power {
     /// Number of subjects per study.
     pub subjects: u16,
     /// Number of simulated studies.
     pub studies: u32,
-    /// Share of studies with a significant difference between the modalities (p below 0.05).
+    /// Fraction of studies with a significant difference between the modalities (p below [`LEVEL`]).
     pub power: f64,
-    /// Standard error of the power.
+    /// Standard error of the power (binomial).
     pub standard_error: f64,
     /// Mean Weber fractions over all studies: vision and haptics, haptics alone.
     pub weber: [f64; 2],
 }
 
-/// Returns a population whose threshold without vision is `ratio` times that with vision.
+/// Returns a population whose thresholds without vision are `ratio` times the thresholds with vision, and whose lapse rate is
+/// `lapse`.
 #[must_use]
 pub fn population(ratio: f64, lapse: f64) -> Population {
     let usual = Population::default();
@@ -37,10 +38,11 @@ pub fn population(ratio: f64, lapse: f64) -> Population {
     Population { h, lapse, ..usual }
 }
 
-/// Simulates one study; returns the p of the paired t-test (1 without variation) and the mean Weber fractions.
+/// Simulates one study; returns the p-value of the paired t-test (1 if not testable) and the mean Weber fractions: vision and
+/// haptics, haptics alone.
 ///
 /// # Errors
-/// [`AnalysisError`] if a track reached no threshold.
+/// [`AnalysisError`] if the study cannot be analysed: a subject has no threshold in some condition.
 pub fn study(
     protocol: &JndProtocol,
     population: &Population,
@@ -67,7 +69,7 @@ pub fn study(
     Ok((analysis.t.tested().map_or(1.0, |t| t.p), [analysis.weber.vh, analysis.weber.h]))
 }
 
-/// Estimates the power from the results of studies with `subjects` subjects.
+/// Estimates the power from the results of [`study`] for `subjects` subjects.
 #[must_use]
 pub fn power(subjects: u16, results: &[(f64, [f64; 2])]) -> Power {
     let n = results.len() as f64;

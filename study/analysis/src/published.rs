@@ -3,7 +3,7 @@
 use flotor_statistics::describe::MeanInterval;
 use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Stimulus};
 
-/// Comparability of a study with the thesis, whose results hold only for springs at its bases and stimuli.
+/// Comparability of a study with the thesis, whose results hold only for springs with the bases and stimuli of the thesis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ThesisComparison {
     /// The settings match the thesis.
@@ -14,7 +14,8 @@ pub enum ThesisComparison {
 }
 
 impl ThesisComparison {
-    /// Checks a difference experiment: springs with bases of 17, 26 and 35 N, larger comparisons, a target of 75 %.
+    /// Compares the settings of a difference experiment with the thesis: springs with bases of 17, 26 and 35 N, larger
+    /// comparisons, a target of 75 %.
     #[must_use]
     pub fn jnd(protocol: &JndProtocol) -> Self {
         let usual = JndProtocol::default();
@@ -25,7 +26,7 @@ impl ThesisComparison {
         if is_same { Self::Thesis } else { Self::Nothing }
     }
 
-    /// Checks a magnitude experiment: springs with twelve stimuli of 12 to 48 N.
+    /// Compares the settings of a magnitude experiment with the thesis: springs with twelve stimuli of 12 to 48 N.
     #[must_use]
     pub fn magnitude(protocol: &MagnitudeProtocol) -> Self {
         let is_same =
@@ -33,19 +34,19 @@ impl ThesisComparison {
         if is_same { Self::Thesis } else { Self::Nothing }
     }
 
-    /// Returns a text of the thesis if comparable, else an empty one.
+    /// Returns `text`, a result of the thesis, if the study is comparable, else an empty text.
     #[must_use]
     pub fn text(self, text: &str) -> &str {
         if self == Self::Thesis { text } else { "" }
     }
 
-    /// Returns effects of the thesis if comparable, else none.
+    /// Returns `effects`, results of the thesis, if the study is comparable, else an empty slice.
     #[must_use]
     pub fn effects(self, effects: &[Published]) -> &[Published] {
         if self == Self::Thesis { effects } else { &[] }
     }
 
-    /// Returns the Weber fractions of the thesis, if comparable.
+    /// Returns the Weber fractions of the thesis ([`WEBER`]) if the study is comparable.
     #[must_use]
     pub fn weber(self) -> Option<[f64; 2]> {
         (self == Self::Thesis).then_some(WEBER)
@@ -56,7 +57,7 @@ fn is_of_springs(stimulus: &Stimulus) -> bool {
     (stimulus.model.as_str(), stimulus.parameter.as_str()) == ("spring", "gamma_n")
 }
 
-/// Name of an effect, and its statistic in the thesis.
+/// Name of an effect, and its test statistic as printed in the thesis.
 pub type Published = (&'static str, &'static str);
 
 /// Effects on thresholds (section 4.3.2).
@@ -71,16 +72,16 @@ pub const MAGNITUDE: [Published; 3] = [
     ("order", "F(1, 14) < 0.823, p = 0.198"),
     ("stimulus", "F(11, 154) = 13.57, p < 0.001"),
 ];
-/// Weber fractions: vision and haptics, haptics alone.
+/// Mean Weber fractions: vision and haptics, haptics alone.
 pub const WEBER: [f64; 2] = [0.142, 0.172];
-/// Effects of the base on Weber fractions, within each modality.
+/// Effects of the base on Weber fractions: vision and haptics, haptics alone.
 pub const CONSTANCY: [&str; 2] = ["F(2, 30) = 1.46, p = 0.25", "F(2, 30) = 0.80, p = 0.46"];
-/// Paired t-test between the modalities.
+/// Paired t-test of the Weber fractions between the modalities.
 pub const T: &str = "t(15) = 3.30, p = 0.005";
-/// R² of the linear trend of ratings.
+/// R² of the linear trend of the mean ratings over the stimuli.
 pub const LINEAR_R2: f64 = 0.983;
 
-/// Returns the published effects on movements, by task and measure; modality had none.
+/// Returns the published effects on a movement measure in a task (modality had no effect); empty for other tasks and measures.
 #[must_use]
 pub fn movement(task: &str, measure: &str) -> &'static [Published] {
     match (task, measure) {
@@ -105,8 +106,8 @@ pub enum Direction {
     Falls,
 }
 
-/// Returns the direction published in section 5: "velocity and acceleration are directly proportional and force is inversely
-/// proportional to the rendered gamma".
+/// Returns the direction of change published in section 5; `None` for a measure without one. The text: "velocity and
+/// acceleration are directly proportional and force is inversely proportional to the rendered gamma".
 #[must_use]
 pub fn direction(measure: &str) -> Option<Direction> {
     match measure {
@@ -117,7 +118,7 @@ pub fn direction(measure: &str) -> Option<Direction> {
 }
 
 impl Direction {
-    /// Returns true if the interval of an exponent lies on the published side of 0.
+    /// Returns true if the confidence interval of an exponent lies entirely on the published side of 0.
     #[must_use]
     pub fn is_reproduced(self, exponent: &MeanInterval) -> bool {
         let [low, high] = exponent.interval;
@@ -127,7 +128,7 @@ impl Direction {
         }
     }
 
-    /// Formats the direction, and its agreement with an exponent.
+    /// Formats the published direction, and whether the confidence interval of `exponent` reproduces this direction.
     #[must_use]
     pub fn beside(self, exponent: &MeanInterval) -> String {
         let way = match self {

@@ -1,5 +1,5 @@
-//! Report on one subject, from the first trial on: tracks, psychometric functions, and signs of answers that do not follow from the
-//! stimuli.
+//! Report on the data quality of one subject, also during a sitting: tracks, psychometric functions, and indications of answers
+//! that do not depend on the stimuli.
 
 use crate::large::wrong_at_large;
 use crate::text::p_text;
@@ -15,17 +15,18 @@ use serde::Serialize;
 
 /// Exploration time below which a presentation is suspicious, s.
 const SHORT_S: f64 = 0.5;
-/// Significance level of each kind of test of a subject: worse than chance, and misfit of the psychometric function.
+/// Significance level, over all conditions of a subject, of each kind of test: worse than chance, and misfit of the
+/// psychometric function.
 const LEVEL: f64 = 0.05;
 
-/// Psychometric function in one condition.
+/// Psychometric function of one subject in one condition.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubjectCondition {
     /// Modality of the condition.
     pub modality: Modality,
     /// Base, in the unit of the stimulus.
     pub base: f64,
-    /// Psychometric function with threshold and lapse.
+    /// Psychometric function with threshold and lapse rate.
     pub function: Psychometric,
 }
 
@@ -42,13 +43,13 @@ pub struct SubjectQuality {
     pub conditions: Vec<SubjectCondition>,
     /// Quartiles of the time from the end of a presentation to the answer, s; `None` if unknown.
     pub response_time_s: Option<[f64; 3]>,
-    /// Share of "I don't know"; `None` without comparisons.
+    /// Fraction of "I don't know" among the answers; `None` for ratings or without answers.
     pub dont_know: Option<f64>,
-    /// Share of "the first" among the answers that name a stimulus.
+    /// Fraction of "the first" among the answers that name a stimulus; `None` for ratings or without such answers.
     pub first: Option<f64>,
     /// Results of the check trials.
     pub checks: SubjectChecks,
-    /// Suspicious findings, one sentence each.
+    /// Suspicious findings, one short text each.
     pub flags: Vec<String>,
 }
 
@@ -57,7 +58,8 @@ impl SubjectCondition {
         format!("{} base {}", self.modality.word(), self.base)
     }
 
-    /// Returns the findings against the function, at a level corrected for the number of conditions.
+    /// Returns the suspicious findings of this condition: worse than chance, or misfit. `level` is the significance level,
+    /// corrected for the number of conditions.
     fn suspicions(&self, level: f64) -> Vec<String> {
         let Psychometric { named, wrong, p_chance, fit, .. } = self.function;
         let chance = (p_chance < level).then(|| {
@@ -73,7 +75,7 @@ impl SubjectCondition {
 }
 
 impl SubjectQuality {
-    /// Evaluates a subject's data so far.
+    /// Evaluates a subject's data so far; `incidents` are the interruptions and disturbances in the log.
     #[must_use]
     pub fn of(protocol: &Protocol, record: &SubjectRecord, incidents: &[Incident]) -> Self {
         let counted: Vec<_> = record.counted().collect();
@@ -122,12 +124,12 @@ impl SubjectQuality {
         let open = self.tracks.iter().filter(|track| track.not_bounded.is_some()).count();
         say(open, "tracks whose answers do not bound the threshold");
         say(incidents.len(), "interruptions and disturbances in the log");
-        // Bonferroni's correction: at most 5 % of subjects without a fault get a flag.
+        // Bonferroni correction: each kind of test flags at most 5 % of the subjects whose answers are in order.
         let level = LEVEL / self.conditions.len().max(1) as f64;
         flags.extend(self.conditions.iter().flat_map(|condition| condition.suspicions(level)));
         if let Some(first) = self.first
             && named >= 20.0
-            // Two standard deviations of a binomial share of a half.
+            // Two standard deviations of a binomial fraction of one half.
             && (first - 0.5).abs() > 1.0 / named.sqrt()
         {
             flags.push(format!("a preference: {:.0} % of the answers named the first", first * 100.0));
@@ -200,8 +202,8 @@ impl SubjectQuality {
     }
 }
 
-/// Counts named answers to pairs of equal stimuli, which are right or wrong by chance and affect the track; they occur in a track
-/// with a floor of 0.
+/// Counts answers that name a stimulus of a pair of equal stimuli. Such an answer is correct or wrong by chance and affects the
+/// track; equal pairs occur in a track with a floor of 0.
 fn without_difference(record: &SubjectRecord) -> usize {
     let is_judged = |event: &&flotor_study::log::TrialEvent| {
         event.response.named().is_some()

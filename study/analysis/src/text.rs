@@ -1,4 +1,4 @@
-//! Text pages of results, compared with CMU-RI-TR-07-21.
+//! Text pages of results, beside the results of CMU-RI-TR-07-21.
 
 use super::blinded::BlindedAnalysis;
 use super::published::ThesisComparison;
@@ -106,7 +106,7 @@ impl Page {
         self.lines.push(String::new());
     }
 
-    /// Adds a row: name, own value, and value of the thesis.
+    /// Adds a row: name, value of this study, and value of the thesis if comparable.
     fn row(&mut self, name: &str, here: &str, published: &str) {
         let published = self.thesis.text(published);
         let line = format!("  {}{}{published}", column(name, 30), column(here, 46));
@@ -127,7 +127,7 @@ impl Page {
         }
     }
 
-    /// Adds the effect sizes, after a note on a missing effect of the order.
+    /// Adds the effect sizes; first a note if the effect of the order is missing.
     fn sizes(&mut self, table: &[Effect]) {
         self.lines.extend(order_note(table).map(|note| format!("  {note}")));
         self.gap();
@@ -178,7 +178,7 @@ fn size_text(size: &EffectSize) -> String {
     format!("{:.2}  ({})", size.value, size_interval_text(size))
 }
 
-/// Formats the interval of an effect size: `0.24 to 1.39`.
+/// Formats the confidence interval of an effect size: `0.24 to 1.39`; an infinite limit gives `or more` or `or less`.
 #[must_use]
 pub fn size_interval_text(size: &EffectSize) -> String {
     match size.interval {
@@ -198,7 +198,7 @@ fn t_with_p_text(t: &TTest, p: f64) -> String {
     format!("t({}) = {:.2}, {}", t.df, t.value, p_text(p))
 }
 
-/// Formats an exponent with its interval.
+/// Formats an exponent with its 95 % confidence interval: `-0.512 (95 %: -0.630 to -0.394)`.
 #[must_use]
 pub fn exponent_text(exponent: &MeanInterval) -> String {
     let [low, high] = exponent.interval;
@@ -209,7 +209,8 @@ fn interval_text(value: &MeanInterval) -> String {
     format!("{:.3} (se {:.3})", value.mean, value.se)
 }
 
-/// Formats an effect as in publications: `F(2, 30) = 1.46, p = 0.250 (HF p = 0.251)`.
+/// Formats an effect as in publications: `F(2, 30) = 1.46, p = 0.250 (HF p = 0.251)`, the Huynh-Feldt p-value only if there is
+/// one; for an effect without a test, the reason.
 #[must_use]
 pub fn effect_text(effect: &Effect) -> String {
     if let Some(reason) = &effect.not_testable {

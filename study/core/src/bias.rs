@@ -1,4 +1,4 @@
-//! Bias and scatter of each threshold estimator, from many simulated tracks of observers with known thresholds.
+//! Bias and standard deviation of each threshold estimator, from many simulated tracks of observers with known thresholds.
 
 use crate::estimate::{Observation, Prior, most_likely};
 use crate::observer::TernaryObserver;
@@ -8,15 +8,15 @@ use crate::trial::{Judgement, Response};
 use flotor_statistics::describe::{deviation, mean};
 use serde::Serialize;
 
-/// Estimator of a threshold.
+/// Procedure and estimator of a threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
-    /// Weighted up-down, mean of the differences from the 4th to the 8th reversal.
+    /// Weighted up-down; mean of the differences from the 4th to the 8th reversal.
     Thesis,
-    /// Weighted up-down, most likely observer.
+    /// Weighted up-down; threshold of the most likely observer ([`most_likely`]).
     Map,
-    /// Trials placed by QUEST+.
+    /// QUEST+; posterior mean.
     QuestPlus,
 }
 
@@ -38,28 +38,28 @@ impl Method {
 /// Accuracy of one method for one observer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BiasRow {
-    /// Criterion of the observer, in deviations of the noise.
+    /// Criterion of the observer, in standard deviations of the noise.
     pub criterion: f64,
-    /// True threshold, as a share of the base.
+    /// True threshold, as a fraction of the base (Weber fraction).
     pub threshold: f64,
-    /// Tracks whose trials make one estimate.
+    /// Number of tracks per estimate.
     pub tracks: u32,
-    /// Estimator.
+    /// Procedure and estimator.
     pub method: Method,
-    /// Number of estimates.
+    /// Number of finite estimates.
     pub runs: u32,
-    /// Mean estimate over the true threshold, less one.
+    /// Relative bias: mean estimate divided by the true threshold, minus 1.
     pub bias: f64,
-    /// Deviation of the estimates, as a share of the true threshold.
+    /// Standard deviation of the estimates, as a fraction of the true threshold.
     pub deviation: f64,
-    /// Root mean square error, as a share of the true threshold.
+    /// Root mean square error of the estimates, as a fraction of the true threshold.
     pub rms_error: f64,
     /// Mean number of trials per track.
     pub trials: f64,
 }
 
-/// Runs every method on an observer. `tracks` tracks make one estimate: means for `thesis` and `questplus`, all trials
-/// together for `map`.
+/// Simulates every method with an observer, at a target of 75 %: `runs` estimates, each from `tracks` tracks (mean of the
+/// tracks' thresholds for `thesis` and `questplus`, all trials together for `map`).
 #[must_use]
 pub fn rows(observer: &TernaryObserver, tracks: u32, runs: u32, seed: u64) -> Vec<BiasRow> {
     let threshold = observer.threshold(0.75);
@@ -109,7 +109,7 @@ pub fn rows(observer: &TernaryObserver, tracks: u32, runs: u32, seed: u64) -> Ve
     Method::ALL.into_iter().zip(&estimates).map(row).collect()
 }
 
-/// Runs one track with one observer; returns threshold and answers.
+/// Runs one track with an observer; returns threshold and answers.
 fn walk(
     mut track: Track,
     observer: &TernaryObserver,

@@ -1,6 +1,6 @@
 //! Condition codes for blinded studies: experimenter and analyst do not know the conditions until unblinding.
 //!
-//! The assignment follows from protocol and seed; [`Codes`] built from the same pair are equal.
+//! The assignment depends on protocol and seed alone, so it need not be stored.
 
 use crate::protocol::Protocol;
 use crate::random::{Purpose, Stream};
@@ -9,14 +9,14 @@ use crate::trial::{Modality, Presented};
 /// Condition codes of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Codes {
-    /// Bases of a difference experiment, or rated stimuli; the code of a level is its index plus one.
+    /// Bases of a difference experiment, or rated stimuli, in random order; the code of a level is its index plus 1.
     levels: Vec<f64>,
     /// Modality with code A.
     a: Modality,
 }
 
 impl Codes {
-    /// Draws the codes from the seed.
+    /// Draws the codes for a study with this protocol and seed.
     #[must_use]
     pub fn new(protocol: &Protocol, seed: u64) -> Self {
         let mut stream = Stream::new(seed, Purpose::Blinding, 0, 0);
@@ -32,7 +32,7 @@ impl Codes {
         if modality == self.a { "A" } else { "B" }
     }
 
-    /// Returns the code of a base or rated stimulus: 1, 2, ...; 0 for a practice stimulus.
+    /// Returns the code of a base or rated stimulus: 1, 2, ...; 0 for a value that is no level, such as a practice stimulus.
     #[must_use]
     pub fn level(&self, level: f64) -> usize {
         self.levels.iter().position(|known| *known == level).map_or(0, |index| index + 1)

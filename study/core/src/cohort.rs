@@ -1,4 +1,4 @@
-//! Runs a study with many simulated subjects in parallel.
+//! Study with many simulated subjects in parallel.
 
 use crate::conduct::{ApparatusOrFrontEndError, ConductError, Presenter, conduct};
 use crate::dataset::{Dataset, DatasetError, ExistingLogPolicy, Progress};
@@ -12,7 +12,7 @@ use std::num::NonZeroUsize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A study with simulated subjects.
+/// Study with simulated subjects.
 #[derive(Clone, Debug)]
 pub struct Cohort {
     /// Experiment with its settings.
@@ -52,21 +52,21 @@ pub enum CohortError {
     },
 }
 
-/// Factory of presenters, one per subject; returns `None` if a stop was requested first.
+/// Factory of presenters, one per subject; returns `None` if a stop was requested before the presenter was ready.
 pub type PresenterFactory<'a> =
     dyn Fn(SubjectNumber) -> Result<Option<Box<dyn Presenter + 'a>>, ApparatusOrFrontEndError> + Sync + 'a;
 
-/// One subject's sitting, ready to run.
+/// Sitting of one subject, ready to run.
 struct Turn {
     subject: SubjectNumber,
-    /// Trials presented before the interruption.
+    /// Trials presented before an interruption; empty for a new sitting.
     earlier: Vec<Trial>,
     sitting: Sitting,
     log: LogWriter,
 }
 
 impl Cohort {
-    /// Returns the mean stimulus, the reference of simulated ratings.
+    /// Returns the mean of the levels, the reference stimulus of simulated ratings.
     fn middle(&self) -> f64 {
         flotor_statistics::describe::mean(self.protocol.levels())
     }
@@ -93,8 +93,8 @@ impl Cohort {
         }
     }
 
-    /// Runs the study with `jobs` subjects at a time and writes the tables. `watch` is called for every trial on disk; `stop` ends
-    /// the study after the trials in progress.
+    /// Runs the study with `jobs` subjects at a time and writes the tables. `watch` is called after each trial is on disk;
+    /// `stop` ends the study after the trials in progress. Not real-time.
     ///
     /// Checks the logs of all subjects before the first presentation.
     ///

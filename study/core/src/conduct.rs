@@ -1,4 +1,4 @@
-//! Conducts a sitting: presents stimuli, collects answers, and writes every trial to disk before the next.
+//! Sitting of a simulated subject: presents stimuli, collects answers, and writes every trial to disk before the next.
 
 use crate::log::{Event, LogError, LogWriter, TrialEvent};
 use crate::observer::SimulatedSubject;
@@ -9,9 +9,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Error of an apparatus or a front end.
 pub type ApparatusOrFrontEndError = Box<dyn std::error::Error + Send + Sync>;
 
-/// Presents the stimuli of a trial one after the other and reports the exploration.
+/// Apparatus that presents the stimuli of a trial one after the other and measures the exploration.
 pub trait Presenter {
-    /// Presents a trial; returns `None` if a stop request interrupted it: the trial counts as not presented. Not real-time.
+    /// Presents a trial; returns `None` if a stop request interrupted the trial, which then counts as not presented. Not
+    /// real-time.
     ///
     /// # Errors
     /// Errors of the apparatus; the trial counts as not presented.
@@ -28,7 +29,7 @@ impl Presenter for NoApparatus {
     }
 }
 
-/// Outcome of a sitting.
+/// Way in which a sitting ended without an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
     /// All trials were presented.
@@ -44,7 +45,7 @@ pub enum ConductError {
     /// Error of the log.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// Error of the apparatus before the first trial.
+    /// Error in setting up the apparatus, before the first trial.
     #[error("{0}")]
     Outside(ApparatusOrFrontEndError),
     /// Error of the apparatus during a trial.
@@ -60,7 +61,8 @@ pub enum ConductError {
     Answer(#[from] AnswerError),
 }
 
-/// Runs the sitting of a simulated subject until it is complete or stopped. `watch` is called for every trial on disk.
+/// Runs the sitting of a simulated subject until it is complete or stopped. `watch` is called after each trial is on disk. Not
+/// real-time.
 ///
 /// # Errors
 /// [`ConductError`]; earlier trials are in the log.

@@ -1,8 +1,9 @@
-//! Exclusion rules, fixed before data collection, and their findings. `flotor-analysis` applies the rules.
+//! Exclusion rules, fixed before data collection, and the exclusions that result. `flotor-analysis` applies the rules.
 //!
-//! A rule applies to a whole sitting (`most_...`, `least_agreement`) or to single trials (`response_time_s`, `least_movement_mm`).
-//! A rated trial is excluded alone. A trial of an adaptive track excludes its track, because the later differences depend on its
-//! answer; only an estimate from all answers (`--estimator map`) can do without that trial alone.
+//! A rule applies to a whole sitting (`most_...`, `least_agreement`) or to single trials (`response_time_s`,
+//! `least_movement_mm`). A rating is excluded alone. An excluded trial of an adaptive track excludes the whole track, because
+//! the later differences depend on the answer; with an estimate from all answers (`--estimator map`) the trial is excluded
+//! alone.
 
 mod check;
 
@@ -14,34 +15,34 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExclusionRules {
-    /// Sitting: largest share of catch trials answered with one of the two equal stimuli.
+    /// Sitting: maximum fraction of catch trials answered with one of the two equal stimuli.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_false_alarms: Option<f64>,
-    /// Sitting: largest share of obvious pairs answered without naming the larger stimulus.
+    /// Sitting: maximum fraction of obvious pairs answered without naming the larger stimulus.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_missed_obvious: Option<f64>,
-    /// Sitting: largest share of wrong answers to differences of 40 % and more.
+    /// Sitting: maximum fraction of wrong answers to differences of 40 % and more.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_wrong_at_large: Option<f64>,
-    /// Sitting: least share of repeated pairs with the same answer.
+    /// Sitting: minimum fraction of repeated pairs with the same answer.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub least_agreement: Option<f64>,
-    /// Sitting: largest deviation of a repeated rating, as a share of the mean rating.
+    /// Sitting: maximum standard deviation of a rating between repetitions, as a fraction of the mean rating.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_retest_deviation: Option<f64>,
-    /// Sitting: largest share of "I don't know".
+    /// Sitting: maximum fraction of the answer "I don't know".
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_dont_know: Option<f64>,
-    /// Sitting: largest share of missed ticks while stimuli were felt.
+    /// Sitting: maximum fraction of missed ticks while stimuli were felt.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_missed_ticks: Option<f64>,
-    /// Trial: least path length of the handle with each stimulus, up and down together, over all repetitions, mm.
+    /// Trial: minimum path length of the handle with each stimulus, up and down added, over all repetitions, mm.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub least_movement_mm: Option<f64>,
-    /// Trial: shortest and longest time to the answer, s.
+    /// Trial: minimum and maximum response time, s.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub response_time_s: Option<[f64; 2]>,
-    /// Sitting: largest share of trials excluded by trial rules.
+    /// Sitting: maximum fraction of trials excluded by trial rules.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub most_excluded_trials: Option<f64>,
 }
@@ -54,11 +55,11 @@ pub const EMPTY_CONDITION: &str = "empty_condition";
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scope {
-    /// All data of the subject.
+    /// The whole sitting of the subject.
     Sitting,
-    /// One track, by its number.
+    /// One track, by track number.
     Track(u32),
-    /// One trial, by its number.
+    /// One trial, by trial number.
     Trial(u32),
 }
 
@@ -71,12 +72,12 @@ pub struct Exclusion {
     pub scope: Scope,
     /// Name of the rule in the study file, or [`EMPTY_CONDITION`].
     pub rule: &'static str,
-    /// Finding that violates the rule.
+    /// Value that violates the rule, as text.
     pub found: String,
 }
 
 impl Exclusion {
-    /// Returns true if a main trial is excluded by this finding.
+    /// Returns true if this exclusion covers a trial of a subject; only counted (main) trials are covered.
     #[must_use]
     pub fn covers(&self, subject: SubjectNumber, trial: &Trial) -> bool {
         let is_here = match self.scope {
@@ -105,13 +106,13 @@ impl std::fmt::Display for Scope {
 }
 
 impl ExclusionRules {
-    /// Returns true without any rule.
+    /// Returns true if no rule is set.
     #[must_use]
     pub fn are_none(&self) -> bool {
         *self == Self::default()
     }
 
-    /// Returns a warning for a rule that depends on the condition as well as on the subject.
+    /// Returns a warning for a rule whose exclusions depend on the stimulus as well as on the subject; `None` for other rules.
     #[must_use]
     pub fn warning(rule: &str) -> Option<&'static str> {
         (rule == "least_movement_mm").then_some(
@@ -120,7 +121,7 @@ impl ExclusionRules {
         )
     }
 
-    /// Formats a rule as in the study file: `most_false_alarms = 0.5`.
+    /// Formats a rule as in the study file: `most_false_alarms = 0.5`; a rule that is not set as its name.
     #[must_use]
     pub fn text_of(&self, rule: &str) -> String {
         let said = serde_json::to_value(self).unwrap_or_default();

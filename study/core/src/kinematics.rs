@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// One sample of handle and force, device frame: z is up, the force acts on the hand.
+/// Sample of handle motion and force in the device frame, z up; the force acts on the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Time since the previous sample, s.
@@ -12,9 +12,9 @@ pub struct Sample {
     pub z_m: f64,
     /// Vertical velocity of the handle, m/s.
     pub velocity_m_per_s: f64,
-    /// Force along z, N.
+    /// Force on the hand along z, N.
     pub force_z_n: f64,
-    /// Magnitude of the whole force, N.
+    /// Magnitude of the force on the hand, all three components, N.
     pub force_n: f64,
     /// True if the handle was out of its range.
     pub out_of_range: bool,
@@ -33,14 +33,16 @@ pub struct StimulusKinematics {
     pub mean_force_n: f64,
     /// Largest magnitude of the force on the hand, N.
     pub peak_force_n: f64,
-    /// Number of down and up movements.
+    /// Number of complete cycles, each one movement down and one up.
     pub cycles: u32,
-    /// Stiffness of vertical force against vertical displacement as felt by the hand, N/m; `None` if the handle did not move.
+    /// Stiffness felt by the hand: negative slope of the vertical force over the handle's height (least squares), N/m; positive
+    /// for a spring, `None` if the handle did not move.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub felt_stiffness_n_per_m: Option<f64>,
 }
 
-/// Smallest counted movement, m: above tremor (Stiles and Randall 1967: tenths of a millimetre), below the millimetres of an exploration.
+/// Dead band of the direction changes, m: above tremor (Stiles and Randall 1967: tenths of a millimetre), below the millimetres
+/// of an exploration.
 const SMALLEST_MOVEMENT_M: f64 = 0.5e-3;
 
 /// Accumulator of movement measures, in constant memory.
@@ -58,7 +60,7 @@ pub struct KinematicsMeter {
 }
 
 impl KinematicsMeter {
-    /// Adds a sample; skips samples that are not finite.
+    /// Adds a sample. A sample with a number that is not finite counts only for `out_of_range`.
     pub fn take(&mut self, sample: &Sample) {
         let Sample { dt_s, z_m, velocity_m_per_s, force_z_n, force_n, out_of_range } = *sample;
         self.out_of_range |= out_of_range;
@@ -76,13 +78,13 @@ impl KinematicsMeter {
         self.line.take(z_m, force_z_n);
     }
 
-    /// Returns true if the handle was ever out of its range.
+    /// Returns true if the handle was out of its range in any sample so far.
     #[must_use]
     pub fn out_of_range(&self) -> bool {
         self.out_of_range
     }
 
-    /// Returns the measures; `None` if the samples span no time.
+    /// Returns the measures of the samples so far; `None` if they span no time.
     #[must_use]
     pub fn finish(&self) -> Option<StimulusKinematics> {
         let duration_s = self.duration_s;
@@ -104,7 +106,7 @@ impl KinematicsMeter {
 struct Turns {
     /// Extreme position in the current direction, m.
     extreme_m: Option<f64>,
-    /// 1 up, -1 down, 0 unknown.
+    /// Direction of the movement: 1 up, -1 down, 0 unknown.
     direction: f64,
     count: u32,
 }
@@ -143,7 +145,7 @@ impl Line {
         self.zf += from_mean_m * (force_n - self.mean_force_n);
     }
 
-    /// Returns the slope; `None` unless the handle moved measurably.
+    /// Returns the slope, N/m; `None` if the height varied by less than a tenth of the dead band (standard deviation).
     fn slope(&self) -> Option<f64> {
         let deviation_m = (self.zz / self.count.max(1.0)).sqrt();
         (deviation_m > 0.1 * SMALLEST_MOVEMENT_M).then(|| self.zf / self.zz)

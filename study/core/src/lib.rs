@@ -9,14 +9,14 @@
 //! ```
 //!
 //! - [`protocol`]: experiments and their settings.
-//! - [`sitting`]: state machine of one subject's experiment, shared by people, simulated observers and replay.
+//! - [`sitting`]: state machine of one subject's experiment, used for people, simulated observers and replay.
 //! - [`procedure`]: adaptive choice of the next difference, and the resulting threshold.
 //! - [`observer`]: simulated subjects; [`estimate`]: estimation of observers from answers; [`bias`]: accuracy of the estimators.
 //! - [`log`]: hash-chained event log; [`dataset`]: data folder and tables.
 //! - [`kinematics`]: movement measures of an exploration, from samples of handle and force.
-//! - [`screen`]: screens of a person's sitting, for any front end; [`blinding`]: codes in place of conditions.
+//! - [`screen`]: screens of a person's sitting, for any front end; [`blinding`]: codes that replace conditions.
 //! - [`conduct`]: runs a sitting with presenter, simulated subject and log.
-//! - [`cohort`]: many simulated subjects in parallel.
+//! - [`cohort`]: studies of many simulated subjects in parallel.
 //! - [`exclusion`]: exclusion rules, fixed before data collection.
 //!
 //! `flotor-analysis` computes thresholds, tests and effects from the logs.

@@ -1,14 +1,14 @@
-//! Stateless seeded randomness: every draw has a separate stream, named by its purpose and subject.
+//! Random streams without stored state: seed, purpose, subject and index determine a stream.
 //!
-//! A sitting resumed after a crash therefore needs no generator state: trial 57 of subject 3 draws the same numbers at any time, on
-//! every machine and in any order.
+//! A sitting resumed after a crash therefore needs no generator state: trial 57 of subject 3 draws the same numbers on every
+//! machine, regardless of other draws.
 
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Purpose of a stream.
+/// Purpose of a random stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// Order of blocks, demos and stimuli.
@@ -38,7 +38,7 @@ pub(crate) struct Stream {
 }
 
 impl Stream {
-    /// Creates the stream for a purpose, subject and index (of a trial, for instance) of an experiment.
+    /// Creates the stream for a seed, purpose, subject and index (for instance the number of a trial).
     pub(crate) fn new(seed: u64, purpose: Purpose, subject: u16, index: u32) -> Self {
         let mut name = [0_u8; 15];
         let parts = [&seed.to_le_bytes()[..], &[purpose as u8], &subject.to_le_bytes(), &index.to_le_bytes()];
@@ -54,19 +54,19 @@ impl Stream {
         bits * STEP
     }
 
-    /// Draws a standard normal number (Box and Muller 1958), bit-identical on every machine.
+    /// Draws a sample of the standard normal distribution (Box and Muller 1958), bit-identical on every machine.
     pub(crate) fn normal(&mut self) -> f64 {
         // 1 - u is never zero, so the logarithm is finite.
         let radius = (-2.0 * libm::log(1.0 - self.uniform())).sqrt();
         radius * libm::cos(TAU * self.uniform())
     }
 
-    /// Draws a fair coin.
+    /// Draws true or false with equal probability.
     pub(crate) fn coin(&mut self) -> bool {
         self.uniform() < 0.5
     }
 
-    /// Draws uniformly from `0..n`; returns 0 for `n` = 0.
+    /// Draws an integer uniformly from `0..n`; returns 0 for `n` = 0.
     pub(crate) fn below(&mut self, n: usize) -> usize {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // n is the length of a list of trials
@@ -74,7 +74,7 @@ impl Stream {
         index.min(n.saturating_sub(1))
     }
 
-    /// Shuffles a list, every order equally likely (Fisher and Yates).
+    /// Shuffles a list; all orders are equally likely (Fisher and Yates).
     pub(crate) fn shuffle<T>(&mut self, list: &mut [T]) {
         for last in (1..list.len()).rev() {
             let other = self.below(last + 1);

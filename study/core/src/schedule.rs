@@ -1,14 +1,15 @@
-//! Orders of blocks, demonstrations, stimuli and checks, from the subject's number and the seed.
+//! Orders of blocks, demonstrations, stimuli and checks, determined by the subject's number and the seed.
 
 use crate::protocol::{JndProtocol, MagnitudeProtocol, SubjectNumber};
 use crate::random::{Purpose, Stream};
 use crate::trial::{Modality, Phase};
 
-/// Returns the order of the bases in each replication, as indices: rows of Latin squares, none repeated before all were used.
+/// Returns the order of the bases in each replication, as indices: rows of Latin squares, without repetition of a row before
+/// all rows were used.
 ///
-/// The rows of a cyclic Latin square (each base once at each place) come in random order, with the bases permuted and the square
-/// mirrored at random; after the last row the mirrored square follows. For the three bases of the thesis these two squares hold all
-/// six orders, so four replications never repeat one.
+/// The rows of a cyclic Latin square (each base once in each position) follow in random order, with the bases permuted and the
+/// square mirrored at random; after the last row the mirrored square follows. For the three bases of the thesis these two
+/// squares contain all six orders, so the orders of four replications all differ.
 pub(crate) fn base_orders(protocol: &JndProtocol, seed: u64, subject: SubjectNumber) -> Vec<Vec<usize>> {
     let count = protocol.bases.len();
     let mut stream = Stream::new(seed, Purpose::Schedule, subject.get(), 0);
@@ -32,14 +33,15 @@ pub(crate) fn base_orders(protocol: &JndProtocol, seed: u64, subject: SubjectNum
     orders
 }
 
-/// Returns the modality of a replication; modalities alternate.
+/// Returns the modality of a replication, counted from 0; modalities alternate.
 pub(crate) fn alternating(first: Modality, replication: usize) -> Modality {
     if replication.is_multiple_of(2) { first } else { first.other() }
 }
 
-/// Returns the demonstration of a difference experiment: three pairs in each modality, in mixed order.
+/// Returns the demonstration of a difference experiment: three pairs in each modality, in random order; empty if it is not
+/// shown.
 ///
-/// The pairs are neighbours among four springs: obviously different, close, nearly equal.
+/// The differences of the three pairs are obvious, close, and nearly zero ([`JndProtocol::demo_values`]).
 pub(crate) fn jnd_demo(
     protocol: &JndProtocol,
     seed: u64,
@@ -68,11 +70,11 @@ pub(crate) fn magnitude_order(
     values
 }
 
-/// Returns the checks of a track in order, each with the number of the track's trials before it, at random places after the first
-/// trial and before the earliest end of the track.
+/// Returns the checks of a track in order, each with the number of counted trials of the track before it. The positions are
+/// random, after the first trial and before the earliest end of the track.
 ///
-/// A repeat check follows another pair than the one it repeats, and a counted trial separates two repeat checks, as far as the
-/// track has places for that.
+/// As far as the track has enough positions, a repeat check does not directly follow the pair that it repeats, and a counted
+/// trial separates any two repeat checks.
 pub(crate) fn track_checks(
     protocol: &JndProtocol,
     seed: u64,
@@ -82,7 +84,7 @@ pub(crate) fn track_checks(
     let mut stream = Stream::new(seed, Purpose::CheckPlace, subject.get(), track);
     let checks = protocol.checks;
     let obvious = checks.obvious.map_or(0, |pairs| pairs.count);
-    // Obvious pairs are drawn last, so that they do not move the other checks.
+    // Obvious pairs are drawn last, so that the positions of the other checks do not depend on them.
     let kinds =
         [(Phase::Catch, checks.catch), (Phase::RepeatCheck, checks.repeats), (Phase::Obvious, obvious)];
     let kinds = kinds.into_iter().flat_map(|(kind, count)| std::iter::repeat_n(kind, count as usize));
@@ -98,14 +100,15 @@ pub(crate) fn track_checks(
     checks
 }
 
-/// Removes the drawn item from a sorted list, else the next larger, wrapping around; returns `None` if the list is empty.
+/// Removes and returns the drawn item of a sorted list, or if it is missing the next larger item, cyclically; `None` if the
+/// list is empty.
 fn taken<T: PartialOrd>(left: &mut Vec<T>, drawn: &T) -> Option<T> {
     let next = left.iter().position(|one| one >= drawn).unwrap_or(0);
     (!left.is_empty()).then(|| left.remove(next))
 }
 
-/// Returns one replication of a magnitude experiment with its checks. Each check repeats a stimulus after at least one other, and
-/// checks share a place only if there are more checks than places.
+/// Returns one replication of a magnitude experiment with its checks. Each check repeats a stimulus after at least one other
+/// stimulus; checks are all different in stimulus or position unless there are more checks than such combinations.
 pub(crate) fn with_repeat_checks(
     protocol: &MagnitudeProtocol,
     seed: u64,
@@ -115,7 +118,7 @@ pub(crate) fn with_repeat_checks(
 ) -> Vec<(Phase, f64)> {
     let mut stream = Stream::new(seed, Purpose::CheckPlace, subject.get(), replication);
     let count = order.len();
-    // Pairs of stimulus index and place of its check, with at least one other stimulus in between.
+    // Pairs of a stimulus index and the position of its check, with at least one other stimulus in between.
     let mut left: Vec<(usize, usize)> = (0..count.saturating_sub(2))
         .flat_map(|which| (which + 2..=count).map(move |place| (which, place)))
         .collect();
@@ -139,7 +142,8 @@ pub(crate) fn with_repeat_checks(
     all
 }
 
-/// Returns the demonstration before a modality of a magnitude experiment: the extremes and others, in random order.
+/// Returns the demonstration before a modality of a magnitude experiment: the smallest, the largest and random other stimuli,
+/// in random order.
 pub(crate) fn magnitude_demo(
     protocol: &MagnitudeProtocol,
     seed: u64,

@@ -1,4 +1,4 @@
-//! State machine of one subject's experiment, shared by people, simulated observers and replay.
+//! State machine of one subject's experiment, used for people, simulated observers and replay.
 //!
 //! [`Sitting::next`] returns the next trial, [`Sitting::answer`] processes its answer. Both depend only on the protocol, the seed,
 //! the subject's number and the answers so far.
@@ -18,11 +18,11 @@ use std::collections::VecDeque;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Verdict {
-    /// The handle left its range: the trial is repeated.
+    /// Answer does not count: the handle left its range, and the trial is repeated.
     Repeated,
-    /// Accepted without judgement: practice, or a rating.
+    /// Answer accepted without judgement: practice, check or rating.
     Taken,
-    /// Judged comparison.
+    /// Answer to a counted pair, judged.
     Judged {
         /// Judgement of the answer.
         judgement: Judgement,
@@ -35,10 +35,10 @@ pub enum Verdict {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum AnswerError {
-    /// A rating for a pair, or a comparison for one stimulus.
+    /// The answer does not fit the trial, such as a rating for a pair.
     #[error("`{}` is not a valid answer in this trial; give one of the offered answers", .0.word())]
     Kind(Response),
-    /// A rating that is not finite.
+    /// A rating is not finite.
     #[error("a rating must be a finite number")]
     NotFinite,
     /// All trials were presented already.
@@ -57,16 +57,16 @@ pub struct TrackResult {
     pub modality: Modality,
     /// Base, in the stimulus's unit.
     pub base: f64,
-    /// Threshold as a share of the base; `None` if the track did not reach one.
+    /// Threshold as a fraction of the base; `None` if the track ended without a threshold.
     pub threshold: Option<f64>,
-    /// Ends of the threshold that the answers do not bound.
+    /// Sides on which the answers do not bound the threshold; `None` if they bound both, or for weighted up-down.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_bounded: Option<NotBounded>,
-    /// Number of trials.
+    /// Number of counted trials.
     pub trials: u32,
 }
 
-/// Remaining block of a sitting.
+/// Remaining item of a sitting: a single presentation or an adaptive track.
 #[derive(Clone, Debug)]
 enum Item {
     Show { phase: Phase, replication: u32, modality: Modality, presented: Presented },
@@ -78,14 +78,14 @@ enum Item {
 struct Running {
     track: Track,
     trials: u32,
-    /// Remaining checks, each with the number of trials before it.
+    /// Remaining checks, each with the number of counted trials before it.
     checks: VecDeque<(u32, Phase)>,
-    /// Pairs presented so far.
+    /// Counted pairs presented so far.
     pairs: Vec<Pair>,
 }
 
 impl Running {
-    /// Returns the check that is due now.
+    /// Returns the check that is due now; `None` if a counted trial is next.
     fn check(&self) -> Option<Phase> {
         self.checks.front().filter(|(after, _)| *after <= self.trials).map(|(_, check)| *check)
     }
@@ -134,7 +134,7 @@ impl Sitting {
         self.subject
     }
 
-    /// Returns the number of presentations so far.
+    /// Returns the number of answered presentations so far, practice, checks and repeats included.
     #[must_use]
     pub fn presented(&self) -> u32 {
         self.presented
@@ -146,13 +146,13 @@ impl Sitting {
         self.items.is_empty()
     }
 
-    /// Returns the results of completed tracks.
+    /// Returns the results of the completed tracks, in order.
     #[must_use]
     pub fn results(&self) -> &[TrackResult] {
         &self.results
     }
 
-    /// Returns the trial to present now; does not change the state.
+    /// Returns the trial to present now, `None` if all trials were presented; does not change the state.
     #[must_use]
     pub fn next(&self) -> Option<Trial> {
         let item = self.items.front()?;
@@ -192,7 +192,7 @@ impl Sitting {
         presented.into_iter().map(trial).collect()
     }
 
-    /// Processes the answer to the trial of [`Sitting::next`].
+    /// Processes the answer to the trial of [`Sitting::next`], and advances to the next trial or to a repeat.
     ///
     /// # Errors
     /// If the answer is of the wrong kind or the sitting is over; the state is unchanged.
@@ -255,16 +255,16 @@ impl Sitting {
         self.begin_track();
     }
 
-    /// Returns the track's next pair or check.
+    /// Returns phase and pair of the track's next trial, a counted one or a check.
     fn of_track(&self, base: f64, number: u32) -> (Phase, Pair) {
         let Some(running) = &self.running else { return (Phase::Main, self.pair(base, 0.0, number)) };
         match running.check() {
             Some(Phase::Catch) => (Phase::Catch, self.pair(base, 0.0, number)),
             Some(Phase::Obvious) => (Phase::Obvious, self.pair(base, self.obvious_delta(), number)),
             Some(Phase::RepeatCheck) => {
-                // Not the last pair, if possible: two equal pairs in a row would be noticed.
+                // Do not repeat the last pair, if there are others: the subject would notice two equal pairs in a row.
                 let earlier = running.pairs.len().saturating_sub(1).max(1);
-                // A repeated check presents the same pair.
+                // If the check itself is repeated, present the same pair.
                 let name = number - self.repeat;
                 let which =
                     Stream::new(self.seed, Purpose::CheckTrial, self.subject.get(), name).below(earlier);
@@ -285,7 +285,7 @@ impl Sitting {
             return pair(base, base, Position::Second, true);
         };
         let mut stream = Stream::new(self.seed, Purpose::Presentation, self.subject.get(), number);
-        // Both are drawn in any case, so that one setting does not affect the other draw.
+        // Both numbers are drawn in any case, so that the setting of order does not affect the draw of the side.
         let (second, above) = (stream.coin(), stream.coin());
         let comparison_at = match jnd.order {
             PresentationOrder::Random if second => Position::Second,

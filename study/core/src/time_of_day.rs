@@ -1,5 +1,5 @@
-//! Time of day in UTC, to the millisecond, for people and for files of other devices. Only a person's events have times; simulated
-//! sittings do not depend on the time.
+//! Time of day in UTC, with a resolution of 1 ms, by which people can relate events to the files of other devices. Only the
+//! events of a person's sitting have times; simulated sittings do not depend on the time.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
@@ -8,7 +8,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 const MS_PER_DAY: u64 = 86_400_000;
 
-/// Time of day, in milliseconds since 1970 UTC; written `2026-11-25T18:34:09.123Z` (ISO 8601, as in BIDS).
+/// Date and time of day, in milliseconds since 1970-01-01 UTC; written as `2026-11-25T18:34:09.123Z` (ISO 8601, as in BIDS).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TimeOfDay(u64);
 
@@ -20,22 +20,22 @@ impl TimeOfDay {
         Self(u64::try_from(since.as_millis()).unwrap_or(u64::MAX))
     }
 
-    /// Returns the time since an earlier moment, s; negative if that was later.
+    /// Returns the time since `earlier`, s; negative if `earlier` is later than this time.
     #[must_use]
     pub fn since_s(self, earlier: Self) -> f64 {
         (self.0 as f64 - earlier.0 as f64) * 1.0e-3
     }
 }
 
-/// Smallest change of the system's time of day that counts as a jump, ms; less is ordinary adjustment.
+/// Smallest change of the system clock that counts as a jump, ms; smaller changes are ordinary adjustments.
 const LEAST_JUMP_MS: i64 = 1_000;
 
-/// Clock of a sitting: the time of day at its start plus monotonic time, unaffected by changes of the system's time.
+/// Clock of a sitting: the time of day at its start plus monotonic time, unaffected by changes of the system clock.
 #[derive(Clone, Copy, Debug)]
 pub struct SittingClock {
     began: TimeOfDay,
     started: Instant,
-    /// System time less this clock's time at the last noted jump, ms.
+    /// System time minus this clock's time at the last reported jump, ms.
     noted_ms: i64,
 }
 
@@ -53,7 +53,8 @@ impl SittingClock {
         TimeOfDay(self.began.0.saturating_add(passed_ms))
     }
 
-    /// Returns the jump of the system's time of day since the last call, ms; `None` without a jump.
+    /// Returns the jump of the system clock since the last reported jump, ms, positive forward; `None` if it changed by less
+    /// than a second.
     pub fn take_jump_ms(&mut self) -> Option<i64> {
         self.jump_to(TimeOfDay::now())
     }
@@ -78,7 +79,8 @@ impl fmt::Display for TimeOfDay {
     }
 }
 
-/// Converts days since 1970-01-01 to year, month and day (Gregorian; years start in March, so that the leap day is the last).
+/// Converts days since 1970-01-01 to year, month and day (Gregorian calendar; computed with years that start in March, so that
+/// the leap day is the last day).
 fn date(days: u64) -> (u64, u64, u64) {
     let from_march = days + 719_468; // days from 0000-03-01 to 1970-01-01
     let (era, day) = (from_march / 146_097, from_march % 146_097);
@@ -90,7 +92,7 @@ fn date(days: u64) -> (u64, u64, u64) {
     (era * 400 + year + carry, month, day)
 }
 
-/// Error of parsing a time of day.
+/// Error: a text is not a valid time of day in canonical form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the text is not a time like 2026-11-25T18:34:09.123Z")]
 pub struct ParseTimeError;

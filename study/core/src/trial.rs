@@ -4,7 +4,7 @@ use crate::kinematics::StimulusKinematics;
 use crate::time_of_day::TimeOfDay;
 use serde::{Deserialize, Serialize};
 
-/// Sensory modality of a trial.
+/// Sensory modalities of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Modality {
@@ -45,11 +45,12 @@ pub enum Phase {
     Practice,
     /// Counted trial.
     Main,
-    /// Check: a pair of equal stimuli, to detect false alarms. Not analysed with counted trials.
+    /// Check: a pair of equal stimuli, to detect false alarms. Does not count in thresholds and effects.
     Catch,
-    /// Check: a pair with an obvious difference, to detect a misread question or swapped keys. Not analysed with counted trials.
+    /// Check: a pair with an obvious difference, to detect a misread question or swapped keys. Does not count in thresholds and
+    /// effects.
     Obvious,
-    /// Check: a repeated presentation, to measure the agreement of answers. Not analysed with counted trials.
+    /// Check: a repeated presentation, to measure the agreement of answers. Does not count in thresholds and effects.
     RepeatCheck,
 }
 
@@ -110,11 +111,11 @@ pub struct Pair {
     pub base: f64,
     /// Comparison, in the stimulus's unit.
     pub comparison: f64,
-    /// Difference as a share of the base, never negative.
+    /// Magnitude of the difference of comparison and base, as a fraction of the base.
     pub delta: f64,
     /// Position of the comparison.
     pub comparison_at: Position,
-    /// Position of the larger stimulus; for equal stimuli, its position had they differed.
+    /// Position of the larger stimulus; for equal stimuli, the position it would have with a difference on the same side.
     pub larger_at: Position,
 }
 
@@ -156,15 +157,16 @@ impl Presented {
 /// Presentation of a stimulus or pair.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
-    /// Number of the presentation in the sitting, from 1; 0 for practice before a resumed sitting, which is not part of it.
+    /// Number of the presentation in the sitting, from 1; 0 for practice before a resumed sitting, which is not part of the
+    /// sitting.
     pub number: u32,
     /// Role of the trial in the analysis.
     pub phase: Phase,
-    /// Replication, from 1; 0 for practice.
+    /// Replication number, from 1; 0 for practice.
     pub replication: u32,
-    /// Adaptive track, from 1 over the whole sitting; 0 without a track.
+    /// Number of the adaptive track, from 1 over the whole sitting; 0 without a track.
     pub track: u32,
-    /// Sensory modality.
+    /// Sensory modalities.
     pub modality: Modality,
     /// Presented stimuli.
     pub presented: Presented,
@@ -176,20 +178,20 @@ pub struct Trial {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Response {
-    /// The first of a pair has more of the quality.
+    /// The first stimulus of a pair has more of the judged quality.
     First,
-    /// The second of a pair has more of the quality.
+    /// The second stimulus of a pair has more of the judged quality.
     Second,
     /// No noticeable difference ("I don't know").
     DontKnow,
-    /// A number on the subject's free scale.
+    /// Rating on the subject's free scale.
     Rating(f64),
     /// Practice without an answer.
     Seen,
 }
 
 impl Response {
-    /// Returns the named stimulus of a pair.
+    /// Returns the position of the named stimulus of a pair; `None` for other answers.
     #[must_use]
     pub fn named(self) -> Option<Position> {
         match self {
@@ -242,17 +244,19 @@ impl Judgement {
 /// Measurements during a presentation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Exploration {
-    /// True if the handle left its range: the presentation is to be repeated.
+    /// True if the handle left its range; [`AtBoundary`](crate::protocol::AtBoundary) then decides whether the presentation is
+    /// repeated.
     pub boundary_hit: bool,
-    /// Time from the end of the presentation to the answer, s; `None` for simulated observers.
+    /// Response time: from the end of the presentation to the answer, s, the time to a withdrawn answer included; `None` for
+    /// simulated observers.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub response_time_s: Option<f64>,
     /// Movement measures of each stimulus in the order of presentation, again for each repetition on request; empty without a device.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub kinematics: Vec<StimulusKinematics>,
-    /// Number of ticks the servo missed.
+    /// Number of ticks the servo missed during the presentation.
     pub missed_ticks: u64,
-    /// Time when the first stimulus could be felt; `None` for simulated observers.
+    /// Time of day from which the first stimulus could be felt; `None` for simulated observers.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub onset: Option<TimeOfDay>,
 }

@@ -1,4 +1,4 @@
-//! `flotor analyse`: thresholds, effects and tests from the data of a study.
+//! `flotor analyse`: computes thresholds, effects and tests from the data of a study.
 
 pub(crate) mod choices;
 pub(crate) mod provenance;
@@ -61,7 +61,7 @@ pub(crate) struct AnalyseArguments {
 pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
     let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
     let Some(begin) = logs.first().map(|first| first.begin.clone()) else { return Ok(()) };
-    // A pilot is analysed before a second subject is complete.
+    // With fewer than two complete sittings, such as in a pilot study, only results of single subjects are possible.
     if arguments.each || logs.iter().filter(|log| log.complete).count() < 2 {
         arguments.refuse_tables()?;
     }
@@ -94,7 +94,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
         note(format_args!("{kept} sittings after exclusions ({excluded} exclusions)"));
     }
     let analysis = Analysis::of(protocol, subjects, &options).map_err(|error| {
-        // Exclusions may be the cause; in a blinded analysis they are not shown.
+        // Print the exclusions, a possible cause, except in a blinded analysis.
         if !applied.excluded.is_empty() && !arguments.blind {
             note(format_args!("exclusions:\n{}", applied.to_text(&rules)));
         }
@@ -127,7 +127,7 @@ pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
 }
 
 impl AnalyseArguments {
-    /// Rejects the options that need a table of all subjects.
+    /// Returns an error if an option needs a table of all subjects.
     fn refuse_tables(&self) -> Result<(), CommandError> {
         if self.blind || [&self.html, &self.csv, &self.trials].into_iter().any(Option::is_some) {
             return Err(CommandError::Usage(
@@ -140,7 +140,7 @@ impl AnalyseArguments {
     }
 }
 
-/// Returns the complete sittings, with a note on each other one; an error if none is complete.
+/// Returns the complete sittings, and prints a note on each incomplete one; an error if no sitting is complete.
 fn complete(arguments: &AnalyseArguments, logs: Vec<SittingLog>) -> Result<Vec<SittingLog>, CommandError> {
     let (complete, others): (Vec<_>, Vec<_>) = logs.into_iter().partition(|log| log.complete);
     if complete.is_empty() {
@@ -157,7 +157,7 @@ fn complete(arguments: &AnalyseArguments, logs: Vec<SittingLog>) -> Result<Vec<S
     Ok(complete)
 }
 
-/// Formats a result for the terminal.
+/// Formats the analysis, checks, exclusions and provenance for the terminal.
 fn report_text(begin: &Begin, report: &Report<'_>, applied: &Applied) -> String {
     let (protocol, rules) = (&begin.protocol, begin.exclusion());
     let title = titled(format!("{} of {}", protocol.task(), protocol.stimulus()), report.observer);
@@ -169,7 +169,7 @@ fn report_text(begin: &Begin, report: &Report<'_>, applied: &Applied) -> String 
     blocks.into_iter().flatten().collect::<Vec<_>>().join("\n\n")
 }
 
-/// Writes a row for each trial, and beside it the scripts that reproduce the tables.
+/// Writes a table with a row for each trial, and scripts in the same folder that reproduce the tables of the analysis.
 fn write_trials(
     path: &Path,
     choices: Choices,
@@ -193,7 +193,7 @@ fn write_trials(
     write_text(Some(&path.with_extension("R")), || script_in_r(&table))
 }
 
-/// Result of one subject, or a blinded result, with the origin of its answers.
+/// Blinded result with the origin of its answers.
 #[derive(Serialize)]
 struct WithObserver<'a, T> {
     observer: ObserverKind,
@@ -201,7 +201,7 @@ struct WithObserver<'a, T> {
     result: &'a T,
 }
 
-/// Appends the restriction of the answers' origin to a title.
+/// Appends the restriction for simulated answers, if any, to a title.
 fn titled(title: String, observer: ObserverKind) -> String {
     match observer.restriction() {
         Some(restriction) => format!("{title}: {restriction}"),
@@ -214,12 +214,12 @@ fn checks_text(checks: &[SubjectChecks]) -> String {
     format!("  Checks{}", checks.iter().map(line).collect::<String>())
 }
 
-/// Describes an incomplete sitting.
+/// Formats subject and number of trials of an incomplete sitting.
 fn incomplete(log: &SittingLog) -> String {
     format!("{}: incomplete after {} trials", log.begin.subject, log.trials.len())
 }
 
-/// Results of one subject.
+/// Data quality of one subject, with the origin of the answers.
 #[derive(Serialize)]
 struct Each {
     observer: ObserverKind,
@@ -247,7 +247,7 @@ impl Each {
     }
 }
 
-/// Prints the results of each subject.
+/// Prints the data quality of each subject.
 fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), CommandError> {
     let each: Vec<Each> = logs.iter().map(|log| Each::of(log, arguments.choices)).collect();
     let text = || {
@@ -259,7 +259,7 @@ fn tell_each(arguments: &AnalyseArguments, logs: &[SittingLog]) -> Result<(), Co
     print_result(arguments.json.file(), &each, text)
 }
 
-/// Returns one line per incident of a log, and one line for all missed ticks.
+/// Formats the incidents of a log, one per line; all missed ticks in one line.
 fn incidents_text(log: &SittingLog) -> String {
     let (mut lines, mut missed) = (String::new(), Vec::new());
     for (trials, time, incident) in &log.incidents {

@@ -17,10 +17,10 @@ enum Command {
     Analyse(analyse::AnalyseArguments),
 }
 
-/// Parser of the commands. Not real-time.
+/// Function that returns the command-line parser of all commands. Not real-time.
 pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
-/// Runs the command given on the command line.
+/// Runs the command given on the command line and returns its exit code. Not real-time.
 #[must_use]
 pub fn main() -> ExitCode {
     flotor_session::on_notice(|notice| flotor_command::note(notice));

@@ -1,5 +1,5 @@
-//! HTML report of a study: figures 17 or 18 of CMU-RI-TR-07-21 with the study's data, and all results beside the thesis's. A single
-//! self-contained file.
+//! HTML page of a study, a single self-contained file: figure 17 or 18 of CMU-RI-TR-07-21 with the study's data, and all
+//! results beside the results of the thesis.
 
 mod figures;
 
@@ -24,7 +24,7 @@ use std::fmt::Write;
 
 /// Returns the HTML page of a result.
 ///
-/// `begin` is the first line of any log of the study, `applied` the analysed sittings and the exclusions.
+/// `begin` is the first line of any log of the study, `applied` has the analysed sittings and the exclusions.
 #[must_use]
 pub(crate) fn html(begin: &Begin, report: &Report<'_>, applied: &Applied) -> String {
     let stimulus = begin.protocol.stimulus();
@@ -57,7 +57,7 @@ pub(crate) fn html(begin: &Begin, report: &Report<'_>, applied: &Applied) -> Str
     )
 }
 
-/// Adds the check results of each subject, if any.
+/// Adds a table of each subject's check results; nothing without checks.
 fn checks(page: &mut Page, checks: &[SubjectChecks]) {
     if checks.is_empty() {
         return;
@@ -68,7 +68,7 @@ fn checks(page: &mut Page, checks: &[SubjectChecks]) {
     });
 }
 
-/// Adds the exclusions and the rules that could not be applied, if the study has rules.
+/// Adds the exclusions and the rules that could not be applied; nothing without rules and exclusions.
 fn exclusions(page: &mut Page, rules: &ExclusionRules, applied: &Applied) {
     if rules.are_none() && applied.excluded.is_empty() {
         return;
@@ -177,7 +177,7 @@ fn jnd_page(
     }
 }
 
-/// Adds the tracks of the first subject, and those of all others in a folded section.
+/// Adds the tracks of the first subject, and the tracks of all other subjects in a collapsed section.
 fn tracks(page: &mut Page, subjects: &[SubjectRecord], stimulus: &Stimulus) {
     let Some((first, others)) = subjects.split_first() else { return };
     page.figure(figures::tracks(first, stimulus), "The adaptive tracks of the first subject.");
@@ -244,7 +244,7 @@ fn movements(
     }
 }
 
-/// Adds the protocol and the provenance.
+/// Adds provenance, study file, protocol and apparatus.
 fn provenance(page: &mut Page, begin: &Begin, provenance: &Provenance) {
     page.heading("Protocol and provenance");
     page.table(&["", ""], |rows| {
@@ -263,7 +263,7 @@ fn provenance(page: &mut Page, begin: &Begin, provenance: &Provenance) {
     }
 }
 
-/// Style sheet for light and dark screens and for paper; tables with three rules, as in journals.
+/// Style sheet for light and dark screens and for print; tables with three horizontal rules, as in journals.
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;max-width:58rem;margin:2rem auto;padding:0 1rem;\
     color-scheme:light dark}h1{line-height:1.2}figure{margin:1.5rem 0}figcaption{font-size:.9rem;opacity:.8}\
     svg{max-width:100%;height:auto}table{border-collapse:collapse;margin:1rem 0;font-variant-numeric:tabular-nums;\
@@ -281,7 +281,7 @@ fn capitalised(text: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Formats a p-value for a column named p.
+/// Formats a p-value for a column with the heading p: `0.250`, or `< 0.001`.
 fn p_cell(p: f64) -> String {
     p_text(p).replace("p = ", "").replace("p ", "")
 }
@@ -289,7 +289,7 @@ fn p_cell(p: f64) -> String {
 /// HTML page under construction.
 struct Page {
     text: String,
-    /// Watermark of every figure.
+    /// Watermark of every figure; empty for answers of people.
     watermark: &'static str,
 }
 

@@ -319,9 +319,9 @@ struct Subject {
     bases: [f64; 3],
 }
 
-/// Springs, with the bases of the thesis.
+/// Springs, with the bases of the thesis, N.
 const STIFFNESS: Subject = Subject { stimulus: "spring.gamma_n", bases: [17.0, 26.0, 35.0] };
-/// Forces in the proportions of the spring bases, within the range of forces felt with those springs.
+/// Forces, with three evenly spaced bases, N, within the range of the forces felt with the springs.
 const FORCE: Subject = Subject { stimulus: "load.force_n", bases: [3.0, 6.0, 9.0] };
 
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
@@ -345,19 +345,19 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     }
 }
 
-/// Parses one word for a table.
+/// Parses one word for a table: 1 to 20 letters or digits.
 fn word(text: &str) -> Result<String, String> {
     let is_word = !text.is_empty() && text.len() <= 20 && text.chars().all(char::is_alphanumeric);
     if is_word { Ok(text.to_owned()) } else { Err("write one word of at most 20 letters".to_owned()) }
 }
 
-/// Parses a duration above 0, s.
+/// Parses a duration above 0; returns seconds.
 fn feel_s(text: &str) -> Result<f64, String> {
     duration_s(text).and_then(|s| if s > 0.0 { Ok(s) } else { Err("the range is above 0".to_owned()) })
 }
 
 impl Common {
-    /// Returns the data on the person, if any were given.
+    /// Returns the data on the person; `None` if none were given.
     fn person(&self) -> Option<Person> {
         let Self { age, sex, handedness, .. } = self;
         let person = Person { age: *age, sex: sex.clone(), handedness: handedness.clone() };
@@ -376,7 +376,7 @@ impl Common {
         Ok(Stimulus { model: model.to_owned(), parameter: parameter.to_owned() })
     }
 
-    /// Loads the scene and applies the command-line settings.
+    /// Loads the scene, or the built-in one, and applies the command-line settings and the settings of the kind of force.
     fn scene(&self, stimulus: &Stimulus, way: Option<ForceWay>) -> Result<Scene, CommandError> {
         let (scene, hand) = match &self.scene {
             Some(path) => (Scene::load(path), None),
@@ -477,7 +477,8 @@ fn carry_out(common: &Common, protocol: Protocol, way: Option<ForceWay>) -> Resu
     }
 }
 
-/// Returns the population of the simulated subjects. Ratings need no Weber fraction.
+/// Returns the population of the simulated subjects: with the thresholds of `--weber`, else for the judged quality. For ratings
+/// the default population, because ratings need no Weber fraction.
 fn people(common: &Common, protocol: &Protocol, way: Option<ForceWay>) -> Result<Population, CommandError> {
     match (common.weber, protocol) {
         (Some(thresholds), _) => Ok(Population::with_thresholds(thresholds)),
@@ -486,7 +487,8 @@ fn people(common: &Common, protocol: &Protocol, way: Option<ForceWay>) -> Result
     }
 }
 
-/// Runs all simulated subjects, several in parallel.
+/// Runs all simulated subjects, several in parallel, and prints the result. `apparatus` is `None` for answers computed from the
+/// stimulus values.
 fn simulate(
     common: &Common,
     protocol: Protocol,
@@ -545,7 +547,7 @@ fn simulate(
     tell(&dataset)
 }
 
-/// Converts an apparatus error: a configuration error, unless the run itself failed.
+/// Converts an apparatus error: an error of the run keeps its exit code, any other is a usage error.
 fn unfit(error: ApparatusError) -> CommandError {
     match error {
         ApparatusError::Run(error) => error.into(),
@@ -593,8 +595,8 @@ fn refused(error: CohortError) -> CommandError {
     }
 }
 
-/// Converts an apparatus error to a command error with the exit code of its cause. For errors of a run, first prints `message` as a
-/// note, with subject and trial.
+/// Converts an apparatus error to a command error with the exit code of its cause. If a fault, an emergency stop, the watchdog
+/// or an oscillation ended the run, first prints `message`, which has subject and trial, as a note.
 fn outside(cause: ApparatusOrFrontEndError, message: String) -> CommandError {
     let error = match cause.downcast_ref::<RunEnded>() {
         Some(RunEnded(

@@ -4,8 +4,8 @@ use crate::distribution::student_two_sided_quantile;
 use crate::{StatisticsError, check, count};
 use serde::Serialize;
 
-/// Returns the mean by the corrected two-pass rule: adding the mean difference from a first mean removes its rounding error, also
-/// for large numbers with small differences. NaN for an empty list.
+/// Returns the arithmetic mean by the corrected two-pass algorithm: adding the mean deviation from a first mean removes the
+/// rounding error of that mean, also for large numbers with small differences. NaN for an empty list.
 #[must_use]
 pub fn mean(values: &[f64]) -> f64 {
     let n = count(values.len());
@@ -13,35 +13,35 @@ pub fn mean(values: &[f64]) -> f64 {
     first + values.iter().map(|value| value - first).sum::<f64>() / n
 }
 
-/// Returns the sum of squared differences from the mean.
+/// Returns the sum of squared deviations from the mean; zero for an empty list.
 #[must_use]
 pub fn sum_of_squares(values: &[f64]) -> f64 {
     let mean = mean(values);
     values.iter().map(|value| (value - mean) * (value - mean)).sum()
 }
 
-/// Returns the standard deviation of a sample (n - 1); NaN for fewer than two values.
+/// Returns the sample standard deviation (divisor n - 1); NaN for a single value, zero for an empty list.
 #[must_use]
 pub fn deviation(values: &[f64]) -> f64 {
     (sum_of_squares(values) / (count(values.len()) - 1.0)).sqrt()
 }
 
-/// Mean with its precision.
+/// Mean with its standard error and confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct MeanInterval {
     /// Mean of the values.
     pub mean: f64,
-    /// Standard deviation of the values.
+    /// Sample standard deviation of the values.
     pub sd: f64,
     /// Standard error of the mean.
     pub se: f64,
-    /// Lower and upper end of the confidence interval.
+    /// Lower and upper confidence limits, at the requested confidence level.
     pub interval: [f64; 2],
     /// Number of values.
     pub n: usize,
 }
 
-/// Computes the mean and its confidence interval by Student's t.
+/// Computes the mean and its two-sided confidence interval by Student's t; `confidence` is the level, for example 0.95.
 ///
 /// # Errors
 /// If there are fewer than two values, or one is not finite.

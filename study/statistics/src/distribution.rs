@@ -1,4 +1,5 @@
-//! Distributions: normal, Student's t and Fisher's F, with tails and the quantiles for intervals.
+//! Distributions: tail probabilities of the normal, Student's t, Fisher's F and binomial distributions, and quantiles of the
+//! first two.
 
 use crate::special::regularised_beta;
 use std::f64::consts::{PI, SQRT_2};
@@ -6,19 +7,19 @@ use std::f64::consts::{PI, SQRT_2};
 /// Maximum number of steps of a quantile search; bisection alone needs 60.
 const QUANTILE_STEPS_MOST: u32 = 200;
 
-/// Returns the density of the standard normal distribution.
+/// Returns the probability density of the standard normal distribution.
 #[must_use]
 pub fn normal_density(x: f64) -> f64 {
     libm::exp(-0.5 * x * x) / (2.0 * PI).sqrt()
 }
 
-/// Returns the probability of a standard normal number below `x`.
+/// Returns the cumulative distribution function of the standard normal distribution.
 #[must_use]
 pub fn normal_below(x: f64) -> f64 {
     0.5 * libm::erfc(-x / SQRT_2)
 }
 
-/// Returns the standard normal quantile; infinite at probabilities 0 and 1, NaN outside.
+/// Returns the quantile of the standard normal distribution; infinite at probabilities 0 and 1, NaN outside this range.
 ///
 /// Acklam's rational approximation (relative error 1.2e-9), refined by two steps of Halley's method.
 #[must_use]
@@ -43,7 +44,7 @@ pub fn normal_quantile(probability: f64) -> f64 {
     x
 }
 
-/// Returns Acklam's approximation of the normal quantile for probabilities up to a half.
+/// Returns Acklam's approximation of the normal quantile for probabilities up to 0.5.
 fn acklam_lower(probability: f64) -> f64 {
     const TAIL: f64 = 0.024_25;
     const CENTRE_NUMERATOR: [f64; 6] = [
@@ -98,8 +99,8 @@ pub fn student_two_sided(t: f64, df: f64) -> f64 {
     regularised_beta(0.5 * df, 0.5, df / (df + square), square / (df + square))
 }
 
-/// Returns the two-sided quantile of Student's t: for probability 0.05, the half-width of a 95 % interval in standard errors. NaN
-/// outside 0 to 1.
+/// Returns the two-sided quantile of Student's t: for probability 0.05, the half-width of a 95 % interval in standard errors.
+/// Infinite for probability 0; NaN for a probability outside 0 to 1, or `df` not above 0.
 #[must_use]
 pub fn student_two_sided_quantile(probability: f64, df: f64) -> f64 {
     if !(0.0..=1.0).contains(&probability) || df.is_nan() || df <= 0.0 {
@@ -128,7 +129,8 @@ pub fn student_two_sided_quantile(probability: f64, df: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Returns the probability of at least this many successes in independent trials: the one-sided p-value.
+/// Returns the probability of at least `successes` in `trials` independent trials with success probability `probability`: the
+/// p-value of the one-sided binomial test.
 #[must_use]
 pub fn binomial_at_least(successes: usize, trials: usize, probability: f64) -> f64 {
     if successes == 0 {
@@ -141,7 +143,8 @@ pub fn binomial_at_least(successes: usize, trials: usize, probability: f64) -> f
     regularised_beta(k, n - k + 1.0, probability, 1.0 - probability)
 }
 
-/// Returns the p-value of an F with `df` and `error_df` degrees of freedom, not necessarily integers.
+/// Returns the p-value of an F statistic with `df` and `error_df` degrees of freedom, not necessarily integers: the upper tail
+/// probability.
 #[must_use]
 pub fn fisher_above(f: f64, df: f64, error_df: f64) -> f64 {
     if f.is_infinite() {

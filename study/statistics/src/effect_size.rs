@@ -1,32 +1,33 @@
-//! Effect sizes with confidence intervals, by inverting the noncentral t and F (Steiger and Fouladi 1997).
+//! Effect sizes with confidence intervals, by inverting the noncentral t and F distributions (Steiger and Fouladi 1997).
 
 use crate::distribution::normal_below;
 use crate::special::{beta_step, regularised_beta};
 use crate::t_test::TTest;
 use serde::Serialize;
 
-/// An effect size with its 95 % confidence interval.
+/// Effect size with its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct EffectSize {
     /// Point estimate.
     pub value: f64,
-    /// Lower and upper end. An end with a noncentrality beyond 1000 (t) or 10^6 (F) is infinite for Cohen's d and 1 for a share;
-    /// the opposite end is then conservative.
+    /// Lower and upper confidence limits (95 %). A limit with a noncentrality beyond 1000 (t) or 10^6 (F) is infinite for
+    /// Cohen's d and 1 for partial omega squared; the opposite limit is then conservative.
     pub interval: [f64; 2],
 }
 
-/// Largest noncentrality of t in the search.
+/// Largest magnitude of the noncentrality of t in the search.
 const MOST_OF_T: f64 = 1.0e3;
 /// Largest noncentrality of F in the search.
 const MOST_OF_F: f64 = 1.0e6;
-/// Probability outside each end of an interval.
+/// Probability beyond each confidence limit.
 const TAIL: f64 = 0.025;
 /// Maximum number of steps of a root search; ten to twenty are usual.
 const STEPS_MOST: usize = 200;
-/// Relative tolerance of a root.
+/// Tolerance of a root: relative above 1, absolute below.
 const WIDTH: f64 = 1.0e-13;
 
-/// Returns Cohen's d of pairs: the mean difference in standard deviations of the differences.
+/// Returns Cohen's d of pairs: the mean difference divided by the standard deviation of the differences. Its sign is the sign
+/// of `t`, the result of a paired t-test.
 #[must_use]
 pub fn of_pairs(t: &TTest) -> EffectSize {
     let root_n = (t.df + 1.0).sqrt();
@@ -35,10 +36,12 @@ pub fn of_pairs(t: &TTest) -> EffectSize {
     EffectSize { value: t.value / root_n, interval: ends.map(|end| end / root_n) }
 }
 
-/// Returns partial omega squared of an F: the share of the population's variation explained by the effect.
+/// Returns partial omega squared for an F with `df` and `error_df` degrees of freedom: the fraction of the variance of effect
+/// and error in the population that the effect explains.
 ///
-/// The value follows from the noncentrality `df (F - 1)`, whose mean F equals the observed one; the interval of the noncentrality
-/// is converted by the same formula. Eta squared is larger on average and may lie outside this interval. An F below 1 gives 0.
+/// The value follows from the noncentrality `df (F - 1)`, whose mean F equals the observed one; the interval of the
+/// noncentrality is converted by the same formula. Eta squared is larger on average and may lie outside this interval. An F
+/// below 1 gives the value 0.
 #[must_use]
 pub fn partial_omega_squared(f: f64, df: f64, error_df: f64) -> EffectSize {
     let share = |noncentrality: f64| {
@@ -48,9 +51,9 @@ pub fn partial_omega_squared(f: f64, df: f64, error_df: f64) -> EffectSize {
     EffectSize { value: share((df * (f - 1.0)).max(0.0)), interval: [low.min(MOST_OF_F), high].map(share) }
 }
 
-/// Returns the noncentrality for which a smaller t has probability `below`; infinite beyond the search.
+/// Returns the noncentrality for which a smaller t has probability `below`; infinite if beyond the range of the search.
 fn noncentrality_of_t(t: f64, df: f64, below: f64) -> f64 {
-    // The distribution moves up with the noncentrality.
+    // The probability falls as the noncentrality rises.
     let of = |delta: f64| noncentral_t_below(t, df, delta) - below;
     let (mut low, mut high) = (t - 1.0, t + 1.0);
     let mut width = 2.0;
@@ -71,7 +74,8 @@ fn noncentrality_of_t(t: f64, df: f64, below: f64) -> f64 {
     falling_root(of, low, high)
 }
 
-/// Returns the noncentrality for which a smaller F has probability `below`; 0 if none reaches it, infinite beyond the search.
+/// Returns the noncentrality for which a smaller F has probability `below`; 0 if the probability is smaller for every
+/// noncentrality, infinite if beyond the range of the search.
 fn noncentrality_of_f(f: f64, df: f64, error_df: f64, below: f64) -> f64 {
     let of = |lambda: f64| noncentral_f_below(f, df, error_df, lambda) - below;
     let (mut low, mut high) = (0.0, 1.0_f64.max(f * df).min(MOST_OF_F));
@@ -87,7 +91,7 @@ fn noncentrality_of_f(f: f64, df: f64, error_df: f64, below: f64) -> f64 {
     falling_root(of, low, high)
 }
 
-/// Returns the root of a falling function between two ends (Dowell and Jarratt 1971, the Illinois rule).
+/// Returns the root of a decreasing function in a bracket (Dowell and Jarratt 1971, the Illinois method).
 fn falling_root(of: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     let (mut at_low, mut at_high) = (of(low), of(high));
     let mut last_raised_low = None;
@@ -106,7 +110,7 @@ fn falling_root(of: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
         } else {
             (high, at_high) = (root, at);
         }
-        // Illinois rule: halve the value at an end that did not move twice.
+        // Illinois method: halve the value at an end that has stayed for two steps.
         match (last_raised_low == Some(raises_low), raises_low) {
             (true, true) => at_high *= 0.5,
             (true, false) => at_low *= 0.5,
@@ -117,7 +121,8 @@ fn falling_root(of: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     root
 }
 
-/// Sums `weight(j) I_x(a + j, b)` over the counts j with significant Poisson weight; all others together weigh less than 1e-17.
+/// Sums `weight(j) I_x(a + j, b)` over the counts j with significant Poisson weight; the weights of all other counts add up to
+/// less than 1e-17.
 ///
 /// `first` returns the weight of the first count, `ratio(j)` the ratio of the weights of j + 1 and j.
 fn mixture(
@@ -146,14 +151,16 @@ fn mixture(
     sum
 }
 
-/// Returns the probability of a noncentral F below a value: Poisson mixture of central distributions.
+/// Returns the cumulative distribution function of the noncentral F distribution: a Poisson mixture of incomplete beta
+/// functions.
 fn noncentral_f_below(f: f64, df: f64, error_df: f64, lambda: f64) -> f64 {
     let parts = (df * f / (df * f + error_df), error_df / (df * f + error_df));
     let half = 0.5 * lambda;
     mixture(half, |j| poisson(half, j), |j| half / (j + 1.0), (0.5 * df, 0.5 * error_df), parts)
 }
 
-/// Returns the probability of a noncentral t below a value (Lenth 1989, AS 243, summed about the largest weights).
+/// Returns the cumulative distribution function of the noncentral t distribution (Lenth 1989, AS 243, summed about the largest
+/// weights).
 fn noncentral_t_below(t: f64, df: f64, delta: f64) -> f64 {
     if t < 0.0 {
         return 1.0 - noncentral_t_below(-t, df, -delta);
@@ -167,7 +174,7 @@ fn noncentral_t_below(t: f64, df: f64, delta: f64) -> f64 {
     (normal_below(-delta) + 0.5 * (even + delta / std::f64::consts::SQRT_2 * odd)).clamp(0.0, 1.0)
 }
 
-/// Returns the Poisson probability of a count.
+/// Returns the probability of `count` in a Poisson distribution.
 fn poisson(mean: f64, count: f64) -> f64 {
     if mean == 0.0 {
         return if count == 0.0 { 1.0 } else { 0.0 };

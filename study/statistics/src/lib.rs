@@ -1,6 +1,6 @@
 //! Statistics for the perception experiments: pure numerics, independent of trials and devices.
 //!
-//! - [`describe`]: means, deviations, confidence intervals.
+//! - [`describe`]: means, standard deviations, confidence intervals.
 //! - [`t_test`]: one sample, pairs, two groups (Welch, Student).
 //! - [`regression`]: straight line by least squares.
 //! - [`anova`]: analysis of variance with factors between and within subjects, sums of squares of type II and III,
@@ -8,10 +8,10 @@
 //! - [`trend`]: linear trend of an effect within subjects.
 //! - [`effect_size`], [`multiple`]: effect sizes with intervals; corrections for multiple tests.
 //! - [`quadrature`]: integrals and quantiles of a density.
-//! - [`distribution`]: normal, Student's t, Fisher's F. A p-value is computed directly as a tail, never as one minus the rest, so
-//!   that small values keep their precision.
+//! - [`distribution`]: normal, Student's t, Fisher's F. A small p-value is computed directly as a tail, not as one minus the
+//!   other tail, so that it keeps its relative precision.
 //!
-//! A number that the data cannot give is an [`Outcome`] with its reason; other results are unaffected.
+//! A statistic that the data cannot give is an [`Outcome`] with the reason; other results are unaffected.
 //!
 //! Every result is compared with R or with the certified values of NIST to 1e-9, relative (`tests/`). Nothing here
 //! is real-time.
@@ -64,13 +64,13 @@ pub enum StatisticsError {
         /// Length of the second list.
         right: usize,
     },
-    /// The values do not vary, so there is no error to test against.
+    /// The values do not vary, so there is no error variance to test against.
     #[error("{what}: the values do not vary, so the statistic is undefined")]
     Constant {
         /// Name of the result.
         what: &'static str,
     },
-    /// The pairs are equal in every subject.
+    /// Both values of a pair are equal in every subject.
     #[error("no difference in any subject")]
     NoDifference,
     /// The differences do not vary between subjects.
@@ -79,10 +79,10 @@ pub enum StatisticsError {
     /// The means are equal at all levels.
     #[error("equal means at all levels")]
     EqualMeans,
-    /// The effect does not vary between subjects.
+    /// The effect does not vary between subjects, so the error sum of squares is zero.
     #[error("no variation between subjects, which the test requires")]
     NoError,
-    /// Scaling of the responses has removed an effect and its error.
+    /// Neither the effect nor its error varies, for example after division of the responses by each subject's mean.
     #[error("scaling of the responses removes the effect")]
     RemovedByScaling,
     /// The design of an analysis of variance is invalid.
@@ -105,7 +105,7 @@ pub enum Outcome<T> {
 }
 
 impl<T> Outcome<T> {
-    /// Returns the statistic, if computed.
+    /// Returns the statistic; `None` if it could not be computed.
     pub fn tested(&self) -> Option<&T> {
         self.result().ok()
     }
@@ -121,12 +121,12 @@ impl<T> Outcome<T> {
         }
     }
 
-    /// Formats the statistic by `text`, or "not testable" with the reason.
+    /// Formats the statistic with `text`; if it is missing, returns `not testable: ` and the reason.
     pub fn to_text(&self, text: impl FnOnce(&T) -> String) -> String {
         self.result().map_or_else(not_testable_text, text)
     }
 
-    /// Converts the statistic by a function.
+    /// Converts the statistic with `of`; keeps the reason for a missing one.
     pub fn map<U>(self, of: impl FnOnce(T) -> U) -> Outcome<U> {
         match self {
             Self::Tested(tested) => Outcome::Tested(of(tested)),
@@ -144,7 +144,7 @@ impl<T> From<Result<T, StatisticsError>> for Outcome<T> {
     }
 }
 
-/// Formats the reason for a missing statistic.
+/// Formats the reason for a missing statistic: `not testable: ` and the reason.
 #[must_use]
 pub fn not_testable_text(reason: &StatisticsError) -> String {
     format!("not testable: {reason}")
@@ -154,10 +154,11 @@ fn as_text<S: serde::Serializer>(reason: &StatisticsError, serializer: S) -> Res
     serializer.collect_str(reason)
 }
 
-/// Share of the squared responses below which squares are rounding errors (relative size 1e-16).
+/// Fraction of the sum of squared responses below which a sum of squares counts as zero. Relative rounding errors are about
+/// 1e-16, their squares about 1e-32.
 const ROUNDING: f64 = 1.0e-20;
 
-/// Checks that a list is finite and long enough.
+/// Checks that all values are finite and that there are at least `needed`.
 fn check(what: &'static str, values: &[f64], needed: usize) -> Result<(), StatisticsError> {
     if let Some(index) = values.iter().position(|value| !value.is_finite()) {
         return Err(StatisticsError::NotFinite { what, index });

@@ -22,7 +22,7 @@ impl Matrix {
         self.columns
     }
 
-    /// Returns the entry at a position; zero outside, so that no index can fail.
+    /// Returns the entry at a position; zero outside the matrix.
     pub(crate) fn at(&self, row: usize, column: usize) -> f64 {
         if column >= self.columns {
             return 0.0;
@@ -59,7 +59,7 @@ impl Matrix {
         (0..self.rows.min(self.columns)).map(|k| self.at(k, k)).sum()
     }
 
-    /// Returns the trace of the square of a symmetric matrix: the sum of all squared entries.
+    /// Returns the sum of all squared entries; for a symmetric matrix, the trace of its square.
     pub(crate) fn trace_of_square(&self) -> f64 {
         self.values.iter().map(|value| value * value).sum()
     }
@@ -70,7 +70,7 @@ pub(crate) struct Basis {
     columns: Vec<Vec<f64>>,
 }
 
-/// Relative length of a residual column below which the column is linearly dependent.
+/// Relative length of a residual column below which the column counts as linearly dependent.
 const DEPENDENT: f64 = 1.0e-10;
 
 impl Basis {
@@ -87,7 +87,7 @@ impl Basis {
         basis
     }
 
-    /// Returns the number of independent columns.
+    /// Returns the number of linearly independent columns.
     pub(crate) fn rank(&self) -> usize {
         self.columns.len()
     }

@@ -1,7 +1,8 @@
-//! Corrections for multiple tests: the family-wise error rate equals that of a single test.
+//! Corrections for multiple tests, which keep the family-wise error rate at or below the level of a single test.
 
-/// Returns p-values after Holm's correction (1979): the smallest p is multiplied by the number of tests, the next by one less, and so on,
-/// without decreasing and limited to 1. Keeps the order of the list; values that are not finite are not counted and returned unchanged.
+/// Returns p-values after Holm's correction (1979): the smallest p is multiplied by the number of tests, the next by one less,
+/// and so on; each corrected p is at least the previous one, and at most 1. Keeps the order of the list. Values that are not
+/// finite do not count as tests and are returned unchanged.
 #[must_use]
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).filter(|index| p[*index].is_finite()).collect();

@@ -17,7 +17,8 @@ pub struct Node {
     pub weight: f64,
 }
 
-/// Returns the rule with a given number of nodes over an interval: exact for polynomials of degree below twice that number.
+/// Returns the Gauss-Legendre rule with `nodes` nodes over an interval, in ascending order: exact for polynomials of degree
+/// below `2 * nodes`.
 #[must_use]
 pub fn gauss_legendre(nodes: usize, [low, high]: [f64; 2]) -> Vec<Node> {
     let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
@@ -48,23 +49,24 @@ fn legendre(degree: usize, x: f64) -> (f64, f64) {
     (value, count(degree) * (x * value - before) / (x * x - 1.0))
 }
 
-/// Density over an interval, interpolated by the polynomial through its values at the nodes of a rule.
+/// Density over an interval, not normalised: the polynomial through the values at the nodes of a quadrature rule; negative
+/// values count as zero.
 #[derive(Clone, Debug)]
 pub struct Density {
     low: f64,
     width: f64,
-    /// Values at the ends and the middles of the panels.
+    /// Values at the ends and midpoints of the panels.
     values: Vec<f64>,
-    /// Integral up to the end of each panel.
+    /// Integral from the lower end to each panel boundary.
     below: Vec<f64>,
 }
 
 impl Density {
-    /// Builds a density, up to a factor, from its values at the nodes of [`gauss_legendre`] over this interval.
+    /// Builds a density from its values, up to a constant factor, at the nodes of [`gauss_legendre`] over the interval.
     #[must_use]
     pub fn new(nodes: &[Node], [low, high]: [f64; 2], at_nodes: &[f64]) -> Self {
         let width = (high - low) / count(PANELS);
-        // Barycentric weights of Legendre's nodes (Wang and Xiang 2012).
+        // Barycentric weights of the Legendre nodes (Wang and Xiang 2012).
         let side = |index: usize| if index.is_multiple_of(2) { 1.0 } else { -1.0 };
         let barycentric: Vec<f64> = nodes
             .iter()
@@ -96,7 +98,7 @@ impl Density {
         Self { low, width, values, below }
     }
 
-    /// Returns the quantile for a share of the density.
+    /// Returns the quantile for the cumulative probability `share`, 0 to 1.
     #[must_use]
     pub fn quantile(&self, share: f64) -> f64 {
         let total = self.below.last().copied().unwrap_or(f64::NAN);

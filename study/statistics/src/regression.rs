@@ -1,16 +1,16 @@
-//! Linear regression of points.
+//! Simple linear regression.
 
 use crate::describe::{mean, sum_of_squares};
 use crate::distribution::{fisher_above, student_two_sided, student_two_sided_quantile};
 use crate::{StatisticsError, check, count};
 use serde::Serialize;
 
-/// Line fitted by least squares.
+/// Straight line fitted by least squares.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Line {
-    /// Value at zero.
+    /// Ordinate of the line at abscissa zero.
     pub intercept: f64,
-    /// Change of the value per unit of the abscissa.
+    /// Change of the ordinate per unit of the abscissa.
     pub slope: f64,
     /// Standard error of the intercept.
     pub intercept_se: f64,
@@ -18,21 +18,21 @@ pub struct Line {
     pub slope_se: f64,
     /// 95 % confidence interval of the slope.
     pub slope_interval: [f64; 2],
-    /// p-value of the slope: probability of a larger |slope| if the true one is zero.
+    /// p-value of the slope: two-sided t-test against a true slope of zero.
     pub slope_p: f64,
-    /// Share of the variation explained by the line.
+    /// R²: fraction of the variance of the ordinates explained by the line; 0 if the ordinates do not vary.
     pub r_squared: f64,
-    /// Standard deviation of the residuals.
+    /// Standard deviation of the residuals, with [`Self::error_df`] as divisor.
     pub residual_sd: f64,
-    /// F of the slope.
+    /// F statistic of the slope, with 1 and [`Self::error_df`] degrees of freedom.
     pub f: f64,
-    /// p-value of F.
+    /// p-value of F, equal to [`Self::slope_p`] up to rounding.
     pub p: f64,
     /// Degrees of freedom of the residuals.
     pub error_df: f64,
 }
 
-/// Fits a line to points.
+/// Fits a straight line to the points `(x, y)` by least squares.
 ///
 /// # Errors
 /// If there are fewer than three points, the lists differ in length, a value is not finite, or the abscissae do not vary.

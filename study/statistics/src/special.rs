@@ -1,15 +1,16 @@
-//! Incomplete beta function, the basis of the tails of t and F.
+//! Incomplete beta function, from which the tail probabilities of t and F are computed.
 
-/// Maximum number of terms of the continued fraction. Convergence takes about the square root of the larger argument, so this
-/// suffices for ten million degrees of freedom.
+/// Maximum number of terms of the continued fraction. The number needed is about the square root of the larger argument, so
+/// this limit suffices for ten million degrees of freedom.
 const FRACTION_TERMS_MOST: u32 = 10_000;
 /// Lower limit of the denominators of the continued fraction (Lentz's method).
 const TINY: f64 = 1.0e-300;
 
 /// Returns the regularised incomplete beta function I_x(a, b). The caller passes `y = 1 - x` as well, computed without cancellation.
 ///
-/// Uses the continued fraction of Abramowitz and Stegun 26.5.8, evaluated from the front (Lentz 1976), on the side of the mean
-/// where it converges; there the result is also the smaller of the two tails, so no tail is computed as a difference.
+/// Uses the continued fraction of Abramowitz and Stegun 26.5.8, evaluated forward (Lentz 1976), on the side of the mean where
+/// it converges fast. On the other side the result is 1 minus the opposite tail, which is the smaller one: a small result is
+/// never computed as a difference.
 pub(crate) fn regularised_beta(a: f64, b: f64, x: f64, y: f64) -> f64 {
     if a.is_nan() || b.is_nan() || x.is_nan() {
         return f64::NAN;
@@ -23,7 +24,7 @@ pub(crate) fn regularised_beta(a: f64, b: f64, x: f64, y: f64) -> f64 {
     if x < (a + 1.0) / (a + b + 2.0) { lower_tail(a, b, x, y) } else { 1.0 - lower_tail(b, a, y, x) }
 }
 
-/// Returns I_x(a, b) - I_x(a + 1, b), the step of the function in its first argument (Abramowitz and Stegun 26.5.16).
+/// Returns I_x(a, b) - I_x(a + 1, b), the difference over a unit step of the first argument (Abramowitz and Stegun 26.5.16).
 pub(crate) fn beta_step(a: f64, b: f64, x: f64, y: f64) -> f64 {
     front(a, b, x, y) / a
 }
@@ -34,7 +35,7 @@ fn lower_tail(a: f64, b: f64, x: f64, y: f64) -> f64 {
 
 /// Returns x^a y^b / B(a, b).
 fn front(a: f64, b: f64, x: f64, y: f64) -> f64 {
-    // ln(1 - y) keeps the digits that ln x loses near 1.
+    // Near x = 1, ln(1 - y) is more accurate than ln x.
     let ln_x = if y < 0.5 { libm::log1p(-y) } else { libm::log(x) };
     let ln_y = if x < 0.5 { libm::log1p(-x) } else { libm::log(y) };
     let ln_beta = libm::lgamma(a) + libm::lgamma(b) - libm::lgamma(a + b);

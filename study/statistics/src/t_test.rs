@@ -8,13 +8,13 @@ use serde::Serialize;
 /// Result of a two-sided t-test.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct TTest {
-    /// Degrees of freedom; not an integer for groups of unequal variance.
+    /// Degrees of freedom; in general not an integer with [`Variances::Separate`].
     pub df: f64,
     /// t statistic.
     pub value: f64,
-    /// Probability of a larger |t| if there is no difference.
+    /// Two-sided p-value: probability of a larger |t| if the true difference is zero.
     pub p: f64,
-    /// Difference of the means.
+    /// Estimated difference: first minus second mean, or mean minus expected value.
     pub difference: f64,
     /// 95 % confidence interval of the difference.
     pub interval: [f64; 2],
@@ -32,10 +32,10 @@ impl TTest {
     }
 }
 
-/// Tests the mean of a sample against `expected`.
+/// Tests whether the mean of a sample differs from `expected`.
 ///
 /// # Errors
-/// If there are fewer than two values, none vary, or one is not finite.
+/// If there are fewer than two values, the values do not vary, or one is not finite.
 pub fn one_sample(values: &[f64], expected: f64) -> Result<TTest, StatisticsError> {
     const WHAT: &str = "a t-test";
     check(WHAT, values, 2)?;
@@ -43,11 +43,11 @@ pub fn one_sample(values: &[f64], expected: f64) -> Result<TTest, StatisticsErro
     TTest::new(WHAT, mean(values) - expected, deviation(values) / n.sqrt(), n - 1.0)
 }
 
-/// Tests the mean difference of pairs, positive where the first of a pair is larger.
+/// Tests whether the mean difference of pairs is zero. The difference is `first` minus `second`.
 ///
 /// # Errors
-/// Errors of [`one_sample`], or lists of different length; [`StatisticsError::NoDifference`] or [`StatisticsError::SameDifference`]
-/// if only rounding errors vary.
+/// Errors of [`one_sample`], or lists of different length; [`StatisticsError::NoDifference`] or
+/// [`StatisticsError::SameDifference`] if the differences vary by rounding errors only.
 pub fn paired(first: &[f64], second: &[f64]) -> Result<TTest, StatisticsError> {
     if first.len() != second.len() {
         return Err(StatisticsError::Lengths {
@@ -69,16 +69,16 @@ pub fn paired(first: &[f64], second: &[f64]) -> Result<TTest, StatisticsError> {
 /// Assumption on the variances of two groups.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variances {
-    /// Common variance of both groups (Student).
+    /// Equal variances, estimated from both groups together (Student).
     Pooled,
     /// Separate variances (Welch 1947), with Satterthwaite's degrees of freedom.
     Separate,
 }
 
-/// Tests the difference of two group means, positive where the first is larger.
+/// Tests whether the means of two groups differ. The difference is `first` minus `second`.
 ///
 /// # Errors
-/// If a group has fewer than two values, none vary, or one is not finite.
+/// If a group has fewer than two values, neither group varies, or a value is not finite.
 pub fn two_groups(first: &[f64], second: &[f64], variances: Variances) -> Result<TTest, StatisticsError> {
     const WHAT: &str = "a t-test of two groups";
     check(WHAT, first, 2)?;

@@ -14,27 +14,27 @@ pub struct LinearTrend {
     pub slope: f64,
     /// Value of the line at zero.
     pub intercept: f64,
-    /// R² of the trend: the share of the variation among the means explained by the line.
+    /// R² of the trend: fraction of the variance of the means explained by the line.
     pub r_squared: f64,
-    /// Test of the linear contrast.
+    /// Test of the linear contrast; not testable for a single subject, or if the contrast is equal in all subjects.
     #[serde(flatten)]
     pub test: Outcome<ContrastTest>,
 }
 
-/// Test of a contrast against its own variation between subjects.
+/// F-test of a contrast; the error is the variation of the contrast between subjects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ContrastTest {
-    /// F of the contrast.
+    /// F statistic of the contrast.
     pub f: f64,
-    /// Degrees of freedom of the contrast.
+    /// Degrees of freedom of the contrast: 1.
     pub df: f64,
-    /// Degrees of freedom of its error.
+    /// Degrees of freedom of the error: number of subjects minus 1.
     pub error_df: f64,
-    /// Probability of a larger F without a trend.
+    /// p-value: probability of a larger F without a trend.
     pub p: f64,
 }
 
-/// Fits the linear trend of `responses[subject][level]` over the levels of a factor.
+/// Fits a line to the means of `responses[subject][level]` over the values `levels` of a factor, and tests the linear contrast.
 ///
 /// # Errors
 /// If there are fewer than three levels, a row has the wrong length, a value is not finite, or the means do not vary.

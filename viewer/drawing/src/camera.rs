@@ -8,13 +8,13 @@ use flotor_hal::glam::{DMat4, DVec4};
 /// Orbit camera: an eye on a sphere around its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Rotation about the vertical, rad; 0 looks along +y, away from the user.
+    /// Rotation about the vertical, rad; 0 looks along +y, away from the user; positive: the eye is further right (+x).
     pub azimuth_rad: f64,
-    /// Elevation above the horizon, rad.
+    /// Elevation of the eye above the target, rad.
     pub inclination_rad: f64,
     /// Distance of the eye from the target, mm.
     pub distance_mm: f64,
-    /// Target in the middle of the picture, mm.
+    /// Position of the target, which is in the middle of the picture, mm.
     pub target_mm: DVec3,
 }
 
@@ -69,7 +69,7 @@ impl std::str::FromStr for View {
     }
 }
 
-/// Vertical angle of view, rad: as of a 70 mm lens on a full frame, for a moderate perspective.
+/// Vertical field of view, rad: that of a 70 mm lens on a full frame, for a moderate perspective.
 const FIELD_OF_VIEW_RAD: f64 = 0.34;
 /// Half the width of a body with its plates, as a fraction of its height.
 const HALF_BODY: f64 = 0.35;
@@ -80,7 +80,7 @@ const NEAREST: f64 = 1.5;
 const FARTHEST: f64 = 30.0;
 
 impl Camera {
-    /// Returns the default view: from the front, right and above, with all of a body of this height in sight.
+    /// Returns the default view: from the front, right and above, with a whole body of this height visible.
     #[must_use]
     pub fn experimenter(height_mm: f64) -> Self {
         Self {
@@ -91,7 +91,8 @@ impl Camera {
         }
     }
 
-    /// Returns the default view of bodies side by side, as near as all of them fit into a picture of this aspect ratio (width to height).
+    /// Returns the default view of bodies side by side, from so far away that all of them fit into a picture of this aspect ratio
+    /// (width over height).
     #[must_use]
     pub fn fitting(extent: Extent, aspect: f64) -> Self {
         /// Fraction of half the picture filled by the bodies.
@@ -125,7 +126,7 @@ impl Camera {
         self.target_mm + out * self.distance_mm
     }
 
-    /// Turns the eye about the target by two angles, within the legal inclinations.
+    /// Turns the eye about the target by two angles, rad, within the legal inclinations.
     pub fn orbit(&mut self, azimuth_rad: f64, inclination_rad: f64) {
         self.azimuth_rad = (self.azimuth_rad + azimuth_rad) % std::f64::consts::TAU;
         let inclined = self.inclination_rad + inclination_rad;
@@ -138,7 +139,7 @@ impl Camera {
         self.distance_mm = distance_mm.clamp(NEAREST * height_mm, FARTHEST * height_mm);
     }
 
-    /// Returns the projection from mm to clip coordinates with depth 0 to 1, for a picture of this aspect ratio.
+    /// Returns the view-projection matrix from mm to clip coordinates with depth 0 to 1, for a picture of this aspect ratio.
     #[must_use]
     pub fn projection(&self, aspect: f64) -> DMat4 {
         let (near_mm, far_mm) = (0.05 * self.distance_mm, 20.0 * self.distance_mm);

@@ -4,8 +4,8 @@ use crate::geometry::{Color, Mesh, Section, SurfacePoint, closest_surface_point,
 use flotor_hal::glam::DQuat;
 use flotor_hal::{DVec3, Part, Shape};
 
-/// Radius and thickness of the disc, and radius and length of the arrow, as fractions of the height of the scene: the disc is wide enough
-/// to be seen around the arrow of the force and a proxy.
+/// Radius and thickness of the disc, and radius and length of the arrow, as fractions of the height of the scene: the disc is wide
+/// enough to be visible around the force arrow and a proxy.
 const DISC: f64 = 0.09;
 const THICKNESS: f64 = 0.004;
 const SHAFT: f64 = 0.009;
@@ -14,7 +14,8 @@ const LENGTH: f64 = 0.3;
 /// Tolerance for a tool on the surface, m: far above rounding, far below any visible distance.
 const ON_SURFACE_M: f64 = 1.0e-9;
 
-/// Returns the contact of a handle inside a primitive body, with the depth of the handle; inside several bodies, the deepest contact.
+/// Returns the contact of a handle inside a primitive body, with the depth of the handle; inside several bodies, the deepest
+/// contact; `None` outside of all bodies.
 ///
 /// The point of contact is the proxy, if the model draws one on the surface: with friction the proxy stays behind, and at a box it is
 /// on the face through which the handle came. Without a proxy it is the closest point of the surface.

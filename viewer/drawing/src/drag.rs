@@ -3,7 +3,7 @@
 use crate::camera::Camera;
 use flotor_hal::DVec3;
 
-/// Inclination above which a point is dragged in a horizontal plane, rad; below, a vertical plane is seen less at a slant.
+/// Inclination above which a point is dragged in a horizontal plane, rad; below, a vertical plane is seen less obliquely.
 const FROM_ABOVE_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Smallest angle between a ray and the plane, as a sine: nearer to grazing, a pixel would be many millimetres.
@@ -19,7 +19,7 @@ pub struct Ray {
 }
 
 impl Ray {
-    /// Casts the ray through a place of the picture, in fractions of width and height from the upper left: the inverse of
+    /// Casts the ray through a point of the picture, in fractions of width and height from the upper left: the inverse of
     /// [`Camera::on_screen`].
     #[must_use]
     pub fn through(camera: &Camera, [x, y]: [f64; 2], aspect: f64) -> Self {

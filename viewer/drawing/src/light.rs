@@ -1,6 +1,6 @@
 //! Shading of surfaces: one key light, one fill light, a bright sky over a dark ground, and a highlight.
 //!
-//! The GPU shader gets the same constants; a test compares GPU and CPU.
+//! The GPU shader receives the same constants; a test compares GPU and CPU.
 
 use crate::geometry::Vertex;
 use flotor_hal::DVec3;
@@ -20,7 +20,8 @@ const SHARPNESS: i32 = 48;
 /// Strength of the rim light, which separates the edge of a round body from its background.
 const RIM: f64 = 0.10;
 
-/// Returns the colour of a corner seen from `eye_mm`, sRGB components from 0 to slightly above 1.
+/// Returns the colour of a vertex seen from `eye_mm`, sRGB components from 0 to slightly above 1; the colour itself without a
+/// normal.
 #[must_use]
 pub fn shade(vertex: &Vertex, eye_mm: DVec3) -> [f64; 3] {
     let [r, g, b, _] = vertex.color;

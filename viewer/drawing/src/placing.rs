@@ -12,7 +12,7 @@ pub struct Placing {
 }
 
 impl Placing {
-    /// Places `count` devices with bodies of this height and radius.
+    /// Places `count` devices side by side, with a spacing for bodies of this height and radius, m.
     #[must_use]
     pub fn of(count: usize, height_m: f64, radius_m: f64) -> Self {
         Self { count, spacing_m: (1.1 * height_m).max(2.6 * radius_m) }

@@ -24,7 +24,7 @@ pub struct Backdrop {
     pub bottom: [u8; 3],
 }
 
-/// View of a picture.
+/// Camera, background and size of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// Camera.
@@ -43,10 +43,10 @@ pub struct Rasterizer {
     corners: Vec<Corner>,
 }
 
-/// Corner projected to the screen.
+/// Vertex projected to the screen.
 #[derive(Clone, Copy, Debug)]
 struct Corner {
-    /// Position in samples from the upper left; NaN in front of the near plane.
+    /// Position in samples from the upper left; NaN if nearer than the near plane.
     at: Vec2,
     depth: f32,
     lit: [f32; 3],
@@ -54,9 +54,9 @@ struct Corner {
 }
 
 impl Rasterizer {
-    /// Draws a mesh; `samples` per pixel and direction smooth the edges.
+    /// Draws a mesh with `samples` × `samples` samples per pixel (supersampling).
     ///
-    /// Triangles that reach in front of the near plane are left out.
+    /// Skips triangles with a vertex nearer than the near plane.
     pub fn draw(&mut self, mesh: &Mesh, view: &View<'_>, samples: usize) -> Image {
         let [width, height] = view.size.map(|length| length.max(1) * samples);
         self.begin(view.backdrop, [width, height]);
@@ -92,7 +92,8 @@ impl Rasterizer {
         self.corners.extend(mesh.vertices.iter().map(|vertex| corner(vertex, &projection, eye_mm, w, h)));
     }
 
-    /// Fills the samples whose centres are inside a triangle; counter-clockwise corners face the eye.
+    /// Fills the samples whose centres are inside a triangle; skips a triangle whose vertices are not counter-clockwise, because it
+    /// faces away from the eye.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // pixels
     fn triangle(&mut self, [a, b, c]: [Corner; 3], [width, height]: [usize; 2]) {
         // Twice the signed area; y runs down, so the area of a triangle that faces the eye is negative. The comparison is false for NaN.

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 /// Point of a trace: time, s, and value.
 pub type Point = [f64; 2];
 
-/// Returns the width of a bucket, s: a power of two, so that zooming by less does not move any edge.
+/// Returns the width of a bucket, s: the next power of two from `span_s / buckets`, so that a small zoom moves no edge of a bucket.
 #[must_use]
 pub fn bucket_width_s(span_s: f64, buckets: usize) -> f64 {
     let wanted_s = (span_s / buckets.max(1) as f64).max(f64::MIN_POSITIVE);

@@ -28,11 +28,12 @@ pub fn felt_stiffness_n_per_m<'a>(earlier: impl Iterator<Item = &'a Sample>, now
 pub struct ForcePosition {
     /// Position, m, and force on the hand, N, in order of time.
     pub points: Vec<[f64; 2]>,
-    /// Stiffness fitted to the points with force (contact without free motion), N/m. None where the handle rests.
+    /// Stiffness fitted to the points with force (contact without free motion), N/m; `None` if the handle rests.
     pub stiffness_n_per_m: Option<f64>,
-    /// Stiffness fitted to all points, with force and without, N/m. None where the handle rests.
+    /// Stiffness fitted to all points, with force and without, N/m; `None` if the handle rests.
     pub stiffness_of_all_n_per_m: Option<f64>,
-    /// Number of whole cycles, and mean energy that a cycle takes from the hand, J: the area of the loop. None without a whole cycle.
+    /// Number of whole cycles, and mean energy that a cycle takes from the hand, J: the area of the loop. `None` without a whole
+    /// cycle.
     pub cycles: Option<(u32, f64)>,
 }
 

@@ -92,7 +92,8 @@ impl History {
         (0..count).map(|device| Self { device, ..Self::new(run.clone(), retention) }).collect()
     }
 
-    /// Reads the history of each device from a recording. Damage after the first tick loses only the ticks after it and becomes a note.
+    /// Reads the history of each device from a recording. If the file is damaged after the first tick, the ticks before the damage are
+    /// kept, and a note describes the damage.
     ///
     /// # Errors
     /// [`ReadError`] if no part of the file is usable.
@@ -139,7 +140,7 @@ impl History {
         self.run.devices().nth(usize::from(self.device)).map_or("", |device| device.name.as_str())
     }
 
-    /// Adds a tick, unless of another device; at the limit of retained samples, removes the oldest sample.
+    /// Adds a tick of this device, and ignores ticks of other devices; at the limit of retained samples, removes the oldest sample.
     pub fn push(&mut self, record: &TickRecord) {
         if record.device != self.device {
             return;
@@ -160,8 +161,8 @@ impl History {
         self.samples.push_back(sample);
     }
 
-    /// Adds a change of a parameter, not earlier than the last change. Ignores changes that guide a hand: each motion of a pointer sends
-    /// one.
+    /// Adds a change of a parameter, not earlier than the last change. Ignores a change that guides a hand: each motion of a pointer
+    /// sends one.
     pub fn push_change(&mut self, time_ns: u64, parameter: &str) {
         let [first_s, _] = self.span_s();
         while self.retention != Retention::All
@@ -199,7 +200,7 @@ impl History {
         self.samples.len()
     }
 
-    /// True if there are no samples.
+    /// Returns whether there are no samples.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
@@ -211,7 +212,7 @@ impl History {
         [self.samples.front(), self.samples.back()].map(|sample| sample.map_or(0.0, Sample::time_s))
     }
 
-    /// Returns the sample valid at a time: the last sample not after it, or the first sample.
+    /// Returns the sample valid at a time, s: the last sample not after the time, or else the first sample; `None` without samples.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Option<&Sample> {
         let after = self.index_after(time_s);
@@ -226,7 +227,7 @@ impl History {
         (20.0 / self.run.rate_hz.max(1.0e-3)).max(LEAST_S)
     }
 
-    /// Returns the sample valid at a time; `None` before the first sample and in a gap.
+    /// Returns the sample valid at a time, s; `None` before the first sample and in a gap.
     #[must_use]
     pub fn seen_at(&self, time_s: f64) -> Option<&Sample> {
         let sample = self.at(time_s)?;
@@ -247,15 +248,15 @@ impl History {
         (span_s > 0.0).then(|| (last.tick - first.tick) as f64 / span_s)
     }
 
-    /// Returns the samples between two times, both included.
+    /// Returns the samples between two times, s, both included.
     pub fn between(&self, from_s: f64, to_s: f64) -> impl DoubleEndedIterator<Item = &Sample> {
         let start = self.samples.partition_point(|sample| sample.time_s() < from_s);
         let end = self.index_after(to_s).max(start);
         self.samples.range(start..end)
     }
 
-    /// Returns the number of the first sample at or after a time, counted from the start and including removed samples: the number
-    /// of a sample is stable.
+    /// Returns the number of the first sample at or after a time, s. Removed samples are counted as well, so that the number of a
+    /// sample never changes.
     #[must_use]
     pub fn number_at(&self, time_s: f64) -> u64 {
         self.forgotten + self.samples.partition_point(|sample| sample.time_s() < time_s) as u64
@@ -272,7 +273,7 @@ impl History {
         self.samples.iter()
     }
 
-    /// Returns the sample with the largest force, for a picture.
+    /// Returns the sample with the largest force; `None` without samples.
     #[must_use]
     pub fn strongest(&self) -> Option<&Sample> {
         self.samples

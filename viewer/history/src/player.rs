@@ -59,7 +59,8 @@ impl Player {
         }
     }
 
-    /// Moves to a time within the samples and no longer follows the newest; playback continues from there.
+    /// Moves to a time, s, limited to the time span of the samples. A player that follows the newest sample is paused; playback
+    /// continues from the new time.
     pub fn seek(&mut self, now_s: f64, [first_s, last_s]: [f64; 2]) {
         self.now_s = now_s.clamp(first_s, last_s.max(first_s));
         if self.motion == Motion::Follow {

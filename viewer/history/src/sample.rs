@@ -1,4 +1,4 @@
-//! Tick for display.
+//! Sample of a run for display: a tick in reduced precision.
 
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Pose, rotation_vector};
@@ -12,9 +12,9 @@ pub struct Sample {
     pub tick: u64,
     /// Pose of the handle in the device frame.
     pub pose: Pose,
-    /// Velocity of the handle, m/s and rad/s.
+    /// Velocity, m/s, and angular velocity of the handle, rad/s.
     pub twist: [f32; 6],
-    /// Wrench sent to the device, N and N·m.
+    /// Wrench sent to the device: force, N, and torque, N·m.
     pub commanded: [f32; 6],
     /// Energy stored in the models, J; NaN if not computed.
     pub energy_j: f32,

@@ -11,7 +11,7 @@ use flotor_history::player::Motion;
 use flotor_live::ChangeMessage;
 use std::time::{Duration, Instant};
 
-/// Repaint interval while a hand is held.
+/// Repaint interval while the pointer guides a hand.
 const HOLDING: Duration = Duration::from_millis(50);
 
 impl Viewer {

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 /// Poll interval of the search for a run.
 const LOOK_PERIOD: Duration = Duration::from_millis(500);
-/// Retained time of a running host, s, and the largest number of retained ticks.
+/// Time span of the retained ticks of a running host, s, and their largest number.
 const KEPT_S: f64 = 60.0;
 const MOST_KEPT: usize = 120_000;
 /// Events that trigger a warning sound.
@@ -106,7 +106,8 @@ impl Viewer {
     }
 }
 
-/// Selects the applied parameter changes to draw: the last of each parameter, because a moving number changes with every tick.
+/// Selects the applied parameter changes to draw: the last change of each parameter, because a moving number changes with every
+/// tick.
 fn to_draw(changes: &[ChangeMessage]) -> Vec<&ChangeMessage> {
     let is_in_force =
         |change: &&ChangeMessage| change.outcome == Outcome::Applied && change.subject == Subject::Parameter;

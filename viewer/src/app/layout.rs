@@ -1,6 +1,6 @@
 //! Layout of an experimenter's window: bar, messages, side panel, 3D view, traces.
 //!
-//! The room is shared by priority: emergency stop and state of the run ([`top_bar`]), messages ([`messages`]), the clock (in the bar of
+//! Space is allocated by priority: emergency stop and state of the run ([`top_bar`]), messages ([`messages`]), the clock (in the bar of
 //! the playback and over the view), numbers and the other texts over the view ([`overlay`]), traces, panel.
 //!
 //! [`top_bar`]: crate::ui::top_bar
@@ -31,11 +31,11 @@ use flotor_history::compared::Compared;
 use flotor_live::{Ask, SetValue};
 use std::time::Instant;
 
-/// Height of the bar for texts of the usual size, points.
+/// Height of the bar at which its texts have their usual size, points.
 const USUAL_BAR_PT: f32 = 42.0;
 /// Largest fraction of the window height for the messages of a run that is over.
 const MOST_OF_HEIGHT: f32 = 0.3;
-/// Accessible name of the border.
+/// Accessible name of the border between view and traces.
 const BORDER: &str = "Border between view and traces";
 /// Smallest fraction of the height for the 3D view above traces.
 const LEAST_VIEW_PART: f32 = 0.27;

@@ -1,6 +1,6 @@
 //! Window of the viewer: state, and handling of a running host or a recording.
 //!
-//! A picture is made only after a change: new ticks, user input, or playback. This module owns all displayed state; the
+//! A picture is drawn only after a change: new ticks, user input, or playback. This module owns all displayed state; the
 //! parts in [`crate::ui`] only show the state.
 
 mod hand;
@@ -89,7 +89,7 @@ impl Recorded {
     }
 }
 
-/// State of the window.
+/// Viewer in a window: source of the data, displayed state and settings of the user.
 pub struct Viewer {
     source: Source,
     devices: Devices,

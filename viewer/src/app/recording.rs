@@ -67,7 +67,7 @@ impl Viewer {
         self.plots.window = Window::Whole;
     }
 
-    /// Replaces the displayed run by another, without its samples.
+    /// Replaces the displayed run by another; resets view and plots, and ends a drag and a comparison.
     pub(super) fn replace_run(&mut self, source: Source, devices: Devices, parts: Parts) {
         let Parts { shapes, panels, missing, guide, limits } = parts;
         self.heading = Heading::of(devices.history().run());

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Frame interval of a running host on a GPU, and on a software adapter, which itself uses the processor.
+/// Frame intervals of a running host on a GPU, and on a software adapter, which itself uses the processor.
 pub(super) const FRAME: Duration = Duration::from_millis(16);
 pub(super) const FRAME_ON_CPU: Duration = Duration::from_millis(33);
 /// Frame interval while only counts and texts change.
@@ -46,7 +46,7 @@ impl Pace {
 pub struct RunSelection {
     /// Directory of the runs.
     pub directory: Directory,
-    /// Process of the run; `None`: the newest run.
+    /// Process id of the run; `None`: the newest run.
     pub process: Option<u32>,
     /// Plugin files for drawing the bodies of a recording, if the window opens one instead.
     pub plugins: Vec<PathBuf>,
@@ -76,7 +76,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// True for a run that can be stopped and changed.
+    /// Returns whether a run is in progress, which can be stopped and changed.
     #[must_use]
     pub fn is_running(&self) -> bool {
         matches!(self, Self::Live { feed, .. } if feed.state() == FeedState::Running)

@@ -32,16 +32,16 @@ pub enum StudyKey {
     Digit(u8),
     /// Type the decimal point of a rating.
     Point,
-    /// Delete the last digit.
+    /// Delete the last digit or the decimal point.
     Back,
 }
 
-/// Largest number of digits of a rating.
+/// Length of a typed rating from which no further digits are accepted.
 const MOST_DIGITS: usize = 8;
 /// Display time of a warning.
 const WARNED: Duration = Duration::from_secs(2);
 
-/// Returns the key of the window for an emergency stop.
+/// Returns egui's key for the configured key of the emergency stop.
 #[must_use]
 pub const fn key_of(stop_key: StopKey) -> egui::Key {
     match stop_key {
@@ -76,7 +76,7 @@ pub struct Prompt {
 pub struct Waker(Arc<OnceLock<Context>>);
 
 impl Waker {
-    /// Requests a picture.
+    /// Requests a repaint of the window.
     pub fn wake(&self) {
         if let Some(context) = self.0.get() {
             context.request_repaint();
@@ -161,19 +161,19 @@ impl Prompt {
         self.is_persons_turn
     }
 
-    /// Returns the digits typed so far.
+    /// Returns the rating typed so far: digits and a decimal point.
     #[must_use]
     pub fn typed(&self) -> &str {
         &self.typed
     }
 
-    /// Returns whether the warning is shown that the handle was out of its range.
+    /// Returns whether the warning about a handle outside its range is shown.
     #[must_use]
     pub fn is_warned(&self) -> bool {
         self.warned_for().is_some()
     }
 
-    /// Returns the rest of the display time of the warning; `None` without a warning.
+    /// Returns the remaining display time of the warning; `None` without a warning.
     #[must_use]
     pub fn warned_for(&self) -> Option<Duration> {
         self.warned.and_then(|since| WARNED.checked_sub(since.elapsed()))

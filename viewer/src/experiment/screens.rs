@@ -1,4 +1,4 @@
-//! Screens for a person in a sitting: few words, large, in the middle, without any hint at the stiffness.
+//! Screens for a person in a sitting: few words, large, in the middle, which give no hint of the stiffness.
 //!
 //! All sizes are fractions of the height, so that a text is readable from the same distance on every display. The keys stand beneath
 //! their text.
@@ -18,7 +18,8 @@ const WORDS_PART: f32 = 0.27;
 const ABOVE_PART: f32 = 0.2;
 /// Largest fraction of the height for a text to read; a longer text is scrolled.
 const READ_PART: f32 = 0.6;
-/// Largest height for text sizes, as a fraction of the width: on a display in portrait orientation, lines are still wide enough.
+/// Upper limit of the height to which text sizes are relative, as a fraction of the width: in portrait orientation, the lines
+/// still fit.
 const HEIGHT_OF_WIDTH: f32 = 0.75;
 
 /// Sizes of text, points.

@@ -1,7 +1,7 @@
 //! Texts of the screens of a sitting, from a file: English unless the study names another.
 //!
-//! The file has one text for each key (`viewer/texts/english.toml`); a key that is missing or unknown is an error, because a screen half
-//! in another language is no translation.
+//! The file has one text for each key (`viewer/texts/english.toml`). A key that is missing or unknown is an error, so that no
+//! screen is partly in another language.
 
 use serde::Deserialize;
 use std::path::Path;
@@ -88,7 +88,7 @@ impl Texts {
     /// Reads the texts from a file.
     ///
     /// # Errors
-    /// A message of one line if the file cannot be read, or a key is missing, unknown, or without the place of its number.
+    /// A message of one line if the file cannot be read, or a key is missing or unknown, or lacks the placeholder of its number.
     pub fn read(file: &Path) -> Result<Self, String> {
         let text =
             std::fs::read_to_string(file).map_err(|cause| format!("cannot read the texts: {cause}"))?;

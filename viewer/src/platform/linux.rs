@@ -17,7 +17,7 @@ pub(crate) fn resident_mib() -> Option<u64> {
     Some(kib / 1024)
 }
 
-/// Returns the folder for the settings of this user.
+/// Returns the folder for the settings of this user; `None` without an absolute path in `XDG_CONFIG_HOME` or `HOME`.
 pub(crate) fn settings_folder() -> Option<PathBuf> {
     let variable = |name| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     variable("XDG_CONFIG_HOME").or_else(|| variable("HOME").map(|home| home.join(".config")))

@@ -32,7 +32,7 @@ pub(crate) fn resident_mib() -> Option<u64> {
     (told != 0).then(|| u64::try_from(memory.WorkingSetSize >> 20).unwrap_or(u64::MAX))
 }
 
-/// Returns the folder for the settings of this user.
+/// Returns the folder for the settings of this user; `None` without an absolute path in `APPDATA`.
 pub(crate) fn settings_folder() -> Option<PathBuf> {
     std::env::var_os("APPDATA").map(PathBuf::from).filter(|path| path.is_absolute())
 }

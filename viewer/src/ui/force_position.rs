@@ -48,7 +48,7 @@ impl ForcePositionPlot {
         self.made_of = None;
     }
 
-    /// Shows the curve in the available area, with the time of the cursor as a dot.
+    /// Shows the curve in the available area, with the sample at the cursor as a dot.
     pub fn show(
         &mut self,
         ui: &mut Ui,

@@ -2,8 +2,8 @@
 
 use egui::{Event, InputState, Key};
 
-/// Returns whether a key was pressed without Ctrl, Alt or Command, which give it another meaning. Checks the modifiers at the time of the
-/// press: after a short press they are up again at the end of the picture.
+/// Returns whether a key was pressed without Ctrl, Alt or Command, which give the key another meaning. Checks the modifiers at the
+/// time of the press: after a short press, they may be released again when the picture is drawn.
 #[must_use]
 pub fn pressed_alone(input: &InputState, wanted: Key) -> bool {
     input.events.iter().any(|event| match event {

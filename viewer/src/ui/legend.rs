@@ -16,7 +16,7 @@ const LINE_PT: f32 = SMALL_PT + 4.0;
 const ROOM_FOR_SCALES_PT: f32 = 600.0;
 /// Largest length of the arrow of the scale, as a fraction of the width of the view.
 const MOST_OF_WIDTH: f64 = 0.3;
-/// Scale of torque above which a run has torques, N·m.
+/// Scale of torque arrows above which the legend shows the scale, N·m.
 const LEAST_TORQUE_NM: f64 = 1.0e-5;
 
 /// Paints the legend of the colours of bodies, of the arrows and of a contact into the lower left, and the distance between the grid
@@ -59,7 +59,7 @@ pub fn paint(overlay: &mut Overlay, area: Rect, facts: &SceneFacts, camera: &Cam
     }
 }
 
-/// Paints a line of text after a gap for a sign of this width, and returns the start of the sign, points.
+/// Paints a line of text with room for a symbol of this width before it; returns the left end of the symbol, `None` without room.
 fn sign(overlay: &mut Overlay, corner: Corner, words: &str, sign_pt: f32, palette: &Palette) -> Option<Pos2> {
     let font = FontId::proportional(SMALL_PT);
     let size = vec2(sign_pt + width_pt(overlay.painter(), words, font.clone()), LINE_PT);

@@ -1,5 +1,5 @@
-//! Marks of events over time: bars at the foot of the traces where a limit acted, ticks were missed or a parameter changed, and a line
-//! with a cross over the traces for each fault.
+//! Marks of events over time: bars at the foot of the traces for parameter changes and for the events [`Events::LIMITS`], such as a
+//! limited force or missed ticks, and a line with a cross over the traces for each fault.
 
 use crate::palette::Palette;
 use egui::{Color32, CornerRadius, Rect, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};

@@ -1,7 +1,7 @@
 //! Row of messages beneath the bar: a separate place for warnings, which cover nothing.
 //!
-//! The row is always shown, so a message moves nothing. It shows the warnings, the most urgent first; without warnings, the last action
-//! or the subtitle of the run. When a run is over the row grows: nothing moves any more, and the whole reason is shown.
+//! The row is always shown, so that a message does not move other parts. It shows the warnings, the most urgent first; without
+//! warnings, the last action or the subtitle of the run. After the end of a run, the row grows to show the whole reason.
 
 use crate::palette::Palette;
 use crate::ui::overlay::{shortened, width_pt};

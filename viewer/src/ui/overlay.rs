@@ -1,7 +1,7 @@
 //! Layout of texts over the 3D view: one pass, in order of priority.
 //!
-//! Every part requests its rectangle from one [`Overlay`], in a corner or below a point. The order of the calls is the priority: a later
-//! part moves past the rectangles taken before, and is left out without room. No text covers another text. The order is:
+//! Every part reserves its rectangle in the same [`Overlay`], in a corner or below a point. The order of the calls is the priority: a
+//! later part is placed beside the earlier rectangles, and is left out without room. No text covers another text. The order is:
 //!
 //! 1. in a picture, title and warnings ([`crate::ui::readout`]); a window has the bar and the row of messages for them,
 //! 2. the clock and the rows of numbers ([`crate::ui::readout::numbers`]): a new number is one more
@@ -43,7 +43,7 @@ impl Corner {
     }
 }
 
-/// Area over the view, and the rectangles taken so far.
+/// Area over the view, and the rectangles reserved so far.
 pub struct Overlay {
     painter: Painter,
     inside: Rect,
@@ -51,7 +51,7 @@ pub struct Overlay {
 }
 
 impl Overlay {
-    /// Returns the empty overlay of an area.
+    /// Creates an overlay of an area, without reserved rectangles.
     #[must_use]
     pub fn new(painter: &Painter, area: Rect) -> Self {
         Self { painter: painter.with_clip_rect(area), inside: area.shrink(MARGIN_PT), taken: Vec::new() }
@@ -69,7 +69,7 @@ impl Overlay {
         self.inside
     }
 
-    /// Takes a rectangle in a corner, past the rectangles taken before; `None` without room.
+    /// Reserves a rectangle in a corner, above or below the earlier rectangles; `None` without room.
     pub fn take(&mut self, corner: Corner, size: Vec2) -> Option<Rect> {
         let left = if corner.is_left() { self.inside.left() } else { self.inside.right() - size.x };
         let mut top = if corner.is_top() { self.inside.top() } else { self.inside.bottom() - size.y };
@@ -80,7 +80,7 @@ impl Overlay {
         }
     }
 
-    /// Takes a rectangle centred below a point, or moved sideways into the area; `None` if it overlaps a rectangle taken before.
+    /// Reserves a rectangle centred below a point, moved into the area if necessary; `None` if it overlaps an earlier rectangle.
     pub fn take_below(&mut self, point: Pos2, size: Vec2) -> Option<Rect> {
         let most = (self.inside.right() - size.x).max(self.inside.left());
         let left = (point.x - 0.5 * size.x).clamp(self.inside.left(), most);

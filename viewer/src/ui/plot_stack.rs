@@ -23,11 +23,11 @@ pub const FIRST_TRACES: [Quantity; 2] = [Quantity::Force, Quantity::Position];
 const CHOICES_PT: f32 = 30.0;
 /// Smallest height of a trace, points: room for three marks of an axis. Traces that do not fit are reached by scrolling.
 const LEAST_TRACE_PT: f32 = 48.0;
-/// Height of a trace that takes precedence over the 3D view, points.
+/// Height up to which a trace takes precedence over the 3D view, points.
 const GOOD_TRACE_PT: f32 = 60.0;
 /// Distance between headings and traces, points.
 const GAP_PT: f32 = 3.0;
-/// Turn of the wheel for scrolling by one trace, points.
+/// Rotation of the wheel that scrolls by one trace, points.
 const SCROLL_PT: f32 = 30.0;
 /// Width below which force over position replaces the traces, points.
 const ROOM_BESIDE_PT: f32 = 560.0;
@@ -100,7 +100,7 @@ pub struct PlotStack {
     pub force_position: ForcePositionPlot,
     /// Options for pictures of the traces.
     pub export: ExportOptions,
-    /// Maximised trace.
+    /// Maximised quantity, if any.
     alone: Option<Quantity>,
     /// Range of values of each zoomed trace, SI.
     values: BTreeMap<Quantity, [f64; 2]>,
@@ -120,7 +120,7 @@ pub struct PlotStack {
     first: usize,
     /// Number of hidden traces above and below.
     out_of_sight: [usize; 2],
-    /// Turn of the wheel since the last scroll, points.
+    /// Rotation of the wheel since the last scroll, points.
     turned_pt: f32,
 }
 
@@ -382,7 +382,7 @@ impl PlotStack {
         requests.extend(self.stack(ui, (seen, cursor_s), (shown, height_pt), controls, palette));
     }
 
-    /// Scrolls by a trace when the wheel turns over the traces.
+    /// Scrolls by whole traces when the wheel is turned over the traces.
     fn scroll(&mut self, ui: &Ui, last: usize) {
         let is_over = ui.rect_contains_pointer(ui.available_rect_before_wrap());
         let turned = |input: &egui::InputState| (input.smooth_scroll_delta().y, input.modifiers.alt);

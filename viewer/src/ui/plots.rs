@@ -26,9 +26,9 @@ pub struct PlotView<'a> {
     pub units: Units,
     /// Height, points.
     pub height: f32,
-    /// True for a time axis beneath, at the lowest plot of a stack.
+    /// True to draw a time axis beneath, for the lowest plot of a stack.
     pub time_axis: bool,
-    /// Smallest and largest value shown, in these units; `None`: all values.
+    /// Smallest and largest value shown, in `units`; `None`: all values.
     pub values: Option<[f64; 2]>,
     /// State of the button for maximising.
     pub maximise: Maximise,
@@ -62,7 +62,7 @@ pub struct PlotAnswer {
     pub frame: egui::Rect,
 }
 
-/// Samples, and the decimated trace of a quantity.
+/// Samples of a device, and the decimated trace of a quantity.
 pub struct Lines<'a> {
     /// Samples of a device.
     pub history: &'a History,
@@ -324,7 +324,7 @@ fn without_minus_of_zero(text: String) -> String {
     if is_zero { text.replace('-', "+") } else { text }
 }
 
-/// Formats a number in seven columns, regardless of its magnitude.
+/// Formats a number in seven characters, regardless of its magnitude; "–" if not finite.
 #[must_use]
 pub fn fixed(value: f64) -> String {
     match value.abs() {
@@ -351,7 +351,7 @@ pub(super) fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
     (first..=last).map(|k| GridMark { value: k as f64 * step_size, step_size }).collect()
 }
 
-/// Formats a mark of an axis without trailing digits and without a minus on zero.
+/// Formats a mark of an axis with at most six decimals, without trailing zeros and without a minus on zero.
 pub(super) fn short(value: f64) -> String {
     let rounded = (value * 1.0e6).round() / 1.0e6;
     if rounded == 0.0 { "0".to_owned() } else { format!("{rounded}") }

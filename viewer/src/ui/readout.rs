@@ -28,7 +28,7 @@ const NOT_GIVEN: &str = "not given";
 /// Events of the loop, which concern all devices.
 const OF_THE_LOOP: Events = Events::MISSED;
 
-/// Returns the title of the scene of a run.
+/// Returns the title of the scene of a run; `A run` if there is none.
 #[must_use]
 pub fn title_of(run: &RunDescription) -> String {
     let scene: Option<toml::Table> = run.scene_toml.parse().ok();

@@ -1,4 +1,4 @@
-//! Use of the limits, and counts of events so far.
+//! Parts of the panel: used fractions of the wrench limits, and counts of events so far.
 
 use crate::event_counts::EventCounts;
 use crate::palette::Palette;
@@ -35,7 +35,8 @@ pub fn limits(ui: &mut Ui, sample: &Sample, limits: &WrenchLimits, units: Units,
     });
 }
 
-/// Shows a line for each event, counted since the first tick received. New lines move no control under the pointer: none is beneath.
+/// Shows a line for each event, counted since the first tick received. A new line moves no control under the pointer, because no
+/// control is beneath the lines.
 pub fn events(ui: &mut Ui, counted: &EventCounts, palette: &Palette) {
     let title = RichText::new(format!("Events since {:.1} s", counted.since_s())).strong();
     CollapsingHeader::new(title).id_salt("events").default_open(true).show(ui, |ui| {

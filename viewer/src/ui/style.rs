@@ -1,4 +1,4 @@
-//! Style of window and pictures: quiet colours, wide spacing, numbers in columns.
+//! Style of window and pictures: muted colours, wide spacing, numbers in columns.
 
 use crate::palette::{Look, Palette};
 use egui::{Color32, Context, FontFamily, FontId, Stroke, TextStyle, Theme};
@@ -43,7 +43,7 @@ pub fn apply(context: &Context, look: Look) {
     });
 }
 
-/// Shows a button with a sign, without a frame; `help` is its hover text and accessible name.
+/// Shows a button with a symbol, without a frame; `help` is its hover text and accessible name.
 pub fn quiet(ui: &mut egui::Ui, sign: &str, help: &str) -> egui::Response {
     let button =
         ui.add(egui::Button::new(egui::RichText::new(sign).size(15.0)).frame(false)).on_hover_text(help);

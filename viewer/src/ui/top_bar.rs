@@ -1,7 +1,7 @@
 //! Bar at the top of the window: title, state of the run, emergency stop.
 //!
-//! The emergency stop and the state are never shortened. The other parts get the remaining width, in this order: the buttons, the name of
-//! the panel's button, the title, which is shortened with "…".
+//! The emergency stop and the state are never shortened. The remaining width goes to the other parts in this order: the buttons, the
+//! name of the panel's button, the title, which is shortened with "…".
 
 use crate::palette::{Look, Palette};
 use crate::ui::overlay::width_pt;
@@ -13,7 +13,7 @@ use egui::{
 
 /// Name of the emergency stop in an experimenter's window.
 pub const STOP: &str = "EMERGENCY STOP";
-/// Width of a button that is a sign, with its gaps, and of the dot before the state, points.
+/// Width of a symbol button with its gaps, and of the dot before the state, points.
 const SIGN_PT: f32 = 32.0;
 const DOT_PT: f32 = 18.0;
 /// Smallest width of a readable title, points.
@@ -62,7 +62,7 @@ pub enum PanelSwitch {
 pub enum RunStatus {
     /// No run, or a normal end.
     Idle,
-    /// The run is in order.
+    /// The run continues normally.
     InOrder,
     /// The run continues with a warning.
     Warning,
@@ -150,7 +150,7 @@ impl TopBar<'_> {
     }
 }
 
-/// Shows the button that must be found without a search: in the same colours for both looks, with its key.
+/// Shows the button of the emergency stop, with the name of its key, in the same conspicuous colours in both looks.
 fn emergency_stop(ui: &mut Ui, Stop { name, key }: &Stop, scale: f32) -> egui::Response {
     const RED: Color32 = Color32::from_rgb(196, 30, 36);
     const YELLOW: Color32 = Color32::from_rgb(255, 214, 64);

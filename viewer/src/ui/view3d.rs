@@ -24,7 +24,7 @@ const ZOOM_PER_POINT: f64 = 1.003;
 pub struct Subject<'a> {
     /// Bodies of the models.
     pub shapes: &'a mut [Shape],
-    /// Version of the bodies, raised by every change other than of the pose.
+    /// Version of the bodies, incremented by every change except of the pose.
     pub version: u64,
     /// Samples at the displayed time.
     pub moment: Moment<'a>,
@@ -38,7 +38,7 @@ pub struct View3d {
     pub camera: Camera,
     /// Extent of the bodies at the last reset: the camera does not move when a body grows.
     extent: Extent,
-    /// Aspect ratio of the view, width to height.
+    /// Aspect ratio of the view, width over height.
     aspect: f64,
     /// True to draw arrows of force and torque.
     pub shows_arrows: bool,
@@ -102,13 +102,13 @@ impl View3d {
         }
     }
 
-    /// Returns the number of corners built so far: an unchanged picture adds none.
+    /// Returns the total number of vertices built; constant while the picture is unchanged.
     #[must_use]
     pub fn corners_made(&self) -> u64 {
         self.builder.corners_made()
     }
 
-    /// Shows the scene in a rectangle, handles the mouse, and returns the facts of the picture.
+    /// Shows the scene in a rectangle, handles the mouse, and returns the properties of the scene.
     pub fn show(&mut self, ui: &mut Ui, area: Rect, look: Look, subject: Subject<'_>) -> SceneFacts {
         let extent = SceneBuilder::extent(subject.shapes, subject.moment.samples.len());
         self.fit(area);

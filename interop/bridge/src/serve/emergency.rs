@@ -4,7 +4,7 @@ use flotor_live::{Directory, Latch};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Callback that sends the reply to a press: the reason of a refusal, or none.
+/// Callback that sends the reply to a press; its argument is the reason of a refusal, `None` on success.
 pub(super) type SendAnswer = Box<dyn FnOnce(Option<String>) + Send>;
 
 /// Timeout of the hosts' confirmation; the peer's timeout is longer.
@@ -17,7 +17,7 @@ pub(super) fn who(member: &str, bridge: impl std::fmt::Display) -> String {
     format!("{member} over the network (bridge {bridge})")
 }
 
-/// Emergency stop with a thread that waits for the hosts' confirmation.
+/// Latch of the emergency stop, with a thread that waits for the hosts' confirmation and sends the replies.
 pub(super) struct Emergency {
     latch: Latch,
     pressed: SyncSender<(SendAnswer, Option<String>)>,
@@ -38,7 +38,8 @@ impl Emergency {
         &self.latch
     }
 
-    /// Presses the latch first: a run that is not visible yet checks the latch before it energises a device.
+    /// Presses the latch; `answer` is called after the hosts have confirmed. The latch comes first: a run that is not visible yet
+    /// checks the latch before it energises a device.
     pub(super) fn press(&self, who: &str, answer: SendAnswer) {
         let problem = self.latch.press(who).err().map(|error| {
             format!("the emergency stop was not stored, so it does not prevent a later run: {error}")

@@ -1,7 +1,7 @@
 //! Request handler of a bridge: receives requests, sends replies, and answers queries about the run.
 //!
-//! The network has two threads for all members: there only the emergency stop is parsed and pressed. All else is queued
-//! for a separate thread, which a slow host or member may delay.
+//! Zenoh calls back on two threads for all members: on these threads, only an emergency stop is parsed and pressed. Everything
+//! else is queued for a separate thread, which a slow host or member may delay.
 
 use super::emergency::{Emergency, who};
 use super::launcher::Launcher;
@@ -22,13 +22,13 @@ use zenoh::query::{Query, Queryable};
 
 /// Timeout of a host's reply.
 const ANSWER_WAIT: Duration = Duration::from_secs(2);
-/// Limit on pending requests to the host, which handles some thousand a second. An emergency stop bypasses the queue.
+/// Limit on pending requests to the host, which handles some thousand requests per second. An emergency stop bypasses the queue.
 const MOST_OPEN: usize = 32;
 /// Limit on queued requests and queries.
 const MOST_IN_LINE: usize = 256;
-/// Limit on queued requests that are too long.
+/// Limit on queued oversized requests.
 const MOST_LONG_ONES: usize = 4;
-/// Interval of the status while nothing changes, for peers that lost one.
+/// Heartbeat interval of an unchanged status, for peers that missed a message.
 const STATUS_PERIOD: Duration = Duration::from_secs(1);
 
 /// Request handler, with the state of the bridge.
@@ -36,19 +36,19 @@ pub(super) struct RequestHandler {
     name: Name,
     emergency: Emergency,
     inside: Mutex<Inside>,
-    /// Number of requests rejected by a full queue, and of requests that were too long.
+    /// Number of requests dropped by a full queue, and of oversized requests.
     turned_away: [AtomicU64; 2],
-    /// Number of too long requests in the queue, which wait for their refusal.
+    /// Number of oversized requests in the queue, waiting for their refusal.
     long_ones: AtomicUsize,
 }
 
 /// Queue entry.
 enum Asked {
-    /// Query for a state, with its key.
+    /// State query: function that reads the state, and key of the reply.
     Known(fn(&RequestHandler) -> Option<Vec<u8>>, String),
-    /// Request.
+    /// Request to admit and carry out.
     Letter,
-    /// Too long request.
+    /// Oversized request, to be refused.
     TooLong,
 }
 
@@ -59,7 +59,7 @@ struct Inside {
     launcher: Option<Launcher>,
     latch: Latch,
     reported: Option<(Status, Instant)>,
-    /// Number of ticks to be published since the bridge started, dropped ones included.
+    /// Number of ticks due for publication since the bridge started, including dropped ticks.
     due: u64,
 }
 
@@ -72,7 +72,7 @@ struct Run {
     open: BTreeMap<u64, (Query, Instant)>,
 }
 
-/// Declares the handler's queryables: for state always, for requests up to `allow`.
+/// Declares the handler's queryables and starts its thread: state queries are always answered, requests up to the right `allow`.
 pub(super) fn open(
     session: &Session,
     handler: &Arc<RequestHandler>,
@@ -162,7 +162,7 @@ impl RequestHandler {
         flotor_core::lock(&self.inside)
     }
 
-    /// Stores a new run.
+    /// Stores a new run, and resets the number of dropped ticks.
     pub(super) fn begin(&self, client: &Client) {
         let mut inside = self.lock();
         inside.status.run = client.greeting().process;
@@ -176,7 +176,7 @@ impl RequestHandler {
         });
     }
 
-    /// Clears the run, and refuses its pending requests.
+    /// Clears the run, and rejects its pending requests.
     pub(super) fn end(&self) {
         let mut inside = self.lock();
         inside.status.run = 0;
@@ -193,7 +193,7 @@ impl RequestHandler {
         }
     }
 
-    /// Updates the number of ticks dropped by the host, which become a visible gap in the numbers.
+    /// Updates the number of ticks of this run that the host has dropped; they leave a gap in the tick numbers.
     pub(super) fn dropped(&self, dropped: u64) {
         let mut inside = self.lock();
         inside.due = inside.due.saturating_add(dropped.saturating_sub(inside.status.dropped));
@@ -205,7 +205,7 @@ impl RequestHandler {
         self.lock().status.couplings = couplings;
     }
 
-    /// Returns the number of the tick to publish.
+    /// Counts a published tick and returns its number.
     pub(super) fn publishing(&self) -> u64 {
         let mut inside = self.lock();
         inside.status.published += 1;
@@ -226,7 +226,8 @@ impl RequestHandler {
         }
     }
 
-    /// Publishes the status if it has changed, and refuses requests whose reply is late.
+    /// Rejects requests whose reply from the host has timed out. Publishes the status if it has changed, and at least once a second;
+    /// changes of ticket, tick count and message counts alone do not count.
     pub(super) fn report(&self, station: &Station) -> Result<(), LinkError> {
         let mut inside = self.lock();
         if let Some(run) = &mut inside.run {
@@ -271,7 +272,7 @@ impl RequestHandler {
         self.lock().run.as_ref().map(|run| run.description.clone())
     }
 
-    /// Receives a request, on a thread of the network: never blocks.
+    /// Presses an emergency stop at once, and queues any other request. Runs on a network thread, so it must not wait.
     fn receive(&self, query: Query, line: &SyncSender<(Asked, Query)>) {
         let [no_room, too_long] = &self.turned_away;
         let payload = query.payload();
@@ -286,7 +287,7 @@ impl RequestHandler {
             return;
         }
         let numbered = payload.map(|payload| payload.to_bytes()).unwrap_or_default();
-        // A key pattern names no member, and is refused.
+        // A key expression with wildcards names no member; it is queued, and rejected as malformed.
         let asked = query.key_expr().as_str();
         if is_emergency_stop(asked, &numbered) {
             let who = who(member(asked), &self.name);
@@ -336,7 +337,7 @@ impl Inside {
                 reply(&query, Some(self.admission.refuse(Refusal::Busy).to_string()));
             }
             (Some(ask), Some(run)) => match run.request_client.ask(ask) {
-                // The lock is held, so that the reply cannot come before the request is stored.
+                // The lock is held, so that the reply cannot be handled before the request is stored.
                 Ok(number) => {
                     run.open.insert(number, (query, Instant::now()));
                 }

@@ -1,10 +1,10 @@
-//! Start of the bridge's scene on request of its owner.
+//! Start of the bridge's scene at the request of a member with the right `own`.
 
 use std::io;
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
-/// Starter of a scene that was named on this machine, never of one from the network.
+/// Starter of one scene file, chosen on this machine: a request over the network cannot name another.
 #[derive(Debug)]
 pub struct Launcher {
     program: PathBuf,
@@ -13,13 +13,13 @@ pub struct Launcher {
 }
 
 impl Launcher {
-    /// Creates a launcher of a scene, run by this `flotor` program.
+    /// Creates a launcher that runs `scene` with the `flotor` executable `program`.
     #[must_use]
     pub fn new(program: PathBuf, scene: PathBuf) -> Self {
         Self { program, scene, child: None }
     }
 
-    /// Starts the scene.
+    /// Starts a process that runs the scene, without standard input and output.
     ///
     /// # Errors
     /// The cause as text: the scene is running already, or the system refuses.

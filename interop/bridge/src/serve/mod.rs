@@ -5,8 +5,8 @@
 //!  host <- live socket <- handler <- ask/..., admitted requests (only keys within the bridge's rights)
 //! ```
 //!
-//! The bridge is a client of the host, in a process of its own: whatever happens to the bridge, the host drops and counts the
-//! messages that the bridge does not take, and goes on.
+//! The bridge is a client of the host, in a process of its own: if the bridge is slow or fails, the host drops and counts the
+//! messages that the bridge does not receive, and keeps running.
 
 mod emergency;
 mod handler;
@@ -29,7 +29,7 @@ use std::time::{Duration, Instant};
 
 /// Poll interval for a run.
 const LOOK_PERIOD: Duration = Duration::from_millis(200);
-/// Interval of the status, and poll interval for subscribers.
+/// Timeout for the next event of the host, and interval of the checks for subscribers and for a changed status.
 const CHECK_PERIOD: Duration = Duration::from_millis(100);
 
 /// Configuration of a bridge.
@@ -45,7 +45,8 @@ pub struct Service {
     pub launcher: Option<Launcher>,
 }
 
-/// Serves until `stop` is set. `report_line` receives a line for people at each change.
+/// Publishes each run of this machine and handles requests until `stop` is set. `report_line` receives a human-readable line at
+/// each change. Not real-time.
 ///
 /// # Errors
 /// [`CoupleError`] of the network or of this machine.
@@ -113,7 +114,7 @@ struct Relay<'s> {
 }
 
 impl Relay<'_> {
-    /// Relays one run until it ends.
+    /// Relays one run until it ends or `stop` is set.
     fn carry(&mut self, mut client: Client, report_line: &mut dyn FnMut(&str)) -> Result<(), CoupleError> {
         self.handler.begin(&client);
         let request_client = client.request_client();
@@ -138,7 +139,7 @@ impl Relay<'_> {
                     for record in &records {
                         station.tick(record, handler.publishing())?;
                     }
-                    // A full queue drops the newest: the dropped ticks came after these.
+                    // A full queue drops the newest ticks: the dropped ticks came after these records.
                     handler.dropped(dropped);
                 }
                 Ok(Some(Event::Change(change))) => {

@@ -26,7 +26,7 @@ pub(super) struct Station {
 impl Station {
     pub(super) fn declare(session: &Session, name: &Name) -> Result<Self, LinkError> {
         // A slow subscriber delays the bridge, not the host, which drops and counts ticks. Zenoh disconnects a subscriber that
-        // takes nothing at all after a while.
+        // receives nothing for a while.
         let publisher = |key: &str| {
             session.declare_publisher(name.key(key)).congestion_control(CongestionControl::Block).wait_now()
         };
@@ -46,7 +46,7 @@ impl Station {
             || self.pose.matching_status().wait_now()?.matching())
     }
 
-    /// Publishes a tick with its number among all due ticks: a gap shows a loss.
+    /// Publishes the pose and the tick. `number` counts all due ticks, so that a gap in the numbers shows a loss.
     pub(super) fn tick(&self, record: &TickRecord, number: u64) -> Result<(), LinkError> {
         let (pose, tick) = {
             let mut messages = flotor_core::lock(&self.messages);

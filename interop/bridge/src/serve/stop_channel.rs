@@ -9,17 +9,17 @@ use std::net::UdpSocket;
 use std::sync::{Arc, Weak};
 use std::time::Duration;
 
-/// Poll interval for the end of the bridge.
+/// Timeout of a receive, and so the poll interval for the end of the bridge.
 const LOOK: Duration = Duration::from_millis(200);
 
-/// Keeps the ports open until dropped.
+/// Guard of the open ports: their threads end when it is dropped.
 pub(super) struct Open(Arc<()>);
 
-/// Opens a port at each address, with a thread of its own. Presses share no thread with the network's sessions, in which a reply
+/// Opens a UDP port at each address, with a thread of its own. Presses share no thread with the Zenoh session, in which a reply
 /// may wait for a member.
 ///
 /// # Errors
-/// The error of the first port that cannot be bound.
+/// The first error: a port that cannot be bound, no further thread, or no random numbers.
 pub(super) fn open(stop: &StopChannel, name: &Name, directory: &Directory) -> io::Result<Open> {
     let open = Open(Arc::default());
     let emergency = Arc::new(Emergency::start(directory)?);

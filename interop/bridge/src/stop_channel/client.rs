@@ -10,12 +10,12 @@ use std::net::{SocketAddr, ToSocketAddrs, UdpSocket};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-/// Retry interval of a hello, and time from a press to a new hello: a flood may lose some datagrams.
+/// Timeouts after a hello and after a press, before a new hello: in a flood, datagrams may be lost.
 const HELLO_WAIT: Duration = Duration::from_millis(50);
 const PRESS_WAIT: Duration = Duration::from_millis(300);
 /// Timeout of the final reply, which includes the hosts' confirmation.
 const ANSWER_WAIT: Duration = Duration::from_secs(5);
-/// Grace period for other endpoints after the first reply: they may be further bridges of that name, or silent.
+/// Grace period after the first confirmation: another endpoint may be a bridge of the same name that refuses.
 const OTHERS_WAIT: Duration = Duration::from_secs(1);
 
 /// Presses the emergency stop by datagrams and by a session in parallel; returns as soon as one path has succeeded.
@@ -66,7 +66,8 @@ fn press(stop: &StopChannel, bridge: &Name) -> Result<(), String> {
     outcome(&answers)
 }
 
-/// Waits for the replies, after the first one only for a grace period; succeeds with one confirmation and no refusal.
+/// Waits for the replies, after the first confirmation only for a grace period; succeeds with a confirmation and without a
+/// refusal.
 fn outcome(answers: &Receiver<Result<Option<String>, String>>) -> Result<(), String> {
     let mut until = Instant::now() + 2 * ANSWER_WAIT;
     let mut is_done = false;
@@ -86,7 +87,7 @@ fn outcome(answers: &Receiver<Result<Option<String>, String>>) -> Result<(), Str
     }
 }
 
-/// Presses the emergency stop at one endpoint; returns the reason of a refusal.
+/// Presses the emergency stop at one endpoint; returns the reason of a refusal, `None` on success.
 fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Option<String>> {
     let places: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
     let of_family = |is_ipv4: bool, any: &str| {
@@ -105,7 +106,7 @@ fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Optio
     };
     let until = Instant::now() + ANSWER_WAIT;
     let mut pending = message(Content::Hello)?;
-    // Any press may be answered; the reply to the last one comes after the hosts have confirmed.
+    // The bridge replies to each accepted press after the hosts have confirmed; any of these replies counts.
     let mut presses: Vec<Nonce> = Vec::new();
     while Instant::now() < until {
         let datagram =

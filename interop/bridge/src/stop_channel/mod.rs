@@ -1,7 +1,7 @@
-//! Second path of an emergency stop: datagrams to the UDP port of the same number as an endpoint of the bridge.
+//! Second path of an emergency stop: datagrams to the UDP port with the number of the bridge's TCP or TLS port.
 //!
-//! A new connection waits for the handshakes of earlier ones, and anybody may begin a handshake. A datagram waits for none, and a
-//! sender without a key gets no reply.
+//! A new connection waits for the handshakes of earlier connections, and anybody can begin a handshake. A datagram waits for no
+//! handshake, and a sender without a key gets no reply.
 //!
 //! ```text
 //! member -> Hello                   bridge -> Challenge
@@ -54,7 +54,7 @@ impl StopChannel {
 pub(crate) struct StopKeys(BTreeMap<String, hmac::Key>);
 
 impl StopKeys {
-    /// Returns the public key of a network without keys.
+    /// Returns the empty HMAC key of the member `anyone`, for a network without keys.
     pub(crate) fn of_anyone() -> Self {
         Self(BTreeMap::from([(Name::anyone().to_string(), hmac::Key::new(hmac::HMAC_SHA256, &[]))]))
     }
@@ -83,7 +83,7 @@ fn bytes_of(digits: &str) -> Option<Vec<u8>> {
     (bytes.len() == KEY_BYTES).then_some(bytes)
 }
 
-/// Returns a line of a stop key file: a new key for a member.
+/// Returns a new line of a stop key file: name of the member and random key.
 ///
 /// # Errors
 /// If the system provides no random numbers.
@@ -115,7 +115,7 @@ impl Nonce {
     }
 }
 
-/// Message of either end.
+/// Message of a stop channel, in either direction.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StopMessage {
@@ -146,7 +146,7 @@ impl StopMessage {
         Some(bytes)
     }
 
-    /// Decodes a datagram; `None` if its HMAC is not that of a member.
+    /// Decodes a datagram; `None` if it is malformed, or its HMAC does not match the member's key.
     pub(crate) fn open(datagram: &[u8], keys: &StopKeys) -> Option<Self> {
         let (bytes, tag) = datagram.split_at_checked(datagram.len().checked_sub(KEY_BYTES)?)?;
         let message: Self = serde_json::from_slice(bytes).ok()?;

@@ -1,9 +1,9 @@
-//! Drop-in `libhdPhantom.so`: the fourteen functions by which CHAI3D reaches a Phantom, served by the devices of a Flotor scene.
+//! Drop-in `libhdPhantom.so`: the fourteen functions through which CHAI3D accesses a Phantom, served by the devices of a scene.
 //!
 //! Lengths in m, forces in N, torques in N·m; x towards the user, y right, z up. Every function may be called from any thread.
-//! A result of 0 is success, -1 an invalid number or a device that is not open. Functions that set a force wait for the next
-//! tick, because CHAI3D's loop has no other pace. CHAI3D opens and closes each device twice before the program does, so opening
-//! causes no motion, and force begins to fade in with the first command.
+//! A result of 0 is success, -1 a failure: an invalid number, a device that is not open, a rejected command, or an ended run.
+//! Functions that set a force wait for the next tick, because nothing else paces CHAI3D's loop. CHAI3D opens and closes each
+//! device twice before the program does, so opening causes no motion, and force begins to fade in with the first command.
 //!
 //! Source: the interface as CHAI3D's own loader uses it (BSD-3), names and numbers only.
 #![allow(unsafe_code)] // C entry points; listed in tests/tests/system/architecture.rs
@@ -27,7 +27,7 @@ const MOST: usize = 16;
 
 /// Last command of each device: force and torque may be set separately.
 static HELD: [Mutex<Wrench>; MOST] = [const { Mutex::new(Wrench::ZERO) }; MOST];
-/// True if a further torque of the device must wait, because one was set since the last force.
+/// True if the next torque command of the device must wait for a tick, because a torque was set since the last force.
 static TORQUE_WAITS: [AtomicBool; MOST] = [const { AtomicBool::new(false) }; MOST];
 
 fn station(id: c_int) -> Option<(&'static Host, &'static Station, usize)> {
@@ -48,7 +48,8 @@ fn sampled(id: c_int) -> Option<&'static Station> {
     Some(station)
 }
 
-/// Returns the success value of `hdPhantomGetPosition` and `hdPhantomClose`: CHAI3D takes 0 for failure there, the original returns 0.
+/// Returns the success value of `hdPhantomGetPosition` and `hdPhantomClose`: 0 as in the original library, or 1 if
+/// `FLOTOR_PHANTOM_SUCCESS` is `1`, because CHAI3D treats a 0 of these functions as a failure.
 fn done_for_chai3d() -> c_int {
     c_int::from(env_value("FLOTOR_PHANTOM_SUCCESS").is_some_and(|value| value == "1"))
 }
@@ -60,7 +61,7 @@ fn set_held(number: usize, change: impl FnOnce(&mut Wrench)) -> Wrench {
     *held
 }
 
-/// Writes a vector of an open device to three places; returns whether the device is open.
+/// Writes a vector of an open device to three outputs; returns whether the device is open.
 fn vector(id: c_int, places: [Out<f64>; 3], of: impl FnOnce(&Station) -> DVec3) -> bool {
     let station = sampled(id);
     let values = station.map(|station| FRAME.of_flotor(of(station)).to_array());
@@ -117,7 +118,7 @@ export! {
     fn hdPhantomGetLinearVelocity(id: c_int, x: Out<f64>, y: Out<f64>, z: Out<f64>) -> c_int [FAILED] {
         if vector(id, [x, y, z], |station| station.state().velocity_m_per_s) { DONE } else { FAILED }
     }
-    /// Reads the rotation matrix, by rows.
+    /// Reads the rotation matrix, row-major.
     fn hdPhantomGetRotation(
         id: c_int,
         r00: Out<f64>,
@@ -176,8 +177,8 @@ export! {
         radius.put(station.range_m().max_element());
         DONE
     }
-    /// Reads the name of the device, 255 bytes; valid before the device is open. `FLOTOR_PHANTOM_TYPE` replaces it: CHAI3D gives
-    /// torque only to `PHANTOM Premium 3.0 6DOF`.
+    /// Reads the name of the device, at most 255 bytes; valid before the device is open. `FLOTOR_PHANTOM_TYPE` replaces the name:
+    /// CHAI3D sends torque only to a `PHANTOM Premium 3.0 6DOF`.
     fn hdPhantomGetType(id: c_int, name: Out<c_char>) -> c_int [FAILED] {
         // The caller's buffer is not initialised.
         name.put(0);

@@ -1,7 +1,7 @@
 //! Entry points of a drop-in library.
 
-/// Exports entry points: on a panic the program gets the value in brackets. A pointer ([`Out`](crate::pointer::Out),
-/// [`In`](crate::pointer::In)) is null or leads to as many values as the entry point states.
+/// Exports entry points as C functions; on a panic the function returns the value in brackets. A pointer argument
+/// ([`Out`](crate::pointer::Out), [`In`](crate::pointer::In)) is null or points to as many values as the entry point states.
 #[macro_export]
 macro_rules! export {
     ($($(#[$meta:meta])* fn $name:ident($($argument:ident: $type:ty),* $(,)?) -> $result:ty [$fallback:expr] $body:block)*) => {

@@ -1,9 +1,9 @@
-//! Axes of other makers' interfaces and of Flotor (x right, y away from the user, z up). All are right-handed, with the
-//! origin at the centre of the range.
+//! Coordinate frames of other makers' interfaces, and of Flotor (x right, y away from the user, z up). All are right-handed, with
+//! the origin at the centre of the range.
 
 use flotor_hal::{DMat3, DQuat, DVec3};
 
-/// Axes of an interface.
+/// Coordinate frame of a maker's interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Frame {
     /// x towards the user, y right, z up: DHD, DRD, hdPhantom, CHAI3D.
@@ -31,7 +31,7 @@ impl Frame {
         }
     }
 
-    /// Returns the rotation matrix, by rows, of an orientation given in Flotor's frame.
+    /// Returns the rotation matrix in this frame, row-major, of an orientation in Flotor's frame.
     #[must_use]
     pub fn rotation(self, orientation: DQuat) -> [[f64; 3]; 3] {
         let turned = DMat3::from_quat(orientation);

@@ -1,4 +1,4 @@
-//! The single run of a process: prepared at the first access, begun by the first open device, ended with the program.
+//! The single run of a process: prepared at the first access, started by the first open device, ended with the program.
 
 use crate::process::{at_end, guarded, is_copy, is_first, library, notice_copies, quietly};
 use crate::run::{LockstepRun, Prepared, is_emergency_stopped, report_line};
@@ -14,17 +14,17 @@ use std::sync::{Mutex, MutexGuard, Once, OnceLock};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Default scene for programs that name none.
+/// Scene for programs without `FLOTOR_SCENE`.
 const SCENE: &str = include_str!("../scene.toml");
-/// Duration of a run, s: practically unlimited, as it ends with the program.
+/// Duration of a run, s: a year, practically unlimited, as the run ends with the program.
 const NO_END_S: f64 = 31_536_000.0;
-/// Timeout of the first ticks.
+/// Timeout for the first tick of all devices.
 const BEGIN: Duration = Duration::from_secs(10);
-/// Timeout of the end of the run, in which force fades out and plugins close their devices.
+/// Timeout for the end of the run, during which force fades out and plugins close their devices.
 const END: Duration = Duration::from_secs(20);
-/// Poll interval of both waits.
+/// Poll interval while waiting for the first ticks, and for the end.
 const LOOK: Duration = Duration::from_millis(1);
-/// Number of reads without a command that make a tick in lockstep: far more than a program's loop has between two commands.
+/// Number of reads without a command after which lockstep executes a tick: far more than a program's loop has between commands.
 const READS_OF_A_TICK: u64 = 100;
 
 static HOST: OnceLock<Option<Host>> = OnceLock::new();
@@ -66,7 +66,7 @@ fn stations_so_far() -> &'static [Station] {
     host_so_far().map_or(&[], Host::stations)
 }
 
-/// A run with its devices and its pace.
+/// Run of this process, with its devices and its pace.
 pub struct Host {
     stations: Vec<Station>,
     pace: Pace,
@@ -155,7 +155,7 @@ impl Host {
         &self.stations
     }
 
-    /// Returns the device with a number.
+    /// Returns the device with a number, counted from 0; `None` if there is none.
     #[must_use]
     pub fn station(&self, number: usize) -> Option<&Station> {
         self.stations.get(number)
@@ -173,7 +173,7 @@ impl Host {
         self.period_ns
     }
 
-    /// Returns the time for the program, ns: the machine's monotonic clock, or in lockstep that of the run.
+    /// Returns the time for the program, ns: the machine's monotonic clock, or in lockstep the elapsed time of the run.
     #[must_use]
     pub fn now_ns(&self) -> u64 {
         match self.pace {
@@ -195,8 +195,8 @@ impl Host {
         }
     }
 
-    /// Opens a device, the first one of which begins the run; returns whether it exists and runs. Takes some 50 ms once; causes no
-    /// motion. Not real-time.
+    /// Opens a device; the first open device starts the run. Returns whether the device exists and the run is in progress. The start
+    /// takes some 50 ms; opening causes no motion. Not real-time.
     pub fn open(&self, number: usize) -> bool {
         let Some(station) = self.stations.get(number) else { return false };
         if !self.begin() {
@@ -206,7 +206,7 @@ impl Host {
         true
     }
 
-    /// Begins the run unless begun already; returns whether it is running.
+    /// Starts the run unless started already; returns whether it is in progress.
     fn begin(&self) -> bool {
         let mut stage = self.stage();
         match std::mem::replace(&mut *stage, Stage::Over) {
@@ -263,8 +263,8 @@ impl Host {
         is_emergency_stopped()
     }
 
-    /// Counts a read of the program. In lockstep the hundredth without a command makes a tick, after `before_tick`: otherwise a program
-    /// that polls for a motion or a button would wait for ever. Not real-time.
+    /// Counts a read of the program. In lockstep, every hundredth read without a command calls `before_tick` and executes a tick:
+    /// otherwise a program that polls for a motion or a button would wait for ever. Not real-time.
     pub fn note_read(&self, before_tick: impl FnOnce()) {
         static WARNING: Once = Once::new();
         let reads = self.reads.fetch_add(1, Ordering::Relaxed) + 1;
@@ -280,7 +280,7 @@ impl Host {
         }
     }
 
-    /// Makes one tick in lockstep; returns whether there was one. Not real-time.
+    /// Executes one tick in lockstep; returns whether there was a tick, false also without lockstep. Not real-time.
     pub fn advance(&self) -> bool {
         self.reads.store(0, Ordering::Relaxed);
         match &mut *self.stage() {
@@ -289,8 +289,8 @@ impl Host {
         }
     }
 
-    /// Waits for a tick that the caller has not seen, usually a period and never longer than 10 ms; in lockstep makes the tick.
-    /// Returns whether there was one. Not real-time.
+    /// Waits for a tick that the caller has not seen, usually for a period and never longer than 10 ms; in lockstep executes the tick.
+    /// Returns whether there was a tick. Not real-time.
     pub fn wait(&self, station: &Station) -> bool {
         self.wait_in(station, station.turn())
     }
@@ -299,7 +299,7 @@ impl Host {
     pub fn wait_in(&self, station: &Station, turn: &Turn) -> bool {
         match self.pace {
             Pace::Real => station.wait_for_tick(turn),
-            // Several devices share a tick: the first command makes it.
+            // Several devices share a tick: the first command executes it.
             Pace::Lockstep if self.stations.len() > 1 => {
                 station.has_unseen_tick(turn) || self.advance() && station.has_unseen_tick(turn)
             }
@@ -307,7 +307,7 @@ impl Host {
         }
     }
 
-    /// Ends the run in order: force fades out, the recording is closed, the summary is written. Not real-time.
+    /// Ends the run normally: force fades out, the recording is closed, the summary is written. Waits at most 20 s. Not real-time.
     pub fn end(&self) {
         self.stations.iter().for_each(Station::disable);
         let stage = std::mem::replace(&mut *self.stage(), Stage::Over);
@@ -333,7 +333,7 @@ extern "C" fn end_with_the_program() {
     guarded((), || host_so_far().into_iter().for_each(Host::end));
 }
 
-/// Returns the `flotor` executable of the installation or build folder that contains a library.
+/// Returns the `flotor` executable of the installation or build folder that contains this library.
 fn executable(folder: &Path) -> Option<PathBuf> {
     let name = format!("flotor{}", std::env::consts::EXE_SUFFIX);
     // lib/flotor/compat/NAME is four folders below the installation.
@@ -343,7 +343,7 @@ fn executable(folder: &Path) -> Option<PathBuf> {
     configured.into_iter().chain(beside).chain(installed).find(|file| file.is_file())
 }
 
-/// Returns the plugin folders of the installation or build folder that contains a library.
+/// Returns the plugin folders of the installation or build folder that contains this library.
 fn plugin_folders(folder: &Path) -> Vec<PathBuf> {
     let installed = folder.ancestors().nth(2).map(|root| root.join("plugins"));
     [folder.join("deps"), folder.to_path_buf(), folder.join("..")].into_iter().chain(installed).collect()

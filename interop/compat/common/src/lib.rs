@@ -27,6 +27,6 @@ pub use process::{Language, guarded, interned, language, library, quietly};
 pub use settings::{Pace, Settings, SharedControlGroup, env_value};
 pub use station::{Axes, State, Station, Turn};
 
-/// Version of Flotor, null-terminated, exported by a drop-in as `flotor_dropin`, so that a plugin that loads a maker's library can
+/// Version of Flotor, NUL-terminated; a drop-in exports it as `flotor_dropin`, so that a plugin that loads a maker's library can
 /// refuse a drop-in, which would load itself without end.
 pub const MARKER: &[u8] = concat!("flotor ", env!("CARGO_PKG_VERSION"), "\0").as_bytes();

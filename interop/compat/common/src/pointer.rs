@@ -1,5 +1,5 @@
-//! Pointers of a program: null is legal, and means that the program does not request the value. A program may have packed the
-//! values, so that they need not be aligned.
+//! Pointers passed by a program: null is legal, and means that the program does not request the value. Values need not be
+//! aligned: they may be fields of packed structures.
 
 use std::ffi::{CStr, c_char};
 
@@ -33,7 +33,7 @@ impl<T: Copy> Out<T> {
 }
 
 impl Out<c_char> {
-    /// Writes a null-terminated text of at most `room` bytes, the terminator included; truncates a longer one.
+    /// Writes a text and a NUL byte, together at most `room` bytes; truncates a longer text.
     pub fn put_text(self, text: &str, room: usize) {
         let cut = text.bytes().filter(|byte| *byte != 0).take(room.saturating_sub(1));
         let terminated: Vec<c_char> = cut.chain([0]).map(|byte| c_char::from_ne_bytes([byte])).collect();
@@ -63,7 +63,7 @@ impl<T: Copy> In<T> {
 }
 
 impl In<c_char> {
-    /// Reads a null-terminated text; replaces invalid UTF-8. `None` for a null pointer.
+    /// Reads a NUL-terminated text; replaces invalid UTF-8. `None` for a null pointer.
     #[must_use]
     pub fn get_text(self) -> Option<String> {
         // SAFETY: the caller of an entry point passes null or a terminated text.

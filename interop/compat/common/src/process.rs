@@ -39,8 +39,8 @@ pub(crate) fn at_end(end: extern "C" fn()) {
     });
 }
 
-/// Returns whether this is the first drop-in of the process that prepares a run: a second one has a run of its own, and must not
-/// write into the first one's files. Not real-time.
+/// Returns whether this is the first drop-in of the process that prepares a run: a second drop-in has a run of its own, and must not
+/// write into the files of the first drop-in. Not real-time.
 pub(crate) fn is_first() -> bool {
     static CLAIM: OnceLock<Option<UnixDatagram>> = OnceLock::new();
     let claim = || {
@@ -80,7 +80,7 @@ pub fn guarded<T>(fallback: T, body: impl FnOnce() -> T) -> T {
     catch_unwind(AssertUnwindSafe(body)).unwrap_or(fallback)
 }
 
-/// Language of the program, by the interpreter in the process.
+/// Language of the program, detected by the interpreter in its process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Language {
     /// Python, whose interpreter is in the process.
@@ -97,7 +97,7 @@ pub fn language() -> Language {
     if interpreter.is_null() { Language::Other } else { Language::Python }
 }
 
-/// Returns the file of this library, with links resolved. Not real-time.
+/// Returns the path of this library, with symbolic links resolved; `None` if the system does not list it. Not real-time.
 #[must_use]
 pub fn library() -> Option<PathBuf> {
     let here = library as fn() -> Option<PathBuf> as usize;
@@ -112,7 +112,7 @@ pub fn library() -> Option<PathBuf> {
     PathBuf::from(path).canonicalize().ok()
 }
 
-/// Interns a text for a program: the pointer stays valid for the life of the process.
+/// Interns a text for a program: the pointer stays valid for the life of the process, and equal texts share one pointer.
 #[must_use]
 pub fn interned(text: String) -> &'static CStr {
     static TEXTS: Mutex<BTreeMap<String, &'static CStr>> = Mutex::new(BTreeMap::new());

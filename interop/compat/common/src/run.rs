@@ -1,4 +1,4 @@
-//! Run behind a program: recorded, published to clients, reported at its end.
+//! Execution of a program's run: recording, publication to clients, and summaries.
 
 use crate::frame::length;
 use crate::settings::Settings;
@@ -44,7 +44,7 @@ struct Watchers {
     draft: Option<Draft>,
 }
 
-/// Intermediate summary, which stays if the program is killed.
+/// Intermediate summary, which remains if the program is killed.
 struct Draft {
     facts: Facts,
     stations: &'static [Station],
@@ -52,7 +52,7 @@ struct Draft {
     written: Option<Instant>,
 }
 
-/// Interval of the intermediate summary, and of the check for it, ticks.
+/// Interval of the intermediate summary; interval of the check whether it is due, ticks.
 const DRAFT_PERIOD: Duration = Duration::from_millis(500);
 const DRAFT_LOOK: u64 = 64;
 
@@ -89,7 +89,7 @@ fn replace(path: &Path, text: &str) {
     let _ = std::fs::write(&new, text).and_then(|()| std::fs::rename(&new, path));
 }
 
-/// Largest requested and applied wrench of a device, N and N·m.
+/// Largest magnitudes of the requested and the applied force and torque of a device, N and N·m.
 #[derive(Clone, Copy, Default)]
 struct Asked {
     force_n: f64,
@@ -125,7 +125,7 @@ impl Observer for Watchers {
     }
 }
 
-/// Facts of a run apart from its ticks.
+/// Data for the summary that the ticks do not contain.
 #[derive(Clone)]
 struct Facts {
     scene: Scene,
@@ -201,7 +201,7 @@ pub(crate) struct LockstepRun {
 }
 
 impl LockstepRun {
-    /// Makes one tick; returns whether there was one. Not real-time.
+    /// Executes one tick; returns whether the run continues. Not real-time.
     pub(crate) fn advance(&mut self) -> bool {
         self.lockstep.advance(&mut self.watched, &self.stop).is_none()
     }
@@ -299,7 +299,7 @@ fn end_of(outcome: &Outcome) -> Option<String> {
     (!outcome.end.is_in_order()).then(|| format!("the run ended before the program: {}", outcome.end.cause()))
 }
 
-/// Writes a result, to standard error if it is named `-`. Returns whether it was written.
+/// Writes a result to a file, or to standard error if the path is `-`. Returns whether it was written.
 fn write(path: &Path, text: String) -> bool {
     if path.as_os_str() == "-" {
         tell_plainly(text.trim_end());
@@ -322,7 +322,7 @@ fn so_far(report: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Writes a message to the user of the program.
+/// Writes a message to the user of the program, on standard error.
 pub(crate) fn report_line(problem: &str) {
     tell_plainly(&format!("flotor: {problem}"));
 }

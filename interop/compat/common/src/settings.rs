@@ -12,9 +12,9 @@ const CONSENT: &str = "FLOTOR_SHARED_CONTROL_GROUP";
 /// Clock of the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
-    /// The machine's clock: the program runs at its own rate.
+    /// The machine's clock; the program runs at its own rate.
     Real,
-    /// The program's calls: one tick each, without waiting, repeatable.
+    /// The program's calls that command or wait: they advance the run without delay, so that a run is repeatable.
     Lockstep,
 }
 
@@ -30,7 +30,7 @@ pub struct Settings {
     /// `FLOTOR_REPORT`: file of the summary as text; `-` is standard error. While the program runs, an intermediate summary lies
     /// beside it.
     pub report: Option<PathBuf>,
-    /// `FLOTOR_JSON`: file of the summary as JSON.
+    /// `FLOTOR_JSON`: file of the summary as JSON; `-` is standard error.
     pub json: Option<PathBuf>,
     /// `FLOTOR_PACE`: `real` or `lockstep`.
     pub pace: Pace,
@@ -66,7 +66,7 @@ impl Settings {
         Self::read(env_value)
     }
 
-    /// Adapts the settings to a program of Flotor's own: a deadly signal stops the devices first.
+    /// Adapts the settings to a program of Flotor's own: a fatal signal stops the devices before the program ends.
     #[must_use]
     pub fn of_own_process(self) -> Self {
         Self { signals: Signals::StopFirst, ..self }

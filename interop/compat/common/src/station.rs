@@ -50,7 +50,7 @@ pub struct Station {
     rate: Mutex<Rate>,
 }
 
-/// Ticks that a caller has waited for: its position relative to the loop.
+/// Record of the ticks that a caller has waited for.
 #[derive(Debug, Default)]
 pub struct Turn {
     /// Last tick that was waited for.
@@ -76,13 +76,13 @@ pub struct State {
     pub position_m: DVec3,
     /// Orientation of the handle, Flotor's axes.
     pub orientation: DQuat,
-    /// Velocity of the handle, m/s.
+    /// Velocity of the handle, m/s, Flotor's axes.
     pub velocity_m_per_s: DVec3,
-    /// Angular velocity of the handle, rad/s.
+    /// Angular velocity of the handle, rad/s, Flotor's axes.
     pub angular_velocity_rad_per_s: DVec3,
-    /// Buttons, one bit each.
+    /// Pressed buttons, one bit each.
     pub buttons: u32,
-    /// Wrench sent to the device, after all limits, N and N·m.
+    /// Wrench sent to the device, after all limits, N and N·m, Flotor's axes.
     pub applied: Wrench,
 }
 
@@ -136,7 +136,7 @@ impl Station {
         &self.plugin
     }
 
-    /// Returns the axes of the device.
+    /// Returns which axes the device senses and drives.
     #[must_use]
     pub fn axes(&self) -> Axes {
         let Capabilities { sensed, actuated, .. } = self.capabilities;
@@ -147,7 +147,7 @@ impl Station {
         }
     }
 
-    /// Returns the largest displacement of the handle from the centre along x, y, z, m; a default for devices without a range.
+    /// Returns the largest displacement of the handle from the centre along x, y, z, m; 0.05 m if the device states no range.
     #[must_use]
     pub fn range_m(&self) -> DVec3 {
         let [x, y, z] = self.capabilities.range_m;
@@ -223,15 +223,15 @@ impl Station {
         self.port.is_enabled()
     }
 
-    /// Sets the validity of a wrench, ns; 0: as in the scene.
+    /// Sets the time after which a wrench without a newer one expires, ns; 0: as in the scene.
     pub fn set_validity(&self, valid_ns: u64) {
         self.port.set_validity(valid_ns);
     }
 
-    /// Commands a wrench on the hand, Flotor's axes, from the next tick on.
+    /// Commands a wrench on the hand, Flotor's axes, from the next tick on; `now_ns` is the time for the command rate.
     ///
     /// # Errors
-    /// [`NotFinite`]: the previous wrench stays in force.
+    /// [`NotFinite`]; the previous wrench remains.
     pub fn command(&self, wrench: &Wrench, now_ns: u64) -> Result<(), NotFinite> {
         self.port.command(wrench)?;
         let mut rate = flotor_core::lock(&self.rate);
@@ -244,7 +244,7 @@ impl Station {
         Ok(())
     }
 
-    /// Returns the recent rate of commands, Hz.
+    /// Returns the rate of commands over the last complete window of at least half a second, Hz; 0 before.
     #[must_use]
     pub fn command_rate_hz(&self) -> f64 {
         flotor_core::lock(&self.rate).hz
@@ -294,8 +294,9 @@ impl Station {
         turn.waited.fetch_max(ticks, Ordering::AcqRel) < ticks
     }
 
-    /// Waits for the next tick on the machine's clock. A caller in a loop that is late by a few ticks does not wait until
-    /// it has caught up: it runs at the rate of the loop, though single iterations may take more or less than a period.
+    /// Waits for the next tick on the machine's clock; returns false after 10 ms without a tick. A caller in a loop that is late by a
+    /// few ticks does not wait until it has caught up: it runs at the rate of the loop, though single iterations may take more or less
+    /// than a period.
     pub(crate) fn wait_for_tick(&self, turn: &Turn) -> bool {
         let entered_ns = monotonic_ns();
         let (entered, _) = self.newest();

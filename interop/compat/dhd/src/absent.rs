@@ -4,7 +4,7 @@
 use crate::error::{Code, failed};
 use std::ffi::c_int;
 
-/// Exports entry points that must exist, because programs look them up, and do nothing.
+/// Exports entry points that must exist, because programs look them up, but are not implemented.
 macro_rules! absent {
     ($($name:ident)*) => {
         $(

@@ -40,17 +40,17 @@ fn whole(count: usize) -> c_int {
 export! {
     /// Returns the number of devices, open or not.
     fn dhdGetDeviceCount() -> c_int [0] { whole(count()) }
-    /// Returns the number of devices that no other program uses.
+    /// Returns the number of devices, as [`dhdGetDeviceCount`]: no other program uses a device of the scene.
     fn dhdGetAvailableCount() -> c_int [0] { whole(count()) }
     /// Opens the first free device; returns its id.
     fn dhdOpen() -> c_int [-1] { result(open_first(|_| true)) }
     /// Opens the first free device, as [`dhdOpen`].
     fn drdOpen() -> c_int [-1] { result(open_first(|_| true)) }
-    /// Opens a device by number; an open device stays open.
+    /// Opens a device by number (-1: the default device), and makes it the default; an open device stays open.
     fn dhdOpenID(index: i8) -> c_int [-1] { opened(index) }
     /// Opens a device by number, as [`dhdOpenID`].
     fn drdOpenID(index: i8) -> c_int [-1] { opened(index) }
-    /// Opens the device with a serial number.
+    /// Opens the device with this serial number, which is its number plus one; an error if it is open.
     fn dhdOpenSerial(serial: c_int) -> c_int [-1] { result(open_first(|open| whole(open.number) + 1 == serial)) }
     /// Opens the first device of a type.
     fn dhdOpenType(wanted: c_int) -> c_int [-1] { result(open_first(|open| kind(open.station) == wanted)) }
@@ -58,7 +58,7 @@ export! {
     fn dhdClose(id: i8) -> c_int [-1] { result(close(id)) }
     /// Closes a device, as [`dhdClose`].
     fn drdClose(id: i8) -> c_int [-1] { result(close(id)) }
-    /// Makes a device the default one, with id -1.
+    /// Makes an open device the default device, which id -1 selects.
     fn dhdSetDevice(id: i8) -> c_int [-1] { result(set_default(id)) }
     /// Sets the default device, as [`dhdSetDevice`].
     fn drdSetDevice(id: i8) -> c_int [-1] { result(set_default(id)) }
@@ -114,11 +114,11 @@ export! {
     fn dhdGetPosition(x: Out<f64>, y: Out<f64>, z: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| put3([x, y, z], open.pose().0))
     }
-    /// Reads the rotation matrix, by rows; the identity without a wrist.
+    /// Reads the rotation matrix, row-major; the identity without a wrist.
     fn dhdGetOrientationFrame(matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| matrix.put_all(open.pose().1.as_flattened()))
     }
-    /// Reads the position, m, and the rotation matrix, by rows.
+    /// Reads the position, m, and the rotation matrix, row-major.
     fn dhdGetPositionAndOrientationFrame(x: Out<f64>, y: Out<f64>, z: Out<f64>, matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
@@ -160,7 +160,7 @@ export! {
     fn dhdGetAngularVelocityDeg(x: Out<f64>, y: Out<f64>, z: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| put3([x, y, z], turning(open) * DEGREES))
     }
-    /// Returns 1 if a button is pressed.
+    /// Returns 1 if a button is pressed, 0 if not.
     fn dhdGetButton(index: c_int, id: i8) -> c_int [-1] {
         let bit = u32::try_from(index).ok().filter(|index| *index < 32).ok_or(Code::InvalidIndex);
         result(bit.and_then(|bit| sampled(id).map(|open| c_int::from(open.station.state().buttons >> bit & 1 == 1))))

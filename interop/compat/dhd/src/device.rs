@@ -45,7 +45,7 @@ pub(crate) struct Device {
     /// Time at which the fade-in ends, ns.
     pub(crate) faded_in_ns: u64,
     pub(crate) velocity_threshold: u32,
-    /// Angles of the device about x, about z, and of the device itself, rad.
+    /// Angles of the base about x and about z, and angle of the device, rad.
     pub(crate) angles_rad: [f64; 3],
     pub(crate) parameters: [[f64; 3]; 8],
     pub(crate) gains: [f64; 4],
@@ -201,13 +201,13 @@ impl Open {
         self.station.axes() == Axes::Six
     }
 
-    /// Returns the position, m, and the rotation matrix, by rows.
+    /// Returns the position, m, and the rotation matrix, row-major.
     pub(crate) fn pose(&self) -> (DVec3, [[f64; 3]; 3]) {
         let state = self.station.state();
         (FRAME.of_flotor(state.position_m), FRAME.rotation(state.orientation))
     }
 
-    /// Enables or disables force.
+    /// Enables or disables force; disabling also clears the last command and ends the regulation.
     pub(crate) fn set_switch(&self, device: &mut Device, switch: Switch) {
         if switch == Switch::On {
             self.enable(device);
@@ -230,8 +230,8 @@ impl Open {
         }
     }
 
-    /// Limits the program's force and torque, and sends them together with those of the regulation. Returns whether they are scaled
-    /// down, here or later by the envelope.
+    /// Limits the program's force and torque, and sends them in addition to regulation and vibration. Returns whether they are scaled
+    /// down, here or later by the envelope; [`Code::Invalid`] for a non-finite command.
     pub(crate) fn send(&self, device: &mut Device, force_n: DVec3, torque_nm: DVec3) -> Result<bool, Code> {
         if !(force_n.is_finite() && torque_nm.is_finite()) {
             // The port counts and rejects the command.

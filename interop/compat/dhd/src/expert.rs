@@ -25,7 +25,7 @@ export! {
     fn dhdJointAnglesToGravityJointTorques(_joints: In<f64>, torques: Out<f64>, _mask: c_uchar, id: i8) -> c_int [-1] {
         read_expert(id, |_| torques.put_all(&[0.0; 8]))
     }
-    /// Sets the validity of a force, in 125 µs; 0: as in the scene.
+    /// Sets the time after which a force without a newer one expires, in units of 125 µs; 0: as in the scene.
     fn dhdSetWatchdog(units: c_uchar, id: i8) -> c_int [-1] {
         read_expert(id, |open| {
             open.station.set_validity(u64::from(units) * WATCHDOG_NS);

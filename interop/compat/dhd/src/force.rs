@@ -8,7 +8,7 @@ use flotor_compat::pointer::Out;
 use flotor_hal::DVec3;
 use std::ffi::{c_int, c_uchar, c_uint};
 
-/// Length of a status.
+/// Number of elements of a status.
 const STATUS: usize = 17;
 
 /// Sends a command; with `waits`, waits for the next tick.
@@ -62,17 +62,17 @@ fn vector(x: f64, y: f64, z: f64) -> DVec3 {
 }
 
 export! {
-    /// Sets the force, N; waits for the next tick.
+    /// Sets the force, N, and zero torque; waits for the next tick.
     fn dhdSetForce(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { command(id, vector(x, y, z), None, true) }
     /// Sets force, N, and torque, N·m; waits for the next tick.
     fn dhdSetForceAndTorque(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, id: i8) -> c_int [-1] {
         command(id, vector(x, y, z), Some(vector(tx, ty, tz)), true)
     }
-    /// Sets the force, N; ignores the gripper.
+    /// Sets the force, N, and zero torque; ignores the gripper; waits for the next tick.
     fn dhdSetForceAndGripperForce(x: f64, y: f64, z: f64, _gripper: f64, id: i8) -> c_int [-1] {
         command(id, vector(x, y, z), None, true)
     }
-    /// Sets force, N, and torque, N·m; ignores the gripper.
+    /// Sets force, N, and torque, N·m; ignores the gripper; waits for the next tick.
     fn dhdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, _gripper: f64, id: i8) -> c_int [-1] {
         command(id, vector(x, y, z), Some(vector(tx, ty, tz)), true)
     }

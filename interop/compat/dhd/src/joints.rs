@@ -1,5 +1,5 @@
-//! Encoders and joints of a nominal base. A Flotor device has other joints or none; programs receive those of a
-//! Cartesian base: one joint along each axis, whose angle is the displacement over the length of an arm. Encoders, joints, positions
+//! Encoders and joints of a nominal base. A Flotor device has other joints or none; programs receive the joints of a Cartesian
+//! base: one joint along each axis, whose angle is the displacement divided by the length of an arm. Encoders, joints, positions
 //! and the Jacobian agree with each other to one count.
 //!
 //! Lengths in m, angles in rad.
@@ -46,9 +46,9 @@ fn put_counts(id: i8, position_m: DVec3, places: [Out<c_int>; 3]) -> c_int {
     }
 }
 
-/// Jacobian of the position by the joint angles, row by row, m/rad.
+/// Jacobian of the position with respect to the joint angles, row-major, m/rad.
 const JACOBIAN: [f64; 9] = [ARM_M, 0.0, 0.0, 0.0, ARM_M, 0.0, 0.0, 0.0, ARM_M];
-/// Jacobian of the orientation by the joints of the wrist, row by row.
+/// Jacobian of the orientation with respect to the joint angles of the wrist, row-major.
 const WRIST_JACOBIAN: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
 
 export! {

@@ -119,7 +119,7 @@ fn gain(id: i8, index: usize) -> f64 {
 }
 
 export! {
-    /// Stores the gain without effect: the regulation has its own gains.
+    /// Stores the proportional gain without effect: the regulation has its own gains.
     fn drdSetEncPGain(value: f64, id: i8) -> c_int [-1] { set_gain(id, 0, value) }
     /// Stores the integral gain without effect.
     fn drdSetEncIGain(value: f64, id: i8) -> c_int [-1] { set_gain(id, 1, value) }

@@ -142,7 +142,7 @@ export! {
     fn drdIsSupported(id: i8) -> bool [false] { open(id).is_ok() }
     /// Returns whether the device is regulated.
     fn drdIsRunning(id: i8) -> bool [false] { open(id).is_ok_and(|open| open.device().regulation.is_running) }
-    /// Returns whether a motion is in progress: until the handle has arrived, or 2 s after the plan.
+    /// Returns whether a motion is in progress: until the handle has arrived, at most until 2 s after the planned end.
     fn drdIsMoving(id: i8) -> bool [false] {
         sampled(id).is_ok_and(|open| progress(&open).contains(&Progress::Moving))
     }
@@ -168,7 +168,7 @@ export! {
             }
         })
     }
-    /// Holds the device at its position, if regulated.
+    /// Holds the device at its position; an error if it is not regulated.
     fn drdHold(id: i8) -> c_int [-1] {
         result(live(id).and_then(|open| {
             let state = open.station.state();
@@ -206,7 +206,7 @@ export! {
     fn drdTrackGrip(_gap: f64, id: i8) -> c_int [-1] {
         go(id, Goal { position_m: None, angles_rad: None }, Way::Follow)
     }
-    /// Reads position, m, angles, rad, 0 for a gripper, and rotation matrix, by rows.
+    /// Reads position, m, angles, rad, 0 for a gripper, and rotation matrix, row-major.
     fn drdGetPositionAndOrientation(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();

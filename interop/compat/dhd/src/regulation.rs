@@ -1,7 +1,7 @@
 //! Regulation: a virtual spring that holds the handle, moves it along a straight line, or follows the program.
 //!
-//! The original regulates encoders by motors. Here a spring and a damper at the handle replace them, inside the envelope:
-//! soft enough for any device, so that a resisting hand wins.
+//! The original controls encoders with motors. Here a spring and a damper at the handle do this, inside the envelope: soft enough
+//! for any device, so that a resisting hand prevails.
 
 use flotor_compat::{Axes, State};
 use flotor_hal::{DQuat, DVec3, orientation_from_rotation_vector, rotation_vector};
@@ -10,7 +10,7 @@ use flotor_hal::{DQuat, DVec3, orientation_from_rotation_vector, rotation_vector
 const STIFFNESS: [f64; 2] = [400.0, 4.0];
 /// Stiffness and damping of the orientation, N·m/rad and N·m·s/rad.
 const TURNING: [f64; 2] = [0.5, 0.005];
-/// Shortest motion, s.
+/// Duration of the shortest motion, s.
 const SHORTEST_S: f64 = 0.1;
 /// Ratio of peak to mean speed of a minimum-jerk motion.
 const PEAK: f64 = 1.875;
@@ -19,10 +19,10 @@ const PEAK: f64 = 1.875;
 const ARRIVED: [f64; 2] = [1.0e-3, 25.0e-3];
 /// Tolerances of arrival, angle and angular velocity, rad and rad/s.
 const TURNED: [f64; 2] = [0.02, 0.5];
-/// Timeout of arrival after the plan of a motion, ns: a hand may hold the handle.
+/// Timeout for the arrival after the planned end of a motion, ns: a hand may hold the handle.
 const PATIENCE_NS: u64 = 2_000_000_000;
 
-/// Progress of a motion, in order: several motions together have the largest of theirs.
+/// Progress of a motion. The variants are ordered: several motions together have the largest progress of all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Progress {
     /// The handle has arrived.
@@ -43,7 +43,7 @@ pub(crate) struct Regulation {
     rotation: Motion,
 }
 
-/// Motion along a straight line, or a constant position.
+/// Motion along a straight line, or a constant goal.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     from: DVec3,
@@ -109,22 +109,22 @@ impl Regulation {
         self.rotation = Motion::at(rotation_vector(state.orientation));
     }
 
-    /// Plans a motion along a line to a position in Flotor's axes, m, from a time on, with a speed limit, m/s.
+    /// Plans a minimum-jerk motion along a line to a position in Flotor's axes, m, from `since_ns` on, with peak speed `fastest`, m/s.
     pub(crate) fn move_to(&mut self, place_m: DVec3, fastest: f64, since_ns: u64) {
         self.position = Motion::new(self.position.place(since_ns), place_m, fastest, since_ns);
     }
 
-    /// Plans a rotation to a rotation vector in Flotor's axes, from a time on, with a speed limit, rad/s.
+    /// Plans a minimum-jerk rotation to a rotation vector in Flotor's axes, rad, from `since_ns` on, with peak speed `fastest`, rad/s.
     pub(crate) fn turn_to(&mut self, turned_rad: DVec3, fastest: f64, since_ns: u64) {
         self.rotation = Motion::new(self.rotation.place(since_ns), turned_rad, fastest, since_ns);
     }
 
-    /// Holds the handle at a position from now on, m.
+    /// Holds the handle at a position from now on, m, Flotor's axes.
     pub(crate) fn follow_place(&mut self, place_m: DVec3) {
         self.position = Motion::at(place_m);
     }
 
-    /// Holds the handle at a rotation vector from now on.
+    /// Holds the handle at a rotation vector from now on, rad, Flotor's axes.
     pub(crate) fn follow_turn(&mut self, turned_rad: DVec3) {
         self.rotation = Motion::at(turned_rad);
     }

@@ -1,4 +1,4 @@
-//! Commands of regulated devices: in real time a thread sends one per tick, in lockstep each call that makes a tick.
+//! Commands of regulated devices: in real time a thread sends a command per tick, in lockstep every call that executes a tick does.
 
 use crate::device::{Open, Switch, count, live};
 use crate::error::Code;
@@ -9,8 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// True while the regulation thread runs.
 static HAS_THREAD: AtomicBool = AtomicBool::new(false);
 
-/// Starts the regulation of a device: in real time a thread sends a command per tick; in lockstep every call that makes a
-/// tick does.
+/// Starts the regulation of a device at its current pose and enables its force; in real time also starts the regulation thread.
 pub(crate) fn start(open: &Open) {
     let state = open.station.state();
     {
@@ -28,7 +27,7 @@ pub(crate) fn start(open: &Open) {
     }
 }
 
-/// Sends the commands of all regulated devices, while there are any.
+/// Sends the commands of all regulated devices once per period, until no device is regulated.
 fn regulate_all() {
     loop {
         let mut first = None;
@@ -42,13 +41,13 @@ fn regulate_all() {
             }
         }
         let Some(open) = first else { break };
-        // Sleeps a period instead of waiting for a tick, which would consume the program's.
+        // Sleep for a period: waiting for a tick would consume the program's tick.
         std::thread::sleep(std::time::Duration::from_nanos(open.host.period_ns()));
     }
     HAS_THREAD.store(false, Ordering::Release);
 }
 
-/// Sends the command of a regulated device, in lockstep, where no thread does.
+/// In lockstep, sends the command of a regulated device; in real time the regulation thread does.
 pub(crate) fn follow(open: &Open) {
     if open.host.pace() == Pace::Lockstep {
         let mut device = open.device();
@@ -58,7 +57,7 @@ pub(crate) fn follow(open: &Open) {
     }
 }
 
-/// Updates the regulation of all devices, for the next tick in lockstep.
+/// In lockstep, sends the commands of all regulated devices, before the next tick.
 pub(crate) fn follow_all() {
     for id in (0..).take(count()) {
         if let Ok(open) = live(id) {
@@ -67,7 +66,7 @@ pub(crate) fn follow_all() {
     }
 }
 
-/// Returns the device of an id for a read of its sample, which is counted, if open and not lost.
+/// Returns the device of an id, if open and not lost, and counts a read of its sample.
 pub(crate) fn sampled(id: i8) -> Result<Open, Code> {
     live(id).inspect(|open| open.host.note_read(follow_all))
 }

@@ -1,7 +1,8 @@
-//! Access control of the service's ports: refuses connections opened by web pages, and foreign names of this machine.
+//! Access control of the service's ports: refuses connections of web pages without permission, and foreign names of this machine.
 //!
-//! A page of any site can open a WebSocket to a local port; the browser then sends the page's `Origin`. A site that resolves its
-//! name to this machine (DNS rebinding) shows in `Host`. Programs send no `Origin` and connect to an address or to `localhost`.
+//! A page of any site can open a WebSocket to a local port; the browser then sends the page's `Origin`. The `Host` header reveals
+//! a site that resolves its name to this machine (DNS rebinding). Programs send no `Origin`, and connect to an address or to
+//! `localhost`.
 
 use std::net::{IpAddr, SocketAddr};
 
@@ -13,12 +14,12 @@ pub(crate) struct Access {
     hosts: Hosts,
 }
 
-/// Permitted names in `Host`.
+/// Permitted values of the `Host` header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Hosts {
-    /// Names of this machine alone.
+    /// Loopback addresses and `localhost`.
     Loopback,
-    /// Any name: the service listens to other machines, which may have other names for this one.
+    /// Any name: the service accepts other machines, which may use any name for this machine.
     Any,
 }
 
@@ -32,7 +33,7 @@ pub(crate) enum Forbidden {
 }
 
 impl Access {
-    /// Permits pages of these origins, and clients on this machine or, on an address beyond loopback, on others.
+    /// Creates the rules of a port: pages of these origins may connect; on a loopback address only loopback names are permitted.
     pub(crate) fn new(origins: Vec<String>, listening_at: SocketAddr) -> Self {
         let hosts = if listening_at.ip().is_loopback() { Hosts::Loopback } else { Hosts::Any };
         Self { origins, hosts }

@@ -1,5 +1,5 @@
-//! Channels of the service: the simulation channel with HTTP, and the events channel, which sends each event to all clients and
-//! reads nothing.
+//! Channels of the service: the simulation channel with HTTP, and the events channel, a WebSocket that sends each event to all
+//! clients and ignores their messages.
 
 use crate::connection::{PATIENCE, answer, prepared, read_body, upgraded};
 use crate::events::{Level, device_data, event};
@@ -11,7 +11,7 @@ use std::net::{Shutdown, TcpStream};
 use std::time::Instant;
 use tungstenite::Message;
 
-/// Serves a client of the simulation channel, or answers an HTTP request.
+/// Serves a client of the simulation channel until the connection ends, or answers one HTTP request.
 ///
 /// # Errors
 /// Error of the connection.
@@ -28,7 +28,7 @@ pub(crate) fn answer_client(service: &Service, mut stream: TcpStream) -> io::Res
     Ok(())
 }
 
-/// Sends all events to a client of the events channel.
+/// Sends the devices and then all events to a client of the events channel, until the connection ends.
 ///
 /// # Errors
 /// Error of the connection.

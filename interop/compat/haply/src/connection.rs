@@ -1,5 +1,5 @@
-//! Connections of a port with two protocols: the first lines of a connection request a WebSocket, or are an HTTP request. The
-//! [`crate::channels`] serve them.
+//! Connections of a port with two protocols: a connection begins with the head of an HTTP request, which may request an upgrade
+//! to WebSocket. The [`crate::channels`] serve the connections.
 
 use crate::access::Access;
 use flotor_emulation::port::Port;
@@ -12,7 +12,7 @@ use tungstenite::handshake::derive_accept_key;
 
 /// Timeout of a whole request, and of each write of a reply.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(5);
-/// Limit on the connections of a port; further ones are closed at once. Each has a thread.
+/// Limit on the connections of a port, each with a thread; further connections are closed at once.
 const MOST_CONNECTIONS: usize = 30;
 /// Limits on head and body of a request, bytes.
 const LONGEST_HEAD: usize = 16 << 10;
@@ -33,11 +33,11 @@ pub(crate) struct Request {
 #[derive(Debug, Default)]
 pub(crate) struct Head {
     pub(crate) request: Request,
-    /// Key of a WebSocket request.
+    /// `Sec-WebSocket-Key` of a request for an upgrade; `None` for any other request.
     key: Option<String>,
-    /// Origin of the web page that opened the connection.
+    /// `Origin`: site of the web page that opened the connection.
     origin: Option<String>,
-    /// Host name used by the client.
+    /// `Host`: name of this machine used by the client.
     host: Option<String>,
     length: usize,
     /// Bytes received after the head.
@@ -77,7 +77,8 @@ pub(crate) fn accept(
     Ok(())
 }
 
-/// Reads the head of a connection, and refuses one without access; `None` without a request to serve.
+/// Reads the head of a request, and answers 403 if access is denied. `None` if there is nothing to serve: access denied, head
+/// malformed or too long, or connection closed.
 pub(crate) fn prepared(
     stream: &mut TcpStream,
     access: &Access,
@@ -108,7 +109,7 @@ pub(crate) fn prepared(
     Ok(None)
 }
 
-/// Reads available bytes before a deadline.
+/// Waits for bytes until a deadline, and reads them; 0 bytes at the end of the connection.
 fn read_before(stream: &mut TcpStream, deadline: Instant, buffer: &mut [u8]) -> io::Result<usize> {
     let remaining = deadline.saturating_duration_since(Instant::now());
     if remaining.is_zero() {
@@ -130,7 +131,7 @@ pub(crate) fn upgraded(stream: &mut TcpStream, head: &Head) -> io::Result<bool> 
     Ok(true)
 }
 
-/// Reads the body of a request.
+/// Reads the body of a request, at most 64 KiB.
 pub(crate) fn read_body(stream: &mut TcpStream, head: &mut Head, deadline: Instant) -> io::Result<()> {
     let length = head.length.min(LONGEST_BODY);
     let mut body = std::mem::take(&mut head.rest);

@@ -14,7 +14,7 @@ pub(crate) fn grip_id(number: usize) -> String {
     format!("A{:03X}", number + 1)
 }
 
-/// Length of a nominal arm, m: joint angles are displacements over this length, and a torque is a force along it.
+/// Length of a nominal arm, m: a joint angle is a displacement divided by this length, a torque a force times this length.
 pub(crate) const ARM_M: f64 = 0.2;
 
 /// Returns the joint angles of the nominal arm for a displacement, degrees.
@@ -22,7 +22,7 @@ pub(crate) fn joint_angles(displacement_m: DVec3) -> DVec3 {
     displacement_m / ARM_M * (180.0 / std::f64::consts::PI)
 }
 
-/// Returns the initial settings of a device that belong to no session.
+/// Returns the initial values of the settings that a device keeps across sessions.
 pub(crate) fn kept_at_first() -> BTreeMap<&'static str, Value> {
     BTreeMap::from([
         ("gravity_compensation", json!({ "enabled": true, "scaling_factor": 1.0 })),

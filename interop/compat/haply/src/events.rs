@@ -1,11 +1,11 @@
-//! Events, and the queues of their receivers.
+//! Events of the service as JSON, and the queues of the clients of the events channel.
 
 use crate::device::inverse_id;
 use serde_json::{Value, json};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Mutex, PoisonError};
 
-/// Limit on the events queued for a slow client; further ones are lost for that client.
+/// Limit on the events queued for a slow client; further events are lost for that client.
 const MOST_WAITING: usize = 256;
 
 /// Severity of an event.
@@ -29,7 +29,7 @@ impl Events {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).retain(is_there);
     }
 
-    /// Returns a queue of the events from now on.
+    /// Adds a client; returns its queue of the events from now on.
     pub(crate) fn listen(&self) -> Receiver<String> {
         let (sender, receiver) = sync_channel(MOST_WAITING);
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(sender);

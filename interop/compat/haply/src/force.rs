@@ -31,7 +31,7 @@ pub(crate) struct SessionCommand {
     pub(crate) damping: DVec3,
 }
 
-/// Commands to a device, by session and time, ns.
+/// Commands to a device, each with its session and its time, ns.
 #[derive(Debug, Default)]
 pub(crate) struct Forces(Vec<(u64, u64, SessionCommand)>);
 
@@ -53,7 +53,8 @@ impl Forces {
         self.0.is_empty()
     }
 
-    /// Returns whether the sum changes between two commands of a session, as it depends on the handle or another session fades.
+    /// Returns whether the sum changes without a new command: it depends on the handle, or the command of one of several sessions may
+    /// fade.
     pub(crate) fn follow_the_handle(&self) -> bool {
         let follows = |wanted: &SessionCommand| wanted.target_m.is_some() || wanted.damping != DVec3::ZERO;
         self.0.len() > 1 || self.0.iter().any(|(.., wanted)| follows(wanted))
@@ -65,7 +66,7 @@ impl Forces {
         valid.max_by_key(|(_, since_ns, _)| *since_ns).map(|(.., wanted)| wanted)
     }
 
-    /// Returns the force on the hand, N.
+    /// Returns the force on the hand, N: the sum of all commands, each faded out after its validity.
     pub(crate) fn sum(&self, state: &State, now_ns: u64) -> DVec3 {
         let largest = DVec3::splat(LARGEST_N);
         let force = |(_, since_ns, wanted): &(u64, u64, SessionCommand)| {

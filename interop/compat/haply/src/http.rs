@@ -60,7 +60,7 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
     }
 }
 
-/// Returns the reply to a setting that was stored, or had no room.
+/// Returns the reply to a request to store a setting: success, or status 507 if there was no room.
 fn stored(had_room: bool) -> Answer {
     if had_room { ok() } else { failed(507, "too many settings; delete some settings") }
 }
@@ -121,7 +121,7 @@ fn setting(service: &Service, method: &str, key: &str, body: &Value) -> Answer {
     }
 }
 
-/// Returns the numbers of the devices that a path selects, and the kind: 0 for arms, 1 for grips.
+/// Returns the numbers of the devices that a path selects, and their kind: 0 for arms, 1 for grips; `None` without a match.
 fn selected(service: &Service, [kind, device]: [&str; 2]) -> Option<(Vec<usize>, usize)> {
     let count = service.host.stations().len();
     let (part, name): (usize, fn(usize) -> String) = match kind {
@@ -137,7 +137,7 @@ fn selected(service: &Service, [kind, device]: [&str; 2]) -> Option<(Vec<usize>,
     (!numbers.is_empty()).then_some((numbers, part))
 }
 
-/// Returns the ids of the sessions that a query selects.
+/// Returns the ids of the sessions that a query selects: by id, by profile and index, or all without `session=`.
 fn of_query(shared: &Shared, query: &str) -> Vec<u64> {
     let expression = query.split('&').find_map(|pair| pair.strip_prefix("session=")).map(decoded);
     let ids = |sessions: Vec<&Session>| sessions.into_iter().map(|session| session.id).collect();
@@ -152,7 +152,7 @@ fn of_query(shared: &Shared, query: &str) -> Vec<u64> {
         },
         |(profile, index)| (profile.to_owned(), index.to_owned()),
     );
-    // A profile with colons of its own, without an index.
+    // The name of the profile contains colons, and there is no index.
     let (profile, index) = match index.parse::<i64>() {
         Ok(index) => (profile, index),
         Err(_) => (expression.trim_start_matches(':').to_owned(), 0),

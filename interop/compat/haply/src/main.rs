@@ -5,7 +5,7 @@
 //!          <- one state for each message                 <- newest tick <---------------------------------------------+
 //! ```
 //!
-//! - [`access`]: access control: no web pages, no foreign names.
+//! - [`access`]: access control: origins of web pages, names of this machine.
 //! - [`channels`]: the simulation channel with HTTP, and the events channel, port 10020.
 //! - [`connection`]: a thread for each connection; the head of a request.
 //! - [`session`]: a client of the simulation channel, with its pace and replies.
@@ -149,7 +149,7 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
     }
 }
 
-/// Binds a port; returns it and its address.
+/// Binds a port; returns the port and its address.
 fn listen(option: &str, at: &str, reach: Reach) -> Result<(Port, SocketAddr), CommandError> {
     let bound = Port::bind(at, reach).and_then(|port| {
         let address = port.address()?;

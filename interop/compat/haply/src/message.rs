@@ -69,7 +69,7 @@ fn entries<'a>(message: &'a Value, kind: &str) -> &'a [Value] {
     message.get(kind).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
-/// Returns the number of an entry's device.
+/// Returns the number of an entry's device; reports an unknown device as an event.
 fn number(service: &Service, entry: &Value, name: fn(usize) -> String) -> Option<usize> {
     let id = entry.get("device_id").and_then(Value::as_str).unwrap_or_default();
     let number = (0..service.host.stations().len()).find(|number| name(*number).eq_ignore_ascii_case(id));
@@ -110,7 +110,7 @@ pub(crate) fn read_basis(basis: &Value) -> Option<Basis> {
     basis.get("permutation").and_then(Value::as_str).and_then(Basis::parse)
 }
 
-/// Applies the settings of a session for a device, by their names in a message and, below `filters`, in a path.
+/// Applies the settings of an entry to the session's view of a device; illegal settings are reported as events.
 fn configure_device(service: &Service, view: &mut View, configure: &Value) {
     if configure.get("mount").is_some() && configure.get("preset").is_some() {
         return service.refuse("configure", "give either a preset or a mount", &configure.to_string());
@@ -122,7 +122,7 @@ fn configure_device(service: &Service, view: &mut View, configure: &Value) {
     }
 }
 
-/// Applies one setting to a view.
+/// Applies one setting to a view, by its name in a message; `filters` contains further settings.
 ///
 /// # Errors
 /// The legal values, as text.
@@ -171,7 +171,7 @@ fn set_workspace(service: &Service, view: &mut View, command: &Value) {
     }
 }
 
-/// Returns whether a command takes effect: a program may send one only for validation.
+/// Returns whether a command takes effect: with `execute: false` a program sends a command for validation only.
 fn is_executed(command: &Value) -> bool {
     command.get("execute").and_then(Value::as_bool).unwrap_or(true)
 }

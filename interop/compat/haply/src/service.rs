@@ -119,7 +119,7 @@ impl Service {
         }
     }
 
-    /// Sends the sum of all commands to a device.
+    /// Sends the sum of all commands to a device and enables force; without commands disables force.
     fn command(&self, forces: &mut Forces, station: &Station, state: &State) {
         let now_ns = self.host.now_ns();
         if forces.remove_expired(now_ns) {
@@ -132,7 +132,7 @@ impl Service {
         station.enable();
     }
 
-    /// Starts a thread that updates sums that depend on the handle, and fades expired commands; for real time.
+    /// Starts a thread that updates sums that depend on the handle, and fades expired commands; it acts in real time only.
     ///
     /// # Errors
     /// If the thread cannot be created.
@@ -169,7 +169,7 @@ impl Service {
         }
     }
 
-    /// Emits an event per device: the devices are gone.
+    /// Emits a `device-disconnected` event for each device.
     pub(crate) fn device_lost(&self) {
         for number in 0..self.host.stations().len() {
             let data = device_data(number);
@@ -177,7 +177,7 @@ impl Service {
         }
     }
 
-    /// Emits an event: a client sent an illegal value.
+    /// Emits an `invalid-value` event: a client sent an illegal value.
     pub(crate) fn refuse(&self, field: &str, reason: &str, context: &str) {
         let context: String = context.chars().take(200).collect();
         let data = json!({ "field": field, "reason": reason, "context": context });
@@ -195,7 +195,7 @@ impl Shared {
     }
 }
 
-/// Returns the current time as the service writes it: date and time in UTC.
+/// Returns the current time in the service's format: `YYYY-MM-DD HH:MM:SS`, UTC.
 fn now_text() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
     let (days, second) = (seconds / 86_400, seconds % 86_400);

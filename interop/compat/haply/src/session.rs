@@ -20,7 +20,7 @@ const ROOM: usize = 16 << 10;
 /// Silence after which a session ends in real time, so that silent clients do not use up the connections.
 const LONGEST_SILENCE: Duration = Duration::from_secs(20);
 
-/// Connection that can be polled.
+/// Connection whose reads can be switched to non-blocking.
 pub(crate) struct Link {
     pub(crate) stream: TcpStream,
     /// True while reads do not block.

@@ -175,14 +175,14 @@ impl io::Write for Sink<'_> {
     }
 }
 
-/// Writes the shortest digits of a number, several times faster than `format!`: a state has dozens.
+/// Writes the shortest decimal representation of a number, several times faster than `format!`: a state has dozens of numbers.
 fn number(text: &mut String, number: f64) {
     // Non-finite numbers are unreachable: the loop replaces them.
     let number = if number.is_finite() { number } else { 0.0 };
     let _ = CompactFormatter.write_f64(&mut Sink(text), number);
 }
 
-/// Writes the name of a member.
+/// Writes the key of a member of a JSON object, after a comma if it is not the first member.
 fn key(text: &mut String, name: &str) {
     text.push_str(if text.ends_with('{') { "\"" } else { ",\"" });
     text.push_str(name);

@@ -64,7 +64,7 @@ impl Basis {
         DVec3::from_array(device)
     }
 
-    /// Converts a rotation to these axes; its axis is reversed where they are left-handed.
+    /// Converts a rotation to these axes; if they are left-handed, the rotation axis is reversed.
     fn orientation(&self, turn: DQuat) -> DQuat {
         let [x, y, z] = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| self.of_device(axis));
         let handed = x.cross(y).dot(z);
@@ -187,7 +187,7 @@ impl Default for View {
 }
 
 impl View {
-    /// Selects a preset of the service; returns false for an unknown name.
+    /// Selects a preset of the service, which resets mount and origin except for `custom`; returns false for an unknown name.
     pub(crate) fn set_preset(&mut self, name: &str) -> bool {
         let Some((name, is_centred)) = PRESETS.iter().find(|(preset, _)| *preset == name) else {
             return false;

@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Callback of the program: returns 0 to end, else to be called again. It may end its thread, as an interpreter does at shutdown.
+/// Callback of the program: returns 0 to end, another value to be called again. May end its thread, like an interpreter at
+/// shutdown.
 pub(crate) type Callback = unsafe extern "C-unwind" fn(*mut c_void) -> c_uint;
 
 /// Limit on the number of callbacks.
@@ -40,7 +41,7 @@ struct List {
 }
 
 static LIST: Mutex<List> = Mutex::new(List { entries: Vec::new(), next: 1 });
-/// Signals a change of the list.
+/// Signals a change of the list, and a start or stop of the scheduler.
 static CHANGED: Condvar = Condvar::new();
 static IS_RUNNING: AtomicBool = AtomicBool::new(false);
 static RATE_HZ: AtomicU32 = AtomicU32::new(1000);
@@ -88,7 +89,7 @@ pub(crate) fn rate_hz() -> u32 {
     RATE_HZ.load(Ordering::Relaxed)
 }
 
-/// Sets the rate; returns false for an unsupported rate.
+/// Sets the rate, Hz; returns false unless it is 500 or 1000.
 pub(crate) fn set_rate(rate_hz: c_ulong) -> bool {
     let rate_hz = u32::try_from(rate_hz).ok().filter(|rate_hz| [500, 1000].contains(rate_hz));
     rate_hz.inspect(|rate_hz| RATE_HZ.store(*rate_hz, Ordering::Relaxed)).is_some()
@@ -103,7 +104,7 @@ pub(crate) fn begin_tick() -> [Option<Entry>; MOST] {
     calls
 }
 
-/// Returns the time since the tick began, s.
+/// Returns the time since the tick began, s; 0 before the first tick.
 pub(crate) fn since_tick_s() -> f64 {
     let began = *TICK_BEGAN.lock().unwrap_or_else(PoisonError::into_inner);
     began.map_or(0.0, |began| began.elapsed().as_secs_f64())
@@ -180,13 +181,13 @@ pub(crate) fn is_empty() -> bool {
     list().entries.is_empty()
 }
 
-/// Waits a short time for a callback, while the scheduler runs.
+/// Waits until a callback is scheduled or the scheduler stops, at most 100 ms.
 pub(crate) fn wait_for_callback() {
     let wait = |list: &mut List| list.entries.is_empty() && is_running();
     let _ = CHANGED.wait_timeout_while(list(), LOOK, wait);
 }
 
-/// Waits for the end of a callback, while the scheduler runs.
+/// Waits until a callback is no longer scheduled, or the scheduler stops.
 pub(crate) fn wait_until_out(handle: u64) {
     let mut list = list();
     while list.is_in(handle) && is_running() {
@@ -194,7 +195,7 @@ pub(crate) fn wait_until_out(handle: u64) {
     }
 }
 
-/// Unschedules a callback, and waits for a running call on another thread; returns whether it was scheduled.
+/// Unschedules a callback, and waits at most 1 s for a running call on another thread; returns whether it was scheduled.
 pub(crate) fn unschedule(handle: c_ulong) -> bool {
     let was_in = take_out(handle);
     let since = Instant::now();

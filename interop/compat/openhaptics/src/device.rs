@@ -28,7 +28,7 @@ const FIRST: [&str; 4] = ["", "Default Device", "Default PHANToM", "Default PHAN
 const FIRST_CAPABILITY: c_uint = FORCE_OUTPUT;
 const CAPABILITIES: c_uint = 5;
 const AT_FIRST: u32 = 0b1_1110;
-/// Nominal length of an arm, m: devices without one report joint angles of an arm that reaches the handle.
+/// Length of a nominal arm, m, whose joint angles are reported: a Flotor device may have other joints or none.
 const ARM_M: f64 = 0.2;
 
 /// Current device of the process.
@@ -84,7 +84,7 @@ enum When {
     Outside(u64),
 }
 
-/// Device of the program.
+/// State of a device for the program: current frame, last command, capabilities and settings.
 pub(crate) struct Device {
     is_initialised: bool,
     number: usize,
@@ -127,13 +127,13 @@ impl Devices {
         Some((host, host.station(usize::try_from(number).ok()?)?))
     }
 
-    /// Enables or disables the force of all devices, by scheduler and capabilities.
+    /// Enables or disables the force of all devices according to scheduler and capabilities.
     pub(crate) fn follow_scheduler() {
         (0..).take(MOST).filter_map(Self::lock).for_each(|device| device.follow_switches());
     }
 }
 
-/// Opens the device with a name and makes it current.
+/// Opens the device with a name and makes it current; returns its handle.
 pub(crate) fn init(name: Option<&str>) -> Result<c_uint, Code> {
     let host = host().ok_or(Code::DeviceFault)?;
     let name = name.unwrap_or_default();
@@ -172,7 +172,8 @@ pub(crate) fn disable(handle: c_uint) -> bool {
     true
 }
 
-/// Begins a frame; outside of the scheduler waits for a tick without a frame.
+/// Begins a frame with a snapshot, and makes the device current. A second frame in a tick is an error in the scheduler; outside
+/// of it, waits for the next tick. Neither applies if the program has disabled the one-frame limit.
 pub(crate) fn begin_frame(handle: c_uint) -> Result<(), Code> {
     let mut device = Devices::initialised(handle).ok_or(Code::BadHandle)?;
     CURRENT.0.store(handle, Ordering::Release);
@@ -203,7 +204,8 @@ pub(crate) fn begin_frame(handle: c_uint) -> Result<(), Code> {
     alive(host)
 }
 
-/// Checks that the run is in progress; otherwise the device is lost, which ends a program's loop, or stopped for safety.
+/// Checks that the run is in progress. Otherwise [`Code::ForceError`] after an emergency stop, or [`Code::CommError`] for a lost
+/// device, which ends a program's loop.
 fn alive(host: &Host) -> Result<(), Code> {
     match (host.is_running(), host.is_stopped_for_safety()) {
         (true, _) => Ok(()),
@@ -360,7 +362,7 @@ impl Device {
             .for_each(|(_, station)| if is_on { station.enable() } else { station.disable() });
     }
 
-    /// Sets a parameter; the last value in a frame wins.
+    /// Sets a parameter; of several values in a frame, the last one is sent.
     pub(crate) fn set(&mut self, parameter: c_uint, [x, y, z]: [f64; 3]) -> Result<(), Code> {
         if !(x.is_finite() && y.is_finite() && z.is_finite()) {
             return Err(Code::InvalidValue);
@@ -383,7 +385,7 @@ impl Device {
     /// Returns the values of a parameter in this frame, or in the last one.
     pub(crate) fn value(&self, parameter: c_uint) -> Result<Values, Code> {
         let (_, station) = self.station().ok_or(Code::CommError)?;
-        // Position in a pair of numbers: the current frame, or the last one.
+        // Index of the parameter in a pair: 0 for the current frame, 1 for the last frame.
         let of = |ids: [c_uint; 2]| ids.iter().position(|id| *id == parameter);
         let seen = |ids: [c_uint; 2]| of(ids).map(|frame| [&self.now, &self.last][frame]);
         // The current force reads 0 until set in this frame, because programs add to it.
@@ -453,7 +455,7 @@ impl Device {
     }
 }
 
-/// Returns the transform by columns, the translation in the last one.
+/// Returns the homogeneous transform, column-major, with the translation in mm.
 fn transform(seen: &Snapshot) -> [f64; 16] {
     let at_mm = seen.position_mm.to_array();
     std::array::from_fn(|index| match (index / 4, index % 4) {
@@ -464,7 +466,7 @@ fn transform(seen: &Snapshot) -> [f64; 16] {
     })
 }
 
-/// Returns turret, thigh and shin of a nominal arm that reaches a position, rad: left, up and up are positive.
+/// Returns the angles of turret, thigh and shin of a nominal arm for a position, rad; positive to the left, up and up.
 fn joint_angles(DVec3 { x, y, z }: DVec3) -> DVec3 {
     DVec3::new(math::atan2(-x, ARM_M), math::atan2(y, ARM_M), math::atan2(y - z, ARM_M))
 }
@@ -477,7 +479,7 @@ fn gimbal_angles(rows: &[[f64; 3]; 3]) -> DVec3 {
     DVec3::new(-yaw, -pitch, -roll)
 }
 
-/// Returns the counts of nominal encoders: 0.01 mm, and 0.1 mrad.
+/// Returns the counts of nominal encoders, 0.01 mm and 0.1 mrad per count.
 fn encoders(seen: &Snapshot) -> [f64; 6] {
     let DVec3 { x, y, z } = seen.position_mm * 100.0;
     let DVec3 { x: yaw, y: pitch, z: roll } = gimbal_angles(&seen.rows) * 1.0e4;

@@ -1,11 +1,11 @@
-//! Stack of errors of each thread, the newest on top.
+//! Error stack of each thread, the newest error on top.
 
 use std::cell::RefCell;
 use std::ffi::{CStr, c_int, c_uint};
 
 /// Handle of no device.
 pub(crate) const NO_DEVICE: c_uint = 0xFFFF_FFFF;
-/// Limit on the stored errors of a thread; older ones are dropped.
+/// Limit on the stored errors of a thread; beyond it the oldest error is dropped.
 const MOST: usize = 64;
 
 /// Error of a call. The numbers are the interface's.
@@ -45,7 +45,7 @@ thread_local! {
     static ERRORS: RefCell<Vec<ErrorInfo>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Pushes an error on the stack of this thread.
+/// Pushes an error on the error stack of the calling thread.
 pub(crate) fn raise(code: Code, device: c_uint) {
     let _ = ERRORS.try_with(|errors| {
         let mut errors = errors.borrow_mut();
@@ -56,12 +56,12 @@ pub(crate) fn raise(code: Code, device: c_uint) {
     });
 }
 
-/// Pops the newest error of this thread.
+/// Pops the newest error of the calling thread; [`NONE`] without one.
 pub(crate) fn take() -> ErrorInfo {
     ERRORS.try_with(|errors| errors.borrow_mut().pop()).ok().flatten().unwrap_or(NONE)
 }
 
-/// Clears the stack of this thread.
+/// Clears the error stack of the calling thread.
 pub(crate) fn clear() {
     let _ = ERRORS.try_with(|errors| errors.borrow_mut().clear());
 }

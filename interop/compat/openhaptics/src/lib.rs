@@ -1,8 +1,8 @@
 //! Drop-in `libHD.so`: the 36 functions of HDAPI, served by the devices of a Flotor scene.
 //!
 //! Lengths in mm, forces in N, torques in mN·m; x right, y up, z towards the user. The scheduler is one thread for all devices
-//! and calls the program once a tick. A frame takes a snapshot of the device at its begin and sends force at its end. The
-//! scene's envelope limits force first; a program gets errors of force only if it has disabled the limit itself.
+//! and calls the program once per tick. A frame takes a snapshot of the device at its start and sends force at its end. The
+//! scene's envelope always limits the force; a program gets the error of an excessive force only if it has disabled clamping.
 //!
 //! Source: public headers of the interface, versions 3.0 to 3.5, and a dozen open programs that use it: names, numbers and
 //! behaviour only.
@@ -89,7 +89,7 @@ export! {
     fn hdDisableDevice(handle: c_uint) -> () [()] { raise_unless(device::disable(handle), Code::BadHandle, handle) }
     /// Makes a device current, for the whole process.
     fn hdMakeCurrentDevice(handle: c_uint) -> () [()] { raise_unless(CURRENT.set(handle), Code::BadHandle, handle) }
-    /// Returns the current device.
+    /// Returns the handle of the current device; an error without one.
     fn hdGetCurrentDevice() -> c_uint [NO_DEVICE] {
         let current = CURRENT.get();
         raise_unless(current != NO_DEVICE, Code::InvalidOperation, NO_DEVICE);
@@ -156,16 +156,16 @@ export! {
     /// Does nothing: there is nothing to calibrate.
     fn hdUpdateCalibrationMessage(_style: c_uint) -> () [()] {}
 
-    /// Starts the scheduler, and with it the enabled force.
+    /// Starts the scheduler, and enables the force of devices whose force output is enabled.
     fn hdStartScheduler() -> () [()] { raise_unless(scheduler::start(), Code::TimerError, CURRENT.get()) }
-    /// Stops the scheduler and waits for its end: no callback is called afterwards.
+    /// Stops the scheduler and disables force; unless called by a callback, waits for its end: no callback is called afterwards.
     fn hdStopScheduler() -> () [()] { scheduler::stop() }
     /// Sets the rate of the scheduler, 1000 or 500 Hz.
     fn hdSetSchedulerRate(rate_hz: c_ulong) -> () [()] {
         raise_unless(callbacks::set_rate(rate_hz), Code::InvalidValue, CURRENT.get());
     }
     /// Schedules a callback, called in every tick until it returns 0; higher priority first. The callback may be called with `data`
-    /// from another thread until it returned 0 or was taken out.
+    /// from another thread until it has returned 0 or is unscheduled.
     fn hdScheduleAsynchronous(callback: Option<Callback>, data: *mut c_void, priority: c_ushort) -> c_ulong [c_ulong::MAX] {
         // SAFETY: the caller of this entry point guarantees what its documentation states.
         let entry = callback.map(|callback| unsafe { Entry::new(callback, data, priority) });

@@ -1,4 +1,4 @@
-//! Parameters by number, with the number and type of their values.
+//! Numbers of the parameters, with count and type of their values.
 
 use crate::error::Code;
 use std::ffi::c_uint;
@@ -86,13 +86,13 @@ impl Values {
         Self::new(Kind::Boolean, &[f64::from(u8::from(value))])
     }
 
-    /// Returns the values, and how many of them count, if they are of this type.
+    /// Returns the values and their count; `None` if they are of another type.
     pub(crate) fn of_kind(&self, kind: Kind) -> Option<([f64; 16], usize)> {
         (kind == self.kind).then_some((self.numbers, self.count))
     }
 }
 
-/// Returns the number of values of this type that a parameter accepts.
+/// Returns the number of values that a parameter accepts; an error for a read-only parameter or another type.
 pub(crate) fn settable(parameter: c_uint, kind: Kind) -> Result<usize, Code> {
     let (legal, count) = match parameter {
         0x2700..=0x2704 => (Kind::Real, 3),

@@ -1,4 +1,4 @@
-//! Scheduler: one thread for all devices, which calls the program once a tick, higher priority first.
+//! Scheduler: one thread for all devices, which calls the program's callbacks once per tick, higher priority first.
 
 use crate::callbacks::{self, Callback, Entry, MOST, is_here, is_running, set_running};
 use crate::device::Devices;
@@ -19,7 +19,7 @@ unsafe extern "C" {
     fn pthread_join(thread: c_ulong, result: *mut *mut c_void) -> c_int;
 }
 
-/// Thread of the system, without frames of the standard library, which would catch the unwinding at a thread's end, and abort.
+/// System thread without stack frames of the standard library, which would catch the unwinding at a thread's end, and abort.
 struct Thread(c_ulong);
 
 impl Thread {
@@ -83,7 +83,8 @@ pub(crate) fn start() -> bool {
     is_started
 }
 
-/// Stops the scheduler: no force, and no callback is called after the return.
+/// Stops the scheduler and disables force. Called from another thread, waits for the end of the scheduler's thread: no callback
+/// is called after the return.
 pub(crate) fn stop() {
     set_running(false);
     Devices::follow_scheduler();
@@ -124,7 +125,7 @@ fn wait_for_tick() -> bool {
     !is_idle
 }
 
-/// Calls a callback until it has ended, on the scheduler's thread if that is running and another one.
+/// Calls a callback until it returns 0: on the scheduler's thread if the scheduler runs, otherwise on the calling thread.
 ///
 /// # Safety
 /// `callback` may be called with `data` from any thread until this returns.

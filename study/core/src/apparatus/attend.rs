@@ -1,4 +1,4 @@
-//! Runs the sitting of a person: shows screens, presents stimuli and logs each answer before the next trial begins.
+//! Sitting of a person: shows screens, presents stimuli and logs each answer before the next trial begins.
 
 use super::real_time_rig::RealTimeRig;
 use crate::conduct::{ApparatusOrFrontEndError, Ending};
@@ -18,20 +18,21 @@ pub enum PollResult {
     Closed,
 }
 
-/// Minimum exploration of a stimulus before an answer counts, against keys pressed by accident or too early.
+/// Minimum exploration of a stimulus before the person can proceed; prevents answers by keys pressed accidentally or too early.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MinimumExploration {
-    /// Least time, s.
+    /// Minimum time, s.
     pub time_s: f64,
-    /// Least path length of the handle, up and down together, m.
+    /// Minimum path length of the handle, up and down added, m.
     pub path_length_m: f64,
 }
 
 impl MinimumExploration {
-    /// Half a second and 2 mm. Past these limits the previous answer can no longer be withdrawn.
+    /// Half a second and 2 mm. Once a stimulus has been felt this much, the previous answer can no longer be withdrawn.
     pub const USUAL: MinimumExploration = MinimumExploration { time_s: 0.5, path_length_m: 2.0e-3 };
 
-    /// Returns a hint if a stimulus was not felt long or far enough.
+    /// Returns a hint for the person if a stimulus was not felt long or far enough; `None` if it was, or without a path length
+    /// if the time suffices.
     fn is_missed(&self, time_s: f64, path_length_m: Option<f64>) -> Option<&'static str> {
         if time_s < self.time_s {
             Some("feel the stimulus a little longer")
@@ -43,7 +44,7 @@ impl MinimumExploration {
     }
 }
 
-/// User interface of a person's sitting: a terminal, a pipe to a window, a test.
+/// User interface of a person's sitting: a terminal, a pipe to a window program, or a test.
 pub trait FrontEnd {
     /// Shows a screen.
     ///
@@ -51,26 +52,28 @@ pub trait FrontEnd {
     /// If the front end is gone.
     fn show(&mut self, screen: &Screen) -> Result<(), ApparatusOrFrontEndError>;
 
-    /// Returns the input since the last call; waits only briefly, so that the handle can be watched meanwhile.
+    /// Returns the next input of the person; waits only briefly, so that the caller can check the handle and the run between
+    /// calls.
     ///
     /// # Errors
     /// If the front end is gone.
     fn poll(&mut self, screen: &Screen) -> Result<PollResult, ApparatusOrFrontEndError>;
 
-    /// Warns at once, visibly and audibly, that the handle was pushed out of its range.
+    /// Warns the person immediately, visibly and audibly, that the handle was pushed out of its range.
     ///
     /// # Errors
     /// If the front end is gone.
     fn warn_out_of_range(&mut self) -> Result<(), ApparatusOrFrontEndError>;
 
-    /// Shows why an input was rejected.
+    /// Shows `why`, the reason for the rejection of an input.
     ///
     /// # Errors
     /// If the front end is gone.
     fn refuse(&mut self, why: &str) -> Result<(), ApparatusOrFrontEndError>;
 }
 
-/// Runs a sitting until it is complete or stopped, and logs each interruption and disturbance.
+/// Runs a sitting until it is complete or stopped, and logs each interruption and disturbance. `least` is required of each
+/// stimulus.
 ///
 /// # Errors
 /// Errors of apparatus, front end or log; the log stays valid and can be resumed.
@@ -84,13 +87,13 @@ pub fn attend(
     let mut parties = Parties { attended, log, rig, front };
     let result = sit(&mut parties, least);
     if let Err(error) = &result {
-        // The first error is returned; a failure to log it matters less.
+        // Return the first error: a failure to log it matters less.
         let _ = parties.log.write(&Event::Incident(parties.rig.incident_of(error.as_ref())));
     }
     result
 }
 
-/// Parties of a sitting: trials, log, apparatus and front end.
+/// Components of a sitting: state machine, log, apparatus and front end.
 struct Parties<'a, 'r> {
     attended: &'a mut ScreenStateMachine,
     log: &'a mut LogWriter,
@@ -153,13 +156,13 @@ fn sit(parties: &mut Parties<'_, '_>, least: MinimumExploration) -> Result<Endin
         };
         match step {
             Step::Answered(event) => {
-                // Log the answer before the movement: it is small, and cannot be measured again.
+                // Log the answer before closing the recording of the movement: the answer is small and cannot be repeated.
                 log.write(&Event::Trial(event))?;
                 close_recording(rig, log)?;
             }
             Step::Withdrawn(trial) => {
                 log.write(&Event::Withdrawn { trial })?;
-                // Abort the stimulus that has just begun: it is presented again after the answer.
+                // End the stimulus that has just begun: it is presented again after the new answer.
                 if let Some(trial) = felt {
                     end(rig, &trial, log)?;
                     close_recording(rig, log)?;
@@ -195,7 +198,8 @@ fn end(
     Ok(felt)
 }
 
-/// Returns the event of a disturbance: an incident, or a note during practice, which is not part of the sitting.
+/// Returns the event to log for a disturbance: an incident, or a note during practice before a resumed sitting, which is not
+/// part of the sitting.
 fn disturbance(trial: &Trial, incident: Incident) -> Event {
     match trial.number {
         0 => Event::Note { text: format!("practice before going on: {incident}") },

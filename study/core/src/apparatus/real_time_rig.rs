@@ -1,4 +1,4 @@
-//! Presents stimuli to a person: the servo loop in real time, on its own threads. Clients may display and stop the run; only the
+//! Apparatus for a person: the servo loop in real time, in separate threads. Clients may display and stop the run; only the
 //! experiment changes the stimuli.
 
 use super::watch::{RunThread, Shared, spawn_run};
@@ -17,7 +17,7 @@ use flotor_session::{ControlError, Controls, LatchGuard, RunError, RunOptions, R
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Settling time, longer than the loop needs to apply a change and its observers to report it.
+/// Settling time, longer than the loop takes to apply a change and the observers take to report the change.
 const SETTLE: Duration = Duration::from_millis(20);
 
 /// Real-time apparatus of one person. Dropping it stops the run.
@@ -29,14 +29,14 @@ pub struct RealTimeRig<'a> {
     stop: StopSwitch,
     shared: Shared,
     viewer_error: Option<String>,
-    /// Warnings of the run.
+    /// Warnings about stops and devices.
     warnings: Vec<String>,
     run: Option<RunThread>,
-    /// End of the run, once known.
+    /// Reason for the end of the run, once known.
     ended: Option<RunEnd>,
 }
 
-/// Request handler that lets clients stop a study, and nothing else.
+/// Request handler through which clients may watch and stop a study, but not change stimuli.
 struct OnlyStop {
     stop: StopSwitch,
     latch: Option<LatchGuard>,
@@ -59,7 +59,8 @@ impl Serve for OnlyStop {
 }
 
 impl<'a> RealTimeRig<'a> {
-    /// Starts the loop with the object faded out.
+    /// Starts the run with the object faded out and publishes it to clients; a failed publication is not an error
+    /// ([`Self::viewer_error`]).
     ///
     /// # Errors
     /// [`RunError`], or the loop's rejection of the first change.
@@ -106,13 +107,14 @@ impl<'a> RealTimeRig<'a> {
         &self.warnings
     }
 
-    /// Returns the reason why no window can display the run, if so.
+    /// Returns the reason why no window can display the run; `None` if the run is published.
     #[must_use]
     pub fn viewer_error(&self) -> Option<&str> {
         self.viewer_error.as_deref()
     }
 
-    /// Sets the stimulus and fades it in; returns the reason if the movement should be recorded and cannot.
+    /// Sets the stimulus, fades it in, and waits until it can be felt. Returns the reason if the recording of the movement
+    /// fails; `None` if it works or none was requested.
     ///
     /// # Errors
     /// If the run has ended, or the model rejected the value.
@@ -120,7 +122,7 @@ impl<'a> RealTimeRig<'a> {
         self.check()?;
         self.set(value)?;
         {
-            // Exploration begins when the first force is felt, not at full weight.
+            // Measure the exploration from the first force of the fade-in on.
             let mut watch = self.shared.lock();
             watch.missed_ticks = 0;
             watch.meter = Some(KinematicsMeter::default());
@@ -144,7 +146,8 @@ impl<'a> RealTimeRig<'a> {
         Ok(None)
     }
 
-    /// Returns the path length of the handle since the stimulus can be felt, m; `None` before the first sample.
+    /// Returns the vertical path length of the handle since the stimulus can be felt, m; `None` without a stimulus, or before
+    /// its first sample.
     #[must_use]
     pub fn path_length_m(&self) -> Option<f64> {
         let watch = self.shared.lock();
@@ -168,10 +171,10 @@ impl<'a> RealTimeRig<'a> {
         Ok(StimulusExploration { kinematics, boundary_hit: meter.out_of_range(), missed_ticks })
     }
 
-    /// Closes the recording of an answered trial.
+    /// Closes the recording of an answered trial; does nothing without a recording.
     ///
     /// # Errors
-    /// Errors of the recording.
+    /// If the recording cannot be completed.
     pub fn close_recording(&mut self) -> Result<(), ApparatusOrFrontEndError> {
         Ok(self.shared.lock().recording.finish(&[])?)
     }
@@ -198,7 +201,7 @@ impl<'a> RealTimeRig<'a> {
         self.check().err().map(|error| self.incident_of(error.as_ref()))
     }
 
-    /// Converts an error that ended the sitting to an incident.
+    /// Converts an error that ended the sitting to an incident: an emergency stop, or the end of the run.
     #[must_use]
     pub fn incident_of(&self, error: &(dyn std::error::Error + Send + Sync + 'static)) -> Incident {
         match error.downcast_ref::<RunEnded>().map(|ended| ended.0).or(self.ended) {
@@ -209,8 +212,8 @@ impl<'a> RealTimeRig<'a> {
         }
     }
 
-    /// Ends the run of an interrupted sitting. After a complete sitting the run continues, so that the handle is held while the
-    /// person is thanked.
+    /// Ends the run of an interrupted sitting, and returns `ending`. After a complete sitting the run continues until the rig
+    /// is dropped, so that the handle is still held during the final screen.
     ///
     /// # Errors
     /// If a fault or an emergency stop ended the run.
@@ -244,8 +247,8 @@ impl<'a> RealTimeRig<'a> {
         std::thread::sleep(Duration::from_secs_f64(self.apparatus.fade_s()) + SETTLE);
     }
 
-    /// Waits until the loop has sampled the object: on a busy machine the time of a fade may pass without a tick, and a trial needs
-    /// a stimulus that could be felt.
+    /// Waits until the loop has sampled the stimulus at least once, at most 5 s: on a busy machine the time of a fade may pass
+    /// without a tick, and a trial needs a stimulus that could be felt.
     fn wait_until_seen(&self) {
         const MOST_LOOKS: u32 = 250;
         let is_seen = || {
@@ -260,7 +263,7 @@ impl<'a> RealTimeRig<'a> {
         }
     }
 
-    /// Returns an error if the run has ended by itself.
+    /// Returns an error if the run has ended.
     fn check(&mut self) -> Result<(), ApparatusOrFrontEndError> {
         match (&self.run, self.ended) {
             (Some(run), _) if !run.is_finished() => return Ok(()),

@@ -1,5 +1,5 @@
-//! Presents stimuli to a simulated observer: the servo loop on the virtual clock, with the subject's simulated hand moving up and
-//! down all the time.
+//! Apparatus for a simulated observer: the servo loop in virtual time; the subject's simulated hand moves up and down
+//! continuously.
 //!
 //! ```text
 //! object's weight   1 ──╮        ╭── 1        between two stimuli the object fades out, changes while nobody feels
@@ -22,12 +22,12 @@ use flotor_session::scene::Scene;
 use flotor_session::{ControlError, Observer, RunError, RunRecording, Steps};
 use std::path::PathBuf;
 
-/// Run that ended before the experiment did.
+/// Error: the run ended before the experiment was complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the run ended during a trial: {}", .0.cause())]
 pub struct RunEnded(pub RunEnd);
 
-/// Stimulus that the model rejected although the check had accepted it.
+/// Error: the model rejected a stimulus during the run, although the check before the first trial had accepted it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("the model rejected {}.{} = {}", .0.plugin, .0.parameter, .0.value)]
 pub struct StimulusRefused(pub Change);
@@ -40,7 +40,7 @@ pub struct TrialFiles {
 }
 
 impl TrialFiles {
-    /// Creates the folder for the recordings.
+    /// Creates the folder for the recordings; file names begin with `prefix`.
     ///
     /// # Errors
     /// If the folder cannot be created.
@@ -67,7 +67,7 @@ impl TrialFiles {
     }
 }
 
-/// Virtual-time apparatus of one simulated subject.
+/// Apparatus of one simulated subject, in virtual time.
 pub struct Rig<'a> {
     apparatus: &'a Apparatus,
     scene: Scene,
@@ -81,7 +81,8 @@ pub struct Rig<'a> {
 }
 
 impl<'a> Rig<'a> {
-    /// Loads and activates the scene with the object faded in. Each stimulus is felt for `feel_s`; `stop` ends the run.
+    /// Loads and activates the scene with the object faded in. Each stimulus is felt for `feel_s` seconds, fades excluded;
+    /// `stop` ends the run.
     ///
     /// # Errors
     /// [`RunError`].
@@ -94,14 +95,14 @@ impl<'a> Rig<'a> {
         stop: &StopSwitch,
     ) -> Result<Self, RunError> {
         let scene = apparatus.scene_with_hand(seed, subject);
-        // Subjects differ in their tremor, too.
+        // A different seed for each subject, so that the tremor differs, too.
         let seed = seed.wrapping_mul(u64::from(SubjectNumber::MOST) + 1).wrapping_add(subject.get().into());
         let steps = Steps::prepare(&scene, apparatus.registry(), seed, stop)?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // minutes at most
         let ticks = |seconds: f64| (seconds * scene.rate_hz).ceil() as u64;
         Ok(Self {
             feel_ticks: ticks(feel_s),
-            // One extra tick until a change is applied.
+            // One tick more: the loop applies a change at the next tick.
             fade_ticks: ticks(apparatus.fade_s()) + 1,
             apparatus,
             seed,
@@ -113,10 +114,10 @@ impl<'a> Rig<'a> {
         })
     }
 
-    /// Presents the stimuli of a trial, each for its time, to a second observer as well.
+    /// Presents the stimuli of a trial one after the other, and passes every tick to `also` as well.
     ///
     /// # Errors
-    /// Errors of the apparatus.
+    /// Errors of the apparatus; [`RunEnded`] after a stop request.
     pub fn present_watched(
         &mut self,
         trial: &Trial,

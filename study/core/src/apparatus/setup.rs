@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Recorded data on how people moved.
+/// Movement data to store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kinematics {
     /// Every tick of every trial (MCAP), and the measures
@@ -44,7 +44,7 @@ pub enum ApparatusError {
     NoModel {
         /// The stimulus as requested.
         stimulus: Stimulus,
-        /// The most similar model name.
+        /// Most similar model name; `None` if no name is similar.
         nearest: Option<String>,
         /// All model names.
         models: Vec<String>,
@@ -58,12 +58,12 @@ pub enum ApparatusError {
     NoParameter {
         /// The stimulus as requested.
         stimulus: Stimulus,
-        /// The most similar parameter id.
+        /// Most similar parameter id; `None` if no id is similar.
         nearest: Option<String>,
         /// Ids of all real parameters.
         numbers: Vec<String>,
     },
-    /// A file of the scene has become unreadable.
+    /// A file of the scene or of a plugin has become unreadable.
     #[error("{}: {cause}; the file was readable at the start: restore the file and start again", path.display())]
     Unreadable {
         /// Path of the file.
@@ -85,14 +85,14 @@ pub enum ApparatusError {
         /// Error of the model.
         cause: Box<RunError>,
     },
-    /// The force ceiling of the host could clip a stimulus, unnoticed in the answers.
+    /// The host's force ceiling could limit a stimulus, which the answers would not reveal.
     #[error(
         "{device}, and the host sends at most {} N and {} N·m: the host would limit a stronger stimulus. Set \
          `[limits] force_n` and `torque_nm` to at most these values, or add `--allow-strong`",
         CEILING.force_n, CEILING.torque_nm
     )]
     ExceedsForceCeiling {
-        /// Device stronger than the ceiling.
+        /// Device with force or torque limits above the ceiling.
         device: StrongDevice,
     },
     /// The device has no simulated hand for a simulated observer.
@@ -107,12 +107,12 @@ pub enum ApparatusError {
     },
 }
 
-/// Means of changing the stimulus in a running model.
+/// Way to change the stimulus in a running model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Route {
-    /// By a live parameter.
+    /// Live parameter.
     Parameter,
-    /// By replacing the model, for a parameter that is read at creation.
+    /// Model replacement (hot swap), for a parameter that is read at creation.
     Swap,
 }
 
@@ -122,7 +122,7 @@ pub struct Apparatus {
     registry: Registry,
     stimulus: Stimulus,
     route: Route,
-    /// Blend weight of the model while it is felt, and its fade time, s.
+    /// Blend weight of the model while it is felt, 0 to 1; below, its fade time, s.
     weight: f64,
     fade_s: f64,
     plugins: Vec<PluginReport>,
@@ -130,10 +130,10 @@ pub struct Apparatus {
     notices: Vec<String>,
 }
 
-/// Duration of the scene, s: a year, longer than any experiment.
+/// Duration of the run, s: a year, longer than any experiment.
 const DURATION_S: f64 = 31_536_000.0;
 
-/// A parameter of the device, and its value from a hand's manner.
+/// Parameter id of the device, and conversion of a hand's movement to the parameter's value.
 type HandParameter = (&'static str, fn(&HandManner) -> f64);
 
 /// Settings of the simulated hand, by parameter id of the device.
@@ -146,8 +146,8 @@ const HAND: [HandParameter; 5] = [
 ];
 
 impl Apparatus {
-    /// Checks an experiment against a scene: model and parameter exist, the model accepts every stimulus, and the device supports
-    /// the scene. Not real-time; energises nothing.
+    /// Checks an experiment against a scene: model and parameter exist, the model accepts the smallest and largest stimulus,
+    /// and the device supports the scene. Not real-time; energises nothing.
     ///
     /// # Errors
     /// The first [`ApparatusError`] found.
@@ -155,8 +155,8 @@ impl Apparatus {
         Self::check_with(scene, protocol, Strength::UnderCeiling)
     }
 
-    /// Checks as [`Self::check`] does, for devices of a given strength. Rejects forces above the host's ceiling unless they are
-    /// allowed. Not real-time; energises nothing.
+    /// Checks as [`Self::check`] does. `strength` permits or rejects devices with limits above the host's force ceiling;
+    /// [`Self::check`] rejects them. Not real-time; energises nothing.
     ///
     /// # Errors
     /// The first [`ApparatusError`] found.
@@ -204,12 +204,12 @@ impl Apparatus {
         &self.notices
     }
 
-    /// Returns the permitted strength of the devices.
+    /// Returns whether devices with limits above the host's force ceiling are permitted.
     pub(super) fn strength(&self) -> Strength {
         self.strength
     }
 
-    /// Checks that the first device has a simulated hand.
+    /// Checks that the first device has all parameters of a simulated hand.
     ///
     /// # Errors
     /// [`ApparatusError::NoHand`].
@@ -224,7 +224,8 @@ impl Apparatus {
         })
     }
 
-    /// Returns the configuration that determines the stimuli, for the log: scene, settings, plugins with versions.
+    /// Returns the configuration that determines the stimuli, for the log: scene, servo rate, and plugins with version and
+    /// settings.
     #[must_use]
     pub fn description(&self) -> Value {
         let plugin = |plugin: &PluginReport| {
@@ -239,7 +240,7 @@ impl Apparatus {
         })
     }
 
-    /// Hashes the files named by settings of the scene. Not real-time: reads the files.
+    /// Returns the files named by settings of the scene, with their hashes. Not real-time: reads the files.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -250,7 +251,8 @@ impl Apparatus {
         named.map(|(used_as, path)| input(used_as, &path)).collect()
     }
 
-    /// Hashes the plugin files: another build of the same version may be another stimulus. Not real-time: reads the files.
+    /// Returns the files of plugins in shared libraries, with their hashes: another build of the same version may present
+    /// another stimulus. Not real-time: reads the files.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -259,7 +261,7 @@ impl Apparatus {
         in_files.map(|plugin| input(plugin.name.clone(), &plugin.metadata.path)).collect()
     }
 
-    /// Estimates the disk space of full recording, bytes per second (measured: 466 bytes per tick with one device).
+    /// Estimates the disk space of a full recording, bytes per second (measured: 466 bytes per tick with one device).
     #[must_use]
     pub fn recording_bytes_per_s(&self) -> f64 {
         470.0 * self.scene.rate_hz * self.scene.devices.len() as f64
@@ -285,11 +287,11 @@ impl Apparatus {
         &self.scene
     }
 
-    /// Returns the scene with the hand of a simulated subject.
+    /// Returns the scene with the hand parameters of a simulated subject.
     pub(super) fn scene_with_hand(&self, seed: u64, subject: SubjectNumber) -> Scene {
         let hand = HandManner::of(seed, subject);
         let mut scene = self.scene.clone();
-        // Inserted in front, so that settings of the scene or a person take precedence.
+        // Insert at the front, so that settings of the scene or the command line take precedence.
         let parameters = HAND.iter().map(|(id, value)| text(id, value(&hand)));
         if let Some(device) = scene.devices.first_mut() {
             device.plugin.parameters.splice(0..0, parameters);
@@ -297,7 +299,7 @@ impl Apparatus {
         scene
     }
 
-    /// Describes the run, for a recording.
+    /// Returns the description of the run for a recording.
     pub(super) fn describe(&self, scene: &Scene, clock: Clock, seed: u64) -> RunDescription {
         describe(scene, &options(clock, seed), &self.plugins)
     }
@@ -307,12 +309,12 @@ impl Apparatus {
         self.fade_s
     }
 
-    /// Fades the object in or out.
+    /// Starts to fade the object in (`shown`) or out.
     pub(super) fn show(&self, controls: &Controls, shown: bool) -> Result<(), ControlError> {
         controls.set_weight(&self.stimulus.model, if shown { self.weight } else { 0.0 })
     }
 
-    /// Sets the next value; the object should be faded out.
+    /// Changes the stimulus to `value`; the object should be faded out.
     pub(super) fn set(&self, controls: &Controls, value: f64) -> Result<(), ControlError> {
         let Stimulus { model, parameter } = &self.stimulus;
         let value = value.to_string();
@@ -349,7 +351,7 @@ fn text(key: &str, value: f64) -> ParameterText {
     ParameterText { key: key.to_owned(), value: value.to_string(), location }
 }
 
-/// Finds a model by its name, else by its plugin's id.
+/// Finds the model of the stimulus by its name in the scene, else by its plugin's id.
 fn find_model<'s>(scene: &'s Scene, stimulus: &Stimulus) -> Result<&'s ModelUse, ApparatusError> {
     let models = &scene.models;
     let by_name = models.iter().find(|model| model.name == stimulus.model);

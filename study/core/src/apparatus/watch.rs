@@ -1,4 +1,4 @@
-//! Observer of a presentation: computes movement measures and records every tick on request.
+//! Observer of a presentation: computes movement measures and, on request, records every tick.
 
 use crate::kinematics::{KinematicsMeter, Sample};
 use flotor_core::trace::{Events, TickRecord};
@@ -12,23 +12,24 @@ use std::io;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::JoinHandle;
 
-/// Thread of a run.
+/// Handle of the thread of a run.
 pub type RunThread = JoinHandle<Result<Outcome, RunError>>;
 
 /// Observer of every tick of a study.
 #[derive(Default)]
 pub struct Watch {
-    /// Active while a stimulus is felt.
+    /// Accumulator of movement measures; `None` unless a stimulus is felt.
     pub meter: Option<KinematicsMeter>,
     /// Recording of the trial in progress.
     pub recording: RunRecording,
-    /// Model outputs to request ahead of the recordings of later trials: the loop applies a request some ticks later.
+    /// Model outputs requested already before the recordings of later trials, because the loop applies a request some ticks
+    /// later; `None` without recordings.
     pub ahead: Option<Demand>,
-    /// Ticks missed since the last reset.
+    /// Number of ticks missed since the last reset.
     pub missed_ticks: u64,
     /// True if the handle was out of its range in the last tick.
     pub out_of_range: bool,
-    /// A stimulus change that the model rejected.
+    /// Newest stimulus change that the model rejected.
     pub refused: Option<Change>,
 }
 
@@ -54,7 +55,7 @@ impl Observer for Watch {
     }
 }
 
-/// Runs a session in a thread of its own, and notifies its clients of the end with a text.
+/// Runs a session in a new thread; at the end of the run notifies its clients with the text `end`.
 ///
 /// # Errors
 /// If the thread cannot be created.
@@ -72,12 +73,12 @@ pub fn spawn_run(
     })
 }
 
-/// Shared handle to a [`Watch`] for the observers' thread and its readers; never for the servo thread.
+/// Shared handle to a [`Watch`], for the observers' thread and the experiment; must not be used in the servo thread.
 #[derive(Clone, Default)]
 pub struct Shared(Arc<Mutex<Watch>>);
 
 impl Shared {
-    /// Locks the collected data. Not real-time: waits for the observers.
+    /// Locks the collected data. Not real-time: waits for the observers' thread.
     pub fn lock(&self) -> MutexGuard<'_, Watch> {
         flotor_core::lock(&self.0)
     }
@@ -102,7 +103,7 @@ impl Observer for Shared {
     }
 }
 
-/// Extracts vertical motion and force from a tick.
+/// Extracts vertical motion and commanded force from a tick.
 fn sample(record: &TickRecord) -> Sample {
     Sample {
         dt_s: record.dt_ns as f64 * 1.0e-9,

@@ -1,5 +1,5 @@
-//! Merges generated files with edits of people, as BIDS requires: preserves added columns and keys, and added values where the
-//! program has none.
+//! Merging of generated files with edits by people, as BIDS requires: preserves added columns, rows and keys, and values where
+//! the program has none.
 
 use super::table::MISSING;
 use serde_json::{Map, Value};
@@ -11,7 +11,7 @@ pub enum Unmergeable {
     /// The table lacks its key column.
     #[error("the first line has no column `{0}`; separate the columns with tabs")]
     NoKey(&'static str),
-    /// A line whose number of cells differs from the number of columns.
+    /// The number of cells in a line differs from the number of columns.
     #[error("line {line} has {cells} cells instead of {columns}, one for each column")]
     Ragged {
         /// Line, from 1.
@@ -33,7 +33,7 @@ struct Table<'t> {
 }
 
 impl<'t> Table<'t> {
-    /// Parses a table; accepts the line ends and byte-order mark of a spreadsheet.
+    /// Parses a table; accepts the CRLF line ends and the byte order mark (BOM) that spreadsheets write.
     fn read(text: &'t str, key: &'static str) -> Result<Self, Unmergeable> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
@@ -64,11 +64,11 @@ impl<'t> Table<'t> {
     }
 }
 
-/// Merges two tables: adds columns and rows of the earlier one, and replaces `n/a` by the earlier cell. Returns `None` if the
-/// result equals the earlier table.
+/// Merges a generated table with an earlier one: adds columns and rows that only the earlier table has, and replaces `n/a` with
+/// the earlier cell. Returns `None` if the result equals the earlier table.
 ///
 /// # Errors
-/// [`Unmergeable`] if the earlier text is not such a table.
+/// [`Unmergeable`] if the earlier text is not a table with the key column first.
 pub(super) fn table(
     earlier: &str,
     generated: &str,
@@ -96,8 +96,8 @@ pub(super) fn table(
     Ok(Some(lines.collect()))
 }
 
-/// Merges two objects: for a common key the earlier value wins unless the program owns the key. Returns `None` if the result equals
-/// the earlier object.
+/// Merges a generated JSON object with an earlier one: for a common key the earlier value is kept unless the key is in `owned`,
+/// with missing members of nested objects added. Returns `None` if the result equals the earlier object.
 ///
 /// # Errors
 /// [`Unmergeable`] if the earlier text is not an object.
@@ -120,7 +120,7 @@ pub(super) fn object(
     Ok((merged != earlier).then_some(merged))
 }
 
-/// Adds the keys of `more` that an object lacks; does not change other values.
+/// Adds the keys of `more` that an object lacks, recursively; does not change other values.
 fn complete(kept: &mut Value, more: Value) {
     if let (Value::Object(kept), Value::Object(more)) = (kept, more) {
         for (key, value) in more {

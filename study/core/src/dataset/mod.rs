@@ -8,8 +8,9 @@
 //! DIR/sourcedata/sub-01/sub-01_task-jnd_log.jsonl        the event log: source of all other files
 //! ```
 //!
-//! The logs are the primary data. Tables are generated from them atomically (written aside, then renamed) and can be regenerated at any
-//! time. Lists of participants and scans, and descriptions, are merged instead of replaced: BIDS asks people to extend them (`kept`).
+//! The logs are the primary data. Tables are generated from the logs, written atomically (to a temporary file, then renamed),
+//! and can be regenerated at any time. Lists of participants and scans, and descriptions, are merged with the existing files
+//! instead of replaced, because BIDS asks people to extend them (`kept`).
 
 mod kept;
 mod table;
@@ -34,16 +35,16 @@ pub struct Dataset {
 pub enum Progress {
     /// No log yet.
     New,
-    /// Began, but is not complete.
+    /// The sitting began and is not complete.
     Partial(Box<SittingLog>),
-    /// Complete.
+    /// The sitting is complete.
     Complete,
 }
 
 /// Policy for subjects with an existing log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExistingLogPolicy {
-    /// Rejects such subjects.
+    /// Rejects subjects with a log.
     Refuse,
     /// Skips complete subjects and resumes incomplete ones.
     Resume,
@@ -66,18 +67,18 @@ pub enum DatasetError {
         /// Error of the system.
         cause: std::io::Error,
     },
-    /// A file edited by people cannot be merged.
+    /// A file edited by people cannot be merged with the generated one.
     #[error("{}: {problem}; correct the file, or remove it: the program then writes a new file", path.display())]
     Unmergeable {
         /// Path of the file.
         path: PathBuf,
-        /// Reason.
+        /// Reason why the file cannot be merged.
         problem: Unmergeable,
     },
     /// The folder has no study.
     #[error("{}: not the folder of a study (no logs under sourcedata/); give the folder of `study --out`", .0.display())]
     NoStudy(PathBuf),
-    /// Logs of different studies in one folder.
+    /// The folder has logs of different studies.
     #[error("{}: {what}, unlike {}; delete the file that does not belong to the study, or use another folder", path.display(), other.display())]
     Mixed {
         /// Path of one of the logs.
@@ -87,7 +88,7 @@ pub enum DatasetError {
         /// Description of the difference.
         what: String,
     },
-    /// A log in another subject's or task's place: its subject would count twice or under another number.
+    /// A log is at the path of another subject or task, where its subject could count twice or under another number.
     #[error("{}: the log is of {subject}, task {task}, and is in the wrong folder; remove the log, or move it to \
     {}", path.display(), place.display())]
     Misplaced {
@@ -97,10 +98,10 @@ pub enum DatasetError {
         subject: SubjectNumber,
         /// Task of the log.
         task: &'static str,
-        /// Correct folder of such a log.
+        /// Correct path of the log.
         place: PathBuf,
     },
-    /// The configuration differs from the one that the study began with.
+    /// The configuration differs from the configuration at the start of the study.
     #[error("{}: {what}; restore the settings of the start, or use another folder", path.display())]
     Changed {
         /// Path of one of the study's logs.
@@ -116,7 +117,7 @@ pub enum DatasetError {
         path: PathBuf,
         /// The changed file.
         now: InputFile,
-        /// Hash of the original file.
+        /// Hash of the file at the start of the sitting.
         then: String,
     },
     /// The subject is already complete.
@@ -147,7 +148,7 @@ impl DatasetError {
 }
 
 impl Dataset {
-    /// Returns the data set in a folder, which need not exist yet.
+    /// Creates the handle of the data set in a folder, which need not exist yet.
     #[must_use]
     pub fn at(root: &Path) -> Self {
         Self { root: root.into() }
@@ -165,7 +166,7 @@ impl Dataset {
         self.root.join(format!("sourcedata/{subject}/{subject}_task-{task}_log.jsonl"))
     }
 
-    /// Returns the folder for further recordings of a subject.
+    /// Returns the folder for the log and the recordings of a subject.
     #[must_use]
     pub fn source_folder(&self, subject: SubjectNumber) -> PathBuf {
         self.root.join(format!("sourcedata/{subject}"))
@@ -178,7 +179,7 @@ impl Dataset {
     /// Reads and verifies all logs, in the order of their subjects.
     ///
     /// # Errors
-    /// If a log is invalid, there is no log, or logs belong to different experiments.
+    /// If a log is invalid or misplaced, there is no log, or logs belong to different studies.
     pub fn logs(&self) -> Result<Vec<SittingLog>, DatasetError> {
         let mut logs = Vec::new();
         self.each_log(|log| {
@@ -223,16 +224,17 @@ impl Dataset {
         if paths.is_empty() { Err(DatasetError::NoStudy(self.root.clone())) } else { Ok(paths) }
     }
 
-    /// Returns the progress of a subject whose sitting may begin or resume.
+    /// Returns the progress of the subject of `begin`, after checking that the sitting may begin or resume.
     ///
     /// # Errors
-    /// If a log is invalid, `existing_log` forbids to continue, or the study began with another configuration.
+    /// If a log is invalid or in use, `existing_log` is [`ExistingLogPolicy::Refuse`] and there is a log, or the study began
+    /// with another configuration.
     pub fn progress(&self, begin: &Begin, existing_log: ExistingLogPolicy) -> Result<Progress, DatasetError> {
         let (subject, root) = (begin.subject, self.root.clone());
         let path = self.log_path(subject, begin.protocol.task());
         let log = match SittingLog::read(&path) {
             _ if !path.exists() => None,
-            // Killed before the first line was complete: nothing was recorded.
+            // The process was killed before the first line was complete: nothing was recorded.
             Err(LogError { problem: LogProblem::Empty, .. }) => None,
             log => Some(Box::new(log?)),
         };
@@ -257,7 +259,7 @@ impl Dataset {
         }
     }
 
-    /// Begins a sitting with a new log.
+    /// Begins a sitting: creates its log and writes `begin` as the first line.
     ///
     /// # Errors
     /// If the log exists or cannot be written.
@@ -272,10 +274,10 @@ impl Dataset {
         Ok((sitting, writer))
     }
 
-    /// Writes the tables of every complete sitting and their description files.
+    /// Writes the tables of all complete sittings, the list of participants, and the description files.
     ///
     /// # Errors
-    /// If a log is invalid or a file cannot be written.
+    /// If a log is invalid, or a file cannot be merged or written.
     pub fn write_tables(&self) -> Result<(), DatasetError> {
         let mut participants = table::PARTICIPANTS_HEAD.to_owned();
         let mut first = None;
@@ -310,7 +312,7 @@ impl Dataset {
     }
 }
 
-/// Writes a file, merged with an earlier one that people may have edited.
+/// Writes a generated file, merged with an existing file that people may have edited.
 fn complete(
     path: &Path,
     generated: &str,
@@ -356,7 +358,7 @@ fn pretty(object: Map<String, Value>) -> String {
     serde_json::to_string_pretty(&Value::Object(object)).unwrap_or_default() + "\n"
 }
 
-/// Checks that a sitting belongs to the study of a log.
+/// Checks that configuration and input files of a sitting equal those of a log.
 fn same_study(begin: &Begin, log: &SittingLog) -> Result<(), DatasetError> {
     let path = || log.path().to_path_buf();
     if let Some(what) = begin.differs(&log.begin) {
@@ -370,8 +372,8 @@ fn same_study(begin: &Begin, log: &SittingLog) -> Result<(), DatasetError> {
     }
 }
 
-/// Returns true for the log of a sitting. Names with a leading dot are ignored: macOS adds a file `._NAME` for each file that it
-/// copies to a stick.
+/// Returns true for the log of a sitting. Names with a leading dot are ignored: macOS adds a file `._NAME` for each file that
+/// it copies to a USB stick.
 fn is_log(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.ends_with("_log.jsonl") && !name.starts_with('.')

@@ -9,10 +9,10 @@ use crate::sitting::Verdict;
 use crate::trial::{Judgement, Presented, Response};
 use serde_json::{Map, Value, json};
 
-/// Missing value in BIDS.
+/// Text for a missing value in BIDS.
 pub(super) const MISSING: &str = "n/a";
 
-/// Name and meaning of each column.
+/// Name and description of each column.
 const COLUMNS: [(&str, &str); 30] = [
     ("trial", "Count of presentations in the sitting, from 1"),
     (
@@ -52,7 +52,7 @@ const COLUMNS: [(&str, &str); 30] = [
     ("observer", "human, or simulated: no person was tested"),
 ];
 
-/// Returns the table of one sitting.
+/// Returns the tab-separated table of one sitting.
 pub(super) fn trials(log: &SittingLog) -> String {
     let head: Vec<&str> = COLUMNS.iter().map(|(name, _)| *name).collect();
     let codes = Codes::new(&log.begin.protocol, log.begin.seed);
@@ -158,7 +158,7 @@ fn row(record: &TrialRecord, codes: &Codes, log: &SittingLog) -> Vec<String> {
     ]
 }
 
-/// Returns the sidecar of the tables, and its keys that the program owns.
+/// Returns the JSON sidecar of the tables, and those of its keys that the program overwrites.
 pub(super) fn columns(protocol: &Protocol) -> (Map<String, Value>, &'static [&'static str]) {
     let mut sidecar = Map::new();
     sidecar.insert("TaskName".to_owned(), json!(protocol.task()));
@@ -170,7 +170,7 @@ pub(super) fn columns(protocol: &Protocol) -> (Map<String, Value>, &'static [&'s
     (sidecar, &["TaskName", "Stimulus", "Protocol"])
 }
 
-/// Returns the description of the data set, and its keys that the program owns.
+/// Returns the description of the data set, and those of its keys that the program overwrites.
 pub(super) fn description(begin: &Begin) -> (Map<String, Value>, &'static [&'static str]) {
     let description = json!({
         "Name": format!("Perception study: {}", begin.protocol.task()),
@@ -188,7 +188,7 @@ pub(super) fn description(begin: &Begin) -> (Map<String, Value>, &'static [&'sta
 /// First column of the list of scans.
 pub(super) const SCAN: &str = "filename";
 
-/// Returns the list of a subject's recordings with the time of day; `None` if the time is unknown.
+/// Returns the list of scans of a subject: the sitting's table with the start time; `None` if the time is unknown.
 pub(super) fn scans(log: &SittingLog) -> Option<String> {
     let (subject, task) = (log.begin.subject, log.begin.protocol.task());
     let began = log.began?;
@@ -201,7 +201,7 @@ pub(super) const PARTICIPANT: &str = "participant_id";
 /// Header of the list of participants.
 pub(super) const PARTICIPANTS_HEAD: &str = "participant_id\tobserver\tfirst_modality\tcomplete\tpresentations\tresumed\tincidents\tage\tsex\thandedness\n";
 
-/// Returns a participant's line.
+/// Returns a participant's line in the list of participants.
 pub(super) fn participant(log: &SittingLog) -> String {
     let subject = log.begin.subject;
     let observer = log.begin.observer_kind().word();
@@ -214,7 +214,7 @@ pub(super) fn participant(log: &SittingLog) -> String {
     format!("{subject}\t{observer}\t{first}\t{complete}\t{}\t{}\n", counts.join("\t"), person.join("\t"))
 }
 
-/// Returns the descriptions of the participant columns; the program owns none of them.
+/// Returns the descriptions of the participant columns; the program overwrites none of them.
 pub(super) fn participant_columns() -> (Map<String, Value>, &'static [&'static str]) {
     let columns = json!({
         "observer": { "Description": "human, or simulated: no person was tested" },

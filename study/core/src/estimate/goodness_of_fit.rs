@@ -1,5 +1,5 @@
-//! Goodness of fit of an observer (Wichmann and Hill, Perception & Psychophysics 63:1293, 2001: by simulation, because a track has
-//! too few answers at a difference for the chi-square distribution).
+//! Goodness of fit of an observer, by simulation (Wichmann and Hill, Perception & Psychophysics 63:1293, 2001): a track has too
+//! few answers at each difference for the chi-square distribution.
 
 use super::{Observation, probability};
 use crate::observer::TernaryObserver;
@@ -9,22 +9,23 @@ use serde::Serialize;
 
 /// Number of simulated answer sets.
 const SETS: u32 = 999;
-/// Maximum number of classes of the difference, and minimum number of answers per class.
+/// Maximum number of classes; below, number of answers per class from which on there are more classes than one.
 const CLASSES_MOST: usize = 4;
 const ANSWERS_LEAST: usize = 6;
 
-/// Pearson's chi-square of the three kinds of answers in classes of the difference, against the fitted observer.
+/// Pearson's chi-square test of the three kinds of answers, in classes of similar differences, against the fitted observer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GoodnessOfFit {
-    /// Sum over classes and kinds of the squared distance over the number expected.
+    /// Pearson's statistic: sum over classes and kinds of answer of `(observed - expected)² / expected`.
     pub chi_square: f64,
-    /// Number of classes of the difference.
+    /// Number of classes into which the differences are divided.
     pub classes: usize,
-    /// Probability of a larger sum: share among answer sets simulated from the fitted observer at the same differences.
+    /// p-value: fraction of answer sets with an equal or larger statistic, among sets simulated from the fitted observer at the
+    /// same differences and the observed set.
     pub p: f64,
 }
 
-/// Tests the fit of an observer to answers. The simulation has a fixed seed, so equal answers give equal probabilities.
+/// Tests the fit of an observer to answers. The simulation has a fixed seed, so equal answers give equal p-values.
 pub(super) fn of(observations: &[Observation], observer: &TernaryObserver) -> GoodnessOfFit {
     let mut sorted = observations.to_vec();
     sorted.sort_by(|a, b| a.delta.total_cmp(&b.delta));
@@ -73,7 +74,7 @@ pub(super) fn of(observations: &[Observation], observer: &TernaryObserver) -> Go
     }
 }
 
-/// Splits answers, sorted by difference, into classes of about equal size; equal differences share a class.
+/// Splits answers, sorted by difference, into classes of about equal size; answers to equal differences are in the same class.
 fn classes(sorted: &[Observation]) -> Vec<&[Observation]> {
     let most = (sorted.len() / ANSWERS_LEAST).clamp(1, CLASSES_MOST);
     let mut found = Vec::new();

@@ -1,8 +1,8 @@
-//! Threshold estimators that use all answers, more precise than the mean of a few reversals.
+//! Threshold estimators that use all answers; more precise than the mean of a few reversals.
 //!
-//! An observer has two parameters (`sigma`, `criterion`; see [`TernaryObserver`]), estimated by the likelihood of the answers and a
-//! weak prior. [`most_likely`] finds the best pair for any trials, however placed; [`Posterior`] holds the probabilities of many
-//! pairs, from which the next trial can be chosen as well.
+//! An observer has two parameters (`sigma`, `criterion`; see [`TernaryObserver`]), estimated from the likelihood of the answers
+//! and a weakly informative prior. [`most_likely`] finds the most likely pair of parameters for any set of trials;
+//! [`Posterior`] holds the probabilities of a grid of pairs, from which the next trial can be chosen as well.
 
 mod goodness_of_fit;
 mod most_likely;
@@ -22,30 +22,31 @@ use crate::trial::Judgement;
 use flotor_statistics::distribution::{normal_below, normal_density};
 use serde::{Deserialize, Serialize};
 
-/// One answer: its difference, as a share of the base, and its judgement.
+/// Judged answer to a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observation {
-    /// Difference of comparison and base, as a share of the base.
+    /// Magnitude of the difference of comparison and base, as a fraction of the base.
     pub delta: f64,
     /// Judgement of the answer.
     pub judgement: Judgement,
 }
 
-/// Prior before the first answer: the threshold lognormal about the middle of those published for stiffness (8 to 25 %, whose geometric
-/// mean is 14 %), so wide that all of them lie within one deviation; the criterion a non-negative normal, from people who always answer to
-/// people who say "I don't know" in half of the trials. The prior is on the threshold, not on sigma, because the threshold is the quantity
-/// of interest: an observer without "I don't know" has another sigma at the same threshold, and a prior on sigma would separate the two.
+/// Prior before the first answer. By default the threshold is lognormal about the geometric mean of the thresholds published
+/// for stiffness (8 to 25 %, geometric mean 14 %), so wide that all of them lie within one standard deviation; the criterion is
+/// a normal distribution truncated at 0, from people who always name a stimulus to people who say "I don't know" in half of the
+/// trials. The prior is on the threshold, not on sigma, because the threshold is the quantity of interest: an observer without
+/// "I don't know" has another sigma at the same threshold, and a prior on sigma would separate the two.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
-    /// Median of the threshold, as a share of the base.
+    /// Median of the threshold, as a fraction of the base.
     pub threshold_median: f64,
-    /// Deviation of the logarithm of the threshold.
+    /// Standard deviation of the natural logarithm of the threshold.
     pub threshold_spread: f64,
-    /// Most likely criterion.
+    /// Mode of the criterion, in standard deviations of the noise.
     pub criterion_mode: f64,
-    /// Deviation of the criterion.
+    /// Standard deviation of the criterion before truncation, in standard deviations of the noise.
     pub criterion_spread: f64,
-    /// Fixed share of trials answered by chance: prevents one slip from outweighing all other answers.
+    /// Fixed lapse rate (fraction of trials answered by chance): prevents one slip from outweighing all other answers.
     pub lapse: f64,
 }
 
@@ -62,13 +63,14 @@ impl Default for Prior {
 }
 
 impl Prior {
-    /// Returns the observer with a given criterion who, while attentive, reaches the target at `threshold`.
+    /// Returns the observer with a given criterion who, lapses aside, reaches the target at `threshold`.
     fn observer(&self, threshold: f64, criterion: f64, target: f64) -> TernaryObserver {
         let sigma = threshold / unit_threshold(criterion, target);
         TernaryObserver { sigma, criterion, bias: 0.0, lapse: self.lapse }
     }
 
-    /// Returns the logarithm of the density over log threshold and criterion, up to a constant.
+    /// Returns the logarithm of the prior density over log threshold and criterion, up to a constant; negative infinity for a
+    /// negative criterion.
     fn log_density(&self, log_threshold: f64, criterion: f64) -> f64 {
         if criterion < 0.0 {
             return f64::NEG_INFINITY;
@@ -79,7 +81,7 @@ impl Prior {
     }
 }
 
-/// Returns the threshold of an attentive observer of sigma 1: the solution of `P(correct) + P(don't know) / 2 = target`.
+/// Returns the threshold of an observer with sigma 1 and no lapses: the solution of `P(correct) + P(don't know) / 2 = target`.
 ///
 /// Newton's method; a test compares it with bisection.
 fn unit_threshold(criterion: f64, target: f64) -> f64 {
@@ -96,18 +98,18 @@ fn unit_threshold(criterion: f64, target: f64) -> f64 {
     delta
 }
 
-/// Estimated observer.
+/// Estimated parameters of an observer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Estimate {
-    /// Deviation of the noise, as a share of the base.
+    /// Standard deviation of the noise, as a fraction of the base.
     pub sigma: f64,
-    /// Criterion for "I don't know", in deviations of the noise.
+    /// Criterion for "I don't know", in standard deviations of the noise.
     pub criterion: f64,
-    /// Difference at which the target is reached, as a share of the base.
+    /// Difference at which the target is reached, as a fraction of the base.
     pub threshold: f64,
 }
 
-/// Returns the probability of an observer's answer.
+/// Returns the probability that an observer gives this answer.
 fn probability(observer: &TernaryObserver, observation: &Observation) -> f64 {
     let [correct, wrong] = observer.correct_and_wrong(observation.delta);
     match observation.judgement {

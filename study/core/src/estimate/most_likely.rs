@@ -1,17 +1,19 @@
-//! Most likely observer given prior and answers (maximum a posteriori).
+//! Most likely observer given prior and answers (maximum a posteriori estimate, MAP).
 //!
-//! The mode of a density depends on its scale. Here the density is over the slope, proportional to 1 / threshold, in which the likelihood
-//! is closest to symmetric; over the threshold or its logarithm the estimate of a single track would be several percent low.
+//! The mode of a density depends on the parametrisation. Here the parameter is the slope, proportional to 1 / threshold, for
+//! which the likelihood is closest to symmetric; with the threshold or its logarithm as the parameter, the estimate from a
+//! single track would be several percent too low.
 
 use super::{Estimate, Observation, Prior, probability};
 
-/// Steps of the coarse grid search in each direction from the prior's median, and their size in deviations of the prior.
+/// Number of steps of the coarse grid search in each direction from the prior's centre; below, their size in standard
+/// deviations of the prior.
 const COARSE_STEPS: i32 = 6;
 const COARSE_SIZE: f64 = 0.5;
-/// Halvings of the compass search: 0.25 down to 1e-5 deviations.
+/// Number of halvings of the step in the compass search: from 0.25 to 1e-5 standard deviations of the prior.
 const HALVINGS: u32 = 15;
 
-/// Finds the most likely observer and the difference at which the observer reaches the target.
+/// Finds the most likely observer, and the threshold: the difference at which the observer, lapses aside, reaches the target.
 ///
 /// The estimate does not depend on the procedure that placed the trials: given the differences, the likelihood is the same.
 #[must_use]
@@ -28,7 +30,7 @@ pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> 
         let observer = prior.observer(libm::exp(threshold), criterion, target);
         let likelihood: f64 =
             observations.iter().map(|observation| libm::log(probability(&observer, observation))).sum();
-        // Adding the log threshold converts the density over the logarithm to that over the slope.
+        // Adding the log threshold converts the density over the log threshold to the density over the slope (Jacobian).
         likelihood + log_density + threshold
     };
     let step =
@@ -49,7 +51,7 @@ pub fn most_likely(observations: &[Observation], prior: &Prior, target: f64) -> 
             consider(step(centre, steps), &mut best);
         }
     }
-    // Compass search: the posterior is smooth with one peak nearby.
+    // Compass search: the posterior is smooth and has one maximum nearby.
     let mut size = 0.5 * COARSE_SIZE;
     for _ in 0..HALVINGS {
         loop {

@@ -1,21 +1,23 @@
 //! Posterior over a grid of observers, and selection of the most informative next difference.
 //!
 //! Implements QUEST+ (Watson, Journal of Vision 17(3):10, 2017) with three answers. The information of a trial is the mutual
-//! information of answer and observer: the entropy of the predicted answer less its expected entropy for a known observer.
+//! information of answer and observer: the entropy of the predicted answer minus the expected entropy of the answer of a known
+//! observer.
 
 use super::{Observation, Prior, probability};
 use crate::observer::TernaryObserver;
 use crate::trial::Judgement;
 
-/// Grid of observers: thresholds evenly spaced in their logarithm, times criteria evenly spaced from 0.
+/// Number of thresholds in the grid of observers, evenly spaced in their logarithm; below, number of criteria, evenly spaced
+/// from 0.
 const THRESHOLDS: u32 = 31;
 const CRITERIA: u32 = 10;
-/// Extent of the grid, in deviations of the prior.
+/// Extent of the grid from the prior's centre, in standard deviations of the prior.
 const REACH: f64 = 3.0;
 /// Number of candidate differences, evenly spaced in their logarithm.
 const DELTAS: u32 = 40;
 
-/// Grid of observers and candidate differences, constant over a track.
+/// Grid of observers and candidate differences; constant during a track.
 #[derive(Clone, Debug)]
 pub struct PosteriorGrid {
     observers: Vec<Member>,
@@ -27,12 +29,12 @@ pub struct PosteriorGrid {
 struct Member {
     observer: TernaryObserver,
     prior: f64,
-    /// Probability of each answer, and the entropy of the answer, at each difference.
+    /// Probabilities of the three answers and their entropy, at each candidate difference.
     answers: Vec<([f64; 3], f64)>,
 }
 
 impl PosteriorGrid {
-    /// Builds the grid from a prior and the bounds of the differences.
+    /// Builds the grid from a prior, the target at the threshold, and the smallest and largest candidate difference.
     #[must_use]
     pub fn new(prior: &Prior, target: f64, least_delta: f64, most_delta: f64) -> Self {
         let share = |index: u32, of: u32| f64::from(index) / f64::from(of.saturating_sub(1).max(1));
@@ -65,7 +67,7 @@ fn entropy(shares: &[f64]) -> f64 {
     shares.iter().filter(|share| **share > 0.0).map(|share| -share * libm::log(*share)).sum()
 }
 
-/// Probability of each observer of a grid.
+/// Posterior probability of each observer of a grid.
 #[derive(Clone, Debug)]
 pub struct Posterior {
     weights: Vec<f64>,
@@ -80,7 +82,7 @@ impl Posterior {
         posterior
     }
 
-    /// Updates the posterior by an answer to any difference.
+    /// Updates the posterior with an answer to any difference (Bayes' rule).
     pub fn answer(&mut self, grid: &PosteriorGrid, observation: &Observation) {
         for (weight, member) in self.weights.iter_mut().zip(&grid.observers) {
             *weight *= probability(&member.observer, observation);
@@ -93,7 +95,7 @@ impl Posterior {
         self.weights.iter_mut().for_each(|weight| *weight /= sum);
     }
 
-    /// Returns the difference with the most informative answer.
+    /// Returns the candidate difference whose answer is expected to be the most informative.
     #[must_use]
     pub fn best_delta(&self, grid: &PosteriorGrid) -> f64 {
         let mut best = (f64::NEG_INFINITY, 0.0);

@@ -1,35 +1,36 @@
-//! Posterior of threshold, criterion and lapse by quadrature over their whole range.
+//! Posterior of threshold, criterion and lapse rate by quadrature over the whole range of each.
 //!
-//! A grid with fixed ends would truncate the interval where answers carry little information. Here the range of the threshold is
-//! determined first, as far as the posterior exceeds `e^-28` of its maximum.
+//! A grid with fixed ends would truncate the posterior if the answers carry little information. Here the range of the threshold
+//! is determined first: the range in which the posterior exceeds `e^-28` of its maximum.
 
 use super::{Observation, Prior, unit_threshold};
 use crate::trial::Judgement;
 use flotor_statistics::distribution::normal_below;
 use flotor_statistics::quadrature::{Density, Node, gauss_legendre};
 
-/// Half width of the search for the threshold's range, in deviations of the prior, and its step.
+/// Half-width of the search for the threshold's range, in standard deviations of the prior; below, the step.
 const REACH: i32 = 8;
 const STEP: f64 = 0.5;
-/// Logarithmic drop below the maximum at which the range ends.
+/// Drop of the log posterior below its maximum at which the range ends.
 const NEGLIGIBLE: f64 = 28.0;
-/// Upper end of the criterion, in deviations above its mode.
+/// Upper end of the criterion, in standard deviations above its mode.
 const CRITERION_REACH: f64 = 7.0;
-/// Half of the 95 % quantile of chi-square with one degree of freedom: the drop of the log-likelihood at the bound of a parameter.
+/// Half of the 95 % quantile of chi-square with one degree of freedom: drop of the log-likelihood at the ends of a 95 %
+/// likelihood-ratio interval.
 const BOUND: f64 = 1.920_729_410_347_062;
-/// Lower limit of the probability of an answer, against underflow.
+/// Lower limit of the probability of an answer; prevents underflow.
 const LEAST_PROBABILITY: f64 = 1.0e-30;
-/// Maximum number of equal answers per group, so that the product of their probabilities does not underflow.
+/// Maximum number of answers per group, so that the product of their probabilities does not underflow.
 const EQUAL_MOST: usize = 8;
-/// Limit below which a product is converted to its logarithm.
+/// Limit below which a product of probabilities is converted to its logarithm.
 const LEAST_PRODUCT: f64 = 1.0e-60;
 
-/// Prior of the share of trials without attention.
+/// Prior of the lapse rate.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum LapsePrior {
-    /// Known share.
+    /// Known lapse rate.
     Known(f64),
-    /// Exponential with this mean, up to 1.
+    /// Exponential distribution with this mean, truncated at 1.
     Exponential(f64),
 }
 
@@ -46,28 +47,28 @@ impl Nodes {
     const OF_THE_SEARCH: Self = Self { thresholds: 0, criteria: 12, lapses: 12 };
 }
 
-/// A criterion and the logarithm of its weight.
+/// Quadrature node of the criterion, with the logarithm of quadrature weight times prior density.
 struct Criterion {
     value: f64,
-    /// Threshold of an observer whose sigma is 1.
+    /// Threshold of an observer with sigma 1 and this criterion.
     unit: f64,
     log_weight: f64,
 }
 
-/// A share of lapses and the logarithm of its density over the root of the share.
+/// Lapse rate at a quadrature node, with the logarithm of its prior density over the square root of the lapse rate.
 struct Lapse {
     value: f64,
     node: Node,
     log_density: f64,
 }
 
-/// Equal answers to one difference, counted by kind.
+/// Answers to equal differences, counted by kind.
 struct Equal {
     delta: f64,
     counts: [usize; 3],
 }
 
-/// Observers of a prior, and the answers to explain.
+/// Answers, and the quadrature nodes of criterion and lapse rate.
 struct Model<'a> {
     prior: &'a Prior,
     answers: Vec<Equal>,
@@ -77,17 +78,17 @@ struct Model<'a> {
 
 /// Marginal densities and means of the posterior.
 pub(super) struct PosteriorDensity {
-    /// Density of the logarithm of the threshold.
+    /// Posterior density of the logarithm of the threshold.
     pub(super) log_threshold: Density,
-    /// Density of the root of the lapse, if the lapse is unknown.
+    /// Posterior density of the square root of the lapse rate; `None` if the lapse rate is known.
     pub(super) root_lapse: Option<Density>,
-    /// Posterior means: logarithms of threshold and sigma, criterion, lapse.
+    /// Posterior means: log threshold, log sigma, criterion, lapse rate.
     pub(super) mean_log_threshold: f64,
     pub(super) mean_log_sigma: f64,
     pub(super) mean_criterion: f64,
     pub(super) mean_lapse: f64,
-    /// True where the answers alone bound the threshold below and above: an infinite threshold lies outside the 95 % interval of
-    /// the likelihood ratio.
+    /// True where the answers alone bound the threshold, `[below, above]`: the limit of a zero or infinite threshold lies
+    /// outside the 95 % likelihood-ratio interval.
     pub(super) is_bounded: [bool; 2],
 }
 
@@ -126,7 +127,8 @@ impl<'a> Model<'a> {
         self.prior.log_density(log_threshold, self.prior.criterion_mode)
     }
 
-    /// Returns the logarithms of likelihood times density for each criterion and lapse.
+    /// Returns the logarithms of likelihood times prior density for each criterion and lapse rate (lapse rate fastest); the
+    /// quadrature weight of the lapse rate is not included.
     fn cells(&self, log_threshold: f64) -> Vec<f64> {
         let threshold = libm::exp(log_threshold);
         let mut cells = Vec::with_capacity(self.criteria.len() * self.lapses.len());
@@ -145,7 +147,7 @@ impl<'a> Model<'a> {
         cells
     }
 
-    /// Returns the log-likelihood of a threshold, averaged over criterion and lapse, up to a constant.
+    /// Returns the log-likelihood of a threshold, marginalised over criterion and lapse rate, up to a constant.
     fn log_likelihood(&self, log_threshold: f64) -> f64 {
         let cells = self.cells(log_threshold);
         let most = cells.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -156,7 +158,7 @@ impl<'a> Model<'a> {
     }
 }
 
-/// Returns the log-likelihood of answers, from the probabilities of an attentive observer and the share of lapses.
+/// Returns the log-likelihood of answers, from the probabilities without lapses and the lapse rate.
 fn log_likelihood(attentive: &[([f64; 2], [usize; 3])], lapse: f64) -> f64 {
     let (mut log, mut product) = (0.0, 1.0);
     for ([correct, wrong], counts) in attentive {
@@ -176,7 +178,7 @@ fn log_likelihood(attentive: &[([f64; 2], [usize; 3])], lapse: f64) -> f64 {
     log + libm::log(product)
 }
 
-/// Groups equal answers to equal differences.
+/// Groups answers to equal differences, at most [`EQUAL_MOST`] per group.
 fn equal(observations: &[Observation]) -> Vec<Equal> {
     let mut sorted = observations.to_vec();
     sorted.sort_by(|a, b| a.delta.total_cmp(&b.delta));
@@ -252,8 +254,8 @@ impl PosteriorDensity {
     }
 }
 
-/// Returns the range of the log threshold outside which the posterior is negligible, and whether the likelihood falls off at each
-/// end of the search.
+/// Returns the range of the log threshold outside which the posterior is negligible, and for each end of the search whether the
+/// likelihood there is below the bound of the 95 % likelihood-ratio interval.
 fn range(model: &Model<'_>) -> ([f64; 2], [bool; 2]) {
     let (median, spread) = (libm::log(model.prior.threshold_median), model.prior.threshold_spread);
     let at = |step: i32| median + spread * STEP * f64::from(step);

@@ -1,14 +1,14 @@
-//! Observer by posterior means.
+//! Estimate of an observer by posterior means.
 
 use super::posterior_density::{LapsePrior, Nodes, PosteriorDensity};
 use super::psychometric::NotBounded;
 use super::{Estimate, Observation, Prior};
 
-/// Node counts for means.
+/// Node counts for the means.
 const NODES: Nodes = Nodes { thresholds: 24, criteria: 16, lapses: 1 };
 
-/// Estimates the observer by posterior means, geometric for sigma and threshold, and returns the ends of the threshold that the
-/// answers do not bound.
+/// Estimates the observer by posterior means (geometric means for sigma and threshold); also returns on which sides the answers
+/// do not bound the threshold, `None` if they bound both.
 pub(crate) fn posterior_mean(
     observations: &[Observation],
     prior: &Prior,

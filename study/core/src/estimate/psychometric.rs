@@ -1,7 +1,8 @@
-//! Psychometric function of one subject in one condition: threshold and lapse with intervals, and goodness of fit.
+//! Psychometric function of one subject in one condition: threshold and lapse rate with credible intervals, and goodness of
+//! fit.
 //!
-//! The posterior combines the [`Prior`] of the other estimators with an exponential prior of the lapse, mean 2 % (as in Kuss, Jäkel
-//! and Wichmann 2005). Intervals hold 95 % of the posterior.
+//! The posterior combines the [`Prior`] of the other estimators with an exponential prior of the lapse rate, mean 2 % (as in
+//! Kuss, Jäkel and Wichmann 2005). Credible intervals contain 95 % of the posterior.
 
 use super::goodness_of_fit::{self, GoodnessOfFit};
 use super::posterior_density::{LapsePrior, Nodes, PosteriorDensity};
@@ -23,40 +24,40 @@ pub struct Psychometric {
     pub named: usize,
     /// Number of wrong answers.
     pub wrong: usize,
-    /// Probability of at least this many wrong answers by guessing.
+    /// p-value of worse than chance: probability of at least this many wrong answers by guessing (binomial, 0.5).
     pub p_chance: f64,
-    /// Median of the threshold, as a share of the base.
+    /// Posterior median of the threshold, as a fraction of the base.
     pub threshold: f64,
-    /// 95 % interval of the threshold; `None` at an end that only the prior bounds.
+    /// 95 % credible interval of the threshold, as fractions of the base; `None` at an end that only the prior bounds.
     pub threshold_interval: [Option<f64>; 2],
-    /// Ends of the threshold that the answers do not bound.
+    /// Sides on which the answers do not bound the threshold; `None` if they bound both.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_bounded: Option<NotBounded>,
-    /// Mean of the criterion.
+    /// Posterior mean of the criterion, in standard deviations of the noise.
     pub criterion: f64,
-    /// Mean share of trials without attention.
+    /// Posterior mean of the lapse rate.
     pub lapse: f64,
-    /// Upper bound of the lapse (97.5 % quantile).
+    /// Upper bound of the lapse rate (97.5 % quantile of the posterior).
     pub lapse_most: f64,
     /// Goodness of fit.
     pub fit: GoodnessOfFit,
 }
 
-/// Ends of an interval that the answers do not bound: without the prior, the interval of the likelihood ratio (95 %) would be
-/// infinite there.
+/// Unbounded sides of a threshold's interval: bounded by the prior alone, because the answers' 95 % likelihood-ratio interval
+/// is unbounded there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NotBounded {
-    /// Arbitrarily small thresholds fit as well.
+    /// Not bounded below: the answers are compatible with arbitrarily small thresholds.
     Below,
-    /// Arbitrarily large thresholds fit as well.
+    /// Not bounded above: the answers are compatible with arbitrarily large thresholds.
     Above,
-    /// Both ends are unbounded.
+    /// Bounded neither below nor above.
     Both,
 }
 
 impl NotBounded {
-    /// Converts the flags for the lower and the upper end.
+    /// Converts the flags of the lower and upper end; `None` if both are bounded.
     pub(super) fn of(is_bounded: [bool; 2]) -> Option<Self> {
         match is_bounded {
             [true, true] => None,
@@ -77,8 +78,8 @@ impl NotBounded {
     }
 }
 
-/// Estimates the psychometric function of answers; `target` is the share of correct answers at the threshold. Returns `None`
-/// without answers.
+/// Estimates the psychometric function of answers; `target` is the value of `P(correct) + P(don't know) / 2` at the threshold.
+/// Returns `None` without answers.
 #[must_use]
 pub fn psychometric(observations: &[Observation], prior: &Prior, target: f64) -> Option<Psychometric> {
     if observations.is_empty() {

@@ -4,7 +4,7 @@ use super::ExclusionRules;
 use crate::protocol::Protocol;
 
 impl ExclusionRules {
-    /// Checks the rules against an experiment.
+    /// Checks that the values are valid, and that the experiment has the trials that the rules need.
     ///
     /// # Errors
     /// The first invalid rule, as text.

@@ -12,7 +12,7 @@ pub struct LogError {
     pub path: PathBuf,
     /// Line number, from 1; 0 for the whole file.
     pub line: usize,
-    /// Reason.
+    /// Reason for the rejection of the log, or for the failed operation.
     #[source]
     pub problem: LogProblem,
 }
@@ -21,7 +21,7 @@ fn line_text(line: usize) -> String {
     if line == 0 { String::new() } else { format!(":{line}") }
 }
 
-/// Problem with a log.
+/// Reason for rejecting an event log, or for a failed operation on it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogProblem {
@@ -39,7 +39,7 @@ pub enum LogProblem {
     /// The log has no complete line.
     #[error("has no complete line, so it contains no data; remove the file")]
     Empty,
-    /// A line with invalid syntax.
+    /// A line has invalid syntax.
     #[error("is not a line of an event log: {0}")]
     Text(String),
     /// The hash chain is broken.
@@ -48,7 +48,7 @@ pub enum LogProblem {
          copy"
     )]
     Chain,
-    /// Unknown format revision.
+    /// The revision of the format is unknown, for example newer than this program.
     #[error(
         "format {found} is not supported, this version reads up to {FORMAT}; use the version that wrote the log"
     )]
@@ -56,10 +56,10 @@ pub enum LogProblem {
         /// Revision found in the log.
         found: u32,
     },
-    /// Event out of sequence.
+    /// An event is out of sequence; the text says which.
     #[error("{0}")]
     Order(&'static str),
-    /// The replayed experiment would have presented another trial.
+    /// The replayed experiment presents another trial or reaches another verdict.
     #[error(
         "trial {number} does not follow from protocol, seed and answers; another version of the program wrote the \
          log: use that version"

@@ -1,9 +1,9 @@
-//! Interruptions and disturbances of a sitting, as ethics boards require them.
+//! Interruptions and disturbances of a sitting, in the detail that ethics boards require to be logged.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// An interruption or a disturbance.
+/// Interruption or disturbance of a sitting.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "incident", rename_all = "kebab-case")]
 pub enum Incident {
@@ -32,7 +32,7 @@ pub enum Incident {
     },
     /// The system's time of day was set; the times of the sitting are unaffected.
     TimeOfDaySet {
-        /// Forward change, ms.
+        /// Change of the time of day, ms; positive forward, negative back.
         by_ms: i64,
     },
     /// The sitting ended without a log entry: the process was killed or the power failed. Logged on resumption.
@@ -45,7 +45,7 @@ pub enum Incident {
 }
 
 impl Incident {
-    /// Returns true if the sitting is interrupted until it is resumed.
+    /// Returns true for an interruption: the sitting ends until it is resumed.
     pub(super) fn ends_the_sitting(&self) -> bool {
         match self {
             Self::EmergencyStop { .. }

@@ -1,4 +1,4 @@
-//! The event log of a sitting: one line of JSON per event, on disk before the next trial begins.
+//! Event log of a sitting: one line of JSON per event, on disk before the next trial begins.
 //!
 //! ```text
 //! {"chain":"<64 hexadecimal digits>","event":{"begin":{...}}}
@@ -6,9 +6,9 @@
 //! {"chain":"...","event":{"trial":{...}},"time":"2026-11-25T18:34:09.123Z"}    with a person
 //! ```
 //!
-//! `chain` is the SHA-256 of the previous line's chain and of the rest of its own line, so a changed, missing or exchanged line
-//! breaks the chain from there on: protection against accidents, not against forgery, because anyone can recompute the chain. An
-//! incomplete last line is left by a killed process and is ignored.
+//! `chain` is the SHA-256 of the previous line's `chain` and of event and time of its own line, so a changed, missing or
+//! exchanged line breaks the chain from that line on. The chain protects against accidents, not against forgery, because anyone
+//! can recompute it. An incomplete last line, which a killed process leaves, is ignored.
 
 mod error;
 mod incident;
@@ -37,28 +37,28 @@ pub const FORMAT: u32 = 5;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Event {
-    /// First line, with all inputs needed to repeat the sitting.
+    /// First line: all inputs needed to repeat the sitting.
     Begin(Box<Begin>),
     /// A trial was presented and answered.
     Trial(Box<TrialEvent>),
-    /// The answer to the last trial was withdrawn; the trial is open again, and consequences of the answer are void.
+    /// The answer to the last trial was withdrawn: the trial is open again, and the state is as before the answer.
     Withdrawn {
         /// Trial number.
         trial: u32,
     },
-    /// The sitting was resumed.
+    /// The sitting was resumed after an interruption.
     Resume {
         /// Number of replayed trials.
         trials: u32,
         /// Version of the program.
         version: String,
     },
-    /// Note of the experimenter.
+    /// Note of the experimenter or the program.
     Note {
         /// Text of the note.
         text: String,
     },
-    /// An interruption or disturbance.
+    /// Interruption or disturbance.
     Incident(Incident),
     /// The sitting is complete.
     End {
@@ -128,7 +128,7 @@ impl ObserverKind {
 /// File that determines the stimuli of a sitting.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputFile {
-    /// Purpose: `measured.curve`, or `spring` for the file of a plugin.
+    /// Purpose: plugin and parameter such as `measured.curve`, or the plugin's name such as `spring` for the file of a plugin.
     pub used_as: String,
     /// File name without folder.
     pub name: String,
@@ -137,7 +137,8 @@ pub struct InputFile {
 }
 
 impl Begin {
-    /// Describes the first difference from an earlier sitting's configuration; subject and version may differ.
+    /// Describes the first difference from an earlier sitting's configuration; `None` if they are equal. Subject, person,
+    /// version and input files may differ.
     #[must_use]
     pub fn differs(&self, earlier: &Self) -> Option<String> {
         let what = Plan::differs(self.plan.as_ref(), earlier.plan.as_ref())
@@ -150,7 +151,8 @@ impl Begin {
         what.map(|what| format!("begun with {what}"))
     }
 
-    /// Returns the first input file whose content differs from the earlier file of the same purpose, and the earlier file.
+    /// Returns the first input file whose content differs from the earlier file of the same purpose, and the earlier file;
+    /// `None` if there is none.
     #[must_use]
     pub fn changed_input<'b>(&'b self, earlier: &'b Self) -> Option<(&'b InputFile, &'b InputFile)> {
         self.inputs.iter().find_map(|now| {
@@ -159,7 +161,7 @@ impl Begin {
         })
     }
 
-    /// Returns true for the sitting of a person, whose events have times of day.
+    /// Returns true for the sitting of a person; its events have times of day.
     #[must_use]
     pub fn is_of_a_person(&self) -> bool {
         self.observer_kind() == ObserverKind::Human
@@ -175,20 +177,21 @@ impl Begin {
         }
     }
 
-    /// Returns the servo rate, Hz, if a scene was presented.
+    /// Returns the servo rate, Hz; `None` if no scene was presented.
     #[must_use]
     pub fn rate_hz(&self) -> Option<f64> {
         let scene = self.apparatus.get("scene").filter(|scene| scene.is_object()).unwrap_or(&self.apparatus);
         scene.get("rate_hz")?.as_f64()
     }
 
-    /// Returns the exclusion rules of the study file.
+    /// Returns the exclusion rules of the study file; no rules without a study file.
     #[must_use]
     pub fn exclusion(&self) -> ExclusionRules {
         self.plan.as_ref().map(|plan| plan.exclusion.clone()).unwrap_or_default()
     }
 
-    /// Returns a digest of the configuration, equal for sittings that differ only in the subject.
+    /// Returns a digest of seed, protocol, observer and apparatus (16 hexadecimal digits of a SHA-256), equal for all subjects
+    /// of a study.
     #[must_use]
     pub fn config_hash(&self) -> String {
         let text = serde_json::to_string(&(self.seed, &self.protocol, &self.observer, &self.apparatus));
@@ -202,9 +205,9 @@ impl Begin {
 pub struct Plan {
     /// File name.
     pub file: String,
-    /// SHA-256 of the text.
+    /// SHA-256 of the text, hexadecimal.
     pub sha256: String,
-    /// Full text, so that a change can be shown.
+    /// Full text, so that a change can be described; empty in early logs.
     #[serde(skip_serializing_if = "String::is_empty", default)]
     pub text: String,
     /// Exclusion rules.
@@ -213,8 +216,8 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Describes the difference of the current file from the earlier one. Equal digests mean equal texts, regardless of the file
-    /// names. The number of subjects and the data folder may differ: neither affects a sitting.
+    /// Describes the difference of the current study file from the earlier one; `None` if they are equal. Only the texts count,
+    /// not the file names. The number of subjects and the data folder may differ: neither affects a sitting.
     fn differs(now: Option<&Self>, earlier: Option<&Self>) -> Option<String> {
         match (earlier, now) {
             (None, None) => None,
@@ -232,7 +235,7 @@ impl Plan {
     }
 }
 
-/// Blanks the lines of a study file that set the number of subjects or the data folder; line numbers do not change.
+/// Empties the lines of a study file that set the number of subjects or the data folder; line numbers do not change.
 fn without_size_and_folder(text: &str) -> String {
     let sets = |line: &str, key: &str| {
         line.trim_start().strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='))
@@ -243,7 +246,8 @@ fn without_size_and_folder(text: &str) -> String {
         .collect()
 }
 
-/// Describes the changed lines between two versions of a text; empty for an early log, which has only the digest.
+/// Describes the changed lines between two versions of a text; empty if `before` is empty, as for an early log that has only
+/// the digest.
 fn changed(before: &str, after: &str) -> String {
     if before.is_empty() {
         return String::new();
@@ -266,7 +270,7 @@ fn changed(before: &str, after: &str) -> String {
     format!(": line {} on had {}, and has {} now", same + 1, middle(&before), middle(&after))
 }
 
-/// Names a part of a sitting that has changed, and the first difference.
+/// Describes a changed part of the configuration with its first difference; `None` if the part is equal.
 fn another<T: PartialEq + Serialize>(what: &str, earlier: &T, now: &T) -> Option<String> {
     if earlier == now {
         return None;
@@ -276,7 +280,7 @@ fn another<T: PartialEq + Serialize>(what: &str, earlier: &T, now: &T) -> Option
     Some(place.map_or(format!("another {what}"), |place| format!("another {what}: {place}")))
 }
 
-/// Returns the path of the first difference of two values, with both values.
+/// Returns the path of the first difference between two JSON values, with both values; `None` if they are equal.
 fn difference(earlier: &Value, now: &Value, place: String) -> Option<String> {
     /// Longest value that is shown, characters.
     const MOST: usize = 60;
@@ -299,7 +303,7 @@ fn difference(earlier: &Value, now: &Value, place: String) -> Option<String> {
     }
 }
 
-/// Optional data on a person, for the BIDS columns.
+/// Optional data on a person, for the list of participants (BIDS).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Person {
     /// Age, years.
@@ -316,20 +320,20 @@ pub struct Person {
 /// Trial with its answer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrialEvent {
-    /// The presented trial.
+    /// Presented trial.
     pub trial: Trial,
     /// Answer of the subject.
     pub response: Response,
-    /// Judgement of the answer.
+    /// Verdict on the answer.
     pub verdict: Verdict,
     /// Measurements during the presentation.
     pub exploration: Exploration,
 }
 
-/// Chain value before the first line.
+/// Value of `chain` before the first line.
 const CHAIN_START: &str = "flotor-study-log";
 
-/// Returns the chain value of a line.
+/// Returns the `chain` of a line: the SHA-256 of the previous line's chain and of the chained text `event`.
 fn chain(before: &str, event: &str) -> String {
     let mut digest = Sha256::new();
     digest.update(before.as_bytes());
@@ -347,7 +351,7 @@ fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// Formats a line without its line end.
+/// Formats a line of the log without the line end.
 fn line(chain: &str, event: &str) -> String {
     format!("{{\"chain\":\"{chain}\",\"event\":{event}}}")
 }
@@ -357,13 +361,13 @@ fn stamped(event: &str, time: TimeOfDay) -> String {
     format!("{event},\"time\":\"{time}\"")
 }
 
-/// Splits the chained text into event and time; an event ends with a brace.
+/// Splits the chained text into event and time; without a time, the text is the event, which ends with a brace.
 fn unstamped(chained: &str) -> (&str, Option<&str>) {
     let time = chained.strip_suffix('"').and_then(|rest| rest.rsplit_once(",\"time\":\""));
     time.map_or((chained, None), |(event, time)| (event, Some(time)))
 }
 
-/// Splits a line into its chain value and the chained text.
+/// Splits a line into `chain` and the chained text; `None` for another syntax.
 fn parts(line: &str) -> Option<(&str, &str)> {
     let rest = line.strip_prefix("{\"chain\":\"")?;
     let (chain, rest) = rest.split_once("\",\"event\":")?;

@@ -1,4 +1,4 @@
-//! Reads and verifies a log: chain, syntax, order of events, and a replay of the experiment.
+//! Reader of a log, which verifies chain, syntax, order of events, and by a replay of the experiment the trials and verdicts.
 
 use super::error::{LogError, LogProblem};
 use super::{Begin, CHAIN_START, Event, FORMAT, Incident, LogWriter, TrialEvent, chain, parts, unstamped};
@@ -8,35 +8,36 @@ use crate::trial::{Response, Trial};
 use flotor_hal::read_file;
 use std::path::{Path, PathBuf};
 
-/// Maximum size of a log, bytes: hundreds of hours.
+/// Maximum size of a log, bytes; enough for hundreds of hours.
 const MOST_BYTES: u64 = 256 << 20;
 
 /// Logged trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrialRecord {
-    /// Trial, answer and judgement.
+    /// Trial, answer, verdict and exploration.
     pub event: TrialEvent,
-    /// Threshold of the track that this trial completed; `None` otherwise.
+    /// Result of the track that this trial completed; `None` if the trial completed no track.
     pub track: Option<TrackResult>,
 }
 
 /// Verified log.
 pub struct SittingLog {
-    /// The first line.
+    /// First line of the log.
     pub begin: Begin,
     /// Trials in order of presentation.
     pub trials: Vec<TrialRecord>,
-    /// Withdrawn answers, not among the trials.
+    /// Trials whose answers were withdrawn; not among [`Self::trials`].
     pub withdrawn: Vec<TrialEvent>,
-    /// Notes of the experimenter, each with the number of trials before it.
+    /// Notes of experimenter and program, each with the number of trials before it.
     pub notes: Vec<(u32, String)>,
-    /// Interruptions and disturbances, each with the number of trials before it.
+    /// Interruptions and disturbances, each with the number of trials before it and the time of day (`None` for simulated
+    /// observers).
     pub incidents: Vec<(u32, Option<TimeOfDay>, Incident)>,
     /// Start of the sitting; `None` for simulated observers.
     pub began: Option<TimeOfDay>,
     /// True if the sitting is complete.
     pub complete: bool,
-    /// Number of resumptions.
+    /// Number of times the sitting was resumed.
     pub resumed: u32,
     /// True if the last event, notes aside, explains the end or interruption of the sitting.
     has_reason_to_end: bool,
@@ -48,7 +49,8 @@ pub struct SittingLog {
 }
 
 impl SittingLog {
-    /// Reads a log, checks its chain, and replays the experiment: every trial and verdict must equal that of the state machine.
+    /// Reads a log, checks its chain, and replays the experiment: every trial and verdict must equal the result of the state
+    /// machine.
     ///
     /// # Errors
     /// [`LogError`] with line and reason.
@@ -65,7 +67,7 @@ impl SittingLog {
             let not_text = || at(number, LogProblem::Text("the file is not UTF-8".to_owned()));
             let text = std::str::from_utf8(bytes).map_err(|_| not_text())?;
             let text = text.strip_suffix('\n').unwrap_or(text);
-            // Line ends may have been changed by a copy through Windows or git.
+            // Windows programs or git may have changed the line ends to CRLF.
             let text = text.strip_suffix('\r').unwrap_or(text);
             let (found, event) = parts(text)
                 .ok_or_else(|| at(number, LogProblem::Text("no `chain` and `event`".to_owned())))?;
@@ -154,7 +156,7 @@ impl SittingLog {
 
     fn replay(&mut self, event: TrialEvent) -> Result<(), LogProblem> {
         let number = event.trial.number;
-        // Bit-exact: JSON keeps every digit of a number.
+        // The comparison is bit-exact, because a number in JSON keeps all digits.
         if self.sitting.next() != Some(event.trial) {
             return Err(LogProblem::Diverges { number });
         }
@@ -169,7 +171,7 @@ impl SittingLog {
         Ok(())
     }
 
-    /// Returns to the state before the last trial, by replaying all earlier answers.
+    /// Restores the state before the last trial by a replay of all earlier answers.
     fn withdraw(&mut self, number: u32) -> Result<(), LogProblem> {
         const LAST: &str = "`withdrawn` of another trial than the last";
         let is_last = |last: &TrialRecord| last.event.trial.number == number;
@@ -183,7 +185,7 @@ impl SittingLog {
         Ok(())
     }
 
-    /// Returns true if the open trial was answered before and the answer withdrawn.
+    /// Returns true if the next trial was already answered and the answer withdrawn.
     #[must_use]
     pub fn is_answered_anew(&self) -> bool {
         let open = self.sitting.presented() + 1;
@@ -196,13 +198,13 @@ impl SittingLog {
         &self.path
     }
 
-    /// Returns the thresholds of completed tracks.
+    /// Returns the results of the completed tracks.
     #[must_use]
     pub fn tracks(&self) -> &[TrackResult] {
         self.sitting.results()
     }
 
-    /// Returns trials and answers, for replay.
+    /// Returns all trials with their answers, in order, for a replay.
     pub fn answers(&self) -> impl Iterator<Item = (Trial, Response)> {
         self.trials.iter().map(|record| (record.event.trial, record.event.response))
     }
@@ -222,8 +224,8 @@ impl SittingLog {
         Ok(if self.begin.is_of_a_person() { writer.stamped() } else { writer })
     }
 
-    /// Returns the sitting at its next trial, and the open log: truncates an incomplete line and logs the resumption. If a person's
-    /// sitting was interrupted without a logged reason, logs [`Incident::Killed`].
+    /// Returns the sitting at its next trial, and the log open for writing. Truncates an incomplete last line and logs the
+    /// resumption. If a person's sitting was interrupted without a logged reason, logs [`Incident::Killed`].
     ///
     /// # Errors
     /// If the log is in use or cannot be written.

@@ -1,4 +1,4 @@
-//! Appends lines to a log and syncs each to disk.
+//! Writer of a log, which appends lines and syncs each to disk.
 
 use super::{CHAIN_START, Event, Incident, LogError, LogProblem, chain, line, stamped};
 use crate::platform::open_alone;
@@ -7,7 +7,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{Error, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-/// Open log, locked against other writers.
+/// Log open for writing, with exclusive write access.
 pub struct LogWriter {
     file: File,
     path: PathBuf,
@@ -23,7 +23,7 @@ enum Stamps {
 }
 
 impl LogWriter {
-    /// Creates a log. Overwrites a file without a complete line: its writer was killed before the first event.
+    /// Creates a log. Overwrites a file without a complete line: the process was killed before the first event was written.
     ///
     /// # Errors
     /// If the log exists, is open in another process, or cannot be created.
@@ -38,14 +38,15 @@ impl LogWriter {
             return Err(failed(Error::from(ErrorKind::AlreadyExists)));
         }
         cut(&mut file, 0).map_err(failed)?;
-        // Sync the folder, too: without this a crash may lose the new file's name.
+        // Sync the folder, too: without this a power failure may lose the new directory entry.
         if let Some(folder) = path.parent().and_then(|folder| File::open(folder).ok()) {
             let _ = folder.sync_all();
         }
         Ok(Self { file, path: path.into(), chain: CHAIN_START.to_owned(), stamps: Stamps::None })
     }
 
-    /// Continues a log of `read_bytes` after its `complete_bytes`, with the given chain value. Truncates the incomplete line after them.
+    /// Opens a log of `read_bytes` to continue it after its complete lines, `complete_bytes` long, whose last `chain` is given.
+    /// Truncates an incomplete last line.
     ///
     /// # Errors
     /// If the log is open in another process, has changed since it was read, or cannot be written.
@@ -76,7 +77,7 @@ impl LogWriter {
         }
     }
 
-    /// Enables the time of day in every line from now on.
+    /// Enables time stamps: from now on every line has the time of day.
     #[must_use]
     pub fn stamped(self) -> Self {
         Self { stamps: Stamps::Of(SittingClock::start()), ..self }
@@ -91,7 +92,8 @@ impl LogWriter {
         }
     }
 
-    /// Writes an event, preceded by an incident if the system's time of day was set. Returns once the event is on disk.
+    /// Writes an event; first an incident if the system's time of day was set. Returns once the event is on disk. Not
+    /// real-time.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -122,7 +124,7 @@ impl LogWriter {
         let before = self.file.metadata().map(|file| file.len());
         let written = self.file.write_all(&bytes).and_then(|()| self.file.sync_data());
         if let Err(cause) = written {
-            // A partial line in the middle would make the whole log unreadable.
+            // Remove a partial line: in the middle it would make the whole log unreadable.
             let _ = before.and_then(|length| self.file.set_len(length));
             return Err(LogError::file(&self.path, "cannot write the log", cause));
         }
@@ -131,7 +133,7 @@ impl LogWriter {
     }
 }
 
-/// Truncates a file and moves to its end.
+/// Truncates a file to a length and seeks to its end.
 fn cut(file: &mut File, bytes: u64) -> Result<(), Error> {
     file.set_len(bytes)?;
     file.seek(SeekFrom::End(0)).map(drop)

@@ -1,28 +1,29 @@
-//! Movement of a simulated subject's hand, constant over the sitting: pace, reach and grip.
+//! Movement of a simulated subject's hand, with the same parameters during the whole sitting.
 
 use crate::protocol::SubjectNumber;
 use crate::random::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
-/// Intended movement of a hand on a vertical object: up and down about a point below home at a constant pace, independent of the
-/// force. The hand is compliant, so a stiffer object moves less and pushes back more: speed and acceleration fall with the
-/// stiffness and force rises, contrary to section 5 of CMU-RI-TR-07-21 (`docs/src/experiments.md`, Simulated observers).
+/// Movement parameters of a simulated subject's hand, which explores along the vertical: intended movement up and down about a
+/// point below home, grip stiffness and tremor. The intended movement does not depend on the force. The hand is compliant, so a
+/// stiffer object moves less and pushes back more: speed and acceleration fall with the stiffness and force rises, contrary to
+/// section 5 of CMU-RI-TR-07-21 (`docs/src/experiments.md`, Simulated observers).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HandManner {
-    /// Cycles per second, Hz.
+    /// Frequency of the movement, Hz.
     pub frequency_hz: f64,
-    /// Middle of the intended movement above home, m.
+    /// Height of the middle of the intended movement above home, m; negative below.
     pub centre_m: f64,
     /// Half the distance between the intended turning points, m.
     pub amplitude_m: f64,
     /// Stiffness of the grip, N/m.
     pub stiffness_n_per_m: f64,
-    /// Physiological tremor, m rms.
+    /// Root mean square of the physiological tremor, m.
     pub tremor_m: f64,
 }
 
-/// Average hand: 1.5 cycles per second, from 2 mm above home to 10 mm below, a firm grip (2 N/mm, as the simulated hand), and the
-/// tremor of a braced hand (15 to 250 µm).
+/// Average hand: 1.5 Hz, from 2 mm above home to 10 mm below, a firm grip (2 N/mm, as the default of the simulated hand), and
+/// the tremor of a braced hand (15 to 250 µm).
 const AVERAGE: HandManner = HandManner {
     frequency_hz: 1.5,
     centre_m: -4.0e-3,
@@ -30,13 +31,13 @@ const AVERAGE: HandManner = HandManner {
     stiffness_n_per_m: 2000.0,
     tremor_m: 50.0e-6,
 };
-/// Spread between people, as the deviation of the logarithm.
+/// Spread between people: standard deviation of the logarithm of a parameter.
 const SPREAD: f64 = 0.15;
-/// Largest deviation from the average, in standard deviations: the handle stays in its range.
+/// Maximum deviation from the average, in standard deviations, so that the handle stays in its range.
 const FARTHEST: f64 = 2.0;
 
 impl HandManner {
-    /// Returns the hand of a subject, a function of seed and number alone.
+    /// Returns the movement parameters of a subject's hand; they depend on seed and subject number alone.
     #[must_use]
     pub fn of(seed: u64, subject: SubjectNumber) -> Self {
         let mut stream = Stream::new(seed, Purpose::Hand, subject.get(), 0);

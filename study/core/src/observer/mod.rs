@@ -14,16 +14,16 @@ use crate::trial::{Modality, Phase, Position, Presented, Response, Trial};
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Sensitivity to differences in one modality.
+/// Sensitivity to differences, in one modality.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensitivity {
-    /// Difference of one standard deviation of the noise, as a share of the base.
+    /// Standard deviation of the noise, as a fraction of the base.
     pub sigma: f64,
-    /// Evidence, in standard deviations, below which the answer is "I don't know".
+    /// Magnitude of the evidence, in standard deviations of the noise, up to which the answer is "I don't know".
     pub criterion: f64,
 }
 
-/// Quality with a published Weber fraction.
+/// Judged quality with a published Weber fraction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Percept {
     /// Stiffness, felt by pressing.
@@ -36,30 +36,31 @@ pub enum Percept {
 
 /// Distribution of simulated subjects in a study.
 ///
-/// The defaults are for stiffness and reproduce the published result (Weber fractions of 14.2 and 17.2 %, about 200 pairs, t(15) of 3.3).
+/// The defaults are for stiffness and reproduce the result of the thesis (Weber fractions of 14.2 and 17.2 %, about 200 pairs
+/// per subject, t(15) of 3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Population {
     /// Mean sensitivity with vision and haptics.
     pub vh: Sensitivity,
     /// Mean sensitivity with haptics alone.
     pub h: Sensitivity,
-    /// Spread of sensitivity between subjects (deviation of its logarithm).
+    /// Spread of the sensitivity between subjects (standard deviation of the logarithm of sigma).
     pub subject_spread: f64,
-    /// Further spread between a subject's modalities (deviation of the logarithm).
+    /// Additional spread between a subject's modalities (standard deviation of the logarithm of sigma).
     pub modality_spread: f64,
-    /// Further spread between a subject's bases (deviation of the logarithm).
+    /// Additional spread between a subject's bases (standard deviation of the logarithm of sigma).
     pub base_spread: f64,
-    /// Spread of the criterion between subjects, as a share of the mean criterion.
+    /// Standard deviation of the criterion between subjects, as a fraction of the mean criterion.
     pub criterion_spread: f64,
-    /// Spread of the preference for the second stimulus, in standard deviations of the noise.
+    /// Standard deviation, between subjects, of the bias to the second stimulus, in standard deviations of the noise.
     pub bias_spread: f64,
-    /// Share of trials answered without attention, first or second by chance.
+    /// Lapse rate: fraction of trials answered "first" or "second" by chance.
     pub lapse: f64,
-    /// Spread between subjects of the exponent of ratings against the stimulus (mean 1; Stevens's power law).
+    /// Standard deviation, between subjects, of the exponent of Stevens's power law for ratings (mean 1).
     pub rating_exponent_spread: f64,
-    /// Noise of a rating (deviation of its logarithm).
+    /// Noise of a rating (standard deviation of its logarithm).
     pub rating_noise: f64,
-    /// Spread of the subjects' free scales (deviation of the logarithm).
+    /// Spread of the modulus of ratings between subjects (standard deviation of its logarithm).
     pub rating_modulus_spread: f64,
 }
 
@@ -82,11 +83,11 @@ impl Default for Population {
 }
 
 impl Population {
-    /// Returns the population for judging a quality.
+    /// Returns the population for a judged quality, with published Weber fractions.
     ///
-    /// For forces the published fractions are thresholds at about 75 %: 5.9 % of weights of 0.3 to 3 kg (Fechner's data, after
-    /// Laming 1986), 7 % of constant resistances of 2.5 to 10 N (Pang, Tan and Durlach 1991, Percept. Psychophys. 49:531). No
-    /// effect of vision is assumed for either.
+    /// For forces the published Weber fractions are thresholds at about 75 %: 5.9 % of weights of 0.3 to 3 kg (Fechner's data,
+    /// after Laming 1986), 7 % of constant resistances of 2.5 to 10 N (Pang, Tan and Durlach 1991, Percept. Psychophys.
+    /// 49:531). No effect of vision is assumed for either.
     #[must_use]
     pub fn judging(percept: Percept) -> Self {
         match percept {
@@ -96,7 +97,8 @@ impl Population {
         }
     }
 
-    /// Returns the default population with other mean thresholds at 75 %, shares of the base, with and without vision.
+    /// Returns the default population with other mean thresholds at 75 %, as fractions of the base:
+    /// `[with vision, without vision]`.
     #[must_use]
     pub fn with_thresholds([vh, h]: [f64; 2]) -> Self {
         let usual = Self::default();
@@ -117,7 +119,7 @@ impl Population {
     }
 }
 
-/// One simulated subject.
+/// Simulated subject.
 #[derive(Clone, Debug)]
 pub struct SimulatedSubject {
     population: Population,
@@ -132,7 +134,7 @@ pub struct SimulatedSubject {
 }
 
 impl SimulatedSubject {
-    /// Draws a subject from a population; `middle` is the mean of the stimuli to be rated.
+    /// Draws a subject from a population; `middle` is the stimulus that is rated with the subject's modulus.
     #[must_use]
     pub fn new(population: &Population, seed: u64, subject: SubjectNumber, middle: f64) -> Self {
         let mut stream = Stream::new(seed, Purpose::Subject, subject.get(), 0);
@@ -163,7 +165,7 @@ impl SimulatedSubject {
         }
     }
 
-    /// Returns the subject's observer for a modality and base.
+    /// Returns the subject's observer parameters for a modality and base.
     #[must_use]
     pub fn observer(&self, modality: Modality, base: f64) -> TernaryObserver {
         let observer = match modality {
@@ -173,7 +175,7 @@ impl SimulatedSubject {
         if self.population.base_spread == 0.0 {
             return observer;
         }
-        // The stream is named by the base itself, so the deviation is the same whenever the base recurs.
+        // The base itself selects the random stream, so that the deviation is the same whenever the base recurs.
         let bits = base.to_bits();
         #[allow(clippy::cast_possible_truncation)] // hash of the bits
         let name = (bits ^ (bits >> 32)) as u32 | 1;
@@ -184,13 +186,13 @@ impl SimulatedSubject {
         }
     }
 
-    /// Selects the answers' noise for a stimulus: a subject has other noise with another object.
+    /// Selects the noise of the answers by the stimulus, so that a subject's answers to different objects are independent.
     #[must_use]
     pub fn about(self, stimulus: &Stimulus) -> Self {
         Self { answer_seed: self.seed ^ xxh3_64(stimulus.to_string().as_bytes()), ..self }
     }
 
-    /// Returns the answer to a trial.
+    /// Returns the answer to a trial; [`Response::Seen`] in practice.
     #[must_use]
     pub fn respond(&self, trial: &Trial) -> Response {
         if trial.phase == Phase::Practice {

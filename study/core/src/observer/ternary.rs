@@ -1,31 +1,33 @@
-//! Signal detection with three answers: the indecision model of García-Pérez and Alcalá-Quintana.
+//! Signal detection with three answers: indecision model of García-Pérez and Alcalá-Quintana.
 
 use crate::random::Stream;
 use crate::trial::Response;
 use flotor_statistics::distribution::normal_below;
 
-/// Observer who compares two stimuli: evidence is the difference in units of its noise; below a criterion the answer is "I don't know".
+/// Observer who compares two stimuli. The evidence is the noisy difference (second minus first) in standard deviations of the
+/// noise; if its magnitude is at most the criterion, the answer is "I don't know".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TernaryObserver {
-    /// Difference of one standard deviation of the noise, as a share of the base.
+    /// Standard deviation of the noise, as a fraction of the base.
     pub sigma: f64,
-    /// Evidence below which the answer is "I don't know".
+    /// Magnitude of the evidence, in standard deviations of the noise, up to which the answer is "I don't know".
     pub criterion: f64,
-    /// Preference for the second stimulus, in deviations of the noise.
+    /// Bias to the second stimulus, in standard deviations of the noise.
     pub bias: f64,
-    /// Share of trials answered by chance.
+    /// Lapse rate: fraction of trials answered "first" or "second" by chance.
     pub lapse: f64,
 }
 
 impl TernaryObserver {
-    /// Returns the observer with a given threshold at a target of 75 %, without bias and lapses.
+    /// Returns the observer with a given threshold (fraction of the base) at a target of 75 %, without bias and lapses.
     #[must_use]
     pub fn with_threshold(threshold: f64, criterion: f64) -> Self {
         let unit = Self { sigma: 1.0, criterion, bias: 0.0, lapse: 0.0 };
         Self { sigma: threshold / unit.threshold(0.75), ..unit }
     }
 
-    /// Returns the probabilities of naming the larger stimulus (averaged over both orders) and the smaller one.
+    /// Returns the probabilities of naming the larger and the smaller stimulus of a pair with difference `delta`, averaged over
+    /// both orders.
     #[must_use]
     pub fn correct_and_wrong(&self, delta: f64) -> [f64; 2] {
         let share = |sign: f64| {
@@ -38,7 +40,8 @@ impl TernaryObserver {
         [1.0, -1.0].map(|sign| (1.0 - self.lapse) * share(sign) + 0.5 * self.lapse)
     }
 
-    /// Returns the difference at which `P(correct) + P(don't know) / 2` equals the target: the equilibrium of a weighted up-down track.
+    /// Returns the difference at which `P(correct) + P(don't know) / 2` equals the target: the equilibrium of a weighted
+    /// up-down track. Infinite if lapses make the target unreachable.
     #[must_use]
     pub fn threshold(&self, target: f64) -> f64 {
         let reached = |delta: f64| {
@@ -60,7 +63,7 @@ impl TernaryObserver {
         high
     }
 
-    /// Draws the answer to a pair with a given relative difference, positive if the second is larger.
+    /// Draws the answer to a pair with the given difference, a fraction of the base, positive if the second stimulus is larger.
     pub(crate) fn respond(&self, second_minus_first: f64, stream: &mut Stream) -> Response {
         let (lapse, guess, noise) = (stream.uniform(), stream.coin(), stream.normal());
         if lapse < self.lapse {

@@ -1,11 +1,11 @@
-//! Linux: a file lock, which the kernel releases when the process ends.
+//! Unix: exclusive write access by a file lock, which the kernel releases when the process ends.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Error, ErrorKind};
 use std::path::Path;
 
-/// Opens a file with exclusive write access; returns `None` if another writer has it open. Without support for locks in the file
-/// system, access is not exclusive.
+/// Opens a file with exclusive write access; returns `None` if another writer has the file locked. If the file system does not
+/// support locks, access is not exclusive.
 ///
 /// # Errors
 /// If the file cannot be opened or locked.

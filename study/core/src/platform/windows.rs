@@ -1,4 +1,4 @@
-//! Windows: a share mode that rejects other writers and admits readers.
+//! Windows: exclusive write access by a share mode that rejects other writers and permits readers.
 
 use std::fs::{File, OpenOptions};
 use std::io::Error;

@@ -1,6 +1,6 @@
 //! Adaptive procedures: choice of the next difference, end of a track, and threshold.
 //!
-//! Differences are shares of the base (0.4: the comparison differs by 40 %).
+//! Differences are fractions of the base (0.4: the comparison differs by 40 %).
 
 mod quest_plus;
 mod weighted_up_down;
@@ -12,7 +12,7 @@ use crate::estimate::NotBounded;
 use crate::trial::Judgement;
 use serde::{Deserialize, Serialize};
 
-/// Procedure with its settings.
+/// Adaptive procedure with its settings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Procedure {
@@ -49,8 +49,8 @@ impl Procedure {
         }
     }
 
-    /// Returns the expected number of trials per track (18 for weighted up-down, with the thesis's settings and observers like its
-    /// subjects).
+    /// Returns the expected number of trials per track. For weighted up-down this is 18, regardless of the settings: the number
+    /// for the thesis's settings and observers like its subjects.
     #[must_use]
     pub fn trials_about(&self) -> u32 {
         match self {
@@ -59,7 +59,8 @@ impl Procedure {
         }
     }
 
-    /// Returns the minimum number of trials per track: each reversal needs a trial, and the first trial cannot be a reversal.
+    /// Returns a lower bound of the number of trials per track. For weighted up-down this is the number of reversals; a track
+    /// has more trials, because the first trial cannot be a reversal.
     #[must_use]
     pub fn trials_least(&self) -> u32 {
         match self {
@@ -68,7 +69,7 @@ impl Procedure {
         }
     }
 
-    /// Returns the largest difference a track can present.
+    /// Returns the largest difference a track can present, as a fraction of the base.
     #[must_use]
     pub fn largest_delta(&self) -> f64 {
         match self {
@@ -77,7 +78,7 @@ impl Procedure {
         }
     }
 
-    /// Returns the share of correct answers at the threshold.
+    /// Returns the value of `P(correct) + P(don't know) / 2` at the threshold.
     #[must_use]
     pub fn target(&self) -> f64 {
         match self {
@@ -87,7 +88,7 @@ impl Procedure {
     }
 }
 
-/// Track of a procedure in progress.
+/// Track in progress.
 #[derive(Clone, Debug)]
 pub enum Track {
     /// Unforced weighted up-down.
@@ -97,7 +98,7 @@ pub enum Track {
 }
 
 impl Track {
-    /// Returns the difference to present next.
+    /// Returns the difference to present next, as a fraction of the base.
     #[must_use]
     pub fn delta(&self) -> f64 {
         match self {
@@ -106,7 +107,8 @@ impl Track {
         }
     }
 
-    /// Processes an answer. Returns true for a reversal of the direction.
+    /// Processes an answer. Returns true for a reversal of the direction; always false for QUEST+. Ignores answers after the
+    /// end of the track.
     pub fn answer(&mut self, judgement: Judgement) -> bool {
         match self {
             Self::WeightedUpDown(track) => track.answer(judgement),
@@ -126,7 +128,8 @@ impl Track {
         }
     }
 
-    /// Returns the ends of the threshold that the answers do not bound, once the track is over.
+    /// Returns on which sides the answers do not bound the threshold; `None` if they bound both, before the end of the track,
+    /// and for weighted up-down.
     #[must_use]
     pub fn not_bounded(&self) -> Option<NotBounded> {
         match self {
@@ -135,7 +138,8 @@ impl Track {
         }
     }
 
-    /// Returns the threshold, once the track is over.
+    /// Returns the threshold, as a fraction of the base; `None` before the end of the track, or if the track ended without a
+    /// threshold.
     #[must_use]
     pub fn threshold(&self) -> Option<f64> {
         match self {

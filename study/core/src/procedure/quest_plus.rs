@@ -1,4 +1,4 @@
-//! Trials placed where their answer is most informative, after QUEST+ (Watson 2017), with three answers.
+//! QUEST+ (Watson 2017) with three answers: each trial is at the difference with the largest expected information.
 
 use super::InvalidRule;
 use crate::estimate::{Estimate, NotBounded, Observation, Posterior, PosteriorGrid, Prior, posterior_mean};
@@ -11,9 +11,9 @@ use std::sync::Arc;
 pub struct QuestPlusRule {
     /// Number of trials of a track.
     pub trials: u32,
-    /// Share of correct answers at the threshold.
+    /// Value of `P(correct) + P(don't know) / 2` at the threshold.
     pub target: f64,
-    /// Smallest and largest candidate difference.
+    /// Smallest and largest candidate difference, as fractions of the base.
     pub deltas: [f64; 2],
     /// Prior of the observer.
     pub prior: Prior,
@@ -47,7 +47,7 @@ impl QuestPlusRule {
     }
 }
 
-/// Track in progress.
+/// QUEST+ track in progress.
 #[derive(Clone, Debug)]
 pub struct QuestPlus {
     rule: QuestPlusRule,
@@ -68,7 +68,7 @@ impl QuestPlus {
         Self { rule: rule.clone(), grid, posterior, delta, answers: Vec::new() }
     }
 
-    /// Returns the difference to present next.
+    /// Returns the difference to present next, as a fraction of the base.
     #[must_use]
     pub fn delta(&self) -> f64 {
         self.delta
@@ -91,7 +91,8 @@ impl QuestPlus {
         self.answers.len() >= self.rule.trials as usize
     }
 
-    /// Estimates the observer from the answers so far, and returns the ends of the threshold that they do not bound.
+    /// Estimates the observer from the answers so far; also returns on which sides these answers do not bound the threshold,
+    /// `None` if they bound both.
     #[must_use]
     pub fn estimate(&self) -> (Estimate, Option<NotBounded>) {
         posterior_mean(&self.answers, &self.rule.prior, self.rule.target)

@@ -1,8 +1,8 @@
 //! Unforced weighted up-down rule (Kaernbach, Perception & Psychophysics 63:1377, 2001).
 //!
-//! A correct answer reduces the difference by a step D1, a wrong one increases it by `D2 = D1 p / (1 - p)`, and "I don't know" by
-//! `D3 = D1 (p - 1/m) / (1 - p)` (his equations 5 and 7), with p the target share of correct answers and m = 2 alternatives. Where
-//! the expected step is zero, `P(correct) + P(don't know) / m = p`.
+//! A correct answer reduces the difference by a step D1, a wrong one increases it by `D2 = D1 p / (1 - p)`, and "I don't know"
+//! by `D3 = D1 (p - 1/m) / (1 - p)` (equations 5 and 7), with the target p and m = 2 alternatives. The expected step is zero at
+//! the threshold, where `P(correct) + P(don't know) / m = p`.
 //!
 //! Points left open by CMU-RI-TR-07-21 (section 4.2) are options here; their defaults reproduce the published distribution of
 //! simulated estimates.
@@ -10,7 +10,7 @@
 use crate::trial::Judgement;
 use serde::{Deserialize, Serialize};
 
-/// Alternatives of a comparison: first or second.
+/// Number of alternatives of a comparison: first or second.
 const ALTERNATIVES: f64 = 2.0;
 
 /// Step size applied at a reversal that halves the step.
@@ -24,7 +24,7 @@ pub enum StepAtReversal {
     Old,
 }
 
-/// Trials in the mean: those at the first and last counted reversal included or not.
+/// Inclusion of the trials at the first and last counted reversal in the mean for the threshold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Averaging {
@@ -40,25 +40,25 @@ pub enum Averaging {
 /// Settings of the weighted up-down rule.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WeightedUpDownRule {
-    /// First difference, as a share of the base.
+    /// First difference, as a fraction of the base.
     pub initial_delta: f64,
-    /// First step D1 of a correct answer, as a share of the base.
+    /// Initial step D1 after a correct answer, as a fraction of the base.
     pub first_step: f64,
-    /// Target share of correct answers.
+    /// Target: value of `P(correct) + P(don't know) / 2` at the threshold.
     pub target: f64,
-    /// Reversals at which the steps are halved, from 1.
+    /// Numbers of the reversals at which the steps are halved, from 1.
     pub halve_at: Vec<u32>,
-    /// Reversal that ends the track, from 1.
+    /// Number of the reversal that ends the track, from 1.
     pub stop_after: u32,
-    /// First reversal of the mean, from 1.
+    /// Number of the reversal at which the mean for the threshold begins, from 1.
     pub average_from: u32,
-    /// Treatment of the first and last reversal in the mean.
+    /// Inclusion of the trials at the first and last counted reversal in the mean.
     pub averaging: Averaging,
     /// Step size at a halving reversal.
     pub step_at_reversal: StepAtReversal,
-    /// Smallest difference, above 0: without a difference no answer is right or wrong.
+    /// Smallest difference, as a fraction of the base; above 0, because equal stimuli have no correct answer.
     pub floor: f64,
-    /// Largest difference, as a share of the base.
+    /// Largest difference, as a fraction of the base.
     pub ceiling: f64,
     /// Maximum number of trials; a longer track ends without a threshold.
     pub trials_most: u32,
@@ -83,11 +83,11 @@ impl Default for WeightedUpDownRule {
     }
 }
 
-/// Invalid setting.
+/// Error: invalid setting of a procedure.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{setting} {value}: {legal}")]
 pub struct InvalidRule {
-    /// Command-line option of the setting.
+    /// Command-line option or name of the setting.
     pub setting: &'static str,
     /// Rejected value, as text.
     pub value: String,
@@ -159,7 +159,7 @@ enum Direction {
     Up,
 }
 
-/// Track in progress.
+/// Weighted up-down track in progress.
 #[derive(Clone, Debug)]
 pub struct WeightedUpDown {
     rule: WeightedUpDownRule,
@@ -188,13 +188,13 @@ impl WeightedUpDown {
         }
     }
 
-    /// Returns the difference to present next.
+    /// Returns the difference to present next, as a fraction of the base.
     #[must_use]
     pub fn delta(&self) -> f64 {
         self.delta
     }
 
-    /// Returns the current step D1.
+    /// Returns the current step D1, as a fraction of the base.
     #[must_use]
     pub fn step(&self) -> f64 {
         self.step
@@ -244,7 +244,7 @@ impl WeightedUpDown {
         turned
     }
 
-    /// Returns true if the current trial is part of the mean.
+    /// Returns true if the current trial counts in the mean for the threshold; `turned` if it is a reversal.
     fn counts(&self, turned: bool) -> bool {
         let WeightedUpDownRule { average_from, stop_after, averaging, .. } = self.rule;
         let first = turned && self.reversals == average_from;
@@ -263,7 +263,8 @@ impl WeightedUpDown {
         self.reversals >= self.rule.stop_after || self.trials >= self.rule.trials_most
     }
 
-    /// Returns the mean of the counted differences; `None` before the last reversal, or if the track ended without it.
+    /// Returns the threshold, the mean of the counted differences, as a fraction of the base; `None` before the last reversal,
+    /// or if the track ended without that reversal.
     #[must_use]
     pub fn threshold(&self) -> Option<f64> {
         let complete = self.reversals >= self.rule.stop_after && self.counted > 0;

@@ -1,4 +1,5 @@
-//! Just noticeable difference: pairs of stimuli, an adaptive track for each base and modality.
+//! Difference experiment (just noticeable difference, JND): pairs of stimuli, with an adaptive track for each base in each
+//! replication.
 
 use super::{
     AtBoundary, Checks, FirstModality, ProtocolError, Stimulus, at_least_one, extremes,
@@ -33,20 +34,21 @@ pub enum PresentationOrder {
     ComparisonFirst,
 }
 
-/// Demonstration before the first trial, in each modality: four springs in three comparisons that sample the range of bases and the
-/// kinds of difference.
+/// Demonstration before the first trial, in each modality: three pairs of four stimuli, which show the range of bases and the
+/// kinds of difference (large, close, nearly equal).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JndDemo {
     /// True if the demonstration is presented.
     pub shown: bool,
-    /// A small but noticeable difference, as a share of the base.
+    /// Small but noticeable difference, as a fraction of the larger stimulus.
     pub close: f64,
-    /// A barely noticeable difference, as a share of the base.
+    /// Barely noticeable difference, as a fraction of the larger stimulus.
     pub nearly_equal: f64,
 }
 
 impl Default for JndDemo {
-    /// Returns one Weber fraction above the thesis's result, and a fifth of it; the thesis names only the kinds of difference.
+    /// Returns a difference slightly above the Weber fractions of the thesis, and about a fifth of them; the thesis gives only
+    /// the kinds of difference.
     fn default() -> Self {
         Self { shown: true, close: 0.20, nearly_equal: 0.03 }
     }
@@ -55,13 +57,13 @@ impl Default for JndDemo {
 /// Settings of a just-noticeable-difference experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JndProtocol {
-    /// The varied parameter.
+    /// Varied parameter.
     pub stimulus: Stimulus,
     /// Bases, in the stimulus's unit.
     pub bases: Vec<f64>,
-    /// Number of replications, each all bases in one modality; the modality alternates.
+    /// Number of replications. A replication has one track for each base, in one modality; the modality alternates.
     pub replications: u32,
-    /// Modality that comes first.
+    /// Rule for the first modality.
     pub first_modality: FirstModality,
     /// Adaptive procedure.
     pub procedure: Procedure,
@@ -73,7 +75,7 @@ pub struct JndProtocol {
     pub at_boundary: AtBoundary,
     /// Practice before the first trial.
     pub demo: JndDemo,
-    /// Check trials in each track.
+    /// Numbers of check trials in each track.
     #[serde(default, skip_serializing_if = "Checks::are_none")]
     pub checks: Checks,
 }
@@ -97,8 +99,8 @@ impl Default for JndProtocol {
 }
 
 impl JndProtocol {
-    /// An obvious difference, as a share of the base: the first of a track of the thesis, more than twice the mean threshold of its
-    /// subjects.
+    /// Smallest obvious difference, as a fraction of the base: the first difference of a track in the thesis, more than twice
+    /// the mean threshold of its subjects.
     pub const LARGE_DELTA: f64 = 0.4;
 
     pub(super) fn check(&self) -> Result<(), ProtocolError> {
@@ -138,7 +140,7 @@ impl JndProtocol {
         }
     }
 
-    /// Returns the expected number of presentations, practice included.
+    /// Returns the expected number of presentations, practice and checks included.
     pub(super) fn presentations_about(&self) -> u64 {
         let practice = if self.demo.shown { 6 } else { 0 };
         practice
@@ -147,7 +149,8 @@ impl JndProtocol {
                 * self.bases.len() as u64
     }
 
-    /// Returns the four springs of the demonstration: lowest base, highest base, one close to the highest, one nearly equal to that.
+    /// Returns the four stimuli of the demonstration: lowest base, highest base, a stimulus close to the highest base, and a
+    /// stimulus nearly equal to the third.
     #[must_use]
     pub fn demo_values(&self) -> [f64; 4] {
         let [least, most] = extremes(self.bases.iter().copied());

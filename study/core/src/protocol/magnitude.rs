@@ -1,4 +1,4 @@
-//! Magnitude estimation with free modulus: one stimulus, rated by any positive number.
+//! Magnitude estimation with free modulus: single stimuli, each rated with any positive number.
 
 use super::{
     AtBoundary, FirstModality, ProtocolError, Stimulus, at_least_one, extremes, positive_and_different,
@@ -23,19 +23,19 @@ pub enum RatingScale {
 /// Settings of a magnitude-estimation experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MagnitudeProtocol {
-    /// The varied parameter.
+    /// Varied parameter.
     pub stimulus: Stimulus,
     /// Stimuli, in the stimulus's unit.
     pub values: Vec<f64>,
-    /// Replications in each modality, each all stimuli in a random order.
+    /// Number of replications in each modality. A replication has all stimuli once, in random order.
     pub replications: u32,
-    /// Modality that comes first.
+    /// Rule for the first modality.
     pub first_modality: FirstModality,
     /// Number of stimuli demonstrated before each modality, smallest and largest among them.
     pub demo: u32,
     /// Action when the handle leaves its range.
     pub at_boundary: AtBoundary,
-    /// Stimuli presented once more in each replication, to check the consistency of ratings; they do not count.
+    /// Number of stimuli presented again in each replication to check the consistency of ratings; their ratings do not count.
     #[serde(default, skip_serializing_if = "is_0")]
     pub repeat_checks: u32,
 }
@@ -61,7 +61,7 @@ impl Default for MagnitudeProtocol {
 }
 
 impl MagnitudeProtocol {
-    /// Returns `count` evenly spaced values from `first` to `last`.
+    /// Returns `count` evenly spaced values from `first` to `last`; for a count of 1, only `first`.
     #[must_use]
     pub fn evenly(first: f64, last: f64, count: u32) -> Vec<f64> {
         let steps = f64::from(count.saturating_sub(1).max(1));
@@ -78,7 +78,8 @@ impl MagnitudeProtocol {
         Ok(())
     }
 
-    /// Returns the number of presentations in both modalities, demonstration included, repeats excluded.
+    /// Returns the number of presentations in both modalities, demonstration and checks included, repeats after leaving the
+    /// range excluded.
     pub(super) fn presentations(&self) -> u64 {
         let one = self.values.len() as u64 + u64::from(self.repeat_checks);
         2 * (u64::from(self.demo) + u64::from(self.replications) * one)

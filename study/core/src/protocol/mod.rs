@@ -21,7 +21,7 @@ pub struct Stimulus {
     pub parameter: String,
 }
 
-/// Quality judged by the subject.
+/// Quality of the stimulus that the subject judges.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quality {
@@ -32,7 +32,8 @@ pub enum Quality {
 }
 
 impl Stimulus {
-    /// Returns name and unit, from the unit suffix of the parameter's id: `gamma_n` is gamma in newtons.
+    /// Returns name and unit, from the unit suffix of the parameter's id (`gamma_n`: `gamma`, `N`); the unit is empty without a
+    /// known suffix.
     #[must_use]
     pub fn name_and_unit(&self) -> (String, &'static str) {
         const UNITS: [(&str, &str); 9] = [
@@ -51,13 +52,13 @@ impl Stimulus {
         (name.replace('_', " "), unit)
     }
 
-    /// Returns true if the value is proportional to a stiffness.
+    /// Returns true if, by its id, the parameter is proportional to a stiffness.
     #[must_use]
     pub fn is_stiffness(&self) -> bool {
         self.parameter.starts_with("gamma") || self.parameter.contains("stiffness")
     }
 
-    /// Returns the judged quality: force for a force parameter, else stiffness.
+    /// Returns the judged quality: force if the parameter's id begins with `force`, else stiffness.
     #[must_use]
     pub fn quality(&self) -> Quality {
         if self.parameter.starts_with("force") { Quality::Force } else { Quality::Stiffness }
@@ -119,14 +120,14 @@ impl Default for AtBoundary {
     }
 }
 
-/// Check trials for attentive subjects; they do not count.
+/// Numbers of check trials, which test the subject's attention; their answers do not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Checks {
-    /// Pairs of equal stimuli, per track.
+    /// Number of catch trials (pairs of equal stimuli) per track.
     pub catch: u32,
-    /// Pairs presented once more in the same order, per track.
+    /// Number of pairs per track that are presented again in the same order.
     pub repeats: u32,
-    /// Pairs with an obvious difference, per track.
+    /// Pairs with an obvious difference; `None` without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obvious: Option<ObviousPairs>,
 }
@@ -136,12 +137,12 @@ pub struct Checks {
 pub struct ObviousPairs {
     /// Number of pairs per track.
     pub count: u32,
-    /// Difference, as a share of the base.
+    /// Difference, as a fraction of the base.
     pub delta: f64,
 }
 
 impl Checks {
-    /// Returns true without checks, as in protocols of earlier versions.
+    /// Returns true if there are no checks, as in protocols of earlier versions.
     #[must_use]
     pub fn are_none(&self) -> bool {
         *self == Self::default()
@@ -154,7 +155,7 @@ impl Checks {
     }
 }
 
-/// Subject number, from 1; the only personal data required here.
+/// Subject number, 1 to 999; the only required data on a person.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "u16", into = "u16")]
 pub struct SubjectNumber(u16);
@@ -201,9 +202,9 @@ impl std::fmt::Display for SubjectNumber {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "task", rename_all = "kebab-case")]
 pub enum Protocol {
-    /// Just noticeable difference.
+    /// Difference experiment (just noticeable difference, JND).
     Jnd(JndProtocol),
-    /// Magnitude estimation.
+    /// Magnitude estimation experiment.
     Magnitude(MagnitudeProtocol),
 }
 
@@ -211,16 +212,16 @@ pub enum Protocol {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProtocolError {
-    /// An empty list.
+    /// A list of values is empty.
     #[error("{list} is empty; give at least one value")]
     Empty {
         /// Command-line option of the list.
         list: &'static str,
     },
-    /// An invalid value.
+    /// A value is invalid.
     #[error("{what} {value}: {legal}")]
     Value {
-        /// Command-line option of the value.
+        /// Command-line option or name of the value.
         what: &'static str,
         /// Rejected value.
         value: f64,
@@ -230,7 +231,7 @@ pub enum ProtocolError {
     /// Invalid setting of the procedure.
     #[error(transparent)]
     Rule(#[from] InvalidRule),
-    /// Stimuli outside the range of the model's parameter.
+    /// A stimulus is outside the range of the model's parameter.
     #[error(
         "stimulus {stimulus} = {value} is outside its range {least} to {most}; change the values or the difference"
     )]
@@ -247,7 +248,7 @@ pub enum ProtocolError {
 }
 
 impl Protocol {
-    /// Returns the task label in file names.
+    /// Returns the task label for file names and results.
     #[must_use]
     pub fn task(&self) -> &'static str {
         match self {
@@ -292,7 +293,7 @@ impl Protocol {
         }
     }
 
-    /// Returns the expected number of presentations in a sitting; adaptive tracks vary.
+    /// Returns the expected number of presentations in a sitting; the number varies with the length of adaptive tracks.
     #[must_use]
     pub fn presentations_about(&self) -> u64 {
         match self {

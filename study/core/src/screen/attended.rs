@@ -1,4 +1,4 @@
-//! State machine of the screens of a person's sitting.
+//! State machine for the screens of a person's sitting.
 
 use super::{Input, May, Pause, Question, Screen, TrialView};
 use crate::kinematics::StimulusKinematics;
@@ -9,22 +9,22 @@ use crate::time_of_day::TimeOfDay;
 use crate::trial::{Exploration, Modality, Position, Presented, Response, Trial};
 use std::collections::VecDeque;
 
-/// Effect of an input.
+/// Effect of a person's input.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
     /// Another screen is shown.
     Shown,
     /// A trial was answered; log it before showing the next screen.
     Answered(Box<TrialEvent>),
-    /// The answer to this trial was withdrawn; log it before showing the question again.
+    /// The answer to the trial of this number was withdrawn; log the withdrawal before showing the question again.
     Withdrawn(u32),
-    /// Description of a practice trial before the sitting resumes; log it before showing the next screen.
+    /// A practice trial before the sitting resumes was answered; log this description before showing the next screen.
     Practised(String),
-    /// A text was read; log it before showing the next screen.
+    /// The person has read this text; log it before showing the next screen.
     Read(String),
     /// Note to be logged; the screen does not change.
     Note(String),
-    /// The person stopped.
+    /// The person stopped the sitting.
     Stopped,
 }
 
@@ -35,18 +35,18 @@ pub struct StimulusExploration {
     pub kinematics: Option<StimulusKinematics>,
     /// True if the handle left its range.
     pub boundary_hit: bool,
-    /// Ticks the servo missed during the stimulus.
+    /// Number of ticks the servo missed during the stimulus.
     pub missed_ticks: u64,
 }
 
-/// Input rejected on the current screen; the state is unchanged.
+/// Reason for the rejection of an input; the state is unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InputError {
     /// The input does not fit the screen; the text explains why.
     #[error("{0}")]
     NotNow(&'static str),
-    /// A rating of 0 or below, which a ratio scale does not have.
+    /// A rating is 0 or below, which a ratio scale excludes.
     #[error("a rating must be a number above 0")]
     NotAbove0,
     /// The answer does not fit the question.
@@ -63,17 +63,17 @@ enum Stage {
     Ask,
 }
 
-/// Availability of a withdrawal.
+/// Availability of a withdrawal of the last answer.
 #[derive(Clone, Debug)]
 enum Undo {
     /// The last answer can be withdrawn; holds the state before it.
     Possible(Box<Before>),
-    /// The open trial was answered and withdrawn once already.
+    /// The answer to the open trial was already withdrawn once.
     Used,
     Impossible,
 }
 
-/// State before an answer.
+/// State before the last answer, restored by a withdrawal.
 #[derive(Clone, Debug)]
 struct Before {
     sitting: Sitting,
@@ -87,26 +87,26 @@ struct Before {
 pub struct ScreenStateMachine {
     sitting: Sitting,
     quality: Quality,
-    /// Texts to read before the first trial, next one first.
+    /// Texts to read before the next trial, in order.
     texts: VecDeque<String>,
     stage: Stage,
     exploration: Exploration,
     of_about: u64,
     rest_every: u32,
     since_rest: u32,
-    /// Maximum number of repetitions of a trial on request; unlimited if `None`.
+    /// Maximum number of repetitions of a trial at the person's request; unlimited if `None`.
     again_most: Option<u32>,
-    /// Repetitions of the current trial so far.
+    /// Number of repetitions of the current trial so far, at the person's request.
     again: u32,
     undo: Undo,
-    /// Practice offered before the sitting resumes.
+    /// Practice trials offered before the sitting resumes; empty once started.
     offered: Vec<Trial>,
-    /// Practice in progress, next trial first.
+    /// Remaining practice trials, in order.
     practice: VecDeque<Trial>,
 }
 
 impl ScreenStateMachine {
-    /// Creates the state machine at the first or next trial; offers a rest after every `rest_every` trials (0: never).
+    /// Creates the state machine at the next trial of a sitting; offers a rest after every `rest_every` trials (0: never).
     #[must_use]
     pub fn new(sitting: Sitting, protocol: &Protocol, rest_every: u32) -> Self {
         Self {
@@ -126,31 +126,31 @@ impl ScreenStateMachine {
         }
     }
 
-    /// Adds texts to be read before the sitting begins: consent, instructions.
+    /// Adds texts that the person reads before the next trial, such as consent or instructions.
     #[must_use]
     pub fn after_reading(self, texts: impl IntoIterator<Item = String>) -> Self {
         Self { texts: texts.into_iter().collect(), ..self }
     }
 
-    /// Limits the repetitions of a trial on request.
+    /// Limits the number of repetitions of a trial at the person's request.
     #[must_use]
     pub fn with_again_at_most(self, times: u32) -> Self {
         Self { again_most: Some(times), ..self }
     }
 
-    /// Offers practice before the sitting resumes.
+    /// Offers practice before the sitting resumes ([`Input::Practise`]).
     #[must_use]
     pub fn with_practice_offered(self) -> Self {
         Self { offered: self.sitting.practice(), ..self }
     }
 
-    /// Marks the open trial as answered and withdrawn before; it cannot be withdrawn again.
+    /// Marks the open trial as already answered and withdrawn; its next answer cannot be withdrawn.
     #[must_use]
     pub fn with_answer_taken_back(self) -> Self {
         Self { undo: Undo::Used, ..self }
     }
 
-    /// Returns the open trial.
+    /// Returns the open trial, of practice or of the sitting; `None` if all trials were presented.
     fn trial(&self) -> Option<Trial> {
         self.practice.front().copied().or_else(|| self.sitting.next())
     }
@@ -170,7 +170,8 @@ impl ScreenStateMachine {
         }
     }
 
-    /// Returns the current stimulus and its trial, for the apparatus; never to be shown to the person.
+    /// Returns the trial and value of the stimulus to be felt, for the apparatus; `None` on other screens. Must not be shown to
+    /// the person.
     #[must_use]
     pub fn stimulus(&self) -> Option<(Trial, f64)> {
         let trial = self.trial()?;
@@ -180,7 +181,7 @@ impl ScreenStateMachine {
         }
     }
 
-    /// Records the time when a stimulus can be felt; the first of a trial counts.
+    /// Records the time from which a stimulus can be felt; only the first time of a trial counts.
     pub fn record_onset(&mut self, time: TimeOfDay) {
         self.exploration.onset.get_or_insert(time);
     }
@@ -192,7 +193,7 @@ impl ScreenStateMachine {
         self.exploration.missed_ticks += felt.missed_ticks;
     }
 
-    /// Applies a person's input, `time_s` after the screen was shown.
+    /// Processes a person's input, `time_s` seconds after the screen was shown.
     ///
     /// # Errors
     /// [`InputError`]; the screen does not change.
@@ -224,7 +225,7 @@ impl ScreenStateMachine {
             (_, Input::Withdraw) => self.withdraw(),
             (Stage::Ready(_), Input::Continue) => self.go_to(Stage::Feel(0)),
             (Stage::Feel(index), Input::Continue) => {
-                // From here on the previous answer could be influenced by the next stimulus.
+                // The felt stimulus could influence the previous answer, which is final from now on.
                 if matches!(self.undo, Undo::Possible(_)) {
                     self.undo = Undo::Impossible;
                 }
@@ -261,7 +262,7 @@ impl ScreenStateMachine {
         self.sitting.is_over()
     }
 
-    // Returns a `Result`, so that all match arms above are alike.
+    // Returns a `Result` like the other branches of `input`.
     #[allow(clippy::unnecessary_wraps)]
     fn go_to(&mut self, stage: Stage) -> Result<Step, InputError> {
         self.stage = stage;
@@ -273,7 +274,7 @@ impl ScreenStateMachine {
             return self.practised(trial, response);
         }
         let mut exploration = self.exploration.clone();
-        // Add the time to a withdrawn answer.
+        // Add the response time of a withdrawn answer.
         exploration.response_time_s = Some(exploration.response_time_s.unwrap_or(0.0) + time_s);
         let before = self.sitting.clone();
         let verdict = self.sitting.answer(response, &exploration)?;
@@ -319,7 +320,7 @@ impl ScreenStateMachine {
         }
     }
 
-    /// Returns the next stage: the next stimulus, or a pause with its reason.
+    /// Returns the stage after an answer: the next stimulus, or a pause with its reason.
     fn next_stage(&mut self, before: &Trial, verdict: Verdict) -> Stage {
         let Some(next) = self.trial() else { return Stage::Ask };
         let pause = if verdict == Verdict::Repeated {
@@ -339,7 +340,7 @@ impl ScreenStateMachine {
         pause.map_or(Stage::Feel(0), Stage::Ready)
     }
 
-    /// Returns the remaining repetitions of the trial; unlimited if `None`.
+    /// Returns the number of remaining repetitions of the trial; unlimited if `None`.
     fn again_left(&self) -> Option<u32> {
         self.again_most.map(|most| most.saturating_sub(self.again))
     }
@@ -358,7 +359,7 @@ impl ScreenStateMachine {
     }
 
     fn view(&self, trial: &Trial) -> TrialView {
-        // Practice before a resumed sitting shows the number of the next trial.
+        // A practice trial before a resumed sitting has the number of the next trial.
         let number = if trial.number == 0 { self.presented() + 1 } else { trial.number };
         TrialView {
             number,
@@ -382,7 +383,7 @@ fn position(trial: &Trial, index: usize) -> Option<Position> {
 }
 
 fn question(trial: &Trial) -> Question {
-    // In practice, too, so that the question is familiar before trials count.
+    // The question is asked in practice, too, so that the person knows it before trials count.
     match trial.presented {
         Presented::Pair(_) => Question::WhichIsMore,
         Presented::One { .. } => Question::HowMuch,

@@ -1,4 +1,4 @@
-//! Messages between a sitting and the separate window program, one line of JSON each.
+//! Messages between a sitting and a separate window program, one line of JSON each.
 
 use super::{Input, Screen};
 use serde::{Deserialize, Serialize};
@@ -8,7 +8,7 @@ use serde_json::Value;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum WindowMessage {
-    /// New screen.
+    /// New screen to show.
     Screen(Screen),
     /// Warning to show at once, visibly and audibly; the screen does not change.
     Warning {
@@ -36,7 +36,7 @@ pub enum Warning {
 pub enum WindowReply {
     /// Input of the person.
     Input(Input),
-    /// State of the window; not sent by front ends without one.
+    /// State of the window; not sent by front ends without a window.
     Window {
         /// State of the window.
         window: WindowState,
@@ -68,7 +68,7 @@ impl WindowReply {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum WindowState {
-    /// The window is visible to the person.
+    /// The window is visible.
     Open,
 }
 

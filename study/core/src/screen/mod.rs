@@ -1,9 +1,9 @@
 //! Screens and inputs of a person's sitting.
 //!
 //! A front end (terminal or window) shows [`ScreenStateMachine::screen`], waits for an [`Input`], and passes it to
-//! [`ScreenStateMachine::input`]. Screens and inputs are plain data (serde) and also travel as lines of JSON ([`WindowMessage`],
-//! [`WindowReply`]) to the viewer, a separate program. No screen identifies the stimulus, not even by a code: the answer to a code could be
-//! learnt.
+//! [`ScreenStateMachine::input`]. Screens and inputs are plain data (serde) and also travel as lines of JSON
+//! ([`WindowMessage`], [`WindowReply`]) to the viewer, a separate program. No screen identifies the stimulus, not even by a
+//! code: a person could learn the answer for a code.
 //!
 //! ```text
 //! Ready -> Feel (first) -> Feel (second) -> Ask -> Ready or Feel of the next trial ... -> Over
@@ -22,7 +22,7 @@ use crate::protocol::Quality;
 use crate::trial::{Phase, Position, Response};
 use serde::{Deserialize, Serialize};
 
-/// Key of the emergency stop in a window; by default not the largest key, which a person tends to press to continue.
+/// Key of the emergency stop in a window; by default not the space bar, which a person tends to press to continue.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum StopKey {
     /// Escape
@@ -62,7 +62,7 @@ pub enum Screen {
         /// The next trial.
         next: TrialView,
     },
-    /// A stimulus to be felt; [`Input::Continue`] ends it.
+    /// A stimulus to be felt; [`Input::Continue`] ends the stimulus.
     Feel {
         /// Trial of the stimulus.
         trial: TrialView,
@@ -99,13 +99,13 @@ impl Screen {
 pub enum Pause {
     /// The sitting begins or resumes.
     Welcome,
-    /// Practice ends, or begins again.
+    /// Practice begins or ends.
     PhaseChanges,
     /// The object becomes visible, or invisible.
     ModalityChanges,
     /// Time to rest the hand.
     Rest,
-    /// The handle left its range: the trial is repeated.
+    /// The handle left its range, and the trial is repeated.
     OutOfRange,
 }
 
@@ -119,7 +119,7 @@ pub enum Question {
     HowMuch,
 }
 
-/// Data of a trial for a front end, without the stimulus.
+/// Data on a trial for a front end, without the stimulus values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrialView {
     /// Count of presentations in the sitting, from 1.
@@ -130,13 +130,13 @@ pub struct TrialView {
     pub phase: Phase,
     /// True if the object is visible.
     pub object_is_shown: bool,
-    /// Number of repeats so far.
+    /// Number of repeats of the trial so far because the handle left its range.
     pub repeat: u32,
     /// Number of stimuli: one to rate, or two to compare.
     pub stimuli: usize,
     /// Judged quality.
     pub quality: Quality,
-    /// Optional inputs available now.
+    /// Optional inputs that the screen accepts.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub may: Vec<May>,
 }
@@ -152,7 +152,7 @@ pub enum May {
     },
     /// Withdraw the last answer: [`Input::Withdraw`].
     Withdraw,
-    /// Practise before the sitting goes on: [`Input::Practise`].
+    /// Practise before the sitting resumes: [`Input::Practise`].
     Practise,
 }
 
@@ -169,7 +169,7 @@ pub enum Input {
         /// Answer to the question.
         response: Response,
     },
-    /// Withdraws the last answer, once per trial and before the next stimulus was felt: its question is open again.
+    /// Withdraws the last answer and returns to its question; possible once per trial, before the next stimulus was felt.
     Withdraw,
     /// Starts practice before the sitting resumes; practice does not count.
     Practise,

@@ -1,4 +1,4 @@
-//! Options of an analysis, from the command line or planned in a study file.
+//! Options of an analysis, from the command line or the plan in a study file.
 
 use clap::{Args, ValueEnum};
 use flotor_analysis::{AnalysisOptions, Estimator};
@@ -6,7 +6,7 @@ use flotor_statistics::anova::SumOfSquares;
 use flotor_study::protocol::{Protocol, RatingScale};
 use serde::Deserialize;
 
-/// Options that affect results.
+/// Options of `flotor analyse` that affect its results.
 #[derive(Args, Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Choices {
     /// Threshold estimator
@@ -32,7 +32,7 @@ enum Sums {
     Three,
 }
 
-/// The table `[analyse]` of a study file: options of `flotor analyse` by name.
+/// Table `[analyse]` of a study file: options of `flotor analyse` by name.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PlannedTable {
@@ -58,7 +58,7 @@ impl Choices {
     /// Parses the planned options; a missing option has its default.
     ///
     /// # Errors
-    /// The first invalid value, with the valid ones.
+    /// The first invalid value, with a list of the valid values.
     pub(crate) fn planned(table: &PlannedTable) -> Result<Self, String> {
         Ok(Self {
             estimator: planned("estimator", table.estimator.as_deref())?,
@@ -76,7 +76,7 @@ impl Choices {
         [own, ("type", word(&self.sums))]
     }
 
-    /// Describes the options of this task that deviate from the plan.
+    /// Describes each option of this task that differs from `from`, the plan.
     pub(crate) fn deviations(self, from: Self, protocol: &Protocol) -> Vec<String> {
         let both = self.of_task(protocol).into_iter().zip(from.of_task(protocol));
         let different = both.filter(|(used, planned)| used != planned);
@@ -92,7 +92,7 @@ fn planned<T: ValueEnum + Default>(name: &str, text: Option<&str>) -> Result<T, 
     })
 }
 
-/// Returns the name of a value on the command line.
+/// Returns the command-line name of a value.
 fn word(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }

@@ -1,4 +1,4 @@
-//! Provenance of a result: observers, plan, and all inputs needed to reproduce it.
+//! Provenance of a result: origin of the answers, plan, and all settings needed to reproduce the result.
 
 use super::choices::Choices;
 use crate::study::plan::{Planned, planned};
@@ -20,11 +20,11 @@ pub(crate) struct Provenance {
     seed: u64,
     /// Version of the program that ran the study.
     version: String,
-    /// Digest of the configuration of the sittings.
+    /// Digest of the configuration of the sittings ([`Begin::config_hash`]).
     configuration: String,
     /// Options of the analysis that affect this task.
     options: BTreeMap<&'static str, String>,
-    /// Adaptive procedure of a difference experiment.
+    /// Adaptive procedure of a difference experiment; `None` for ratings.
     #[serde(skip_serializing_if = "Option::is_none")]
     threshold_rule: Option<Procedure>,
     /// Exclusion rules of the study file.
@@ -44,7 +44,7 @@ struct StudyFile {
     name: String,
     sha256: String,
     text: String,
-    /// Planned analysis, as text.
+    /// Description of the planned analysis.
     analysis: String,
 }
 
@@ -52,13 +52,13 @@ struct StudyFile {
 #[derive(Serialize)]
 #[serde(rename_all = "kebab-case")]
 enum Agreement {
-    /// No study file.
+    /// The study has no study file.
     NoPlan,
-    /// Options, rules and number of subjects match the study file.
+    /// Options and number of subjects match the study file, and all its exclusion rules were applied.
     AsPlanned,
-    /// Deviations from the study file.
+    /// Deviations from the study file, one text each.
     NotAsPlanned(Vec<String>),
-    /// The log has no study file that this version can parse.
+    /// This version cannot parse the study file in the log.
     Unknown,
 }
 
@@ -94,7 +94,7 @@ impl Provenance {
         }
     }
 
-    /// Returns names and values in the order of printing.
+    /// Returns the lines of the provenance as names and values, in order.
     pub(crate) fn lines(&self) -> Vec<(&'static str, String)> {
         let observer = self.observer.restriction().unwrap_or("people").to_owned();
         let options: Vec<String> =
@@ -127,7 +127,7 @@ impl Provenance {
         format!("  Provenance{}", self.lines().into_iter().map(line).collect::<String>())
     }
 
-    /// Returns name and text of the study file, if any.
+    /// Returns name and text of the study file; `None` without one.
     pub(crate) fn study_file(&self) -> Option<(&str, &str)> {
         self.study_file.as_ref().map(|file| (file.name.as_str(), file.text.as_str()))
     }

@@ -1,4 +1,4 @@
-//! Result of an analysis.
+//! Report of an analysis, also its JSON output.
 
 use super::provenance::Provenance;
 use flotor_analysis::exclusion::NotApplied;

@@ -1,5 +1,5 @@
-//! Figures of a study: figures 17 and 18 of CMU-RI-TR-07-21 with the study's data, individual subjects, and movements. `tracks` and
-//! `psychometric` plot the answers of a difference experiment.
+//! Figures of a study: figures 17 and 18 of CMU-RI-TR-07-21 with the study's data, Weber fractions of individual subjects, and
+//! movements; in `tracks` and `psychometric` the answers of a difference experiment.
 
 mod psychometric;
 mod tracks;
@@ -16,18 +16,18 @@ pub(super) use tracks::tracks;
 /// Height of a single-panel figure, px.
 const HEIGHT_PX: f64 = 340.0;
 
-/// Style slot of error bars over filled bars: the text colour.
+/// Style slot of error bars over filled bars: text colour.
 const INK: usize = 6;
 
-/// Legend of an error bar.
+/// Legend of the error bars.
 const ONE_ERROR: &str = "± 1 standard error";
 
 /// Modalities with their legends, in the order of their colours.
 const MODALITIES: [(Modality, &str); 2] =
     [(Modality::Vh, "vision + haptics"), (Modality::H, "haptics alone")];
 
-/// Plots figure 18: thresholds as bars over the base, one bar per modality, with standard errors and the thresholds of the thesis's
-/// Weber fractions.
+/// Plots figure 18: thresholds as bars over the base, one bar per modality, with standard errors; if the study is comparable,
+/// also the thesis's mean Weber fractions times the base.
 pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> Figure {
     let cells = |modality| analysis.thresholds.iter().filter(move |cell| cell.modality == modality);
     let mut bases: Vec<f64> = cells(Modality::Vh).map(|cell| cell.base).collect();
@@ -65,7 +65,7 @@ pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> Figure 
         .panel(panel)
 }
 
-/// Plots every subject's Weber fraction in one modality against the other.
+/// Plots each subject's Weber fraction with haptics alone over the fraction with vision and haptics.
 pub(super) fn subjects(analysis: &JndAnalysis) -> Figure {
     let mut points: Vec<(String, [Vec<f64>; 2])> = Vec::new();
     for row in &analysis.responses {
@@ -98,7 +98,7 @@ pub(super) fn ratings(analysis: &MagnitudeAnalysis, stimulus: &Stimulus) -> Figu
     let values: Vec<f64> = cells(Modality::Vh).map(|cell| cell.stimulus).collect();
     let span = values.iter().fold(0.0_f64, |most, value| most.max(*value))
         - values.iter().fold(f64::INFINITY, |least, value| least.min(*value));
-    // Offset horizontally, so that neither error bar hides the other.
+    // Offset the modalities horizontally, so that neither error bar hides the other.
     let beside = |slot: usize, x: f64| x + if slot == 0 { -0.004 * span } else { 0.004 * span };
     let mut panel = Panel::new(Axis::linear("Rating, scaled", ""));
     for (slot, (modality, name)) in MODALITIES.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Free space of a disk, per operating system.
+//! Free disk space, per operating system.
 
 #[cfg(not(windows))]
 mod unix;

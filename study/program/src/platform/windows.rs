@@ -5,7 +5,7 @@ use std::os::windows::ffi::OsStrExt;
 use std::path::Path;
 use windows_sys::Win32::Storage::FileSystem::GetDiskFreeSpaceExW;
 
-/// Returns the free bytes of an existing folder's disk, for this user; `None` if unknown. Not real-time.
+/// Returns the disk space available to this user on the volume of an existing folder, bytes; `None` if unknown. Not real-time.
 pub(crate) fn free_bytes(folder: &Path) -> Option<f64> {
     let name: Vec<u16> = folder.as_os_str().encode_wide().chain([0]).collect();
     let mut free = 0;

@@ -7,8 +7,8 @@ use flotor_study::bias::{BiasRow, rows};
 use flotor_study::observer::TernaryObserver;
 use rayon::prelude::*;
 
-/// Simulated observers: true threshold as a share of the base, and criterion. First the two of the default population, then one
-/// threshold over the range of criteria.
+/// Simulated observers: true threshold, as a fraction of the base, and criterion. First the two mean observers of the default
+/// population, then one threshold with different criteria.
 const OBSERVERS: [(f64, f64); 7] =
     [(0.1114, 1.0), (0.1357, 1.0), (0.142, 0.0), (0.142, 0.25), (0.142, 0.5), (0.142, 0.75), (0.142, 1.0)];
 

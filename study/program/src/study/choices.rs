@@ -98,18 +98,19 @@ impl ForceWay {
         }
     }
 
-    /// Returns the settings of the simulated hand that differ from those for a spring, for the built-in scene.
+    /// Returns the settings of the simulated hand in the built-in scene that differ from its settings for a spring.
     pub(super) fn hand(self) -> &'static [&'static str] {
         match self {
-            // Only the hand supports a weight: the softest hand (1.5 N/mm) yields by 12 mm to the heaviest weight of the default bases
-            // (17.5 N), the whole range below home. The intended position is therefore above home, and the hand lifts the weight a little.
+            // Only the hand supports a weight: the heaviest weight of the default bases (17.5 N) deflects the softest hand (1.5
+            // N/mm) by 12 mm, the whole range below home. The intended position is therefore above home, and the hand lifts the
+            // weight a little.
             Self::Felt => &["device.hand_centre_mm=4", "device.hand_amplitude_mm=3"],
             Self::Exerted => &[],
         }
     }
 }
 
-/// Returns the population that judges pairs of a stimulus.
+/// Returns the population of simulated subjects for pairs of a stimulus; `way` is the kind of force in a force experiment.
 ///
 /// # Errors
 /// If no Weber fraction of the stimulus is published.
@@ -128,7 +129,7 @@ pub(super) fn population(stimulus: &Stimulus, way: Option<ForceWay>) -> Result<P
     Ok(Population::judging(percept))
 }
 
-/// Parses `VH,H`: two shares between 0 and 1.
+/// Parses `VH,H`: two thresholds as fractions of the base, above 0 and below 1.
 pub(super) fn thresholds(text: &str) -> Result<[f64; 2], String> {
     let (vh, h) = text.split_once(',').ok_or("write VH,H, like 0.14,0.17")?;
     let both = [real(vh)?, real(h)?];
@@ -136,7 +137,7 @@ pub(super) fn thresholds(text: &str) -> Result<[f64; 2], String> {
     if are_shares { Ok(both) } else { Err("both must be shares above 0 and below 1".to_owned()) }
 }
 
-/// Parses `LEAST-MOST`, with the first value smaller.
+/// Parses the range `LEAST-MOST`; the first value must be smaller.
 pub(super) fn range(text: &str) -> Result<(f64, f64), String> {
     let (least, most) = text.split_once('-').ok_or("write LEAST-MOST, like 12-48")?;
     let (least, most) = (real(least)?, real(most)?);

@@ -17,14 +17,14 @@ use serde::Serialize;
 /// Measured curve of a spring.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct MeasuredCurve {
-    /// Compression, m, and force, N, in the order of measurement.
+    /// Points of compression, m, and force, N, in the order of measurement.
     pub(super) points: Vec<(f64, f64)>,
-    /// Length without load, m; `None` if the table has compressions and no length was given.
+    /// Free length (without load), m; `None` if the table has compressions and no free length was given.
     pub(super) free_length_m: Option<f64>,
 }
 
-/// Fitted range of the deflection, as shares of the largest: ends that are not seated yet, and coils that begin to touch, do not
-/// represent the wire (EN 15800 measures a spring's rate between 30 and 70 %).
+/// Fitted range of the deflection, as fractions of the largest deflection. Outside it, spring ends that are not yet seated and
+/// coils that begin to touch falsify the stiffness (EN 15800 measures the spring rate between 30 and 70 %).
 pub(super) const FITTED: [f64; 2] = [0.3, 0.7];
 
 /// Linear spring fitted to a curve.
@@ -34,38 +34,38 @@ pub(super) struct SpringFit {
     pub(super) stiffness_n_per_m: f64,
     /// 95 % confidence interval of the stiffness, N/m.
     pub(super) stiffness_interval_n_per_m: [f64; 2],
-    /// Compression at which the fitted line meets zero force, m: play of the fixture.
+    /// Compression at which the fitted line crosses zero force, m: play of the fixture.
     pub(super) offset_m: f64,
-    /// Length without load, m; `None` if unknown.
+    /// Free length (without load), m; `None` if unknown.
     pub(super) free_length_m: Option<f64>,
-    /// Compression rigidity, N: stiffness times free length.
+    /// Compression rigidity gamma, N: stiffness times free length; `None` without a free length.
     pub(super) gamma_n: Option<f64>,
-    /// R² of the line over the fitted range.
+    /// R² of the fitted line over the fitted range.
     pub(super) r_squared: f64,
     /// Number of points in the fitted range.
     pub(super) points: usize,
-    /// Largest deviation of any measured point from the line, as a share of the largest force.
+    /// Largest deviation of any measured point from the line, as a fraction of the largest force.
     pub(super) nonlinearity: f64,
 }
 
-/// Measured curve prepared for rendering: smoothed, and with a force that never falls.
+/// Measured curve prepared for rendering: averaged, with a force that does not decrease with compression.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct ServedCurve {
-    /// Compression, m, and force, N: starts at (0, 0), both increasing.
+    /// Knots of compression, m, and force, N: from (0, 0) on, compression increasing, force not decreasing.
     pub(super) knots: Vec<(f64, f64)>,
-    /// Root mean square deviation of the measured points from the curve, N: scatter, friction, and smoothing.
+    /// Root mean square deviation of the measured points from the curve, N, due to scatter, friction and averaging.
     pub(super) rms_n: f64,
 }
 
-/// Number of equal parts of the deflection for averaging: finer than a hand moves between two ticks, coarse enough to hold points
-/// of both strokes.
+/// Number of equal parts of the deflection in which points are averaged: finer than the movement of a hand between two ticks,
+/// coarse enough for a part to contain points of both strokes.
 const PARTS: u32 = 64;
 
-/// Reason why a curve is unusable.
+/// Reason why a measured curve is unusable.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub(super) enum CurveError {
-    /// Invalid line.
+    /// A line is invalid.
     #[error("line {line}: {problem}")]
     Line {
         /// Line number, from 1.
@@ -73,18 +73,18 @@ pub(super) enum CurveError {
         /// Description of the problem.
         problem: String,
     },
-    /// The length without load is unknown.
+    /// The free length is unknown.
     #[error("the table has compressions only; give the length without load (--free-length-mm)")]
     NoFreeLength,
-    /// Too few points in the fitted range.
+    /// The fitted range has too few points.
     #[error("the middle of the deflection (30 to 70 %) has too few points ({0}); measure at more lengths")]
     Statistics(#[from] StatisticsError),
-    /// The force decreases with compression.
+    /// The force decreases with compression; holds the slope, N/m.
     #[error(
         "the force falls as the spring is compressed ({0:.1} N/m); check whether length and compression are interchanged"
     )]
     Falling(f64),
-    /// Too few different compressions for a curve.
+    /// The points have too few different compressions for a curve; holds their number, zero compression included.
     #[error("the curve needs points at three lengths or more, and has {0}; measure at more lengths")]
     Sparse(usize),
 }
@@ -103,10 +103,10 @@ enum Abscissa {
 }
 
 impl MeasuredCurve {
-    /// Parses a table. In a table of lengths, the longest is the free length unless `free_length_m` is given.
+    /// Parses a table. In a table of lengths, the largest length is the free length unless `free_length_m` is given.
     ///
     /// # Errors
-    /// [`CurveError::Line`] for an invalid header or line.
+    /// [`CurveError::Line`] if the header or a line is invalid.
     pub(super) fn parse(text: &str, free_length_m: Option<f64>) -> Result<Self, CurveError> {
         let table = Table::parse(text, HashLines::Comments)?;
         let abscissa = match table.columns().join(",").as_str() {
@@ -133,10 +133,10 @@ impl MeasuredCurve {
         })
     }
 
-    /// Fits a linear spring to the middle of the deflection.
+    /// Fits a linear spring to the middle of the deflection ([`FITTED`]) by least squares.
     ///
     /// # Errors
-    /// [`CurveError`], if the range has too few points or the force falls.
+    /// [`CurveError`] if the range has too few points, or the force decreases with compression.
     pub(super) fn fit(&self) -> Result<SpringFit, CurveError> {
         let deepest_m = self.points.iter().map(|(x, _)| *x).fold(0.0, f64::max);
         let [from_m, to_m] = FITTED.map(|share| share * deepest_m);
@@ -160,15 +160,16 @@ impl MeasuredCurve {
         })
     }
 
-    /// Computes the curve for rendering: averages points in small parts of the deflection (over both strokes, if measured), starts
-    /// at zero force and compression, and never falls (isotonic regression by pooling adjacent violators).
+    /// Computes the curve for rendering: averages the points in small parts of the deflection (over both strokes, if measured),
+    /// begins at zero force and compression, and makes the force non-decreasing (isotonic regression by the
+    /// pool-adjacent-violators algorithm).
     ///
     /// # Errors
-    /// [`CurveError::Sparse`] if the points are too few.
+    /// [`CurveError::Sparse`] if fewer than two parts of the deflection have points.
     pub(super) fn served(&self) -> Result<ServedCurve, CurveError> {
         let deepest_m = self.points.iter().map(|(x, _)| *x).fold(0.0, f64::max);
         let part_m = deepest_m / f64::from(PARTS);
-        // Part 0 is around zero compression, where the force is zero.
+        // Part 0 is about zero compression, where the force is zero: it has no points.
         let mut parts: Vec<(f64, f64, f64)> = vec![(0.0, 0.0, 0.0); PARTS as usize + 1];
         for (x_m, force_n) in self.points.iter().filter(|(x_m, _)| *x_m > 0.5 * part_m) {
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // positive, at most PARTS
@@ -196,7 +197,7 @@ impl MeasuredCurve {
 }
 
 impl ServedCurve {
-    /// Formats the table for the force model `measured`.
+    /// Formats the curve as a table (CSV) for the force model `measured`.
     #[must_use]
     pub(super) fn to_table(&self) -> String {
         let row = |(x_m, force_n): &(f64, f64)| format!("{:.6},{force_n:.6}\n", x_m * 1.0e3);
@@ -205,7 +206,8 @@ impl ServedCurve {
     }
 }
 
-/// Returns the closest non-decreasing values by weighted least squares: pools neighbours in the wrong order into their mean.
+/// Returns the closest non-decreasing values to `(weight, value)` pairs by weighted least squares (pool-adjacent-violators
+/// algorithm).
 fn never_falling(weighted: &[(f64, f64)]) -> Vec<f64> {
     let mut blocks: Vec<(f64, f64, usize)> = Vec::new();
     for (weight, value) in weighted {
@@ -219,7 +221,7 @@ fn never_falling(weighted: &[(f64, f64)]) -> Vec<f64> {
     blocks.into_iter().flat_map(|(_, value, count)| std::iter::repeat_n(value, count)).collect()
 }
 
-/// Interpolates linearly between knots; constant beyond the last, zero before the first.
+/// Interpolates the force linearly between knots; constant beyond the last knot, zero before the first.
 fn between(knots: &[(f64, f64)], x_m: f64) -> f64 {
     let after = knots.partition_point(|(at, _)| *at <= x_m);
     match (after.checked_sub(1).and_then(|before| knots.get(before)), knots.get(after)) {

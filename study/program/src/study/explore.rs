@@ -1,5 +1,5 @@
-//! `flotor study explore`: feel a spring while changing its dimensions and material, without trials: the immediate use suggested by
-//! the thesis (CMU-RI-TR-07-21, section 7).
+//! `flotor study explore`: presents a spring whose dimensions and material can be changed while it is felt, without trials; the
+//! immediate use that the thesis suggests (CMU-RI-TR-07-21, section 7).
 
 use super::front::lines_of;
 use clap::Args;
@@ -23,8 +23,8 @@ use std::path::PathBuf;
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
-/// Young's and shear modulus of spring wire, MPa: music wire as in the thesis, the others from Shigley's Mechanical
-/// Engineering Design, table 10-5.
+/// Materials of spring wire with Young's and shear modulus, MPa: music wire as in the thesis, the other materials from
+/// Shigley's Mechanical Engineering Design, table 10-5.
 const MATERIALS: [(&str, [&str; 2]); 4] = [
     ("music-wire", ["203395", "75842"]),
     ("stainless", ["193000", "69000"]),
@@ -108,7 +108,8 @@ fn end(stop: &StopSwitch, run: RunThread, rate_hz: f64) -> Result<(), CommandErr
     }
 }
 
-/// Returns the scene to explore; by default a physical wire spring, so that all dimensions and the material are parameters.
+/// Returns the scene to explore; by default a spring in the mode `physical`, so that all dimensions and the material are
+/// parameters.
 fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
     let scene = match &arguments.scene {
         Some(path) => Scene::load(path),
@@ -126,7 +127,7 @@ fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
     Ok(scene)
 }
 
-/// Command prompt: changes the model and reports the forces at the hand.
+/// Command prompt, which changes the model and reports stiffness and force at the hand.
 struct Prompt {
     controls: Controls,
     registry: Registry,
@@ -134,7 +135,7 @@ struct Prompt {
     /// All changes so far, applied again to a replacement model.
     settings: Vec<(String, String)>,
     watch: Shared,
-    /// Ratio of the stiffness at the hand to that of the model.
+    /// Ratio of the stiffness at the hand to the stiffness of the model.
     mapping: f64,
 }
 
@@ -169,7 +170,7 @@ impl Prompt {
             return format!("  {error}");
         }
         self.settings.extend(changes.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())));
-        // Wait for the fade-in and one up and down movement of the hand.
+        // Wait for the fade-in, or the model's rejection of the change.
         std::thread::sleep(Duration::from_millis(200));
         let refused = self.watch.lock().refused.take();
         if let Some(Change { parameter, value, .. }) = refused {
@@ -177,11 +178,12 @@ impl Prompt {
             return format!("  the model rejected {parameter} = {value}, which contradicts its other values");
         }
         self.watch.lock().meter = Some(KinematicsMeter::default());
+        // Wait for one up-and-down movement of the hand.
         std::thread::sleep(Duration::from_millis(700));
         self.felt()
     }
 
-    /// Replaces the model, with all earlier changes: fixed parameters are read at creation.
+    /// Replaces the model with a new one that has all changes so far, because fixed parameters are read at creation.
     fn swap(&self, changes: &[(&str, &str)]) -> Result<(), ControlError> {
         let before = self.settings.iter().map(|(key, value)| (key.as_str(), value.as_str()));
         let all: Vec<(&str, &str)> = before.chain(changes.iter().copied()).collect();
@@ -204,7 +206,7 @@ impl Prompt {
         schema.iter().map(line).collect::<Vec<_>>().join("\n")
     }
 
-    /// Describes the stiffness and force at the hand since the last request.
+    /// Describes stiffness and peak force at the hand since the last call, and restarts the measurement.
     fn felt(&self) -> String {
         let felt = self.watch.lock().meter.replace(KinematicsMeter::default());
         let words = |felt: StimulusKinematics| {
@@ -217,7 +219,8 @@ impl Prompt {
     }
 }
 
-/// Describes the model's own stiffness if a mapping makes it differ from `at_hand`, N/m.
+/// Describes the model's stiffness if the mapping makes it differ from the stiffness at the hand, `at_hand`, N/m; else returns
+/// an empty text.
 fn model_text(at_hand: f64, mapping: f64) -> String {
     if (mapping - 1.0).abs() < 1.0e-6 || mapping <= 0.0 {
         return String::new();

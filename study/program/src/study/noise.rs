@@ -1,5 +1,5 @@
-//! White noise on headphones, to mask the sound of the device (CMU-RI-TR-07-21, section 4). Samples are piped to a player of the
-//! system, if there is one.
+//! White noise on headphones, which masks the sound of the device (CMU-RI-TR-07-21, section 4). Samples are piped to an audio
+//! player of the system.
 
 use flotor_core::Random;
 use flotor_servo::last_stop::spawn_unblocked;
@@ -9,10 +9,10 @@ use std::thread::JoinHandle;
 
 /// Sample rate, Hz.
 const RATE_HZ: u32 = 44_100;
-/// Peak sample, of 32767: a quarter of full scale; the system volume sets the loudness.
+/// Peak amplitude: a quarter of full scale (32767); the system volume sets the loudness.
 const LOUDEST: i16 = 8_000;
 
-/// Players that accept 16-bit samples on standard input: name and arguments.
+/// Audio players that accept 16-bit samples on standard input: name and arguments.
 const PLAYERS: [(&str, &[&str]); 3] = [
     ("pw-cat", &["--playback", "--rate", "44100", "--channels", "1", "--format", "s16", "-"]),
     ("paplay", &["--raw", "--rate=44100", "--channels=1", "--format=s16le"]),
@@ -22,13 +22,13 @@ const PLAYERS: [(&str, &[&str]); 3] = [
 /// White noise, played until dropped.
 pub(super) struct WhiteNoise {
     player: Child,
-    /// Writer thread, which ends with the player.
+    /// Thread that writes samples to the player; ends with the player.
     feeder: Option<JoinHandle<()>>,
     name: &'static str,
 }
 
 impl WhiteNoise {
-    /// Starts the first available player; `None` without a player or sound card.
+    /// Starts the noise with the first player that works; `None` without a player or sound card. Waits 200 ms per player.
     #[must_use]
     pub(super) fn start() -> Option<Self> {
         PLAYERS.iter().find_map(|(name, arguments)| {
@@ -47,7 +47,7 @@ impl WhiteNoise {
         })
     }
 
-    /// Returns the player's name.
+    /// Returns the program name of the player.
     #[must_use]
     pub(super) fn player(&self) -> &'static str {
         self.name

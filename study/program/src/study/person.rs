@@ -23,7 +23,8 @@ use serde_json::json;
 use std::io::{BufReader, Stdout, stdin, stdout};
 use std::path::Path;
 
-/// Runs the sitting of a person. Checks the configuration, starts the loop and opens the window before the log begins.
+/// Runs the sitting of a person and writes the tables. Checks the configuration, starts the run and opens the front end before
+/// it begins or resumes the log.
 pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -> Result<(), CommandError> {
     let dataset = Dataset::at(&common.out);
     let begin = begin(common, &dataset, protocol, apparatus)?;
@@ -41,7 +42,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     let screen_texts = screen_texts(common)?;
     let kinematics = common.kinematics.unwrap_or(Kinematics::Full);
     let bytes_per_s = if kinematics == Kinematics::Full { apparatus.recording_bytes_per_s() } else { 0.0 };
-    // Tracks may need more trials than expected: plan for at least one.
+    // Tracks may need more trials than expected: assume at least one.
     let trials = protocol.presentations_about().saturating_sub(presented as u64).max(1) as f64;
     space::check(&common.out, Need { stimuli: trials * protocol.stimuli_in_a_trial(), bytes_per_s })?;
     let stop = stop_run_on_signals()?;
@@ -96,7 +97,7 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     }
 }
 
-/// Returns the first line of the sitting's log.
+/// Returns the data for the first line of the sitting's log.
 fn begin(
     common: &Common,
     dataset: &Dataset,
@@ -118,14 +119,14 @@ fn begin(
     })
 }
 
-/// Reads the texts that the person reads first. Consent is given once, before the first trial; instructions are shown again when the
+/// Returns the texts that the person reads first: the consent text before the first trial only, instructions also when the
 /// sitting resumes.
 fn texts(common: &Common, presented: usize) -> Result<Vec<String>, CommandError> {
     let consent = common.consent.iter().filter(|_| presented == 0);
     consent.chain(&common.instructions).map(|path| text_of(path)).collect()
 }
 
-/// Reads the texts of the window's screens, if given.
+/// Returns the content of the file with the texts of the window's screens; `None` without a file.
 fn screen_texts(common: &Common) -> Result<Option<String>, CommandError> {
     let texts = common.texts.as_deref().map(text_of).transpose()?;
     if texts.is_some() && common.screen != ScreenOption::Viewer {
@@ -139,7 +140,7 @@ fn least_exploration(common: &Common) -> MinimumExploration {
     MinimumExploration { time_s: common.least_time, path_length_m: common.least_movement_mm * 1.0e-3 }
 }
 
-/// Notes the conditions of the sitting in its log.
+/// Writes the conditions of the sitting as notes to its log: noise, texts, minimum exploration, repetitions.
 fn note_conditions(
     log: &mut LogWriter,
     common: &Common,
@@ -155,7 +156,7 @@ fn note_conditions(
     notes.into_iter().flatten().try_for_each(|text| log.write(&Event::Note { text }))
 }
 
-/// Reads a text to be shown to the person.
+/// Reads a text file; an empty one is an error.
 fn text_of(path: &Path) -> Result<String, CommandError> {
     let text =
         read_text(path, "the text").map_err(|wrong| CommandError::Usage(wrong.in_file(path.display())))?;
@@ -170,13 +171,13 @@ fn text_of(path: &Path) -> Result<String, CommandError> {
     Ok(text)
 }
 
-/// Converts an apparatus error.
+/// Converts an apparatus error to a command error with the exit code of its cause.
 fn outside(cause: ApparatusOrFrontEndError) -> CommandError {
     let message = cause.to_string();
     super::outside(cause, message)
 }
 
-/// Describes the progress of an interrupted sitting and how to resume.
+/// Describes the progress of an interrupted sitting, and the options that resume it.
 fn broken_off(subject: SubjectNumber, attended: &ScreenStateMachine) -> String {
     let presented = attended.presented();
     format!(
@@ -185,7 +186,7 @@ fn broken_off(subject: SubjectNumber, attended: &ScreenStateMachine) -> String {
     )
 }
 
-/// Screen for questions and answers.
+/// Front end for questions and answers.
 enum Front {
     Window(Window),
     Terminal(Terminal),
@@ -220,7 +221,7 @@ fn failed(error: impl std::fmt::Display) -> CommandError {
     CommandError::Failed(error.to_string())
 }
 
-/// Returns the requested subject number, or the first free one.
+/// Returns the requested subject number, else the first one without a log.
 fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<SubjectNumber, CommandError> {
     let is_new = |number: &SubjectNumber| !dataset.log_path(*number, protocol.task()).exists();
     let named = common.subject.and_then(SubjectNumber::new);
@@ -231,7 +232,8 @@ fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<Su
     })
 }
 
-/// Starts the noise if requested; prints a note or returns an error if this machine cannot play it.
+/// Starts the noise unless `--noise off`. If this machine cannot play it, returns an error for `--noise on`, else prints a note
+/// and returns `None`.
 fn noise(common: &Common) -> Result<Option<WhiteNoise>, CommandError> {
     if common.noise == NoiseOption::Off {
         return Ok(None);

@@ -1,7 +1,8 @@
 //! `flotor study run`: runs a study from a file.
 //!
-//! A file `NAME.study.toml` sets the options of an experiment for all subjects, and what is fixed before data collection: exclusion
-//! rules and the plan of the analysis. Every log contains the digest of the file, so that the version of the plan is documented.
+//! A file `NAME.study.toml` sets the options of an experiment for all subjects, and the exclusion rules and the plan of the
+//! analysis, which are fixed before data collection. Every log contains text and SHA-256 of the file, so that the version of
+//! the plan is documented.
 
 use super::{StudyArguments, Task};
 use crate::analyse::choices::{Choices, PlannedTable};
@@ -18,7 +19,7 @@ use std::path::{Path, PathBuf};
 
 /// Suffix of a study file's name.
 const ENDING: &str = ".study.toml";
-/// Options with paths, relative to the folder of the study file.
+/// Options whose values are paths, relative to the folder of the study file.
 const PATHS: [&str; 6] = ["out", "scene", "consent", "instructions", "texts", "plugin-path"];
 /// Options that are only valid on the command line of `study run`.
 const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
@@ -64,7 +65,7 @@ pub(super) struct RunArguments {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StudyFile {
-    /// Task of the experiment.
+    /// Experiment: `jnd`, `magnitude` or `force`.
     task: TaskName,
     /// Exclusion rules, fixed before data collection.
     #[serde(default)]
@@ -75,7 +76,7 @@ struct StudyFile {
     /// Planned options of `flotor analyse`.
     #[serde(default)]
     analyse: PlannedTable,
-    /// Options of the experiment, by long name without dashes.
+    /// Options of the experiment, by long name without leading dashes; `_` stands for `-`.
     #[serde(default)]
     options: toml::Table,
 }
@@ -104,11 +105,11 @@ impl StudyFile {
 
 /// Analysis plan of a study file.
 pub(crate) struct Planned {
-    /// Description for people.
+    /// Description of the planned analysis.
     pub(crate) analysis: String,
-    /// Options of `flotor analyse`.
+    /// Planned options of `flotor analyse`.
     pub(crate) choices: Choices,
-    /// Planned number of subjects, if stated.
+    /// Planned number of subjects; `None` if not stated.
     pub(crate) subjects: Option<usize>,
 }
 
@@ -122,7 +123,7 @@ pub(crate) fn planned(text: &str) -> Option<Planned> {
 }
 
 impl RunArguments {
-    /// Separates the study file from the options before and after it.
+    /// Separates the name of the study file from the options before and after it; `None` if no file is named.
     fn file_and_options(&self) -> (Option<PathBuf>, Vec<OsString>) {
         let mut words: Vec<OsString> =
             self.file.iter().map(OsString::from).chain(self.further.iter().cloned()).collect();
@@ -144,7 +145,7 @@ impl RunArguments {
     }
 }
 
-/// Runs a study file: begins or resumes the study, and skips complete subjects.
+/// Runs the study of a study file: begins or resumes it, and skips complete subjects.
 pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let (file, further) = arguments.file_and_options();
     let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
@@ -169,7 +170,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     super::run(&study)
 }
 
-/// Finds the only study file of a folder.
+/// Returns the only study file of a folder; an error if there is none, or more than one.
 fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
     let entries = std::fs::read_dir(folder)
         .map_err(|cause| CommandError::Usage(format!("{}: {cause}", folder.display())))?;
@@ -193,7 +194,8 @@ fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
     }
 }
 
-/// Converts a study file to command-line arguments, from the task on, and its exclusion rules.
+/// Converts a study file and the `further` options to command-line arguments, from the task on; also returns the exclusion
+/// rules of the file.
 fn words(
     file: &Path,
     text: &str,
@@ -213,7 +215,7 @@ fn words(
     let folder = file.parent().unwrap_or(Path::new(""));
     let said = Said(&further);
     let mut words: Vec<OsString> = vec![task.into()];
-    // Plugin folders of the file, searched after those of the command line.
+    // Plugin folders of the file, which are searched after the plugin folders of the command line.
     let mut last: Vec<OsString> = Vec::new();
     for (key, value) in &study.options {
         let name = key.replace('_', "-");
@@ -255,7 +257,8 @@ fn words(
             let one = [OsString::from(format!("--{name}")), value];
             match name.as_str() {
                 "plugin-path" => last.extend(one),
-                // A setting on the command line replaces the file's setting of the same parameter; others are added.
+                // A setting on the command line replaces the file's setting of the same parameter; the file's other settings
+                // are added.
                 "set" if said.sets(&one[1]) => {}
                 "set" => words.extend(one),
                 _ if said.has(&name) => {}
@@ -271,7 +274,7 @@ fn words(
     Ok((words, study.exclusion))
 }
 
-/// Options given on the command line, which override those of the file.
+/// Options on the command line, which override the options of the file.
 struct Said<'a>(&'a [OsString]);
 
 impl Said<'_> {
@@ -299,7 +302,7 @@ fn kind(value: &toml::Value) -> &'static str {
     }
 }
 
-/// Formats a value for the command line; `None` for a table, list, boolean or date.
+/// Formats a string or number for the command line; `None` for a table, list, boolean or date.
 fn plain(value: &toml::Value) -> Option<String> {
     match value {
         toml::Value::String(text) => Some(text.clone()),
@@ -308,7 +311,7 @@ fn plain(value: &toml::Value) -> Option<String> {
     }
 }
 
-/// Formats a reason as one line, with the file name.
+/// Formats an error of the command-line parser as one line, with the name of the study file.
 fn of_file(file: &Path, reason: &str) -> String {
     let lines = reason.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("Usage:"));
     let reason = lines.take_while(|line| !line.starts_with("For more")).collect::<Vec<_>>().join(" ");

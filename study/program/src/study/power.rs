@@ -41,7 +41,7 @@ pub(super) struct PowerArguments {
     json: JsonOption,
 }
 
-/// Parses a range like `8..32`.
+/// Parses a range of sample sizes such as `8..32`.
 fn sizes(text: &str) -> Result<(u16, u16), String> {
     let wrong = || {
         format!(

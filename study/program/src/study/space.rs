@@ -1,4 +1,4 @@
-//! Check of the free disk space before a person's sitting.
+//! Check of the available disk space before a person's sitting.
 
 use crate::platform::free_bytes;
 use flotor_command::{CommandError, note};
@@ -6,9 +6,9 @@ use std::path::Path;
 
 /// Assumed time per stimulus of a person, with fades, answer and rest, s.
 const STIMULUS_S: f64 = 8.0;
-/// Minimum number of stimuli that must fit on the disk, or the rest of the sitting if shorter.
+/// Number of stimuli whose data must fit on the disk, or the rest of the sitting if shorter.
 const LEAST_STIMULI: f64 = 20.0;
-/// Size of one answer in the event log and the tables, bytes.
+/// Estimated size of one answer in the event log and the tables, bytes.
 const ANSWER_BYTES: f64 = 4.0e3;
 
 /// Expected output of a sitting.
@@ -16,17 +16,17 @@ const ANSWER_BYTES: f64 = 4.0e3;
 pub(super) struct Need {
     /// Estimated number of remaining stimuli.
     pub(super) stimuli: f64,
-    /// Recorded movement, bytes per second; 0 without recording.
+    /// Data rate of the recorded movement, bytes per second; 0 without recording.
     pub(super) bytes_per_s: f64,
 }
 
-/// Result of comparing need and free space.
+/// Result of comparing expected output and available space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Room {
     Enough,
-    /// Enough for a part of the sitting; holds the bytes for all of it.
+    /// Enough for a part of the sitting; holds the bytes for the whole rest.
     Short(f64),
-    /// Not enough to begin; holds the bytes for the minimum.
+    /// Not enough to begin; holds the bytes for the minimum ([`LEAST_STIMULI`]).
     None(f64),
 }
 
@@ -45,8 +45,8 @@ impl Need {
     }
 }
 
-/// Rejects a disk without space to begin a sitting, and prints a note if the whole sitting may not fit. Skips the check if the free
-/// space is unknown.
+/// Returns an error if the disk has no space to begin a sitting, and prints a note if the whole sitting may not fit. Skips the
+/// check if the available space is unknown.
 pub(super) fn check(folder: &Path, need: Need) -> Result<(), CommandError> {
     let exists =
         folder.ancestors().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });

@@ -1,4 +1,5 @@
-//! `flotor study spring`: fits a spring to a measured curve, plots it, and writes scenes of the fitted spring or of the curve.
+//! `flotor study spring`: fits a spring to a measured curve, plots both, and writes scenes of the fitted spring or of the
+//! curve.
 
 use super::curve::{CurveError, FITTED, MeasuredCurve, ServedCurve, SpringFit};
 use clap::Args;
@@ -133,7 +134,7 @@ fn picture(curve: &MeasuredCurve, fit: &SpringFit, served: &ServedCurve) -> Stri
         .to_svg()
 }
 
-/// Returns the scene of the fitted spring, for the model of the built-in study scene.
+/// Returns the scene (TOML) of the fitted spring, with the model `spring`; an error without a free length.
 fn scene(fit: &SpringFit, coil_diameter_mm: Option<f64>) -> Result<String, CurveError> {
     let (free_length_m, gamma_n) = fit.free_length_m.zip(fit.gamma_n).ok_or(CurveError::NoFreeLength)?;
     let parameters = format!(
@@ -147,10 +148,10 @@ fn scene(fit: &SpringFit, coil_diameter_mm: Option<f64>) -> Result<String, Curve
     Ok(life_size(head, "spring", &parameters))
 }
 
-/// Drawn length of a spring of unknown length, as a multiple of the largest compression.
+/// Drawn length of a spring of unknown free length, as a multiple of the largest compression.
 const DRAWN: f64 = 1.5;
 
-/// Returns the scene of the measured curve.
+/// Returns the scene (TOML) of the measured curve, with the model `measured` and the file `table`.
 fn curve_scene(table: &Path, fit: &SpringFit, served: &ServedCurve, coil_diameter_mm: Option<f64>) -> String {
     let table = table.file_name().unwrap_or_default().to_string_lossy();
     let deepest_m = served.knots.last().map_or(0.0, |(x_m, _)| *x_m);
@@ -172,7 +173,7 @@ fn coil(diameter_mm: Option<f64>) -> String {
     diameter_mm.map_or_else(String::new, |mm| format!("coil_diameter_mm = {mm}\n"))
 }
 
-/// Returns a scene without scaling of motion or force: the model represents a real spring.
+/// Returns a scene without scaling of motion or force, as for a real spring.
 fn life_size(head: &str, plugin: &str, parameters: &str) -> String {
     format!(
         "{head}rate_hz = 1000\n\n[device]\nplugin = \"simulated\"\n\n[[model]]\nplugin = \"{plugin}\"\n\n\

@@ -4,7 +4,7 @@ use crate::StatisticsError;
 use crate::count;
 use crate::linear::Matrix;
 
-/// Factor that divides the subjects into groups.
+/// Between-subject factor, which divides the subjects into groups.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BetweenFactor {
     /// Factor name in the table.
@@ -13,7 +13,7 @@ pub struct BetweenFactor {
     pub groups: Vec<usize>,
 }
 
-/// Factor with repeated measures: every subject is measured at all levels.
+/// Within-subject factor (repeated measures): every subject is measured at all levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WithinFactor {
     /// Factor name in the table.
@@ -43,7 +43,7 @@ impl Term {
         other.0.iter().all(|factor| self.0.contains(factor))
     }
 
-    /// Returns all sets of factors in order of size, the empty set first.
+    /// Returns all subsets of `factors` factors in order of size, the empty set first.
     fn all(factors: usize) -> Vec<Self> {
         let mut terms = vec![Self(Vec::new())];
         for factor in 0..factors {
@@ -57,12 +57,12 @@ impl Term {
 }
 
 impl Design {
-    /// Checks a design. `responses[subject]` has one value per cell of the within-subject factors, with the levels of the last
-    /// factor varying fastest; without such factors, one value.
+    /// Creates a design after checking it. `responses[subject]` has one value per cell of the within-subject factors, with the
+    /// levels of the last factor varying fastest; without within-subject factors, one value.
     ///
     /// # Errors
     /// [`StatisticsError::Design`] for wrong counts, a group without subjects, or a value that is not finite;
-    /// [`StatisticsError::TooFew`] for too few subjects.
+    /// [`StatisticsError::TooFew`] if no combination of groups has two subjects.
     pub fn new(
         between: Vec<BetweenFactor>,
         within: Vec<WithinFactor>,
@@ -154,7 +154,7 @@ impl Design {
         between.chain(within).collect::<Vec<_>>().join(":")
     }
 
-    /// Returns the design columns of an effect between subjects, coded to sum to zero over the groups of each factor.
+    /// Returns the design columns of an effect between subjects in sum-to-zero (effect) coding.
     pub(super) fn coded(&self, term: &Term) -> Matrix {
         let factors = term.0.iter().filter_map(|index| self.between.get(*index));
         let intercept = Matrix::from_fn(self.subjects(), 1, |_, _| 1.0);
@@ -166,7 +166,8 @@ impl Design {
         })
     }
 
-    /// Returns orthonormal contrasts of an effect within subjects, over all cells: contrasts of its own factors, means over the others.
+    /// Returns orthonormal contrasts of an effect within subjects, over all cells: Helmert contrasts of the factors of the
+    /// effect, means over the other factors.
     pub(super) fn contrasts(&self, term: &Term) -> Matrix {
         let one = Matrix::from_fn(1, 1, |_, _| 1.0);
         self.within.iter().enumerate().fold(one, |contrasts, (index, factor)| {
@@ -201,7 +202,7 @@ fn constant(levels: usize) -> Matrix {
     Matrix::from_fn(levels, 1, |_, _| 1.0 / count(levels).sqrt())
 }
 
-/// Returns normalised Helmert contrasts: each level against the mean of the previous ones.
+/// Returns normalised Helmert contrasts: each level against the mean of the previous levels.
 fn helmert(levels: usize) -> Matrix {
     Matrix::from_fn(levels, levels - 1, |level, column| {
         let before = count(column + 1);

@@ -1,15 +1,16 @@
 //! Analysis of variance with factors between subjects and within them.
 //!
-//! One row per subject, one response per cell of the within-subject factors. Effects within subjects are tested by a general linear
-//! model of orthonormal contrasts: the responses of a subject are multiplied by contrasts of the within-subject factors, and the
-//! between-subject design explains the products. The sums of squares are traces of the hypothesis and error matrices of that model,
-//! as in `car::Anova` of R; they are valid for groups of unequal size, where type II and type III differ:
+//! The data have one row per subject, with one response per cell of the within-subject factors. Effects within subjects are
+//! tested by a multivariate linear model of orthonormal contrasts: the responses of a subject are multiplied by contrasts of
+//! the within-subject factors, and the between-subject design explains the products. The sums of squares are traces of the
+//! hypothesis and error matrices of that model, as in `car::Anova` of R; they are valid for groups of unequal size, where type
+//! II and type III differ:
 //!
 //! - **Type III**: each effect adjusted for all others, with effects coded to sum to zero.
 //! - **Type II**: each effect adjusted for all others that do not contain it.
 //!
-//! Greenhouse and Geisser's epsilon (1959) and Huynh and Feldt's (1976, with Lecoutre's correction of 1991) scale the
-//! degrees of freedom of effects whose contrasts vary unequally.
+//! Greenhouse and Geisser's epsilon (1959) and Huynh and Feldt's (1976, with Lecoutre's correction of 1991) scale the degrees
+//! of freedom of effects that violate sphericity: whose contrasts have unequal variances or are correlated.
 
 mod design;
 
@@ -34,10 +35,10 @@ pub enum SumOfSquares {
     Three,
 }
 
-/// Row of the table: one effect.
+/// Row of the analysis-of-variance table: one effect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Effect {
-    /// Factors, joined by colons: `modality:base`.
+    /// Names of the factors, joined by colons: `modality:base`.
     pub effect: String,
     /// Sum of squares of the effect.
     pub sum_of_squares: f64,
@@ -47,11 +48,12 @@ pub struct Effect {
     pub error_sum_of_squares: f64,
     /// Degrees of freedom of the error.
     pub error_df: f64,
-    /// F; NaN (`null` in JSON) if the error consists of rounding errors only.
+    /// F statistic; NaN (`null` in JSON) if the error consists of rounding errors only.
     pub f: f64,
-    /// Probability of a larger F without the effect; NaN like [`Self::f`].
+    /// p-value, without sphericity correction; NaN if [`Self::f`] is NaN.
     pub p: f64,
-    /// Share of effect in the sum of squares of effect and error; NaN like [`Self::f`]. Biased upwards, unlike [`partial_omega_squared`].
+    /// Partial eta squared: fraction of the effect in the sum of squares of effect and error; NaN if [`Self::f`] is NaN. Biased
+    /// upwards, unlike [`partial_omega_squared`].
     pub partial_eta_squared: f64,
     /// Partial omega squared with its interval, without sphericity correction; `None` without a test.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -59,14 +61,16 @@ pub struct Effect {
     /// Reason for a missing F.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "reason")]
     pub not_testable: Option<StatisticsError>,
-    /// Share of the effect in the sum of squares of effect and all errors (Olejnik and Algina 2003, all factors manipulated).
+    /// Generalised eta squared: fraction of the effect in the sum of squares of effect and all errors (Olejnik and Algina 2003,
+    /// all factors manipulated).
     pub generalised_eta_squared: f64,
-    /// Sphericity corrections; `None` unless the effect has more than one contrast within subjects.
+    /// Sphericity corrections; `None` for a single within-subject contrast or without a test.
     pub sphericity: Option<Sphericity>,
 }
 
 impl Effect {
-    /// Returns true if the effect has an F. An effect without error, or removed by scaling of all responses, has none.
+    /// Returns true if the effect has an F statistic. An effect without error, or removed by scaling of all responses, has
+    /// none.
     #[must_use]
     pub fn is_testable(&self) -> bool {
         self.not_testable.is_none()
@@ -78,18 +82,18 @@ fn reason<S: serde::Serializer>(reason: &Option<StatisticsError>, serializer: S)
     reason.as_ref().map(ToString::to_string).serialize(serializer)
 }
 
-/// Smallest residual degrees of freedom after subtraction; less is rounding error.
+/// Lower limit of the denominator of the Huynh-Feldt epsilon; a smaller difference is rounding error.
 const LEAST_LEFT: f64 = 1.0e-9;
 
 /// Sphericity estimates and corrected p-values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sphericity {
-    /// Greenhouse and Geisser's epsilon: 1 for equal and independent variances of all contrasts.
+    /// Greenhouse-Geisser epsilon: 1 if the orthonormal contrasts have equal variances and are uncorrelated (sphericity).
     pub epsilon_gg: f64,
     /// p-value with degrees of freedom scaled by `epsilon_gg`.
     pub p_gg: f64,
-    /// Huynh and Feldt's epsilon, which may exceed 1; its minimum, one over the number of contrasts, if the residuals have a single
-    /// degree of freedom.
+    /// Huynh-Feldt epsilon (corrected by Lecoutre), which may exceed 1; its minimum, one over the number of contrasts, if the
+    /// residuals have a single degree of freedom.
     pub epsilon_hf: f64,
     /// p-value with degrees of freedom scaled by `epsilon_hf`, limited to 1.
     pub p_hf: f64,

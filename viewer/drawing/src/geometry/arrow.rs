@@ -23,7 +23,8 @@ pub fn force_arrow(mesh: &mut Mesh, from_m: DVec3, vector_m: DVec3, shaft_radius
     revolve(mesh, &Frame::along(from_m, direction), &profile, SIDES, color);
 }
 
-/// Adds an arc with a head about an axis, in the sense of a torque; `angle_rad` is the angle of the arc with its head.
+/// Adds an arc with a head, right-handed about an axis, for a torque; `angle_rad` is the angle of the arc with its head. Adds
+/// nothing if the head does not fit.
 pub fn torque_arrow(
     mesh: &mut Mesh,
     center_m: DVec3,

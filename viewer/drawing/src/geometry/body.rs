@@ -6,7 +6,7 @@ use flotor_hal::{CenterlineInfo, Pose};
 /// Constant data of a body: sizes for drawing, and the shape at rest.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// Radii and turns around the centreline.
+    /// Radii of wire, helix and plates, m, and number of turns.
     pub info: CenterlineInfo,
     /// Centreline at home.
     pub rest: Curve,
@@ -15,7 +15,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// Checks the description of a model; `None` if there is nothing to draw.
+    /// Creates a body from the description of a model; `None` if the description is invalid or there is nothing to draw.
     #[must_use]
     pub fn new(info: CenterlineInfo, rest: &[Pose]) -> Option<Self> {
         let numbers = [info.tube_radius_m, info.helix_radius_m, info.helix_turns, info.plate_radius_m];
@@ -28,7 +28,7 @@ impl Body {
         (rest_length_m > 0.0).then_some(Self { info, rest: curve, rest_length_m })
     }
 
-    /// True if a wire is wound about the centreline; false for a plain tube.
+    /// Returns whether a wire is wound about the centreline; false for a plain tube.
     #[must_use]
     pub fn is_coil(&self) -> bool {
         self.info.helix_turns > 0.0 && self.info.helix_radius_m > 0.0

@@ -2,12 +2,12 @@
 
 use flotor_hal::{DQuat, DVec3, Pose};
 
-/// A cross-section of a slender body.
+/// Cross-section of a slender body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
     /// Centre, m.
     pub center_m: DVec3,
-    /// Orientation; the turned z axis is the normal of the section.
+    /// Orientation; the rotated z axis is the normal of the section.
     pub orientation: DQuat,
 }
 
@@ -17,7 +17,7 @@ type Components = [f64; 7];
 /// Smooth curve with a frame along it, through reported sections at even arc lengths at rest.
 ///
 /// Cubic Hermite pieces whose slopes are differences of fourth order (third at the ends): between 65 sections of a
-/// spring bent by its own length the error is below a thousandth of its wire (a test holds it).
+/// spring bent by its own length the error is below a thousandth of the wire's diameter (tested).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     values: Vec<Components>,
@@ -32,7 +32,7 @@ impl Curve {
             return None;
         }
         let mut values: Vec<Components> = sections.iter().map(components).collect();
-        // q and -q are one rotation: neighbours have to be on the same side to be interpolated.
+        // q and -q are the same rotation: neighbours need the same sign to be interpolated.
         for i in 1..values.len() {
             let side: f64 = (3..7).map(|k| values[i - 1][k] * values[i][k]).sum();
             if side < 0.0 {

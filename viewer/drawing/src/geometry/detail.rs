@@ -1,4 +1,4 @@
-//! Resolution of meshes: as fine as can be seen, and no finer.
+//! Resolution of meshes, limited to visible detail.
 
 use super::Body;
 use std::f64::consts::PI;
@@ -8,31 +8,32 @@ use std::f64::consts::PI;
 pub struct Detail {
     /// Number of rings along the whole tube.
     pub rings: usize,
-    /// Number of corners of a ring.
+    /// Number of vertices of a ring.
     pub sides: usize,
 }
 
 /// Largest distance of a chord from its arc, in pixels: below the resolution of anti-aliasing.
 const SAG_PX: f64 = 0.12;
-/// Range of rings per turn: a coil looks round at the lower limit and costs no more than can be seen at the upper.
+/// Range of the number of rings per turn: at the lower limit a coil still looks round; above the upper limit no difference is
+/// visible.
 const RINGS_PER_TURN: std::ops::RangeInclusive<f64> = 16.0..=96.0;
-/// Range of corners of a ring.
+/// Range of the number of vertices of a ring.
 const SIDES: std::ops::RangeInclusive<f64> = 8.0..=40.0;
-/// Rings of a plain tube, which may bend anywhere.
+/// Number of rings of a plain tube, which may bend anywhere.
 const RINGS_OF_A_TUBE: usize = 129;
-/// Largest number of rings of a tube: a hundred turns at full resolution would be more than can be seen.
+/// Largest number of rings of a tube: with a hundred turns, full resolution would not be visible.
 const MOST_RINGS: f64 = 6000.0;
 
 impl Detail {
     /// Returns the resolution for a body drawn at this many pixels per millimetre.
     ///
-    /// One of `n` chords on a circle of radius r lies `r (pi / n)² / 2` inside the arc.
+    /// The middle of one of `n` chords of a circle of radius r lies `r (pi / n)² / 2` inside the arc.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // within the ranges above
     pub fn for_size(body: &Body, pixels_per_mm: f64) -> Self {
         let parts = |radius_m: f64, range: &std::ops::RangeInclusive<f64>| {
             let radius_px = radius_m * super::MM_PER_M * pixels_per_mm.max(0.0);
-            // Even steps, so that zooming does not remesh every frame.
+            // Steps of eight, so that zooming does not change the mesh in every picture.
             let wanted = (PI * (radius_px / (2.0 * SAG_PX)).sqrt() / 8.0).ceil() * 8.0;
             wanted.max(*range.start()).min(*range.end())
         };

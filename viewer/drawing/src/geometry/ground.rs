@@ -1,4 +1,4 @@
-//! Ground of the scene: a grid that fades out and soft shadows, as cues for up, near and far.
+//! Ground of the scene: a grid that fades out, and soft shadows, as visual cues for height and depth.
 //!
 //! Grid and surface are static; only the shadows change from picture to picture.
 
@@ -33,7 +33,7 @@ pub struct Shadow {
     pub strength: f64,
 }
 
-/// Rings and sectors of the surface: fine enough for soft shadows.
+/// Numbers of rings and sectors of the surface: fine enough for soft shadows.
 const RINGS: usize = 48;
 const SECTORS: usize = 96;
 /// Half the width of a grid line, as a fraction of the line distance.
@@ -42,13 +42,13 @@ const LINE_HALF_WIDTH: f64 = 0.012;
 const LINE_LIFT: f64 = 0.002;
 
 impl Ground {
-    /// Adds surface and lines, without shadows. To be drawn first: bodies on the ground cover it.
+    /// Adds surface and lines, without shadows. Call it first: bodies on the ground cover the ground.
     pub fn append(&self, mesh: &mut Mesh) {
         self.surface(mesh);
         self.lines(mesh);
     }
 
-    /// Casts shadows on the corners added by [`Ground::append`]; replaces earlier shadows.
+    /// Darkens the surface's vertices added by [`Ground::append`] by the shadows; replaces earlier shadows.
     pub fn shade(&self, corners: &mut [Vertex], shadows: &[Shadow]) {
         for corner in corners.iter_mut().take((RINGS + 1) * (SECTORS + 1)) {
             let [x_mm, y_mm, _] = corner.position_mm.map(f64::from);

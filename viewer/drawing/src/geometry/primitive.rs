@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 /// Thickness of the slab drawn for a plane, as a fraction of half its longer side.
 const SLAB: f64 = 0.15;
-/// Sectors of round primitives, and rings of a ball.
+/// Number of sectors of round primitives, and of rings of a ball.
 const SECTORS: usize = 64;
 const RINGS: usize = 32;
 
@@ -47,7 +47,7 @@ fn cuboid(mesh: &mut Mesh, frame: &Frame, half_m: DVec3, color: Color) {
     for face in 0..3 {
         for side in [1.0, -1.0] {
             let (out, depth) = axes[face];
-            // Seen from outside, u to v is a left turn on both sides.
+            // Seen from outside, the rotation from u to v is counter-clockwise on both sides.
             let (u, v) = (axes[(face + 1) % 3], axes[(face + 2) % 3]);
             let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(a, b)| {
                 let place = out * (side * depth) + u.0 * (a * u.1 * side) + v.0 * (b * v.1);
@@ -59,7 +59,7 @@ fn cuboid(mesh: &mut Mesh, frame: &Frame, half_m: DVec3, color: Color) {
 }
 
 /// Adds a surface coloured by the values of its vertices; a surface with two sides is also drawn from the back.
-#[allow(clippy::cast_possible_truncation)] // a picture needs no more than f32, and no more than 2^32 corners
+#[allow(clippy::cast_possible_truncation)] // a picture needs no more than f32, and no more than 2^32 vertices
 pub fn append_surface(mesh: &mut Mesh, surface: &Surface, color: impl Fn(f64) -> Color) {
     let first = mesh.vertices.len() as u32;
     mesh.vertices.extend(surface.vertices.iter().map(|vertex| Vertex {

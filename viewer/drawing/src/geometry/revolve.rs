@@ -10,16 +10,16 @@ use std::f64::consts::TAU;
 pub struct Frame {
     /// Origin, m.
     pub origin_m: DVec3,
-    /// First direction across the axis.
+    /// First unit vector perpendicular to the axis.
     pub x: DVec3,
-    /// Second direction across the axis.
+    /// Second unit vector perpendicular to the axis.
     pub y: DVec3,
-    /// Direction of the axis.
+    /// Unit vector along the axis.
     pub z: DVec3,
 }
 
 impl Frame {
-    /// Returns a frame at a point, with the axis in a direction.
+    /// Returns a frame at a point, with the axis along a unit vector; its rotation about the axis is arbitrary.
     #[must_use]
     pub fn along(origin_m: DVec3, direction: DVec3) -> Self {
         let (x, y) = direction.any_orthonormal_pair();

@@ -33,7 +33,7 @@ struct Piece {
 pub struct LocalStrain {
     /// Relative change of length along the axis; negative where turns come closer.
     pub axial: f64,
-    /// Shear: sideways displacement per length.
+    /// Shear: displacement across the axis per length, 0 or more.
     pub shear: f64,
 }
 
@@ -78,7 +78,7 @@ impl Strain {
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few pieces
     pub fn at(&self, s: f64, fibre_m: DVec2) -> LocalStrain {
-        // Values belong to the middles of the pieces; linear between them.
+        // The values of the pieces apply at their middles; linear interpolation in between.
         let place = (s * self.pieces.len() as f64 - 0.5).clamp(0.0, (self.pieces.len() - 1) as f64);
         let i = (place as usize).min(self.pieces.len().saturating_sub(2));
         let u = place - i as f64;

@@ -10,12 +10,12 @@ pub struct SurfacePoint {
     pub position_m: DVec3,
     /// Unit vector out of the body.
     pub normal: DVec3,
-    /// Depth of the other point beneath the surface, m; negative outside.
+    /// Depth of the other point inside the body, m; negative outside.
     pub depth_m: f64,
 }
 
-/// Returns the point of a primitive's surface that is closest to a point, m. A plane has no edges here, as in a model. None for a
-/// cylinder and forms of a later contract, and in the middle of a ball, where every point is the closest.
+/// Returns the point of a primitive's surface that is closest to a point, m. A plane is infinite here, as in a model. `None` for a
+/// cylinder and for forms of a later contract, and at the centre of a ball, where all points of the surface are equally close.
 #[must_use]
 pub fn closest_surface_point(primitive: &Primitive, to_m: DVec3) -> Option<SurfacePoint> {
     let frame = Frame::at(&primitive.pose());
@@ -36,7 +36,8 @@ pub fn closest_surface_point(primitive: &Primitive, to_m: DVec3) -> Option<Surfa
     Some(SurfacePoint { position_m: frame.origin_m + turned(position_m), normal: turned(normal), depth_m })
 }
 
-/// Returns position, normal and depth for a box about the origin: for a point inside, of the nearest face.
+/// Returns position, normal and depth of the surface point of a box about the origin that is closest to `local_m`; for a point
+/// inside, the closest point of the nearest face.
 fn closest_of_box(half_m: DVec3, local_m: DVec3) -> Option<(DVec3, DVec3, f64)> {
     let outside_m = local_m - local_m.clamp(-half_m, half_m);
     if let Some(normal) = outside_m.try_normalize() {

@@ -23,7 +23,7 @@ fn fibre(body: &Body, s: f64) -> DVec2 {
 }
 
 /// Adds the wire with its flat ends; `color` maps the local strain to a colour.
-#[allow(clippy::cast_possible_truncation)] // thousands of corners
+#[allow(clippy::cast_possible_truncation)] // thousands of vertices
 pub fn append_tube(
     mesh: &mut Mesh,
     body: &Body,
@@ -77,14 +77,14 @@ fn tangent(centers: &[DVec3], k: usize) -> DVec3 {
     direction.try_normalize().unwrap_or(DVec3::Z)
 }
 
-/// Transports the direction across the wire from the last ring, without a turn about the wire.
+/// Transports the normal of the last ring to the next one, without a rotation about the wire.
 fn carry(across: Option<DVec3>, tangent: DVec3) -> DVec3 {
     let start = across.unwrap_or_else(|| tangent.any_orthonormal_vector());
     (start - tangent * tangent.dot(start)).try_normalize().unwrap_or_else(|| tangent.any_orthonormal_vector())
 }
 
-/// Closes an end with a flat disc, with separate corners for the normal of the end.
-#[allow(clippy::cast_possible_truncation)] // thousands of corners
+/// Closes an end with a flat disc, whose vertices are separate because their normal is that of the end.
+#[allow(clippy::cast_possible_truncation)] // thousands of vertices
 fn cap(mesh: &mut Mesh, ring: u32, sides: u32, center_m: DVec3, normal: DVec3, forward: bool) {
     let color = mesh.vertices[ring as usize].color;
     let middle = mesh.vertex(center_m, normal, color);

@@ -25,7 +25,7 @@ pub struct GpuScene {
     target: Option<Target>,
 }
 
-/// GPU buffer that grows by doubling.
+/// GPU buffer that grows to the next power of two of the required size.
 struct Growing {
     buffer: wgpu::Buffer,
     usage: BufferUsages,
@@ -59,7 +59,8 @@ impl GpuScene {
         }
     }
 
-    /// Draws a mesh and returns its texture view: `Rgba8Unorm`, in gamma space. A change of size creates a new view.
+    /// Draws a mesh and returns its texture view: `Rgba8Unorm`, in gamma space, at most as large as the device permits. A change of
+    /// size creates a new view.
     pub fn draw(&mut self, mesh: &Mesh, view: &View<'_>) -> &TextureView {
         let size = view.size.map(|length| u32::try_from(length.max(1)).unwrap_or(u32::MAX));
         let size = size.map(|length| length.min(self.device.limits().max_texture_dimension_2d));

@@ -1,4 +1,4 @@
-//! Render target with several samples per pixel, resolved to one.
+//! Multisampled render target, resolved to a texture with one sample per pixel.
 
 use super::pipeline::{COLOR, DEPTH, SAMPLES};
 use wgpu::{

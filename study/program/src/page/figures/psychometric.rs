@@ -1,4 +1,5 @@
-//! Figure of the psychometric functions: share of correct answers over the difference, with the fitted function of each subject.
+//! Figure of the psychometric functions: proportion of correct answers over the difference, with the fitted function of each
+//! subject.
 
 use super::{HEIGHT_PX, MODALITIES};
 use flotor_analysis::SubjectRecord;
@@ -9,17 +10,17 @@ use flotor_study::observer::TernaryObserver;
 use flotor_study::protocol::JndProtocol;
 use flotor_study::trial::{Judgement, Modality};
 
-/// Width of a group of differences, as a share of the base, and the minimum number of answers in a plotted group.
+/// Width of a group of differences, as a fraction of the base; below, the minimum number of answers in a plotted group.
 const GROUP: f64 = 0.05;
 const FEWEST_ANSWERS: usize = 5;
 
-/// Points of a curve.
+/// Number of line segments of a curve.
 const CURVE_POINTS: u32 = 80;
 
 /// Style slot of the functions of single subjects.
 const GREY: usize = 7;
 
-/// Plots the answers of all subjects, pooled over bases, and the most likely function of each subject.
+/// Plots the answers of all subjects, pooled over bases, and the most likely function of each subject, one panel per modality.
 pub(in super::super) fn psychometric(protocol: &JndProtocol, subjects: &[SubjectRecord]) -> Figure {
     let target = protocol.procedure.target();
     let figure = Figure::new("Psychometric functions", Axis::linear("Difference", "% of the base"))
@@ -81,13 +82,13 @@ fn observer(observations: &[Observation], target: f64) -> TernaryObserver {
     TernaryObserver { sigma: estimate.sigma, criterion: estimate.criterion, bias: 0.0, lapse: prior.lapse }
 }
 
-/// Returns the share of correct answers; "I don't know" counts half.
+/// Returns an observer's expected proportion of correct answers, 0 to 1; "I don't know" counts half.
 fn share_right(observer: &TernaryObserver, delta: f64) -> f64 {
     let [correct, wrong] = observer.correct_and_wrong(delta);
     0.5 * (1.0 + correct - wrong)
 }
 
-/// Returns the share of correct answers in groups of differences, %, with one standard error in each direction.
+/// Returns the proportion of correct answers in groups of differences, both in %, with error bars of ± 1 standard error.
 fn groups(of_subjects: &[Vec<Observation>]) -> Vec<ErrorBar> {
     let all: Vec<&Observation> = of_subjects.iter().flatten().collect();
     let largest = all.iter().map(|one| one.delta).fold(0.0, f64::max);
@@ -110,7 +111,7 @@ fn groups(of_subjects: &[Vec<Observation>]) -> Vec<ErrorBar> {
     found
 }
 
-/// Returns the score of an answer, 0 to 1.
+/// Returns the score of an answer: 1 if correct, 0.5 for "I don't know", 0 if wrong.
 fn worth(judgement: Judgement) -> f64 {
     match judgement {
         Judgement::Correct => 1.0,

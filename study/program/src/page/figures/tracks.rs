@@ -1,4 +1,4 @@
-//! Figure of a subject's adaptive tracks, one panel each: differences, answers, and reversals.
+//! Figure of a subject's adaptive tracks, one panel per track: differences, answers and reversals.
 
 use super::MODALITIES;
 use flotor_analysis::SubjectRecord;
@@ -12,7 +12,7 @@ const WRONG: usize = 6;
 const UNSURE: usize = 4;
 const REVERSAL: usize = 7;
 
-/// Answer of a track.
+/// Judged answer of a track.
 struct Answer {
     /// Number of the trial in the track, from 1.
     trial: f64,
@@ -21,7 +21,7 @@ struct Answer {
     is_reversal: bool,
 }
 
-/// Plots the tracks of a subject.
+/// Plots the completed tracks of a subject, in the order of their bases.
 pub(in super::super) fn tracks(record: &SubjectRecord, stimulus: &Stimulus) -> Figure {
     let answers: Vec<(&TrackResult, Vec<Answer>)> =
         record.tracks.iter().map(|track| (track, answers(record, track))).collect();

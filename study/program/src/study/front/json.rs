@@ -1,4 +1,4 @@
-//! Screens and inputs as lines of JSON, for a separate window program.
+//! Front end for a separate window program: screens and inputs as lines of JSON.
 
 use super::next_line;
 use flotor_study::apparatus::attend::{FrontEnd, PollResult};
@@ -7,7 +7,7 @@ use flotor_study::screen::{Screen, Warning, WindowMessage, WindowReply};
 use std::io::{ErrorKind, Write};
 use std::sync::mpsc::Receiver;
 
-/// Front end over lines of JSON in both directions.
+/// Front end that exchanges lines of JSON with a window program.
 pub(in crate::study) struct JsonLines<W> {
     lines: Receiver<String>,
     out: W,
@@ -22,7 +22,7 @@ impl<W: Write> JsonLines<W> {
     fn report(&mut self, message: &WindowMessage) -> Result<(), ApparatusOrFrontEndError> {
         let line = serde_json::to_string(message)?;
         match writeln!(self.out, "{line}").and_then(|()| self.out.flush()) {
-            // Ignored: a closed window is detected by the end of its input.
+            // Ignore the error: the end of the input reports a closed window.
             Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
             other => Ok(other?),
         }

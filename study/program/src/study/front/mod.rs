@@ -14,7 +14,7 @@ use std::io::BufRead;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// Timeout of one poll for input, so that the handle is watched meanwhile.
+/// Timeout of one poll for input; between polls the handle is checked.
 const MOMENT: Duration = Duration::from_millis(50);
 
 /// Values of `--screen`.
@@ -29,7 +29,8 @@ pub(super) enum ScreenOption {
     Json,
 }
 
-/// Waits a moment for a line of input; without one returns what the front end has noticed.
+/// Waits up to [`MOMENT`] for a line of input. If there is none, the error is the poll result: [`PollResult::Nothing`], or
+/// [`PollResult::Closed`] at the end of the input.
 fn next_line(lines: &Receiver<String>) -> Result<String, PollResult> {
     lines.recv_timeout(MOMENT).map_err(|none| match none {
         RecvTimeoutError::Timeout => PollResult::Nothing,
@@ -38,10 +39,11 @@ fn next_line(lines: &Receiver<String>) -> Result<String, PollResult> {
     })
 }
 
-/// Reads lines in a background thread and returns their channel.
+/// Starts a background thread that reads lines, and returns the channel of the lines.
 pub(super) fn lines_of(reader: impl BufRead + Send + 'static) -> std::io::Result<Receiver<String>> {
     let (sender, lines) = channel();
-    // Detached: a blocking read cannot be interrupted; the thread ends with its reader or the process.
+    // The thread is detached, because a blocking read cannot be interrupted; it ends with the input, the receiver or the
+    // process.
     std::thread::Builder::new().name("flotor-answers".to_owned()).spawn(move || {
         for line in reader.lines().map_while(Result::ok) {
             if sender.send(line).is_err() {

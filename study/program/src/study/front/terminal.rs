@@ -11,13 +11,13 @@ use flotor_study::trial::{Phase, Position, Response};
 use std::io::{BufReader, IsTerminal, Write};
 use std::sync::mpsc::Receiver;
 
-/// Front end on this terminal.
+/// Front end on the terminal of this process.
 pub(in crate::study) struct Terminal {
     lines: Receiver<String>,
 }
 
 impl Terminal {
-    /// Starts reading standard input.
+    /// Creates the front end and starts a thread that reads standard input.
     pub(in crate::study) fn listen() -> std::io::Result<Self> {
         Ok(Self { lines: lines_of(BufReader::new(std::io::stdin()))? })
     }
@@ -65,7 +65,7 @@ fn ring_bell() {
     let _ = std::io::stdout().write_all(b"\x07");
 }
 
-/// Formats a screen as text.
+/// Formats a screen, with its keys, as text.
 fn words(screen: &Screen) -> String {
     match screen {
         Screen::Read { text } => {
@@ -106,7 +106,7 @@ fn words(screen: &Screen) -> String {
     }
 }
 
-/// Describes the keys of optional inputs.
+/// Describes the keys of the optional inputs that the trial permits.
 fn others(trial: &TrialView) -> String {
     let key = |may: &May| match may {
         May::Practise => "; p practises first".to_owned(),
@@ -134,7 +134,7 @@ fn pause(reason: Pause, next: &TrialView) -> &'static str {
     }
 }
 
-/// Parses a typed line.
+/// Parses a typed line; the error is a hint for the person.
 fn typed(line: &str, screen: &Screen) -> Result<Input, String> {
     let line = line.trim();
     let answer = |response| Ok(Input::Answer { response });

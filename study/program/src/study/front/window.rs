@@ -1,4 +1,5 @@
-//! Front end in the viewer's window: a separate process that displays the run and the screens and sends the person's inputs.
+//! Front end in the window of the viewer, a separate process that displays the run and the screens and sends the person's
+//! inputs.
 
 use super::{JsonLines, lines_of};
 use flotor_command::CommandError;
@@ -15,18 +16,18 @@ use std::time::Duration;
 /// Poll interval for the exit of the viewer.
 const LOOK_PERIOD: Duration = Duration::from_millis(50);
 
-/// Viewer window in front of a person. Dropping it closes the window.
+/// Window of the viewer, for a person. Dropping it closes the window.
 pub(in crate::study) struct Window {
-    /// Messages to and from the window.
+    /// Front end that exchanges messages with the window.
     pub(in crate::study) lines: JsonLines<ChildStdin>,
     viewer: Running,
 }
 
 impl Window {
-    /// Opens a window on the run of this process and waits until it is visible.
+    /// Starts the viewer with a window for the run of this process, and waits until the window is visible.
     ///
     /// # Errors
-    /// If there is no viewer, or the viewer cannot open a window and has printed the reason.
+    /// If the viewer cannot be started, or opens no window; the viewer then prints the reason.
     pub(in crate::study) fn open(stop_key: StopKey, texts: Option<&Path>) -> Result<Self, CommandError> {
         let mut command = SeparateProgram::VIEWER.command()?;
         command.arg("--sitting").arg("--run").arg(process_number().to_string());
