@@ -11,7 +11,7 @@ pub(crate) enum Grade {
     Bad,
 }
 
-/// Finding of the diagnosis.
+/// Finding: topic, severity, observation and remedy.
 #[derive(Debug, Serialize)]
 pub(crate) struct Diagnosis {
     pub(crate) what: &'static str,
@@ -29,7 +29,7 @@ impl Diagnosis {
         Self::problem(Grade::Note, what, found, remedy)
     }
 
-    /// Creates a bad finding whose text contains the remedy.
+    /// Creates a bad finding whose text already contains the remedy.
     pub(crate) fn bad_without_remedy(what: &'static str, found: impl Into<String>) -> Self {
         Self { what, grade: Grade::Bad, found: found.into(), remedy: None }
     }
@@ -38,7 +38,7 @@ impl Diagnosis {
         Self::problem(Grade::Bad, what, found, remedy)
     }
 
-    /// Creates a finding with a remedy, of this grade.
+    /// Creates a finding of this severity with a remedy.
     pub(crate) fn problem(
         grade: Grade,
         what: &'static str,

@@ -1,8 +1,8 @@
-//! The `flotor` command: its arguments, its output, pictures of runs, and templates of plugins.
+//! The `flotor` command: arguments, output, plots of runs, and templates of plugins.
 //!
 //! - [`cli`]: the commands.
-//! - [`scaffold`]: `flotor new`.
-//! - [`run_picture`], [`timing_picture`]: charts of a run and of its timing.
+//! - [`scaffold`]: creation of plugins, for `flotor new`.
+//! - [`run_picture`], [`timing_picture`]: plots of a run and of its timing.
 //!
 //! To embed Flotor in a program, use `flotor-session`; this crate is for the command alone.
 

@@ -1,4 +1,4 @@
-//! The `flotor` command; its code is in the library.
+//! Entry point of the `flotor` command; the code is in the library.
 
 fn main() -> std::process::ExitCode {
     flotor::cli::main()

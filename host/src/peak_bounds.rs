@@ -1,11 +1,11 @@
-//! Bounds of the largest force and torque of a run, as a test expects them: a panel of the magnitude, with a line at each bound
-//! and a mark at the time of the largest value.
+//! Bounds on the largest force and torque of a run, from the expectations of a test: plot panel of the magnitude, with a line at each
+//! bound and a mark at the time of the largest value.
 
 use flotor_core::trace::TickRecord;
 use flotor_plot::{Axis, Mark, Panel, Quantity, Series, Trace};
 use std::str::FromStr;
 
-/// Number of the summary that is reached at one instant.
+/// Value of the summary that is reached at one instant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Peak {
     Force,
@@ -13,7 +13,7 @@ enum Peak {
 }
 
 impl Peak {
-    /// Returns heading and quantity of the axis.
+    /// Returns title and quantity of the axis.
     fn axis(self) -> (&'static str, Quantity) {
         match self {
             Self::Force => ("Force, magnitude", Quantity::Force),
@@ -22,7 +22,7 @@ impl Peak {
     }
 }
 
-/// Bound of a peak, written as `peak_force_n=3.2`.
+/// Bound on the largest force, N, or torque, N·m, parsed from text such as `peak_force_n=3.2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PeakBound {
     peak: Peak,
@@ -43,22 +43,22 @@ impl FromStr for PeakBound {
     }
 }
 
-/// Magnitude of a force or torque over time, the largest of all devices.
+/// Magnitude of the commanded force or torque over time, the largest of all devices, with its bounds.
 struct Magnitude {
     peak: Peak,
     bounds_si: Vec<f64>,
     trace: Trace,
-    /// Time and magnitude of the current tick, whose devices have not all reported, SI.
+    /// Time, s, and largest magnitude, SI, of the current tick, which may lack records of further devices.
     tick: Option<(f64, f64)>,
-    /// Time and value of the largest magnitude, SI.
+    /// Time, s, and value, SI, of the largest magnitude.
     largest: (f64, f64),
 }
 
-/// Magnitudes with bounds.
+/// Magnitudes of force and torque for which there are bounds.
 pub(crate) struct BoundedPeaks(Vec<Magnitude>);
 
 impl BoundedPeaks {
-    /// Creates the magnitudes with these bounds.
+    /// Creates a magnitude for each quantity with a bound.
     pub(crate) fn new(bounds: &[PeakBound]) -> Self {
         let magnitude = |peak: Peak| {
             let bounds_si: Vec<f64> =
@@ -69,7 +69,7 @@ impl BoundedPeaks {
         Self([Peak::Force, Peak::Torque].into_iter().filter_map(magnitude).collect())
     }
 
-    /// Adds a tick of a device.
+    /// Adds the record of a tick at a device.
     pub(crate) fn add(&mut self, record: &TickRecord) {
         let time_s = record.time_ns as f64 * 1.0e-9;
         self.0.iter_mut().for_each(|magnitude| magnitude.add(time_s, record));

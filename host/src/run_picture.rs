@@ -1,4 +1,4 @@
-//! Picture of a run: pose, force and torque, stored energy and, in real time, the timing.
+//! Plot of a run: pose, force, torque, stored energy and, on the real clock, the timing.
 
 use crate::peak_bounds::{BoundedPeaks, PeakBound};
 use crate::timing_picture::panels;
@@ -10,7 +10,7 @@ use flotor_plot::{Axis, Figure, Mark, Panel, Quantity, Series, Spans, Trace, Vec
 use flotor_servo::Timing;
 use flotor_session::Observer;
 
-/// Traces of a run, reduced while the run lasts, and drawn at its end.
+/// Plot of a run: an observer that collects reduced traces during the run, and draws them at its end.
 pub struct RunPicture {
     title: String,
     devices: Vec<DeviceTraces>,
@@ -31,7 +31,7 @@ struct DeviceTraces {
     events: EventTimes,
 }
 
-/// Times of events.
+/// Times of the events of a device.
 #[derive(Default)]
 struct EventTimes {
     /// Time of the first tick with each fault and each limit, s.
@@ -42,10 +42,10 @@ struct EventTimes {
     limited: Spans,
 }
 
-/// Changes of parameters during the run.
+/// Changes of parameters during the run, for marks in the plot.
 #[derive(Default)]
 struct Changes {
-    /// First changes: time, s, and text.
+    /// Marked changes, the first of the run: time, s, and text.
     marked: Vec<(f64, String)>,
     /// Number of changes without a mark.
     further: usize,
@@ -55,7 +55,7 @@ struct Changes {
 const MAX_CHANGES: usize = 12;
 
 impl RunPicture {
-    /// Creates an empty picture of a run with these devices, and the bounds to draw.
+    /// Creates an empty plot of a run with these devices, in the scene's order, and with the bounds to draw. Not real-time.
     #[must_use]
     pub fn new(title: &str, devices: Vec<String>, bounds: &[PeakBound]) -> Self {
         Self {
@@ -68,7 +68,7 @@ impl RunPicture {
         }
     }
 
-    /// Draws the traces. Not real-time.
+    /// Draws the traces as SVG, on the real clock with the timing. Not real-time.
     #[must_use]
     pub fn into_svg(self, subtitle: &str, timing: &Timing) -> String {
         let is_only_one = self.devices.len() == 1;
@@ -99,7 +99,7 @@ impl Observer for RunPicture {
         }
     }
 
-    /// Returns the drawn outputs: the energy, beside the force.
+    /// Returns the model outputs that the plot shows: energy and force.
     fn demand(&self) -> Demand {
         Demand::ENERGY.with(Demand::FORCE)
     }
@@ -165,7 +165,7 @@ impl EventTimes {
     }
 }
 
-/// Visibility of the names of marks: only the first panel of a device has them, above the others.
+/// Visibility of the names of marks: only the first panel of a device, above its other panels, shows them.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Names {
     Written,
@@ -204,7 +204,7 @@ impl DeviceTraces {
         with_events(panels.chain([energy_panel("stored energy", energy)]), &events, changes)
     }
 
-    /// Returns the panels of one device of several: motion, force and energy. Rotation and torque are in the recording.
+    /// Returns the panels of one device of several: position, force and energy. Rotation and torque are in the recording only.
     fn main_panels(self, changes: &Changes) -> Vec<Result<Panel, String>> {
         let name = |quantity: &str| format!("{quantity}, {}", self.name);
         let (position, force) = (self.position.panel(&name("position")), self.force.panel(&name("force")));
@@ -213,7 +213,7 @@ impl DeviceTraces {
     }
 }
 
-/// Marks events and changes in each panel, with their names in the first.
+/// Marks events and changes in each panel, with their names in the first panel.
 fn with_events(
     panels: impl Iterator<Item = Result<Panel, String>>,
     events: &EventTimes,
@@ -228,7 +228,7 @@ fn with_events(
     panels.map(marked).collect()
 }
 
-/// Returns the panel of the stored energy over time.
+/// Returns the panel of the stored energy over time; a note as error if the models give no energy.
 fn energy_panel(name: &str, trace: Trace) -> Result<Panel, String> {
     if !trace.has_data() {
         return Err(format!("{name} (not given by the models)"));

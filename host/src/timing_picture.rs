@@ -3,8 +3,8 @@
 use flotor_plot::{Axis, Bin, Panel, Series};
 use flotor_servo::{Durations, Timing};
 
-/// Returns the panels of a run's timing: ticks by lateness and by compute time, and every sixteenth tick by the time of its stages; each
-/// has its own, logarithmic axis of time. Not real-time.
+/// Returns two panels with histograms of a run's timing: lateness and compute time of all ticks, and stage times of every sixteenth
+/// tick. Each panel has a logarithmic time axis of its own. Not real-time.
 #[must_use]
 pub fn panels(timing: &Timing) -> [Panel; 2] {
     let [read, models, envelope, write] = &timing.stages;
@@ -22,7 +22,7 @@ fn histogram() -> Panel {
     Panel::with_x(Axis::log("Time", "µs"), Axis::log("Ticks", ""))
 }
 
-/// Counts ticks by their time, µs; times below 10 ns are in the first bar.
+/// Returns the histogram of a time, µs; times below 10 ns are in the first bin.
 fn times(durations: &Durations) -> Vec<Bin> {
     Bin::quarter_octaves(0.01, durations.bins().into_iter().map(|(ns, count)| (ns as f64 * 1.0e-3, count)))
 }

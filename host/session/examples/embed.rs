@@ -1,4 +1,4 @@
-//! Flotor in a program: a scene in virtual time, every tick observed, the spring made softer during the run.
+//! Embeds Flotor in a program: runs a scene in virtual time, observes every tick, and halves the weight of the spring during the run.
 //!
 //! `cargo run -p flotor-session --example embed`
 
@@ -35,7 +35,7 @@ impl Observer for Peak {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = Scene::parse(Path::new("embedded scene"), SCENE)?;
-    // A program finds plugins beside itself, in the scene's folders and in FLOTOR_PLUGIN_PATH; here they are linked in.
+    // A program finds plugins beside itself, in the scene's folders and in FLOTOR_PLUGIN_PATH; here they are linked into the program.
     let registry = Registry::search(&[])
         .with_linked(&flotor_simulated::FLOTOR_ENTRY)?
         .with_linked(&flotor_spring::FLOTOR_ENTRY)?;

@@ -1,4 +1,4 @@
-//! A program as the source of force: a wall drawn by this program, not by a model, in lockstep with the loop.
+//! Uses a program as the source of force: this program, not a model, renders a wall, in lockstep with the loop.
 //!
 //! `cargo run -p flotor-session --example program`
 
@@ -22,7 +22,7 @@ impl Observer for Nobody {
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut scene = Scene::parse(Path::new("embedded scene"), SCENE)?;
-    // Each device gets a model with the wrench that the port commands.
+    // Adds a model to each device; its wrench is the one that the program commands through the port.
     let connected = program::connect(&mut scene);
     let registry = Registry::search(&[]).with_linked(&flotor_simulated::FLOTOR_ENTRY)?;
     let mut session = Session::prepare(&scene, &registry, &RunOptions { clock: Clock::Virtual, seed: 1 })?;

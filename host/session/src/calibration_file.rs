@@ -1,4 +1,4 @@
-//! Calibration file: readable TOML, checked when loaded.
+//! Calibration file of a device's vertical force: TOML, checked when loaded.
 //!
 //! ```toml
 //! format = 1
@@ -29,11 +29,11 @@ use toml::de::DeTable;
 /// Version of the format that this program writes and reads.
 pub const FORMAT: u32 = 1;
 
-/// Content of a calibration file.
+/// Calibration of one device, as in its file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationFile {
-    /// Version of the format.
+    /// Version of the file format; [`FORMAT`] is the only legal one.
     pub format: u32,
     /// Calibrated device.
     pub device: CalibratedDevice,
@@ -46,42 +46,42 @@ pub struct CalibrationFile {
     pub provenance: Provenance,
 }
 
-/// Device that a calibration is for.
+/// Device for which a calibration was made.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CalibratedDevice {
-    /// Id of the plugin.
+    /// Id of the device's plugin.
     pub plugin: String,
     /// Serial number; empty: fits every device of the plugin.
     #[serde(default)]
     pub serial: String,
 }
 
-/// Delivered over commanded vertical force, as powers of the height in mm.
+/// Ratio of delivered to commanded vertical force, as a polynomial in the height z, mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VerticalCurve {
-    /// Lowest and highest measured height, mm.
+    /// Lowest and highest measured height, mm above the centre of the device's range.
     pub range_mm: [f64; 2],
-    /// Coefficients of 1, z, z² ..., in 1, 1/mm, 1/mm² ...
+    /// Coefficients of 1, z, z² ..., in units of 1, 1/mm, 1/mm² ...
     pub coefficients_per_mm: Vec<f64>,
 }
 
-/// Quality of the fit and of the check afterwards; absent if not measured.
+/// Quality of the fit and of the check after the correction; `None` for values that were not measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Quality {
-    /// Number of readings.
+    /// Number of readings of the force sensor.
     pub readings: Option<u32>,
     /// Standard deviation of the residuals, N.
     pub residual_n: Option<f64>,
-    /// Half width of the 95 % band of the curve's shape, percent.
+    /// Largest half width of the 95 % confidence band of the curve's shape, percent of the commanded force.
     pub band_95_percent: Option<f64>,
     /// Unevenness before the correction, percent, peak to peak.
     pub error_before_percent: Option<f64>,
     /// Unevenness after the correction, percent, peak to peak.
     pub error_after_percent: Option<f64>,
-    /// Weight of the moving parts of the rig, N.
+    /// Fitted weight of the moving parts of the rig, N.
     pub weight_n: Option<f64>,
 }
 
@@ -93,21 +93,21 @@ pub struct Provenance {
     pub source: Source,
     /// Program that wrote the file, with its version.
     pub program: String,
-    /// Date of the calibration.
+    /// Date of the calibration; `None` if unknown.
     pub date: Option<toml::value::Datetime>,
-    /// Seed of a simulated rig.
+    /// Seed of the random numbers of a simulated rig; `None` for a real rig.
     pub seed: Option<i64>,
-    /// Free text.
+    /// Note of the user, free text.
     pub note: Option<String>,
 }
 
-/// Source of the numbers of a calibration.
+/// Source of the values of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
     /// Measured by `flotor calibrate vertical`.
     Measured,
-    /// Imported from elsewhere.
+    /// Imported from another source.
     Imported,
 }
 
@@ -118,7 +118,7 @@ fn error(file: &str, line: usize, problem: impl Into<String>) -> CalibrationFile
 const MM: f64 = 1.0e-3;
 
 impl VerticalCurve {
-    /// Converts a calibration to a curve, without trailing zero coefficients.
+    /// Converts a calibration, in metres, to a curve in millimetres, without trailing zero coefficients.
     #[must_use]
     pub fn of(calibration: &VerticalCalibration) -> Self {
         let mut coefficients: Vec<f64> = Vec::new();
@@ -133,10 +133,10 @@ impl VerticalCurve {
         Self { range_mm: calibration.range_m().map(|height| height / MM), coefficients_per_mm: coefficients }
     }
 
-    /// Converts the curve to a calibration.
+    /// Converts the curve, in millimetres, to a calibration in metres.
     ///
     /// # Errors
-    /// [`flotor_hal::InvalidCalibration`] if the curve is not valid.
+    /// [`flotor_hal::InvalidCalibration`] if range or coefficients are not valid.
     pub fn calibration(&self) -> Result<VerticalCalibration, flotor_hal::InvalidCalibration> {
         let mut scale = 1.0;
         let powers = self.coefficients_per_mm.iter().map(|coefficient| {
@@ -148,7 +148,7 @@ impl VerticalCurve {
     }
 }
 
-/// Returns the line of the value under these keys, from 1; 0 without a value.
+/// Returns the line, from 1, of the value under these nested keys; 0 if there is no value.
 fn line_of(text: &str, keys: &[&str]) -> usize {
     let Ok(root) = DeTable::parse(text) else { return 0 };
     let (mut table, mut start) = (Some(root.get_ref()), None);
@@ -161,10 +161,10 @@ fn line_of(text: &str, keys: &[&str]) -> usize {
 }
 
 impl CalibrationFile {
-    /// Reads and checks a file.
+    /// Reads and checks a calibration file; returns its content and the calibration of the curve. Not real-time.
     ///
     /// # Errors
-    /// [`CalibrationFileError`].
+    /// [`CalibrationFileError`] with file, line and remedy, if the file cannot be read or is not a valid calibration.
     pub fn load(path: &Path) -> Result<(Self, VerticalCalibration), CalibrationFileError> {
         let file = path.display().to_string();
         let text = read_text(path, "the calibration")
@@ -172,10 +172,11 @@ impl CalibrationFile {
         Self::parse(&file, &text)
     }
 
-    /// Parses and checks a text; `file` is its name in error messages.
+    /// Parses and checks the text of a calibration file; returns its content and the calibration of the curve. `file` is its name in
+    /// error messages. Not real-time.
     ///
     /// # Errors
-    /// [`CalibrationFileError`].
+    /// [`CalibrationFileError`] with file, line and remedy, if the text is not a valid calibration.
     pub fn parse(file: &str, text: &str) -> Result<(Self, VerticalCalibration), CalibrationFileError> {
         let read: Self = toml::from_str(text).map_err(|wrong: toml::de::Error| {
             let before = wrong.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
@@ -194,7 +195,7 @@ impl CalibrationFile {
             ));
         }
         let calibration = read.vertical.calibration().map_err(|invalid| match invalid {
-            // In the unit of the file.
+            // In mm, the unit of the file.
             InvalidCalibration::Range(_) => {
                 let [from, to] = read.vertical.range_mm;
                 wrong(&["vertical", "range_mm"], format!("[vertical] invalid range {from:?} mm to {to:?} mm"))
@@ -204,7 +205,7 @@ impl CalibrationFile {
         Ok((read, calibration))
     }
 
-    /// Returns the file as text, the same for the same content.
+    /// Serialises the file as TOML with a comment header; equal content gives equal text. Not real-time.
     ///
     /// # Errors
     /// Errors of the serialiser; none is known.
@@ -214,10 +215,10 @@ impl CalibrationFile {
         Ok(format!("{HEAD}{}", toml::to_string(self)?))
     }
 
-    /// Checks that the file is for this device.
+    /// Checks that the calibration was made for this device; `file` is its name in error messages.
     ///
     /// # Errors
-    /// [`CalibrationFileError`].
+    /// [`CalibrationFileError`] if plugin id or serial number differ.
     pub fn check_device(&self, file: &str, plugin: &str, serial: &str) -> Result<(), CalibrationFileError> {
         let CalibratedDevice { plugin: wanted, serial: wanted_serial } = &self.device;
         if wanted == plugin && (wanted_serial.is_empty() || wanted_serial == serial) {
@@ -230,7 +231,7 @@ impl CalibrationFile {
     }
 }
 
-/// Returns today's date in universal time, as a date of TOML.
+/// Returns the current UTC date as a TOML date. Not real-time.
 #[must_use]
 pub fn today() -> toml::value::Datetime {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();

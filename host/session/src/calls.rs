@@ -1,7 +1,7 @@
 //! Plugin calls outside the loop, each with a name and a time limit.
 //!
-//! A thread cannot be ended from outside while plugin code runs in it. Such a call therefore has a thread of its own; the caller waits no
-//! longer than a limit, then abandons the thread and names the plugin. In the loop the watchdog does the same. Not real-time.
+//! A thread cannot be terminated from outside while it executes plugin code. Plugin calls therefore run in a separate thread; after a
+//! timeout the caller abandons the thread and reports the plugin. For calls in the loop the watchdog detects the hang. Not real-time.
 
 mod call;
 mod process;

@@ -4,7 +4,7 @@ use flotor_hal::Detail;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 
-/// Returns the error estimates of a model, each with its detail. Not real-time.
+/// Returns the error estimates of a model, each with its detail; empty if the model has none. Not real-time.
 pub fn estimates(model: &mut Model) -> Vec<(Detail, f64)> {
     let details = model.details();
     let mut values = vec![f64::NAN; details.len()];

@@ -3,20 +3,20 @@
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Pose, rotation_vector};
 
-/// Distance over which a change of force counts as stiffness, and within which a handle is at rest, m: larger than a step of a
-/// sensor, and much smaller than a press of a hand.
+/// Shortest displacement over which stiffness is computed, and distance within which a handle is at rest, m: larger than the
+/// resolution of a sensor, and much smaller than the movement of a press.
 const WAY_M: f64 = 1.0e-4;
 /// Rotation within which a handle is at rest, rad.
 const TURN_RAD: f64 = 1.0e-3;
-/// Time for which a handle that moved has to rest, ns: longer than a slow swing stays at its turning point.
+/// Time for which a handle that has moved must rest to be settled, ns: longer than a slow oscillation stays near its turning point.
 const REST_NS: u64 = 500_000_000;
 
-/// Analysis of the ticks of one device, in order and in constant memory.
+/// Felt stiffness and settling time of one device, from its records in order, in constant memory.
 #[derive(Debug, Default)]
 pub(crate) struct Feel {
-    /// Position and force of an earlier tick within the distance, while the models alone made the force.
+    /// Position, m, and force, N, at the start of the current displacement; `None` after a tick with an event.
     before: Option<(DVec3, DVec3)>,
-    /// Pose at the start of the present rest.
+    /// Pose at the start of the current rest.
     rest: Option<Pose>,
     peak_stiffness_n_per_m: f64,
     settled_ns: u64,
@@ -39,7 +39,7 @@ impl Feel {
     }
 
     fn observe_force(&mut self, record: &TickRecord) {
-        // A ramp, a limit or a change of a parameter moves the force, not the hand.
+        // A ramp, a limit or a change of a parameter changes the force without a displacement.
         if record.events != Events::NONE {
             self.before = None;
             return;
@@ -54,7 +54,8 @@ impl Feel {
         }
     }
 
-    /// Returns the largest rise of the force against the handle over its displacement, 0.1 mm at a time, N/m; 0 if the force never rose.
+    /// Returns the largest stiffness felt, N/m: increase of the force against the handle per displacement, over displacements of 0.1
+    /// mm; 0 if the force never increased.
     pub(crate) fn peak_stiffness_n_per_m(&self) -> f64 {
         self.peak_stiffness_n_per_m
     }

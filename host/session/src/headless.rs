@@ -1,4 +1,4 @@
-//! Headless runs: a scene in virtual time from start to end, for sweeps, studies and other programs.
+//! Headless runs: whole runs of a scene in virtual time, for sweeps, studies and other programs.
 
 use crate::registry::Registry;
 use crate::run_description::describe;
@@ -10,7 +10,7 @@ use flotor_record::{RecordError, Recorder};
 use flotor_servo::{Clock, StopSwitch};
 use std::path::Path;
 
-/// Reason why a scene did not run, or was not recorded completely.
+/// Reason why a headless run failed or was not recorded completely.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum HeadlessError {
@@ -22,8 +22,8 @@ pub enum HeadlessError {
     Record(#[from] RecordError),
 }
 
-/// Runs a scene as fast as possible, with the model outputs of `demand` and of the recording; equal scenes and seeds give equal
-/// digests. Not real-time.
+/// Runs a scene in virtual time, as fast as possible, records it to `recording` if given, and returns the summary. The models compute
+/// at least the outputs in `demand`, and all outputs for a recording. Equal scenes and seeds give equal digests. Not real-time.
 ///
 /// # Errors
 /// [`HeadlessError`]. A device fault is no error: the summary reports it in `end`.
@@ -46,7 +46,7 @@ pub fn run(
     let recorded = measured.recording.finish(&[]);
     let mut outcome = ran?;
     recorded?;
-    // The notices were not shown before the run.
+    // A headless run has shown no notices before its start.
     outcome.warnings.splice(0..0, notices);
     Ok(RunSummary::new(facts, &outcome, &measured.tally))
 }

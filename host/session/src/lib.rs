@@ -10,8 +10,8 @@
 //! - [`program`]: the embedding program as a source of force.
 //! - [`headless`]: a whole run in virtual time, recorded and reported.
 //! - [`summary`]: results of a run; [`run_description`]: all data to repeat the run.
-//! - [`telemetry`]: access of other programs to a running session.
-//! - [`PluginProcess`]: process for the code of plugins, which ends with its host.
+//! - [`telemetry`]: server through which other programs observe and change a running session.
+//! - [`PluginProcess`]: process for plugin code, killed when its host ends.
 //! - [`calibration_file`]: measured correction of a device's vertical force.
 
 pub mod calibration_file;

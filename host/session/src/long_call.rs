@@ -1,7 +1,7 @@
 //! Limits of a call that may not return: processor time, waiting time, and time after a stop request.
 //!
-//! Time in which other threads have the processor is not the fault of the call. So one limit is on processor time, and another, ten
-//! times as long, on the time in which the call's thread needs no processor.
+//! A call does not count the time in which other threads have the processor. So one limit is on its processor time, and another, ten
+//! times as long, on the time in which its thread needs no processor (sleeps or waits).
 
 use crate::calls::STEP_LIMIT_VARIABLE;
 use crate::platform::ThreadClock;
@@ -13,12 +13,13 @@ use std::time::{Duration, Instant};
 const DEFAULT_LIMIT: Duration = Duration::from_secs(1);
 /// Limit of the waiting time of a call, as a multiple of the limit of its processor time.
 const WAITS: u32 = 10;
-/// Grace period of a call once the run is to stop.
+/// Grace period of a call after a stop request.
 const STOP_PATIENCE: Duration = Duration::from_secs(1);
-/// Longest poll interval that counts: a longer one shows that the polling thread had no processor either.
+/// Longest time that counts between two polls: a longer one shows that the polling thread had no processor either.
 const LONGEST_LOOK: Duration = Duration::from_millis(100);
 
-/// Returns the processor time limit of a call in a loop without a clock. Not real-time.
+/// Returns the limit on the processor time of a call in a loop on the virtual clock: the value of `FLOTOR_STEP_LIMIT_S`, or 1 s. Not
+/// real-time.
 #[must_use]
 pub fn step_limit() -> Duration {
     crate::calls::limit_of(STEP_LIMIT_VARIABLE).unwrap_or(DEFAULT_LIMIT)
@@ -30,7 +31,7 @@ const REMEDY: &str = "`FLOTOR_STEP_LIMIT_S` allows more";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Exceeded {
-    /// Limit of the watchdog, which has stopped the devices.
+    /// Watchdog timeout; the watchdog has stopped the devices.
     Watchdog(Duration),
     /// Limit of processor time.
     Processor(Duration),
@@ -57,7 +58,7 @@ impl fmt::Display for Exceeded {
     }
 }
 
-/// Call at a place, polled from another thread.
+/// Timer of a call at a place of the loop, polled from another thread.
 pub struct LongCall<P> {
     place: P,
     ran_before: Option<Duration>,
@@ -67,7 +68,7 @@ pub struct LongCall<P> {
 }
 
 impl<P: PartialEq> LongCall<P> {
-    /// Starts the timing of a call that has just begun.
+    /// Starts the timing of a call at `place` that has just begun.
     pub fn new(place: P) -> Self {
         let (waited, lasted) = (Duration::ZERO, Duration::ZERO);
         Self { place, ran_before: None, waited, lasted, looked: Instant::now() }
@@ -78,8 +79,8 @@ impl<P: PartialEq> LongCall<P> {
         &self.place
     }
 
-    /// Polls the thread of `clock`, which is at `place` now; returns the limit that the call has exceeded. Call it every few
-    /// hundredths of a second. Not real-time.
+    /// Polls the thread of `clock`, which is at `place` now, and returns the limit that the call has exceeded; at a new place the
+    /// timing starts again. To be called every few tens of milliseconds. Not real-time.
     pub fn check(
         &mut self,
         place: P,

@@ -1,4 +1,4 @@
-//! Measurements of a run for its report, and its recording, without which the run continues.
+//! Measurements of a run for its summary, and its recording; a failed recording does not end the run.
 
 use crate::scene::Scene;
 use crate::summary::{RunFacts, Tally};
@@ -8,25 +8,27 @@ use flotor_core::trace::TickRecord;
 use flotor_hal::Demand;
 use flotor_record::{Note, RecordError, Recorder, TraceDigest};
 
-/// Observer that measures a run for its report.
+/// Observer that collects tick statistics and trace digest for the summary of a run, and records the run.
 pub struct Measurements {
-    /// Tick statistics.
+    /// Tick statistics for the summary.
     pub tally: Tally,
-    /// Recording of the run, if one is requested.
+    /// Recording of the run; records nothing if none was requested.
     pub recording: RunRecording,
     digest: TraceDigest,
     requested: Demand,
 }
 
 impl Measurements {
-    /// Creates the measurements before a run; `requested` are the model outputs to compute beside those that are recorded.
+    /// Creates the measurements before a run; `requested` are the model outputs to compute in addition to the recorded ones. Without
+    /// `recorder` the run is not recorded.
     #[must_use]
     pub fn new(recorder: Option<Recorder>, requested: Demand) -> Self {
         let (tally, digest) = (Tally::default(), TraceDigest::new());
         Self { tally, recording: RunRecording::new(recorder), digest, requested }
     }
 
-    /// Returns the inputs of the summary so far, without messages between hosts; called before the recording is finished.
+    /// Returns the inputs of the summary, without the counts of messages between hosts; to be called before the recording is
+    /// finished, because the demand changes then.
     #[must_use]
     pub fn facts<'a>(
         &self,
@@ -55,7 +57,7 @@ impl Observer for Measurements {
     }
 }
 
-/// Recording of a run, if one is requested. A failing disk ends the recording, not the run. Not real-time.
+/// Recording of a run, if one is requested. A write error ends the recording, not the run. Not real-time.
 #[derive(Default)]
 pub struct RunRecording {
     recorder: Option<Recorder>,
@@ -64,13 +66,13 @@ pub struct RunRecording {
 }
 
 impl RunRecording {
-    /// Creates the recording of a run; without a recorder nothing is recorded.
+    /// Creates the recording of a run; `None`: the run is not recorded.
     #[must_use]
     pub fn new(recorder: Option<Recorder>) -> Self {
         Self { recorder, failure: None, has_ticks: false }
     }
 
-    /// Returns true while the recording is not finished.
+    /// Returns true if a recording was requested and is not finished; also after a write error.
     #[must_use]
     pub fn is_on(&self) -> bool {
         self.recorder.is_some()
@@ -80,7 +82,7 @@ impl RunRecording {
     /// record under the same name.
     ///
     /// # Errors
-    /// The error that ended the recording, during the run or now.
+    /// The write error that ended the recording, during the run or now.
     pub fn finish(&mut self, notes: &[Note]) -> Result<(), RecordError> {
         let Some(mut recorder) = self.recorder.take() else { return Ok(()) };
         self.failure.take().map_or(Ok(()), Err)?;
@@ -106,7 +108,7 @@ impl Observer for RunRecording {
         self.write(|recorder| recorder.change(change));
     }
 
-    /// Returns all outputs that a recording stores, until it fails or ends.
+    /// Returns all outputs while the recording writes, the force alone otherwise.
     fn demand(&self) -> Demand {
         if self.is_on() && self.failure.is_none() { Demand::ALL } else { Demand::FORCE }
     }

@@ -1,8 +1,8 @@
-//! Process for the code of plugins: it ends with the thread that started it, for any reason, and takes all processes of its process
-//! group with it.
+//! Process for plugin code, in a process group of its own. Dropping its handle kills the whole group; the system kills the process
+//! when the thread that started it ends, for any reason.
 //!
-//! A plugin may hang, ignore signals or start processes; none of them outlives the thread that waits for an answer. On Windows only
-//! the process itself is killed, and it outlives a killed host: a remedy is a job object, which Flotor does not use yet.
+//! A plugin may hang, ignore signals or start processes. On Windows only the process itself is killed, and it outlives a killed host:
+//! a remedy is a job object, which Flotor does not use yet.
 
 use crate::platform::process_group;
 use std::io;
@@ -13,7 +13,7 @@ use std::time::Duration;
 /// Poll interval of [`PluginProcess::wait`].
 const POLL: Duration = Duration::from_millis(2);
 
-/// A running process for the code of plugins. Dropping it kills the whole process group.
+/// Process for plugin code, with its exit status once it has ended. Dropping the handle kills the whole process group.
 pub struct PluginProcess {
     pub(crate) child: Child,
     status: Option<ExitStatus>,
@@ -35,12 +35,13 @@ impl PluginProcess {
         self.child.id()
     }
 
-    /// Returns the status of a process that has ended, and kills the rest of its group. Does not wait. Not real-time.
+    /// Returns the exit status if the process has ended, and kills the rest of its group; `None` while the process runs. Does not
+    /// wait. Not real-time.
     ///
     /// # Errors
     /// If a system call fails.
     pub fn try_wait(&mut self) -> io::Result<Option<ExitStatus>> {
-        // The id of the group is free once its leader was waited for.
+        // Killed before the leader is reaped: afterwards the system may reuse the id of the group.
         if self.status.is_none() && process_group::has_ended(&mut self.child)? {
             process_group::kill(&mut self.child);
             self.status = Some(self.child.wait()?);
@@ -48,7 +49,7 @@ impl PluginProcess {
         Ok(self.status)
     }
 
-    /// Waits for the end of the process, and kills the rest of its group. Not real-time.
+    /// Waits for the end of the process, kills the rest of its group, and returns the exit status. Not real-time.
     ///
     /// # Errors
     /// If a system call fails.
@@ -61,7 +62,7 @@ impl PluginProcess {
         }
     }
 
-    /// Kills the process group and waits for its end. Not real-time.
+    /// Kills the process group and waits for the end of the process. Not real-time.
     ///
     /// # Errors
     /// If a system call fails.

@@ -1,4 +1,4 @@
-//! The program as a source of force: a force model whose wrench comes from a program in the same process.
+//! Program as a source of force: a force model whose wrench a program in the same process commands.
 //!
 //! ```text
 //!  program                                             loop
@@ -6,9 +6,9 @@
 //!  pose, wrench applied  <- Tap, latest-value cell  <------------------------------------- record of the tick
 //! ```
 //!
-//! In a scene it is a model like any other (`plugin = "program"`): mapped, mixed, limited and recorded. A wrench is valid for a
-//! stated time after the first tick that reads it; then it fades to zero, which is counted. Force fades in when the program enables
-//! it. Neither side waits for the other.
+//! In a scene it is a model like any other (`plugin = "program"`): mapped, blended, limited and recorded. A wrench is valid for a
+//! limited time after the first tick that reads it; then it fades to zero, and [`ProgramCounts`] counts the lapse. Force fades in
+//! when the program enables it. Neither side waits for the other.
 
 use crate::nanoseconds::whole_ns;
 use crate::scene::{ModelUse, Scene};
@@ -26,24 +26,24 @@ use std::sync::{Arc, Mutex};
 /// Plugin id of the model in scenes.
 pub const ID: &str = "program";
 
-/// Entry of the model, for a registry. Without a [`Port`] of a program, `create` refuses.
+/// Plugin entry of the model, for a registry. `create` fails unless a free [`Port`] has the number of the parameter `port`.
 pub static ENTRY: Entry = model_entry::<ProgramModel>();
 
-/// Scene text with the model, for devices without one.
+/// Scene text with the model, added to devices without such a model.
 const MODEL: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"program\"\n";
 
-/// Fade-in time unless a scene sets `ramp_ms`.
+/// Fade-in time unless a scene sets `ramp_ms`, ms.
 const RAMP_MS: f64 = 200.0;
 
 /// Command from the program.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Command {
     wrench: Wrench,
-    /// Number of commands so far: the same wrench again is valid anew.
+    /// Number of commands so far; distinguishes a repeated wrench, whose validity starts again.
     commands: u64,
-    /// Number of times enabled and disabled: odd if enabled.
+    /// Number of times that force was enabled and disabled; odd: enabled.
     gate: u64,
-    /// Validity of the wrench, ns; 0: as in the scene.
+    /// Validity time of the wrench, ns; 0: `valid_ms` of the scene.
     valid_ns: u64,
 }
 
@@ -62,16 +62,16 @@ impl Words<9> for Command {
 
 const NO_COMMAND: Command = Command { wrench: Wrench::ZERO, commands: 0, gate: 0, valid_ns: 0 };
 
-/// Counters of a program.
+/// Counters of the commands of a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ProgramCounts {
-    /// Commanded wrenches.
+    /// Number of commanded wrenches, refused wrenches included.
     pub commands: u64,
-    /// Wrenches refused because of a number that is not finite.
+    /// Number of wrenches refused because a component was NaN or infinite.
     pub refused: u64,
-    /// Wrenches that expired and faded because no other came.
+    /// Number of wrenches that expired and faded because no newer wrench was commanded.
     pub lapses: u64,
-    /// Ticks in which an expired wrench faded or was gone.
+    /// Number of ticks in which an expired wrench was fading or had faded.
     pub lapsed_ticks: u64,
 }
 
@@ -81,22 +81,22 @@ struct Lapses {
     ticks: AtomicU64,
 }
 
-/// Model side of a port, until a model takes it.
+/// Model side of a port, free until a model is created with its number.
 struct ModelEnd {
     command: Observer<Command, 9>,
     lapses: Arc<Lapses>,
 }
 
-/// Ports that no model has taken yet.
+/// Model sides of the ports that no model uses yet, by number.
 static FREE: Mutex<Vec<(u32, ModelEnd)>> = Mutex::new(Vec::new());
 static NEXT: AtomicU32 = AtomicU32::new(1);
 
-/// A wrench with a number that is not finite.
+/// Error: a component of the wrench is NaN or infinite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a wrench has a number that is not finite; the previous wrench stays until it expires")]
 pub struct NotFinite;
 
-/// Program side: takes the wrench that the hand is to feel, in the model's frame. Any thread may use it.
+/// Program side of the connection: accepts the wrench on the hand, in the model frame, from any thread.
 #[derive(Debug)]
 pub struct Port {
     number: u32,
@@ -112,7 +112,8 @@ impl Default for Port {
 }
 
 impl Port {
-    /// Creates a port, disabled at first; the next model with this [number](Self::number) takes it. Not real-time.
+    /// Creates a port with disabled force; the next model that is created with its [number](Self::number) as `port` is connected to
+    /// it. Not real-time.
     #[must_use]
     pub fn new() -> Self {
         let (publisher, command) = latest(NO_COMMAND);
@@ -121,14 +122,14 @@ impl Port {
         Self { number, command: Mutex::new((NO_COMMAND, publisher)), refused: AtomicU64::new(0), lapses }
     }
 
-    /// Returns the value of the model's parameter `port` for this port.
+    /// Returns the number of this port, for the parameter `port` of the model that connects to it.
     #[must_use]
     pub fn number(&self) -> u32 {
         self.number
     }
 
-    /// Commands the wrench on the hand from the next tick on, N and N·m, until it expires. Bounded; may wait for another thread of
-    /// the program in the same call.
+    /// Commands the wrench on the hand, N and N·m, model frame, from the next tick on until it expires. Bounded, but may wait for
+    /// another thread that uses the same port.
     ///
     /// # Errors
     /// [`NotFinite`]; the previous wrench stays until it expires.
@@ -149,7 +150,7 @@ impl Port {
         self.change(|command| command.gate += 1 - command.gate % 2);
     }
 
-    /// Disables the force from the next tick on, without a fade. Bounded, as [`Self::command`].
+    /// Disables the force from the next tick on, without a fade, and clears the commanded wrench. Bounded, as [`Self::command`].
     pub fn disable(&self) {
         self.change(|command| {
             command.gate += command.gate % 2;
@@ -157,13 +158,13 @@ impl Port {
         });
     }
 
-    /// Returns true if the force is enabled.
+    /// Returns true if the program has enabled the force.
     #[must_use]
     pub fn is_enabled(&self) -> bool {
         lock(&self.command).0.gate % 2 == 1
     }
 
-    /// Sets the validity of a wrench, ns, in place of the model's `valid_ms`; 0: as in `valid_ms`.
+    /// Sets the validity time of a wrench, ns, in place of the model's `valid_ms`; 0 restores `valid_ms`.
     pub fn set_validity(&self, valid_ns: u64) {
         self.change(|command| command.valid_ns = valid_ns);
     }
@@ -188,27 +189,27 @@ impl Port {
     }
 }
 
-/// Port connected to a device of a scene.
+/// Port for a device of a scene.
 #[derive(Debug)]
 pub struct Connected {
-    /// Program side of the port.
+    /// Port with which the program commands the device.
     pub port: Port,
-    /// Number of the device.
+    /// Number of the device, from 0 in the scene's order.
     pub device: u16,
-    /// Mapping between the frame of the device and that of the program.
+    /// Mapping between device frame and model frame, in which the program commands.
     pub mapping: Mapping,
-    /// Fade-in time once the program enables the force, ns.
+    /// Fade-in time of the force after the program has enabled it, ns.
     pub ramp_ns: u64,
 }
 
-/// Connects each device of a scene to a port, in the scene's order: the first model `program` on the device takes the port; a
-/// device without one gets one in addition to its other models. Not real-time.
+/// Creates a port for each device of a scene, in the scene's order, and assigns it to the first model `program` on the device; adds
+/// such a model to a device that has none. Not real-time.
 #[must_use]
 pub fn connect(scene: &mut Scene) -> Vec<Connected> {
     let connect = |device: u16| {
         let is_ours = |model: &&mut ModelUse| model.plugin.plugin == ID && model.device == device;
         if !scene.models.iter_mut().any(|model| is_ours(&model)) {
-            // A built-in text, which a test reads.
+            // Cannot fail: the text is built in, and a test parses it.
             let added =
                 Scene::parse(std::path::Path::new("built-in program"), MODEL).map(|scene| scene.models);
             let named = scene.devices.get(usize::from(device)).map_or("", |device| device.name.as_str());
@@ -232,7 +233,8 @@ pub fn connect(scene: &mut Scene) -> Vec<Connected> {
     devices.into_iter().map(connect).collect()
 }
 
-/// Returns the fade-in time of a model `program`, ns, as set in the scene. A value that is no number is rejected with the scene.
+/// Returns the fade-in time of a model `program`, ns, as set in the scene. A value that is not a number gives the default; the
+/// preparation of the scene rejects it.
 fn ramp_ns(model: &ModelUse) -> u64 {
     let set = model.plugin.parameters.iter().rev().find(|parameter| parameter.key == "ramp_ms");
     set.and_then(|parameter| parameter.value.parse().ok()).map_or(nanoseconds(RAMP_MS), nanoseconds)
@@ -243,7 +245,7 @@ fn nanoseconds(time_ms: f64) -> u64 {
     whole_ns(time_ms * 1.0e6)
 }
 
-/// Force model with the wrench of a program. Times are those of ticks, so that a run on the virtual clock can be repeated.
+/// Force model with the wrench of a program. All times are tick times, so that a run on the virtual clock is repeatable.
 struct ProgramModel {
     end: ModelEnd,
     valid_ns: u64,
@@ -253,13 +255,13 @@ struct ProgramModel {
     version: u64,
     /// Time of the first tick with the newest wrench, ns.
     commanded_ns: u64,
-    /// Start and duration of the fade-in, ns.
+    /// Start, as tick time, and duration of the fade-in, ns.
     since_ns: u64,
     rise_ns: u64,
     has_lapsed: bool,
 }
 
-/// Returns the parameter of a time, ms, at most a minute.
+/// Returns the description of a time parameter, ms, `least` to a minute.
 const fn time(id: &'static str, least: f64, default: f64, doc: &'static str) -> Parameter {
     Parameter::real(id, "ms", least, 60_000.0, default, doc)
 }
@@ -314,7 +316,7 @@ impl ForceModel for ProgramModel {
 
     fn step(&mut self, input: &Input) -> Output {
         let now_ns = input.time_ns;
-        // A command that is being written is read in the next tick.
+        // A command that is being written now is read in the next tick.
         if let Some((version, command)) = self.end.command.read()
             && version != self.version
         {
@@ -368,7 +370,7 @@ impl ProgramModel {
     }
 }
 
-/// Returns a smooth step from 0 to 1 over `length_ns`, with zero slope at both ends.
+/// Returns a smooth step (cubic) from 0 to 1 over `length_ns`, with zero slope at both ends.
 fn smooth(elapsed_ns: u64, length_ns: u64) -> f64 {
     if elapsed_ns >= length_ns {
         return 1.0;

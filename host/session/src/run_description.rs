@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 /// Creates the description of a run before it begins. Not real-time.
 ///
-/// `plugins` are those of the prepared scene: the devices, then the models, both in the scene's order.
+/// `plugins` are the plugins of the prepared session ([`crate::Session::plugins`]): devices, then models, both in the scene's order.
 #[must_use]
 pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -> RunDescription {
     let devices = (0..).zip(&scene.devices).zip(plugins).map(|((device, used), report)| PluginDescription {
@@ -56,7 +56,7 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
     }
 }
 
-/// Returns the parameters of a plugin that name files, each with its path; names of built-in data are left out.
+/// Returns id and path of each parameter of a plugin that names a file; parameters that are empty or name built-in data are left out.
 pub fn named_files(report: &PluginReport) -> impl Iterator<Item = (&'static str, PathBuf)> + '_ {
     let files = report.schema.iter().filter(|parameter| parameter.kind() == ParameterKind::File);
     files.filter_map(|parameter| {
@@ -66,8 +66,8 @@ pub fn named_files(report: &PluginReport) -> impl Iterator<Item = (&'static str,
     })
 }
 
-/// Returns the contents of the files that a plugin's parameters name, as further parameters for the description. Files that cannot
-/// be read any more are left out. Not real-time.
+/// Returns the contents of the files that a plugin's parameters name, as further parameters for the description. Files that cannot be
+/// read are left out. Not real-time.
 fn contents_of_files(report: &PluginReport) -> Vec<(String, String)> {
     let content =
         |(parameter, path): (_, PathBuf)| Some(NamedFile::read(&path).ok()?.to_parameters(parameter));

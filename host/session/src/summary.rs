@@ -1,4 +1,4 @@
-//! Summary of a run: numbers for machines, a page for users.
+//! Summary of a run: JSON for programs, text for users.
 
 use crate::feel::Feel;
 use crate::scene::{Isolation, Scene};
@@ -15,21 +15,21 @@ use flotor_servo::{
 };
 use serde::{Serialize, Serializer};
 
-/// Observer that collects the tick statistics of a run.
+/// Observer that collects the tick statistics for the summary of a run.
 #[derive(Default)]
 pub struct Tally {
     /// Statistics of each device, by number.
     devices: Vec<DeviceTally>,
     event_ticks: [u64; Events::NAMES.len()],
-    /// Events of the present tick, at any device.
+    /// Events of the current tick, at any device.
     events: Events,
     generated_peak_j: f64,
     port_lowest_j: f64,
-    /// Outputs of the models that were computed in every tick at every device; `None` before the first tick.
+    /// Model outputs that were computed in every tick at every device; `None` before the first tick.
     computed: Option<Demand>,
 }
 
-/// Tick statistics of one device.
+/// Tick statistics of one device, from its records.
 #[derive(Default)]
 struct DeviceTally {
     peak_force_n: f64,
@@ -55,19 +55,19 @@ impl DeviceTally {
     }
 }
 
-/// Energy that the sampled loop puts out at a device beyond the energy stored in the models: known while all outputs of the models
-/// are computed.
+/// Energy that the sampled loop generates at a device: work on the hand beyond the decrease of the energy stored in the models. Known
+/// while all model outputs are computed and finite.
 #[derive(Default)]
 struct LoopBalance {
-    /// Energy stored in the first tick, J.
+    /// Energy stored in the models in the first tick, J; `None` if not computed.
     first_energy_j: Option<f64>,
     work_j: f64,
     generated_j: Option<f64>,
 }
 
 impl LoopBalance {
-    /// Adds the work of the models on the hand from one tick to the next, with the wrench held over the tick as the device holds
-    /// it.
+    /// Adds the work of the models on the hand from one tick to the next; the wrench of the last tick acts until this tick
+    /// (zero-order hold), as at the device.
     fn observe(&mut self, last: Option<&TickRecord>, record: &TickRecord) {
         let energy_j = record.model.energy_j();
         if last.is_none() {
@@ -92,20 +92,21 @@ impl Tally {
         std::array::from_fn(|bit| self.event_ticks[bit] + u64::from(self.events.bits() >> bit & 1))
     }
 
-    /// Returns the time of the last tick, ns.
+    /// Returns the time of the last tick, ns; 0 before the first tick.
     #[must_use]
     pub fn last_ns(&self) -> u64 {
         let last = |device: &DeviceTally| device.last.as_ref().map(|record| record.time_ns);
         self.devices.iter().filter_map(last).max().unwrap_or(0)
     }
 
-    /// Returns the largest energy that the loops of all devices together have generated, J; `None` if not known to the end.
+    /// Returns the largest energy that the loops of all devices together have generated at any time, J; `None` if it is not known to
+    /// the end.
     fn generated_peak_j(&self) -> Option<f64> {
         let is_known = self.devices.iter().all(|device| device.balance.generated_j.is_some());
         is_known.then_some(self.generated_peak_j)
     }
 
-    /// Returns the largest value over all devices.
+    /// Returns the largest value over all devices; 0 without a device.
     fn largest(&self, number: impl Fn(&DeviceTally) -> f64) -> f64 {
         self.devices.iter().map(number).fold(0.0, f64::max)
     }
@@ -114,7 +115,7 @@ impl Tally {
 impl Observer for Tally {
     fn observe(&mut self, record: &TickRecord) {
         if record.device == 0 {
-            // The tick before is complete.
+            // The previous tick is complete.
             self.event_ticks = self.event_ticks();
             self.events = Events::NONE;
         }
@@ -135,80 +136,82 @@ impl Observer for Tally {
     }
 }
 
-/// A run in numbers. The names are a contract: scripts rely on them.
+/// Results of a run, written as JSON. The field names are a stable interface: scripts rely on them.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunSummary {
     /// Title of the scene.
     pub title: String,
-    /// End, in JSON its [word](RunEnd::word).
+    /// Reason of the end, in JSON as its [word](RunEnd::word).
     #[serde(serialize_with = "write_word")]
     pub end: RunEnd,
-    /// "real" or "virtual".
+    /// Clock of the loop: "real" or "virtual".
     pub clock: &'static str,
     /// Seed of the run.
     pub seed: u64,
-    /// Requested rate, Hz.
+    /// Requested loop rate, Hz.
     pub rate_hz: f64,
-    /// Number of ticks.
+    /// Number of executed ticks.
     pub ticks: u64,
-    /// Ticks that started later than a tenth of the period.
+    /// Number of ticks that started late by more than a tenth of the period.
     pub late_ticks: u64,
-    /// Number of skipped ticks.
+    /// Number of ticks that were skipped because their whole period had passed.
     pub missed_ticks: u64,
     /// Time from the first deadline to the end of the last period, s.
     pub elapsed_s: f64,
-    /// Delays of the ticks after their deadlines.
+    /// Lateness of the ticks after their deadlines, ns.
     pub lateness_ns: Percentiles,
-    /// Durations of whole ticks.
+    /// Compute times of whole ticks, ns.
     pub compute_ns: Percentiles,
-    /// Durations of the stages of a tick, sampled.
+    /// Compute times of the stages of a tick, ns, measured in a sample of the ticks.
     pub stages_ns: StageSummary,
-    /// Largest force sent, N.
+    /// Largest magnitude of the commanded force at any device, N.
     pub peak_force_n: f64,
-    /// Largest torque sent, N·m.
+    /// Largest magnitude of the commanded torque at any device, N·m.
     pub peak_torque_nm: f64,
-    /// Largest rise of the force against a handle over its displacement, 0.1 mm at a time, without a limit or ramp in action, N/m.
+    /// Largest stiffness felt at a handle, N/m: increase of the force against the handle per displacement, over displacements of 0.1
+    /// mm in ticks without an event (limit, ramp, change).
     pub peak_stiffness_n_per_m: f64,
-    /// Time from which on the handles stayed within 0.1 mm and 1 mrad of one pose, s; `None` if one moved within the last half second.
+    /// Time after which every handle stayed within 0.1 mm and 1 mrad of one pose, s; `None` if a handle moved within the last half
+    /// second.
     pub settled_after_s: Option<f64>,
-    /// Energy balance, all devices together.
+    /// Energy balance of all devices together.
     pub energy: EnergySummary,
-    /// Effects of the envelope's passivity controller and slew limit, all devices together.
+    /// Effects of the envelope's passivity controller and slew limit, summed over all devices.
     pub envelope: EnvelopeSummary,
-    /// Summary of each device.
+    /// Summaries of the devices, in the scene's order.
     pub devices: Vec<DeviceSummary>,
-    /// Summary of each coupling between devices.
+    /// Summaries of the couplings, in the scene's order.
     pub couplings: Vec<CouplingSummary>,
-    /// Number of ticks with each event that happened.
+    /// Number of ticks with each event, by name; events that did not happen are left out.
     pub events: std::collections::BTreeMap<&'static str, u64>,
-    /// Digest of the trace without measured times: equal digests, equal runs.
+    /// Digest of all records without measured times: equal for equal runs.
     pub trace_digest: String,
     /// Model outputs that were not computed in every tick, because they were not requested or a model has none: "torque", "energy".
     pub not_computed: Vec<&'static str>,
-    /// Records lost because an observer was too slow.
+    /// Number of records dropped because an observer was too slow.
     pub dropped_records: u64,
-    /// Wall-clock time, s.
+    /// Wall-clock time from the start of the run to its outcome, s.
     pub wall_s: f64,
     /// Warnings for users, a sentence each.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
-    /// Plugins with the values of all parameters.
+    /// Plugins of the run with the values of all parameters: devices, models, then replacements with faults.
     pub plugins: Vec<PluginSummary>,
-    /// Models in place of those of the scene at the end, after a hot swap; not those that the seed chose.
+    /// Replacements in place at the end, after hot swaps; without replacements that the seed chose.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub replacements: Vec<PluginSummary>,
 }
 
-/// Durations of the stages of a tick.
+/// Compute times of the stages of a tick, ns.
 #[derive(Clone, Debug, Serialize)]
 pub struct StageSummary {
-    /// Reading the device.
+    /// Reading the devices.
     pub read: Percentiles,
-    /// Mapping and models.
+    /// Mapping the poses and stepping the models.
     pub models: Percentiles,
-    /// Limiting the wrench.
+    /// Limiting the wrenches.
     pub envelope: Percentiles,
-    /// Writing the device.
+    /// Writing the devices.
     pub write: Percentiles,
 }
 
@@ -217,17 +220,19 @@ pub struct StageSummary {
 pub struct DeviceSummary {
     /// Name in the scene.
     pub name: String,
-    /// Largest force sent, N.
+    /// Largest magnitude of the commanded force, N.
     pub peak_force_n: f64,
-    /// Largest torque sent, N·m.
+    /// Largest magnitude of the commanded torque, N·m.
     pub peak_torque_nm: f64,
-    /// Lowest energy at the device's port, J; below zero if another device drives this one.
+    /// Lowest net energy put in by the hand at the device's port, J; below zero: more energy came out than had gone in, for example
+    /// from a coupled device.
     pub port_lowest_j: f64,
-    /// Energy at the device's port at the end, J.
+    /// Net energy put in by the hand at the device's port until the end, J.
     pub port_end_j: f64,
     /// Effects of the device's passivity controller and slew limit.
     pub envelope: EnvelopeSummary,
-    /// Time from the request of the emergency stop to the device without force, ms; absent without one, and on the virtual clock.
+    /// Time from the request of an emergency stop until the device exerted no force, ms; absent without an emergency stop, and on the
+    /// virtual clock.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stop_ms: Option<f64>,
 }
@@ -265,7 +270,7 @@ impl EnvelopeSummary {
         }
     }
 
-    /// Returns the effect of each active stage as text for users.
+    /// Returns name and effect of each stage that was active, as text for users.
     fn rows(&self) -> impl Iterator<Item = (&'static str, String)> {
         let Self { passivity_active_s, passivity_removed_j, slew_active_s, slew_generated_j } = *self;
         let removed_mj = passivity_removed_j * 1.0e3;
@@ -278,54 +283,56 @@ impl EnvelopeSummary {
     }
 }
 
-/// Summary of one coupling: the energy tanks of its ends, in their common frame.
+/// Summary of one coupling: energy tanks of its two ends. Energies are in the shared frame of the coupling.
 #[derive(Clone, Debug, Serialize)]
 pub struct CouplingSummary {
     /// Name in the scene.
     pub name: String,
-    /// Largest ratio of the energy that one hand gets to the energy that the other puts in, by the scales of the ends.
+    /// Largest ratio of the energy delivered to one hand to the energy that the other hand puts in; depends on the scales of the ends
+    /// alone.
     pub energy_gain: f64,
-    /// Lowest energy of the tank of each end, J: below zero, more came out there than this end had and received. The number of a
-    /// remote end is a claim of its host, and proves nothing.
+    /// Lowest energy of the tank of each end, J; below zero: more came out at this end than it had and received. The value of a
+    /// remote end is reported by its host and cannot be verified here.
     pub lowest_j: [f64; 2],
-    /// Total energy that the hand at each end put in less the energy that came out, J.
+    /// Net energy that the hand at each end put in, J; negative: more came out.
     pub gone_in_j: [f64; 2],
-    /// Energy dissipated at each end, J.
+    /// Energy put in at each end that its tank has discarded (dissipated), J.
     #[serde(rename = "given_up_j")]
     pub discarded_j: [f64; 2],
-    /// Link to a remote second end, whose numbers above are as last received.
+    /// Link statistics, if the second end is remote; the energies of the remote end are the last received values.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub link: Option<LinkSummary>,
 }
 
-/// Link statistics between two hosts.
+/// Statistics of the link between two hosts.
 #[derive(Clone, Debug, Serialize)]
 pub struct LinkSummary {
-    /// Ticks in which a message arrived.
+    /// Number of ticks in which a message arrived.
     #[serde(rename = "heard_ticks")]
     pub received_ticks: u64,
-    /// Number of times without a message for the watchdog's timeout: the coupling removed its force.
+    /// Number of timeouts: no message arrived for the watchdog timeout, and the coupling removed its force.
     pub silences: u64,
-    /// Longest wait for a message, ms; always less than the watchdog's timeout.
+    /// Longest wait for a message without a timeout, ms.
     pub longest_wait_ms: f64,
-    /// Messages with an implausible pose or velocity, which were not used.
+    /// Number of messages with an implausible pose or velocity, which were not used.
     pub implausible: u64,
-    /// Counts of messages.
+    /// Counts of the messages received by the peer link.
     pub carried: LinkCounts,
-    /// Run of the partner, by its start in ns since 1970, as text; empty without a partner.
+    /// Id of the partner's run, its start in ns since 1970, as text; empty without a partner.
     pub partner: String,
-    /// Energy accepted from the partner, J: no more than this and the input of the local hand came out here.
+    /// Energy accepted from the partner, J. The energy delivered to the local hand is at most this energy plus the energy that the
+    /// local hand put in.
     #[serde(rename = "believed_j")]
     pub accepted_j: f64,
-    /// Claimed energy beyond the part that can be checked here, J.
+    /// Energy claimed by the partner beyond the part that can be verified here, J; it was rejected.
     pub cut_j: f64,
-    /// Claimed travel beyond the plausible limit, m.
+    /// Travel claimed by the partner beyond the plausible limit, m.
     pub cut_path_m: f64,
-    /// Claimed rotation beyond the plausible limit, rad.
+    /// Rotation claimed by the partner beyond the plausible limit, rad.
     pub cut_turn_rad: f64,
-    /// Ticks with a rejected claim, or with a place beyond the range of the local device.
+    /// Number of ticks with a rejected claim, or with a position beyond the range of the local device.
     pub cut_ticks: u64,
-    /// Partner runs rejected for implausible claims, as text.
+    /// Ids of the partner runs that were disconnected because of implausible claims, as text.
     #[serde(rename = "let_go")]
     pub rejected_runs: Vec<String>,
 }
@@ -333,58 +340,61 @@ pub struct LinkSummary {
 /// Energy balance of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct EnergySummary {
-    /// Unexplained part of the device's own energy balance, relative to its peak energy; absent without a balance.
+    /// Unexplained part of a device's own energy balance, relative to its peak energy; of several devices the largest in magnitude.
+    /// Absent if no device keeps a balance.
     pub device_residual_relative: Option<f64>,
-    /// Largest mechanical energy of the device, J; absent without a balance.
+    /// Largest mechanical energy of a device, J; absent if no device keeps a balance.
     pub device_peak_j: Option<f64>,
-    /// Largest energy that the sampled loop has put out beyond the energy stored in the models, J: a zero-order hold leaks. Absent
-    /// if torque or energy of the models was not computed in every tick, or was not finite.
+    /// Largest energy that the sampled loop has generated, J: work on the hand beyond the decrease of the energy stored in the
+    /// models, as by the zero-order hold. Absent if torque or energy of the models was not computed in every tick, or was not finite.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loop_generated_j: Option<f64>,
-    /// Lowest energy at the ports of the devices together, J: below zero, more came out at some time than had gone in.
+    /// Lowest net energy put in by the hands at the ports of all devices together, J; below zero: more energy came out at some time
+    /// than had gone in.
     pub port_lowest_j: f64,
-    /// Energy at the ports at the end, J: the total input of the hands.
+    /// Net energy put in by the hands at all ports until the end, J.
     pub port_end_j: f64,
 }
 
-/// Summary of a plugin of a run.
+/// Summary of a plugin of a run: identity, health and parameters.
 #[derive(Clone, Debug, Serialize)]
 pub struct PluginSummary {
     /// Name in the scene.
     pub name: String,
     /// Id of the plugin.
     pub id: String,
-    /// "model" or "device".
+    /// Kind of the plugin: "model" or "device".
     pub kind: &'static str,
     /// Version of the plugin.
     pub version: String,
-    /// File of the plugin.
+    /// Path of the plugin file; empty for a linked plugin.
     pub file: String,
-    /// Isolation of a model, as `isolation` of a scene: "process" for a worker process, "none" for the loop.
+    /// Isolation of a model, as `isolation` of a scene: "process" for a worker process, "none" for the loop's own thread; absent for
+    /// a device.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub isolation: Option<&'static str>,
-    /// "ok", or the problem.
+    /// Health of the plugin: "ok", or the problem.
     pub health: String,
-    /// Every parameter with its value.
+    /// Value of every parameter before the run, as text, by id.
     pub parameters: std::collections::BTreeMap<String, String>,
-    /// Error estimates of a model, by the names of its details.
+    /// Error estimates of a model, by the id of the detail.
     #[serde(skip_serializing_if = "std::collections::BTreeMap::is_empty")]
     pub estimates: std::collections::BTreeMap<String, f64>,
 }
 
-/// Inputs of a summary, beyond the outcome.
+/// Inputs of a summary in addition to outcome and tally.
 pub struct RunFacts<'a> {
     /// Scene of the run.
     pub scene: &'a Scene,
     /// Options of the run.
     pub options: &'a RunOptions,
-    /// Plugins of the run.
+    /// Plugins of the run: devices, then models, in the scene's order.
     pub plugins: &'a [PluginReport],
-    /// Model outputs that the run's own observer requested, without those of clients.
+    /// Model outputs that the observer of the run requested; without the outputs that clients requested.
     pub requested: Demand,
-    /// Counts of messages between hosts, by name of the coupling.
+    /// Counts of messages between hosts, by the name of the coupling.
     pub carried: &'a [(String, LinkCounts)],
-    /// Digest of the trace.
+    /// Digest of all records of the run.
     pub trace_digest: String,
 }
 
@@ -499,7 +509,7 @@ impl RunSummary {
         }
     }
 
-    /// Sets the health of the plugin that ended the run.
+    /// Sets the health of the plugins with this name to `what`: for the plugin that ended the run.
     #[must_use]
     pub fn with_health(mut self, name: &str, what: &str) -> Self {
         let cause = self.plugins.iter_mut().filter(|plugin| plugin.name == name);
@@ -507,7 +517,7 @@ impl RunSummary {
         self
     }
 
-    /// Returns the run in one line, for the title of a picture.
+    /// Formats plugins, rate, clock, peak force and digest in one line, for the title of a plot.
     #[must_use]
     pub fn one_line(&self) -> String {
         let plugins: Vec<&str> = self.plugins.iter().map(|plugin| plugin.id.as_str()).collect();
@@ -518,7 +528,7 @@ impl RunSummary {
         )
     }
 
-    /// Formats the summary for users.
+    /// Formats the summary as lines of text for users.
     #[must_use]
     pub fn to_text(&self) -> String {
         let mut lines = Vec::new();
@@ -603,7 +613,7 @@ impl RunSummary {
     }
 }
 
-/// Returns the unexplained part of a device's own energy balance, relative to its peak energy.
+/// Returns the unexplained part of a device's own energy balance, relative to its peak energy; in J if the peak is 0.
 fn relative_residual(ledger: EnergyLedger) -> f64 {
     if ledger.peak_j > 0.0 { ledger.residual_j() / ledger.peak_j } else { ledger.residual_j() }
 }
@@ -657,7 +667,7 @@ fn coupling_summary(
     }
 }
 
-/// Returns the problem of a model as text; "ok" without one.
+/// Returns the problem of a model as text; "ok" without a problem.
 fn health_words(health: &ModelHealth, words: &str) -> String {
     let us = |ns: u64| ns as f64 * 1.0e-3;
     if let Some(tick) = health.panicked_at {
@@ -693,7 +703,7 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
     )
 }
 
-/// Returns the summary of a plugin; the devices of a run come first.
+/// Returns the summary of the plugin with this number; devices have the first numbers.
 fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
     let device = outcome.devices.get(number);
     let float_changes = device.map_or(0, |device| device.float_changes);

@@ -11,7 +11,7 @@ pub(super) const BRIDGE: SeparateProgram<'static> = SeparateProgram {
     build: "cargo build --release --manifest-path interop/bridge/Cargo.toml --target-dir target/bridge",
 };
 
-/// Prefix of the names of remote sessions.
+/// Prefix that marks the name of a remote session.
 const REMOTE: &str = "zenoh/";
 
 /// Options for reaching a remote session.
@@ -26,7 +26,7 @@ pub(super) struct Way {
 }
 
 impl Way {
-    /// Returns the arguments of the bridge for a command on a remote session.
+    /// Returns the arguments of the bridge for `command` on the remote session `name`.
     pub(super) fn arguments(&self, command: &str, name: &OsStr) -> Vec<OsString> {
         let mut arguments = vec![command.into(), name.to_owned()];
         arguments.extend(self.config.iter().flat_map(|file| ["--config".into(), file.into()]));

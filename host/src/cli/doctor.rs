@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
     verdict
 }
 
-/// Diagnoses the real-time configuration.
+/// Diagnoses the real-time configuration of this machine, with the plugins found.
 fn machine(registry: &Registry, root: &Path) -> Vec<Diagnosis> {
     let mut diagnoses = vec![cores(root)];
     diagnoses.extend(of_the_system(root));

@@ -1,6 +1,6 @@
 //! The `flotor` command: parses arguments, runs commands and returns exit codes.
 //!
-//! Commands without a servo loop are separate programs beside this one, which shortens a first build.
+//! Commands without a servo loop are separate programs in the same folder, which shortens a first build.
 
 mod bridge;
 mod doctor;
@@ -26,8 +26,8 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
-/// Version, and the commit in a release: `.ci/archive` sets the variable. Other builds have none, so that a new
-/// commit does not force a rebuild.
+/// Version, and in a release the commit: `.ci/archive` sets `FLOTOR_COMMIT`. Other builds show no commit, so that a new commit does
+/// not force a rebuild.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let commit = option_env!("FLOTOR_COMMIT").map(|commit| format!(" ({commit})")).unwrap_or_default();
     format!("{}{commit}", env!("CARGO_PKG_VERSION"))
@@ -61,7 +61,7 @@ const fn built_with_this(program: &'static str) -> SeparateProgram<'static> {
     SeparateProgram { program, built: Built::WithThis, build: "cargo build --release" }
 }
 
-/// Program that sweeps parameters into tables; in its own workspace, because it depends on Parquet.
+/// Program that sweeps parameters and writes tables; in its own workspace, because it depends on Parquet.
 const SWEEP: SeparateProgram<'static> = SeparateProgram {
     program: "flotor-sweep",
     built: Built::OwnWorkspace("sweep"),
@@ -151,7 +151,7 @@ pub fn command() -> clap::Command {
     Arguments::command()
 }
 
-/// Returns the names of the commands that the help lists, in its order. Not real-time.
+/// Returns the names of the commands that the help lists, in the order of the help. Not real-time.
 #[must_use]
 pub fn command_names() -> Vec<String> {
     let command = command();
@@ -159,7 +159,7 @@ pub fn command_names() -> Vec<String> {
     listed.map(|command| command.get_name().to_owned()).collect()
 }
 
-/// Runs the command of this process.
+/// Parses the arguments of this process, runs the command and returns its exit code.
 #[must_use]
 pub fn main() -> ExitCode {
     let arguments = options::arguments::<Arguments>();
@@ -170,7 +170,7 @@ pub fn main() -> ExitCode {
     {
         end_with_parent();
     }
-    // Other commands run no code of plugins in this process.
+    // Other commands execute no plugin code in this process.
     match matches!(command, Command::Run(_) | Command::Doctor(_)) {
         true => supervised(|| carry_out(command)),
         false => exit_code_of(carry_out(command)),
@@ -208,7 +208,7 @@ fn carry_out(command: Command) -> Result<(), CommandError> {
         Command::Worker(arguments) => worker::run(arguments),
         Command::Watchdog(arguments) => watchdog::run(arguments),
         Command::Completions { shell } => {
-            // Into memory first: the generator panics if its output is closed.
+            // Written to memory first: the generator panics if its output is closed.
             let mut script = Vec::new();
             clap_complete::generate(shell, &mut Arguments::command(), "flotor", &mut script);
             say!("{}", String::from_utf8_lossy(&script).trim_end());

@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Rejects an id that another plugin has: only the first plugin found is used, and would hide the other.
+/// Returns an error if another plugin has the id: of two plugins with the same id the first one found hides the other.
 fn refuse_an_id_in_use(name: &PluginName) -> Result<(), CommandError> {
     let registry = Registry::search(&[]);
     let Some(known) = registry.found().iter().find(|known| known.id == name.id()) else { return Ok(()) };

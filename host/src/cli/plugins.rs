@@ -136,11 +136,11 @@ fn describe(registry: &Registry, id: &str, sets: &[KeyValue], json: &JsonOption)
     Ok(())
 }
 
-/// Number of ticks at home for the median time.
+/// Number of steps at home for the median time.
 const TIMED_TICKS: usize = 1000;
 
-/// Prints the error estimates of a model with some settings and the time of a tick, if the model has estimates or settings are
-/// given.
+/// Creates a model with some settings, and prints its error estimates and the time of a step, if the model has estimates or settings
+/// are given.
 fn print_certificate(plugin: &Plugin, sets: &[KeyValue]) -> Result<(), CommandError> {
     let settings = settings(plugin, "--set", sets)?;
     let started = Instant::now();

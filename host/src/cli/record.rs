@@ -11,7 +11,7 @@ use flotor_servo::StopSwitch;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Poll interval of the stop switch, while no event arrives.
+/// Poll interval of the stop switch while no event arrives.
 const LOOK_PERIOD: Duration = Duration::from_millis(100);
 
 /// Attach to a running session and record it until it ends.
@@ -77,7 +77,7 @@ struct Kept {
     end: RecordingEnd,
 }
 
-/// Kind of end of a recording, with the text to print.
+/// End of a recording, with the text to print.
 enum RecordingEnd {
     /// The run is over, or the user stopped the recording.
     Complete(String),
@@ -92,7 +92,7 @@ fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, Comma
     let mut kept = Kept { ticks: 0, dropped: 0, end: RecordingEnd::Complete("stopped recording".to_owned()) };
     while !stop.is_stop_requested() {
         match client.next(LOOK_PERIOD) {
-            // The only request is that to watch.
+            // The only request is the one to receive ticks.
             Ok(Some(Event::Answer(Answer { refused: Some(reason), .. }))) => {
                 recorder.discard();
                 return Err(CommandError::Failed(reason));

@@ -82,7 +82,7 @@ pub(crate) struct RunArguments {
 }
 
 impl RunArguments {
-    /// Returns true if `flotor lend` has started this run: the run then ends with that process, as nothing else would end it.
+    /// Returns true if `flotor lend` has started this run: the run must then end with that process, because nothing else ends it.
     pub(crate) fn is_lent(&self) -> bool {
         self.ml_api.is_some()
     }
@@ -106,12 +106,12 @@ impl OutputOption {
     }
 }
 
-/// Scene with the model for `--ml-api`; its device is a placeholder, because a scene must have one.
+/// Scene text with the model for `--ml-api`; its device is a placeholder, because a scene needs a device.
 const ML_API: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"ml-api\"\n";
 
 pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
-    // First, so that a signal during loading ends the run, too. With `--ml-api`, every signal ends the run in order, so that a summary is
-    // always printed, even after a very short program.
+    // First, so that a signal during loading also ends the run. With `--ml-api`, every signal stops the run normally, so that a
+    // summary is always printed, even after a very short program.
     let stop = if arguments.is_lent() { stop_on_signals()? } else { stop_run_on_signals()? };
     stop_waits_with(&stop);
     if arguments.json.is_on_standard_output() {
@@ -166,7 +166,7 @@ fn run_options(arguments: &RunArguments) -> Result<RunOptions, CommandError> {
     Ok(RunOptions { clock, seed: arguments.seed })
 }
 
-/// Prepares the session, with its notices and warnings.
+/// Prepares the session and prints its notices and warnings.
 fn prepare(arguments: &RunArguments, scene: &Scene, options: &RunOptions) -> Result<Session, CommandError> {
     let registry = Registry::search(&scene.plugin_folders);
     let session = while_preparing(&scene.title, || Session::prepare(scene, &registry, options))?;
@@ -178,7 +178,7 @@ fn prepare(arguments: &RunArguments, scene: &Scene, options: &RunOptions) -> Res
     Ok(session)
 }
 
-/// Finishes the recording of a run that failed, and writes the summary of a loop that is stuck.
+/// Finishes the recording of a failed run, and writes the JSON summary if the loop is stuck.
 fn report_failure(
     arguments: &RunArguments,
     facts: RunFacts<'_>,
@@ -197,7 +197,7 @@ fn report_failure(
     first_error([Err(error.into()), recorded, reported])
 }
 
-/// Finishes the recording of a run, draws and prints its results, and frees its plugins.
+/// Finishes the recording of a run, writes plot and summary, and frees its plugins; returns the first error.
 fn report(
     arguments: &RunArguments,
     facts: RunFacts<'_>,
@@ -208,7 +208,7 @@ fn report(
     let Watchers { measured: Measurements { tally, mut recording, .. }, plot, .. } = watchers;
     let plugins = facts.plugins;
     let summary = RunSummary::new(facts, &outcome, &tally);
-    // Before any other step that can fail: the recording cannot be repeated.
+    // Before all other steps that can fail: the recording cannot be repeated.
     let recorded = recording.finish(&notes(&outcome, &summary)).map_err(Into::into);
     let drawn = match (&arguments.plot, plot) {
         (Some(path), Some(plot)) => std::fs::write(path, plot.into_svg(&summary.one_line(), &outcome.timing))
@@ -221,7 +221,7 @@ fn report(
     outcome.later_warnings().iter().for_each(note);
     latch.and_then(|latch| stop_note(outcome.end, latch)).into_iter().for_each(note);
     let verdict = verdict(&outcome, plugins, &summary);
-    // Last, because the code of a plugin may hang, or end the process.
+    // Last, because plugin code may hang or end the process.
     let Outcome { unresponsive, unfreed_plugins, .. } = outcome;
     let freed = unfreed_plugins.free();
     let freed = unresponsive.map_or(freed, Err).map_err(|hung| CommandError::PluginRefused(hung.to_string()));
@@ -250,7 +250,8 @@ fn notes(outcome: &Outcome, summary: &RunSummary) -> Vec<Note> {
     notes
 }
 
-/// Describes the reach of an emergency stop of this run, or the source of another run's.
+/// Describes the effect of this run's emergency stop on other runs, or the source of the emergency stop of another run; `None`
+/// without an emergency stop.
 fn stop_note(end: RunEnd, latch: &LatchGuard) -> Option<String> {
     match end {
         RunEnd::EmergencyStop(EmergencySource::Latch) => latch.check().err().map(|error| error.to_string()),
@@ -275,7 +276,8 @@ fn verdict(outcome: &Outcome, plugins: &[PluginReport], summary: &RunSummary) ->
 /// Largest number of open files of a run in real time, with a margin: plugins, recording, socket, sixteen clients.
 const OPEN_FILES: u64 = 64;
 
-/// Checks the limit of open files: without descriptors a run lacks signal handlers, recording or socket, while a hand is at the device.
+/// Checks the limit on open files: a run that cannot open more files lacks signal handlers, recording or socket while a hand is on
+/// the device.
 fn enough_files() -> Result<(), CommandError> {
     match most_open_files() {
         Some(most) if most < OPEN_FILES => Err(CommandError::Usage(format!(
@@ -327,7 +329,7 @@ fn peer_links(session: &mut Session, clock: Clock) -> Result<Vec<(String, PeerLi
     lines.into_iter().map(link).collect()
 }
 
-/// Describes the end of a run, for its clients.
+/// Describes the end of a run for its clients.
 fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
     match outcome.end {
         RunEnd::DeviceFault(fault) => {
@@ -338,10 +340,10 @@ fn end_words(outcome: &Outcome, rate_hz: f64) -> String {
     }
 }
 
-/// Returns the error of a broken plugin for the exit code: a model that failed, or a device that changed the floating-point
-/// environment.
+/// Returns an error for the first broken plugin, which sets the exit code: a model that failed, or a device that changed the
+/// floating-point environment.
 fn broken_plugins(outcome: &Outcome, summary: &RunSummary) -> Result<(), CommandError> {
-    // The devices come first. A failed one has ended the run; tolerated faults of its samples are in the summary.
+    // Devices come first. A failed device has ended the run; tolerated faults of its samples are in the summary.
     let is_borne =
         |number: usize| outcome.devices.get(number).is_some_and(|device| device.float_changes == 0);
     let mut plugins = summary.plugins.iter().enumerate();
@@ -355,14 +357,14 @@ fn broken_plugins(outcome: &Outcome, summary: &RunSummary) -> Result<(), Command
     })
 }
 
-/// Observers of every tick of a run.
+/// Observers of a run: measurements, plot and progress line.
 struct Watchers {
     measured: Measurements,
     plot: Option<RunPicture>,
     progress: ProgressBar,
 }
 
-/// Interval between updates of the progress line, ticks; at 1 kHz thirty updates a second.
+/// Interval between updates of the progress line, ticks: thirty updates per second at 1 kHz.
 const PROGRESS_TICKS: u64 = 33;
 
 impl Watchers {
@@ -412,7 +414,7 @@ impl Observer for Watchers {
     }
 }
 
-/// Formats the height of the handle as a bar, and the force on the hand.
+/// Formats the height of the handle, as a bar and in mm, and the vertical force on the hand, N.
 fn live_line(record: &TickRecord) -> String {
     const COLUMNS: usize = 21;
     let z_mm = record.pose.position().z * 1.0e3;

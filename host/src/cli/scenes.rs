@@ -21,7 +21,7 @@ pub(crate) struct ScenesArguments {
     json: JsonOption,
 }
 
-/// Row of the list.
+/// Row of the list of scenes.
 #[derive(Serialize)]
 struct Listed {
     name: &'static str,
@@ -75,7 +75,7 @@ impl Listed {
     }
 }
 
-/// Returns the names in their order, without repetitions.
+/// Returns the names in the given order, without repetitions.
 fn each_once(names: impl Iterator<Item = String>) -> Vec<String> {
     let mut seen = BTreeSet::new();
     names.filter(|name| seen.insert(name.clone())).collect()

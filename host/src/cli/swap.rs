@@ -9,9 +9,9 @@ use flotor_session::scene::is_named;
 use std::path::MAIN_SEPARATOR;
 use std::time::{Duration, Instant};
 
-/// Timeout of the host for creating the model.
+/// Timeout for the host's reply, which follows the creation of the model.
 const CREATION_LIMIT: Duration = Duration::from_secs(60);
-/// Timeout of the loop for swapping the model and reporting the swap.
+/// Timeout for the loop's report of the swap, after the host's reply.
 const SWAP_LIMIT: Duration = Duration::from_secs(5);
 
 /// Hot-swap a model of a running session, without a jump in the force.
@@ -66,7 +66,7 @@ pub(crate) fn run(arguments: &SwapArguments) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Converts the name of a plugin for the host, which may run in another folder: a file to its absolute path.
+/// Converts a plugin's path to an absolute path for the host, which may have another working directory; an id stays unchanged.
 fn for_host(plugin: &str) -> Result<String, CommandError> {
     if !plugin.contains(MAIN_SEPARATOR) {
         return Ok(plugin.to_owned());
@@ -78,7 +78,7 @@ fn for_host(plugin: &str) -> Result<String, CommandError> {
     })
 }
 
-/// Requests the swap and waits for its result: the change in the loop, or `None` if the loop does not report it in time.
+/// Requests the swap and waits for its result: the change that the loop reports, or `None` if the loop does not report it in time.
 fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMessage>, CommandError> {
     let lost = |error: LiveError| CommandError::Failed(error.to_string());
     let asked = client.request_client().ask(ask).map_err(lost)?;

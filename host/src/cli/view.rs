@@ -146,7 +146,8 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
     }
 }
 
-/// Shows a remote session: the bridge republishes it here for the viewer, and reports loss and reconnection on the terminal.
+/// Shows a remote session: the bridge republishes the session on this machine for the viewer, and reports loss of the connection and
+/// reconnection on the terminal.
 fn view_remote(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result<(), CommandError> {
     let (mut viewer, mut bridge) = (SeparateProgram::VIEWER.command()?, BRIDGE.command()?);
     let cannot = |program: &str, cause| CommandError::file(program.as_ref(), "cannot be started", cause);
@@ -163,7 +164,7 @@ fn view_remote(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result
     std::process::exit(shown.code().unwrap_or(1));
 }
 
-/// Returns the first option that requires a recording.
+/// Returns a description of the first given option that requires a recording; `None` without such an option.
 fn of_recordings_only(arguments: &ViewArguments) -> Option<&'static str> {
     let all = [
         (arguments.screenshot.is_some(), "a picture of a moment"),
@@ -175,7 +176,7 @@ fn of_recordings_only(arguments: &ViewArguments) -> Option<&'static str> {
     all.into_iter().find_map(|(is_wanted, what)| is_wanted.then_some(what))
 }
 
-/// Prints a note on a damaged recording, because neither a picture nor a file of traces shows the damage.
+/// Prints a note if the recording is damaged, because neither a picture nor a file of traces shows the damage.
 fn tell_damage(file: &Path, mut recording: Recording, what: &str) {
     let broken = recording.by_ref().find_map(Result::err);
     let damage = match (broken, recording.ending()) {
@@ -186,7 +187,7 @@ fn tell_damage(file: &Path, mut recording: Recording, what: &str) {
     note(format_args!("{damage}; {what} the readable part"));
 }
 
-/// Returns the files of the recording's plugins that were found; the viewer reports the missing ones.
+/// Returns the files of the recording's plugins that are installed; the viewer reports the missing plugins.
 fn plugin_files(recording: &Recording, registry: &Registry) -> Vec<PathBuf> {
     let plugins = recording.run().plugins.iter();
     let found = plugins.filter_map(|plugin| registry.found().iter().find(|known| known.id == plugin.id));

@@ -26,7 +26,7 @@ pub(super) struct WorkerArguments {
 }
 
 pub(super) fn run(arguments: WorkerArguments) -> Result<(), CommandError> {
-    // Signals end a worker like any process; those of a terminal do not reach its separate process group.
+    // Signals end a worker like any process; the signals of a terminal do not reach its separate process group.
     let WorkerArguments { plugin, host, period_ns, seed, sets } = arguments;
     process::serve(&process::WorkerArguments { plugin, host, period_ns, seed, sets }, load_file)
         .map_err(|error| CommandError::Usage(format!("`flotor worker` is started by `flotor run`: {error}")))

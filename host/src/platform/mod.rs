@@ -1,8 +1,8 @@
 //! Platform layer of the `flotor` command. Each system has one module with the same items:
-//! - `doctor`, `usb`: diagnosis of the system and of USB devices;
-//! - `lend`: programs of other makers;
-//! - `most_open_files`, `end_with_parent`: the process;
-//! - `C_COMPILER`, `canonical`: command that builds a plugin in C, if other than `cc`, and a path in cargo's form.
+//! - `doctor`, `usb`: diagnosis of the operating system and of USB devices;
+//! - `lend`: the command `flotor lend`;
+//! - `most_open_files`, `end_with_parent`: limit on open files, and end of the process with its parent;
+//! - `C_COMPILER`, `canonical`: command that builds a plugin in C, if other than `cc`, and absolute paths in a form for cargo.
 
 #[cfg(not(windows))]
 mod linux;

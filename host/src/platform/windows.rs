@@ -1,4 +1,4 @@
-//! Windows: neither programs of other makers nor diagnosis of USB devices yet.
+//! Windows: `flotor lend` and the diagnosis of USB devices are not supported yet.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 pub(crate) const C_COMPILER: Option<&str> =
     Some("gcc -std=c11 -O2 -Wall -Wextra -shared -o your_name.dll plugin.c");
 
-/// Returns an absolute path without links, in the form for people and cargo: without the prefix that the system puts before it, and with
-/// slashes, because backslashes are escapes in a manifest. Not real-time.
+/// Returns an absolute path without links, in a form for users and cargo: without the prefix `\\?\` of the system, and with slashes,
+/// because backslashes are escapes in a manifest. Not real-time.
 ///
 /// # Errors
 /// Errors of the system.
@@ -22,21 +22,21 @@ pub(crate) fn canonical(path: &Path) -> io::Result<PathBuf> {
     Ok(PathBuf::from(text.replace('\\', "/")))
 }
 
-/// Returns the largest number of open files of this process: unlimited.
+/// Returns the limit on the number of open files of this process: `None`, unlimited.
 pub(crate) fn most_open_files() -> Option<u64> {
     None
 }
 
-/// Does nothing: only `flotor lend` starts processes that end with their parent.
+/// Does nothing: only `flotor lend`, which is not supported on Windows, needs it.
 pub(crate) fn end_with_parent() {}
 
 pub(crate) mod doctor {
-    //! Findings of `flotor doctor` about the system.
+    //! Findings of `flotor doctor` about the operating system.
 
     use crate::diagnosis::Diagnosis;
     use std::path::Path;
 
-    /// Returns the remedy for missing priority.
+    /// Returns the remedy for missing real-time priority.
     pub(crate) fn priority_remedy(_: &Path) -> String {
         "start the program with normal priority".to_owned()
     }
@@ -61,13 +61,13 @@ pub(crate) mod doctor {
 }
 
 pub(crate) mod usb {
-    //! USB connection of a device.
+    //! Diagnosis of a device's USB connection, not supported yet.
 
     use crate::diagnosis::Diagnosis;
     use flotor_hal::UsbKind;
     use std::path::Path;
 
-    /// Placeholder for the files of a machine, which are not read yet.
+    /// Placeholder: no files of the machine are read yet.
     pub(crate) struct Machine;
 
     impl Machine {
@@ -113,7 +113,7 @@ pub(crate) mod lend {
     }
 
     pub(crate) mod guard {
-        //! The guard of a program of `flotor lend`.
+        //! Guard process of `flotor lend`, which does nothing on Windows.
 
         use flotor_command::CommandError;
 

@@ -1,33 +1,33 @@
-//! Source of the crate `flotor-hal` for a new plugin: the registry, the sources of the running program, or a copy.
+//! Source of the crate `flotor-hal` for a new plugin: the registry, the sources of this installation, or a copy.
 
 use super::error::ScaffoldError;
 use super::vendor::{write_copy, write_file};
 use crate::platform::canonical;
 use std::path::{Path, PathBuf};
 
-/// Folder of the contract when this program was built.
+/// Folder of the contract's sources when this program was built.
 const BUILT_FROM: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../hal");
-/// Folder of the contract in an installation, below its prefix.
+/// Folder of the contract's sources in an installation, relative to its prefix.
 const INSTALLED: &str = "share/flotor/hal";
-/// Folder of a copy, in the folder of the plugin.
+/// Folder of the copied sources, relative to the folder of the plugin.
 const COPY: &str = "flotor-hal";
-/// Configuration of cargo for one machine, with the replacement for the registry; git ignores it.
+/// Cargo configuration for one machine, which replaces the registry's crate by a folder; git ignores the file.
 const CONFIG: &str = ".cargo/config.toml";
 
 /// Source of the contract's crate.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Contract {
-    /// This version from the registry.
+    /// Crate of this version in the registry.
     Published,
-    /// A folder of this machine in place of the registry.
+    /// Folder on this machine, in place of the registry.
     Patched(ContractFolder),
-    /// A copy in the plugin's folder.
+    /// Copy in the plugin's folder, of the sources in this folder.
     Vendored(ContractFolder),
 }
 
 impl Contract {
-    /// Selects the sources of this installation, in place of the registry; or the registry, if the installation has none and the user
-    /// names none. Not real-time.
+    /// Selects the sources in the folder `named`, or else of this installation, in place of the registry; the registry if neither is
+    /// given. Not real-time.
     ///
     /// # Errors
     /// [`ScaffoldError::NoContract`] if the named folder does not contain the contract.
@@ -39,10 +39,10 @@ impl Contract {
         }
     }
 
-    /// Selects a copy for the plugin. Not real-time.
+    /// Selects a copy of the sources in the folder `named`, or else of this installation. Not real-time.
     ///
     /// # Errors
-    /// [`ScaffoldError::NoContract`] if there are no sources.
+    /// [`ScaffoldError::NoContract`] if the sources are not found.
     pub fn copied(named: Option<&Path>) -> Result<Self, ScaffoldError> {
         ContractFolder::found(named).map(Self::Vendored)
     }
@@ -56,7 +56,8 @@ impl Contract {
         }
     }
 
-    /// Returns the options of `cargo build` on a forge, where an archive of Flotor is unpacked in `flotor/`.
+    /// Returns the additional option of `cargo build` on a forge, where an archive of Flotor is unpacked in `flotor/`; empty if none
+    /// is needed.
     pub(super) fn option_on_a_forge(&self) -> &'static str {
         match self {
             Self::Patched(_) => r#" --config "patch.crates-io.flotor-hal.path='flotor/share/flotor/hal'""#,
@@ -64,7 +65,7 @@ impl Contract {
         }
     }
 
-    /// Writes the files that a crate needs beside its manifest; returns their paths.
+    /// Writes the configuration or copy of the contract, and the lock file, into the folder of the plugin; returns the paths to list.
     pub(super) fn write_beside(&self, plugin: &Path) -> Result<Vec<String>, ScaffoldError> {
         match self {
             Self::Published => Ok(Vec::new()),
@@ -94,13 +95,13 @@ impl Contract {
     }
 }
 
-/// Folder of `flotor-hal`: manifest, sources and C header.
+/// Folder with the sources of `flotor-hal`: manifest, code and C header.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ContractFolder(PathBuf);
 
 impl ContractFolder {
-    /// Finds the folder: the one that the user names; else `hal/` or that of an installation in a folder above the program; else the one
-    /// at build time.
+    /// Finds the sources: in the folder that the user names; else in `hal/` or `share/flotor/hal/` of a folder above the program;
+    /// else in their folder at build time.
     fn found(named: Option<&Path>) -> Result<Self, ScaffoldError> {
         let own = std::env::current_exe().unwrap_or_default();
         let above = own.ancestors().skip(1).flat_map(|folder| [folder.join("hal"), folder.join(INSTALLED)]);
@@ -118,15 +119,15 @@ impl ContractFolder {
         })
     }
 
-    /// Returns the path as text, for cargo.
+    /// Returns the path as text for cargo's configuration.
     fn as_text(&self) -> Result<&str, ScaffoldError> {
         // Quotes and backslashes would end the string in cargo's configuration.
         let text = self.0.to_str().filter(|text| !text.contains(['"', '\\', '\n']));
         text.ok_or_else(|| ScaffoldError::NotText(self.0.clone()))
     }
 
-    /// Copies the lock file of the contract's package or workspace, so that a plugin builds with the versions that are already
-    /// there.
+    /// Copies the lock file of the contract's package or workspace to the plugin, so that the plugin builds with the same locked
+    /// versions of dependencies. Does nothing if there is no lock file.
     fn copy_lock_file(&self, plugin: &Path) -> Result<(), ScaffoldError> {
         let places = [Some(self.0.as_path()), self.0.parent()].into_iter().flatten();
         let lock = places
@@ -136,7 +137,7 @@ impl ContractFolder {
     }
 }
 
-/// Resolves `..` in a path, for people.
+/// Resolves `..` in a path for an error message, without access to the file system.
 fn plain(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for part in path.components() {

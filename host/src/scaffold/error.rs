@@ -3,14 +3,14 @@
 use super::name::NameError;
 use std::path::PathBuf;
 
-/// Reason why no plugin was created.
+/// Reason why a plugin was not created.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ScaffoldError {
-    /// The name cannot be used.
+    /// The name is not valid.
     #[error(transparent)]
     Name(#[from] NameError),
-    /// The plugin's type would have the name of a type that the template uses.
+    /// The plugin's type would have the name of a type of the contract that the template uses.
     #[error("type `{type_name}` of plugin `{id}` clashes with a type of the contract; use `my-{id}`")]
     Clash {
         /// Id of the plugin.
@@ -21,14 +21,14 @@ pub enum ScaffoldError {
     /// A file or folder of this name exists.
     #[error("{} exists; move it or choose another name", .0.display())]
     Exists(PathBuf),
-    /// The folder belongs to a cargo workspace that includes every folder in it as a member.
+    /// The folder belongs to Flotor's own workspace, which would include the plugin as a member.
     #[error(
         "{} belongs to Flotor's own workspace, whose plugins use `flotor-hal.workspace = true` (see \
          ARCHITECTURE.md, Adding a plugin); change to a folder outside it",
         .0.display()
     )]
     InsideWorkspace(PathBuf),
-    /// The contract's sources were not found.
+    /// The contract's sources were not found; the path is the last folder searched.
     #[error(
         "the sources of the contract (`hal/`, `share/flotor/hal/`) are neither in a folder above this program nor at {}; give \
          their folder with --hal PATH",
@@ -40,10 +40,10 @@ pub enum ScaffoldError {
     Manifest {
         /// Path of the manifest.
         path: PathBuf,
-        /// Reason, for people.
+        /// Reason as text.
         reason: String,
     },
-    /// A path that cannot be written into a manifest.
+    /// A path is not valid UTF-8, or has characters that cargo's configuration cannot hold.
     #[error("{}: the path is not valid UTF-8, or has quotes or backslashes; use another folder", .0.display())]
     NotText(PathBuf),
     /// A file cannot be read.

@@ -1,9 +1,9 @@
 //! `flotor new`: a new plugin crate that builds, validates and runs unchanged.
 //!
-//! The templates are whole files that compile once `your-name` (the id), `your_name` (in symbols), `YourName` (the
-//! type), `Your name` (for people) and placeholders for language and place are replaced. A new crate builds in any
-//! folder and on any machine: it depends on a version of the contract, it has a workspace of its own, and settings of this machine
-//! are in a file that git ignores. A plugin in C has a copy of the header.
+//! The templates are whole files that compile once `your-name` (the id), `your_name` (in symbols), `YourName` (the type), `Your name`
+//! (for users) and the placeholders for build commands and paths are replaced. A new crate builds in any folder and on any machine:
+//! it depends on a version of the contract, it has a workspace of its own, and the settings for this machine are in a file that git
+//! ignores. A plugin in C has a copy of the header.
 
 mod contract;
 mod error;
@@ -29,23 +29,24 @@ pub enum Language {
     C,
 }
 
-/// Created plugin.
+/// Folder of a created plugin, with the paths of its files and the build command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Scaffold {
-    /// Path of its folder.
+    /// Path of the folder.
     pub folder: PathBuf,
-    /// Paths of its files, relative to the folder; the first is the one to edit.
+    /// Paths of the files, relative to the folder; the first file is the one to edit.
     pub files: Vec<String>,
-    /// Command that builds it, in its folder.
+    /// Command that builds the plugin, to be run in the folder.
     pub build: String,
     /// Path of the built library, relative to the folder.
     pub library: String,
 }
 
-/// Creates the plugin `parent/NAME`. Not real-time.
+/// Creates the plugin `parent/NAME` from the templates for its kind and language. Not real-time.
 ///
 /// # Errors
-/// If the name clashes, the folder exists (which is not changed), or a file cannot be read or written.
+/// If the name clashes with a type of the template, the folder exists (it is not changed) or belongs to Flotor's workspace, or a file
+/// cannot be read or written.
 pub fn scaffold(
     parent: &Path,
     name: &PluginName,
@@ -80,7 +81,7 @@ pub fn scaffold(
     })
 }
 
-/// Returns the files of a plugin: path and template, the one to edit first.
+/// Returns path and template of each file of a plugin; the file to edit comes first.
 fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'static str)] {
     const IGNORE: (&str, &str) = (".gitignore", "/target\n/ANY_LIBRARY\n/.cargo/config.toml\n");
     const HEADER: (&str, &str) = ("flotor.h", C_HEADER);
@@ -121,7 +122,7 @@ struct Placeholders([(&'static str, String); 9]);
 
 impl Placeholders {
     fn new(name: &PluginName, language: Language, contract: &Contract) -> Self {
-        // A forge runs Linux.
+        // Workflows of a forge run on Linux.
         let cc = "cc -std=c11 -O2 -Wall -Wextra -shared -fPIC -o libyour_name.so plugin.c -lm";
         let cargo = "cargo build --release";
         let (build, on_a_forge, built_in) = match language {
@@ -145,7 +146,7 @@ impl Placeholders {
         self.0.iter().fold(template.to_owned(), |text, (placeholder, value)| text.replace(placeholder, value))
     }
 
-    /// Returns true if the Rust template uses a type that the plugin's own type would hide.
+    /// Returns true if the Rust template uses a type with the name of the plugin's own type, which would hide it.
     fn clashes_with(&self, template: &str) -> bool {
         let [_, _, _, _, _, _, (_, type_name), ..] = &self.0;
         let code = template.lines().filter(|line| !line.trim_start().starts_with("//"));

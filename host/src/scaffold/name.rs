@@ -1,4 +1,4 @@
-//! Name of a new plugin: checked once, then converted to the forms for crate, type and people.
+//! Name of a new plugin: checked once, then converted to id, symbol, type name and title.
 
 /// Names reserved by cargo or the compiler (Rust reference, "Keywords"; `cargo new` rejects the rest).
 const TAKEN: [&str; 47] = [
@@ -7,12 +7,12 @@ const TAKEN: [&str; 47] = [
     "macro", "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self", "static",
     "struct", "super", "trait", "true", "try", "type", "unsafe", "use", "where", "while",
 ];
-/// Crates of every build, and folders that cargo creates beside a crate.
+/// Names of crates in every build, and of folders that cargo creates.
 const CRATES: [&str; 7] = ["alloc", "core", "proc-macro", "std", "test", "build", "deps"];
-/// Largest length of a name: longer ones make lists unreadable.
+/// Largest length of a name, characters: longer names make lists unreadable.
 const LONGEST: usize = 32;
 
-/// Valid name of a folder, a crate, a type and an id.
+/// Valid name of a plugin, from which folder, crate, type and id are named.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PluginName(String);
 
@@ -20,14 +20,14 @@ pub struct PluginName(String);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NameError {
-    /// The name has characters that a crate's name cannot have, or has them in wrong positions.
+    /// The name is too long, or has characters that are not allowed there.
     #[error("invalid plugin name `{name}`: use lower-case letters, digits and single hyphens between \
         them, a letter first, at most {LONGEST} characters{}",
         nearest.as_ref().map_or(String::new(), |nearest| format!("; use `{nearest}`")))]
     Form {
         /// Given name.
         name: String,
-        /// Valid name with the same letters, if there is one.
+        /// Valid name with the same letters and digits; `None` if there is none.
         nearest: Option<String>,
     },
     /// The name is reserved.
@@ -41,7 +41,7 @@ pub enum NameError {
 }
 
 impl PluginName {
-    /// Checks a name. Not real-time.
+    /// Checks a name and creates the plugin name. Not real-time.
     ///
     /// # Errors
     /// [`NameError`] with a suggestion.
@@ -59,13 +59,13 @@ impl PluginName {
         }
     }
 
-    /// Returns the id in scenes, folder and crate: `soft-wall`.
+    /// Returns the id, also the name of folder and crate: `soft-wall`.
     #[must_use]
     pub fn id(&self) -> &str {
         &self.0
     }
 
-    /// Returns the name in files and symbols: `soft_wall`.
+    /// Returns the name in library files and symbols: `soft_wall`.
     #[must_use]
     pub fn symbol(&self) -> String {
         self.0.replace('-', "_")
@@ -77,7 +77,7 @@ impl PluginName {
         self.0.split('-').map(capitalised).collect()
     }
 
-    /// Returns the name for people: `Soft wall`.
+    /// Returns the title for users: `Soft wall`.
     #[must_use]
     pub fn title(&self) -> String {
         capitalised(&self.0.replace('-', " "))
@@ -90,7 +90,8 @@ fn well_formed(name: &str) -> bool {
     characters && hyphens && name.starts_with(|c: char| c.is_ascii_lowercase()) && name.len() <= LONGEST
 }
 
-/// Returns the letters and digits of a name, in lower case, with one hyphen in place of other characters.
+/// Returns the letters and digits of a name in lower case, with single hyphens in place of other characters and before capital
+/// letters.
 fn tidied(name: &str) -> String {
     let mut words: Vec<String> = vec![String::new()];
     let mut after_lower = false;

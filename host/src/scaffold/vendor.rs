@@ -1,4 +1,4 @@
-//! Copy of the contract's sources that builds without their workspace.
+//! Copy of the contract's sources that builds outside their workspace.
 
 use super::error::ScaffoldError;
 use std::fs::File;
@@ -6,10 +6,10 @@ use std::io::Write;
 use std::path::Path;
 use toml::{Table, Value};
 
-/// Files and folders of the contract that a build needs, and its licences.
+/// Files and folders of the contract that a build needs, with the licences.
 const COPIED: [&str; 5] = ["src", "include", "README.md", "LICENSE-MIT", "LICENSE-APACHE"];
 
-/// Writes a copy of the contract in `from` to the new folder `to`.
+/// Copies the contract's sources in `from` to the new folder `to`, with a manifest that needs no workspace.
 ///
 /// # Errors
 /// If a file cannot be read or written, or the manifest cannot be converted.
@@ -25,7 +25,7 @@ pub(super) fn write_copy(from: &Path, to: &Path) -> Result<(), ScaffoldError> {
         .try_for_each(|name| copy(&from.join(name), &to.join(name)))
 }
 
-/// Writes a new file, and creates the folders above it.
+/// Writes a new file and creates its parent folders; an existing file is an error.
 pub(super) fn write_file(path: &Path, text: &str) -> Result<(), ScaffoldError> {
     let above = path.parent().map_or(Ok(()), std::fs::create_dir_all);
     let written =
@@ -49,7 +49,7 @@ fn copy(from: &Path, to: &Path) -> Result<(), ScaffoldError> {
     Ok(())
 }
 
-/// Replaces references of a manifest to its workspace by their values.
+/// Replaces the `workspace = true` references of a manifest by the values in the workspace's manifest.
 fn standalone(manifest: &str, workspace: &str) -> Result<String, String> {
     let parsed = |text: &str| text.parse::<Table>().map_err(|error| error.to_string());
     let (mut manifest, workspace) = (parsed(manifest)?, parsed(workspace)?);
@@ -61,7 +61,7 @@ fn standalone(manifest: &str, workspace: &str) -> Result<String, String> {
         let Some(entries) = manifest.get_mut(section).and_then(Value::as_table_mut) else { continue };
         write_out(entries, shared(section))?;
     }
-    // Dependencies of single systems.
+    // Dependencies for single platforms.
     let systems = manifest.get_mut("target").and_then(Value::as_table_mut).into_iter().flatten();
     for (_, system) in systems {
         let Some(entries) = system.get_mut("dependencies").and_then(Value::as_table_mut) else { continue };
@@ -70,7 +70,7 @@ fn standalone(manifest: &str, workspace: &str) -> Result<String, String> {
     Ok(manifest.to_string())
 }
 
-/// Replaces entries that refer to their workspace by its entries.
+/// Replaces the entries that refer to the workspace by the entries of the workspace.
 fn write_out(entries: &mut Table, shared: Option<&Table>) -> Result<(), String> {
     for (name, value) in entries {
         let Some(own) = value.as_table_mut().filter(|own| own.contains_key("workspace")) else {
@@ -84,7 +84,7 @@ fn write_out(entries: &mut Table, shared: Option<&Table>) -> Result<(), String> 
     Ok(())
 }
 
-/// Merges an entry of the workspace with the additions of a member; features are united.
+/// Merges an entry of the workspace with the additions of a member; feature lists are concatenated.
 fn with(theirs: &Value, mut own: Table) -> Value {
     if own.is_empty() {
         return theirs.clone();

@@ -4,18 +4,19 @@ use flotor_servo::THREAD_ADVICE;
 use std::fmt;
 use std::time::Duration;
 
-/// Environment variable with the time limit of a call before a run, in seconds.
+/// Environment variable with the time limit of a call before a run, s; 60 by default.
 pub const LIMIT_VARIABLE: &str = "FLOTOR_CALL_LIMIT_S";
 
-/// Environment variable with the processor time limit of a step without a clock (virtual clock, `validate`, `stress`), in seconds.
+/// Environment variable with the limit on the processor time of a step on the virtual clock, in `validate` and in `stress`, s; 1 by
+/// default.
 pub const STEP_LIMIT_VARIABLE: &str = "FLOTOR_STEP_LIMIT_S";
 
-/// Default time limit of a call before a run, or for a replacement during one: large models compute tables.
+/// Default time limit of a call before a run, or for a replacement during a run: large models compute tables.
 const DEFAULT_LIMIT: Duration = Duration::from_secs(60);
-/// Time limit of a call after a run: the device is stopped, and nothing depends on the call.
+/// Time limit of a call after a run: short, because the devices are stopped and nothing depends on the call.
 const END_LIMIT: Duration = Duration::from_secs(5);
 
-/// Plugin call outside the loop.
+/// Plugin call outside the loop, for time limits and messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Call {
@@ -58,14 +59,14 @@ impl fmt::Display for Call {
     }
 }
 
-/// Call that did not return in time: its thread is abandoned, and the process should end soon.
+/// Error: a plugin call did not return in time. Its thread is abandoned, and the process should end soon.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{who}` did not return from {call} within {} s, the time limit; check the plugin, or raise the limit with `{LIMIT_VARIABLE}`",
     limit.as_secs_f64()
 )]
 pub struct Unresponsive {
-    /// Name in the scene, or path of the file.
+    /// Name of the device or model in the scene, or path of the plugin file.
     pub who: String,
     /// Call that did not return.
     pub call: Call,
@@ -79,26 +80,26 @@ pub enum CallError {
     /// The call did not return in time.
     #[error(transparent)]
     Unresponsive(#[from] Unresponsive),
-    /// The system has no thread for the call.
+    /// The system cannot start a thread for the call.
     #[error("cannot start a thread for the calls of a plugin; {THREAD_ADVICE}")]
     NoThread,
-    /// The run was stopped or over before the call returned.
+    /// A stop was requested, or the run ended, before the call returned.
     #[error("the run was stopped before `create`, `open` or another call returned; start the run again")]
     Stopped,
 }
 
-/// Returns the time limit of a call before a run.
+/// Returns the time limit of a call before a run: the value of [`LIMIT_VARIABLE`], or the default.
 pub(crate) fn limit() -> Duration {
     limit_of(LIMIT_VARIABLE).unwrap_or(DEFAULT_LIMIT)
 }
 
-/// Reads a time limit from the environment.
+/// Reads a time limit, s, from an environment variable; `None` if it is unset or not a positive number.
 pub(crate) fn limit_of(variable: &str) -> Option<Duration> {
     let seconds = std::env::var(variable).ok()?.parse::<f64>().ok().filter(|seconds| *seconds > 0.0)?;
     Duration::try_from_secs_f64(seconds).ok()
 }
 
-/// Returns the time limit of a call after a run: at most the one before a run.
+/// Returns the time limit of a call after a run: 5 s, or the limit before a run if that is shorter.
 pub(crate) fn end_limit() -> Duration {
     END_LIMIT.min(limit())
 }

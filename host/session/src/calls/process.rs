@@ -1,4 +1,4 @@
-//! State of the process that all plugin calls share, and notices about it.
+//! Process-wide state of plugin calls, and notices for the user.
 
 use super::call::Call;
 use crate::platform::MachineState;
@@ -10,29 +10,29 @@ use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Notice for the user.
+/// Notice for the user about plugin calls and the watchdog process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Notice {
-    /// A call takes long.
+    /// A plugin call has not returned after 5 s, or after half its time limit if that is shorter.
     Waiting {
-        /// Name in the scene, or path of the file.
+        /// Name of the device or model in the scene, or path of the plugin file.
         who: String,
         /// Call in progress.
         call: Call,
         /// Time limit of the call.
         limit: Duration,
     },
-    /// A plugin changed the state of the process.
+    /// A plugin changed the state of the process during a call.
     Changed {
-        /// Name in the scene.
+        /// Name of the device or model in the scene.
         who: String,
-        /// Changed parts, restored by the host.
+        /// Names of the changed parts, which the host has restored.
         restored: Vec<&'static str>,
-        /// Changed environment variables, which stay: other threads may read them at any time.
+        /// Names of changed environment variables, which the host does not restore: other threads may read them at any time.
         variables: Vec<String>,
     },
-    /// The watchdog process has ended, and the run continues.
+    /// The watchdog process has ended and the run continues without it.
     Unguarded,
 }
 
@@ -67,7 +67,7 @@ impl fmt::Display for Notice {
 /// Shared state of the plugin calls of this process.
 struct ProcessCalls {
     on_notice: OnceLock<fn(&Notice)>,
-    /// Switch that stops waiting for a call before a run.
+    /// Switch whose stop request ends the wait for a call before a run.
     stop: OnceLock<StopSwitch>,
     /// True once a thread with plugin code was abandoned.
     has_abandoned: AtomicBool,
@@ -76,8 +76,8 @@ struct ProcessCalls {
 static CALLS: ProcessCalls =
     ProcessCalls { on_notice: OnceLock::new(), stop: OnceLock::new(), has_abandoned: AtomicBool::new(false) };
 
-/// Sets the callback for notices: calls that take 5 s or more, changes of the process by plugins, and the end of a watchdog
-/// process. Only the first callback counts.
+/// Sets the callback for notices: slow calls, changes of the process by plugins, and the end of the watchdog process. Only the first
+/// call has an effect.
 pub fn on_notice(notify: fn(&Notice)) {
     let _ = CALLS.on_notice.set(notify);
 }
@@ -88,17 +88,18 @@ pub(crate) fn notify(notice: &Notice) {
     }
 }
 
-/// Sets the switch that stops waiting for a call before a run, when nothing is energised. Only the first switch counts.
+/// Sets the switch whose stop request ends the wait for a plugin call before a run, when nothing is energised. Only the first call
+/// has an effect.
 pub fn stop_waits_with(stop: &StopSwitch) {
     let _ = CALLS.stop.set(stop.clone());
 }
 
-/// Returns true unless a stop was requested.
+/// Returns true unless a stop or an emergency stop was requested.
 pub(crate) fn is_to_begin() -> bool {
     CALLS.stop.get().is_none_or(|stop| !stop.is_stop_requested() && stop.emergency().is_none())
 }
 
-/// Returns true if a call did not return and its thread still runs: exit handlers of the process may wait for that thread.
+/// Returns true if a thread was abandoned in plugin code: exit handlers of the process may wait for that thread for ever.
 #[must_use]
 pub fn is_abandoned() -> bool {
     CALLS.has_abandoned.load(Ordering::Relaxed)
@@ -109,7 +110,7 @@ pub(crate) fn abandon() {
     CALLS.has_abandoned.store(true, Ordering::Relaxed);
 }
 
-/// Runs plugin code, `make`, and restores the state of the process afterwards.
+/// Runs `make`, which calls plugin code, then restores the changed state of the process and notifies the user of the changes.
 pub(crate) fn keeping_machine<T>(who: &str, make: impl FnOnce() -> T) -> T {
     let (before, variables) = (MachineState::now(), environment());
     let made = make();

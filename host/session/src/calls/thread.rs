@@ -9,13 +9,13 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-/// Delay before a "still waiting" notice, at most half of the limit.
+/// Delay before a [`Notice::Waiting`]; half of the time limit if that is shorter.
 const NOTIFY_AFTER: Duration = Duration::from_secs(5);
 /// Poll interval while waiting for a call.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
-/// Memory reserved for the end of a run, bytes: last messages, summary, index of the recording.
+/// Memory reserved for the end of a run, bytes: for last messages, summary, and index of the recording.
 const RESERVE_BYTES: usize = 1 << 20;
-/// Size of one block, bytes: small enough to come from the heap, to which a freed block returns.
+/// Size of one reserved block, bytes: small enough that the allocator takes it from the heap and returns it there when freed.
 const BLOCK_BYTES: usize = 1 << 16;
 
 /// Progress of a call thread. Clones share their state.
@@ -45,7 +45,7 @@ impl Progress {
         exit_call();
     }
 
-    /// Sends a notice about a call that takes long; returns an error for a call beyond the limit.
+    /// Sends one notice about a slow call; once the call exceeds `limit`, marks its thread as abandoned and returns an error.
     pub(crate) fn check(&self, limit: Duration) -> Result<(), Unresponsive> {
         let mut now = lock(&self.now);
         let Some(Now { who, call, since, is_reported }) = &mut *now else { return Ok(()) };
@@ -64,8 +64,8 @@ impl Progress {
 
 type Job = Box<dyn FnOnce() + Send>;
 
-/// Thread for plugin calls, started by the first call. A call that does not return occupies the thread, and
-/// the next one starts a new thread. The thread ends when the handle is dropped, after the calls that have begun.
+/// Thread for plugin calls, started by the first call. A call that does not return occupies the thread, and the next call starts a
+/// new thread. The thread ends when the handle is dropped, after the calls in progress have returned.
 #[derive(Default)]
 pub(crate) struct CallThread {
     jobs: Option<SyncSender<Job>>,
@@ -86,7 +86,7 @@ impl CallThread {
         Ok(jobs)
     }
 
-    /// Begins plugin calls on this thread; `body` records each in the progress.
+    /// Starts `body` on this thread without waiting; `body` makes plugin calls and records each in the progress.
     ///
     /// # Errors
     /// If the system cannot start a thread.
@@ -105,16 +105,17 @@ impl CallThread {
             // Without a receiver the value is dropped here.
             let _ = sender.send(value);
         };
-        // The thread ends after this sender only.
+        // Cannot fail: the thread receives as long as this sender exists.
         let _ = jobs.send(Box::new(job));
         self.jobs = Some(jobs);
         Ok(PendingCall { result, progress, limit })
     }
 
-    /// Executes plugin calls, `body`, each for no longer than `limit`, and only while the result is wanted.
+    /// Runs `body`, which makes plugin calls, on this thread and returns its result. Waits up to `limit` for each call, and only
+    /// while `is_wanted` returns true.
     ///
     /// # Errors
-    /// Call that did not return, stop request, or no thread.
+    /// If a call exceeds `limit`, if `is_wanted` returns false, or if the system cannot start a thread.
     pub(crate) fn run_while<T: Send + 'static>(
         &mut self,
         limit: Duration,
@@ -134,7 +135,7 @@ pub(crate) struct PendingCall<T> {
 }
 
 impl<T> PendingCall<T> {
-    /// Waits up to `time` for the result; returns the result, or the call beyond its limit.
+    /// Waits up to `time` for the result; returns the result, or an error if a call has exceeded its limit; `None` if neither.
     pub(crate) fn poll(&self, time: Duration) -> Option<Result<T, Unresponsive>> {
         match self.result.recv_timeout(time) {
             Ok(Ok(value)) => Some(Ok(value)),
@@ -146,7 +147,7 @@ impl<T> PendingCall<T> {
         }
     }
 
-    /// Waits for the result while `is_wanted`, no longer than the limit for each call.
+    /// Waits for the result while `is_wanted` returns true, up to the limit for each call.
     fn wait_while(self, is_wanted: impl Fn() -> bool) -> Result<T, CallError> {
         while is_wanted() {
             if let Some(result) = self.poll(POLL_INTERVAL) {
@@ -160,8 +161,8 @@ impl<T> PendingCall<T> {
     }
 }
 
-/// Thread and memory for the end of a run, reserved before anything is energised: a limit of the machine, reached during the run,
-/// would refuse both at its end. The default reserves nothing.
+/// Thread and memory for the end of a run, reserved before anything is energised: if the run exhausts a resource limit, the system
+/// grants neither at the end. The default reserves nothing.
 #[derive(Default)]
 pub(crate) struct EndReserve {
     thread: CallThread,
@@ -174,13 +175,13 @@ impl EndReserve {
     /// # Errors
     /// If the system cannot start a thread.
     pub(crate) fn take() -> std::io::Result<Self> {
-        // Written to, so that the system allocates each page.
+        // Written, so that the system maps each page.
         let block = || vec![1; BLOCK_BYTES].into_boxed_slice();
         let memory = std::iter::repeat_with(block).take(RESERVE_BYTES / BLOCK_BYTES).collect();
         Ok(Self { thread: CallThread { jobs: Some(CallThread::start()?) }, memory })
     }
 
-    /// Frees the memory and returns the thread for the calls.
+    /// Frees the reserved memory and returns the thread for the calls at the end of the run.
     pub(crate) fn begin(self) -> CallThread {
         drop(self.memory);
         self.thread

@@ -1,9 +1,9 @@
 //! Platform layer of a session. Each system has one module with the same items:
-//! - `MachineState`: state of the process that any plugin can change;
+//! - `MachineState`: record of the process state that any plugin can change;
 //! - `identity`, `changed`, `is_same_file`: identity of a file, and detection of changes;
 //! - `NOT_CAUGHT`: warning about ends of the process that stop no device;
 //! - `ThreadClock`: processor use of a thread;
-//! - `process_group`: process that ends with its parent, with the processes that it starts;
+//! - `process_group`: process in a group of its own, which is killed when its parent ends;
 //! - `user_folder`, `distrust`: plugin folder of the user, and folders that are not searched.
 
 #[cfg(not(windows))]

@@ -1,4 +1,5 @@
-//! Plugin registry: finds plugins and resolves their ids. Files are read, not run, until a scene needs one.
+//! Plugin registry: finds plugins and resolves their ids. Reads the metadata of plugin files; executes the code of a plugin only when
+//! the plugin is loaded.
 
 #![allow(unsafe_code)] // `load_file`; listed in tests/tests/system/architecture.rs
 
@@ -23,38 +24,38 @@ pub const PATH_VARIABLE: &str = "FLOTOR_PLUGIN_PATH";
 pub struct SkippedFolder {
     /// Path of the folder.
     pub folder: PathBuf,
-    /// Reason and remedy.
+    /// Reason and remedy, as text for users.
     pub reason: String,
 }
 
-/// Findings of a search for plugins.
+/// Results of a search for plugins.
 #[derive(Default)]
 pub struct Findings {
-    /// Plugins in search order.
+    /// Plugins that can be loaded by id, in search order.
     pub found: Vec<Metadata>,
-    /// Plugins hidden by an earlier one with the same id.
+    /// Plugins hidden by an earlier plugin with the same id.
     pub shadowed: Vec<Metadata>,
-    /// Pairs of files with one id in one folder. A scene that names the id is rejected.
+    /// Pairs of files with the same id in the same folder. A scene that names the id is rejected.
     pub ambiguous: Vec<(Metadata, Metadata)>,
-    /// Files that look like plugins and cannot be read as one.
+    /// Files that claim to be plugins and cannot be read as such.
     pub broken: Vec<LoadError>,
     /// Folders that were not searched.
     pub skipped: Vec<SkippedFolder>,
 }
 
-/// Plugins found, in search order: of two folders with a plugin of one id the first one counts; two files with one id in one folder
-/// are rejected.
+/// Plugins found, in search order. Of several folders with a plugin of the same id, the first counts; an id with two files in one
+/// folder is rejected.
 pub struct Registry {
     linked: Vec<Plugin>,
     findings: Findings,
-    /// Searched folders, those of the scene first.
+    /// Searched folders, the scene's folders first.
     folders: Vec<PathBuf>,
     /// Number of folders of the scene.
     of_scene: usize,
     loaded: Mutex<Vec<Loaded>>,
 }
 
-/// Loaded file, in its state at that time.
+/// Loaded plugin, with the state of its file when it was loaded.
 struct Loaded {
     path: PathBuf,
     stamp: FileStamp,
@@ -65,9 +66,9 @@ struct Loaded {
 
 /// Location of a plugin.
 enum Located<'a> {
-    /// Linked into this program.
+    /// Plugin that is linked into this program.
     Linked(&'a Plugin),
-    /// A file of a searched folder.
+    /// File in a searched folder.
     Found(&'a Metadata),
     /// File given by its path.
     Given(&'a Path),
@@ -83,19 +84,19 @@ pub enum LookupError {
         nearest.as_ref().map_or(String::new(), |n| format!("; did you mean `{n}`?")),
         hint.as_ref().map_or(String::new(), |hint| format!(" ({hint})")))]
     Unknown {
-        /// Requested id.
+        /// Requested id of the plugin.
         id: String,
         /// Requested kind; `None` for any.
         kind: Option<PluginKind>,
         /// The most similar id of that kind.
         nearest: Option<String>,
-        /// Hint about a file of that name, with the reason why it is not used, or about a folder of the scene without a plugin.
+        /// Hint about a file with this name and the reason why it is not used, or about a folder of the scene without a plugin.
         hint: Option<String>,
     },
     /// Two files of one folder have the id.
     #[error("`{id}` is the id of two plugins in one folder: `{}` and `{}`; remove one of them", one.display(), other.display())]
     Ambiguous {
-        /// Requested id.
+        /// Requested id of the plugin.
         id: String,
         /// First file.
         one: PathBuf,
@@ -105,14 +106,14 @@ pub enum LookupError {
     /// The plugin was found and rejected.
     #[error(transparent)]
     Refused(#[from] LoadError),
-    /// The initialisers of the plugin do not return.
+    /// The initialisers of the plugin did not return, a stop was requested meanwhile, or the system cannot start a thread.
     #[error(transparent)]
     Calls(#[from] CallError),
 }
 
 impl Registry {
-    /// Searches the folders of a scene, of the environment, of this installation and of the user, in this order. Not
-    /// real-time.
+    /// Searches for plugins in the folders of a scene, of the environment variable [`PATH_VARIABLE`], of this installation and of the
+    /// user, in this order. Not real-time.
     #[must_use]
     pub fn search(scene_folders: &[PathBuf]) -> Self {
         let mut folders = scene_folders.to_vec();
@@ -122,7 +123,7 @@ impl Registry {
         folders.extend(own_folders());
         folders.extend(user_folder());
         let mut registry = Self {
-            // Part of the host; refuses itself without a program.
+            // Part of the host; its `create` fails unless a program provides a port.
             linked: Plugin::in_process(&crate::program::ENTRY).into_iter().collect(),
             findings: Findings::default(),
             folders,
@@ -135,7 +136,7 @@ impl Registry {
         registry
     }
 
-    /// Adds a plugin that is linked into this program, which takes precedence over files: for instruments of the host, and for
+    /// Adds a plugin that is linked into this program and takes precedence over files: for plugins of the program itself, and for
     /// debuggers and sanitizers, which cannot inspect libraries. Not real-time.
     ///
     /// # Errors
@@ -162,7 +163,7 @@ impl Registry {
             match read_metadata(&file) {
                 Ok(metadata) => match found.iter().find(|known| known.id == metadata.id) {
                     None => found.push(metadata),
-                    // Cargo links its output into two folders: one file under two names hides nothing.
+                    // Cargo links its output into two folders: two names of one file are no conflict.
                     Some(known) if is_same_file(&known.path, &metadata.path) => {}
                     Some(known) if known.path.parent() == metadata.path.parent() => {
                         ambiguous.push((known.clone(), metadata));
@@ -176,25 +177,25 @@ impl Registry {
         }
     }
 
-    /// Returns the plugins found, in search order.
+    /// Returns the plugins found in files, in search order; without linked plugins.
     #[must_use]
     pub fn found(&self) -> &[Metadata] {
         &self.findings.found
     }
 
-    /// Returns the findings of the search.
+    /// Returns the results of the search: plugins found, hidden, ambiguous and unreadable, and skipped folders.
     #[must_use]
     pub fn findings(&self) -> &Findings {
         &self.findings
     }
 
-    /// Returns the folders in search order, existing or not.
+    /// Returns the searched folders in order, existing or not.
     #[must_use]
     pub fn folders(&self) -> &[PathBuf] {
         &self.folders
     }
 
-    /// Loads the plugin of an id (or a path to a file). Not real-time; runs the plugin's code.
+    /// Loads the plugin with an id (or the file at a path), which must be of this kind. Not real-time; runs the plugin's code.
     ///
     /// # Errors
     /// [`LookupError`]: unknown, with the closest known id, or rejected, with the reason.
@@ -202,7 +203,7 @@ impl Registry {
         self.find(id, Some(kind))
     }
 
-    /// Loads the plugin of an id (or a path to a file), of any kind. Not real-time; runs the plugin's code.
+    /// Loads the plugin with an id (or the file at a path), of any kind. Not real-time; runs the plugin's code.
     ///
     /// # Errors
     /// [`LookupError`]: unknown, with the closest known id, or rejected, with the reason.
@@ -250,7 +251,7 @@ impl Registry {
         Ok(Located::Found(found))
     }
 
-    /// Returns the error about an unknown id, with the closest known one.
+    /// Returns the error about an unknown id, with the closest known id and a hint.
     fn unknown(&self, id: &str, kind: Option<PluginKind>) -> LookupError {
         let candidates = self.found().iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
         let unknown_program = || installation_is_unknown().map(str::to_owned);
@@ -266,7 +267,7 @@ impl Registry {
         }
     }
 
-    /// Returns advice to build, if a folder of the scene contains no plugin.
+    /// Returns advice to build the plugins of the first folder of the scene that contains none; `None` if every folder has one.
     fn unbuilt(&self) -> Option<String> {
         let holds_plugin =
             |folder: &Path| self.found().iter().any(|known| known.path.parent() == Some(folder));
@@ -275,10 +276,10 @@ impl Registry {
         Some(format!("`{}` contains no plugin: build it first", empty.display()))
     }
 
-    /// Loads a file, or returns the plugin loaded before if the file is unchanged: libraries are never unloaded, and a thousand
-    /// models of one plugin share one mapping of the file.
+    /// Loads a file, or returns the plugin loaded before if the file is unchanged: libraries are never unloaded, so a thousand models
+    /// of one plugin share one mapping of the file.
     fn open(&self, path: &Path) -> Result<Plugin, LookupError> {
-        // Taken before the bytes are read: a write meanwhile is noticed the next time.
+        // Read before the bytes: a write in between is noticed at the next load.
         let Ok(stamp) = FileStamp::of(path) else { return load_in_time(path) }; // reports the error
         let mut loaded = lock(&self.loaded);
         if let Some(known) = loaded.iter().find(|known| known.path == path && known.stamp.is_same_as(&stamp))
@@ -296,25 +297,26 @@ impl Registry {
     }
 }
 
-/// Returns the reason why plugins beside this program are not found, if the system does not report the program's path.
+/// Returns the reason why plugins beside this program are not found, if the system does not report the program's path; `None`
+/// otherwise.
 #[must_use]
 pub fn installation_is_unknown() -> Option<&'static str> {
     own_folders().is_empty().then_some(UNKNOWN_PROGRAM)
 }
 
-/// Returns the plugin folders of this installation: beside the program, or as in its archive.
+/// Returns the plugin folders of this installation, relative to the program: build folders, and the layout of a release archive.
 fn own_folders() -> Vec<PathBuf> {
     let program = flotor_servo::guest::program().cloned().or_else(|| std::env::current_exe().ok());
     let Some(own) = program.as_deref().and_then(Path::parent) else { return Vec::new() };
     // `deps` before the folder itself: `cargo run` refreshes only `deps`, and an older copy may lie above it.
     let beside = ["deps", "", "plugins", "../lib/flotor/plugins"];
     let folder = |name: &str| if name.is_empty() { own.to_path_buf() } else { own.join(name) };
-    // Without `bin/..` in the summary of a run.
+    // Canonical, so that the summary of a run shows no `bin/..`.
     beside.map(folder).map(|folder| folder.canonicalize().unwrap_or(folder)).to_vec()
 }
 
-/// Returns true if a plugin belongs to this installation: linked into the program, or located beside it or in
-/// `../lib/flotor/plugins`. Not real-time.
+/// Returns true if a plugin belongs to this installation: linked into the program, or located in a plugin folder of the installation.
+/// Not real-time.
 pub(crate) fn is_installed(plugin: &Path) -> bool {
     let Ok(file) = plugin.canonicalize() else { return plugin.as_os_str().is_empty() };
     let folder = file.parent();
@@ -331,7 +333,7 @@ fn load_in_time(path: &Path) -> Result<Plugin, LookupError> {
     Ok(loaded??)
 }
 
-/// Loads a plugin file; the only place of the host that does. Not real-time; runs the plugin's code.
+/// Loads a plugin file; all plugin files of the host are loaded here. Not real-time; runs the plugin's code.
 ///
 /// # Errors
 /// [`LoadError`], with file, cause and remedy.
@@ -341,7 +343,7 @@ pub fn load_file(path: &Path) -> Result<Plugin, LoadError> {
     unsafe { Plugin::load(path) }
 }
 
-/// Rejects a plugin of the other kind.
+/// Returns an error if a plugin is not of the requested kind; `None` accepts any kind.
 fn check_kind(plugin: &Metadata, kind: Option<PluginKind>) -> Result<(), LoadError> {
     let Some(kind) = kind.filter(|kind| *kind != plugin.kind) else { return Ok(()) };
     let Metadata { path, id, kind: found, .. } = plugin.clone();

@@ -1,4 +1,4 @@
-//! File stamps, which show if a file has changed since it was read.
+//! File stamps, which show whether a file has changed since it was read.
 
 use crate::platform;
 use std::fs::File;
@@ -6,8 +6,8 @@ use std::path::Path;
 use std::time::{Duration, SystemTime};
 use xxhash_rust::xxh3::Xxh3Default;
 
-/// Coarsest resolution of file times: a change this soon after another may leave the time unchanged. File systems count in ticks of
-/// the kernel (10 ms at most), some in seconds (FAT in two).
+/// Coarsest resolution of file times: a second change within this time may leave the file time unchanged. File systems count in
+/// kernel ticks (10 ms at most), some in seconds (FAT in two).
 const COARSEST_FILE_TIME: Duration = Duration::from_secs(2);
 
 /// Identity and state of a file, as reported by the file system.
@@ -17,12 +17,12 @@ pub(super) struct FileStamp {
     length_bytes: u64,
     /// Time of the last change, s and ns since 1970.
     changed: (i64, i64),
-    /// True if the last change was so long before the stamp that a later change has another time.
+    /// True if the last change was so long before the stamp that any later change has a different time.
     settled: bool,
 }
 
 impl FileStamp {
-    /// Takes the stamp of a file. Not real-time.
+    /// Reads the stamp of a file. Not real-time.
     pub(super) fn of(path: &Path) -> std::io::Result<Self> {
         let file = std::fs::metadata(path)?;
         let changed = platform::changed(&file);
@@ -34,7 +34,7 @@ impl FileStamp {
         })
     }
 
-    /// Returns true if the contents are the same for both stamps; false means that they have to be compared.
+    /// Returns true if the contents have not changed between the two stamps; false: unknown, the contents have to be compared.
     pub(super) fn is_same_as(&self, other: &Self) -> bool {
         let what = |stamp: &Self| (stamp.identity, stamp.length_bytes, stamp.changed);
         self.settled && what(self) == what(other)
@@ -49,7 +49,7 @@ fn is_settled((seconds, nanoseconds): (i64, i64), now: SystemTime) -> bool {
     now.duration_since(changed).is_ok_and(|age| age > COARSEST_FILE_TIME)
 }
 
-/// Returns the xxh3-64 of a file's bytes. Not real-time.
+/// Returns the xxh3-64 hash of the bytes of a regular file. Not real-time.
 pub(super) fn hash_of(path: &Path) -> std::io::Result<u64> {
     if !std::fs::metadata(path)?.is_file() {
         return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file"));

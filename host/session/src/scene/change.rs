@@ -3,18 +3,18 @@
 use super::reader::{Location, SceneError, Section, Value};
 use super::{ParameterText, PluginKeyValue};
 
-/// Scheduled change.
+/// Scheduled change of a parameter, a model or a weight.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ChangeUse {
     /// Time since the start of the loop, s; applied before the first tick at this time or later.
     pub at_s: f64,
-    /// Kind of the change.
+    /// Kind of the change, with its target and value.
     pub what: ChangeWhat,
-    /// Location in the scene.
+    /// Location in the scene, for error messages.
     pub location: Location,
 }
 
-/// Kind of a change.
+/// Kind of a scheduled change, with its target and value.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ChangeWhat {
     /// New value of a parameter.
@@ -24,33 +24,33 @@ pub enum ChangeWhat {
         /// Parameter with its value.
         parameter: ParameterText,
     },
-    /// Replacement of a model by another plugin, or by the same one built anew.
+    /// Replacement of a model by another plugin, or by a new instance of the same plugin.
     Swap {
         /// Name of a model in the scene, or id of a plugin.
         model: String,
-        /// Alternatives for the model; of several, the seed of the run chooses one. Never empty.
+        /// Alternatives for the model, at least one; of several, the seed of the run chooses one.
         by: Vec<Alternative>,
     },
-    /// New weight of a model, approached at the rate of its fade.
+    /// New weight of a model; the loop approaches it at the rate of the model's fade.
     Weight {
         /// Name of a model in the scene, or id of a plugin.
         model: String,
-        /// Fraction of the wrench that is felt, 0 to 1.
+        /// Factor on the wrench of the model, 0 to 1.
         weight: f64,
     },
 }
 
-/// Alternative plugin for a model.
+/// Alternative plugin for a hot swap of a model.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Alternative {
     /// Id or file of the plugin; `None`: as named in the scene.
     pub plugin: Option<String>,
-    /// Parameters of the plugin.
+    /// Parameters of the replacement; without `plugin` they are added to those of the scene.
     pub parameters: Vec<ParameterText>,
 }
 
 impl Alternative {
-    /// Takes `plugin` and `parameters` of a table.
+    /// Reads the keys `plugin` and `parameters` of a table.
     fn take(section: &mut Section<'_>) -> Result<Self, SceneError> {
         let plugin = section.read("plugin", Value::text)?;
         let parameters =
@@ -59,10 +59,11 @@ impl Alternative {
     }
 }
 
-/// Longest time, s: a year, as for a run.
+/// Latest time of a change, s: a year, as for the duration of a run.
 const LATEST_S: f64 = 31_536_000.0;
 
-/// Reads all changes in the order written; those of one table come before the same tick.
+/// Reads the changes of all tables in the order of the file; within a table: swap, parameters, weights. The changes of one table are
+/// applied before the same tick.
 pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneError> {
     let mut changes = Vec::new();
     for mut section in sections {
@@ -112,7 +113,7 @@ pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneEr
     Ok(changes)
 }
 
-/// Reader of a change from its text and location.
+/// Function that parses a change from its text and location.
 type Read = fn(&str, &Location) -> Result<ChangeWhat, SceneError>;
 
 /// Reads `PLUGIN.KEY=VALUE`.

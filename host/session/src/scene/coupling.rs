@@ -8,7 +8,7 @@ use flotor_core::coupling::{
 };
 use flotor_core::mapping::MappingConfig;
 
-/// Reads every coupling, in the order written.
+/// Reads all couplings, in the order of the file.
 pub(super) fn read(
     sections: Vec<Section<'_>>,
     devices: &[DeviceUse],
@@ -100,7 +100,7 @@ fn coupling(
     Ok(CouplingDescription { name, config, ends })
 }
 
-/// Location of the other end.
+/// Location of the other end of a coupling.
 #[derive(Clone, Copy)]
 enum Partner {
     /// In this scene.
@@ -109,7 +109,7 @@ enum Partner {
     Elsewhere,
 }
 
-/// Returns true if a name can be a part of a network's key.
+/// Returns true if a name can be part of a key on the network: 1 to 40 lower-case letters, digits and hyphens.
 fn is_key(name: &str) -> bool {
     let legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
     (1..=40).contains(&name.len()) && name.chars().all(legal)
@@ -118,7 +118,7 @@ fn is_key(name: &str) -> bool {
 fn end(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<CouplingEnd, SceneError> {
     let device = devices::number(devices, section.require("device")?)?;
     let mapping = match section.section("mapping")? {
-        // No torque scale: both ends must measure energy alike.
+        // No torque scale: both ends must measure the same energy.
         Some(mut mapping) => {
             let config = frame_and_scales(&mut mapping)?;
             mapping.finish()?;

@@ -5,17 +5,17 @@ use super::{CalibrationUse, ModelUse, PluginUse, plugin_use};
 use flotor_core::MAX_DEVICES;
 use std::collections::BTreeSet;
 
-/// Separator between the names of a model and of its device, for a model on several devices.
+/// Separator between model name and device name, for a model on several devices.
 const ON: char = '@';
 
-/// A device in a scene.
+/// Device of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DeviceUse {
-    /// Name in `--set NAME.KEY=VALUE` and reports; "device" by default.
+    /// Name in `--set NAME.KEY=VALUE` and reports; "device" by default for the only device.
     pub name: String,
     /// Plugin of the device.
     pub plugin: PluginUse,
-    /// Calibration file of the vertical force, if any.
+    /// Calibration file of the vertical force; `None`: not calibrated.
     pub calibration: Option<CalibrationUse>,
 }
 
@@ -54,7 +54,7 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError>
     Ok(devices)
 }
 
-/// Reads a name that differs from that of any model on a device.
+/// Reads a name; rejects the separator of model and device.
 pub(super) fn name(value: Value<'_>) -> Result<String, SceneError> {
     let wrong =
         value.problem(format!("a name must not contain `{ON}`, which separates a model from its device"));
@@ -62,7 +62,7 @@ pub(super) fn name(value: Value<'_>) -> Result<String, SceneError> {
     if name.contains(ON) { Err(wrong) } else { Ok(name) }
 }
 
-/// Returns the number of the device with this name.
+/// Returns the number, from 0, of the device with this name.
 pub(super) fn number(devices: &[DeviceUse], value: Value<'_>) -> Result<u16, SceneError> {
     let location = value.location.clone();
     find(devices, &value.text()?, &location)
@@ -76,7 +76,7 @@ fn find(devices: &[DeviceUse], name: &str, location: &Location) -> Result<u16, S
     })
 }
 
-/// Returns the devices of a model: the named ones, or the only one.
+/// Returns the numbers of the devices of a model: the named ones, or the only device of the scene.
 pub(super) fn of_model(
     devices: &[DeviceUse],
     named: Option<Value<'_>>,
@@ -110,13 +110,13 @@ pub fn is_named(name: &str, requested: &str) -> bool {
     name == requested || without_device(name) == requested
 }
 
-/// Returns the name of a model without its device.
+/// Returns the name of a model without its device: `spring` for `spring@left`.
 #[must_use]
 pub fn without_device(name: &str) -> &str {
     name.split_once(ON).map_or(name, |(model, _)| model)
 }
 
-/// Reports an error for two models, or a model and a device, of one name: `--set` and changes would reach only one.
+/// Returns an error if two models, or a model and a device, have the same name: `--set` and changes would reach only one of them.
 pub(super) fn tell_apart(models: &[ModelUse], devices: &[DeviceUse]) -> Result<(), SceneError> {
     let mut names = BTreeSet::new();
     for model in models {

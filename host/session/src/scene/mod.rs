@@ -1,4 +1,4 @@
-//! Scene: devices, models, their mapping and limits. A TOML file; unknown keys are errors.
+//! Scene: devices, models, their mapping and limits, read from a TOML file; unknown keys are errors.
 
 mod change;
 mod coupling;
@@ -29,44 +29,44 @@ use std::path::{Path, PathBuf};
 /// Scene that `flotor` runs if none is named: spring 1 on the simulated flotor, held by a hand.
 pub const DEMO: &str = include_str!("../../scenes/demo.toml");
 
-/// The scene of experiments: a spring to be judged, on the simulated flotor.
+/// Scene of perception experiments: a spring for the subject to judge, on the simulated flotor.
 pub const STUDY: &str = include_str!("../../scenes/study.toml");
 
-/// Scene as read: complete and consistent, not yet checked against the plugins that it names.
+/// Scene as read from text: complete and consistent, but not yet checked against the plugins that it names.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// Title of a report.
+    /// Title of the run in reports; may be empty.
     pub title: String,
-    /// Text of the scene, for recordings.
+    /// TOML text of the scene, stored in recordings.
     pub text: String,
     /// Loop rate, Hz.
     pub rate_hz: f64,
-    /// Time base of the ticks (real clock).
+    /// Time base of the ticks, on the real clock only.
     pub pacing: Pacing,
     /// Duration of the run, s.
     pub duration_s: f64,
-    /// Folders with plugins, searched first; relative to the scene's file.
+    /// Plugin folders, searched before all others; [`Scene::load`] resolves them against the folder of the scene file.
     pub plugin_folders: Vec<PathBuf>,
-    /// The devices, one at least.
+    /// Devices, at least one.
     pub devices: Vec<DeviceUse>,
     /// Force models, whose wrenches add up. A model on several devices has an entry for each.
     pub models: Vec<ModelUse>,
-    /// Couplings between devices.
+    /// Virtual couplings between two devices, or with a device on another host.
     pub couplings: Vec<CouplingDescription>,
-    /// Limits, tighter than or equal to what the device declares.
+    /// Limits of the scene for every device; where the device declares a tighter limit, that limit applies.
     pub limits: Limits,
-    /// Boundary where the handle is pushed back.
+    /// Spring-damper wall a little inside the range of each device.
     pub boundary: Boundary,
-    /// Scheduled changes, in the order written.
+    /// Scheduled changes, in the order of the file.
     pub changes: Vec<ChangeUse>,
 }
 
-/// Plugin with its parameters.
+/// Plugin named in a scene, with its parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PluginUse {
-    /// Id of the plugin.
+    /// Id of the plugin, or path of its file.
     pub plugin: String,
-    /// Location in the scene.
+    /// Location of the id, for error messages.
     pub location: Location,
     /// Parameters as written, checked later against the plugin's schema.
     pub parameters: Vec<ParameterText>,
@@ -75,14 +75,15 @@ pub struct PluginUse {
 /// Calibration file named in a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationUse {
-    /// Path, relative to the scene's file.
+    /// Path as written; [`Self::path`] resolves it.
     pub file: PathBuf,
-    /// Location in the scene.
+    /// Location of the path in the scene.
     pub location: Location,
 }
 
 impl CalibrationUse {
-    /// Returns the path from the working folder of this process.
+    /// Resolves the path against the folder of the scene file, if the scene comes from a file. The result is absolute or relative to
+    /// the working directory of this process.
     #[must_use]
     pub fn path(&self) -> PathBuf {
         match self.location.file.parent() {
@@ -92,45 +93,47 @@ impl CalibrationUse {
     }
 }
 
-/// A force model in a scene.
+/// Force model of a scene on one device.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelUse {
     /// Name in `--set NAME.KEY=VALUE` and reports; the plugin's id by default.
     pub name: String,
     /// Plugin of the model.
     pub plugin: PluginUse,
-    /// Number of the model's device.
+    /// Number of the model's device, from 0 in the scene's order.
     pub device: u16,
-    /// Mapping from device to model and back.
+    /// Mapping between device frame and model frame: rotation and scales.
     pub mapping: MappingConfig,
-    /// Homes of the model in the device frame, m: one instance for each.
+    /// Positions of the model's home in the device frame, m; one instance for each.
     pub places_m: Vec<[f64; 3]>,
-    /// Weight, priority and fade time.
+    /// Weight, priority and fade time of the model among the models of its device.
     pub blend: Blend,
-    /// Isolation of the model from the host.
+    /// Isolation of the model from the host process.
     pub isolation: Isolation,
-    /// Timing of an asynchronous model, whose local linear model the loop evaluates; `None` in the loop.
+    /// Timing of an asynchronous model, whose local linear model the loop evaluates; `None`: the loop steps the model itself.
     pub field: Option<FieldTiming>,
-    /// Time limit of a step, s; `None`: half a period in real time, none on the virtual clock.
+    /// Time limit of a step, s; `None`: half a period on the real clock, no limit on the virtual clock.
     pub budget_s: Option<f64>,
     /// Latency declared by the model's device, s; 0 until a session has opened the device.
     pub latency_s: f64,
 }
 
-/// Isolation of a model from the host.
+/// Isolation of a model from the host process.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Isolation {
-    /// By the model's origin: a worker process for a model from outside the installation on a real device in real time, otherwise none.
+    /// By the model's origin: a worker process if the plugin is from outside the installation, the device physical and the clock
+    /// real; otherwise none.
     #[default]
     ByOrigin,
     /// No isolation: the model runs in the loop's own thread.
     None,
-    /// Worker process, which may hang or crash.
+    /// Worker process: a hang or crash of the model ends neither loop nor host.
     Process,
 }
 
 impl Isolation {
-    /// Returns the value of the key `isolation` in a scene; `ByOrigin`, which has none, runs in the loop once it is settled.
+    /// Returns the value of the key `isolation` in a scene, "process" or "none"; `ByOrigin`, which has no value in scenes, gives
+    /// "none".
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {
@@ -141,8 +144,8 @@ impl Isolation {
 }
 
 impl ModelUse {
-    /// Returns a copy with another plugin, or with the same one for `None`. Another plugin starts from its own defaults; `settings`
-    /// are added.
+    /// Returns a copy of the model with `plugin`, or with the same plugin for `None`. A given plugin starts from its own defaults,
+    /// without the parameters of the scene; `settings`, as key and value, are added.
     #[must_use]
     pub fn replaced_by(&self, plugin: Option<&str>, settings: &[(&str, &str)]) -> Self {
         let mut other = self.clone();
@@ -160,7 +163,7 @@ impl ModelUse {
 }
 
 impl Scene {
-    /// Duration of a run without `duration_s`, s.
+    /// Default of `duration_s`, s.
     pub const DURATION_S: f64 = 10.0;
 
     /// Reads the built-in demo.
@@ -171,7 +174,7 @@ impl Scene {
         Self::parse(Path::new("built-in demo"), DEMO)
     }
 
-    /// Reads the built-in scene of experiments; a model other than the spring takes the spring's place, at its natural scale.
+    /// Reads the built-in scene of experiments. A plugin other than the spring replaces the spring, with the default mapping.
     ///
     /// # Errors
     /// None in practice: a test reads it.
@@ -213,10 +216,10 @@ impl Scene {
         Self::read(&Source::new(file, text))
     }
 
-    /// Sets another rate than that of the scene; `place` is the location in error messages. Not real-time.
+    /// Sets the loop rate, Hz, in place of the scene's; `place` is the location in error messages. Not real-time.
     ///
     /// # Errors
-    /// [`SceneError`] if a limit does not fit the new rate.
+    /// [`SceneError`] if the watchdog timeout is shorter than three periods at the new rate.
     pub fn set_rate(&mut self, rate_hz: f64, place: &str) -> Result<(), SceneError> {
         let place = Location { file: PathBuf::from(place), line: 0 };
         legal_watchdog_s(self.limits.watchdog_s, rate_hz, place)?;
@@ -265,9 +268,9 @@ impl Scene {
 /// Time base of the ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pacing {
-    /// Clock of the host; `read` returns the newest sample of any age.
+    /// Clock of the host; `read` of a device returns its newest sample, whatever its age.
     Host,
-    /// Samples of the first device; the loop waits for the next one before each `read`.
+    /// Samples of the first device; before each `read` the loop waits for the device's next sample.
     Device,
 }
 
@@ -275,7 +278,7 @@ fn pacing(value: Value<'_>) -> Result<Pacing, SceneError> {
     value.one_of(&[("host", Pacing::Host), ("device", Pacing::Device)])
 }
 
-/// Reads a model, once for each of its devices.
+/// Reads a model; returns one entry for each of its devices.
 fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse>, SceneError> {
     let plugin = plugin_use(&mut section)?;
     let name = section.read("name", devices::name)?;
@@ -318,7 +321,7 @@ fn field(mut section: Section<'_>) -> Result<FieldTiming, SceneError> {
     let latency_s =
         section.number("latency_ms", 0.0..=period_s * 1.0e3)?.map(|milliseconds| milliseconds * 1.0e-3);
     section.finish()?;
-    // By default the model needs its whole period.
+    // Default: the model needs its whole period.
     Ok(FieldTiming { rate_hz, latency_s: latency_s.unwrap_or(period_s) })
 }
 
@@ -341,7 +344,7 @@ fn plugin_use(section: &mut Section<'_>) -> Result<PluginUse, SceneError> {
     Ok(PluginUse { plugin: plugin.text()?, location, parameters })
 }
 
-/// Reads scales, rotation and places of a model.
+/// Reads scales, rotation and positions of a model.
 fn mapping(mut section: Section<'_>) -> Result<(MappingConfig, Vec<[f64; 3]>), SceneError> {
     let torque_scale = section.number("torque_scale", SCALE)?;
     let mapping = MappingConfig { torque_scale, ..frame_and_scales(&mut section)? };
@@ -372,28 +375,28 @@ fn rotation(value: Value<'_>) -> Result<[f64; 4], SceneError> {
     )))
 }
 
-/// Legal scales: zero would suppress motion or force; a million is a wrong unit.
+/// Legal scales: zero would suppress motion or force, and a larger scale indicates a wrong unit.
 const SCALE: std::ops::RangeInclusive<f64> = 1.0e-6..=1.0e6;
 
-/// Largest number of models, each on one device: their calls alone take a millisecond.
+/// Largest number of models, counted once for each device: the calls alone of so many take a millisecond.
 const MAX_MODELS: usize = 4096;
 
-/// Longest timeout of a watchdog, ms.
+/// Longest watchdog timeout, ms.
 const LONGEST_WATCHDOG_MS: f64 = 60_000.0;
 
-/// Shortest timeout of a watchdog, in periods: one passes between two ticks of a healthy loop, a late tick makes it two, and the
+/// Shortest watchdog timeout, in periods: one period passes between two ticks of a healthy loop, a late tick adds another, and the
 /// watchdog's own polls are late as well.
 const WATCHDOG_PERIODS: f64 = 3.0;
 
-/// Returns the timeout if a healthy loop at this rate ticks more often; `place` is the location in error messages.
+/// Returns `watchdog_s` if it is at least [`WATCHDOG_PERIODS`] periods at this rate; `place` is the location in error messages.
 fn legal_watchdog_s(watchdog_s: f64, rate_hz: f64, place: Location) -> Result<f64, SceneError> {
     let least_ms = WATCHDOG_PERIODS * 1.0e3 / rate_hz;
-    // To a microsecond: milliseconds that were seconds in between have a rounding error.
+    // Rounded to a microsecond: the conversion from ms to s and back has a rounding error.
     let watchdog_ms = (watchdog_s * 1.0e6).round() / 1.0e3;
     if watchdog_ms > least_ms - 1.0e-3 {
         return Ok(watchdog_s);
     }
-    // Upwards, so that the value in the message is legal.
+    // Rounded up, so that the value in the message is legal.
     let least_ms = (least_ms * 100.0).ceil() / 100.0;
     let problem = format!(
         "`limits.watchdog_ms` = {watchdog_ms}: at {rate_hz} Hz it must be {least_ms} to {LONGEST_WATCHDOG_MS}, \
@@ -402,7 +405,7 @@ fn legal_watchdog_s(watchdog_s: f64, rate_hz: f64, place: Location) -> Result<f6
     Err(place.problem(problem))
 }
 
-/// Largest value of a limit.
+/// Upper end of the legal range of a limit: none.
 const MOST: f64 = f64::INFINITY;
 
 fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> {

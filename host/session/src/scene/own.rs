@@ -1,12 +1,12 @@
-//! Flotor's own scenes, by name, as a part of the program.
+//! Flotor's own scenes, built into the program and selected by name.
 
 use super::{Scene, SceneError, did_you_mean};
 use std::path::Path;
 
-/// One of Flotor's own scenes.
+/// Scene that is built into the program.
 #[derive(Clone, Copy, Debug)]
 pub struct OwnScene {
-    /// Name: that of the file, without the extension.
+    /// Name of the scene: its file name without extension.
     pub name: &'static str,
     /// TOML text.
     pub text: &'static str,
@@ -38,7 +38,7 @@ pub const OWN_SCENES: &[OwnScene] = own![
 ];
 
 impl OwnScene {
-    /// Returns the own scene with this name, unless a file has that path. Not real-time.
+    /// Returns the built-in scene with this name; `None` if there is none, or if a file exists at this path. Not real-time.
     #[must_use]
     pub fn named(path: &Path) -> Option<Self> {
         if path.exists() && !path.is_dir() {
@@ -47,7 +47,7 @@ impl OwnScene {
         OWN_SCENES.iter().copied().find(|scene| Path::new(scene.name) == path)
     }
 
-    /// Reads the scene. Not real-time.
+    /// Parses the scene. Not real-time.
     ///
     /// # Errors
     /// None in practice: a test reads all of them.

@@ -1,13 +1,14 @@
-//! Placement of a model: in one place, in several, or in all points of a grid.
+//! Placement of a model: at one position, at several, or at all points of a grid.
 
 use super::reader::{SceneError, Section};
 
-/// Most places of one model: each is an instance of the model, with its own memory.
+/// Largest number of positions of one model: each has an instance of the model, with its own memory.
 const MAX_PLACES: usize = 1_000_000;
-/// Farthest place along an axis, mm: a farther one is a wrong unit.
+/// Largest coordinate of a position, mm: a larger value indicates a wrong unit.
 const FARTHEST_MM: f64 = 1.0e4;
 
-/// Reads the places of a model in the device frame, m: `position_mm`, `positions_mm` or a `grid` about `position_mm`.
+/// Reads the positions of a model in the device frame and returns them in m: `position_mm` alone, or `positions_mm` or a `grid`
+/// relative to `position_mm`.
 pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
     let centre_mm = mapping.three("position_mm", -FARTHEST_MM..=FARTHEST_MM)?.unwrap_or_default();
     let list = mapping.take("positions_mm");
@@ -25,7 +26,7 @@ pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneErro
     Ok(places_mm.into_iter().map(from_centre).collect())
 }
 
-/// Returns the points of a grid about its centre, x fastest, mm.
+/// Reads a grid and returns its points relative to its centre, mm; x varies fastest.
 fn points_of(mut grid: Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
     let count_value = grid.require("count")?;
     let too_many = count_value.problem(format!("a grid has at most {MAX_PLACES} points"));

@@ -1,7 +1,7 @@
-//! Reader of TOML tables, key by key, so that every error names file, line, key and remedy.
+//! Reader of TOML tables, key by key, whose errors name file, line, key and remedy.
 //!
-//! serde would report the line of an unknown key but not the closest valid one; here each key is taken by name, and keys left over
-//! at the end are unknown.
+//! serde would report the line of an unknown key but not the closest valid one; here each key is removed by name, and keys that
+//! remain at the end are unknown.
 
 use flotor_core::limits::Bound;
 pub use flotor_hal::abi::loader::nearest;
@@ -13,12 +13,12 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Location of a text: a line of a file, or an option of a command line.
+/// Location of a value, for error messages: a line of a file, or a command line option.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Location {
-    /// File, or its substitute ("built-in demo", "--set").
+    /// Path of the file, or a substitute such as "built-in demo" or "--set".
     pub file: PathBuf,
-    /// Line, from 1; 0 without lines.
+    /// Line number, from 1; 0 for a source without lines.
     pub line: usize,
 }
 
@@ -54,14 +54,14 @@ pub struct SceneError {
     pub problem: String,
 }
 
-/// Parameter as written.
+/// Parameter of a plugin as written in a scene or on a command line, not yet checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParameterText {
     /// Id of the parameter.
     pub key: String,
-    /// Value as text.
+    /// Value of the parameter, as text.
     pub value: String,
-    /// Location in the scene.
+    /// Location of the value.
     pub location: Location,
 }
 
@@ -69,11 +69,11 @@ pub struct ParameterText {
 pub(super) struct Source<'t> {
     file: &'t Path,
     text: &'t str,
-    /// Positions of the line ends, for a lookup of lines without counting through the text.
+    /// Byte offsets of the line ends, for a lookup of line numbers by binary search.
     line_ends: Vec<usize>,
-    /// Keys looked up in each table that was read to its end.
+    /// Name and looked-up keys of each table that was read to its end.
     seen: RefCell<Vec<(String, Vec<Known>)>>,
-    /// Keys looked up above all tables.
+    /// Keys looked up at the top level, above all tables.
     above: RefCell<Vec<&'static str>>,
 }
 
@@ -93,7 +93,7 @@ pub(super) enum Takes {
     Number(RangeInclusive<f64>),
     /// Three numbers, or one for all.
     Three(RangeInclusive<f64>),
-    /// One number, a norm; three, one for each axis; or a table with both.
+    /// Bound of a vector: one number (the norm), three numbers (one for each axis), or a table with both.
     Bound(RangeInclusive<f64>),
     /// A table.
     Table,
@@ -142,12 +142,12 @@ impl<'t> Source<'t> {
     }
 }
 
-/// Returns true if a text cannot control the terminal on which it is shown.
+/// Returns true if a text has no control character except line feed and tab, so that it cannot control a terminal.
 fn is_for_people(text: &str) -> bool {
     text.chars().all(|character| !character.is_control() || matches!(character, '\n' | '\t'))
 }
 
-/// Table of a scene, whose keys are taken until none is left.
+/// Table of a scene. Keys are removed as they are read; remaining keys are unknown.
 pub(super) struct Section<'t> {
     source: &'t Source<'t>,
     name: String,
@@ -164,7 +164,7 @@ pub(super) struct Value<'t> {
 }
 
 impl<'t> Section<'t> {
-    /// Takes a key, if present.
+    /// Removes a key and returns its value; `None` if the key is absent.
     pub(super) fn take(&mut self, key: &'static str) -> Option<Value<'t>> {
         self.take_as(key, Takes::Value)
     }
@@ -184,13 +184,13 @@ impl<'t> Section<'t> {
         self.source.location(&self.span)
     }
 
-    /// Takes a required key.
+    /// Removes a required key and returns its value.
     pub(super) fn require(&mut self, key: &'static str) -> Result<Value<'t>, SceneError> {
         let missing = self.missing(key);
         self.take(key).ok_or(missing)
     }
 
-    /// Returns the error about a missing key, or about a similar one in its place.
+    /// Returns the error about a missing key, or about an unknown key with a similar name, if the table has one.
     pub(super) fn missing(&self, key: &str) -> SceneError {
         let alike = nearest(key, self.table.keys().map(|written| &**written.get_ref()));
         if let Some(written) = self.table.keys().find(|written| Some(&**written.get_ref()) == alike) {
@@ -199,7 +199,7 @@ impl<'t> Section<'t> {
         self.location().problem(format!("`{}` is missing", self.path(key)))
     }
 
-    /// Takes a key, if present, and reads its value.
+    /// Removes a key and reads its value; `None` if the key is absent.
     pub(super) fn read<T>(
         &mut self,
         key: &'static str,
@@ -208,7 +208,7 @@ impl<'t> Section<'t> {
         self.take(key).map(read).transpose()
     }
 
-    /// Takes a number, or `default`, and checks that it lies in `range`.
+    /// Reads a number and checks that it lies in `range`; returns `default` if the key is absent.
     pub(super) fn number_or(
         &mut self,
         key: &'static str,
@@ -218,7 +218,7 @@ impl<'t> Section<'t> {
         Ok(self.number(key, range)?.unwrap_or(default))
     }
 
-    /// Takes a number, if present, and checks that it lies in `range`.
+    /// Reads a number and checks that it lies in `range`; `None` if the key is absent.
     pub(super) fn number(
         &mut self,
         key: &'static str,
@@ -227,7 +227,7 @@ impl<'t> Section<'t> {
         Ok(self.number_and_place(key, range)?.map(|(number, _)| number))
     }
 
-    /// Takes a number as [`Self::number`], with its location for errors that depend on other keys.
+    /// Reads a number as [`Self::number`] does, with its location for errors that depend on other keys.
     pub(super) fn number_and_place(
         &mut self,
         key: &'static str,
@@ -238,7 +238,7 @@ impl<'t> Section<'t> {
         Ok(Some((value.number(range)?, place)))
     }
 
-    /// Takes three numbers (or one for all three), if present, and checks that they lie in `range`.
+    /// Reads three numbers (or one for all three) and checks that they lie in `range`; `None` if the key is absent.
     pub(super) fn three(
         &mut self,
         key: &'static str,
@@ -247,8 +247,8 @@ impl<'t> Section<'t> {
         self.take_as(key, Takes::Three(range.clone())).map(|value| value.three(range)).transpose()
     }
 
-    /// Takes the bound of a vector, or `default`, and checks that its numbers lie in `range`: a norm, a number for each axis, or a
-    /// table with both.
+    /// Reads the bound of a vector, a norm, a number for each axis, or a table with both, and checks that its numbers lie in `range`;
+    /// returns `default` if the key is absent.
     pub(super) fn bound_or(
         &mut self,
         key: &'static str,
@@ -271,7 +271,7 @@ impl<'t> Section<'t> {
         }
     }
 
-    /// Takes a sub-table, if present.
+    /// Removes a sub-table and returns it; `None` if absent.
     pub(super) fn section(&mut self, key: &'static str) -> Result<Option<Section<'t>>, SceneError> {
         let source = self.source;
         self.known.push(Known { key, takes: Takes::Table });
@@ -279,7 +279,7 @@ impl<'t> Section<'t> {
         Section::from_value(source, self.path(key), value).map(Some)
     }
 
-    /// Takes a list of tables (`[[key]]`); empty if absent.
+    /// Removes a list of tables (`[[key]]`), or a single table, and returns it; empty if absent.
     pub(super) fn sections(&mut self, key: &'static str) -> Result<Vec<Section<'t>>, SceneError> {
         let source = self.source;
         self.known.push(Known { key, takes: Takes::Tables });
@@ -304,7 +304,7 @@ impl<'t> Section<'t> {
         }
     }
 
-    /// Returns all keys with their values as text: for parameters, whose keys only the plugin defines.
+    /// Returns all keys with their values as text, in the order of the file: for parameters, whose keys only the plugin defines.
     pub(super) fn into_texts(self) -> Result<Vec<ParameterText>, SceneError> {
         let source = self.source;
         let mut entries: Vec<_> = self.table.into_iter().collect();
@@ -327,13 +327,13 @@ impl<'t> Section<'t> {
         entries.into_iter().map(text).collect()
     }
 
-    /// Reports an error for the first unknown key.
+    /// Returns an error for the first key that was not read.
     pub(super) fn finish(self) -> Result<(), SceneError> {
         let Some(key) = self.table.keys().min_by_key(|key| key.span().start) else {
             self.source.seen.borrow_mut().push((self.name, self.known));
             return Ok(());
         };
-        // TOML cannot return to the keys above the first table.
+        // In TOML no key after the first table header belongs to the top level.
         if let Some(above) = self.source.above.borrow().iter().find(|above| **above == &**key.get_ref()) {
             return Err(self.unknown(key, &format!("; `{above}` belongs above all tables")));
         }
@@ -371,12 +371,12 @@ impl Value<'_> {
         self.location.problem(problem)
     }
 
-    /// Returns the error about a value that must be something else.
+    /// Returns the error about an illegal value; `legal` describes the legal values.
     fn must_be(&self, legal: impl Display) -> SceneError {
         self.problem(format!("`{}` must be {legal}", self.key))
     }
 
-    /// Returns the error about a value of another type.
+    /// Returns the error about a value of the wrong type; `legal` describes the right one.
     fn wrong_type(&self, legal: &str) -> SceneError {
         self.must_be(format_args!("{legal}; found: {}", self.value.type_str()))
     }
@@ -396,7 +396,7 @@ impl Value<'_> {
         self.value.as_bool().ok_or_else(|| self.wrong_type("true or false"))
     }
 
-    /// Returns the meaning of one of a few words.
+    /// Returns the value that `words` assigns to the text.
     pub(super) fn one_of<T: Copy>(self, words: &[(&str, T)]) -> Result<T, SceneError> {
         let legal: Vec<&str> = words.iter().map(|(word, _)| *word).collect();
         let wrong = self.must_be(format_args!("one of: {}", legal.join(", ")));
@@ -414,7 +414,7 @@ impl Value<'_> {
         texts.collect()
     }
 
-    /// Returns one text or several.
+    /// Returns the texts of a list, or a single text as a list.
     pub(super) fn one_or_more_texts(self) -> Result<Vec<String>, SceneError> {
         match self.value {
             DeValue::Array(_) => self.texts(),
@@ -437,7 +437,7 @@ impl Value<'_> {
         self.each_in_range(self.numbers()?, &range)
     }
 
-    /// Returns a number in `range` for each axis.
+    /// Returns three numbers in `range`, one for each axis.
     fn axes(self, range: RangeInclusive<f64>) -> Result<[f64; 3], SceneError> {
         self.each_in_range(self.numbers().map_err(|_| self.no_bound())?, &range)
     }
@@ -455,7 +455,7 @@ impl Value<'_> {
         if number.fract() == 0.0 { Ok(number as u32) } else { Err(wrong) }
     }
 
-    /// Returns a list of points, each three numbers in `range`.
+    /// Returns a list of points, each three numbers in `range`; `counts` is the legal number of points.
     pub(super) fn points(
         self,
         range: RangeInclusive<f64>,
@@ -489,7 +489,7 @@ impl Value<'_> {
     }
 }
 
-/// Formats a range for an error or the reference.
+/// Formats a range of legal values for an error or the reference.
 pub(super) fn legal(range: &RangeInclusive<f64>) -> String {
     let (least, most) = (range.start(), range.end());
     if most.is_finite() { format!("{least} to {most}") } else { format!("{least} or more") }

@@ -1,4 +1,4 @@
-//! Reference of every key of a scene, from the reader's own lookups: for the book, and for editors.
+//! Reference of all keys of a scene, generated from the reader's own lookups, for the book and for editors.
 
 use super::Scene;
 use super::reader::{Known, SceneError, Source, Takes, legal};
@@ -34,16 +34,16 @@ at_s = 0
 set = "left.key=0"
 "#;
 
-/// A table of a scene.
+/// Reference of one table of a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SectionReference {
-    /// Name as in a headline; empty for the keys above all tables.
+    /// Name as in a table header, such as `model.mapping`; empty for the keys above all tables.
     pub name: String,
     /// Keys in the order of their lookup.
     pub keys: Vec<KeyReference>,
 }
 
-/// A key of a scene.
+/// Reference of one key of a table.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeyReference {
     /// Name of the key.
@@ -52,7 +52,7 @@ pub struct KeyReference {
     pub takes: String,
 }
 
-/// Returns every table of a scene with every key. Not real-time.
+/// Returns all tables of a scene, sorted by name, with all keys. Not real-time.
 ///
 /// # Errors
 /// None in practice: a test reads it.

@@ -1,4 +1,4 @@
-//! Settings on top of a scene, in the notation of users: `spring.variant=energy`.
+//! Settings that override values of a scene, in command line syntax: `spring.variant=energy`.
 
 use super::{DeviceUse, Location, ModelUse, ParameterText, Scene, did_you_mean, is_named, without_device};
 use std::fmt;
@@ -38,14 +38,15 @@ impl KeyValue {
         (&self.key, &self.value)
     }
 
-    /// Returns the setting without a part before its key: `device.address=usb` of a scene becomes `address=usb` of its device.
+    /// Returns the setting without the prefix `part` of its key, if the key has it: within `device`, `device.address=usb` becomes
+    /// `address=usb`.
     #[must_use]
     pub fn within(&self, part: &str) -> Self {
         let inner = self.key.strip_prefix(part).and_then(|key| key.strip_prefix('.'));
         Self { key: inner.unwrap_or(&self.key).to_owned(), value: self.value.clone() }
     }
 
-    /// Converts the setting to a parameter of a plugin.
+    /// Converts the setting to a parameter of a plugin, with its command line option as location.
     pub fn parameter(&self) -> ParameterText {
         let location = Location { file: PathBuf::from(format!("--set {}", self.key)), line: 0 };
         ParameterText { key: self.key.clone(), value: self.value.clone(), location }
@@ -88,11 +89,11 @@ impl PluginKeyValue {
         (self.plugin, self.setting.key, self.setting.value)
     }
 
-    /// Adds the setting to its target in a scene: a device, a model (on all its devices, or as `MODEL@DEVICE` on one), a plugin's
-    /// id; `device` is every device. Not real-time.
+    /// Adds the setting to the plugins of a scene that it names: a device, a model (`MODEL` on all its devices, `MODEL@DEVICE` on
+    /// one), or a plugin id; `device` names every device. Not real-time.
     ///
     /// # Errors
-    /// Error text if the scene has no such plugin, with the closest name.
+    /// Message with the closest name, if the scene has no such plugin.
     pub fn apply(&self, scene: &mut Scene) -> Result<(), String> {
         let Scene { devices, models, .. } = scene;
         let of_name = |device: &DeviceUse| device.name == self.plugin || self.plugin == "device";
@@ -108,10 +109,10 @@ impl PluginKeyValue {
         self.apply_among(models, &names.collect::<Vec<_>>())
     }
 
-    /// Adds the setting to the models of this name in the scene, or of this plugin id.
+    /// Adds the setting to the models that it names, by name in the scene or by plugin id. Not real-time.
     ///
     /// # Errors
-    /// If no model has that name.
+    /// Message with the closest name, if no model has the name or id.
     pub fn apply_to_models(&self, models: &mut [ModelUse]) -> Result<(), String> {
         self.apply_among(models, &[])
     }

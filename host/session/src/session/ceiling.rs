@@ -1,5 +1,5 @@
-//! Envelopes of the devices, and the ceiling of the host: the largest force for a device that does not declare itself simulated,
-//! unless the user allows more.
+//! Envelopes of the devices, and the ceiling of the host: the largest force and torque of a device that does not declare itself
+//! simulated, unless the user allows more.
 
 use super::prepare::Opened;
 use crate::scene::Scene;
@@ -8,21 +8,21 @@ use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_hal::{Axes, Capabilities, Embodiment};
 use flotor_servo::{Envelope, Guarded};
 
-/// Permitted strength of the devices of a session.
+/// Permitted force and torque of the devices of a session.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Strength {
     /// At most the host's [ceiling](CEILING), except for simulated devices.
     #[default]
     UnderCeiling,
-    /// As strong as scene and device allow: permitted by the user, and not in the scene.
+    /// Up to the limits of scene and device: permitted by the user; a scene cannot permit it.
     Strong,
 }
 
-/// Environment variable that allows strong devices if 1.
+/// Environment variable that permits strong devices if its value is 1.
 const VARIABLE: &str = "FLOTOR_ALLOW_STRONG";
 
 impl Strength {
-    /// Reads the permission from the environment: `FLOTOR_ALLOW_STRONG=1` allows strong devices. Not real-time.
+    /// Reads the permission from the environment variable: `FLOTOR_ALLOW_STRONG=1` permits strong devices. Not real-time.
     #[must_use]
     pub fn of_the_environment() -> Self {
         match std::env::var(VARIABLE).as_deref() {
@@ -32,21 +32,21 @@ impl Strength {
     }
 }
 
-/// Device for which scene and device allow more than the ceiling.
+/// Physical device with force or torque limits, of scene and device together, above the ceiling.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StrongDevice {
     /// Name in the scene.
     pub name: String,
     /// Id of the plugin.
     pub plugin: String,
-    /// Largest force that scene and device allow, N.
+    /// Largest force that scene and device allow in any direction, N.
     pub force_n: f64,
-    /// Largest torque that scene and device allow, N·m.
+    /// Largest torque that scene and device allow about any axis, N·m.
     pub torque_nm: f64,
 }
 
 impl StrongDevice {
-    /// Returns a device that could exceed the ceiling; `None` for any other. Not real-time.
+    /// Returns the entry of a physical device that could exceed the ceiling; `None` for any other device. Not real-time.
     fn of(
         [name, plugin]: [&str; 2],
         embodiment: Embodiment,
@@ -63,7 +63,7 @@ impl StrongDevice {
         })
     }
 
-    /// Returns the notice at the start of a run. Not real-time.
+    /// Returns the notice on this device for the start of a run. Not real-time.
     pub(super) fn notice(&self, strength: Strength) -> String {
         let Ceiling { force_n, torque_nm } = CEILING;
         match strength {
@@ -90,7 +90,7 @@ fn longest(limits: &Limits, device: &Capabilities) -> [f64; 2] {
     [limits.force_n.and(boxes[0]).longest(), limits.torque_nm.and(boxes[1]).longest()]
 }
 
-/// Returns the limits of a device under the ceiling. Not real-time.
+/// Returns the limits of a device: under the ceiling if it is physical, unchanged if it is simulated. Not real-time.
 fn under_ceiling(limits: &Limits, embodiment: Embodiment) -> Limits {
     match embodiment {
         Embodiment::Physical => limits.under(CEILING),
@@ -98,8 +98,8 @@ fn under_ceiling(limits: &Limits, embodiment: Embodiment) -> Limits {
     }
 }
 
-/// Returns a notice if one number as a limit, which held along each axis in earlier versions, limits a device more as a norm. Not
-/// real-time.
+/// Returns a notice if a limit given as one number restricts a device more than in earlier versions: the number now limits the norm,
+/// and limited each axis before. Not real-time.
 fn norm_notice(limits: &Limits, devices: &[Capabilities]) -> Option<String> {
     let forces = devices.iter().map(|device| device.max_force_n);
     let torques = devices.iter().map(|device| device.max_torque_nm);
@@ -115,7 +115,7 @@ fn norm_notice(limits: &Limits, devices: &[Capabilities]) -> Option<String> {
     (!parts.is_empty()).then(|| format!("one number limits the norm, not each axis: {}", parts.join("; ")))
 }
 
-/// Returns the notice about one limit.
+/// Returns the notice about one limit; `None` if it restricts no device more.
 fn changed(key: &str, bound: Bound, devices: impl Iterator<Item = [f64; 3]>, unit: &str) -> Option<String> {
     let most = bound.norm();
     if bound != Bound::ball(most) || most.is_infinite() {
@@ -123,7 +123,7 @@ fn changed(key: &str, bound: Bound, devices: impl Iterator<Item = [f64; 3]>, uni
     }
     let along_each_axis = |device| Bound::box_of([most; 3]).and(Bound::box_of(device)).longest();
     let before = devices.map(along_each_axis).fold(0.0, f64::max);
-    // Rounding at the corner is no change.
+    // Tolerance for the rounding of the norm at a corner of the box.
     (before > most * (1.0 + 1.0e-12)).then(|| {
         format!(
             "in earlier versions `limits.{key} = {most}` allowed up to {before:.2} {unit}, now {most} {unit}; \
@@ -132,9 +132,9 @@ fn changed(key: &str, bound: Bound, devices: impl Iterator<Item = [f64; 3]>, uni
     })
 }
 
-/// Guarded devices of a run.
+/// Devices of a run with their envelopes, and notices about their limits.
 pub(super) struct Guards {
-    /// Devices in the scene's order, under the ceiling.
+    /// Devices in the scene's order, with envelopes under the ceiling.
     pub(super) devices: Vec<Guarded>,
     /// Envelopes of all devices without the ceiling.
     pub(super) strong_envelopes: Vec<Envelope>,

@@ -1,4 +1,4 @@
-//! Errors of a run.
+//! Errors that prevent or end a run.
 
 use super::plugin_report::PluginNames;
 use crate::calls::CallError;
@@ -17,36 +17,37 @@ pub enum RunError {
     /// The scene is not valid.
     #[error(transparent)]
     Scene(#[from] SceneError),
-    /// A plugin is unknown or was rejected.
+    /// A plugin of the scene is unknown or was rejected.
     #[error(transparent)]
     Lookup(#[from] LookupError),
     /// A plugin refused its settings or a call.
     #[error(transparent)]
     Plugin(#[from] LoadError),
-    /// Device and scene do not fit; all mismatches at once.
+    /// Scene and device do not fit; the error lists all mismatches.
     #[error("the scene does not fit the device `{device}`: {}", mismatches.join("; "))]
     Mismatch {
-        /// Id of the device.
+        /// Id of the device's plugin.
         device: String,
         /// Mismatches, each with a remedy.
         mismatches: Vec<String>,
     },
-    /// A plugin did not return from a call before the run.
+    /// A call before the run did not return, was stopped, or had no thread.
     #[error(transparent)]
     Calls(#[from] CallError),
-    /// The servo thread failed.
+    /// The servo thread failed; the text says how.
     #[error("the servo thread {0}; no device was moved")]
     Thread(&'static str),
-    /// The system has no thread for this part of the run.
+    /// The system cannot start the thread for this part of the run.
     #[error("cannot start the thread for {0}, so no device was moved; {THREAD_ADVICE}")]
     NoThread(&'static str),
-    /// The scene requires a stop that does not depend on this process, and there is none.
+    /// The scene requires an independent stop (`require_independent_stop`), and the watchdog process cannot be started.
     #[error(
         "cannot start the watchdog process: {0}; `[limits] require_independent_stop = true` requires this process; \
          correct the cause, or remove that line"
     )]
     WatchdogProcess(std::io::Error),
-    /// Only the watchdog process stops a device when this process is gone, and a kill of one control group ends both.
+    /// Only the watchdog process stops a device after the end of this process, and one kill of their control group ends both
+    /// processes.
     #[error(
         "a kill of the control group `{group}`, as at the end of a service or a container or when memory runs out, leaves the force of \
          `{device}` on: the watchdog process cannot leave that group, and the device has no watchdog of its own; \
@@ -59,40 +60,41 @@ pub enum RunError {
         /// Control group of both processes.
         group: String,
     },
-    /// The emergency stop of the machine is pressed, or was while the run started; nothing was energised.
+    /// The emergency stop of the machine is pressed (with its press), or was pressed while the run started (`None`); nothing was
+    /// energised.
     #[error("{}", latched(.0.as_ref()))]
     Latched(Option<Pressed>),
     /// A call of the loop did not return; the devices are stopped.
     #[error("`{who}` did not return from {} in tick {}{limit}", stuck.place.call(), stuck.tick)]
     Hung {
-        /// Name in the scene, or "device" or "host".
+        /// Name of the plugin in the scene, its number if unknown, or "host".
         who: String,
         /// Tick and place of the call.
         stuck: Stuck,
-        /// The limit that the call has exceeded.
+        /// Limit that the call has exceeded.
         limit: Exceeded,
     },
 }
 
 impl RunError {
-    /// Creates the error of a loop that is stuck in a call, with the plugin that blocks it.
+    /// Creates the error of a loop that is stuck in a call, with the name of the blocking plugin.
     pub(super) fn hung(stuck: Stuck, names: &PluginNames, limit: Exceeded) -> Self {
         Self::Hung { who: names.at(stuck.place), stuck, limit }
     }
 
-    /// Creates the error of a plugin that refused.
+    /// Creates the error of a plugin that refused its settings or a call.
     pub(super) fn refused(metadata: &Metadata, refusal: Refusal) -> Self {
         let Metadata { path, id, .. } = metadata.clone();
         Self::Plugin(LoadError::Refused { path, id, refusal })
     }
 
-    /// Returns true if a stop was requested before the run.
+    /// Returns true if a stop request before the run is the reason.
     #[must_use]
     pub const fn is_stopped(&self) -> bool {
         matches!(self, Self::Calls(CallError::Stopped) | Self::Lookup(LookupError::Calls(CallError::Stopped)))
     }
 
-    /// Returns true if the scene or the command line is wrong, not a plugin.
+    /// Returns true if the scene or the command line is the cause, not a plugin.
     #[must_use]
     pub fn is_configuration(&self) -> bool {
         match self {
@@ -104,7 +106,7 @@ impl RunError {
     }
 }
 
-/// Returns the reason why nothing may be energised, as text.
+/// Formats the reason why nothing may be energised.
 fn latched(pressed: Option<&Pressed>) -> String {
     match pressed {
         Some(pressed) => format!(

@@ -1,4 +1,4 @@
-//! Fit of a scene and its devices, before anything is energised: mismatches and warnings.
+//! Check that a scene fits its devices, before anything is energised: mismatches and warnings.
 
 use super::error::RunError;
 use super::prepare::Opened;
@@ -29,8 +29,8 @@ pub(super) fn warnings(scene: &Scene, opened: &[Opened]) -> Vec<String> {
     torqueless.chain(amplifications(scene)).collect()
 }
 
-/// Returns a warning if models may request torque that the device lacks, unless the scene wants none. No mismatch: a model declares
-/// that it can compute torque, not that it will.
+/// Returns a warning if models may request torque from a device that exerts none, unless the scene limits the torque to zero. It is
+/// no mismatch: a model declares that it can compute torque, not that it will.
 fn without_torque(scene: &Scene, number: u16, device: &Capabilities) -> Option<String> {
     let is_driven = device.actuated != Axes::NONE && !device.actuated.contains(Axes::ROTATION);
     let is_felt = scene.models.iter().any(|model| model.device == number);
@@ -44,7 +44,7 @@ fn without_torque(scene: &Scene, number: u16, device: &Capabilities) -> Option<S
     })
 }
 
-/// Returns a warning for each coupling that amplifies, with the scene's consent.
+/// Returns a warning for each coupling that amplifies energy, which the scene allows.
 fn amplifications(scene: &Scene) -> impl Iterator<Item = String> + '_ {
     let gains = scene.couplings.iter().map(|coupling| (&coupling.name, coupling.ends.energy_gain()));
     gains.filter(|(_, gain)| *gain > 1.0).map(|(name, gain)| {
@@ -55,7 +55,7 @@ fn amplifications(scene: &Scene) -> impl Iterator<Item = String> + '_ {
     })
 }
 
-/// Returns all mismatches of a scene with its device `number`, before anything is energised.
+/// Returns all mismatches of a scene with its device `number`.
 fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: bool) -> Vec<String> {
     let mut mismatches = Vec::new();
     let [slowest, fastest] = device.rate_hz;
@@ -65,7 +65,7 @@ fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: bool) -> Ve
             scene.rate_hz
         ));
     }
-    // Only the first device can set the pace.
+    // Only the first device can pace the loop.
     if scene.pacing == Pacing::Device && number == 0 && !can_pace {
         mismatches.push(
             "the device cannot set the pace of the loop; remove `pacing`, or set `pacing = \"host\"`"
@@ -81,7 +81,7 @@ fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: bool) -> Ve
     mismatches
 }
 
-/// Returns an error text if the boundary's margin leaves no free workspace, but only a spring to the centre.
+/// Returns an error text if the margin of the boundary leaves no workspace without wall force; `None` otherwise.
 fn boundless(boundary: &Boundary, device: &Capabilities) -> Option<String> {
     let narrowest = |range: [f64; 3]| {
         let moving = range.into_iter().filter(|half_side| *half_side > 0.0);
@@ -100,7 +100,8 @@ fn boundless(boundary: &Boundary, device: &Capabilities) -> Option<String> {
     (margin_deg >= range_deg).then(|| says("margin_deg", margin_deg, range_deg, "degrees"))
 }
 
-/// Returns an error text if models may request a force that the device lacks, unless the scene wants none there.
+/// Returns an error text if models may request a force along an axis that the device does not drive, unless the scene limits the
+/// force along this axis to zero.
 fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
     let axes = [(Axes::X, "x"), (Axes::Y, "y"), (Axes::Z, "z")];
     let is_driven = axes.map(|(axis, _)| device.actuated.contains(axis));

@@ -12,25 +12,25 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime};
 
-/// Purpose of the thread without which nothing is energised.
+/// Purpose of the latch's thread, for the error if the thread cannot be started.
 pub(super) const WATCH: &str = "the emergency stop of the machine";
 /// Poll interval of the latch file, for the stops of other runs. The emergency stop of this run wakes the thread at once.
 const POLL: Duration = Duration::from_millis(5);
-/// Timeout for the other runs to confirm an emergency stop.
+/// Timeout for the confirmation of an emergency stop by the other runs.
 const CONFIRM_WAIT: Duration = Duration::from_secs(2);
 
-/// Latch of the machine, with its state when a run began to load.
+/// Emergency stop latch of the machine, with its state when the preparation of a run began.
 #[derive(Clone, Debug)]
 pub struct LatchGuard {
     latch: Latch,
-    /// State at the start. Pressing a pressed latch leaves no trace after a release, so a latch that was pressed at the start
-    /// counts as pressed.
+    /// State at the start of the preparation. A second press of a pressed latch is lost at the release, so a latch that was pressed
+    /// at the start counts as pressed.
     at_start: LatchState,
-    /// Reach of the emergency stop of this run; `None` before the stop.
+    /// Effect of this run's emergency stop on other runs; `None` before the stop.
     reach: Arc<Mutex<Option<StopReach>>>,
 }
 
-/// Reach of an emergency stop beyond its own run.
+/// Effect of an emergency stop on the other runs of this machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StopReach {
     /// Reason why a later run may start, if the latch could not be pressed.
@@ -40,7 +40,8 @@ pub struct StopReach {
 }
 
 impl LatchGuard {
-    /// Creates a guard for which every press counts from now on, even one that is released before the next check. Not real-time.
+    /// Creates a guard of the latch in `directory`. Every press from now on counts, even if it is released before the next check. Not
+    /// real-time.
     #[must_use]
     pub fn of(directory: &Directory) -> Self {
         let latch = directory.latch();
@@ -48,13 +49,14 @@ impl LatchGuard {
         Self { latch, at_start, reach: Arc::default() }
     }
 
-    /// Creates a guard for the folder with the runs of this user. Not real-time.
+    /// Creates a guard of the latch in the run folder of this user. Not real-time.
     #[must_use]
     pub fn of_this_user() -> Self {
         Self::of(&Directory::of_this_user())
     }
 
-    /// Returns a warning, before anything is energised, if an emergency stop of this run will not reach other runs.
+    /// Returns a warning if an emergency stop of this run will not be stored or may not reach other runs; `None` otherwise. To be
+    /// called before anything is energised. Not real-time.
     #[must_use]
     pub fn warning(&self) -> Option<String> {
         let problem = self.latch.problem()?;
@@ -64,7 +66,7 @@ impl LatchGuard {
     /// Checks the latch right before a device is energised, after [`LatchGuard::watch`]. Not real-time.
     ///
     /// # Errors
-    /// [`RunError::Latched`].
+    /// [`RunError::Latched`] if the latch is pressed, or was pressed since the guard was created.
     pub fn check(&self) -> Result<(), RunError> {
         let now = self.latch.state();
         let was_pressed = self.at_start.pressed.is_some() || now.was_pressed_after(&self.at_start);
@@ -75,8 +77,8 @@ impl LatchGuard {
         }
     }
 
-    /// Watches the latch on a thread of its own until the watch is dropped: a press closes the switch, and an emergency stop of the
-    /// switch presses the latch. Not real-time.
+    /// Watches the latch in a separate thread until the returned watch is dropped: a press of the latch triggers the emergency stop
+    /// of `stop`, and any other emergency stop of this run presses the latch. Not real-time.
     ///
     /// # Errors
     /// If the system cannot start a thread.
@@ -92,8 +94,8 @@ impl LatchGuard {
         Ok(LatchWatch { is_over, thread: Some(thread) })
     }
 
-    /// Presses the latch for an emergency stop of this process, and requests all other runs to stop. Only the first call does so;
-    /// later calls return the same reach. Not real-time: waits for the other runs, 2 s at most.
+    /// Presses the latch for an emergency stop of this process, and requests all other runs to stop. Later calls only return the
+    /// result of the first. Not real-time: waits for the other runs, 2 s at most.
     pub fn press(&self, source: EmergencySource) -> StopReach {
         let mut reach = lock(&self.reach);
         let reach = reach.get_or_insert_with(|| {
@@ -108,29 +110,30 @@ impl LatchGuard {
         reach.clone()
     }
 
-    /// Returns the reach of this run's emergency stop; `None` before, and for a stop by another run. Not real-time.
+    /// Returns the effect of this run's emergency stop on other runs; `None` before the stop, and for a stop by another run. Not
+    /// real-time.
     #[must_use]
     pub fn reach(&self) -> Option<StopReach> {
         lock(&self.reach).clone()
     }
 
-    /// Returns the time of a press that is not released. Not real-time.
+    /// Returns the time of the press, if the latch is pressed. Not real-time.
     pub(super) fn pressed_at(&self) -> Option<SystemTime> {
         self.latch.state().pressed.map(|pressed| pressed.at)
     }
 
-    /// Checks the latch, and watches it until the watch is dropped: for devices that move without
-    /// [`Session::run`](super::Session::run). Not real-time.
+    /// Starts to watch the latch, as [`Self::watch`] does, and checks it, as [`Self::check`] does: for devices that are energised
+    /// without [`Session::run`](super::Session::run). Not real-time.
     ///
     /// # Errors
-    /// [`RunError::Latched`], or no thread.
+    /// [`RunError::Latched`] as for [`Self::check`]; [`RunError::NoThread`] if the system cannot start a thread.
     pub fn check_and_watch(&self, stop: &StopSwitch) -> Result<LatchWatch, RunError> {
         let watch = self.watch(stop).map_err(|_| RunError::NoThread(WATCH))?;
         self.check().map(|()| watch)
     }
 
     fn attend(&self, poll: Duration, stop: &StopSwitch, is_over: &AtomicBool) {
-        // A stop of another run waits for this thread.
+        // The emergency stop of another run waits for this thread.
         enter_guard_priority();
         loop {
             let is_last = is_over.load(Ordering::Relaxed);
@@ -152,7 +155,8 @@ impl LatchGuard {
 }
 
 impl StopReach {
-    /// Returns the reasons why the stop has not reached every run, now and later; `None` if it has.
+    /// Returns a message with the runs that have not confirmed the stop and the reason why later runs may start; `None` if all runs
+    /// are stopped and no later run can start.
     #[must_use]
     pub fn problem(&self) -> Option<String> {
         let mut problems = Vec::new();
@@ -185,7 +189,7 @@ impl Display for StopReach {
     }
 }
 
-/// The thread that watches a latch; it ends when dropped.
+/// Handle of the thread that watches a latch; dropping the handle stops and joins the thread.
 #[derive(Debug)]
 pub struct LatchWatch {
     is_over: Arc<AtomicBool>,

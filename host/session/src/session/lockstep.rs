@@ -1,4 +1,4 @@
-//! Run on the virtual clock that the caller advances, tick by tick, and that ends with the usual outcome.
+//! Run on the virtual clock that the caller advances tick by tick, with the outcome of a whole run.
 
 use super::controls::ChangeLog;
 use super::observer::Taps;
@@ -11,7 +11,7 @@ use flotor_hal::Demand;
 use flotor_hal::abi::loader::Stopper;
 use flotor_servo::{Loop, RealTimeReport, RunEnd, Schedule, StopSwitch};
 
-/// Run that the caller advances. If it is dropped before its end, the devices are stopped.
+/// Run that the caller advances tick by tick. Dropping it stops the devices.
 pub struct Lockstep {
     runner: Loop,
     controls: Controls,
@@ -32,11 +32,11 @@ impl Drop for Stoppers {
 }
 
 impl Session {
-    /// Converts the session to a run with one tick for each call of [`Lockstep::advance`], on the virtual clock whatever the
-    /// session's clock: without waiting, and repeatable. Not real-time.
+    /// Energises the devices and returns a run with one tick for each call of [`Lockstep::advance`]. The run is on the virtual clock,
+    /// even if the session was prepared for the real clock: without waiting, and repeatable. Not real-time.
     ///
     /// # Errors
-    /// [`RunError`] if a device refuses to be energised; then none is.
+    /// [`RunError`] if a device refuses to be energised; then no device is energised.
     pub fn into_lockstep(self) -> Result<Lockstep, RunError> {
         let epilogue = self.epilogue(EndReserve::default());
         let Session { prepared, controls, changes, .. } = self;
@@ -49,8 +49,8 @@ impl Session {
 }
 
 impl Lockstep {
-    /// Runs one tick; passes the changes before the tick, and the tick's records, to the observer. Returns the end of the run once
-    /// it has ended. Not real-time: the observer is not.
+    /// Runs one tick; passes the changes before the tick, and the tick's records, to the observer. Returns the end of the run once it
+    /// has ended, `None` before. Not real-time: calls the observer.
     pub fn advance(&mut self, observer: &mut dyn Observer, stop: &StopSwitch) -> Option<RunEnd> {
         let Self { runner, controls, changes, taps, requested, .. } = self;
         if runner.end().is_some() {

@@ -1,4 +1,4 @@
-//! Session: loads the plugins of a scene, pairs them, runs the loop, and gives observers and controls access.
+//! Session: loads the plugins of a scene, opens devices and creates models, runs the loop, and connects observers and controls.
 
 mod ceiling;
 mod controls;
@@ -61,16 +61,16 @@ use schedule::{Scheduled, schedule};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Options of a run.
+/// Options of a run that are not in its scene.
 #[derive(Clone, Debug)]
 pub struct RunOptions {
-    /// Real or virtual clock.
+    /// Clock of the loop, real or virtual.
     pub clock: Clock,
-    /// Seed of all random numbers.
+    /// Seed of all random numbers of the run, and of the choice among alternatives in the scene.
     pub seed: u64,
 }
 
-/// A scene ready to run: everything loaded, paired and opened, nothing energised.
+/// Scene that is ready to run: plugins loaded, devices open, models created, no device energised.
 pub struct Session {
     prepared: PreparedLoop,
     clock: Clock,
@@ -88,7 +88,8 @@ pub struct Session {
 }
 
 impl Session {
-    /// Loads, checks and opens the plugins of a scene, and energises none. Not real-time.
+    /// Loads the plugins of a scene, opens its devices, creates its models and checks that they fit; energises no device. On the real
+    /// clock also starts the watchdog process. Not real-time; runs plugin code.
     ///
     /// # Errors
     /// [`RunError`].
@@ -123,7 +124,7 @@ impl Session {
         let [ramp_ns, watchdog_ns] =
             [scene.limits.ramp_s, scene.limits.watchdog_s].map(|seconds| whole_ns(seconds * 1.0e9));
         let capabilities: Vec<_> = opened.iter().map(|opened| opened.capabilities).collect();
-        // A partner on another host is monitored like the loop itself.
+        // A partner on another host has the same timeout as the loop.
         let timeouts = LinkTimeouts { silence_ns: watchdog_ns, fade_ns: ramp_ns };
         let (couplings, lines) = couple(scene, &capabilities, config.period_ns, timeouts);
         let Guards { devices, strong_envelopes, strong_devices, notices } =
@@ -165,8 +166,8 @@ impl Session {
         Ok(session.with_strength(Strength::of_the_environment()))
     }
 
-    /// Lifts the host's ceiling: the devices are as strong as they and the scene allow. Only a user who knows the device should
-    /// decide so; a scene cannot. Not real-time.
+    /// Lifts the host's ceiling on force and torque: only the limits of scene and device apply. Only a user who knows the device
+    /// should decide this; a scene cannot. Not real-time.
     #[must_use]
     pub fn allow_strong(mut self) -> Self {
         self.prepared.standby.guard_with(std::mem::take(&mut self.strong_envelopes));
@@ -183,7 +184,7 @@ impl Session {
         }
     }
 
-    /// Returns the devices that would get more without the host's ceiling, in the scene's order; none once the ceiling is
+    /// Returns the devices whose force or torque the host's ceiling limits, in the scene's order; empty once the ceiling is
     /// [lifted](Self::allow_strong).
     #[must_use]
     pub fn held_back(&self) -> &[StrongDevice] {
@@ -200,37 +201,40 @@ impl Session {
         self.limit_notices.iter().cloned().chain(strong).collect()
     }
 
-    /// Returns the warnings collected during preparation, a sentence each.
+    /// Returns the warnings of the preparation, a sentence each.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// Pins the loop to this core, on the real clock.
+    /// Sets the core to which the loop's thread is pinned on the real clock; `None` pins it to no core.
     #[must_use]
     pub fn on_core(mut self, core: Option<Core>) -> Self {
         self.real_clock.core = core;
         self
     }
 
-    /// Uses the latch of another folder than that of this user's runs, from now on.
+    /// Uses the latch in `directory` in place of the latch of this user; presses count from this call on. No effect on the virtual
+    /// clock.
     #[must_use]
     pub fn latched_in(mut self, directory: &Directory) -> Self {
         self.real_clock.latch = self.real_clock.latch.map(|_| LatchGuard::of(directory));
         self
     }
 
-    /// Returns the latch that stops this run and that its emergency stop presses; `None` on the virtual clock, where no hand is held.
+    /// Returns the latch of the machine: a press stops this run, and an emergency stop of this run presses it. `None` on the virtual
+    /// clock, where no hand is on a device.
     #[must_use]
     pub fn latch(&self) -> Option<&LatchGuard> {
         self.real_clock.latch.as_ref()
     }
 
-    /// Returns the servo with its devices energised, for a caller that paces the loop differently; the stoppers must be used before
-    /// the servo is dropped. Not real-time.
+    /// Energises the devices and returns the servo and the stoppers of its devices, for a caller that paces the loop itself; the
+    /// caller must stop the devices before dropping the servo. Not real-time.
     ///
     /// # Errors
-    /// [`RunError::Plugin`] if a device refuses, [`RunError::Latched`]; then none is energised.
+    /// [`RunError::Latched`] if the emergency stop of the machine is pressed, [`RunError::Plugin`] if a device refuses; then no
+    /// device is energised.
     pub fn into_loop(self) -> Result<(Servo, Vec<Stopper>), RunError> {
         self.latch().map_or(Ok(()), LatchGuard::check)?;
         let PreparedLoop { standby, plugins, .. } = self.prepared;
@@ -238,23 +242,24 @@ impl Session {
         Ok((activate(standby, &plugins)?, stoppers))
     }
 
-    /// Returns the core for the loop, if one is named.
+    /// Returns the core to which the loop's thread is pinned; `None` if no core was set.
     pub fn core(&self) -> Option<Core> {
         self.real_clock.core
     }
 
-    /// Returns the nominal time between ticks, ns.
+    /// Returns the nominal period of the loop, ns.
     pub fn period_ns(&self) -> u64 {
         self.prepared.period_ns
     }
 
-    /// Returns the plugins of this run with the values of all parameters.
+    /// Returns the plugins of this run with the values of all parameters: devices, then models, in the scene's order.
     #[must_use]
     pub fn plugins(&self) -> &[PluginReport] {
         &self.prepared.plugins
     }
 
-    /// Returns the largest wrench that may reach a hand at any device: the tighter limit of scene and device.
+    /// Returns the largest force, N, and torque, N·m, that may reach a hand at any device, along each axis and as a norm; `None`:
+    /// unlimited.
     #[must_use]
     pub fn limits(&self) -> WrenchLimits {
         let finite = |limit: f64| limit.is_finite().then_some(limit);
@@ -264,20 +269,21 @@ impl Session {
         WrenchLimits { force_n, torque_nm, force_norm_n, torque_norm_nm }
     }
 
-    /// Returns the couplings with a remote end, by name, each with the line for its peer state. Returned once; an end without a
-    /// connected line gets no peer state and requests no force.
+    /// Removes and returns the lines of the couplings with a remote end, each with the name of its coupling; a line transports the
+    /// peer state. Without a connected line the local end receives no peer state and requests no force.
     #[must_use]
     pub fn take_lines(&mut self) -> Vec<(String, Line)> {
         std::mem::take(&mut self.lines)
     }
 
-    /// Creates a tap for the newest record of a device, as soon as its tick is over: for a program that runs along. Not real-time.
+    /// Creates a tap: a concurrent program reads the newest record of the device from it, without waiting. The loop publishes a
+    /// record as soon as its tick is over. Not real-time.
     #[must_use]
     pub fn tap(&mut self, device: u16) -> Tap {
         self.prepared.taps.add(device)
     }
 
-    /// Returns the demand of further observers for model outputs, beside the observer of the run.
+    /// Returns the handle with which observers other than the observer of the run request model outputs.
     #[must_use]
     pub fn observers(&self) -> ObserverDemand {
         self.prepared.standby.observers()
@@ -295,11 +301,13 @@ impl Session {
         self.controls.clone()
     }
 
-    /// Runs until the duration is over, `stop` is used, or the device faults.
+    /// Energises the devices, runs the loop until the duration is over, `stop` requests an end, or a device faults, then de-energises
+    /// the devices and returns the outcome. The observer is called in the calling thread. Not real-time.
     ///
     /// # Errors
-    /// [`RunError::Plugin`] if a device refuses to be energised, [`RunError::NoThread`] if the system has no thread for a part of
-    /// the run, [`RunError::Hung`] if the loop does not return: its thread is abandoned then, and the process should end soon.
+    /// [`RunError::Latched`] if the emergency stop of the machine is pressed, [`RunError::Plugin`] if a device refuses to be
+    /// energised, [`RunError::NoThread`] if the system cannot start a thread for a part of the run, [`RunError::Calls`] or
+    /// [`RunError::Hung`] if a plugin call does not return: its thread is abandoned then, and the process should end soon.
     pub fn run(self, observer: &mut dyn Observer, stop: &StopSwitch) -> Result<Outcome, RunError> {
         let reserve = EndReserve::take().map_err(|_| RunError::NoThread("the end of the run"))?;
         let epilogue = self.epilogue(reserve);
@@ -311,7 +319,7 @@ impl Session {
         Ok(epilogue.conclude(finished))
     }
 
-    /// Collects the data from the beginning of this run that its end needs.
+    /// Collects the data from the start of this run that its end needs.
     fn epilogue(&self, reserve: EndReserve) -> Epilogue {
         Epilogue {
             reserve,
@@ -324,7 +332,7 @@ impl Session {
     }
 }
 
-/// Creates the couplings of a scene; returns the coupling and, by name, the line of each remote end.
+/// Creates the couplings of a scene; returns them, and the name and line of each coupling with a remote end.
 fn couple(
     scene: &Scene,
     capabilities: &[Capabilities],

@@ -1,15 +1,15 @@
-//! Observers of a run: of every tick, or of the newest one.
+//! Observers of a run: [`Observer`] receives every tick, [`Tap`] reads the newest.
 
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
 use flotor_core::{Change, ModelOutputs};
 use flotor_hal::{Demand, Pose, Twist, Wrench};
 
-/// Observer of every tick, off the loop.
+/// Observer of all records and changes of a run; on the real clock called outside the loop's thread.
 pub trait Observer {
     /// Receives the record of a tick at one device: tick after tick, and within a tick device after device. Not real-time.
     fn observe(&mut self, record: &TickRecord);
 
-    /// Receives a change of a parameter, before the first tick with the new value. Not real-time.
+    /// Receives a change of a parameter, a weight or a model, before the record of the first tick with the change. Not real-time.
     fn change(&mut self, _change: &Change) {}
 
     /// Returns the model outputs that the observer reads; the loop computes the others only where the hand feels them. Called
@@ -19,7 +19,8 @@ pub trait Observer {
     }
 }
 
-/// The newest record of a device, for another thread: version 0 is a device at home before the first tick. Read without waiting.
+/// Reader of the newest record of a device, for another thread, without waiting. Version 0, before the first tick, is a device at
+/// rest at home.
 pub type Tap = flotor_sync::Observer<TickRecord, RECORD_WORDS>;
 
 /// Initial record: device at home.
@@ -40,7 +41,7 @@ const AT_HOME: TickRecord = TickRecord {
     compute_ns: 0,
 };
 
-/// Loop sides of the taps, each with its device number.
+/// Publishers of the taps, in the loop's thread, each with its device number.
 #[derive(Default)]
 pub(super) struct Taps(Vec<(u16, flotor_sync::Publisher<TickRecord, RECORD_WORDS>)>);
 
@@ -52,7 +53,7 @@ impl Taps {
         tap
     }
 
-    /// Publishes a record as the newest of its device. Real-time: bounded, no allocation.
+    /// Publishes a record to the taps of its device. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn publish(&mut self, record: &TickRecord) {
         let taps = self.0.iter_mut().filter(|(device, _)| *device == record.device);

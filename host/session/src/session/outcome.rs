@@ -1,4 +1,4 @@
-//! Outcome of a run, and its end: de-energises the devices and queries the last messages of the models.
+//! Outcome of a run, and the steps after its last tick: de-energises the devices and queries the last messages of the models.
 
 use super::controls::Settled;
 use super::plugin_report::PluginNames;
@@ -13,21 +13,21 @@ use flotor_servo::{
 };
 use std::time::Instant;
 
-/// Outcome of a run.
+/// Outcome of a run: end, statistics, and faults of devices and models.
 pub struct Outcome {
-    /// End of the run.
+    /// Reason why the run ended.
     pub end: RunEnd,
     /// Timing statistics of the loop.
     pub timing: Timing,
     /// Time from the first deadline to the end of the last period, ns (virtual clock: virtual time).
     pub elapsed_ns: u64,
-    /// Wall-clock time, s.
+    /// Wall-clock time from the start of the run to its outcome, s.
     pub wall_s: f64,
-    /// Ticks whose records were dropped because an observer was too slow (real clock only).
+    /// Number of records dropped because an observer was too slow (real clock only).
     pub dropped_records: u64,
-    /// Privileges that the system granted.
+    /// Real-time privileges that the system granted or refused.
     pub real_time: RealTimeReport,
-    /// Duration of the emergency stop, if there was one (real clock only).
+    /// Duration of the emergency stop; `None` without an emergency stop, and on the virtual clock.
     pub stop_time: Option<StopTime>,
     /// Outcomes of the devices, in the scene's order.
     pub devices: Vec<DeviceOutcome>,
@@ -35,27 +35,27 @@ pub struct Outcome {
     pub couplings: Vec<CouplingOutcome>,
     /// Name, health and last message of each model that the run began with.
     pub models: Vec<(String, ModelHealth, String)>,
-    /// Replacements with faults.
+    /// Replacements of models that had faults.
     pub faulty_plugins: Vec<FaultyPlugin>,
     /// Replacements in place at the end, after a hot swap; not those that the seed chose among several.
     pub replacements: Vec<PluginReport>,
-    /// Warnings for users, a sentence each: first those known before the run.
+    /// Warnings for users, a sentence each; the warnings known before the run come first.
     pub warnings: Vec<String>,
-    /// Number of warnings that were shown before the run or at once.
+    /// Number of warnings that have been shown already.
     known_before: usize,
-    /// The first plugin that did not return from a call right after the run.
+    /// First plugin that did not return from a call after the run; `None` if all returned.
     pub unresponsive: Option<Unresponsive>,
     /// Plugin instances left to free. Free or drop them last: plugin code may hang.
     pub unfreed_plugins: UnfreedPlugins,
 }
 
 impl Outcome {
-    /// Returns the warnings that came up in the run.
+    /// Returns the warnings that arose during the run and have not been shown.
     #[must_use]
     pub fn later_warnings(&self) -> &[String] {
         self.warnings.get(self.known_before..).unwrap_or_default()
     }
-    /// Returns the outcome of a run whose loop did not return, from the stuck place and the time observed, ns.
+    /// Returns the outcome of a run whose loop is stuck at `stuck`, after `elapsed_ns` of observed run time.
     #[must_use]
     pub fn of_hung_loop(stuck: Stuck, elapsed_ns: u64) -> Self {
         Self {
@@ -78,7 +78,7 @@ impl Outcome {
         }
     }
 
-    /// Returns the number of the faulted device and its last message.
+    /// Returns number and last message of the first device with a fault; `None` without a fault.
     #[must_use]
     pub fn faulted(&self) -> Option<(usize, &str)> {
         let mut devices = self.devices.iter().enumerate();
@@ -87,22 +87,22 @@ impl Outcome {
     }
 }
 
-/// Outcome of a device after a run.
+/// Outcome of one device of a run.
 #[derive(Clone, Debug)]
 pub struct DeviceOutcome {
-    /// First fault, reported by the device or found by the host.
+    /// First fault, reported by the device or detected by the host; `None` without a fault.
     pub fault: Option<Fault>,
-    /// Implausible samples of the device.
+    /// Counts of implausible samples of the device, by reason.
     pub implausible: ImplausibleSamples,
     /// Effects of the envelope's passivity controller and slew limit.
     pub effects: EnvelopeEffects,
-    /// Problem with samples or commands of the device, found by the host.
+    /// Problem with samples or commands of the device that the host detected; `None` without a problem.
     pub problem: Option<String>,
-    /// Energy balance of the device itself, if it keeps one.
+    /// Energy balance kept by the device itself; `None` if it keeps none.
     pub ledger: Option<EnergyLedger>,
-    /// Last message of the device, or the problem that the host found; empty without either.
+    /// Problem that the host found, or else the last message of the device; may be empty.
     pub words: String,
-    /// Calls that changed the floating-point environment of the loop's thread; the host restored it each time.
+    /// Number of calls that changed the floating-point environment of the loop's thread; the host restored it each time.
     pub float_changes: u64,
 }
 
@@ -115,7 +115,7 @@ pub(super) struct Finished {
     pub(super) real_time: RealTimeReport,
     /// `None` without an emergency stop on the real clock.
     pub(super) stop_time: Option<StopTime>,
-    /// Warning for users, which was shown already.
+    /// Warning for users that was shown already.
     pub(super) warning: Option<String>,
 }
 
@@ -126,7 +126,7 @@ impl Finished {
     }
 }
 
-/// Data from the beginning of a run that its end needs.
+/// Data from the start of a run that its end needs.
 pub(super) struct Epilogue {
     pub(super) started: Instant,
     pub(super) warnings: Vec<String>,
@@ -153,7 +153,7 @@ impl Epilogue {
             closing.extend(opened.map(|opened| (name.clone(), opened)));
         }
         let couplings = forces.coupling_outcomes();
-        // Replacements that no tick will apply any more.
+        // Replacements that were scheduled and not applied.
         let waiting = swaps.into_layers().into_iter();
         let (layers, reports) =
             last_words(&mut calls, &names, (forces, controls.take_retired()), &mut unresponsive);
@@ -194,7 +194,7 @@ impl Epilogue {
     }
 }
 
-/// De-energises a stopped device; returns its outcome, and the device unless its plugin failed or hangs.
+/// De-energises a stopped device; returns its outcome, and the opened device unless its plugin failed or hangs.
 fn deactivate(
     calls: &mut CallThread,
     name: &str,
@@ -226,8 +226,8 @@ fn deactivate(
 /// Layers, each with its model number.
 type Layers = Vec<(usize, Box<Layer>)>;
 
-/// Returns reports on the layers in the loop and on those that it returned, with the last messages of unhealthy ones; and the
-/// layers, unless a call hangs.
+/// Returns the layers, both of the loop and returned by it, and a report on each, with the last message of unhealthy models; returns
+/// nothing if a call hangs.
 fn last_words(
     calls: &mut CallThread,
     names: &PluginNames,
@@ -252,7 +252,7 @@ fn last_words(
     })
 }
 
-/// Records the first plugin that did not return.
+/// Records the plugin that did not return, unless one is recorded already.
 fn note(error: CallError, unresponsive: &mut Option<Unresponsive>) {
     if let CallError::Unresponsive(hung) = error {
         unresponsive.get_or_insert(hung);

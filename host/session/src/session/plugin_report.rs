@@ -1,4 +1,4 @@
-//! Plugins of a run, for reports, and their names, for errors.
+//! Reports on the plugins of a run, and their names for errors.
 
 use crate::scene::Isolation;
 use flotor_core::PluginIndex;
@@ -8,37 +8,38 @@ use flotor_hal::{Demand, Embodiment, Parameter, SoftRange};
 use flotor_servo::Place;
 use flotor_servo::last_stop::TakenSignals;
 
-/// A plugin in a run, for reports and recordings.
+/// Report on a plugin of a run: metadata, parameters and properties, for summaries and recordings.
 #[derive(Clone, Debug)]
 pub struct PluginReport {
-    /// Name in the scene, of device or model.
+    /// Name of the device or model in the scene.
     pub name: String,
-    /// Metadata of the plugin.
+    /// Metadata of the plugin: id, kind, version and file.
     pub metadata: Metadata,
-    /// Parameters of the plugin.
+    /// Descriptions of the plugin's parameters.
     pub schema: &'static [Parameter],
-    /// Settings of scene and command line, as written, in order.
+    /// Parameters set in the scene and on the command line, as id and value, as written and in order.
     pub settings: Vec<(String, String)>,
-    /// Every parameter with its value before the run, as text.
+    /// Id of every parameter with its value before the run, as text.
     pub parameters: Vec<(String, String)>,
-    /// Range of each parameter for changes by hand; `None` for a parameter that is no number.
+    /// Soft range of each parameter, which bounds the rate of its changes; `None` for a parameter that is not a number, and for all
+    /// parameters of a simulated device.
     pub soft_ranges: Vec<Option<SoftRange>>,
-    /// Embodiment of a device; `None` for a model.
+    /// Embodiment of a device, physical or simulated; `None` for a model.
     pub embodiment: Option<Embodiment>,
     /// Latency that a device declares, s; 0 for a model.
     pub latency_s: f64,
-    /// Model outputs that reach the hand at a device.
+    /// Model outputs that reach the hand: at a device force, and torque if device and scene allow any; at a model the whole wrench.
     pub at_hand: Demand,
-    /// Isolation of a model, resolved by its origin; `None` for a device.
+    /// Isolation of a model, with `ByOrigin` resolved; `None` for a device.
     pub isolation: Option<Isolation>,
-    /// Signals of the host that the plugin took during its creation, restored since.
+    /// Signals of the host whose actions the plugin replaced, or which it blocked, while it was created; the host has restored them.
     pub signals_taken: TakenSignals,
-    /// Error estimates of a model ([`crate::estimates`]), by name.
+    /// Error estimates of a model ([`crate::estimates`]): id and value of each.
     pub estimates: Vec<(String, f64)>,
 }
 
 impl PluginReport {
-    /// Returns a warning if the plugin took signals of the host.
+    /// Returns a warning if the plugin has replaced or blocked signals of the host.
     pub(super) fn warning(&self) -> Option<String> {
         let Self { name, signals_taken, .. } = self;
         (!signals_taken.is_none()).then(|| {
@@ -47,7 +48,7 @@ impl PluginReport {
     }
 }
 
-/// Names of the plugins of a run in its scene.
+/// Names, in the scene, of the plugins of a run.
 #[derive(Clone)]
 pub(super) struct PluginNames {
     names: Vec<String>,
@@ -71,7 +72,7 @@ impl PluginNames {
         self.names.get(self.devices..).unwrap_or_default()
     }
 
-    /// Returns the name of a plugin; its number, if the run has fewer plugins.
+    /// Returns the name of a plugin, or its number as text if the run has fewer plugins.
     pub(super) fn name(&self, plugin: PluginIndex) -> String {
         self.names.get(plugin.position()).cloned().unwrap_or_else(|| plugin.to_string())
     }

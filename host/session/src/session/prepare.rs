@@ -31,7 +31,7 @@ fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plu
 /// Checks that the plugins of a scene exist, without running their code. Not real-time.
 ///
 /// # Errors
-/// [`RunError`], with the line of the scene.
+/// [`RunError`] for the first plugin that is unknown, of the wrong kind or unreadable, with the line of the scene.
 pub fn check_plugins(scene: &Scene, registry: &Registry) -> Result<(), RunError> {
     let devices = scene.devices.iter().map(|device| (&device.plugin, PluginKind::Device));
     let models = scene.models.iter().map(|model| (&model.plugin, PluginKind::Model));
@@ -47,7 +47,7 @@ fn not_found(plugin: &PluginUse, error: LookupError) -> RunError {
     }
 }
 
-/// Passes the scene's calibration to the device that it was measured on. Not real-time.
+/// Loads a calibration file, checks that it was made for this device, and passes the calibration to the device. Not real-time.
 fn calibrate(
     plugin: &Plugin,
     device: &mut OpenedDevice,
@@ -61,16 +61,16 @@ fn calibrate(
     device.calibrate_vertical(&curve).map_err(|refusal| RunError::refused(plugin.metadata(), refusal))
 }
 
-/// Opened device, not energised.
+/// Open device, not energised, with its capabilities.
 pub(super) struct Opened {
     pub(super) device: OpenedDevice,
     pub(super) capabilities: Capabilities,
     pub(super) embodiment: Embodiment,
-    /// Stop of the device after the end of this process.
+    /// Means that stop the device after the end of this process.
     pub(super) stop: StopWithoutHost,
 }
 
-/// Loads and opens the devices of a scene. Not real-time.
+/// Loads the device plugins of a scene and opens the devices. Not real-time.
 pub(super) fn open_devices(
     registry: &Registry,
     scene: &Scene,
@@ -111,10 +111,10 @@ fn open_device(registry: &Registry, device: &DeviceUse) -> Result<(Opened, Plugi
     Ok((Opened { device, capabilities, embodiment, stop }, report))
 }
 
-/// Loads one model of a scene and creates it in all its places. Not real-time.
+/// Loads the plugin of a model and creates an instance at each of the model's positions. Not real-time; runs the plugin's code.
 ///
 /// # Errors
-/// [`RunError`]: the plugin is unknown, was rejected, refused, or does not return.
+/// [`RunError`]: the plugin is unknown or was rejected, refused its settings, or did not return.
 pub fn prepare_model(
     registry: &Registry,
     model: &ModelUse,
@@ -124,7 +124,7 @@ pub fn prepare_model(
     prepare_model_while(registry, model, config, clock, is_to_begin)
 }
 
-/// Prepares a model like [`prepare_model`], but only while it is wanted.
+/// Prepares a model as [`prepare_model`] does, but waits only while `is_wanted` returns true.
 pub(super) fn prepare_model_while(
     registry: &Registry,
     model: &ModelUse,
@@ -159,8 +159,8 @@ pub(super) fn prepare_model_while(
     Ok((layer, report))
 }
 
-/// Returns a scene with the latencies of its open devices, and without isolation by origin where no hand is: on the virtual clock
-/// and on simulated devices.
+/// Returns the scene with the latencies of its open devices, and without isolation by origin where no hand is at risk: on the virtual
+/// clock and on simulated devices.
 pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
     let mut scene = scene.clone();
     for model in &mut scene.models {
@@ -177,7 +177,7 @@ pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
 /// Layers of a scene's models, each with its device number, and reports on their plugins.
 type Models = (Vec<(usize, Layer)>, Vec<PluginReport>);
 
-/// Loads the models of a scene and creates each in all its places. Not real-time.
+/// Loads the models of a scene and creates an instance at each position of each model. Not real-time.
 pub(super) fn prepare_models(
     registry: &Registry,
     scene: &Scene,
@@ -191,13 +191,13 @@ pub(super) fn prepare_models(
     scene.models.iter().map(prepare).collect()
 }
 
-/// Time for ending a worker whose model was not created in time.
+/// Additional time for ending a worker whose model was not created in time.
 const END_OF_A_WORKER: Duration = Duration::from_secs(10);
 
-/// Most instances of a model that get a process each without the scene's explicit request.
+/// Largest number of instances of a model that get a process each without the scene's explicit request.
 const MAX_PROCESSES: usize = 64;
 
-/// Resolves the isolation of a model by its origin.
+/// Resolves the isolation of a model by its origin; returns an error if too many instances would need a process each.
 fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolation, SceneError> {
     let is_outside = clock == Clock::Real && !is_installed(&plugin.path);
     match model.isolation {
@@ -229,7 +229,8 @@ struct ModelBuilder {
 }
 
 impl ModelBuilder {
-    /// Creates the model in all its places; returns it with the values of its parameters and its error estimates. Runs the plugin's code.
+    /// Creates an instance of the model at each of its positions; returns the layer with the model's parameter values and error
+    /// estimates. Runs the plugin's code.
     fn layer(&self, progress: &Progress) -> Result<(Layer, Vec<f64>, Estimates), RunError> {
         let Self { plugin, model, config, clock, .. } = self;
         let budget_ns = budget_ns(model, *clock, config.period_ns);
@@ -265,7 +266,7 @@ impl ModelBuilder {
         Ok((Layer::new(instances, &model.blend, budget, &sampled), values, estimates))
     }
 
-    /// Creates one instance: in the loop, in a worker, or asynchronous.
+    /// Creates and prepares one instance: in the loop, in a worker, or asynchronous.
     fn engine(&self, budget_ns: Option<u64>, progress: &Progress) -> Result<Engine, RunError> {
         let Self { isolation, plugin, settings, model, config, clock } = self;
         let no = |refusal| RunError::refused(plugin.metadata(), refusal);
@@ -280,7 +281,7 @@ impl ModelBuilder {
                     plugin: &plugin.metadata().path,
                     sets: keys.zip(values).collect(),
                     config: field.map_or(*config, |field| AsynchronousModel::config(field, config)),
-                    // The loop does not wait for a field.
+                    // The loop does not wait for an asynchronous model.
                     timeout_ns: in_the_loop.unwrap_or(PATIENCE_NS),
                     create_timeout: limit(),
                 };
@@ -309,11 +310,11 @@ fn complain(model: &ModelUse, problem: &str) -> SceneError {
     model.plugin.location.problem(format!("[{}] {problem}", model.name))
 }
 
-/// Timeout of a worker on the virtual clock, ns.
+/// Timeout of a worker without a time limit for its steps (virtual clock, asynchronous model), ns.
 const PATIENCE_NS: u64 = 2_000_000_000;
 
-/// Returns the time limit of a step of a model, ns. On the virtual clock only if the scene sets one: the wall clock would make two
-/// runs differ.
+/// Returns the time limit of a step of a model, ns; `None` on the virtual clock unless the scene sets a limit: a limit on wall-clock
+/// time would make two runs differ.
 fn budget_ns(model: &ModelUse, clock: Clock, period_ns: u64) -> Option<u64> {
     let set_ns = model.budget_s.map(|seconds| whole_ns(seconds * 1.0e9));
     let usual_ns = match clock {
@@ -323,7 +324,7 @@ fn budget_ns(model: &ModelUse, clock: Clock, period_ns: u64) -> Option<u64> {
     set_ns.or(usual_ns)
 }
 
-/// Checks settings against the plugin's schema; errors name file and line.
+/// Parses settings and checks them against the plugin's schema; errors name file and line.
 fn settings(plugin: &Plugin, name: &str, parameters: &[ParameterText]) -> Result<Vec<Setting>, SceneError> {
     let schema = plugin.parameters();
     let check = |parameter: &ParameterText| {
@@ -334,7 +335,8 @@ fn settings(plugin: &Plugin, name: &str, parameters: &[ParameterText]) -> Result
     parameters.iter().map(check).collect()
 }
 
-/// Returns the value for the plugin: a file is relative to the scene that names it, or to the working folder on a command line.
+/// Returns the value for the plugin. A file named in a scene is resolved against the folder of the scene file; a file on the command
+/// line stays relative to the working directory.
 fn from_the_scene<'t>(schema: &[Parameter], text: &'t ParameterText) -> Cow<'t, str> {
     let ParameterText { key, value, location } = text;
     let parameter = schema.iter().find(|parameter| parameter.id() == key);
@@ -376,8 +378,8 @@ fn report(
     }
 }
 
-/// Returns the range of each parameter for changes by hand, at its present value. No hand is on a simulated device: its numbers
-/// change at once.
+/// Returns the soft range of each parameter at its current value; `None` for all parameters of a simulated device, which change at
+/// once because no hand is on the device.
 fn soft_ranges(plugin: &Plugin, values: &[(String, String)]) -> Vec<Option<SoftRange>> {
     if plugin.device_info().is_some_and(|info| info.embodiment() == Embodiment::Simulated) {
         return vec![None; values.len()];
@@ -386,7 +388,7 @@ fn soft_ranges(plugin: &Plugin, values: &[(String, String)]) -> Vec<Option<SoftR
     values.iter().map(number).enumerate().map(|(index, value)| plugin.soft_range(index, value)).collect()
 }
 
-/// Returns every parameter with its value, as text.
+/// Returns the id of every parameter with its current value, as text.
 fn in_force(plugin: &Plugin, settings: &[Setting], values: &[f64]) -> Vec<(String, String)> {
     let schema = plugin.parameters();
     let show = |(index, parameter): (usize, &Parameter)| {

@@ -17,7 +17,8 @@ pub(super) struct PreparedLoop {
     pub(super) duration_ns: u64,
 }
 
-/// Energises the devices of a run right before its first tick, each within a time limit. Not real-time.
+/// Energises the devices of a run right before its first tick, with a time limit for each; stops the devices if a call does not
+/// return. Not real-time.
 pub(super) fn activate(standby: Standby, plugins: &[PluginReport]) -> Result<Servo, RunError> {
     let (plugins, stoppers) = (plugins.to_vec(), standby.stoppers());
     let activate = move |progress: &Progress| activate_here(standby, &plugins, progress);
@@ -26,7 +27,7 @@ pub(super) fn activate(standby: Standby, plugins: &[PluginReport]) -> Result<Ser
     activated.inspect(Servo::register_loop_thread)
 }
 
-/// Energises the devices on this thread, while another thread polls the progress. Not real-time.
+/// Energises the devices in this thread; another thread polls `progress` for a call that does not return. Not real-time.
 pub(super) fn activate_here(
     standby: Standby,
     plugins: &[PluginReport],

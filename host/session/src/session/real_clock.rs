@@ -1,4 +1,4 @@
-//! Loop on the real clock, on a thread of its own; the caller's thread serves the observers and watches the loop.
+//! Loop on the real clock, in a separate thread; the caller's thread calls the observers and watches the loop.
 
 use super::controls::ChangeLog;
 use super::latch;
@@ -24,14 +24,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Capacity for records between loop and observers: four seconds at 1 kHz.
+/// Capacity of the record queue between loop and observers: four seconds of one device at 1 kHz.
 const RING_RECORDS: usize = 4096;
 /// Timeout for the end of a watchdog that is not needed any more.
 const WATCHDOG_END: Duration = Duration::from_millis(50);
 /// Poll interval of the observers in real time.
 const OBSERVER_PERIOD: Duration = Duration::from_millis(5);
-/// Grace period for a stuck loop after the watchdog has stopped its device: a tick that was only late ends by itself, and its
-/// report is complete.
+/// Grace period for a stuck loop after the watchdog has stopped its device: a tick that was only late ends by itself, and the run
+/// then has a complete outcome.
 const COME_BACK: Duration = Duration::from_millis(500);
 
 /// Configuration of a run that only the real clock needs.
@@ -41,13 +41,13 @@ pub(super) struct RealClock {
     pub(super) watchdog_ns: u64,
     /// Process that stops the devices if this process ends.
     pub(super) watchdog_process: Option<Arc<WatchdogProcess>>,
-    /// True if the run has to end without the watchdog process.
+    /// True if the run must stop when the watchdog process has ended.
     pub(super) requires_independent_stop: bool,
-    /// `None` on the virtual clock, where no hand is held.
+    /// Latch of the machine; `None` on the virtual clock, where no hand is on a device.
     pub(super) latch: Option<LatchGuard>,
 }
 
-/// Runs the loop until it ends; this thread serves the observers meanwhile.
+/// Runs the loop in a separate thread until it ends; this thread calls the observers meanwhile.
 pub(super) fn run(
     prepared: PreparedLoop,
     clock: RealClock,
@@ -64,7 +64,7 @@ pub(super) fn run(
     let mut requested = prepared.standby.observers().request(observer.demand());
     let mut watch = LoopWatch::of(&prepared, clock.watchdog_ns);
     let (progress, stopping, loop_stop) = (watch.progress.clone(), watch.stopping.clone(), stop.clone());
-    // Not scoped: a thread that is stuck in a plugin has to be abandoned.
+    // Not scoped: a thread that is stuck in plugin code must be abandoned.
     let thread = std::thread::Builder::new().name("flotor-servo".to_owned());
     let servo_thread =
         thread.spawn(move || run_loop(prepared, clock, &loop_stop, &mut records, &progress, &stopping));
@@ -82,7 +82,7 @@ pub(super) fn run(
     Ok(Finished { end: guardian.end(finished.end), warning: guardian.warning(), ..finished })
 }
 
-/// Device that is being stopped on the loop's thread: polled from another thread, as `safe_stop` may hang, too.
+/// Device that is being stopped in the loop's thread; another thread polls it, because `safe_stop` may hang as well.
 #[derive(Clone, Default)]
 struct Stopping(Arc<AtomicUsize>);
 
@@ -92,7 +92,7 @@ impl Stopping {
         self.0.store(device + 1, Ordering::Relaxed);
     }
 
-    /// Marks the end of all stops.
+    /// Marks that all devices are stopped.
     fn exit(&self) {
         self.0.store(0, Ordering::Relaxed);
     }
@@ -114,14 +114,14 @@ fn run_loop(
     let PreparedLoop { standby, plugins, mut taps, period_ns, duration_ns } = prepared;
     let RealClock { pacing, core, watchdog_ns, watchdog_process, latch, .. } = clock;
     let real_time = enter_real_time(core);
-    // The polling thread notices the end of the process.
+    // The caller's thread notices the end of the watchdog process.
     let signs = watchdog_process.as_ref().and_then(|process| {
         let _ = process.follow_this_thread();
         process.heartbeat_sender().ok()
     });
     let spin = (pacing == Pacing::Host).then(|| SpinWindow::measure(period_ns));
     let (stoppers, heartbeat) = (standby.stoppers(), standby.heartbeat());
-    // After all other steps that take time.
+    // Last check, after all steps that take time.
     latch.as_ref().map_or(Ok(()), LatchGuard::check)?;
     let servo = activate_here(standby, &plugins, progress)?;
     let schedule = match spin {
@@ -130,7 +130,7 @@ fn run_loop(
     };
     let watchdog = start_watchdog(heartbeat, stoppers.clone(), stop.clone(), watchdog_ns, signs);
     let mut runner = Loop::new(servo, schedule, duration_ns).releasing();
-    // Without a watchdog nothing is moved.
+    // Without a watchdog the loop does not tick.
     let (dropped_records, last_tick) = match &watchdog {
         Ok(_) => tick(&mut runner, stop, &mut taps, records),
         Err(_) => (0, Duration::ZERO),
@@ -146,8 +146,8 @@ fn run_loop(
     Ok(Finished { stop_time, ..finished })
 }
 
-/// Runs the loop to its end; returns the number of dropped records, and the time of the last tick. A full queue drops records:
-/// observers never delay the loop.
+/// Runs the loop to its end; returns the number of dropped records, and the compute time of the last tick. If the queue is full,
+/// records are dropped: observers never delay the loop.
 fn tick(
     runner: &mut Loop,
     stop: &StopSwitch,
@@ -174,7 +174,8 @@ fn stop_devices(
     stopping: &Stopping,
 ) -> StopTimer {
     let mut timer = StopTimer::start(last_tick);
-    // A button or the device itself: press for the latch, even if `safe_stop` hangs.
+    // For an emergency stop by a button or by the device: press the switch first, so that the latch is pressed even if `safe_stop`
+    // hangs.
     if let Some(RunEnd::EmergencyStop(source)) = end {
         stop.press(source);
     }
@@ -187,8 +188,8 @@ fn stop_devices(
     timer
 }
 
-/// Waits until the watchdog, which polls every millisecond, has released the devices, so that they are closed where a hang is
-/// reported. Has a timeout: the watchdog may be in a `safe_stop` that hangs.
+/// Waits until the watchdog, which polls every millisecond, has released the devices, so that the calls that close them are the ones
+/// with a time limit. Has a timeout: the watchdog may be in a `safe_stop` that hangs.
 fn wait_for_end_of(watchdog: &JoinHandle<()>) {
     let since = Instant::now();
     while !watchdog.is_finished() && since.elapsed() < WATCHDOG_END {
@@ -204,9 +205,9 @@ struct LoopWatch {
     watchdog_limit: Duration,
     progress: Progress,
     stopping: Stopping,
-    /// The device that was being stopped first, and the time when this was noticed.
+    /// Device whose stop was noticed first, and the time of that poll.
     stopping_since: Option<(PluginIndex, Instant)>,
-    /// Place where the watchdog found the loop, and the time when this was noticed.
+    /// Place where the watchdog found the loop stuck, and the time of the poll that noticed it.
     fired: Option<(Stuck, Instant)>,
 }
 
@@ -224,7 +225,7 @@ impl LoopWatch {
         }
     }
 
-    /// Checks the thread; a thread that does not return is abandoned.
+    /// Checks the loop's thread, and abandons a thread whose call does not return.
     ///
     /// # Errors
     /// [`RunError::Calls`], [`RunError::Hung`].

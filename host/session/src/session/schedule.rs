@@ -1,4 +1,4 @@
-//! Scheduled changes of a scene, checked, with the models for replacements.
+//! Scheduled changes of a scene, checked, with the models that replace others.
 
 use super::controls::{ChosenBy, PluginTable, understands};
 use super::{ControlError, NewValue, PluginReport, RunError, prepare_model};
@@ -36,7 +36,7 @@ pub(super) fn schedule(
                 let new = NewValue { plugin, parameter: key, value };
                 match plugins.check(&new) {
                     Ok(checked) => checked,
-                    // The change is for another seed.
+                    // The change is for an alternative of another seed.
                     Err(_) if passed_over.iter().flatten().any(|part| understands(part, &new)) => continue,
                     Err(error) => return Err(wrong("change.set", error).into()),
                 }
@@ -58,7 +58,7 @@ pub(super) fn schedule(
                         other.plugin.parameters.extend(parameters.iter().cloned());
                         prepare_model(registry, &other, config, clock)
                     };
-                    // All of them: an error in one is found with any seed.
+                    // All alternatives: an error in one is found with any seed.
                     let mut made = by.iter().map(make).collect::<Result<Vec<_>, _>>()?;
                     if choice >= made.len() {
                         continue;
@@ -78,18 +78,18 @@ pub(super) fn schedule(
     Ok(scheduled)
 }
 
-/// Returns the alternative of a seed; `draw` distinguishes several choices of one run. Not real-time.
+/// Returns the index of the alternative for a seed; `draw` distinguishes several choices of one run. Not real-time.
 ///
-/// Permuted blocks, as trials are randomised: of `n` alternatives, any `n` seeds from a multiple of `n` on get each exactly once,
-/// in an order that looks random. So sixteen subjects with the seeds 0 to 15 are eight and eight, and the seed does not reveal the
-/// alternative to a subject. Source: M. Zelen, "The randomization and stratification of patients to clinical trials", J. Chronic
-/// Diseases 27, 1974, section 4 (blocks).
+/// Permuted blocks, as in randomised trials: of `n` alternatives, `n` successive seeds from a multiple of `n` on select each exactly
+/// once, in pseudorandom order. So of sixteen subjects with the seeds 0 to 15 eight get each of two alternatives, and the seed does
+/// not reveal the alternative to a subject. Source: M. Zelen, "The randomization and stratification of patients to clinical trials",
+/// J. Chronic Diseases 27, 1974, section 4 (blocks).
 fn chosen(seed: u64, draw: u64, alternatives: usize) -> usize {
     let count = alternatives.max(1) as u64;
     let (block, place) = (seed / count, seed % count);
     let mut order: Vec<usize> = (0..alternatives.max(1)).collect();
     let mut random = Random::new(block, draw);
-    // Fisher and Yates: all orders are equally likely.
+    // Fisher-Yates shuffle: all orders are equally likely.
     for last in (1..order.len()).rev() {
         #[allow(clippy::cast_possible_truncation)] // below the number of alternatives
         let other = (random.bits() % (last as u64 + 1)) as usize;

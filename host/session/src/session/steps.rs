@@ -1,4 +1,5 @@
-//! Run on the virtual clock that the caller advances: for experiments, which decide between ticks how to continue.
+//! Run on the virtual clock that the caller advances by any number of ticks: for experiments, which decide between ticks how to
+//! continue.
 
 use super::virtual_loop::VirtualLoop;
 use super::{Controls, Observer, RunError, RunOptions, Session};
@@ -7,7 +8,7 @@ use crate::scene::Scene;
 use flotor_coupling::Line;
 use flotor_servo::{Clock, CouplingOutcome, RunEnd, StopSwitch};
 
-/// Run that the caller advances. When it is dropped the devices are stopped.
+/// Run that the caller advances by any number of ticks. Dropping it stops the devices.
 pub struct Steps {
     ticks: VirtualLoop,
     controls: Controls,
@@ -15,10 +16,11 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Loads, checks, opens and activates the plugins of a scene; `stop` ends the run. Not real-time.
+    /// Prepares a session as [`Session::prepare`] does, on the virtual clock, and energises its devices; `stop` ends the run. Not
+    /// real-time.
     ///
     /// # Errors
-    /// [`RunError`]; nothing is energised before this has succeeded.
+    /// [`RunError`]; then no device is energised.
     pub fn prepare(
         scene: &Scene,
         registry: &Registry,
@@ -31,13 +33,14 @@ impl Steps {
         Ok(Self { ticks: VirtualLoop::start(prepared, changes, stop)?, controls, lines })
     }
 
-    /// Returns the handle to change parameters, weights and models of the run.
+    /// Returns the handle with which the caller changes parameters, weights and models of the run.
     #[must_use]
     pub fn controls(&self) -> &Controls {
         &self.controls
     }
 
-    /// Returns the lines of couplings, as [`Session::take_lines`]: a caller that advances two runs can connect them.
+    /// Removes and returns the lines of couplings with a remote end, as [`Session::take_lines`] does: a caller that advances two runs
+    /// can connect their lines.
     #[must_use]
     pub fn take_lines(&mut self) -> Vec<(String, Line)> {
         std::mem::take(&mut self.lines)
@@ -49,11 +52,11 @@ impl Steps {
         self.ticks.couplings()
     }
 
-    /// Runs `ticks` ticks, or until the run ends; returns the end of the run once it has ended. Passes the changes before each tick
-    /// and the tick's records to the observer. Not real-time: the observer is not.
+    /// Runs `ticks` ticks, or until the run ends; returns the end of the run once it has ended, `None` before. Passes the changes
+    /// before each tick and the tick's records to the observer. Not real-time: calls the observer.
     ///
     /// # Errors
-    /// [`RunError::Hung`] if a plugin call does not return: there are no ticks any more.
+    /// [`RunError::Hung`] if a plugin call does not return; the devices are stopped, and later calls fail.
     pub fn advance(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<Option<RunEnd>, RunError> {
         let mut left = ticks;
         while left > 0 && self.ticks.end().is_none() {

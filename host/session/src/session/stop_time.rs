@@ -1,13 +1,13 @@
-//! Duration of an emergency stop, from its request to each device without force.
+//! Duration of an emergency stop, from its request until each device exerts no force.
 
 use super::latch::LatchGuard;
 use flotor_servo::{EmergencySource, StopSwitch, monotonic_ns};
 use std::time::{Duration, SystemTime};
 
-/// Time within which each device is without force; a slower one is reported.
+/// Longest time from the request until a device exerts no force; a longer time gives a warning.
 const BOUND: Duration = Duration::from_millis(20);
 
-/// Times of the last tick and of the stops of the devices, taken on the thread of the loop.
+/// Timer of the last tick and of the stops of the devices, in the loop's thread.
 pub(super) struct StopTimer {
     tick: Duration,
     sent_ns: u64,
@@ -20,17 +20,17 @@ impl StopTimer {
         Self { tick, sent_ns: monotonic_ns(), stopped_ns: Vec::new() }
     }
 
-    /// Records the time of the next device, whose `safe_stop` has returned. Not real-time.
+    /// Records the current time for the next device, whose `safe_stop` has returned. Not real-time.
     pub(super) fn stopped(&mut self) {
         self.stopped_ns.push(monotonic_ns());
     }
 
-    /// Returns the times since the request of an emergency stop. Not real-time: reads the latch.
+    /// Returns the parts of the time since the request of the emergency stop. Not real-time: reads the latch.
     pub(super) fn since_request(self, stop: &StopSwitch, latch: Option<&LatchGuard>) -> StopTime {
         let Self { tick, sent_ns, stopped_ns } = self;
         let since = |start_ns: u64, end_ns: u64| Duration::from_nanos(end_ns.saturating_sub(start_ns));
         let seen = stop.pressed_ns().map_or(Duration::ZERO, |pressed_ns| since(pressed_ns, sent_ns));
-        // Another run pressed the latch before this one noticed.
+        // Another run pressed the latch before this run noticed the press.
         let latch = latch.filter(|_| stop.emergency() == Some(EmergencySource::Latch));
         let pressed =
             latch.and_then(LatchGuard::pressed_at).and_then(|at| SystemTime::now().duration_since(at).ok());
@@ -45,24 +45,25 @@ impl StopTimer {
 /// Duration of an emergency stop, in parts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StopTime {
-    /// From the request to the start of the last tick, which sends no force.
+    /// Time from the request to the start of the last tick, which commands no force.
     before_the_tick: Duration,
-    /// Duration of that tick, with the commands to all devices.
+    /// Duration of the last tick, with the commands to all devices.
     tick: Duration,
-    /// From the end of the tick to the end of each device's `safe_stop`, in the scene's order: the device then has no force, even
-    /// if it has not taken the command of the tick.
+    /// Time from the end of the last tick to the end of each device's `safe_stop`, in the scene's order: the device then exerts no
+    /// force, even if it has not executed the command of the tick.
     stops: Vec<Duration>,
 }
 
 impl StopTime {
-    /// Returns the time from the request to a device without force, by its number in the scene.
+    /// Returns the time from the request until a device exerts no force, by the device's number in the scene; `None` if there is no
+    /// such device.
     #[must_use]
     pub fn of_device(&self, number: usize) -> Option<Duration> {
         self.stops.get(number).map(|stop| self.before_the_tick + self.tick + *stop)
     }
 
-    /// Returns a warning about devices that could have force for longer than the bound, with the parts of the time; `None` if no
-    /// device could. `names` are those of the devices.
+    /// Returns a warning about devices that may have exerted force for longer than the bound, with the parts of the time; `None`
+    /// without such a device. `names` are the names of the devices.
     pub(super) fn warning(&self, names: &[String]) -> Option<String> {
         let ms = |time: Duration| format!("{:.1} ms", time.as_secs_f64() * 1.0e3);
         let late = names.iter().zip(&self.stops).enumerate().filter_map(|(number, (name, stop))| {

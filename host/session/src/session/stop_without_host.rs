@@ -8,20 +8,21 @@ use flotor_hal::abi::loader::OpenedDevice;
 use flotor_hal::{Axes, Capabilities, Embodiment, Independence, Refusal};
 use flotor_servo::watchdog_process::WatchdogProcess;
 
-/// Stop of an open device after the end of the host's process.
+/// Means that stop an open device after the end of the host's process.
 pub struct StopWithoutHost {
     device: String,
     embodiment: Embodiment,
     actuated: Axes,
-    /// Means of the stop; `None` if nothing stops the device.
+    /// Means that the plugin declares; `None` if nothing stops the device.
     means: Option<Independence>,
 }
 
 impl StopWithoutHost {
-    /// Reads the stop of a device; `name` is the device's name in messages. Not real-time.
+    /// Queries the plugin how its device is stopped after the end of the host's process; `name` is the device's name in messages. Not
+    /// real-time.
     ///
     /// # Errors
-    /// A [`Refusal`] of a stop that cannot be used.
+    /// [`Refusal`] if the plugin declares a stop that cannot be used.
     pub fn of(
         name: &str,
         embodiment: Embodiment,
@@ -32,7 +33,8 @@ impl StopWithoutHost {
         Ok(Self { device: name.to_owned(), embodiment, actuated: capabilities.actuated, means })
     }
 
-    /// Returns the reason to reject the device if a stop is required; `None` for a device with a stop or without force.
+    /// Returns the reason to reject the device if an independent stop is required; `None` for a device that has one or exerts no
+    /// force.
     pub(super) fn missing(&self) -> Option<String> {
         self.is_missing().then(|| {
             "no process stops the device if this program is killed: its plugin lacks the extension \
@@ -64,20 +66,20 @@ impl StopWithoutHost {
     }
 }
 
-/// Result of starting a watchdog process.
+/// Watchdog process of open devices, and warnings about its limits.
 #[derive(Default)]
 pub struct WatchdogStart {
-    /// Process; `None` if no device is stopped by a message, or if it cannot be started and is not required.
+    /// Watchdog process; `None` if no device is stopped by a message, or if the process cannot be started and is not required.
     pub process: Option<WatchdogProcess>,
-    /// Ways in which the devices stay unguarded, a sentence each.
+    /// Warnings about cases in which no process stops the devices, a sentence each.
     pub warnings: Vec<String>,
 }
 
 /// Starts the watchdog process of open devices, before the first of them is energised. Not real-time.
 ///
 /// # Errors
-/// [`RunError::WatchdogProcess`] if `limits` require one and there is none; [`RunError::SharedControlGroup`] if a kill of one
-/// control group leaves the force of a device on and `limits` do not accept that.
+/// [`RunError::WatchdogProcess`] if `limits` require the process and it cannot be started; [`RunError::SharedControlGroup`] if a kill
+/// of one control group leaves the force of a device on and `limits` do not accept this.
 pub fn start_watchdog_process(
     stops: &[&StopWithoutHost],
     limits: &Limits,

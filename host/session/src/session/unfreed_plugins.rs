@@ -1,18 +1,17 @@
-//! Plugins of a finished run: models and de-energised devices, which only plugin code can free.
+//! Plugin instances of a finished run: models and de-energised devices, which only plugin code can free.
 //!
-//! That code may hang or end the process, and nothing of the run depends on it any more. So recordings should be closed and
-//! summaries printed before.
+//! Plugin code may hang or end the process. So recordings should be closed and summaries printed before the instances are freed.
 
 use crate::calls::{Call, CallError, CallThread, Unresponsive, end_limit};
 use flotor_hal::abi::loader::OpenedDevice;
 use flotor_servo::{LastStop, Layer};
 
-/// Models and devices of a finished run. Freed when dropped, or by [`Self::free`], which names a plugin that hangs.
+/// Models and devices of a finished run. Dropping the value frees them; [`Self::free`] also reports a plugin that hangs.
 #[derive(Default)]
 pub struct UnfreedPlugins {
     devices: Vec<(String, OpenedDevice)>,
     models: Vec<(String, Box<Layer>)>,
-    /// Owns the devices, too, and closes one without another owner.
+    /// Also owns the devices, and closes a device that has no other owner.
     last_stop: Option<LastStop>,
     calls: CallThread,
 }
@@ -30,13 +29,13 @@ impl UnfreedPlugins {
     /// Closes the devices and frees the models, each for no longer than 5 s. Not real-time.
     ///
     /// # Errors
-    /// The first plugin that did not return; its thread is abandoned. The others are freed all the same.
+    /// The first plugin that did not return; its thread is abandoned. The other plugins are freed nevertheless.
     pub fn free(mut self) -> Result<(), Unresponsive> {
         self.free_all()
     }
 
     fn free_all(&mut self) -> Result<(), Unresponsive> {
-        // Nothing is energised any more. Of a device whose plugin failed, only this is left.
+        // Nothing is energised any more. For a device whose plugin failed, this is the only owner left.
         let mut first = free(&mut self.calls, "a device".to_owned(), Call::Close, self.last_stop.take());
         for (who, device) in self.devices.drain(..) {
             first = first.and(free(&mut self.calls, who, Call::Close, device));

@@ -1,11 +1,11 @@
-//! Monitor for the end of the watchdog process itself.
+//! Monitor that detects the end of the watchdog process during a run.
 
 use crate::calls::{Notice, notify};
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{RunEnd, StopSwitch};
 use std::sync::{Arc, Weak};
 
-/// Monitor of the watchdog process of a run.
+/// Monitor of a run's watchdog process: stops the run or warns if the process ends.
 pub struct Guardian {
     process: Weak<WatchdogProcess>,
     is_required: bool,
@@ -13,13 +13,14 @@ pub struct Guardian {
 }
 
 impl Guardian {
-    /// Monitors this process, if there is one; with `is_required` its loss ends the run.
+    /// Creates a monitor of this process, if there is one; with `is_required` the end of the process stops the run.
     #[must_use]
     pub fn of(process: Option<&Arc<WatchdogProcess>>, is_required: bool) -> Self {
         Self { process: process.map(Arc::downgrade).unwrap_or_default(), is_required, is_gone: false }
     }
 
-    /// Reports the end of the process once; a run that requires the process ends in order then. Not real-time.
+    /// Checks whether the process has ended, and reacts once: requests `stop` if the run requires the process, otherwise notifies the
+    /// user. Not real-time.
     pub fn check(&mut self, stop: &StopSwitch) {
         if self.is_gone || !self.process.upgrade().is_some_and(|process| process.is_gone()) {
             return;
@@ -32,7 +33,7 @@ impl Guardian {
         }
     }
 
-    /// Returns the end of the run, `Unguarded` if it was stopped for the loss of a required process.
+    /// Converts the end of the run: `Unguarded` if the end of a required process stopped it, unchanged otherwise.
     pub(super) fn end(&self, end: RunEnd) -> RunEnd {
         match end {
             RunEnd::Stopped if self.is_required && self.is_gone => RunEnd::Unguarded,
@@ -40,7 +41,7 @@ impl Guardian {
         }
     }
 
-    /// Returns the warning for users, which was shown already.
+    /// Returns the warning that the watchdog process has ended, which the user has seen as a notice; `None` without it.
     pub(super) fn warning(&self) -> Option<String> {
         (self.is_gone && !self.is_required).then(|| Notice::Unguarded.to_string())
     }

@@ -1,4 +1,4 @@
-//! Loop on the virtual clock, on a thread of its own: a plugin call that does not return is reported, and the thread abandoned.
+//! Loop on the virtual clock, in a separate thread: if a plugin call does not return, the call is reported and the thread abandoned.
 
 use super::controls::ChangeLog;
 use super::observer::Taps;
@@ -21,20 +21,21 @@ use flotor_servo::{
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
-/// Records of one batch: observers run between two batches, so that a slow observer slows the run and loses nothing.
+/// Number of records in a batch. Observers are called between two batches, so that a slow observer delays the run and loses no
+/// record.
 const BATCH: usize = 1024;
-/// Poll interval for a batch that takes long.
+/// Poll interval while a batch runs.
 const LOOK: Duration = Duration::from_millis(20);
 
 /// Loop with its publishers, passed to the loop's thread for a batch and returned afterwards.
 struct Batch {
     runner: Loop,
     taps: Taps,
-    /// Remaining ticks of the batch, if it is not full before.
+    /// Ticks still to run; the batch ends earlier if its record buffer is full.
     ticks: u64,
 }
 
-/// Runs the loop to its end without waiting.
+/// Runs the loop to its end, as fast as possible.
 pub(super) fn run(
     prepared: PreparedLoop,
     changes: ChangeLog,
@@ -50,7 +51,7 @@ pub(super) fn run(
     ticks.finish()
 }
 
-/// The loop of a run whose devices are energised.
+/// Loop of a run on the virtual clock, with energised devices.
 pub(super) struct VirtualLoop {
     thread: LoopThread,
     /// `None` once a call has not returned.
@@ -68,7 +69,7 @@ impl VirtualLoop {
     /// Energises the devices; `stop` ends the run. Not real-time.
     ///
     /// # Errors
-    /// [`RunError`]; nothing is energised then.
+    /// [`RunError`]; then no device is energised.
     pub(super) fn start(
         prepared: PreparedLoop,
         changes: ChangeLog,
@@ -103,11 +104,11 @@ impl VirtualLoop {
         self.batch.as_ref().and_then(|batch| batch.runner.end())
     }
 
-    /// Runs `ticks` ticks, or until the batch is full or the run ends; returns the remaining ticks. Passes the changes before each
-    /// tick and the tick's records to the observer. Not real-time.
+    /// Runs `ticks` ticks, or until the batch is full or the run ends; returns the number of remaining ticks. Passes the changes
+    /// before each tick and the tick's records to the observer. Not real-time.
     ///
     /// # Errors
-    /// [`RunError::Hung`] if a call does not return; then there are no ticks any more.
+    /// [`RunError::Hung`] if a call does not return; the devices are stopped, and later calls fail.
     pub(super) fn batch(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<u64, RunError> {
         let batch = self.batch.take().ok_or(RunError::Thread("did not return its state"))?;
         self.requested.change_to(observer.demand());
@@ -135,14 +136,14 @@ impl VirtualLoop {
         self.stoppers.iter().for_each(Stopper::safe_stop);
     }
 
-    /// Ends the run. Not real-time.
+    /// Returns the ended loop. Not real-time.
     fn finish(mut self) -> Result<Finished, RunError> {
         let batch = self.batch.take().ok_or(RunError::Thread("did not return its state"))?;
         Ok(Finished::of(batch.runner, 0, RealTimeReport::not_requested()))
     }
 }
 
-/// Reason why a batch does not return.
+/// Reason why a batch was not returned.
 enum Lost {
     Stuck(Stuck, Exceeded),
     Thread,
@@ -156,7 +157,7 @@ struct LoopThread {
 }
 
 impl LoopThread {
-    /// Starts the thread; `tick` runs a batch.
+    /// Starts the thread, which calls `tick` for each batch.
     fn start(mut tick: impl FnMut(&mut Batch) + Send + 'static) -> Result<Self, RunError> {
         let (batches, waiting) = sync_channel::<Batch>(0);
         let (sender, done) = sync_channel(1);

@@ -1,14 +1,14 @@
-//! Telemetry of the running host, by which other programs on this machine observe and change a run: viewer, bridges, scripts.
+//! Telemetry server of a run: other programs on this machine (viewer, bridges, scripts) observe and change the run.
 //!
 //! ```text
-//!  servo -> ring -> observers -> flotor_live::Publication -> socket -> watchers
-//!  servo <- Controls, StopSwitch, at a tick boundary <- Host <- socket <- watchers
+//!  servo -> ring -> observers -> flotor_live::Publication -> socket -> clients
+//!  servo <- Controls, StopSwitch, at a tick boundary <- Host <- socket <- clients
 //! ```
 //!
-//! The protocol of the socket, and both its ends, are the crate `flotor_live`; this module has the host's own messages and handles
-//! its requests. Nothing of it runs on the servo's thread. Not real-time.
+//! The crate `flotor_live` implements protocol, server and client; this module creates the host's greeting and handles the requests
+//! of clients. No code of this module runs in the servo thread. Not real-time.
 //!
-//! A replacement for a model is loaded and created here, on a thread of its own, and sent to the loop when it is ready.
+//! A replacement for a model is loaded and created in a separate thread, then sent to the loop.
 
 mod peer_link;
 
@@ -31,10 +31,10 @@ use flotor_servo::{EmergencySource, StopSwitch};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-/// Publishes a prepared run, to be found, observed and changed.
+/// Publishes a prepared run in `directory`, so that clients can find, observe and change it. Not real-time.
 ///
 /// # Errors
-/// [`PublishError`]; the run continues without clients.
+/// [`PublishError`]; the session can still run, without clients.
 pub fn publish(
     directory: &Directory,
     scene: &Scene,
@@ -48,10 +48,11 @@ pub fn publish(
     announce(directory, scene, run, session, Arc::new(host))
 }
 
-/// Publishes a prepared run, to be found and observed; `host` handles all other requests.
+/// Publishes a prepared run in `directory`, so that clients can find and observe it; `host` handles all other requests. Not
+/// real-time.
 ///
 /// # Errors
-/// [`PublishError`]; the run continues without clients.
+/// [`PublishError`]; the session can still run, without clients.
 pub fn announce(
     directory: &Directory,
     scene: &Scene,
@@ -76,16 +77,16 @@ fn panel(report: &PluginReport) -> PanelPlugin {
     PanelPlugin { is_simulated: *embodiment == Some(Embodiment::Simulated), ..panel }
 }
 
-/// Observer of a run, with the clients of the telemetry server.
+/// Observer of a run that also passes all records and changes to the clients of the telemetry server.
 pub struct ObservedRun<O> {
-    /// Observer of the run itself.
+    /// Observer of the run, called before the clients.
     pub observer: O,
-    /// Clients, if the telemetry server has started.
+    /// Telemetry server; `None` if it has not started.
     pub publication: Option<Publication>,
 }
 
 impl<O> ObservedRun<O> {
-    /// Notifies the clients of the end of the run.
+    /// Notifies the clients of the end of the run, described by `words`, and stops the telemetry server.
     pub fn end(self, words: &str, kind: EndKind) {
         if let Some(publication) = self.publication {
             publication.end(words, kind);
@@ -101,7 +102,7 @@ impl<O: Observer> Observer for ObservedRun<O> {
         }
     }
 
-    /// Returns the demand of the observer: each client requests its own.
+    /// Returns the demand of the observer alone; the telemetry server requests the outputs for its clients.
     fn demand(&self) -> Demand {
         self.observer.demand()
     }
@@ -118,16 +119,16 @@ impl<O: Observer> Observer for ObservedRun<O> {
 struct Host {
     controls: Controls,
     stop: StopSwitch,
-    /// Pressed by an emergency stop before the reply.
+    /// Latch of the machine, which an emergency stop presses before the reply; `None` on the virtual clock.
     latch: Option<LatchGuard>,
     /// Plugin folders of the scene.
     folders: Vec<PathBuf>,
-    /// Searched at the first replacement of a model and reused, so that an unchanged file is not mapped again.
+    /// Plugins, searched at the first replacement of a model and kept, so that an unchanged file is not mapped again.
     registry: Mutex<Option<Registry>>,
 }
 
 impl Host {
-    /// Replaces a model on a thread of its own: the thread that serves a client has too small a stack for plugins.
+    /// Replaces a model in a separate thread: the stack of the thread that serves a client is too small for plugin code.
     fn swap(
         &self,
         model: &str,
@@ -162,17 +163,18 @@ fn refused(error: &ControlError) -> (RefusalCause, String) {
     (cause, error.to_string())
 }
 
-/// Performs a client's emergency stop: of this run, and of the machine before the reply.
+/// Performs a client's emergency stop: stops this run, then presses the latch of the machine, if there is one, and waits up to 2 s
+/// until the other runs confirm the stop. Not real-time.
 ///
 /// # Errors
-/// If only this run stops.
+/// Cause and message if another run may continue, or a later run may start; this run stops in any case.
 pub fn emergency_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) -> Result<(), (RefusalCause, String)> {
     stop.press(EmergencySource::Watcher);
     let problem = latch.and_then(|latch| latch.press(EmergencySource::Watcher).problem());
     problem.map_or(Ok(()), |problem| Err((RefusalCause::Other, format!("this run stops; {problem}"))))
 }
 
-/// Performs the emergency stop of another run, if this run has the machine's latch.
+/// Stops this run for an emergency stop of another run, if this run has the machine's latch (real clock).
 pub fn machine_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) {
     if latch.is_some() {
         stop.press(EmergencySource::Latch);

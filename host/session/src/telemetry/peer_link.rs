@@ -13,19 +13,20 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Poll interval of both sides: half a period at 1 kHz.
+/// Poll interval for the loop's peer state and for the socket: half a period at 1 kHz.
 const LOOK_PERIOD: Duration = Duration::from_micros(500);
 
-/// Most datagrams read per poll.
+/// Largest number of datagrams read per poll.
 const MAX_AT_ONCE: usize = 256;
 
-/// The thread of a peer link; it ends when dropped.
+/// Handle of a peer link's thread; dropping the handle stops and joins the thread.
 pub struct PeerLink {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<LinkCounts>>,
 }
 
-/// Starts the peer link of a coupling.
+/// Starts the peer link of a coupling: opens its socket in `directory` and starts the thread that transports the peer state. Not
+/// real-time.
 ///
 /// # Errors
 /// [`PublishError`]; the run continues, and its end of the coupling requests no force.
@@ -39,7 +40,7 @@ pub fn start_peer_link(directory: &Directory, coupling: &str, line: Line) -> Res
 }
 
 impl PeerLink {
-    /// Ends the thread and returns its counts.
+    /// Stops the thread, waits for its end and returns its counts of messages. Not real-time.
     #[must_use]
     pub fn finish(mut self) -> LinkCounts {
         self.join()
@@ -72,7 +73,7 @@ fn run(mut socket: PeerSocket, line: Line, stop: &AtomicBool) -> LinkCounts {
             sent = version;
             socket.send(&pairing.address(&dispatch));
         }
-        // Of several messages only the last counts; a flood is cut off here, and read further at the next poll.
+        // Only the newest message of a poll counts. The limit bounds a flood; the next poll reads its rest.
         #[allow(clippy::cast_possible_truncation)] // in five hundred years
         let now_ns = since.elapsed().as_nanos() as u64;
         let mut newest = None;

@@ -1,4 +1,4 @@
-//! `flotor doctor --device ID`: diagnosis of a device by its plugin and by the connection to the machine.
+//! `flotor doctor --device ID`: diagnosis of a device from its plugin and its USB connection.
 
 use crate::diagnosis::Diagnosis;
 use crate::platform::usb::{Machine, connection};
@@ -13,10 +13,11 @@ use flotor_servo::watchdog_process;
 use flotor_session::registry::Registry;
 use std::io;
 
-/// Topic of the findings on the stop of a device without its host.
+/// Topic of the findings on the stop of a device after the end of its host.
 const WITHOUT_ITS_HOST: &str = "without its host";
 
-/// Diagnoses a device before its first run. Opens the device, without force.
+/// Diagnoses a device before its first run: its USB connection, opening, axes, boundary wall and stop. Opens the device, without
+/// force.
 pub(super) fn diagnose(
     registry: &Registry,
     id: &str,
@@ -35,7 +36,7 @@ pub(super) fn diagnose(
     let mut diagnoses = connection(machine, plugin.usb_kinds(), opened.is_ok());
     match opened {
         Ok(mut device) => diagnoses.extend(abilities(&plugin, &mut device)),
-        // The reason is one sentence for people: problem, place, remedy.
+        // The reason is one sentence for users: problem, place, remedy.
         Err(LoadError::Refused { refusal, .. }) => {
             diagnoses.push(Diagnosis::bad_without_remedy("opening", refusal.reason))
         }
@@ -59,7 +60,7 @@ fn abilities(plugin: &Plugin, device: &mut OpenedDevice) -> Vec<Diagnosis> {
     diagnoses
 }
 
-/// Returns the finding on the stop of the device without its host.
+/// Returns the finding on the stop of the device after the end of its host.
 fn without_its_host(declared: Result<Option<Independence>, Refusal>) -> Diagnosis {
     match declared {
         Ok(Some(Independence::Itself { .. })) => Diagnosis::good(WITHOUT_ITS_HOST, "stops by itself"),
@@ -87,7 +88,7 @@ fn not_stopped(found: impl Into<String>) -> Diagnosis {
     )
 }
 
-/// Returns the wall of a scene without `[limits]` and `[boundary]`, at 1 kHz or the nearest rate of the device.
+/// Describes the boundary wall in a scene without `[limits]` and `[boundary]`, at 1 kHz or the nearest rate of the device.
 fn boundary_wall(device: &Capabilities) -> String {
     let [slowest, fastest] = device.rate_hz;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a rate of a device is not zero

@@ -6,24 +6,24 @@ use flotor_servo::watchdog_process::probe_shared_group;
 use std::fs::read_to_string;
 use std::path::Path;
 
-/// Remedy for missing real-time priority, if no control group refuses it.
+/// Remedy for missing real-time priority, unless a control group refuses it.
 const PRIORITY_REMEDY: &str = "as root: `groupadd -f realtime`, `usermod -aG realtime USER`, and a line `@realtime - rtprio 99` in \
                 /etc/security/limits.conf; then log in again";
 /// Remedy for missing locked memory.
 pub(crate) const MEMORY_REMEDY: &str = "as root: `groupadd -f realtime`, `usermod -aG realtime USER`, and a line `@realtime - memlock unlimited` \
                 in /etc/security/limits.conf; then log in again";
 
-/// Remedy for a watchdog process that is killed with the group of the run.
+/// Remedy for a watchdog process that is killed with the control group of the run.
 const SHARED_GROUP_REMEDY: &str = "start the run where systemd's user or system manager can be reached (`busctl --user status`), or in a \
                                    group with a writable outer group. In a service: `KillMode=mixed`, `OOMPolicy=continue`, \
                                    `ManagedOOMPreference=avoid`. In a container: end the run with a signal before the container";
 
-/// Least share of a core for a loop with real-time priority: slightly below the kernel's default for the whole machine.
+/// Smallest sufficient fraction of a core for a loop with real-time priority: slightly below the kernel's default of 0.95.
 const SOUND_SHARE: f64 = 0.9;
-/// Threads and processes that a run starts, with a margin.
+/// Number of threads and processes that a run starts, with a margin.
 const NEEDED_THREADS: u64 = 32;
 
-/// Returns the findings other than cores and privileges; those of control groups from the files below `root`.
+/// Returns the findings other than cores and privileges; reads the limits of control groups from the files below `root`.
 pub(crate) fn of_the_system(root: &Path) -> Vec<Diagnosis> {
     let own = [isolated_cores(), kernel(), throttling(), governor(), killed_together(), supervision()];
     own.into_iter().chain(group_limits(root).iter().filter_map(of_limit)).collect()
@@ -112,7 +112,7 @@ fn of_limit(limit: &GroupLimit) -> Option<Diagnosis> {
     })
 }
 
-/// Returns the finding on a limit of memory: bad if less than a tenth is left.
+/// Returns the finding on a memory limit: bad if less than a tenth is left.
 fn of_memory(what: &'static str, Use { most, now }: Use, file: &Path, remedy: &str) -> Diagnosis {
     let mib = |bytes: u64| bytes >> 20;
     let found =
@@ -120,7 +120,8 @@ fn of_memory(what: &'static str, Use { most, now }: Use, file: &Path, remedy: &s
     Diagnosis::problem(if now > most / 10 * 9 { Grade::Bad } else { Grade::Note }, what, found, remedy)
 }
 
-/// Checks whether a kill of all processes of a control group ends the watchdog process with the host.
+/// Returns the finding on the control group of the watchdog process: bad if a kill of all processes of the host's group also kills
+/// the watchdog process.
 fn killed_together() -> Diagnosis {
     match probe_shared_group() {
         Ok(None) => Diagnosis::good("watchdog process", "in a control group of its own"),
@@ -133,7 +134,8 @@ fn killed_together() -> Diagnosis {
     }
 }
 
-/// Returns the finding on a supervisor of the process that runs plugins.
+/// Returns the finding on the supervisor of the process that executes plugins: a note if this process is process 1 of a container and
+/// has none.
 fn supervision() -> Diagnosis {
     if std::process::id() != 1 {
         return Diagnosis::good(
@@ -162,7 +164,7 @@ fn isolated_cores() -> Diagnosis {
     }
 }
 
-/// Returns the finding on the share of a core that all real-time threads may use together.
+/// Returns the finding on the fraction of a core that all real-time threads may use together.
 fn throttling() -> Diagnosis {
     let number = |file: &str| read_to_string(file).ok()?.trim().parse::<f64>().ok();
     let [runtime, period] =

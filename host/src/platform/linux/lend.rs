@@ -1,5 +1,5 @@
-//! `flotor lend`: runs an unmodified program on a Flotor device: a drop-in library replaces that of the maker of the program's
-//! device.
+//! `flotor lend`: runs an unmodified program, written for another maker's device, on a device of a scene; a drop-in library or a
+//! service replaces the maker's.
 
 mod api;
 mod arguments;
@@ -42,7 +42,7 @@ enum Interface {
 }
 
 impl Interface {
-    /// Parses the name of an interface.
+    /// Parses the value of `--api`.
     fn of_word(word: &str) -> Result<Self, CommandError> {
         let library = Api::ALL.into_iter().find(|api| api.word() == word).map(Self::Library);
         let service = || Service::ALL.into_iter().find(|api| api.word() == word).map(Self::Service);
@@ -61,13 +61,13 @@ impl Interface {
 pub(crate) fn run(arguments: LendArguments) -> Result<(), CommandError> {
     match lend(&arguments) {
         Ok(0) => Ok(()),
-        // The service has ended and the folder is removed: `exit` would skip that.
+        // The service has ended and the folder is removed before `exit`, which runs no destructors.
         Ok(code) | Err(Early::Exit(code)) => std::process::exit(code),
         Err(Early::Failed(error)) => Err(error),
     }
 }
 
-/// Runs the program; returns its exit code, or that of its runs.
+/// Runs the program; returns the exit code of the program or of its runs.
 fn lend(arguments: &LendArguments) -> Result<i32, Early> {
     let stop = StopRequest::by_signals()?;
     let [name, rest @ ..] = arguments.program.as_slice() else {
@@ -92,13 +92,14 @@ struct Lending<'a> {
     program: Program,
     /// Arguments of the program.
     rest: &'a [OsString],
-    /// Path of this command.
+    /// Path of the running `flotor`.
     own: PathBuf,
     stop: StopRequest,
 }
 
 impl Lending<'_> {
-    /// Runs the program with the libraries of one interface, or of all; returns the exit code of the program or its runs.
+    /// Runs the program with the drop-in libraries of one interface, or of all interfaces; returns the exit code of the program or of
+    /// its runs.
     fn with_library(&self, api: Option<Api>) -> Result<i32, Early> {
         let Self { arguments, program, own, .. } = self;
         if arguments.listen.is_some() {
@@ -127,8 +128,8 @@ impl Lending<'_> {
         Ok(runs.exit_code())
     }
 
-    /// Serves the program over the network; returns the exit code of the program and its runs, or if that is 0, of the service, whose
-    /// run may have been rejected.
+    /// Starts the service, then runs the program, which connects to the service. Returns the exit code of the program and its runs;
+    /// if this is 0, the exit code of the service, whose run may have failed.
     fn with_service(&self, service: Service) -> Result<i32, Early> {
         let Self { arguments, program, own, stop, .. } = self;
         let folder = Folder::new()?;
@@ -159,7 +160,8 @@ impl Lending<'_> {
         command
     }
 
-    /// Runs the guarded program; returns its end. A guard that cannot start the program has printed the cause.
+    /// Runs the program under its guard and returns the program's end. If the guard cannot start the program, it prints the cause,
+    /// and its exit code is returned as error.
     fn carry_out(&self, command: &mut Command, folder: &Folder) -> Result<ProgramEnd, Early> {
         if self.stop.stage() > Stage::Running {
             return Err(Early::Exit(INTERRUPTED));
@@ -176,7 +178,7 @@ impl Lending<'_> {
         Ok(end)
     }
 
-    /// Sets the environment variables of a drop-in library.
+    /// Sets the environment variables with which the program finds the drop-in libraries, and those for the run in a library.
     fn set_environment(&self, command: &mut Command, folder: &Path) -> Result<(), CommandError> {
         let before = std::env::var_os("LD_LIBRARY_PATH").filter(|path| !path.is_empty());
         let before = before.iter().flat_map(std::env::split_paths);
@@ -189,7 +191,7 @@ impl Lending<'_> {
     }
 }
 
-/// Creates the folder with the libraries of one interface, or of all.
+/// Creates the folder with the libraries of one interface, or of all interfaces.
 fn folder_of_libraries(api: Option<Api>, program: &Program, own: &Path) -> Result<Folder, CommandError> {
     let folder = Folder::new()?;
     for wanted in api.map_or(Api::ALL.to_vec(), |api| vec![api]) {
@@ -200,7 +202,7 @@ fn folder_of_libraries(api: Option<Api>, program: &Program, own: &Path) -> Resul
             Err(_) => {}
         }
     }
-    // CHAI3D searches for this file first, and calls none of its functions.
+    // CHAI3D searches for this file first, but calls none of its functions.
     let (beside, phantom) = (folder.0.join("libHD.so"), folder.0.join("libhdPhantom.so"));
     if !beside.exists() && phantom.exists() {
         let _ = symlink(&phantom, &beside);
@@ -215,7 +217,7 @@ fn folder_of_libraries(api: Option<Api>, program: &Program, own: &Path) -> Resul
     Ok(folder)
 }
 
-/// Checks the scene and its plugins before the program starts, which would otherwise see a missing device.
+/// Checks the scene and its plugins before the program starts; otherwise the program would report a missing device.
 fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
     let Some(file) = &arguments.scene else { return Ok(()) };
     if file.is_dir() || !file.exists() {
@@ -236,8 +238,9 @@ fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
     Ok(())
 }
 
-/// Waits for the guard of the program. After a request to stop, sends SIGTERM to the guard, then the request to kill the group. At the
-/// end of the schedule the guard goes on alone. A terminal sends its own signal to the program.
+/// Waits for the guard of the program and returns its exit status. After a request to stop, sends SIGTERM to the guard, then the
+/// signal to kill the process group of the program. At the end of the schedule returns as for a killed guard, which keeps running. A
+/// terminal sends its own signal to the program.
 fn wait(mut guard: Child, stop: &StopRequest) -> ExitStatus {
     let process = Pid::from_child(&guard);
     let mut asked = Stage::Running;

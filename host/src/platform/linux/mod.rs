@@ -1,4 +1,4 @@
-//! Linux: files of the kernel, programs of other makers, limits of the process.
+//! Linux: diagnosis from files of the kernel, `flotor lend`, limits of the process.
 
 pub(crate) mod doctor;
 pub(crate) mod lend;
@@ -14,17 +14,17 @@ pub(crate) const C_COMPILER: Option<&str> = None;
 /// Returns an absolute path without links. Not real-time.
 ///
 /// # Errors
-/// Errors of the system.
+/// Error of the system if the path does not exist or cannot be read.
 pub(crate) fn canonical(path: &Path) -> io::Result<PathBuf> {
     path.canonicalize()
 }
 
-/// Returns the largest number of open files of this process; `None` if it is unlimited.
+/// Returns the limit on the number of open files of this process; `None` if unlimited.
 pub(crate) fn most_open_files() -> Option<u64> {
     getrlimit(Resource::Nofile).current
 }
 
-/// Requests that the system ends this process, by SIGTERM, when its parent ends.
+/// Requests that the system sends SIGTERM to this process when its parent ends.
 pub(crate) fn end_with_parent() {
     let _ = set_parent_process_death_signal(Some(Signal::TERM));
 }

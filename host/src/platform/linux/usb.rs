@@ -6,39 +6,39 @@ use rustix::fs::{Access, access};
 use std::fs::{read_dir, read_link, read_to_string};
 use std::path::{Path, PathBuf};
 
-/// Folders with rules of udev.
+/// Folders with udev rules, relative to the root.
 const RULES: [&str; 4] = ["etc/udev/rules.d", "run/udev/rules.d", "usr/lib/udev/rules.d", "lib/udev/rules.d"];
-/// Property by which a rule of udev excludes a port from ModemManager.
+/// Property with which a udev rule excludes a port from ModemManager.
 const IGNORED: &str = "ID_MM_DEVICE_IGNORE";
 
-/// Files of a machine.
+/// Root folder of a machine's files, with a check of access rights.
 pub(crate) struct Machine {
     root: PathBuf,
     /// Returns true if this user may read and write a file.
     may_use: fn(&Path) -> bool,
 }
 
-/// USB device that the system reports.
+/// USB device of one of the requested kinds, found in sysfs.
 struct Seen {
-    /// Its folder below `sys/bus/usb/devices`.
+    /// Folder of the device below `sys/bus/usb/devices`.
     folder: PathBuf,
-    /// Position on the bus: `1-4.2` is the second port of a hub at the fourth of the first bus.
+    /// Position on the bus: `1-4.2` is port 2 of a hub at port 4 of bus 1.
     place: String,
     vendor: u16,
     product: u16,
-    /// Matching kind.
+    /// Requested kind that the device matches.
     kind: UsbKind,
     access: UsbAccess,
 }
 
 impl Machine {
-    /// Uses the files below a folder: `/`, except in tests.
+    /// Creates the machine whose files are below `root`: `/`, except in tests.
     pub(crate) fn at(root: &Path) -> Self {
         let may_use = |path: &Path| access(path, Access::READ_OK | Access::WRITE_OK).is_ok();
         Self { root: root.to_path_buf(), may_use }
     }
 
-    /// Returns the devices of these kinds.
+    /// Returns the connected devices of these kinds, sorted by their position.
     fn seen(&self, kinds: &[UsbKind]) -> Vec<Seen> {
         let folders = entries(&self.root.join("sys/bus/usb/devices"));
         let mut seen: Vec<Seen> = folders.filter_map(|folder| Seen::of(&folder, kinds)).collect();
@@ -46,13 +46,13 @@ impl Machine {
         seen
     }
 
-    /// Returns true if a program of this name runs.
+    /// Returns true if a program with this name is running.
     fn runs(&self, program: &str) -> bool {
         let processes = entries(&self.root.join("proc"));
         processes.filter_map(|process| text_of(&process, "comm")).any(|name| name == program)
     }
 
-    /// Returns true if a rule of udev excludes a vendor's ports from ModemManager.
+    /// Returns true if a udev rule excludes the ports of a vendor from ModemManager.
     fn keeps_modem_manager_away(&self, vendor: u16) -> bool {
         let vendor = format!("{vendor:04x}");
         let files = RULES.iter().flat_map(|folder| entries(&self.root.join(folder)));
@@ -79,7 +79,7 @@ impl Seen {
         Some(Self { folder: folder.to_path_buf(), place, vendor, product, kind, access })
     }
 
-    /// Returns the folders of its interfaces, such as `1-4.2:1.0`, in order.
+    /// Returns the folders of the device's interfaces, such as `1-4.2:1.0`, in order.
     fn interfaces(&self) -> Vec<PathBuf> {
         let begins = format!("{}:", self.place);
         let is_own = |path: &PathBuf| {
@@ -91,14 +91,14 @@ impl Seen {
         own
     }
 
-    /// Returns the path of the node through which a program uses the device, below the root.
+    /// Returns the path, below the root, of the device node through which a program uses the device; `None` if there is no node.
     fn node(&self, machine: &Machine) -> Option<PathBuf> {
         if self.access == UsbAccess::Raw {
             let number = |file| text_of(&self.folder, file)?.parse::<u16>().ok();
             let (bus, device) = (number("busnum")?, number("devnum")?);
             return Some(machine.root.join(format!("dev/bus/usb/{bus:03}/{device:03}")));
         }
-        // tty/ttyACM0 below an interface, or hidraw/hidraw0 below the device of its driver.
+        // `tty/ttyACM0` in the folder of an interface, or `hidraw/hidraw0` one folder below.
         let kind = if self.access == UsbAccess::Serial { "tty" } else { "hidraw" };
         let node = self.interfaces().into_iter().find_map(|interface| {
             let below = entries(&interface).map(|path| path.join(kind));
@@ -107,7 +107,8 @@ impl Seen {
         Some(machine.root.join("dev").join(node.file_name()?))
     }
 
-    /// Returns the rule of udev that permits access for the user at the machine, limited to the product if the vendor has several.
+    /// Returns the udev rule that grants access to the locally logged-in user (`uaccess`), limited to the product if the vendor has
+    /// several products.
     fn rule(&self) -> String {
         let (begins, attribute, then) = match self.access {
             UsbAccess::Raw => ("SUBSYSTEM==\"usb\"", "ATTR", String::new()),
@@ -153,7 +154,8 @@ impl Seen {
         diagnoses
     }
 
-    /// Returns the finding on the user of a raw device: a driver of the kernel, or another program if the device is not open here.
+    /// Returns a finding if a kernel driver uses the raw device, or another program while the device is not open here; `None`
+    /// otherwise.
     fn driver(&self, is_open: bool) -> Option<Diagnosis> {
         if self.access != UsbAccess::Raw {
             return None;
@@ -198,12 +200,14 @@ impl Seen {
     }
 }
 
-/// Creates a finding on an obstacle; a note if the device is open in spite of it, through a service or another connection.
+/// Creates the diagnosis of an access problem: a note if the device is open despite the problem, through a service or another
+/// connection; bad otherwise.
 fn hindrance(is_open: bool, what: &'static str, found: String, remedy: String) -> Diagnosis {
     Diagnosis::problem(if is_open { Grade::Note } else { Grade::Bad }, what, found, remedy)
 }
 
-/// Diagnoses the connection of a device of these kinds; a missing device is a note if the plugin opened one, and bad otherwise.
+/// Diagnoses the USB connection of devices of these kinds. A missing device is a note if the plugin has opened a device, and bad
+/// otherwise.
 pub(crate) fn connection(machine: &Machine, kinds: &[UsbKind], is_open: bool) -> Vec<Diagnosis> {
     if kinds.is_empty() {
         return Vec::new(); // a simulated device, or one behind a service

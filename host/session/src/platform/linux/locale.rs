@@ -1,10 +1,10 @@
-//! The locale of the C library, by which C plugins read and write numbers.
+//! Locale of the C library, which determines how C plugins parse and format numbers.
 #![allow(unsafe_code)] // `setlocale`; tests/tests/system/architecture.rs lists it
 
 use std::ffi::{CStr, CString};
 use std::ptr::null;
 
-/// Returns the locale of the process, for all categories. Not real-time.
+/// Returns the locale of the process, for all categories; `None` if the C library reports none. Not real-time.
 pub(super) fn now() -> Option<CString> {
     // SAFETY: asked with no name, `setlocale` changes nothing and returns a text that is valid until the next call. The host makes no
     // other call meanwhile, and the contract forbids plugins to change the process.

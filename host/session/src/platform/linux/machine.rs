@@ -1,7 +1,7 @@
-//! State of the process that any plugin can change: recorded before plugin code runs, and restored afterwards.
+//! State of the process that any plugin can change: recorded before plugin code runs, and restored after it returns.
 //!
-//! The state of a thread (priority, cores, floating-point environment) needs no restoring: plugin code runs in a thread that ends
-//! with it. Only the main thread can be changed by others, through the process id.
+//! The state of a thread (priority, cores, floating-point environment) need not be restored: plugin code runs in a separate thread.
+//! Only the main thread can be changed by other threads, through the process id.
 
 use super::locale;
 use rustix::fs::Mode;
@@ -10,7 +10,7 @@ use rustix::process::{getpriority_process, setpriority_process, umask};
 use rustix::thread::{CpuSet, sched_getaffinity, sched_setaffinity};
 use std::ffi::CString;
 
-/// Limits that a run depends on.
+/// Resource limits that a run depends on, with their names in notices.
 const LIMITS: [(Resource, &str); 6] = [
     (Resource::Nofile, "the limit of open files"),
     (Resource::Fsize, "the limit of file sizes"),
@@ -20,7 +20,7 @@ const LIMITS: [(Resource, &str); 6] = [
     (Resource::Rttime, "the limit of real-time processor time"),
 ];
 
-/// The state of the process that plugins share with the host.
+/// State of the process that plugins share with the host; `None` for a part that could not be read.
 pub(crate) struct MachineState {
     folder: Option<CString>,
     limits: [Rlimit; LIMITS.len()],
@@ -31,7 +31,7 @@ pub(crate) struct MachineState {
 }
 
 impl MachineState {
-    /// Records the present state. Not real-time.
+    /// Reads the current state. Not real-time.
     pub(crate) fn now() -> Self {
         Self {
             folder: getcwd(Vec::new()).ok(),
@@ -43,7 +43,8 @@ impl MachineState {
         }
     }
 
-    /// Restores the changed parts and returns their names, also of parts that the system refuses to restore. Not real-time.
+    /// Restores the changed parts and returns the names of all changed parts, also of those that the system refuses to restore. Not
+    /// real-time.
     pub(crate) fn restore(&self) -> Vec<&'static str> {
         let Self { folder, limits, cores, nice, mask, locale } = self;
         let now = Self::now();
@@ -78,12 +79,12 @@ impl MachineState {
     }
 }
 
-/// Returns the former value of a part, if it is known and the part has changed.
+/// Returns the former value of a part; `None` if it is unknown or unchanged.
 fn lost<'a, T: PartialEq>(before: &'a Option<T>, now: &Option<T>) -> Option<&'a T> {
     before.as_ref().filter(|before| now.as_ref() != Some(before))
 }
 
-/// Returns the mode mask of new files, from a file of the kernel: reading it with `umask` would change it.
+/// Returns the file mode creation mask (umask) from `/proc`: the system call `umask` cannot read the mask without changing it.
 fn file_mask() -> Option<Mode> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let mask = status.lines().find_map(|line| line.strip_prefix("Umask:"))?;

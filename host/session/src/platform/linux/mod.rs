@@ -14,20 +14,20 @@ use std::fs::Metadata;
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::{Path, PathBuf};
 
-/// Warning about ends of this process that stop no device, on this system only: none.
+/// Warning, for users, about ends of this process that stop no device; none on Linux.
 pub(crate) const NOT_CAUGHT: Option<&str> = None;
 
-/// Returns device and inode, which identify a file among all that exist.
+/// Returns device and inode number, which together identify an existing file.
 pub(crate) fn identity(file: &Metadata) -> [u64; 2] {
     [file.dev(), file.ino()]
 }
 
-/// Returns the time of the last change of contents or attributes, s and ns since 1970: no program can set it back.
+/// Returns the time of the last change of contents or attributes (ctime), s and ns since 1970; programs cannot set it back.
 pub(crate) fn changed(file: &Metadata) -> (i64, i64) {
     (file.ctime(), file.ctime_nsec())
 }
 
-/// Returns true if two paths lead to one file that exists. Not real-time.
+/// Returns true if two paths lead to the same existing file. Not real-time.
 #[must_use]
 pub fn is_same_file(one: &Path, other: &Path) -> bool {
     let of = |path: &Path| std::fs::metadata(path).map(|file| identity(&file));
@@ -38,8 +38,8 @@ pub fn is_same_file(one: &Path, other: &Path) -> bool {
 pub(crate) const UNKNOWN_PROGRAM: &str = "the folder of this program is unknown, because /proc is not mounted: \
 mount /proc, or give plugin folders with --plugin-path";
 
-/// Returns the folder of a user's plugins for all installations, by the XDG base directory specification. None for root: a file in
-/// a home folder must not run with all rights.
+/// Returns the plugin folder of the user, shared by all installations (XDG base directory specification); `None` for root, because a
+/// file in a home folder must not run with root privileges, and without `XDG_DATA_HOME` and `HOME`.
 pub(crate) fn user_folder() -> Option<PathBuf> {
     if geteuid().is_root() {
         return None;
@@ -49,8 +49,8 @@ pub(crate) fn user_folder() -> Option<PathBuf> {
     Some(data?.join("flotor/plugins"))
 }
 
-/// Returns the reason not to search a folder: another user could put a plugin there. Trusted are root, the user, and the owner of
-/// this program.
+/// Returns the reason why a folder is not searched, if another user could place a plugin there; `None` for a folder that is not
+/// world-writable and belongs to root, the user or the owner of this program.
 pub(crate) fn distrust(folder: &Path, attributes: &Metadata) -> Option<String> {
     let folder = folder.display();
     if attributes.permissions().mode() & 0o002 != 0 {

@@ -1,4 +1,4 @@
-//! A process group that ends with its parent.
+//! Process group whose leader is killed when its parent ends.
 #![allow(unsafe_code)] // calls between `fork` and `exec`; tests/tests/system/architecture.rs lists it
 
 use rustix::process::{
@@ -10,19 +10,19 @@ use std::mem::MaybeUninit;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Command};
 
-/// Makes a command the leader of a process group. The system kills the leader when the thread that starts it ends.
+/// Makes the process of a command the leader of a new process group. The system kills the leader when the thread that starts it ends.
 pub(crate) fn lead_until_parent_ends(command: &mut Command) {
     end_with_this_thread(command.process_group(0));
 }
 
-/// Makes the system kill the process of a command when the thread that starts it ends, for any reason. The process blocks no
-/// signal, even if the thread blocks them all, so that none ends the thread while it starts the process. Not real-time.
+/// Makes the system kill the process of a command when the thread that starts it ends, for any reason. The process starts with no
+/// signal blocked: the thread may therefore block all signals while it starts the process. Not real-time.
 pub fn end_with_this_thread(command: &mut Command) {
     let parent = getpid();
     let end_with_parent = move || {
         set_parent_process_death_signal(Some(Signal::KILL))?;
         block_no_signal();
-        // A parent that ended before sends no signal.
+        // The system sends no signal for a parent that has already ended.
         if getppid() == Some(parent) { Ok(()) } else { Err(io::ErrorKind::NotFound.into()) }
     };
     // SAFETY: system calls alone, without a lock or an allocation.
@@ -39,13 +39,13 @@ fn block_no_signal() {
     }
 }
 
-/// Returns true once a child has ended, without waiting for it.
+/// Returns true once a child has ended, without reaping it.
 pub(crate) fn has_ended(child: &mut Child) -> io::Result<bool> {
     let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
     Ok(waitid(WaitId::Pid(Pid::from_child(child)), options)?.is_some())
 }
 
-/// Kills the process group of a child that has not been waited for.
+/// Kills the process group of a child that has not been reaped.
 pub(crate) fn kill(child: &mut Child) {
     let _ = kill_process_group(Pid::from_child(child), Signal::KILL);
 }

@@ -1,12 +1,12 @@
-//! Processor time and state of a thread, read by other threads.
+//! Processor time and scheduling state of a thread, read by other threads.
 
 use rustix::thread::gettid;
 use std::time::Duration;
 
-/// Unit of processor times under /proc: `USER_HZ` is 100 on every Linux.
+/// Unit of processor times in `/proc`: `USER_HZ` is 100 on every Linux.
 const CLOCK_TICK: Duration = Duration::from_millis(10);
 
-/// Processor use of a thread.
+/// Processor use of a thread at one instant.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Used {
     /// Processor time since the start of the thread.

@@ -1,15 +1,15 @@
-//! Log of changes that the loop reports, for the observer of a run.
+//! Changes that the loop reports, passed to the observer of a run.
 
 use super::super::observer::Observer;
 use super::plugin_table::PluginTable;
 use flotor_core::trace::TickRecord;
 use flotor_servo::{ChangeReport, PLUGIN, ReportReceiver};
 
-/// Changes of a run for its observer, each before its tick.
+/// Receiver of the loop's change reports: passes each change to the observer before the record of its tick.
 pub(in super::super) struct ChangeLog {
     plugins: PluginTable,
     reports: ReportReceiver,
-    /// The next change, of a later tick.
+    /// Next report, if its tick is later than the last record.
     pending: Option<ChangeReport>,
 }
 

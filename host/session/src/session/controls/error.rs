@@ -1,9 +1,9 @@
-//! Errors of changes.
+//! Errors of changes to a running loop.
 
 use flotor_hal::abi::loader::SettingError;
 use flotor_live::RefusalCause;
 
-/// Reason for a refused change.
+/// Reason why a change was rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ControlError {
@@ -16,9 +16,9 @@ pub enum ControlError {
     UnknownPlugin {
         /// Requested name.
         name: String,
-        /// Most similar name of a plugin.
+        /// Most similar name of a plugin of the run; `None` without a similar one.
         nearest: Option<String>,
-        /// Names of all plugins.
+        /// Names of all plugins of the run.
         names: Vec<String>,
     },
     /// The plugin has no such parameter, or the value is not legal for it.
@@ -26,7 +26,7 @@ pub enum ControlError {
     Setting {
         /// Name of the plugin.
         plugin: String,
-        /// Error of the setting.
+        /// Reason why the setting is illegal.
         #[source]
         error: SettingError,
     },
@@ -37,23 +37,23 @@ pub enum ControlError {
         plugin: String,
         /// Id of the parameter.
         id: String,
-        /// Ids of the parameters that can change.
+        /// Ids of the parameters that can change while the loop runs.
         live: Vec<String>,
     },
-    /// A device has no weight and cannot be replaced.
+    /// The name is that of a device, which has no weight and cannot be replaced.
     #[error("only models have a weight and can be swapped; name a model instead of a device")]
     NoWeight,
-    /// A model cannot be replaced.
+    /// The replacement of a model was rejected; the model stays in place.
     #[error("[{model}] model unchanged: {problem}")]
     Refused {
         /// Name of the model.
         model: String,
-        /// Problem as text.
+        /// Reason as text.
         problem: String,
-        /// Cause of the refusal.
+        /// Class of the cause: request, plugin or other.
         cause: RefusalCause,
     },
-    /// Too many changes are pending, or the last replacement of the model is still fading.
+    /// The queue of pending changes is full, or the last replacement of the model is still pending or fading.
     #[error("previous changes are pending, or a swap is still fading in; try again in a moment")]
     Busy,
     /// The loop has ended.

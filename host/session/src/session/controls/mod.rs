@@ -1,6 +1,6 @@
 //! Changes of a running loop by other threads: new values of parameters, weights, replacements of models.
 //!
-//! Texts are checked against the schema of a plugin here; only numbers enter the loop.
+//! Values given as text are checked against the plugin's schema and converted here; the loop receives numbers only.
 
 mod change_log;
 mod error;
@@ -28,7 +28,7 @@ use flotor_servo::{ChangeSender, Clock, HostSwaps, Layer, LayerReport, Parameter
 use std::sync::{Arc, Mutex, MutexGuard};
 use swaps::Swaps;
 
-/// Handle to a running loop, for any thread, with cheap clones. No method makes the loop wait.
+/// Handle with which any thread changes a running loop; clones are cheap. No method makes the loop wait.
 #[derive(Clone)]
 pub struct Controls {
     shared: Arc<Shared>,
@@ -36,9 +36,9 @@ pub struct Controls {
 
 struct Shared {
     plugins: PluginTable,
-    /// Locked by panels and scripts, never by the loop.
+    /// Queue to the loop; locked by the threads that change the run, never by the loop.
     changes: Mutex<ChangeSender>,
-    /// Models of the scene, for place and mixing of a replacement.
+    /// Models of the scene, from which a replacement takes positions, mapping and blending.
     models: Vec<ModelUse>,
     config: LoopConfig,
     clock: Clock,
@@ -57,20 +57,22 @@ impl Controls {
         Self { shared: Arc::new(Shared { plugins, changes, models: models.to_vec(), config, clock, swaps }) }
     }
 
-    /// Returns every plugin of the run with its schema: the devices, then the models in the scene's order.
+    /// Returns name and parameter schema of each plugin of the run, replacements included: devices, then models, in the scene's
+    /// order.
     #[must_use]
     pub fn plugins(&self) -> Vec<(String, &'static [Parameter])> {
         let plugins = self.shared.plugins.lock();
         plugins.iter().map(|plugin| (plugin.now().name.clone(), plugin.now().schema)).collect()
     }
 
-    /// Moves a live parameter to a new value, by a tenth of its [soft range](flotor_hal::SoftRange) in 50 ms; a value that is no
-    /// number changes before the next tick. Not real-time.
+    /// Moves a live parameter to a new value at a rate of a tenth of its [soft range](flotor_hal::SoftRange) per 50 ms; a parameter
+    /// without a soft range, for example of a simulated device, changes before the next tick. Not real-time.
     ///
-    /// The plugin may still refuse a value that does not fit its other values: observers get the outcome ([`super::Observer::change`]).
+    /// The plugin may still reject a value that does not fit its other values: observers receive the outcome
+    /// ([`super::Observer::change`]).
     ///
     /// # Errors
-    /// [`ControlError`]: no such plugin, parameter or value; not a live one; the loop is busy or over.
+    /// [`ControlError`]: unknown plugin or parameter, illegal value, parameter not live, queue to the loop full, or run over.
     pub fn set_parameter(&self, plugin: &str, parameter: &str, value: &str) -> Result<(), ControlError> {
         self.set_parameters(&[NewValue { plugin, parameter, value }])
     }
@@ -79,7 +81,7 @@ impl Controls {
     /// real-time.
     ///
     /// # Errors
-    /// [`ControlError`]; then none of them changes.
+    /// [`ControlError`]; then no parameter changes.
     pub fn set_parameters(&self, values: &[NewValue<'_>]) -> Result<(), ControlError> {
         let Shared { plugins, .. } = &*self.shared;
         let slowed = |change: &ParameterChange| ParameterChange { pace: plugins.pace(change), ..*change };
@@ -88,21 +90,21 @@ impl Controls {
         self.send(&checked.iter().map(slowed).collect::<Vec<_>>())
     }
 
-    /// Sets several live parameters, all before the same tick: for changes that no hand feels, such as the next stimulus of an
-    /// experiment. Not real-time.
+    /// Sets several live parameters before the same tick, without a gradual change: for changes that no hand feels, such as the next
+    /// stimulus of an experiment. Not real-time.
     ///
     /// # Errors
-    /// [`ControlError`]; then none of them changes.
+    /// [`ControlError`]; then no parameter changes.
     pub fn set_parameters_at_once(&self, values: &[NewValue<'_>]) -> Result<(), ControlError> {
         let checked = values.iter().map(|value| self.shared.plugins.check(value));
         self.send(&checked.collect::<Result<Vec<_>, _>>()?.concat())
     }
 
-    /// Sets the weight of a model, approached at the rate of its fade from the next tick on. A model with a weight of 0 is not
-    /// stepped any more. Not real-time.
+    /// Sets the weight of a model, limited to 0 to 1; the loop approaches it at the rate of the model's fade from the next tick on. A
+    /// model with weight 0 is not stepped. Not real-time.
     ///
     /// # Errors
-    /// [`ControlError`]: no such model; the loop is busy or over.
+    /// [`ControlError`]: unknown model, queue to the loop full, or run over.
     pub fn set_weight(&self, model: &str, weight: f64) -> Result<(), ControlError> {
         self.send(&self.shared.plugins.check_weight(model, weight)?)
     }
@@ -112,18 +114,18 @@ impl Controls {
         if changes.is_abandoned() {
             return Err(ControlError::Ended);
         }
-        // All or none, and the loop applies them together.
+        // All changes or none; the loop applies them together.
         changes.push_entire_slice(checked).map_err(|_| ControlError::Busy)
     }
 
-    /// Replaces a model by another plugin, or by the same one rebuilt (hot swap): the new one is loaded and created here, and fades
-    /// in from the next tick on while the old one fades out. Not real-time: takes as long as creating the model.
+    /// Replaces a model by another plugin, or by a new instance of the same plugin (hot swap): loads and creates the new model, which
+    /// then fades in from the next tick on while the old model fades out. Not real-time: takes as long as creating the model.
     ///
-    /// Without `plugin`, plugin and settings are those of the scene; another plugin starts from its own defaults. `settings` are
-    /// added. Places, mapping and weight stay.
+    /// Without `plugin`, plugin and parameters are those of the scene; a given plugin starts from its own defaults. `settings`, as
+    /// key and value, are added. Positions, mapping and weight stay.
     ///
     /// # Errors
-    /// [`ControlError`]: no such model; the plugin is refused; the model replaced last is still fading; the loop is over.
+    /// [`ControlError`]: unknown model, rejected plugin, a previous replacement pending or still fading, or run over.
     pub fn swap(
         &self,
         registry: &Registry,
@@ -151,7 +153,7 @@ impl Controls {
             let is_wanted = || !lock(&self.shared.changes).is_abandoned() && is_to_begin();
             prepare_model_while(registry, &other, config, *clock, is_wanted).map_err(refused)
         };
-        // Without the lock: the run goes on meanwhile, and may end.
+        // Without the lock: the run continues meanwhile, and may end.
         let made = numbers.iter().map(make).collect::<Result<Vec<_>, _>>();
         let mut swaps = self.swaps();
         let made = made.inspect_err(|_| swaps.release(&numbers))?;
@@ -163,7 +165,7 @@ impl Controls {
         Ok(())
     }
 
-    /// Returns warnings about replacements, a sentence each. Not real-time.
+    /// Removes and returns the warnings about replacements, a sentence each. Not real-time.
     pub(super) fn warnings(&self) -> Vec<String> {
         self.swaps().take_warnings()
     }
@@ -172,19 +174,20 @@ impl Controls {
         lock(&self.shared.swaps)
     }
 
-    /// Frees models that the loop has returned, unless another thread does. Not real-time.
+    /// Frees models that the loop has returned, unless another thread holds the lock. Not real-time.
     pub(super) fn sweep(&self) {
         if let Ok(mut swaps) = self.shared.swaps.try_lock() {
             swaps.sweep(&self.shared.plugins);
         }
     }
 
-    /// Returns the models that a finished loop has returned last, each with its number. Not real-time.
+    /// Removes and returns the models that a finished loop has returned, each with its number. Not real-time.
     pub(super) fn take_retired(&self) -> Vec<(usize, Box<Layer>)> {
         self.swaps().take_retired()
     }
 
-    /// Returns the faults of all plugins of a run that is over; `in_loop` has those still in the loop. Not real-time.
+    /// Returns health and faults of all models of a finished run; `in_loop` has a report on each model still in the loop. Not
+    /// real-time.
     pub(super) fn settle(&self, in_loop: Vec<LayerReport>) -> Settled {
         let Shared { plugins, models, .. } = &*self.shared;
         self.swaps().settle(plugins, models.len(), in_loop)

@@ -1,4 +1,5 @@
-//! Table of the plugins of a run with their replacements: checks new values before they enter the loop, and describes its reports.
+//! Table of the plugins of a run with their replacements: checks new values before they enter the loop, and describes the changes
+//! that the loop reports.
 
 use super::super::plugin_report::PluginReport;
 use super::error::ControlError;
@@ -20,14 +21,14 @@ pub struct NewValue<'a> {
     pub plugin: &'a str,
     /// Id of the parameter.
     pub parameter: &'a str,
-    /// Value in the notation of users.
+    /// Value in the syntax of scenes and of the command line.
     pub value: &'a str,
 }
 
 /// Parses a new value of a live parameter.
 ///
 /// # Errors
-/// [`ControlError::Setting`], [`ControlError::Fixed`].
+/// [`ControlError::Setting`] for an unknown parameter or illegal value, [`ControlError::Fixed`] if the parameter is not live.
 fn live_setting(part: &PluginReport, new: &NewValue<'_>) -> Result<Setting, ControlError> {
     let setting = Setting::parse(part.schema, new.parameter, new.value)
         .map_err(|error| ControlError::Setting { plugin: part.name.clone(), error })?;
@@ -49,7 +50,7 @@ pub(in super::super) fn understands(part: &PluginReport, new: &NewValue<'_>) -> 
     is_named && live_setting(part, new).is_ok()
 }
 
-/// The plugins of a run by number: devices first, then models in the scene's order. Clones share one table.
+/// Plugins of a run, by number: devices, then models, in the scene's order. Clones share one table.
 #[derive(Clone)]
 pub(in super::super) struct PluginTable {
     places: Arc<Mutex<Vec<Versions>>>,
@@ -86,18 +87,18 @@ impl PluginTable {
         }
     }
 
-    /// Returns the plugin of a model and generation.
+    /// Returns the plugin of a model with this generation; `None` if the run has fewer models.
     pub(super) fn plugin(&self, model: usize, generation: u16) -> Option<PluginReport> {
         self.model(model, |versions| versions.get(generation).clone())
     }
 
-    /// Returns the name of a model; its number, if the run has fewer models.
+    /// Returns the name of a model, or its number as text if the run has fewer models.
     pub(super) fn name(&self, model: usize) -> String {
         let name = self.model(model, |versions| versions.first.name.clone());
         name.unwrap_or_else(|| PluginIndex::of_model(self.devices, model).to_string())
     }
 
-    /// Returns the replacements in place, except those that the seed chose.
+    /// Returns the replacements in place, except replacements that the seed chose.
     pub(super) fn replacements(&self) -> Vec<PluginReport> {
         let in_place = |versions: &Versions| {
             let mut later = versions.later.iter();
@@ -112,7 +113,7 @@ impl PluginTable {
         self.model(model, |versions| versions.retire(generation));
     }
 
-    /// Checks new values against the plugins that a run begins with.
+    /// Selects the plugins that a run begins with as the ones that new values are checked against.
     pub(in super::super) fn start_with_the_first(&self) {
         self.lock().iter_mut().for_each(|versions| versions.current = 0);
     }
@@ -137,13 +138,13 @@ impl PluginTable {
         })
     }
 
-    /// Returns the numbers, among the models, of the models with a name.
+    /// Returns the numbers, counted among the models, of the models that a name names; an error for a device.
     pub(in super::super) fn models(&self, name: &str) -> Result<Vec<usize>, ControlError> {
         let model = |plugin: PluginIndex| plugin.among_models(self.devices).ok_or(ControlError::NoWeight);
         self.numbers(name)?.into_iter().map(model).collect()
     }
 
-    /// Returns the changes that give a model a new weight, limited to 0 to 1.
+    /// Returns the changes that give a model a new weight, limited to 0 to 1, on each of its devices.
     pub(in super::super) fn check_weight(
         &self,
         model: &str,
@@ -156,7 +157,7 @@ impl PluginTable {
         Ok(self.numbers(model)?.into_iter().map(change).collect())
     }
 
-    /// Returns the changes of a new value, one for each plugin that it names.
+    /// Checks a new value and returns one change for each plugin that it names.
     pub(in super::super) fn check(&self, new: &NewValue<'_>) -> Result<Vec<ParameterChange>, ControlError> {
         self.numbers(new.plugin)?.into_iter().map(|plugin| self.check_one(plugin, new)).collect()
     }
@@ -170,7 +171,8 @@ impl PluginTable {
         Ok(ParameterChange { plugin, generation, parameter, value: setting.value(), pace: Pace::AtOnce })
     }
 
-    /// Returns the rate at which a user's request moves a number: a tenth of its soft range in 50 ms.
+    /// Returns the rate at which a user's request moves a number: a tenth of its soft range per 50 ms; at once for a parameter
+    /// without a soft range.
     pub(super) fn pace(&self, change: &ParameterChange) -> Pace {
         let places = self.lock();
         let part = places.get(change.plugin.position()).map(|versions| versions.get(change.generation));

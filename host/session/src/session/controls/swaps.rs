@@ -7,14 +7,14 @@ use crate::calls::{Call, CallThread, PendingCall, Unresponsive, end_limit};
 use flotor_servo::{HostSwaps, Layer, LayerReport, ModelHealth, Replacement};
 use std::time::Duration;
 
-/// Plugin of a run with faults: the first one of a model, or a replacement.
+/// Model plugin of a run with faults: the plugin that the run began with, or a replacement.
 #[derive(Clone, Debug)]
 pub struct FaultyPlugin {
-    /// Plugin, under the name of the model.
+    /// Report on the plugin, with the name of the model.
     pub plugin: PluginReport,
-    /// Health counters with the faults.
+    /// Health of the model, with counts of its faults.
     pub health: ModelHealth,
-    /// Last message; may be empty.
+    /// Last message of the plugin; may be empty.
     pub words: String,
 }
 
@@ -22,25 +22,26 @@ pub struct FaultyPlugin {
 pub(super) struct Swaps {
     queues: HostSwaps,
     busy: Vec<bool>,
-    /// Plugins with faults, each with model number and generation: the first of each file, which bounds the list.
+    /// Plugins with faults, each with model number and generation; of the replacements of a model at most one per plugin file, which
+    /// bounds the list.
     faulty_plugins: Vec<(usize, u16, FaultyPlugin)>,
     /// Warnings about replacements, a sentence each.
     warnings: Vec<String>,
     /// Plugins being freed on helper threads: `sweep` does not wait for plugin code.
     freeing: Vec<PendingCall<LayerReport>>,
-    /// The first plugin that was not freed in time.
+    /// First plugin that was not freed in time.
     hung: Option<Unresponsive>,
 }
 
-/// Models of a finished run.
+/// Health and replacements of the models of a finished run.
 pub(in super::super) struct Settled {
-    /// Health and last message of the models of the scene, in its order.
+    /// Health and last message of the models that the run began with, in the scene's order.
     pub(in super::super) first: Vec<(ModelHealth, String)>,
     /// Replacements with faults.
     pub(in super::super) faulty_plugins: Vec<FaultyPlugin>,
     /// Replacements in place at the end.
     pub(in super::super) replacements: Vec<PluginReport>,
-    /// The first plugin that was not freed in time.
+    /// First plugin that was not freed in time.
     pub(in super::super) hung: Option<Unresponsive>,
 }
 
@@ -56,7 +57,7 @@ impl Swaps {
         }
     }
 
-    /// Starts to free plugins that the loop has returned, and records faults of the freed ones. Not real-time; does not wait.
+    /// Starts to free plugins that the loop has returned, and records the faults of freed plugins. Not real-time; does not wait.
     pub(super) fn sweep(&mut self, plugins: &PluginTable) {
         while let Ok((model, mut layer)) = self.queues.retired.pop() {
             let who = plugins.name(model);
@@ -75,7 +76,7 @@ impl Swaps {
     /// Reserves models for a replacement, all or none.
     ///
     /// # Errors
-    /// [`ControlError::Busy`].
+    /// [`ControlError::Busy`] if a replacement of one of the models is pending.
     pub(super) fn reserve(&mut self, plugins: &PluginTable, numbers: &[usize]) -> Result<(), ControlError> {
         self.sweep(plugins);
         if numbers.iter().any(|number| self.busy.get(*number).is_none_or(|busy| *busy)) {
@@ -96,7 +97,7 @@ impl Swaps {
         }
     }
 
-    /// Records the faults of freed plugins, waiting for each up to a time.
+    /// Records the faults of freed plugins; waits up to `time` for each plugin that is being freed.
     pub(super) fn collect(&mut self, plugins: &PluginTable, time: Duration) {
         let mut at = 0;
         while let Some(calls) = self.freeing.get(at) {
@@ -135,7 +136,7 @@ impl Swaps {
         }
     }
 
-    /// Sends a replacement to the loop. There is room: each model has at most one pending.
+    /// Sends a replacement to the loop. The queue has room: each model has at most one pending replacement.
     ///
     /// # Errors
     /// [`ControlError::Busy`].
@@ -146,7 +147,7 @@ impl Swaps {
         sent.map_err(|_| ControlError::Busy)
     }
 
-    /// Returns the models that a finished loop has returned last, each with its number.
+    /// Removes and returns the models that a finished loop has returned, each with its number.
     pub(super) fn take_retired(&mut self) -> Vec<(usize, Box<Layer>)> {
         std::iter::from_fn(|| self.queues.retired.pop().ok()).collect()
     }
@@ -159,7 +160,8 @@ impl Swaps {
         std::mem::take(&mut self.warnings)
     }
 
-    /// Returns the faults of all plugins of a run that is over; `in_loop` has those still in the loop. Not real-time.
+    /// Returns health and faults of all models of a finished run; `in_loop` has a report on each model still in the loop. Not
+    /// real-time.
     pub(super) fn settle(
         &mut self,
         plugins: &PluginTable,

@@ -3,10 +3,11 @@
 use super::super::plugin_report::PluginReport;
 use std::collections::VecDeque;
 
-/// Capacity that stays allocated: for the version in place, the one before, one that fades in, one that fades out.
+/// Capacity that stays allocated: for the version in place, the previous version, a version that fades in, and a version that fades
+/// out.
 const USUAL_VERSIONS: usize = 4;
 
-/// First plugin of a place in a run, with its replacements.
+/// Plugin of one device or model that a run began with, and its replacements.
 pub(super) struct Versions {
     pub(super) first: PluginReport,
     /// Replacements that reports may still refer to, oldest first.
@@ -19,12 +20,12 @@ pub(super) struct Versions {
     pub(super) in_place: u16,
 }
 
-/// The source of a replacement.
+/// Source of the choice of a replacement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in super::super) enum ChosenBy {
     /// Name, in the scene or from a user.
     Name,
-    /// The seed, among several; hidden from reports.
+    /// Seed of the run, among several alternatives; hidden from reports.
     Seed,
 }
 
@@ -49,8 +50,8 @@ impl Versions {
         version.map_or(&self.first, |version| &version.report)
     }
 
-    /// Adds a replacement and returns its generation. Generation 0 is the plugin of the scene; after the last number, 1 follows,
-    /// whose replacement was dropped long before.
+    /// Adds a replacement and returns its generation. Generation 0 is the plugin of the scene. After the largest number the count
+    /// continues at 1, whose replacement was dropped long before.
     pub(super) fn add(&mut self, report: PluginReport, chosen_by: ChosenBy) -> u16 {
         self.newest = self.newest.checked_add(1).unwrap_or(1);
         self.current = self.newest;
@@ -68,7 +69,7 @@ impl Versions {
     }
 
     /// Drops replacements that no report can refer to any more, so that memory stays bounded. A pending change may refer to the
-    /// version before the one in place, and the loop to an older one until its return.
+    /// version before the one in place, and the loop may hold an older version that it has not returned.
     pub(super) fn forget(&mut self) {
         let in_place = self.later.iter().position(|version| version.generation == self.in_place);
         let mut old = in_place.unwrap_or(0).saturating_sub(1);
@@ -76,7 +77,7 @@ impl Versions {
             self.later.pop_front();
             old -= 1;
         }
-        // Gives back the capacity of an earlier burst.
+        // Frees the capacity of an earlier burst.
         self.later.shrink_to(USUAL_VERSIONS);
     }
 

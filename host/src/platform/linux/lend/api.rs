@@ -1,4 +1,4 @@
-//! Library interfaces of other makers, and their drop-in libraries.
+//! Library interfaces of other makers, and the drop-in libraries for them.
 
 use flotor_command::CommandError;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ pub(super) enum Api {
 /// Drop-in library for an interface.
 struct Library {
     word: &'static str,
-    /// File that cargo builds.
+    /// Name of the library file that cargo builds.
     built: &'static str,
     package: &'static str,
     names: &'static [&'static str],
@@ -52,7 +52,7 @@ impl Api {
                 word: "openhaptics",
                 built: "libHD.so",
                 package: "flotor-openhaptics",
-                // Programs that are linked with the higher layer load it, and call none of its functions.
+                // Includes HL, the higher layer: programs that are linked with it load it, even if they call none of its functions.
                 names: &[
                     "libHL.so",
                     "libHL.so.3.4",
@@ -73,17 +73,17 @@ impl Api {
         }
     }
 
-    /// Returns the file names by which programs load the library; the last one is used by an installation.
+    /// Returns the file names under which programs load the library; an installation has the file under the last name.
     pub(super) fn names(self) -> &'static [&'static str] {
         self.library().names
     }
 
-    /// Returns strings in a program that is linked with the library, or loads it.
+    /// Returns the strings that the file of a program contains if the program is linked with the library or loads it.
     pub(super) fn marks(self) -> &'static [&'static str] {
         self.library().marks
     }
 
-    /// Finds the library, in the installation or the build folder of this program.
+    /// Finds the drop-in library, in the installation or in the build folder of the program `own`.
     pub(super) fn find(self, own: &Path) -> Result<PathBuf, CommandError> {
         let folder = own.parent().unwrap_or(Path::new("."));
         let Library { built, package, .. } = self.library();

@@ -1,4 +1,4 @@
-//! Arguments of `flotor lend`, and the environment variables that pass them to a run behind a program.
+//! Arguments of `flotor lend`, and the environment variables that pass the arguments to the run in a drop-in library or service.
 
 use super::outcome::Runs;
 use clap::{Args, ValueEnum};
@@ -52,7 +52,7 @@ pub(super) enum PaceOption {
 }
 
 impl LendArguments {
-    /// Sets the environment variables of a run behind a program, in a library or a service.
+    /// Sets the environment variables for the run in a drop-in library or service.
     pub(super) fn set_environment(
         &self,
         command: &mut Command,

@@ -1,4 +1,4 @@
-//! Private folder of `flotor lend`: the libraries that a program finds, and the files that its runs write.
+//! Private folder of `flotor lend`: links to the drop-in libraries, and the files that the runs of a program write.
 
 use super::api::Api;
 use flotor_command::CommandError;
@@ -11,18 +11,18 @@ pub(super) struct Folder(pub(super) PathBuf);
 impl Folder {
     pub(super) fn new() -> Result<Self, CommandError> {
         let path = std::env::temp_dir().join(format!("flotor-lend-{}", std::process::id()));
-        // From a killed process with the same id.
+        // Left by a killed process with the same id.
         let _ = std::fs::remove_dir_all(&path);
         let made = std::fs::DirBuilder::new().mode(0o700).create(&path);
         made.map_err(|cause| CommandError::file(&path, "cannot make a folder for the libraries", cause))?;
         Ok(Self(path))
     }
 
-    /// Links a library under the names of its interface, in the folders that loader and SDK variables search.
+    /// Links a library under the file names of its interface, in the folders that the loader and the clients of an SDK search.
     pub(super) fn put(&self, api: Api, library: &Path) -> Result<(), CommandError> {
         let library = library.canonicalize().unwrap_or_else(|_| library.to_path_buf());
         let sdk = self.0.join(format!("lib/release/lin-{}-gcc", std::env::consts::ARCH));
-        // One old client searches a folder `lib` in the folder of the libraries.
+        // An old client searches the folder `lib` inside the folder of the libraries.
         let folders = match api {
             Api::Dhd => vec![self.0.clone(), sdk.clone(), sdk.join("lib")],
             Api::Openhaptics | Api::Chai3d => vec![self.0.clone()],
@@ -35,7 +35,7 @@ impl Folder {
         Ok(())
     }
 
-    /// Returns the file for the end of the program.
+    /// Returns the path of the file to which the guard writes the end of the program.
     pub(super) fn program_end(&self) -> PathBuf {
         self.0.join("program-end.json")
     }

@@ -1,8 +1,8 @@
 //! Guard process between `flotor lend` and the program: starts the program, reports its end, and kills the rest of its process group
-//! when the program or `flotor lend` ends, however that happens.
+//! when the program or `flotor lend` ends, for any reason.
 //!
-//! The guard is a subreaper: it becomes the parent of orphaned descendants, so that none is lost. A descendant that has moved to a
-//! process group of its own, as a daemon does, goes on and is reported.
+//! The guard is a subreaper: it becomes the parent of orphaned descendants, so that it finds them all. A descendant that has moved to
+//! a process group of its own, as a daemon does, keeps running and is reported.
 
 use clap::Args;
 use flotor_command::{CommandError, note, stopping};
@@ -20,18 +20,18 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 use std::time::{Duration, Instant};
 
-/// Signal to the guard to kill the process group; the system sends it when `flotor lend` ends.
+/// Signal that requests the guard to kill the process group; the system sends it when `flotor lend` ends.
 pub(super) const KILL_GROUP: Signal = Signal::USR1;
 /// Poll interval; signals and the end of a child wake the guard at once.
 const POLL: Duration = Duration::from_secs(1);
 /// Pause between two attempts to kill the group.
 const KILL_PAUSE: Duration = Duration::from_millis(2);
-/// Timeout for killing the group; processes that survive are left to the system.
+/// Timeout for killing the group; surviving processes are left running.
 const KILL_PATIENCE: Duration = Duration::from_secs(5);
 /// Grace period for processes outside the group to end by themselves, such as those of a run that has ended.
 const GRACE: Duration = Duration::from_millis(500);
 
-/// Arguments of the guard of a program, which `flotor lend` starts.
+/// Command line arguments of the guard process started by `flotor lend`.
 #[derive(Args)]
 pub(crate) struct GuardArguments {
     /// Process of `flotor lend`
@@ -45,7 +45,7 @@ pub(crate) struct GuardArguments {
     program: Vec<OsString>,
 }
 
-/// End of a program, as its guard reports it.
+/// End of a program, as reported by its guard in a file.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct ProgramEnd {
     /// Wait status of the program.
@@ -55,12 +55,12 @@ pub(super) struct ProgramEnd {
 }
 
 impl ProgramEnd {
-    /// Reads the result of a guard that has ended; `None` if it was not written.
+    /// Reads the file of a guard that has ended; `None` if the guard has written none.
     pub(super) fn read(file: &Path) -> Option<Self> {
         serde_json::from_slice(&std::fs::read(file).ok()?).ok()
     }
 
-    /// Creates the end of a program whose guard was killed, and the program with it.
+    /// Creates the end of a program that was killed together with its guard; `status` is the exit status of the guard.
     pub(super) fn of(status: ExitStatus) -> Self {
         Self { status: status.into_raw(), left_running: Vec::new() }
     }
@@ -70,7 +70,7 @@ impl ProgramEnd {
         ExitStatus::from_raw(self.status)
     }
 
-    /// Prints a note on each process that goes on.
+    /// Prints a note on each process that keeps running.
     pub(super) fn tell(&self) {
         for process in &self.left_running {
             note(format_args!("{process} has left the process group of the program, and still runs"));
@@ -78,7 +78,7 @@ impl ProgramEnd {
     }
 }
 
-/// Process that descends from the guard.
+/// Process that is a descendant of the guard.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Descendant {
     process: i32,
@@ -93,7 +93,7 @@ impl Display for Descendant {
     }
 }
 
-/// Guards a program until its end. Called while the process has one thread.
+/// Starts a program and guards it until its end; must be called while the process has only one thread.
 pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
     let failed = |cause: std::io::Error| CommandError::Failed(format!("cannot guard the program: {cause}"));
     let [program, rest @ ..] = arguments.program.as_slice() else {
@@ -110,7 +110,7 @@ pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
     }
     let mut command = Command::new(program);
     end_with_this_thread(command.args(rest));
-    // This process always blocks its signals: a pending one would end it.
+    // This process always blocks these signals: a pending signal would end it.
     let child =
         command.spawn().map_err(|cause| CommandError::file(program.as_ref(), "cannot be started", cause))?;
     let program = Pid::from_child(&child);
@@ -134,13 +134,14 @@ pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
         .map_err(|cause| CommandError::file(&arguments.end, "cannot be written", cause))
 }
 
-/// Reaps the children that have ended; returns the wait status of the program, if it has.
+/// Reaps the children that have ended; returns the wait status of the program if it is among them.
 fn collect(program: Pid) -> Option<i32> {
     let ended = std::iter::from_fn(|| wait(WaitOptions::NOHANG).ok().flatten());
     ended.filter(|(child, _)| *child == program).map(|(_, status)| status.as_raw()).last()
 }
 
-/// Kills every descendant in the process group of this process, and returns the others.
+/// Kills all descendants in the process group of this process, and returns the descendants in other groups, after a grace period for
+/// their end.
 fn kill_group(program: Pid, status: &mut Option<i32>) -> Vec<Descendant> {
     let (group, since) = (getpgrp().as_raw_nonzero().get(), Instant::now());
     loop {
@@ -158,7 +159,7 @@ fn kill_group(program: Pid, status: &mut Option<i32>) -> Vec<Descendant> {
     }
 }
 
-/// Returns the processes that descend from this one and have not ended.
+/// Returns the descendants of this process that have not ended.
 fn descendants() -> Vec<Descendant> {
     let entries = std::fs::read_dir("/proc").into_iter().flatten().flatten();
     let stats = entries.filter_map(|entry| std::fs::read_to_string(entry.path().join("stat")).ok());
@@ -174,7 +175,7 @@ fn descendants() -> Vec<Descendant> {
     found
 }
 
-/// Parses a line of `/proc/PID/stat`: the parent, and the process; `None` for a process that has ended.
+/// Parses `/proc/PID/stat` and returns the id of the parent and the process; `None` for a process that has ended.
 fn parse(stat: &str) -> Option<(i32, Descendant)> {
     let (process, rest) = stat.split_once(" (")?;
     // The name may contain parentheses.

@@ -1,4 +1,4 @@
-//! Summaries of the runs behind a program in the folder of `flotor lend`: one for each process that opened a device.
+//! Summaries that the runs of a program write to the folder of `flotor lend`: one for each process that has opened a device.
 
 use super::guard::ProgramEnd;
 use flotor_command::{CommandError, note, say, write_json};
@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 
-/// Exit code of a run ended by a device, the watchdog or an oscillation, equal to that of `flotor run`.
+/// Exit code for a run that a device fault, the watchdog or an oscillation has ended; the same as of `flotor run`.
 const RUN_FAILED: i32 = 4;
-/// Extension of a file that a run has not completed.
+/// Extension of a file of a run that has not ended.
 const SO_FAR: &str = "so-far";
 
 /// Result files of a run.
@@ -23,24 +23,24 @@ struct Run {
     is_whole: bool,
 }
 
-/// Runs behind a program, by the suffix in the names of their files.
+/// Runs of a program, by the suffix in the names of their files.
 pub(super) struct Runs<'a> {
     runs: BTreeMap<String, Run>,
     program: &'a ProgramEnd,
 }
 
 impl<'a> Runs<'a> {
-    /// Returns the names of the files that a run writes in this folder: its text and its summary.
+    /// Returns the paths of the files that a run writes to this folder: summary as text, and as JSON.
     pub(super) fn files(folder: &Path) -> [PathBuf; 2] {
         ["report.txt", "report.json"].map(|name| folder.join(name))
     }
 
-    /// Reads the files that exist at the end of the program.
+    /// Reads the files of all runs at the end of the program.
     pub(super) fn read(folder: &Path, program: &'a ProgramEnd) -> Self {
         let mut runs = BTreeMap::<String, Run>::new();
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
-            // report-2.txt, report-2.json.so-far
+            // For example report-2.txt, report-2.json.so-far
             let Some((suffix, kind)) = name.strip_prefix("report").and_then(|rest| rest.split_once('.'))
             else {
                 continue;
@@ -61,7 +61,7 @@ impl<'a> Runs<'a> {
         Self { runs, program }
     }
 
-    /// Prints the text of each run; returns true if there is any.
+    /// Prints the summary of each run; returns true if there is a summary.
     pub(super) fn tell(&self, program: &Path, record: Option<&Path>) -> bool {
         let name = program.display();
         for (suffix, run) in &self.runs {
@@ -81,7 +81,7 @@ impl<'a> Runs<'a> {
         self.runs.values().any(|run| run.text.is_some())
     }
 
-    /// Describes the end of the program, for a run that did not end before.
+    /// Describes the end of the program, for a run that did not end before the program.
     fn end(&self) -> String {
         let status = self.program.status();
         match (status.signal(), status.code()) {
@@ -92,7 +92,7 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// Writes the summary of each run: of the first into `file`, of others beside that file.
+    /// Writes the summary of each run as JSON: the first to `file`, each further one to a file beside it, with the suffix of the run.
     pub(super) fn write(&self, file: &Path) -> Result<(), CommandError> {
         if self.runs.is_empty() {
             return write_json(
@@ -114,7 +114,8 @@ impl<'a> Runs<'a> {
         Ok(())
     }
 
-    /// Returns the exit code of the command: that of the program, or that of a failed run whose program ended with 0.
+    /// Returns the exit code of the command: the exit code of the program, 128 plus the signal that ended it, or 4 if it ended with 0
+    /// after a failed run.
     pub(super) fn exit_code(&self) -> i32 {
         let in_order = [RunEnd::Finished, RunEnd::Stopped].map(RunEnd::word);
         let ended_early = |run: &Run| {
@@ -130,7 +131,7 @@ impl<'a> Runs<'a> {
     }
 }
 
-/// Inserts the suffix of a run into the name of a file.
+/// Inserts the suffix of a run into the name of a file, before the extension.
 fn named(file: &Path, suffix: &str) -> PathBuf {
     let mut name = file.file_stem().unwrap_or_default().to_owned();
     name.push(suffix);

@@ -1,4 +1,4 @@
-//! Program of `flotor lend`: its path, and checks whether a drop-in library can replace its maker's.
+//! Program of `flotor lend`: its path, and a check that a drop-in library can replace the library of the other maker.
 
 use super::api::Api;
 use flotor_command::CommandError;
@@ -6,13 +6,13 @@ use std::ffi::OsStr;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 
-/// Largest size of a program that is searched for names of libraries, bytes.
+/// Largest size of a program file that is searched for names of libraries, bytes.
 const MAX_BYTES: u64 = 512 << 20;
 
 /// Program to be run on a device.
 pub(super) struct Program {
     pub(super) path: PathBuf,
-    /// Properties of its file, if it is a native program.
+    /// Properties of its file; `None` for a script or a very large file.
     native: Option<Native>,
 }
 
@@ -21,11 +21,11 @@ pub(super) struct Program {
 struct Native {
     bits: Bits,
     is_dynamic: bool,
-    /// True for each interface that the file names, in the order of [`Api::ALL`].
+    /// For each interface, in the order of [`Api::ALL`], true if the file contains the name of its library.
     names: [bool; 3],
 }
 
-/// Size of the addresses of a native program.
+/// Address size of a native program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Bits {
     ThirtyTwo,
@@ -33,7 +33,7 @@ enum Bits {
 }
 
 impl Program {
-    /// Finds the program, as a shell would.
+    /// Finds an executable file by path or, for a name without a folder, in `PATH`.
     pub(super) fn find(name: &OsStr) -> Result<Self, CommandError> {
         let is_program = |path: &PathBuf| {
             std::fs::metadata(path).is_ok_and(|file| file.is_file() && file.permissions().mode() & 0o111 != 0)
@@ -60,12 +60,12 @@ impl Program {
         Ok(Self { path, native })
     }
 
-    /// Returns true if the program's file names an interface.
+    /// Returns true if the program's file contains the name of the interface's library.
     pub(super) fn calls(&self, api: Api) -> bool {
         self.native.is_some_and(|native| native.calls(api))
     }
 
-    /// Checks that a drop-in library can replace the one of the program.
+    /// Checks that a drop-in library can replace the library that the program uses; accepts a program that cannot be judged.
     pub(super) fn check(&self, api: Option<Api>) -> Result<(), CommandError> {
         let Some(native) = self.native else { return Ok(()) };
         let name = self.path.display();
@@ -83,7 +83,8 @@ impl Program {
             )));
         }
         let Some(api) = api.filter(|api| !native.calls(*api)) else { return Ok(()) };
-        // Programs of CHAI3D name the libraries of all its devices, and use one that libhdPhantom replaces.
+        // Programs with CHAI3D name the libraries of all devices that it supports, and can use the library that libhdPhantom
+        // replaces.
         let others = [Api::Chai3d].into_iter().chain(Api::ALL);
         match others.into_iter().find(|other| native.calls(*other)) {
             Some(other) => Err(CommandError::Usage(format!(
@@ -104,7 +105,7 @@ impl Native {
     }
 }
 
-/// Reads the properties of a native program's file; `None` for a script.
+/// Reads the properties of a native program's file; `None` for a script or a file above [`MAX_BYTES`].
 fn read_native(path: &Path) -> Option<Native> {
     let length = std::fs::metadata(path).ok()?.len();
     if length > MAX_BYTES {
@@ -117,7 +118,7 @@ fn read_native(path: &Path) -> Option<Native> {
     Some(Native { bits, is_dynamic, names: Api::ALL.map(|api| api.marks().iter().any(holds)) })
 }
 
-/// Returns the size of the addresses of an ELF program; `None` for another file.
+/// Returns the address size of an ELF program; `None` for another file.
 fn bits(bytes: &[u8]) -> Option<Bits> {
     match bytes.get(..5)? {
         b"\x7fELF\x01" => Some(Bits::ThirtyTwo),
@@ -126,9 +127,9 @@ fn bits(bytes: &[u8]) -> Option<Bits> {
     }
 }
 
-/// Returns true if a 64-bit ELF program requires a loader; `None` for another file.
+/// Returns true if a 64-bit ELF program requires a dynamic loader; `None` for another or malformed file.
 fn has_interpreter(bytes: &[u8]) -> Option<bool> {
-    /// Type of the segment that names the loader.
+    /// Type of the program header that names the loader (`PT_INTERP`).
     const INTERPRETER: u32 = 3;
     let number = |at: usize, length: usize| {
         let bytes = bytes.get(at..at.checked_add(length)?)?;

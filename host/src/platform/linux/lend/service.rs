@@ -1,4 +1,4 @@
-//! Interfaces that a program reaches over the network: the service is a separate process beside the program.
+//! Services of other makers, to which a program connects over the network: the service is a separate process.
 
 use super::arguments::{LendArguments, PaceOption};
 use super::folder::Folder;
@@ -14,17 +14,17 @@ use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
-/// Scene with a simulated flotor, for a program of the ML API without a scene.
+/// Scene with a simulated flotor, for a program of the ML API if no scene is given.
 const SCENE: &str = include_str!("ml-api.toml");
-/// Duration of the run, a year: longer than any program.
+/// Duration of the run, a year: longer than any program runs.
 const LONGEST: &str = "8760h";
 
-/// Service of another maker.
+/// Service of another maker, emulated by Flotor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Service {
     /// Haply's Inverse Service.
     Haply,
-    /// The controller of the Maglev 200.
+    /// Controller of the Maglev 200.
     MlApi,
 }
 
@@ -39,12 +39,13 @@ impl Service {
         }
     }
 
-    /// Returns true if the service writes its summary to the folder of `flotor lend`; the other is a `flotor run` with its own file.
+    /// Returns true if the service writes its summary to the folder of `flotor lend`; false for the ML API, a `flotor run` that
+    /// writes the file itself.
     pub(super) fn writes_summary(self) -> bool {
         self == Self::Haply
     }
 
-    /// Returns the default address.
+    /// Returns the default address, at which programs expect the service.
     fn usual(self) -> &'static str {
         match self {
             Self::Haply => "127.0.0.1:10001",
@@ -77,7 +78,7 @@ impl Service {
             }
             Self::MlApi => self.run(arguments, folder, own)?,
         };
-        // Ctrl-C is for the program: the service ends after the program.
+        // In a process group of its own: Ctrl-C reaches only the program, and the service ends after the program.
         command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
         end_with_this_thread(&mut command);
         let file = command.get_program().to_owned();
@@ -86,7 +87,7 @@ impl Service {
         Served::wait(child, self, stop)
     }
 
-    /// Returns a `flotor run` command with the controller as one more model of the scene.
+    /// Returns a `flotor run` command that adds the controller to the scene as a model.
     fn run(self, arguments: &LendArguments, folder: &Folder, own: &Path) -> Result<Command, CommandError> {
         if arguments.pace == PaceOption::Lockstep {
             return Err(CommandError::Usage(
@@ -121,7 +122,7 @@ impl Service {
 /// End of a service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ServiceEnd {
-    /// The service ended with this exit code; not 0 after a failed run.
+    /// The service ended with this exit code; nonzero after a failed run.
     Exited(i32),
     /// `flotor lend` killed the service at the end of the schedule.
     Killed,
@@ -141,11 +142,11 @@ impl ServiceEnd {
     }
 }
 
-/// Running service. Its drop requests the end of the service and waits for it.
+/// Running service. Dropping it requests the end of the service and waits for the end.
 pub(super) struct Served<'a> {
     child: Child,
     stop: &'a StopRequest,
-    /// Output of the service after its address, sent when the output has ended.
+    /// Output of the service: first its address, then the rest, sent when the output has ended.
     output: Receiver<String>,
 }
 
@@ -187,7 +188,7 @@ impl<'a> Served<'a> {
         }
     }
 
-    /// Ends the service, prints its output on the run, and returns its end.
+    /// Ends the service, prints its remaining output, and returns its end.
     pub(super) fn finish(mut self) -> ServiceEnd {
         let end = self.end();
         if end == ServiceEnd::Killed {
@@ -204,8 +205,8 @@ impl<'a> Served<'a> {
         end
     }
 
-    /// Requests the end of the service, and waits. At the end of the schedule its process group is killed; the watchdog process then
-    /// stops the devices.
+    /// Requests the end of the service by SIGTERM, and waits for it. At the end of the schedule kills its process group; the watchdog
+    /// process then stops the devices.
     fn end(&mut self) -> ServiceEnd {
         let process = Pid::from_child(&self.child);
         if has_ended(&mut self.child).is_none() {
@@ -226,7 +227,7 @@ impl Drop for Served<'_> {
     }
 }
 
-/// Returns the address at which a service listens; `None` if the service ends before.
+/// Reads the address at which a service listens from its output; `None` if the output ends before.
 fn listening(output: &mut BufReader<ChildStdout>) -> Option<String> {
     loop {
         let mut line = String::new();

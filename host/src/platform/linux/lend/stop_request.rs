@@ -1,5 +1,5 @@
-//! Schedule of the end of `flotor lend` after a request to stop: program and service share one schedule, which starts with the request,
-//! so that their grace periods do not add up.
+//! Schedule for the end of `flotor lend` after a request to stop. Program and service share one schedule, which starts with the
+//! request, so that their grace periods do not add up.
 
 use flotor_command::CommandError;
 use flotor_command::stopping::stop_on_signals;
@@ -8,15 +8,15 @@ use std::cell::OnceCell;
 use std::process::{Child, ExitStatus};
 use std::time::{Duration, Instant};
 
-/// Poll interval of the request and of the processes that end after it.
+/// Poll interval for the request and for the end of the processes.
 const POLL: Duration = Duration::from_millis(10);
 
-/// Stage of the end, in the order of time.
+/// Stage of the schedule, in order of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Stage {
     /// No stop was requested.
     Running,
-    /// The program may end by the signal that a terminal has sent to it.
+    /// A stop was requested: the program may end by the signal that a terminal has sent to it.
     Requested,
     /// The program has received SIGTERM.
     ProgramAsked,
@@ -27,7 +27,7 @@ pub(super) enum Stage {
 }
 
 impl Stage {
-    /// The stages after a request, each with the time from the request to its start.
+    /// Stages after a request, each with the time from the request to its start.
     const SCHEDULE: [(Self, Duration); 4] = [
         (Self::Requested, Duration::ZERO),
         (Self::ProgramAsked, Duration::from_millis(300)),
@@ -42,10 +42,10 @@ impl Stage {
     }
 }
 
-/// Reason why `flotor lend` ends without an end of its program.
+/// Reason why `flotor lend` ends without a result of its program.
 pub(super) enum Early {
     Failed(CommandError),
-    /// The exit code, after a request to stop or an error that another process has printed.
+    /// Exit code, after a request to stop or an error that another process has printed.
     Exit(i32),
 }
 
@@ -63,12 +63,12 @@ pub(super) struct StopRequest {
 }
 
 impl StopRequest {
-    /// Starts taking signals. Called before there are other threads.
+    /// Installs the handlers of the signals that request the stop; must be called before other threads start.
     pub(super) fn by_signals() -> Result<Self, CommandError> {
         Ok(Self { switch: stop_on_signals()?, found: OnceCell::new() })
     }
 
-    /// Returns the present stage. An emergency stop kills the program at once.
+    /// Returns the current stage; after an emergency stop at least [`Stage::ProgramKilled`].
     pub(super) fn stage(&self) -> Stage {
         self.stage_at(Instant::now())
     }
@@ -82,7 +82,7 @@ impl StopRequest {
         if is_emergency { stage.max(Stage::ProgramKilled) } else { stage }
     }
 
-    /// Polls until there is a value; returns `None` at [`Stage::Over`].
+    /// Calls `poll` with the current stage until it returns a value; returns `None` at [`Stage::Over`].
     pub(super) fn poll<T>(&self, mut poll: impl FnMut(Stage) -> Option<T>) -> Option<T> {
         loop {
             let stage = self.stage();
@@ -97,7 +97,7 @@ impl StopRequest {
     }
 }
 
-/// Returns the exit status of a process once it has ended.
+/// Returns the exit status of a process that has ended; `None` while it runs.
 pub(super) fn has_ended(child: &mut Child) -> Option<ExitStatus> {
     child.try_wait().unwrap_or_else(|_| Some(ExitStatus::default()))
 }
