@@ -72,7 +72,8 @@ impl<'a> Table<'a> {
             }
             first = lines.next();
         }
-        let (header_line, header) = first.ok_or_else(|| TextProblem::at(1, "the table is empty"))?;
+        let (header_line, header) = first
+            .ok_or_else(|| TextProblem::at(1, "the table is empty; write a header and at least one row"))?;
         let at = |problem| TextProblem::at(header_line, problem);
         if let Some(separator) =
             [";", "\t"].into_iter().find(|other| header.contains(other) && !header.contains(','))
@@ -127,7 +128,7 @@ impl<'a> Table<'a> {
                 _ => "",
             };
             let cells = if found == 1 { "cell" } else { "cells" };
-            Err(TextProblem::at(line, format!("{found} {cells} for {expected} columns{hint}")))
+            Err(TextProblem::at(line, format!("the line has {found} {cells} for {expected} columns{hint}")))
         })
     }
 }
@@ -197,7 +198,7 @@ fn cells(line: &str) -> Result<Vec<Cow<'_, str>>, String> {
         match after.strip_prefix(',') {
             Some(next) => rest = next,
             None if after.is_empty() => return Ok(cells),
-            None => return Err("a comma is expected after a closing quotation mark".to_owned()),
+            None => return Err("a comma must follow a closing quotation mark".to_owned()),
         }
     }
 }
@@ -207,7 +208,9 @@ fn quoted_cell(text: &str) -> Result<(String, &str), String> {
     let mut cell = String::new();
     let mut rest = text;
     loop {
-        let end = rest.find('"').ok_or("a quotation mark is not closed in this line")?;
+        let end = rest.find('"').ok_or(
+            "a quotation mark is not closed in this line; close it, or double a mark inside the text",
+        )?;
         cell.push_str(&rest[..end]);
         rest = &rest[end + 1..];
         match rest.strip_prefix('"') {
@@ -263,7 +266,7 @@ mod tests {
     #[test]
     fn what_is_refused_has_a_line_and_the_cause() {
         for (text, says) in [
-            ("", "t:1: the table is empty"),
+            ("", "t:1: the table is empty; write a header and at least one row"),
             ("x;y\n1,5;2\n", "t:1: columns are separated by `;`; separate them with commas"),
             ("sep=;\nx;y\n1;2\n", "t:1: columns are separated by `;`"),
             ("x\ty\n1\t2\n", "t:1: columns are separated by tabs"),

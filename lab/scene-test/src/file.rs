@@ -204,10 +204,7 @@ impl TestFile {
         let seeds = match &written.seeds {
             None => vec![1],
             Some(none) if none.get_ref().is_empty() => {
-                return Err((
-                    none.span().start,
-                    "without a seed there is no case; write at least one seed".to_owned(),
-                ));
+                return Err((none.span().start, "`seeds` is empty; write at least one seed".to_owned()));
             }
             Some(seeds) => seeds.get_ref().clone(),
         };
@@ -234,7 +231,12 @@ impl TestFile {
                 .map_err(|wrong| (at, wrong))?;
             }
             if numbers.is_empty() {
-                return Err((at, "no number to compare; write within = { peak_force_n = 0.01 }".to_owned()));
+                return Err((
+                    at,
+                    "the reference has no number to compare; write, for example, within = \
+                     { peak_force_n = 0.01 }"
+                        .to_owned(),
+                ));
             }
             Ok(Reference { set, within: numbers })
         });
@@ -364,9 +366,7 @@ fn settings_with_values(
                 one => vec![scalar(one)?],
             };
             if values.is_empty() {
-                return Err(format!(
-                    "without a value for `{key}` there is no case; write at least one value"
-                ));
+                return Err(format!("`{key}` has an empty list; write at least one value"));
             }
             found.push((key.to_owned(), values));
             Ok(())

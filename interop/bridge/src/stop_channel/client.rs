@@ -109,8 +109,9 @@ fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Optio
     // The bridge replies to each accepted press after the hosts have confirmed; any of these replies counts.
     let mut presses: Vec<Nonce> = Vec::new();
     while Instant::now() < until {
-        let datagram =
-            pending.sealed(&stop.keys).ok_or_else(|| io::Error::other("the keys have no stop key"))?;
+        let datagram = pending.sealed(&stop.keys).ok_or_else(|| {
+            io::Error::other("the keys contain no stop key; create new keys with `flotor bridge keys`")
+        })?;
         for (socket, places) in &sockets {
             for place in places {
                 // Without a listener the next system call reports the error.

@@ -31,8 +31,8 @@ fn rotations_are_followed_too() {
 #[test]
 fn complaints_name_the_line_and_the_column() {
     for (text, expected) in [
-        ("", "t:1: the table is empty"),
-        ("t,x,y,z\n0,0,0,0\n", "t:1: the columns are time_s,x_m,y_m,z_m or time_s,"),
+        ("", "t:1: the table is empty; write a header and at least one row"),
+        ("t,x,y,z\n0,0,0,0\n", "t:1: the columns must be time_s,x_m,y_m,z_m or time_s,"),
         ("time_s,x_m,y_m,z_m\n", "has no pose"),
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n1,0,up,0\n", "t:3: `y_m` must be a number, not `up`"),
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n0,0,0,0\n", "t:3: time 0 ns is not after 0 ns"),

@@ -30,7 +30,7 @@ pub(crate) type Handle = OwnedFd;
 /// The descriptor is open during the call, as the contract obliges the plugin that owns it.
 pub(crate) unsafe fn writable_duplicate(descriptor: i32) -> Result<Handle, String> {
     if descriptor < 0 {
-        return Err(format!("names the descriptor {descriptor}"));
+        return Err(format!("names the negative descriptor {descriptor}"));
     }
     // SAFETY: open for the call, as this function demands.
     let theirs = unsafe { BorrowedFd::borrow_raw(descriptor) };
