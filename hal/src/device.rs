@@ -255,6 +255,7 @@ impl std::ops::BitOr for Axes {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Capabilities {
     /// Axes whose position is measured.
     pub sensed: Axes,
@@ -304,26 +305,22 @@ impl Capabilities {
     const DEFAULT_RISE_S: f64 = 0.5e-3;
 
     /// Returns the capabilities of a device that senses and drives these axes, with range and limits of zero.
-    #[must_use]
     pub const fn driving(axes: Axes) -> Self {
         Self { sensed: axes, actuated: axes, ..Self::UNDRIVEN }
     }
 
     /// Sets the sensed axes.
-    #[must_use]
     pub const fn sensing(self, axes: Axes) -> Self {
         Self { sensed: axes, ..self }
     }
 
     /// Sets the range of every sensed axis: largest displacement, m, and rotation, rad.
-    #[must_use]
     pub const fn with_range(self, range_m: f64, range_rad: f64) -> Self {
         let (range_m, range_rad) = self.sensed.spread(range_m, range_rad);
         Self { range_m, range_rad, ..self }
     }
 
     /// Sets the largest force, N, and torque, N·m, of every driven axis, and a slew that reaches them in 0.5 ms.
-    #[must_use]
     pub const fn with_limits(self, max_force_n: f64, max_torque_nm: f64) -> Self {
         let (force_n, torque_nm) = self.actuated.spread(max_force_n, max_torque_nm);
         Self { max_force_n: force_n, max_torque_nm: torque_nm, ..self }
@@ -331,19 +328,16 @@ impl Capabilities {
     }
 
     /// Sets the fastest accepted change of force, N/s, and of torque, N·m/s.
-    #[must_use]
     pub const fn with_slew(self, max_force_slew_n_per_s: f64, max_torque_slew_nm_per_s: f64) -> Self {
         Self { max_force_slew_n_per_s, max_torque_slew_nm_per_s, ..self }
     }
 
     /// Sets the largest stiffness rendered stably, N/m.
-    #[must_use]
     pub const fn with_stiffness(self, max_stiffness_n_per_m: f64) -> Self {
         Self { max_stiffness_n_per_m, ..self }
     }
 
     /// Sets the latency beyond one period, s.
-    #[must_use]
     pub const fn with_latency(self, latency_s: f64) -> Self {
         Self { latency_s, ..self }
     }

@@ -18,6 +18,7 @@ layout! {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Demand {
     bits: u32,
 }
@@ -35,13 +36,11 @@ impl Demand {
     pub const ALL: Demand = Demand { bits: 7 };
 
     /// Returns the union of both sets. Real-time: bounded, no allocation.
-    #[must_use]
     pub const fn with(self, other: Demand) -> Demand {
         Demand { bits: self.bits | other.bits }
     }
 
     /// Returns the intersection of both sets. Real-time: bounded, no allocation.
-    #[must_use]
     pub const fn limited_to(self, other: Demand) -> Demand {
         Demand { bits: self.bits & other.bits }
     }
@@ -174,6 +173,7 @@ impl From<Wrench> for Output {
 /// Path dependence of the force: a path-dependent model has an internal state.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[must_use]
 pub enum Memory {
     /// Same pose, same wrench: may be evaluated anywhere, in any order.
     Stateless = 0,
@@ -183,7 +183,6 @@ pub enum Memory {
 
 impl Memory {
     /// Converts a code from the boundary; an unknown code counts as path-dependent, the safe choice.
-    #[must_use]
     pub(crate) const fn from_code(code: u32) -> Self {
         if code == Self::Stateless as u32 { Self::Stateless } else { Self::PathDependent }
     }
@@ -193,6 +192,7 @@ impl Memory {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct ModelInfo {
     pub(crate) id: Str,
     pub(crate) name: Str,
@@ -203,7 +203,6 @@ pub struct ModelInfo {
 
 impl ModelInfo {
     /// Builds a declaration: `id` for scenes and commands ("spring"), `name` and `doc` for people.
-    #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
         Self {
             id: Str::new(id),
@@ -215,7 +214,6 @@ impl ModelInfo {
     }
 
     /// Declares the demands that the model can serve (default: force and torque).
-    #[must_use]
     pub const fn serving(mut self, demand: Demand) -> Self {
         self.serves = demand;
         self
@@ -223,7 +221,6 @@ impl ModelInfo {
 
     /// Declares the path dependence of the output. If it depends on settings, declare the safe value here and the exact
     /// one with [`crate::VariantModel`].
-    #[must_use]
     pub const fn with_memory(mut self, memory: Memory) -> Self {
         self.memory = memory as u32;
         self
@@ -248,13 +245,11 @@ impl ModelInfo {
     }
 
     /// Returns the demands that the model can serve.
-    #[must_use]
     pub const fn serves(&self) -> Demand {
         self.serves
     }
 
     /// Returns the path dependence of the output; an unknown code counts as path-dependent, the safe choice.
-    #[must_use]
     pub const fn memory(&self) -> Memory {
         Memory::from_code(self.memory)
     }

@@ -91,7 +91,6 @@ impl Devices {
     }
 
     /// Returns a scale of arrows that fits all samples of all devices.
-    #[must_use]
     pub fn scale(&self) -> ArrowScale {
         let scales = self.seen.iter().map(|seen| seen.event_counts.scale());
         scales.reduce(ArrowScale::larger).unwrap_or_else(|| ArrowScale::fitting(std::iter::empty()))

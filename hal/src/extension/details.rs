@@ -16,6 +16,7 @@ use crate::{ForceModel, choices};
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Detail {
     id: Str,
     unit: Str,
@@ -25,19 +26,16 @@ pub struct Detail {
 
 impl Detail {
     /// Declares a number, in SI. `unit` is for people ("rad", "1" for none).
-    #[must_use]
     pub const fn number(id: &'static str, unit: &'static str, doc: &'static str) -> Self {
         Self { id: Str::new(id), unit: Str::new(unit), doc: Str::new(doc), words: Choices::EMPTY }
     }
 
     /// Declares one of a fixed list of words; the value is its index.
-    #[must_use]
     pub const fn word(id: &'static str, words: Choices, doc: &'static str) -> Self {
         Self { id: Str::new(id), unit: Str::EMPTY, doc: Str::new(doc), words }
     }
 
     /// Declares a flag: `1` or `0`.
-    #[must_use]
     pub const fn flag(id: &'static str, doc: &'static str) -> Self {
         Self::word(id, choices!["0", "1"], doc)
     }

@@ -34,6 +34,7 @@ pub enum StoppedState {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct IndependentStop {
     /// Time from the end of the host's commands, or from the message, until the device is in its safe state, ns; with
     /// descriptor -1 the largest number for a device without an independent stop.
@@ -54,7 +55,6 @@ pub struct IndependentStop {
 impl IndependentStop {
     /// Declares a stop by a message to a descriptor, which is open for writing until the device is closed. The host
     /// rejects a message that is too long.
-    #[must_use]
     pub fn by_message(descriptor: i32, message: &[u8], state: StoppedState, within_ns: u64) -> Self {
         let mut bytes = [0; STOP_MESSAGE_BYTES];
         bytes.iter_mut().zip(message).for_each(|(place, byte)| *place = *byte);
@@ -63,14 +63,12 @@ impl IndependentStop {
     }
 
     /// Declares a stop by the device's controller after `within_ns` without a command; 0: the device ends with the host's process.
-    #[must_use]
     pub const fn by_itself(state: StoppedState, within_ns: u64) -> Self {
         let message = [0; STOP_MESSAGE_BYTES];
         Self { within_ns, descriptor: BY_ITSELF, length: 0, message, state: state as u32, reserved: 0 }
     }
 
     /// Declares no independent stop, as without this extension: for plugins with several kinds of devices.
-    #[must_use]
     pub const fn none() -> Self {
         Self::by_itself(StoppedState::Zero, NEVER_NS)
     }

@@ -86,7 +86,6 @@ impl Primitive {
     }
 
     /// Returns the centre (m, model frame) and the orientation.
-    #[must_use]
     pub const fn pose(&self) -> Pose {
         self.pose
     }

@@ -159,7 +159,6 @@ impl Mapping {
 
     /// Maps a pose into the model frame. Real-time: bounded, no allocation.
     #[inline(always)] // as `wrench_to_device`
-    #[must_use]
     pub fn pose_to_model(&self, pose: &Pose) -> Pose {
         let turn = self.model_from_device;
         let position_m = turn.there(pose.position() - self.home_m) * self.motion_scale;
@@ -213,7 +212,6 @@ impl Mapping {
 
     /// Maps a twist into the model frame. Real-time: bounded, no allocation.
     #[inline(always)] // as `wrench_to_device`
-    #[must_use]
     pub fn twist_to_model(&self, twist: &Twist) -> Twist {
         let turn = self.model_from_device;
         Twist::new(turn.there(twist.linear()) * self.motion_scale, turn.there(twist.angular()))
@@ -221,7 +219,6 @@ impl Mapping {
 
     /// Maps a wrench into the device frame. Real-time: bounded, no allocation.
     #[inline(always)] // 5 ns: a call returns it in memory, and the reader waits for that
-    #[must_use]
     pub fn wrench_to_device(&self, wrench: &Wrench) -> Wrench {
         let turn = self.model_from_device;
         Wrench::new(
@@ -231,7 +228,6 @@ impl Mapping {
     }
 
     /// Maps a wrench into the model frame: the inverse of [`Self::wrench_to_device`]. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn wrench_to_model(&self, wrench: &Wrench) -> Wrench {
         let turn = self.model_from_device;
         Wrench::new(

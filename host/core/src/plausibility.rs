@@ -385,7 +385,6 @@ pub fn is_rotation(quaternion: DQuat) -> bool {
 /// Returns a pose with its orientation scaled to length one, as a model may reject any other. An orientation of length one
 /// within rounding, and one that [`is_rotation`] rejects, keeps its bits. Real-time: bounded, no allocation.
 #[inline]
-#[must_use]
 pub fn normalised(pose: &Pose) -> Pose {
     let orientation = pose.orientation();
     let squared = orientation.length_squared();

@@ -30,6 +30,7 @@ const SNAP_TO_ZERO: f64 = 0.25;
 
 /// A quantity with its unit, a linear or logarithmic scale, and an optional fixed range.
 #[derive(Debug, Clone)]
+#[must_use]
 pub struct Axis {
     pub(super) label: String,
     pub(super) unit: String,
@@ -67,7 +68,6 @@ impl Axis {
 
     /// Fixes the range, in the unit of the axis; the order of the ends does not matter. A range that cannot
     /// be drawn (not finite, empty, not positive on a log axis) is ignored in favour of the automatic one.
-    #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.fixed = Some((low.min(high), low.max(high)));
         self
@@ -75,7 +75,6 @@ impl Axis {
 
     /// Widens an automatic range to at least `span`, in the unit of the axis: smaller differences are rounding and no signal. A
     /// logarithmic axis has a least range of its own.
-    #[must_use]
     pub fn least_range(mut self, span: f64) -> Self {
         if self.scale == Scale::Linear && (0.0..LARGEST_DRAWABLE).contains(&span) {
             self.least = span;
@@ -84,14 +83,12 @@ impl Axis {
     }
 
     /// Extends an automatic range of a linear axis to zero, so that lengths are in proportion to values.
-    #[must_use]
     pub fn with_zero(mut self) -> Self {
         self.includes_zero = true;
         self
     }
 
     /// Places tick labels at these values and nowhere else: the levels of an experiment.
-    #[must_use]
     pub fn levels(mut self, levels: impl IntoIterator<Item = f64>) -> Self {
         self.levels = levels.into_iter().collect();
         self

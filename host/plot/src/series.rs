@@ -10,6 +10,7 @@ const OPEN_BIN_DECADES: f64 = 0.5;
 /// Named samples and their style. Colour, dash and marker follow from the series' place in its
 /// panel unless [`Series::slot`] sets them.
 #[derive(Debug, Clone)]
+#[must_use]
 pub struct Series {
     pub(super) label: String,
     slot: Option<Look>,
@@ -154,21 +155,18 @@ impl Series {
 
     /// Sets the palette entry `slot` (counted from 0), for the same look of a quantity in every
     /// panel, or of a theory line and its measured points.
-    #[must_use]
     pub fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(Look::Slot(slot));
         self
     }
 
     /// Sets the colour of vector component 0, 1 or 2 (x, y or z): a solid line in the same colour in every panel and picture.
-    #[must_use]
     pub fn axis(mut self, component: usize) -> Self {
         self.slot = Some(Look::Axis(component));
         self
     }
 
     /// Draws the line thin, solid and pale, as one of many of its kind.
-    #[must_use]
     pub fn faint(mut self) -> Self {
         self.weight = Weight::Faint;
         self

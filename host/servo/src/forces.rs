@@ -56,7 +56,6 @@ impl Port {
 
     /// Returns the outputs of models and couplings in this tick. Real-time: bounded, no allocation.
     #[inline]
-    #[must_use]
     pub fn outputs(&self) -> ModelOutputs {
         let Self { at_hand, computed, requested, unfelt_torque_nm, energy_j, .. } = self;
         let wrench = if at_hand.contains(Demand::TORQUE) {

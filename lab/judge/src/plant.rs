@@ -140,13 +140,11 @@ impl Flotor {
     }
 
     /// Returns the pose.
-    #[must_use]
     pub fn pose(&self) -> Pose {
         self.pose
     }
 
     /// Returns the twist.
-    #[must_use]
     pub fn twist(&self) -> Twist {
         Twist::new(self.velocity_m_per_s, self.angular_rad_per_s)
     }

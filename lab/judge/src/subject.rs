@@ -234,7 +234,6 @@ impl<'a> Subject<'a> {
     }
 
     /// Returns the kind of the model's memory.
-    #[must_use]
     pub fn memory(&self) -> Memory {
         self.model.memory()
     }

@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 
 /// Triangle mesh, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[must_use]
 pub struct Skin {
     /// Undeformed positions of the corners, m.
     pub places_m: Vec<DVec3>,
@@ -49,7 +50,6 @@ impl Focus {
 
 impl Skin {
     /// Triangulates top and sides of a block, its top about the origin; `steps`: number along x, y, z.
-    #[must_use]
     pub fn block(half_m: [f64; 2], height_m: f64, focus: Focus, steps: [usize; 3]) -> Self {
         let [half_x, half_y] = half_m;
         let x = focus.steps(0, -half_x, half_x, steps[0]);
@@ -59,7 +59,6 @@ impl Skin {
     }
 
     /// Triangulates faces of the box between the first and last coordinates, cut at all of them.
-    #[must_use]
     pub fn boxed(x: &[f64], y: &[f64], z: &[f64], faces: &[Face]) -> Self {
         let mut skin = Self::default();
         let last = |steps: &[f64]| steps.last().copied().unwrap_or_default();
@@ -105,7 +104,6 @@ impl Skin {
     }
 
     /// Triangulates a disc about the origin: lines from the focus to even steps of the rim, cut at growing distances.
-    #[must_use]
     pub fn disc(radius_m: f64, focus: Focus) -> Self {
         /// Largest distance of the focus from the centre, in radii.
         const MOST: f64 = 0.97;
@@ -126,7 +124,6 @@ impl Skin {
     }
 
     /// Triangulates top and side of a round cylinder, its top about the origin.
-    #[must_use]
     pub fn cylinder(radius_m: f64, height_m: f64, focus: Focus) -> Self {
         let mut skin = Self::disc(radius_m, focus);
         let rim: Vec<DVec3> = skin.places_m[..SECTORS].to_vec();

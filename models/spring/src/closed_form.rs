@@ -76,7 +76,6 @@ impl ClosedForm {
     ///   wrench, [`Validity::OutOfDomain`](crate::validity::Validity);
     /// - NaN, infinity or a quaternion that is not of unit length: no wrench,
     ///   [`Validity::InvalidInput`](crate::validity::Validity).
-    #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         self.respond_at(pose, demand)
     }

@@ -91,7 +91,6 @@ impl EnergyForm {
     ///   million free lengths, for a wire with `G > E` also any length at which the rod has no shear stiffness
     ///   left: no wrench, [`Validity::OutOfDomain`](crate::validity::Validity::OutOfDomain);
     /// - NaN, infinity or a quaternion not of unit length: no wrench, [`Validity::InvalidInput`](crate::validity::Validity::InvalidInput).
-    #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         self.respond_at(pose, demand)
     }

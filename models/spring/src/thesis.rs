@@ -84,7 +84,6 @@ impl Thesis {
 
     /// Returns the wrench on the hand at a pose; this law has no energy. Real-time: bounded, no allocation. Total, see
     /// the module.
-    #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         if !pose.is_valid() {
             return Response::none(Validity::InvalidInput);

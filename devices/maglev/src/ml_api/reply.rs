@@ -42,6 +42,7 @@ pub enum Results {
 
 /// Reply of a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Reply {
     /// Status of the call.
     pub status: Status,
@@ -172,19 +173,16 @@ impl Results {
 
 impl Reply {
     /// Creates a reply with status OK and these results.
-    #[must_use]
     pub const fn ok(results: Results) -> Self {
         Self { status: Status::OK, results }
     }
 
     /// Creates a reply of a function without results.
-    #[must_use]
     pub const fn status(status: Status) -> Self {
         Self { status, results: Results::None }
     }
 
     /// Creates a reply with an error and results of zeros; no results without a function.
-    #[must_use]
     pub fn failed(function: Option<Function>, status: Status) -> Self {
         Self { status, results: function.map_or(Results::None, Results::zero) }
     }

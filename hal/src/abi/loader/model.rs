@@ -64,13 +64,11 @@ impl Model {
     }
 
     /// Returns the demands that the model serves with the settings it was created with.
-    #[must_use]
     pub fn serves(&self) -> Demand {
         self.variant.serves()
     }
 
     /// Returns the path dependence of the model with the settings it was created with.
-    #[must_use]
     pub fn memory(&self) -> Memory {
         self.variant.memory()
     }

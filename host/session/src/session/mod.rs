@@ -71,6 +71,7 @@ pub struct RunOptions {
 }
 
 /// A scene ready to run: everything loaded, paired and opened, nothing energised.
+#[must_use]
 pub struct Session {
     prepared: PreparedLoop,
     clock: Clock,
@@ -167,7 +168,6 @@ impl Session {
 
     /// Lifts the host's ceiling: the devices are as strong as they and the scene allow. Only a user who knows the device should
     /// decide so; a scene cannot. Not real-time.
-    #[must_use]
     pub fn allow_strong(mut self) -> Self {
         self.prepared.standby.guard_with(std::mem::take(&mut self.strong_envelopes));
         self.strength = Strength::Strong;
@@ -175,7 +175,6 @@ impl Session {
     }
 
     /// Applies [`Session::allow_strong`] if the strength is [`Strength::Strong`]. Not real-time.
-    #[must_use]
     pub fn with_strength(self, strength: Strength) -> Self {
         match (strength, self.strength) {
             (Strength::Strong, Strength::UnderCeiling) => self.allow_strong(),
@@ -207,14 +206,12 @@ impl Session {
     }
 
     /// Pins the loop to this core, on the real clock.
-    #[must_use]
     pub fn on_core(mut self, core: Option<Core>) -> Self {
         self.real_clock.core = core;
         self
     }
 
     /// Uses the latch of another folder than that of this user's runs, from now on.
-    #[must_use]
     pub fn latched_in(mut self, directory: &Directory) -> Self {
         self.real_clock.latch = self.real_clock.latch.map(|_| LatchGuard::of(directory));
         self

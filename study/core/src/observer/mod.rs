@@ -119,6 +119,7 @@ impl Population {
 
 /// One simulated subject.
 #[derive(Clone, Debug)]
+#[must_use]
 pub struct SimulatedSubject {
     population: Population,
     seed: u64,
@@ -133,7 +134,6 @@ pub struct SimulatedSubject {
 
 impl SimulatedSubject {
     /// Draws a subject from a population; `middle` is the mean of the stimuli to be rated.
-    #[must_use]
     pub fn new(population: &Population, seed: u64, subject: SubjectNumber, middle: f64) -> Self {
         let mut stream = Stream::new(seed, Purpose::Subject, subject.get(), 0);
         let general = stream.normal() * population.subject_spread;
@@ -185,7 +185,6 @@ impl SimulatedSubject {
     }
 
     /// Selects the answers' noise for a stimulus: a subject has other noise with another object.
-    #[must_use]
     pub fn about(self, stimulus: &Stimulus) -> Self {
         Self { answer_seed: self.seed ^ xxh3_64(stimulus.to_string().as_bytes()), ..self }
     }

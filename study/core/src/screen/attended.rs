@@ -84,6 +84,7 @@ struct Before {
 
 /// Screen state machine of a person's sitting.
 #[derive(Clone, Debug)]
+#[must_use]
 pub struct ScreenStateMachine {
     sitting: Sitting,
     quality: Quality,
@@ -107,7 +108,6 @@ pub struct ScreenStateMachine {
 
 impl ScreenStateMachine {
     /// Creates the state machine at the first or next trial; offers a rest after every `rest_every` trials (0: never).
-    #[must_use]
     pub fn new(sitting: Sitting, protocol: &Protocol, rest_every: u32) -> Self {
         Self {
             sitting,
@@ -127,25 +127,21 @@ impl ScreenStateMachine {
     }
 
     /// Adds texts to be read before the sitting begins: consent, instructions.
-    #[must_use]
     pub fn after_reading(self, texts: impl IntoIterator<Item = String>) -> Self {
         Self { texts: texts.into_iter().collect(), ..self }
     }
 
     /// Limits the repetitions of a trial on request.
-    #[must_use]
     pub fn with_again_at_most(self, times: u32) -> Self {
         Self { again_most: Some(times), ..self }
     }
 
     /// Offers practice before the sitting resumes.
-    #[must_use]
     pub fn with_practice_offered(self) -> Self {
         Self { offered: self.sitting.practice(), ..self }
     }
 
     /// Marks the open trial as answered and withdrawn before; it cannot be withdrawn again.
-    #[must_use]
     pub fn with_answer_taken_back(self) -> Self {
         Self { undo: Undo::Used, ..self }
     }

@@ -193,7 +193,6 @@ impl Controller {
     }
 
     /// Returns the present faults.
-    #[must_use]
     pub fn faults(&self) -> FaultBits {
         self.faults
     }
