@@ -368,6 +368,7 @@ impl Embodiment {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct DeviceInfo {
     pub(crate) id: Str,
     pub(crate) name: Str,
@@ -380,7 +381,6 @@ pub struct DeviceInfo {
 
 impl DeviceInfo {
     /// Builds the declaration of a physical device: `id` for scenes and commands ("simulated"), `name` and `doc` for people.
-    #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
         Self {
             id: Str::new(id),
@@ -393,7 +393,6 @@ impl DeviceInfo {
 
     /// Marks the device as a simulation. A host limits the force of a physical device to its ceiling, unless a person
     /// allows more.
-    #[must_use]
     pub const fn simulated(self) -> Self {
         Self { embodiment: Embodiment::Simulated as u32, ..self }
     }

@@ -62,7 +62,6 @@ impl Pose {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
-#[must_use]
 pub struct Twist {
     /// Velocity of the handle, m/s.
     pub linear_m_per_s: [f64; 3],
@@ -76,6 +75,7 @@ impl Twist {
 
     /// Builds a twist from glam values. Real-time: bounded, no allocation.
     #[inline]
+    #[must_use]
     pub fn new(linear_m_per_s: DVec3, angular_rad_per_s: DVec3) -> Self {
         Self { linear_m_per_s: linear_m_per_s.to_array(), angular_rad_per_s: angular_rad_per_s.to_array() }
     }
@@ -108,7 +108,6 @@ impl Twist {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
-#[must_use]
 pub struct Wrench {
     /// Force, N.
     pub force_n: [f64; 3],
@@ -122,12 +121,14 @@ impl Wrench {
 
     /// Builds a wrench from glam values. Real-time: bounded, no allocation.
     #[inline]
+    #[must_use]
     pub fn new(force_n: DVec3, torque_nm: DVec3) -> Self {
         Self { force_n: force_n.to_array(), torque_nm: torque_nm.to_array() }
     }
 
     /// Builds a wrench of a force in N, without torque. Real-time: bounded, no allocation.
     #[inline]
+    #[must_use]
     pub fn from_force(force_n: DVec3) -> Self {
         Self::new(force_n, DVec3::ZERO)
     }

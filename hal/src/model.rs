@@ -57,6 +57,7 @@ impl Demand {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Input {
     /// Pose of the handle relative to the model's home, m and unit quaternion.
     pub pose: Pose,
@@ -76,7 +77,6 @@ pub struct Input {
 
 impl Input {
     /// Builds the input at a pose, at rest, at time zero, with all outputs demanded: for tests and off-line evaluation.
-    #[must_use]
     pub const fn at_rest(pose: Pose) -> Self {
         Self { pose, twist: Twist::ZERO, time_ns: 0, dt_ns: 0, tick: 0, buttons: 0, demand: Demand::ALL }
     }

@@ -144,7 +144,6 @@ impl Parameter {
     }
 
     /// Returns the names of a choice in index order, or the built-in files; empty for the other kinds.
-    #[must_use]
     pub const fn choices(&self) -> &[Str] {
         self.choices.as_slice()
     }

@@ -5,7 +5,6 @@ use flotor_servo::{Durations, Timing};
 
 /// Returns the panels of a run's timing: ticks by lateness and by compute time, and every sixteenth tick by the time of its stages; each
 /// has its own, logarithmic axis of time. Not real-time.
-#[must_use]
 pub fn panels(timing: &Timing) -> [Panel; 2] {
     let [read, models, envelope, write] = &timing.stages;
     let whole = histogram()

@@ -97,7 +97,6 @@ impl Devices {
     }
 
     /// Returns the events in the newest ticks of all devices.
-    #[must_use]
     pub fn newest_events(&self) -> Events {
         let newest = self.seen.iter().filter_map(|seen| seen.history.at(f64::INFINITY));
         newest.fold(Events::NONE, |mut events, sample| {

@@ -59,7 +59,6 @@ impl Detail {
     }
 
     /// Returns the words, in index order; empty for a number.
-    #[must_use]
     pub const fn words(&self) -> &[Str] {
         self.words.as_slice()
     }
@@ -146,7 +145,6 @@ table!(DetailsTable: "flotor.details/1", M: [DetailsModel] {
 #[cfg(feature = "loader")]
 impl Model {
     /// Returns the diagnostic numbers of the model; empty for a model without details.
-    #[must_use]
     pub fn details(&self) -> &'static [Detail] {
         let table = self.extensions.details;
         // SAFETY: a table's list is a static array of `detail_count` details of the checked layout.

@@ -42,6 +42,7 @@ pub enum Part {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Primitive {
     /// Code of a [`Form`].
     form: u32,
@@ -56,13 +57,11 @@ pub struct Primitive {
 impl Primitive {
     /// Builds a body from half its sides, m: a plane has no third side, a sphere three equal ones (its radius), a
     /// cylinder its radius twice and half its height.
-    #[must_use]
     pub const fn new(form: Form, part: Part, pose: Pose, half_sides_m: [f64; 3]) -> Self {
         Self { form: form as u32, part: part as u32, pose, half_sides_m }
     }
 
     /// Builds a ball.
-    #[must_use]
     pub const fn sphere(part: Part, pose: Pose, radius_m: f64) -> Self {
         Self::new(Form::Sphere, part, pose, [radius_m; 3])
     }

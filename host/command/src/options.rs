@@ -205,8 +205,10 @@ impl JsonOption {
 /// Options of each command that searches for plugins and has a result for programs.
 #[derive(Args, Clone, Debug, Default)]
 pub struct PluginResultOptions {
+    /// Output as JSON.
     #[command(flatten)]
     pub json: JsonOption,
+    /// Folders to search for plugins.
     #[command(flatten)]
     pub plugin_path: PluginPathOption,
 }

@@ -57,6 +57,7 @@ pub struct FieldTiming {
 
 /// Frames and scales of one model on one device, in one place.
 #[derive(Clone, Copy, Debug)]
+#[must_use]
 pub struct Mapping {
     home_m: DVec3,
     model_from_device: Turn,
@@ -108,7 +109,6 @@ impl Turn {
 
 impl Mapping {
     /// Creates a mapping from its checked configuration. Not real-time.
-    #[must_use]
     pub fn new(config: &MappingConfig) -> Self {
         let energy_scale = config.force_scale / config.motion_scale;
         Self {
@@ -132,7 +132,6 @@ impl Mapping {
     }
 
     /// Returns the mapping with the model's home at this place, m, device frame, instead of the device's home. Not real-time.
-    #[must_use]
     pub fn at(self, home_m: [f64; 3]) -> Self {
         Self { home_m: DVec3::from_array(home_m), ..self }
     }
@@ -197,7 +196,6 @@ impl Mapping {
 
     /// Returns the input of a model for a tick: the motion in its own frame, and the demanded outputs. Real-time: bounded, no allocation.
     #[inline]
-    #[must_use]
     pub fn input(&self, tick: &Tick, state: &DeviceState, demand: Demand) -> Input {
         Input {
             pose: self.pose_to_model(&state.pose),
@@ -212,6 +210,7 @@ impl Mapping {
 
     /// Maps a twist into the model frame. Real-time: bounded, no allocation.
     #[inline(always)] // as `wrench_to_device`
+    #[must_use]
     pub fn twist_to_model(&self, twist: &Twist) -> Twist {
         let turn = self.model_from_device;
         Twist::new(turn.there(twist.linear()) * self.motion_scale, turn.there(twist.angular()))
@@ -219,6 +218,7 @@ impl Mapping {
 
     /// Maps a wrench into the device frame. Real-time: bounded, no allocation.
     #[inline(always)] // 5 ns: a call returns it in memory, and the reader waits for that
+    #[must_use]
     pub fn wrench_to_device(&self, wrench: &Wrench) -> Wrench {
         let turn = self.model_from_device;
         Wrench::new(
@@ -228,6 +228,7 @@ impl Mapping {
     }
 
     /// Maps a wrench into the model frame: the inverse of [`Self::wrench_to_device`]. Real-time: bounded, no allocation.
+    #[must_use]
     pub fn wrench_to_model(&self, wrench: &Wrench) -> Wrench {
         let turn = self.model_from_device;
         Wrench::new(

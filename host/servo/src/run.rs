@@ -5,6 +5,7 @@ use flotor_core::trace::TickRecord;
 use flotor_hal::SampleWait;
 
 /// Loop over a servo and its schedule, the same for both clocks.
+#[must_use]
 pub struct Loop {
     servo: Servo,
     schedule: Schedule,
@@ -16,14 +17,12 @@ pub struct Loop {
 
 impl Loop {
     /// Creates a loop before its first tick. Not real-time.
-    #[must_use]
     pub fn new(servo: Servo, schedule: Schedule, duration_ns: u64) -> Self {
         Self { servo, schedule, duration_ns, release_ns: u64::MAX, end: None }
     }
 
     /// Fades the force out at the end of the duration, so that it does not drop abruptly. Unnecessary on the virtual clock, which
     /// has no hand.
-    #[must_use]
     pub fn releasing(self) -> Self {
         Self { release_ns: self.duration_ns.saturating_sub(self.servo.ramp_ns()), ..self }
     }

@@ -88,7 +88,7 @@ impl Standby {
             let Guarded { mut device, capabilities, envelope } = guarded;
             enters(number);
             // The loader rejects capabilities that differ from those the envelope was made for.
-            let _: Capabilities = device.capabilities().map_err(|refusal| (number, refusal))?;
+            let _ = device.capabilities().map_err(|refusal| (number, refusal))?;
             let device = device.activate(&config).map_err(|(_, refusal)| (number, refusal))?;
             Ok(Station::new(device, envelope, &capabilities, config.period_ns))
         };

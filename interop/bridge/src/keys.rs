@@ -24,6 +24,7 @@ pub const ROOT: &str = "flotor";
 
 /// Name of a bridge or a member: one part of a key.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[must_use]
 pub struct Name(String);
 
 /// The text is no valid name.
@@ -45,13 +46,11 @@ impl Name {
     }
 
     /// Returns the member name of all peers of a bridge without keys.
-    #[must_use]
     pub fn anyone() -> Self {
         Self(crate::request::ANYONE.to_owned())
     }
 
     /// Returns the name of this machine, with other characters replaced by hyphens.
-    #[must_use]
     pub fn of_this_machine() -> Self {
         let system = rustix::system::uname();
         let host = system.nodename().to_string_lossy().to_lowercase();

@@ -145,6 +145,7 @@ impl Flotor {
     }
 
     /// Returns the twist.
+    #[must_use]
     pub fn twist(&self) -> Twist {
         Twist::new(self.velocity_m_per_s, self.angular_rad_per_s)
     }

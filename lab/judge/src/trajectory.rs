@@ -98,7 +98,6 @@ impl Trajectory {
 
     /// Returns the pose with derivatives by the parameter: of the position, m, and of the rotation as an angular
     /// velocity, rad.
-    #[must_use]
     pub fn at(&self, parameter: f64) -> (Pose, DVec3, DVec3) {
         let (position_m, shift_m) = self.position.at(parameter);
         let (rotation_rad, slope_rad) = self.rotation.at(parameter);

@@ -86,6 +86,7 @@ const SHARPNESS_ROOTS: u32 = 3; // 2^3 = 8
 
 /// Energy, J, its gradient, N, and depth, m, of a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Answer {
     /// Stored energy and its gradient.
     pub energy: Jet,
@@ -104,7 +105,6 @@ impl Answer {
 
 impl Atlas {
     /// Returns the energy of a sphere whose centre is at `centre_m` (finite). Real-time: bounded, no allocation.
-    #[must_use]
     pub fn answer(&self, centre_m: [f64; 3]) -> Answer {
         let centre = [0, 1, 2].map(|axis| Jet::variable(centre_m[axis], axis));
         let touch = match &self.body {
@@ -132,7 +132,6 @@ impl Atlas {
     /// Returns the energy of the top face of a block alone: zero beyond its edges, fading in over half a radius inside
     /// them. Its force grows with the depth; that of [`Self::answer`] does not where another face is nearer. Real-time:
     /// bounded, no allocation.
-    #[must_use]
     pub fn top(&self, centre_m: [f64; 3]) -> Answer {
         let TouchedBody::Block { size, ratios, rounding_m } = &self.body else {
             return self.answer(centre_m);

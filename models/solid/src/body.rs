@@ -111,7 +111,6 @@ impl<'a> Body<'a> {
     }
 
     /// Tabulates the remainder between all points of a grid, each moved onto the face by `nearest`. Not real-time.
-    #[must_use]
     pub fn table(&self, nodes_m: [Vec<f64>; 2], nearest: impl Fn([f64; 2]) -> [f64; 2]) -> Table {
         let points: Vec<[f64; 2]> =
             nodes_m[1].iter().flat_map(|&y| nodes_m[0].iter().map(move |&x| [x, y])).map(nearest).collect();

@@ -137,7 +137,6 @@ impl Skin {
     }
 
     /// Triangulates the surface of a mesh; returns also the node of each corner. Touched and free faces meet in a sharp edge.
-    #[must_use]
     pub fn of_mesh(mesh: &Mesh) -> (Self, Vec<usize>) {
         let (mut skin, mut nodes) = (Self::default(), Vec::new());
         for facets in [&mesh.touched, &mesh.free] {

@@ -42,6 +42,7 @@ const LEAST_OVERTURN: f64 = 1e-3;
 
 /// The conservative law of one spring, its constants prepared.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct EnergyForm {
     free_length_m: f64,
     /// `gamma / L0`
@@ -54,14 +55,12 @@ pub struct EnergyForm {
 impl EnergyForm {
     /// Prepares the law. Real-time: bounded, no allocation; tens of microseconds, to fit
     /// the fourth-order coefficients.
-    #[must_use]
     pub fn new(spring: &Spring) -> Self {
         Self::with_bending(spring, Bending::new(spring))
     }
 
     /// Returns the law of `to`, derived from this law of `from`. Equal to [`Self::new`], but takes only nanoseconds
     /// where the stiffness has changed and not the proportions. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn retuned(&self, from: &Spring, to: &Spring) -> Self {
         if to.is_proportional_to(from) {
             Self::with_bending(to, self.bending.restiffened(to))

@@ -30,7 +30,6 @@ pub struct Power {
 }
 
 /// Returns a population whose threshold without vision is `ratio` times that with vision.
-#[must_use]
 pub fn population(ratio: f64, lapse: f64) -> Population {
     let usual = Population::default();
     let h = Sensitivity { sigma: usual.vh.sigma * ratio, ..usual.vh };

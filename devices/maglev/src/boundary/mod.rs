@@ -151,6 +151,7 @@ impl Walls {
     }
 
     /// Returns force and torque of all walls on the hand.
+    #[must_use]
     pub fn wrench(&self, state: &DeviceState) -> Wrench {
         let (position, velocity) = (state.pose.position(), state.twist.linear());
         let distance = position.length();

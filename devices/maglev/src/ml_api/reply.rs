@@ -188,7 +188,6 @@ impl Reply {
     }
 
     /// Encodes the reply as a frame.
-    #[must_use]
     pub fn encode(&self) -> Frame {
         let mut frame = Frame::new(self.status.0);
         self.results.write(&mut frame);

@@ -118,12 +118,14 @@ impl Coils {
     }
 
     /// Returns the wrench of a set of currents (A) in an even field. Real-time: bounded, no allocation.
+    #[must_use]
     pub fn wrench(&self, currents_a: &Currents) -> Wrench {
         let [fx, fy, fz, tx, ty, tz] = product(&self.wrench_of, currents_a);
         Wrench { force_n: DVec3::new(fx, fy, fz), torque_nm: DVec3::new(tx, ty, tz) }
     }
 
     /// Returns the largest force and torque along one axis alone, N and N·m. Real-time: bounded, no allocation.
+    #[must_use]
     pub fn pure_axis_limits(&self) -> Wrench {
         let limit = |axis: usize| {
             let largest = self.currents_of.iter().fold(0.0_f64, |largest, row| largest.max(row[axis].abs()));

@@ -155,7 +155,6 @@ impl Plugin {
     }
 
     /// Returns the parameter schema of the plugin.
-    #[must_use]
     pub fn parameters(&self) -> &'static [Parameter] {
         self.parameters
     }

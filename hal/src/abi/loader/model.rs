@@ -46,13 +46,11 @@ impl Model {
     }
 
     /// Returns the model's declaration, which holds for all settings.
-    #[must_use]
     pub fn info(&self) -> &ModelInfo {
         &self.table.info
     }
 
     /// Returns the parameter schema of the model.
-    #[must_use]
     pub fn parameters(&self) -> &'static [Parameter] {
         self.parameters
     }

@@ -281,7 +281,6 @@ impl Session {
     }
 
     /// Returns the capabilities of the devices, in the scene's order.
-    #[must_use]
     pub fn capabilities(&self) -> &[Capabilities] {
         &self.capabilities
     }

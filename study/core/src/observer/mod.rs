@@ -38,6 +38,7 @@ pub enum Percept {
 ///
 /// The defaults are for stiffness and reproduce the published result (Weber fractions of 14.2 and 17.2 %, about 200 pairs, t(15) of 3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[must_use]
 pub struct Population {
     /// Mean sensitivity with vision and haptics.
     pub vh: Sensitivity,
@@ -87,7 +88,6 @@ impl Population {
     /// For forces the published fractions are thresholds at about 75 %: 5.9 % of weights of 0.3 to 3 kg (Fechner's data, after
     /// Laming 1986), 7 % of constant resistances of 2.5 to 10 N (Pang, Tan and Durlach 1991, Percept. Psychophys. 49:531). No
     /// effect of vision is assumed for either.
-    #[must_use]
     pub fn judging(percept: Percept) -> Self {
         match percept {
             Percept::Stiffness => Self::default(),
@@ -97,7 +97,6 @@ impl Population {
     }
 
     /// Returns the default population with other mean thresholds at 75 %, shares of the base, with and without vision.
-    #[must_use]
     pub fn with_thresholds([vh, h]: [f64; 2]) -> Self {
         let usual = Self::default();
         let of = |usual: Sensitivity, threshold: f64| {
@@ -164,7 +163,6 @@ impl SimulatedSubject {
     }
 
     /// Returns the subject's observer for a modality and base.
-    #[must_use]
     pub fn observer(&self, modality: Modality, base: f64) -> TernaryObserver {
         let observer = match modality {
             Modality::Vh => self.vh,

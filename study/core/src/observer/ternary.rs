@@ -6,6 +6,7 @@ use flotor_statistics::distribution::normal_below;
 
 /// Observer who compares two stimuli: evidence is the difference in units of its noise; below a criterion the answer is "I don't know".
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct TernaryObserver {
     /// Difference of one standard deviation of the noise, as a share of the base.
     pub sigma: f64,
@@ -19,7 +20,6 @@ pub struct TernaryObserver {
 
 impl TernaryObserver {
     /// Returns the observer with a given threshold at a target of 75 %, without bias and lapses.
-    #[must_use]
     pub fn with_threshold(threshold: f64, criterion: f64) -> Self {
         let unit = Self { sigma: 1.0, criterion, bias: 0.0, lapse: 0.0 };
         Self { sigma: threshold / unit.threshold(0.75), ..unit }

@@ -77,6 +77,7 @@ impl Hub {
     }
 
     /// Returns the wrench over the interval.
+    #[must_use]
     pub fn drive(&self, dt_s: f64) -> Wrench {
         self.state().controller.drive(dt_s)
     }
