@@ -256,6 +256,7 @@ impl std::ops::BitOr for Axes {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Capabilities {
     /// Axes whose position is measured.
     pub sensed: Axes,
@@ -306,19 +307,16 @@ impl Capabilities {
     const DEFAULT_RISE_S: f64 = 0.5e-3;
 
     /// Returns the capabilities of a device that senses and drives `axes`, with ranges and limits still 0.
-    #[must_use]
     pub const fn driving(axes: Axes) -> Self {
         Self { sensed: axes, actuated: axes, ..Self::UNDRIVEN }
     }
 
     /// Sets the axes whose position is measured; the driven axes are unchanged.
-    #[must_use]
     pub const fn sensing(self, axes: Axes) -> Self {
         Self { sensed: axes, ..self }
     }
 
     /// Sets the range of every axis in `sensed`: largest displacement, m, and rotation, rad, to both sides of the origin.
-    #[must_use]
     pub const fn with_range(self, range_m: f64, range_rad: f64) -> Self {
         let (range_m, range_rad) = self.sensed.spread(range_m, range_rad);
         Self { range_m, range_rad, ..self }
@@ -326,7 +324,6 @@ impl Capabilities {
 
     /// Sets the largest force, N, and torque, N·m, of every driven axis, and slew rates that reach these limits in 0.5
     /// ms.
-    #[must_use]
     pub const fn with_limits(self, max_force_n: f64, max_torque_nm: f64) -> Self {
         let (force_n, torque_nm) = self.actuated.spread(max_force_n, max_torque_nm);
         Self { max_force_n: force_n, max_torque_nm: torque_nm, ..self }
@@ -334,19 +331,16 @@ impl Capabilities {
     }
 
     /// Sets the maximum slew rates of force, N/s, and torque, N·m/s.
-    #[must_use]
     pub const fn with_slew(self, max_force_slew_n_per_s: f64, max_torque_slew_nm_per_s: f64) -> Self {
         Self { max_force_slew_n_per_s, max_torque_slew_nm_per_s, ..self }
     }
 
     /// Sets the largest stiffness that the device renders stably, N/m.
-    #[must_use]
     pub const fn with_stiffness(self, max_stiffness_n_per_m: f64) -> Self {
         Self { max_stiffness_n_per_m, ..self }
     }
 
     /// Sets the latency from a sample to the resulting force, beyond one period, s.
-    #[must_use]
     pub const fn with_latency(self, latency_s: f64) -> Self {
         Self { latency_s, ..self }
     }
@@ -377,6 +371,7 @@ impl Embodiment {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct DeviceInfo {
     pub(crate) id: Str,
     pub(crate) name: Str,
@@ -390,7 +385,6 @@ pub struct DeviceInfo {
 impl DeviceInfo {
     /// Builds the declaration of a physical device: `id` for scenes and commands ("simulated"), `name` and `doc` for
     /// display.
-    #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
         Self {
             id: Str::new(id),
@@ -403,7 +397,6 @@ impl DeviceInfo {
 
     /// Marks the device as a simulation. A host limits the force of a physical device to a ceiling unless the user allows
     /// more; a simulated device has no ceiling.
-    #[must_use]
     pub const fn simulated(self) -> Self {
         Self { embodiment: Embodiment::Simulated as u32, ..self }
     }

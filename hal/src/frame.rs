@@ -18,6 +18,7 @@ layout! {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Pose {
     /// Position of the handle, m.
     pub position_m: [f64; 3],
@@ -31,7 +32,6 @@ impl Pose {
 
     /// Builds a pose from glam values. Real-time: bounded, no allocation.
     #[inline]
-    #[must_use]
     pub fn new(position_m: DVec3, orientation: DQuat) -> Self {
         Self { position_m: position_m.to_array(), orientation_xyzw: orientation.to_array() }
     }

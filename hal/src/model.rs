@@ -19,6 +19,7 @@ layout! {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Demand {
     bits: u32,
 }
@@ -36,13 +37,11 @@ impl Demand {
     pub const ALL: Demand = Demand { bits: 7 };
 
     /// Returns the union of both sets. Real-time: bounded, no allocation.
-    #[must_use]
     pub const fn with(self, other: Demand) -> Demand {
         Demand { bits: self.bits | other.bits }
     }
 
     /// Returns the intersection of both sets. Real-time: bounded, no allocation.
-    #[must_use]
     pub const fn limited_to(self, other: Demand) -> Demand {
         Demand { bits: self.bits & other.bits }
     }
@@ -59,6 +58,7 @@ impl Demand {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Input {
     /// Pose of the handle relative to the model's home, m and unit quaternion.
     pub pose: Pose,
@@ -78,7 +78,6 @@ pub struct Input {
 
 impl Input {
     /// Builds the input at a pose, at rest, at time zero, with all outputs demanded: for tests and off-line evaluation.
-    #[must_use]
     pub const fn at_rest(pose: Pose) -> Self {
         Self { pose, twist: Twist::ZERO, time_ns: 0, dt_ns: 0, tick: 0, buttons: 0, demand: Demand::ALL }
     }
@@ -175,6 +174,7 @@ impl From<Wrench> for Output {
 /// Path dependence of the force: a path-dependent model has an internal state.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[must_use]
 pub enum Memory {
     /// The wrench depends on the current input only: inputs may be evaluated in any order.
     Stateless = 0,
@@ -184,7 +184,6 @@ pub enum Memory {
 
 impl Memory {
     /// Converts a code from the boundary; an unknown code counts as path-dependent, the safe choice.
-    #[must_use]
     pub(crate) const fn from_code(code: u32) -> Self {
         if code == Self::Stateless as u32 { Self::Stateless } else { Self::PathDependent }
     }
@@ -194,6 +193,7 @@ impl Memory {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct ModelInfo {
     pub(crate) id: Str,
     pub(crate) name: Str,
@@ -204,7 +204,6 @@ pub struct ModelInfo {
 
 impl ModelInfo {
     /// Builds a declaration: `id` for scenes and commands ("spring"), `name` and `doc` for display.
-    #[must_use]
     pub const fn new(id: &'static str, name: &'static str, doc: &'static str) -> Self {
         Self {
             id: Str::new(id),
@@ -216,7 +215,6 @@ impl ModelInfo {
     }
 
     /// Declares the demands that the model can serve (default: force and torque).
-    #[must_use]
     pub const fn serving(mut self, demand: Demand) -> Self {
         self.serves = demand;
         self
@@ -224,7 +222,6 @@ impl ModelInfo {
 
     /// Declares the path dependence of the output. If this depends on settings, declare [`Memory::PathDependent`] here
     /// and the path dependence of each instance with [`crate::VariantModel`].
-    #[must_use]
     pub const fn with_memory(mut self, memory: Memory) -> Self {
         self.memory = memory as u32;
         self
@@ -249,13 +246,11 @@ impl ModelInfo {
     }
 
     /// Returns the demands that the model can serve.
-    #[must_use]
     pub const fn serves(&self) -> Demand {
         self.serves
     }
 
     /// Returns the path dependence of the output; an unknown code counts as path-dependent, the safe choice.
-    #[must_use]
     pub const fn memory(&self) -> Memory {
         Memory::from_code(self.memory)
     }

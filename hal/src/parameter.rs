@@ -55,6 +55,7 @@ pub enum Mutability {
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Parameter {
     pub(crate) id: Str,
     pub(crate) unit: Str,
@@ -69,7 +70,6 @@ pub struct Parameter {
 
 impl Parameter {
     /// Declares a real number between `min` and `max`. `unit` is shown beside the slider ("mm", "N", "1" for none).
-    #[must_use]
     pub const fn real(
         id: &'static str,
         unit: &'static str,
@@ -95,7 +95,6 @@ impl Parameter {
     ///
     /// # Panics
     /// In the compiler (schemas are constants), if `default` is not an index.
-    #[must_use]
     pub const fn choice(id: &'static str, choices: Choices, default: usize, doc: &'static str) -> Self {
         let count = choices.as_slice().len();
         assert!(default < count, "the default must be one of the choices");
@@ -106,7 +105,6 @@ impl Parameter {
     }
 
     /// Declares a file, or one of `built_in` by its name; none by default.
-    #[must_use]
     pub const fn file(id: &'static str, built_in: Choices, doc: &'static str) -> Self {
         let mut parameter = Self::text(id, doc);
         parameter.kind = ParameterKind::File as u32;
@@ -115,7 +113,6 @@ impl Parameter {
     }
 
     /// Declares a free text, empty by default.
-    #[must_use]
     pub const fn text(id: &'static str, doc: &'static str) -> Self {
         let mut parameter = Self::real(id, "", 0.0, 0.0, 0.0, doc);
         parameter.kind = ParameterKind::Text as u32;
@@ -123,7 +120,6 @@ impl Parameter {
     }
 
     /// Makes the parameter changeable at tick boundaries.
-    #[must_use]
     pub const fn live(mut self) -> Self {
         self.mutability = Mutability::Live as u32;
         self
@@ -148,7 +144,6 @@ impl Parameter {
     }
 
     /// Returns the names of a choice in index order, or the built-in files; empty for the other kinds.
-    #[must_use]
     pub const fn choices(&self) -> &[Str] {
         self.choices.as_slice()
     }

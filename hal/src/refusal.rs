@@ -31,6 +31,7 @@ impl RefusalKind {
 
 /// Refusal to create, open, prepare or activate, with its reason. Not real-time.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[must_use]
 pub struct Refusal {
     /// Kind of the refusal, which determines the remedy.
     pub kind: RefusalKind,
@@ -40,25 +41,21 @@ pub struct Refusal {
 
 impl Refusal {
     /// Builds a refusal of a parameter value.
-    #[must_use]
     pub fn parameter(reason: impl fmt::Display) -> Self {
         Self { kind: RefusalKind::Parameter, reason: reason.to_string() }
     }
 
     /// Builds a refusal of a request that the plugin does not support.
-    #[must_use]
     pub fn unsupported(reason: impl fmt::Display) -> Self {
         Self { kind: RefusalKind::Unsupported, reason: reason.to_string() }
     }
 
     /// Builds a refusal because a resource outside the plugin is missing, busy or forbidden.
-    #[must_use]
     pub fn resource(reason: impl fmt::Display) -> Self {
         Self { kind: RefusalKind::Resource, reason: reason.to_string() }
     }
 
     /// Builds a refusal because the plugin panicked or violated the contract.
-    #[must_use]
     pub fn broken(reason: impl fmt::Display) -> Self {
         Self { kind: RefusalKind::Broken, reason: reason.to_string() }
     }

@@ -5,7 +5,6 @@ use flotor_servo::{Durations, Timing};
 
 /// Returns two panels with histograms of a run's timing: lateness and compute time of all ticks, and stage times of every sixteenth
 /// tick. Each panel has a logarithmic time axis of its own. Not real-time.
-#[must_use]
 pub fn panels(timing: &Timing) -> [Panel; 2] {
     let [read, models, envelope, write] = &timing.stages;
     let whole = histogram()

@@ -47,7 +47,6 @@ impl Observer for Keep {
 ///
 /// # Panics
 /// If the scene is wrong or a plugin is refused: such tests have other means.
-#[must_use]
 pub fn prepared(clock: Clock, scene: &str) -> Session {
     prepared_with(&Registry::search(&[build_folder().join("deps")]), clock, scene)
 }

@@ -8,6 +8,7 @@ use flotor_drawing::gpu::GpuScene;
 use flotor_drawing::raster::{Rasterizer, View};
 
 /// Renderer of the 3D view, with its last texture.
+#[must_use]
 pub enum Canvas {
     /// Rendering by the device of the interface.
     Gpu {
@@ -31,7 +32,6 @@ pub enum Canvas {
 
 impl Canvas {
     /// Creates a canvas on the device of the interface, or on the processor without a device.
-    #[must_use]
     pub fn new(state: Option<&RenderState>) -> Self {
         /// Samples per pixel and direction, for interfaces without a waiting user (tests).
         const SAMPLES: usize = 2;
@@ -46,7 +46,6 @@ impl Canvas {
     }
 
     /// Creates a canvas on the processor, with this many samples per pixel and direction.
-    #[must_use]
     pub fn on_processor(samples: usize) -> Self {
         Self::Cpu { rasterizer: Rasterizer::default(), samples, texture: None }
     }

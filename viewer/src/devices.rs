@@ -91,14 +91,12 @@ impl Devices {
     }
 
     /// Returns a scale of arrows that fits all samples of all devices.
-    #[must_use]
     pub fn scale(&self) -> ArrowScale {
         let scales = self.seen.iter().map(|seen| seen.event_counts.scale());
         scales.reduce(ArrowScale::larger).unwrap_or_else(|| ArrowScale::fitting(std::iter::empty()))
     }
 
     /// Returns the events in the newest ticks of all devices.
-    #[must_use]
     pub fn newest_events(&self) -> Events {
         let newest = self.seen.iter().filter_map(|seen| seen.history.at(f64::INFINITY));
         newest.fold(Events::NONE, |mut events, sample| {

@@ -4,6 +4,7 @@ use flotor_history::quantity::Quantity;
 
 /// Display options; each has a default.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[must_use]
 pub struct DisplayOptions {
     /// Number of the device for numbers and traces, from 0.
     pub device: usize,
@@ -17,7 +18,6 @@ pub struct DisplayOptions {
 
 impl DisplayOptions {
     /// Creates options for a device, traces, and force over position along an axis, with automatic scaling of arrows.
-    #[must_use]
     pub fn new(device: usize, mut traces: Vec<Quantity>, force_position: Option<usize>) -> Self {
         traces.sort();
         traces.dedup();
@@ -25,7 +25,6 @@ impl DisplayOptions {
     }
 
     /// Sets the force of an arrow of full length, N; `None`: the largest force of the run.
-    #[must_use]
     pub fn with_arrow_force(self, arrow_force_n: Option<f64>) -> Self {
         Self { arrow_force_n, ..self }
     }

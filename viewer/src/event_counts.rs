@@ -53,7 +53,6 @@ impl EventCounts {
     }
 
     /// Returns a scale of arrows that fits all samples.
-    #[must_use]
     pub fn scale(&self) -> ArrowScale {
         self.scale
     }

@@ -15,6 +15,7 @@ use flotor_history::Sample;
 
 /// Scale of force and torque arrows.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct ArrowScale {
     /// Force drawn as an arrow as long as the body is high, N.
     pub force_n: f64,
@@ -25,7 +26,6 @@ pub struct ArrowScale {
 impl ArrowScale {
     /// Returns the scale at which the largest force and torque of the samples have arrows of full length; a smallest scale for small
     /// or no samples.
-    #[must_use]
     pub fn fitting<'a>(samples: impl Iterator<Item = &'a Sample>) -> Self {
         /// Smallest scale: smaller forces and torques have short arrows.
         const LEAST: ArrowScale = ArrowScale { force_n: FULL_FORCE * 1.0e-3, torque_nm: 1.0e-5 };
@@ -33,7 +33,6 @@ impl ArrowScale {
     }
 
     /// Returns the scale enlarged to fit one more sample.
-    #[must_use]
     pub fn with(self, sample: &Sample) -> Self {
         Self {
             force_n: self.force_n.max(FULL_FORCE * sample.force_n().length()),
@@ -42,13 +41,11 @@ impl ArrowScale {
     }
 
     /// Returns the scale for a chosen largest force, N, if any: the arrows of several pictures are then comparable.
-    #[must_use]
     pub fn with_chosen(self, force_n: Option<f64>) -> Self {
         Self { force_n: force_n.map_or(self.force_n, |force_n| FULL_FORCE * force_n), ..self }
     }
 
     /// Returns the larger of both scales.
-    #[must_use]
     pub fn larger(self, other: Self) -> Self {
         Self { force_n: self.force_n.max(other.force_n), torque_nm: self.torque_nm.max(other.torque_nm) }
     }

@@ -191,7 +191,6 @@ impl Shape {
     }
 
     /// Returns the mapping from the device frame to the model frame.
-    #[must_use]
     pub fn mapping(&self) -> &Mapping {
         &self.mapping
     }

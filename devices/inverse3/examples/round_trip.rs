@@ -6,8 +6,12 @@
 
 use flotor_hal::DVec3;
 use flotor_inverse3::session::{GripRequest, Request, Session};
-use flotor_inverse3::stand_in::{ARM, Said, StandIn, configured, state};
+use stand_in::{ARM, Said, StandIn, configured, state};
 use std::time::{Duration, Instant};
+
+#[path = "../tests/stand_in/mod.rs"]
+#[allow(dead_code, unused_imports)] // tests use the rest
+mod stand_in;
 
 const EXCHANGES: usize = 20_000;
 

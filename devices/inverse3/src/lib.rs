@@ -13,7 +13,6 @@
 //! - [`foreign`]: detects force that no command of this session explains.
 //! - `exchange`: the thread and its data exchange with the tick.
 //! - `plugin`: parameters and the contract.
-//! - [`stand_in`]: scripted service for tests.
 //!
 //! `flotor emulate haply-service` is a complete service without hardware.
 
@@ -25,7 +24,10 @@ mod plugin;
 pub mod session;
 mod session_error;
 pub mod socket;
-pub mod stand_in;
 
 pub use plugin::{FLOTOR_ENTRY, Inverse3Device};
 pub use session_error::SessionError;
+
+#[cfg(test)]
+#[path = "../tests/stand_in/texts.rs"]
+mod stand_in;

@@ -2,8 +2,10 @@
 
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Axes, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, UsbAccess, Wrench};
-use flotor_inverse3::stand_in::{ARM, GRIP, OTHER_ARM, Said, StandIn, configured, frame, state};
+use stand_in::{ARM, GRIP, OTHER_ARM, Said, StandIn, configured, frame, state};
 use std::time::{Duration, Instant};
+
+mod stand_in;
 
 const CONFIG: LoopConfig = LoopConfig { period_ns: 1_000_000, seed: 1 };
 /// How long anything here may take.

@@ -15,6 +15,7 @@ use std::ops::AddAssign;
 
 /// Mechanical energy of the flotor (without the mass of a gripping hand).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[must_use]
 pub struct MechanicalEnergy {
     /// Energy of translation and rotation, J.
     pub kinetic_j: f64,
@@ -97,13 +98,11 @@ impl Ledger {
     }
 
     /// Returns the mechanical energy at the start of the balance. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn start(&self) -> MechanicalEnergy {
         self.start
     }
 
     /// Returns the present mechanical energy. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn energy(&self) -> MechanicalEnergy {
         self.now
     }

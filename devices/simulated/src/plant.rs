@@ -133,7 +133,6 @@ impl Plant {
     }
 
     /// Returns the present mechanical energy of the flotor. Real-time: bounded, no allocation.
-    #[must_use]
     #[inline]
     pub fn energy(&self) -> MechanicalEnergy {
         self.free.body().energy(&self.motion)

@@ -145,6 +145,15 @@ impl SimulatedFlotor {
         let stable = sampled.largest_stiffness(drag_ns_per_m, Damper::BothWays(RENDERED_DAMPING_NS_PER_M));
         stable.min(STIFFNESS_LIMIT_N_PER_M)
     }
+
+    /// Creates flotor, hand and machine at time 0.
+    fn start(&self, tick_ns: u64, seed: u64) -> Result<(Simulation, Option<Box<Machine>>), InvalidParameter> {
+        let setup = Setup { tick_ns, seed, ..self.setup.clone() };
+        let machine = |parameters| Machine::new(parameters, &setup.start, seed).map(Box::new);
+        let mut simulation = Simulation::new(&setup)?;
+        live::begin(&mut simulation, &self.values);
+        Ok((simulation, self.machine.as_ref().map(machine).transpose()?))
+    }
 }
 
 impl CalibrationDevice for SimulatedFlotor {
@@ -160,17 +169,6 @@ impl CalibrationDevice for SimulatedFlotor {
         }
         self.calibration = *calibration;
         Ok(())
-    }
-}
-
-impl SimulatedFlotor {
-    /// Creates flotor, hand and machine at time 0.
-    fn start(&self, tick_ns: u64, seed: u64) -> Result<(Simulation, Option<Box<Machine>>), InvalidParameter> {
-        let setup = Setup { tick_ns, seed, ..self.setup.clone() };
-        let machine = |parameters| Machine::new(parameters, &setup.start, seed).map(Box::new);
-        let mut simulation = Simulation::new(&setup)?;
-        live::begin(&mut simulation, &self.values);
-        Ok((simulation, self.machine.as_ref().map(machine).transpose()?))
     }
 }
 

@@ -103,7 +103,6 @@ impl Motion {
     }
 
     /// Returns the pose of the handle. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn pose(&self) -> Pose {
         Pose::new(self.position_m, self.orientation)
     }

@@ -81,6 +81,22 @@ impl<S: Reports> SpaceMouse<S> {
     fn new(source: S, values: Values) -> Self {
         Self { source, values, deflection: Deflection::default(), motion: Motion::default(), buttons: 0 }
     }
+
+    fn take_reports(&mut self) -> Result<(), Gone> {
+        let mut bytes = [0; REPORT_BYTES];
+        for _ in 0..REPORTS_PER_TICK {
+            let length = self.source.next(&mut bytes)?;
+            if length == 0 {
+                break;
+            }
+            let report = Report::parse(bytes.get(..length).unwrap_or(&bytes));
+            self.deflection.update(&report);
+            if let Report::Buttons(buttons) = report {
+                self.buttons = buttons;
+            }
+        }
+        Ok(())
+    }
 }
 
 impl<S: Reports> SimpleDevice for SpaceMouse<S> {
@@ -132,24 +148,6 @@ impl<S: Reports> SimpleDevice for SpaceMouse<S> {
         match self.values.0.get_mut(index) {
             Some(place) if [SPEED, SPIN, DEAD_ZONE, HOME_BUTTON].contains(&index) => *place = value,
             _ => return Err(SetParameterError::Fixed),
-        }
-        Ok(())
-    }
-}
-
-impl<S: Reports> SpaceMouse<S> {
-    fn take_reports(&mut self) -> Result<(), Gone> {
-        let mut bytes = [0; REPORT_BYTES];
-        for _ in 0..REPORTS_PER_TICK {
-            let length = self.source.next(&mut bytes)?;
-            if length == 0 {
-                break;
-            }
-            let report = Report::parse(bytes.get(..length).unwrap_or(&bytes));
-            self.deflection.update(&report);
-            if let Report::Buttons(buttons) = report {
-                self.buttons = buttons;
-            }
         }
         Ok(())
     }

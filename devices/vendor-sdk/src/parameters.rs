@@ -20,14 +20,12 @@ pub const TIMEOUT: Parameter =
     Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Timeout for samples of the device");
 
 /// Declares the parameter `max_force_n`, N, with the range 0 to `most_n`; 0: the limit of the device.
-#[must_use]
 pub const fn max_force(most_n: f64) -> Parameter {
     let doc = "Largest force on the hand; 0: the limit of the device";
     Parameter::real("max_force_n", "N", 0.0, most_n, 0.0, doc)
 }
 
 /// Declares the parameter `max_torque_nm`, N·m, with the range 0 to `most_nm`; 0: the limit of the device.
-#[must_use]
 pub const fn max_torque(most_nm: f64) -> Parameter {
     let doc = "Largest torque on the hand; 0: the limit of the device";
     Parameter::real("max_torque_nm", "N·m", 0.0, most_nm, 0.0, doc)

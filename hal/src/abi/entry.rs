@@ -125,6 +125,7 @@ unsafe impl Sync for LayoutProof {}
 
 /// The exported static `flotor_entry_<crate>`: plain data, readable before any plugin code runs.
 #[repr(C)]
+#[must_use]
 pub struct Entry {
     /// [`MAGIC`].
     pub(crate) magic: [u8; 8],

@@ -41,13 +41,11 @@ unsafe extern "C" fn model_interface<M: ForceModel, E: Extensions<M>>(id: Str) -
 /// use flotor_hal::abi::{Entry, MAGIC};
 /// let forged = Entry { magic: MAGIC, kind: 1, ..unreachable!() };
 /// ```
-#[must_use]
 pub const fn model_entry<M: ForceModel>() -> Entry {
     model_entry_with::<M, ()>()
 }
 
 /// Returns the entry of a model plugin with the extensions `E`; used by [`crate::export_model!`].
-#[must_use]
 pub const fn model_entry_with<M: ForceModel, E: Extensions<M>>() -> Entry {
     entry(PluginKind::Model, model_interface::<M, E>)
 }
@@ -67,13 +65,11 @@ unsafe extern "C" fn device_interface<D: Device, E: Extensions<D>>(id: Str) -> *
 }
 
 /// Returns the entry of a device plugin without extensions.
-#[must_use]
 pub const fn device_entry<D: Device>() -> Entry {
     device_entry_with::<D, ()>()
 }
 
 /// Returns the entry of a device plugin with the extensions `E`; used by [`crate::export_device!`].
-#[must_use]
 pub const fn device_entry_with<D: Device, E: Extensions<D>>() -> Entry {
     entry(PluginKind::Device, device_interface::<D, E>)
 }

@@ -8,6 +8,7 @@ use std::fmt;
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Str {
     ptr: *const u8,
     len: usize,
@@ -24,14 +25,12 @@ impl Str {
     pub const EMPTY: Str = Str::new("");
 
     /// Wraps a text that lives as long as the process.
-    #[must_use]
     pub const fn new(text: &'static str) -> Self {
         Self { ptr: text.as_ptr(), len: text.len() }
     }
 
     /// Converts constant words to texts, for [`crate::choices!`].
     #[doc(hidden)]
-    #[must_use]
     pub const fn all<const N: usize>(words: &[&'static str]) -> [Str; N] {
         assert!(words.len() == N);
         let (mut texts, mut i) = ([Str::EMPTY; N], 0);
@@ -46,7 +45,6 @@ impl Str {
     ///
     /// # Safety
     /// The caller lets no copy of the result outlive `text`.
-    #[must_use]
     pub unsafe fn borrowed(text: &str) -> Self {
         Self { ptr: text.as_ptr(), len: text.len() }
     }
@@ -111,7 +109,6 @@ impl Choices {
     }
 
     /// Returns the texts; empty if null or if the length exceeds the address space.
-    #[must_use]
     pub const fn as_slice(&self) -> &[Str] {
         if self.ptr.is_null() || self.len > isize::MAX as usize / size_of::<Str>() {
             return &[];

@@ -27,6 +27,7 @@ pub enum RegionShape {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct ActiveRegion {
     shape: u32,
     reserved: u32,
@@ -40,13 +41,11 @@ impl ActiveRegion {
         Self { shape: 0, reserved: 0, center_m: [0.0; 3], half_sides_m: [f64::INFINITY; 3] };
 
     /// Builds a ball about `center_m` (m, model frame).
-    #[must_use]
     pub const fn sphere(center_m: [f64; 3], radius_m: f64) -> Self {
         Self { shape: 1, reserved: 0, center_m, half_sides_m: [radius_m; 3] }
     }
 
     /// Builds a box about `center_m` from its half extents, both in m, with sides along the axes of the model frame.
-    #[must_use]
     pub const fn cuboid(center_m: [f64; 3], half_sides_m: [f64; 3]) -> Self {
         Self { shape: 2, reserved: 0, center_m, half_sides_m }
     }
@@ -149,7 +148,6 @@ table!(ActiveRegionTable: "flotor.active-region/1", M: [ActiveRegionModel] {
 impl Model {
     /// Returns the active region of the instance with the current parameters; without the extension, everywhere.
     /// Real-time: bounded, no allocation.
-    #[must_use]
     pub fn active_region(&mut self) -> ActiveRegion {
         let ask = self.extensions.active_region.and_then(|table| table.region);
         self.calls.query(ask, ActiveRegion::EVERYWHERE).unwrap_or(ActiveRegion::EVERYWHERE)

@@ -36,6 +36,7 @@ impl UsbAccess {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct UsbKind {
     pub(crate) vendor: u16,
     pub(crate) product: u16,
@@ -45,13 +46,11 @@ pub struct UsbKind {
 
 impl UsbKind {
     /// Returns the identity of one product of a vendor.
-    #[must_use]
     pub const fn new(vendor: u16, product: u16, access: UsbAccess) -> Self {
         Self { vendor, product, access: access as u32 }
     }
 
     /// Returns the identity of all products of a vendor.
-    #[must_use]
     pub const fn of_vendor(vendor: u16, access: UsbAccess) -> Self {
         Self::new(vendor, 0, access)
     }
@@ -134,7 +133,6 @@ table!(ConnectionTable: "flotor.connection/1", D: [ConnectionDevice] {
 #[cfg(feature = "loader")]
 impl Plugin {
     /// Returns the USB identities of a device; empty without a declaration and for a model.
-    #[must_use]
     pub fn usb_kinds(&self) -> &'static [UsbKind] {
         let table = self.device_extensions().and_then(|extensions| extensions.connection);
         // SAFETY: a table's list is a static array of `usb_count` kinds of the checked layout.

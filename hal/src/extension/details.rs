@@ -16,6 +16,7 @@ use crate::{ForceModel, choices};
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Detail {
     id: Str,
     unit: Str,
@@ -25,19 +26,16 @@ pub struct Detail {
 
 impl Detail {
     /// Declares a number in SI units; `unit` is the unit to display ("rad", "1" for none).
-    #[must_use]
     pub const fn number(id: &'static str, unit: &'static str, doc: &'static str) -> Self {
         Self { id: Str::new(id), unit: Str::new(unit), doc: Str::new(doc), words: Choices::EMPTY }
     }
 
     /// Declares a word from a fixed list; the value is the index of the word.
-    #[must_use]
     pub const fn word(id: &'static str, words: Choices, doc: &'static str) -> Self {
         Self { id: Str::new(id), unit: Str::EMPTY, doc: Str::new(doc), words }
     }
 
     /// Declares a flag, with the value 1 or 0.
-    #[must_use]
     pub const fn flag(id: &'static str, doc: &'static str) -> Self {
         Self::word(id, choices!["0", "1"], doc)
     }
@@ -61,7 +59,6 @@ impl Detail {
     }
 
     /// Returns the words, in index order; empty for a number.
-    #[must_use]
     pub const fn words(&self) -> &[Str] {
         self.words.as_slice()
     }
@@ -149,7 +146,6 @@ table!(DetailsTable: "flotor.details/1", M: [DetailsModel] {
 #[cfg(feature = "loader")]
 impl Model {
     /// Returns the diagnostic numbers of the model; empty for a model without details.
-    #[must_use]
     pub fn details(&self) -> &'static [Detail] {
         let table = self.extensions.details;
         // SAFETY: a table's list is a static array of `detail_count` details of the checked layout.

@@ -34,6 +34,7 @@ pub enum StoppedState {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct IndependentStop {
     /// Time from the end of the host's commands, or from the message, until the device is in its safe state, ns. The
     /// largest number with descriptor -1: no independent stop.
@@ -54,7 +55,6 @@ pub struct IndependentStop {
 impl IndependentStop {
     /// Declares a stop by a message to a descriptor, which is open for writing until the device is closed; the device is
     /// in `state` at most `within_ns` after the message. The host rejects an empty message and one of more than 64 bytes.
-    #[must_use]
     pub fn by_message(descriptor: i32, message: &[u8], state: StoppedState, within_ns: u64) -> Self {
         let mut bytes = [0; STOP_MESSAGE_BYTES];
         bytes.iter_mut().zip(message).for_each(|(place, byte)| *place = *byte);
@@ -63,14 +63,12 @@ impl IndependentStop {
     }
 
     /// Declares a stop by the device's controller after `within_ns` without a command; 0: the device ends with the host's process.
-    #[must_use]
     pub const fn by_itself(state: StoppedState, within_ns: u64) -> Self {
         let message = [0; STOP_MESSAGE_BYTES];
         Self { within_ns, descriptor: BY_ITSELF, length: 0, message, state: state as u32, reserved: 0 }
     }
 
     /// Declares no independent stop, as a plugin without this extension: for a plugin with several kinds of devices.
-    #[must_use]
     pub const fn none() -> Self {
         Self::by_itself(StoppedState::Zero, NEVER_NS)
     }

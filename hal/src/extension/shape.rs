@@ -42,6 +42,7 @@ pub enum Part {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct Primitive {
     /// Code of a [`Form`].
     form: u32,
@@ -56,13 +57,11 @@ pub struct Primitive {
 impl Primitive {
     /// Builds a body from its half extents: of a plane only the first two count, of a sphere each is the radius, of a
     /// cylinder the first two are the radius and the third is half the height.
-    #[must_use]
     pub const fn new(form: Form, part: Part, pose: Pose, half_sides_m: [f64; 3]) -> Self {
         Self { form: form as u32, part: part as u32, pose, half_sides_m }
     }
 
     /// Builds a sphere with its centre at the position of `pose`.
-    #[must_use]
     pub const fn sphere(part: Part, pose: Pose, radius_m: f64) -> Self {
         Self::new(Form::Sphere, part, pose, [radius_m; 3])
     }
@@ -86,7 +85,6 @@ impl Primitive {
     }
 
     /// Returns the centre (m, model frame) and the orientation.
-    #[must_use]
     pub const fn pose(&self) -> Pose {
         self.pose
     }

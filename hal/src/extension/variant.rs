@@ -26,13 +26,11 @@ impl VariantInfo {
     }
 
     /// Returns the demands that the instance can serve.
-    #[must_use]
     pub const fn serves(&self) -> Demand {
         self.serves
     }
 
     /// Returns the path dependence of the wrench; an unknown code counts as path-dependent, the safe choice.
-    #[must_use]
     pub const fn memory(&self) -> Memory {
         Memory::from_code(self.memory)
     }

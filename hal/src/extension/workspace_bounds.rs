@@ -16,6 +16,7 @@ use crate::{DVec3, ForceModel};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
+#[must_use]
 pub struct WorkspaceBounds {
     lower_m: [f64; 3],
     upper_m: [f64; 3],
@@ -26,7 +27,6 @@ impl WorkspaceBounds {
     pub const UNBOUNDED: Self = Self { lower_m: [f64::NEG_INFINITY; 3], upper_m: [f64::INFINITY; 3] };
 
     /// Builds bounds from `lower_m` to `upper_m` (m, model frame); infinite for no limit.
-    #[must_use]
     pub const fn between(lower_m: [f64; 3], upper_m: [f64; 3]) -> Self {
         Self { lower_m, upper_m }
     }
@@ -112,7 +112,6 @@ table!(WorkspaceBoundsTable: "flotor.workspace-bounds/1", M: [WorkspaceBoundsMod
 impl Model {
     /// Returns the limits of the instance with the current parameters; unbounded without the extension. Real-time:
     /// bounded, no allocation.
-    #[must_use]
     pub fn workspace_bounds(&mut self) -> WorkspaceBounds {
         let ask = self.extensions.workspace_bounds.and_then(|table| table.bounds);
         self.calls.query(ask, WorkspaceBounds::UNBOUNDED).unwrap_or(WorkspaceBounds::UNBOUNDED)

@@ -202,6 +202,17 @@ impl JsonOption {
     }
 }
 
+/// Options of each command that searches for plugins and has a result for programs.
+#[derive(Args, Clone, Debug, Default)]
+pub struct PluginResultOptions {
+    /// Output as JSON.
+    #[command(flatten)]
+    pub json: JsonOption,
+    /// Folders to search for plugins.
+    #[command(flatten)]
+    pub plugin_path: PluginPathOption,
+}
+
 /// Parses a duration in seconds from `10`, `10s`, `500ms`, `2min` or `1h`.
 ///
 /// # Errors

@@ -8,7 +8,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Returns the outputs that reach the hand at a device: force, and torque if its bound allows any.
-#[must_use]
 pub fn hand_demand(torque_nm: &Bound) -> Demand {
     if torque_nm.longest() > 0.0 { Demand::WRENCH } else { Demand::FORCE }
 }
@@ -31,14 +30,12 @@ impl TickDemand {
 
     /// Returns the outputs that reach the hand.
     #[inline]
-    #[must_use]
     pub const fn at_hand(self) -> Demand {
         self.at_hand
     }
 
     /// Returns the outputs that the models compute, for the hand or an observer.
     #[inline]
-    #[must_use]
     pub const fn computed(self) -> Demand {
         self.computed
     }
@@ -67,7 +64,6 @@ impl ObserverDemand {
 
     /// Returns force and the outputs with at least one request. Real-time: bounded, no allocation.
     #[inline]
-    #[must_use]
     pub fn now(&self) -> Demand {
         let counts = self.counts.load(Ordering::Relaxed);
         let [torque, energy] = COUNTS;

@@ -4,6 +4,7 @@ use crate::coupling::PassivityMode;
 
 /// Bound of a vector, in its unit: a largest norm, and a largest component along each axis. Both apply together.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Bound {
     norm: f64,
     axes: [f64; 3],
@@ -14,19 +15,16 @@ impl Bound {
     pub const NONE: Self = Self { norm: f64::INFINITY, axes: [f64::INFINITY; 3] };
 
     /// Creates a ball: the bound of vectors no longer than `norm`.
-    #[must_use]
     pub const fn ball(norm: f64) -> Self {
         Self { norm, axes: [norm; 3] }
     }
 
     /// Creates a box: the bound of vectors whose components are at most `axes` in magnitude.
-    #[must_use]
     pub const fn box_of(axes: [f64; 3]) -> Self {
         Self { norm: f64::INFINITY, axes }
     }
 
     /// Returns the intersection of two bounds. Not real-time.
-    #[must_use]
     pub fn and(self, other: Self) -> Self {
         let norm = self.norm.min(other.norm);
         let axis = |index: usize| self.axes[index].min(other.axes[index]).min(norm);

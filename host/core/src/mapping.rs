@@ -57,6 +57,7 @@ pub struct FieldTiming {
 
 /// Mapping between a device and one instance of a model: frames, scales and home position.
 #[derive(Clone, Copy, Debug)]
+#[must_use]
 pub struct Mapping {
     home_m: DVec3,
     model_from_device: Turn,
@@ -108,7 +109,6 @@ impl Turn {
 
 impl Mapping {
     /// Creates a mapping from its checked configuration. Not real-time.
-    #[must_use]
     pub fn new(config: &MappingConfig) -> Self {
         let energy_scale = config.force_scale / config.motion_scale;
         Self {
@@ -133,7 +133,6 @@ impl Mapping {
 
     /// Returns the mapping with the home of the model at the position `home_m` (m, device frame) instead of the
     /// device's home. Not real-time.
-    #[must_use]
     pub fn at(self, home_m: [f64; 3]) -> Self {
         Self { home_m: DVec3::from_array(home_m), ..self }
     }
@@ -161,7 +160,6 @@ impl Mapping {
 
     /// Maps a pose from the device frame to the model frame. Real-time: bounded, no allocation.
     #[inline(always)] // as `wrench_to_device`
-    #[must_use]
     pub fn pose_to_model(&self, pose: &Pose) -> Pose {
         let turn = self.model_from_device;
         let position_m = turn.there(pose.position() - self.home_m) * self.motion_scale;
@@ -201,7 +199,6 @@ impl Mapping {
     /// Returns the input of a model for a tick: the motion in the model frame, and the demanded outputs. Real-time:
     /// bounded, no allocation.
     #[inline]
-    #[must_use]
     pub fn input(&self, tick: &Tick, state: &DeviceState, demand: Demand) -> Input {
         Input {
             pose: self.pose_to_model(&state.pose),

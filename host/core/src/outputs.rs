@@ -9,6 +9,7 @@ use flotor_hal::{DVec3, Demand, Wrench};
 /// An output that was not computed is absent. An output that is present but not finite was computed for an observer
 /// alone and did not reach the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct ModelOutputs {
     wrench: Wrench,
     energy_j: f64,
@@ -21,7 +22,6 @@ impl ModelOutputs {
 
     /// Creates a set of all outputs: wrench, N and N·m, and stored energy, J. Real-time: bounded, no allocation.
     #[inline]
-    #[must_use]
     pub const fn new(wrench: Wrench, energy_j: f64) -> Self {
         Self { wrench, energy_j, computed: Demand::ALL }
     }
@@ -29,7 +29,6 @@ impl ModelOutputs {
     /// Returns the outputs without those outside `demand`, which become absent; force is always present. Real-time:
     /// bounded, no allocation.
     #[inline]
-    #[must_use]
     pub const fn limited_to(self, demand: Demand) -> Self {
         let computed = self.computed.limited_to(demand).with(Demand::FORCE);
         let Self { mut wrench, mut energy_j, .. } = self;
@@ -44,7 +43,6 @@ impl ModelOutputs {
 
     /// Returns the set of outputs that are present.
     #[inline]
-    #[must_use]
     pub const fn computed(&self) -> Demand {
         self.computed
     }

@@ -390,7 +390,6 @@ pub fn is_rotation(quaternion: DQuat) -> bool {
 /// length 1 within rounding, and one that [`is_rotation`] rejects, is returned unchanged. Real-time: bounded, no
 /// allocation.
 #[inline]
-#[must_use]
 pub fn normalised(pose: &Pose) -> Pose {
     let orientation = pose.orientation();
     let squared = orientation.length_squared();

@@ -4,23 +4,21 @@ use std::fmt;
 
 /// Number of a plugin in a run: the devices come first, then the models, both in the scene's order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[must_use]
 pub struct PluginIndex(usize);
 
 impl PluginIndex {
     /// Returns the number of the plugin at a position in a list of all plugins.
-    #[must_use]
     pub const fn at(position: usize) -> Self {
         Self(position)
     }
 
     /// Returns the number of a device.
-    #[must_use]
     pub const fn of_device(device: u16) -> Self {
         Self(device as usize)
     }
 
     /// Returns the number of a model in a run with this many devices.
-    #[must_use]
     pub const fn of_model(devices: usize, model: usize) -> Self {
         Self(devices.saturating_add(model))
     }

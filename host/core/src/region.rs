@@ -36,7 +36,6 @@ impl Region {
     }
 
     /// Returns the bound. Not real-time.
-    #[must_use]
     pub fn bound(&self) -> Bound {
         self.bound
     }

@@ -9,6 +9,7 @@ use flotor_sync::Words;
 
 /// Events of a tick, as a bit set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[must_use]
 pub struct Events {
     bits: u32,
 }
@@ -100,7 +101,6 @@ impl Events {
 
     /// Returns the union of both sets. Real-time: bounded, no allocation.
     #[inline]
-    #[must_use]
     pub const fn with(self, other: Events) -> Self {
         Self { bits: self.bits | other.bits }
     }
@@ -134,7 +134,6 @@ impl Events {
 
     /// Creates the set from a bit mask.
     #[inline]
-    #[must_use]
     pub const fn from_bits(bits: u32) -> Self {
         Self { bits }
     }

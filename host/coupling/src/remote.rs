@@ -156,7 +156,6 @@ impl RemoteEnd {
 
     /// Returns the events of the connection in this tick. Real-time: bounded, no allocation.
     #[inline]
-    #[must_use]
     pub fn events(&self) -> Events {
         let mut events = Events::NONE;
         if self.hold == Hold::Released {

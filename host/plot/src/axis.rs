@@ -30,6 +30,7 @@ const SNAP_TO_ZERO: f64 = 0.25;
 
 /// Axis of a panel: label, unit, linear or logarithmic scale, and range, automatic by default.
 #[derive(Debug, Clone)]
+#[must_use]
 pub struct Axis {
     pub(super) label: String,
     pub(super) unit: String,
@@ -67,7 +68,6 @@ impl Axis {
 
     /// Fixes the range, in the unit of the axis; the order of the ends does not matter. A range that cannot be drawn (not finite,
     /// empty, not positive on a log axis) is ignored in favour of the automatic range.
-    #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.fixed = Some((low.min(high), low.max(high)));
         self
@@ -75,7 +75,6 @@ impl Axis {
 
     /// Widens an automatic range to at least `span`, in the unit of the axis, so that rounding errors do not look like a signal.
     /// Ignored on a logarithmic axis, which has a least range of its own.
-    #[must_use]
     pub fn least_range(mut self, span: f64) -> Self {
         if self.scale == Scale::Linear && (0.0..LARGEST_DRAWABLE).contains(&span) {
             self.least = span;
@@ -84,14 +83,12 @@ impl Axis {
     }
 
     /// Extends an automatic range of a linear axis to zero, so that drawn lengths are proportional to values.
-    #[must_use]
     pub fn with_zero(mut self) -> Self {
         self.includes_zero = true;
         self
     }
 
     /// Places tick labels on an x axis at these values only, for example the levels of an experiment; no values: automatic ticks.
-    #[must_use]
     pub fn levels(mut self, levels: impl IntoIterator<Item = f64>) -> Self {
         self.levels = levels.into_iter().collect();
         self

@@ -80,6 +80,7 @@ const DEFAULT_PANEL_HEIGHT_PX: f64 = 120.0;
 /// Panels without an x axis of their own share the figure's x axis: one range covers the data of all these panels, and the labels
 /// are drawn once at the foot of each column.
 #[derive(Debug, Clone)]
+#[must_use]
 pub struct Figure {
     title: String,
     subtitle: String,
@@ -115,28 +116,24 @@ impl Figure {
     }
 
     /// Sets the line under the title: conditions of the measurement, seed, versions. Long text wraps.
-    #[must_use]
     pub fn subtitle(mut self, subtitle: impl Into<String>) -> Self {
         self.subtitle = subtitle.into();
         self
     }
 
     /// Sets a large pale text behind the panels, for a restriction that applies to every copy of the picture.
-    #[must_use]
     pub fn watermark(mut self, watermark: impl Into<String>) -> Self {
         self.watermark = watermark.into();
         self
     }
 
     /// Sets the number of panels side by side; 0 counts as 1.
-    #[must_use]
     pub fn columns(mut self, columns: usize) -> Self {
         self.columns = columns.max(1);
         self
     }
 
     /// Sets the height of each plotting area, without headings and tick labels, clamped to 40 px to 2000 px; NaN changes nothing.
-    #[must_use]
     pub fn panel_height_px(mut self, panel_height_px: f64) -> Self {
         if !panel_height_px.is_nan() {
             self.panel_height_px = panel_height_px.clamp(40.0, 2000.0);
@@ -146,7 +143,6 @@ impl Figure {
 
     /// Sets width and height of the whole picture, each clamped to 200 px to 8000 px (NaN: 960 px). The plotting areas divide the
     /// height that titles and labels leave, at least 40 px each.
-    #[must_use]
     pub fn size_px(mut self, [width_px, height_px]: [f64; 2]) -> Self {
         let held = |length: f64| if length.is_nan() { WIDTH_PX } else { length.clamp(200.0, 8000.0) };
         (self.width_px, self.height_px) = (held(width_px), Some(held(height_px)));
@@ -154,7 +150,6 @@ impl Figure {
     }
 
     /// Sets the magnification of the picture, text and lines included, clamped to 0.1 to 10; NaN changes nothing.
-    #[must_use]
     pub fn scale(mut self, scale: f64) -> Self {
         if !scale.is_nan() {
             self.scale = scale.clamp(0.1, 10.0);
@@ -163,21 +158,18 @@ impl Figure {
     }
 
     /// Selects light or dark colours, or the colour scheme of the page that shows the picture.
-    #[must_use]
     pub fn paper(mut self, paper: Paper) -> Self {
         self.paper = paper;
         self
     }
 
     /// Adds a panel after the existing ones.
-    #[must_use]
     pub fn panel(mut self, panel: Panel) -> Self {
         self.panels.push(panel);
         self
     }
 
     /// Adds a panel; for an error adds its text, a quantity and the reason why it is not drawn, to a note under the subtitle.
-    #[must_use]
     pub fn panel_or_note(mut self, panel: Result<Panel, String>) -> Self {
         match panel {
             Ok(panel) => self.panels.push(panel),
@@ -220,6 +212,7 @@ pub enum Paper {
 
 /// Plotting area with axes, series and marks.
 #[derive(Debug, Clone)]
+#[must_use]
 pub struct Panel {
     title: String,
     own_x: Option<Axis>,
@@ -231,7 +224,6 @@ pub struct Panel {
 
 impl Panel {
     /// Creates an empty panel with the figure's x axis. The label of the y axis is the panel's heading.
-    #[must_use]
     pub fn new(y: Axis) -> Self {
         Self {
             title: String::new(),
@@ -244,34 +236,29 @@ impl Panel {
     }
 
     /// Creates an empty panel with an x axis of its own.
-    #[must_use]
     pub fn with_x(x: Axis, y: Axis) -> Self {
         Self { own_x: Some(x), ..Self::new(y) }
     }
 
     /// Sets the first part of the heading, before the label of the y axis, for panels that show the same quantity in different cases.
-    #[must_use]
     pub fn title(mut self, title: impl Into<String>) -> Self {
         self.title = title.into();
         self
     }
 
     /// Adds a series, drawn over the series added before.
-    #[must_use]
     pub fn series(mut self, series: Series) -> Self {
         self.series.push(series);
         self
     }
 
     /// Adds a reference line or a fault.
-    #[must_use]
     pub fn mark(mut self, mark: Mark) -> Self {
         self.marks.push(mark);
         self
     }
 
     /// Adds a bar along the foot of the panel over the intervals of x in which a limit acted.
-    #[must_use]
     pub fn limited(mut self, spans: Spans) -> Self {
         self.limited.push(spans);
         self

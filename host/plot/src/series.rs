@@ -10,6 +10,7 @@ const OPEN_BIN_DECADES: f64 = 0.5;
 /// Labelled samples with their style. Colour, dash and marker depend on the position of the series in its panel unless
 /// [`Series::slot`] or [`Series::axis`] sets them. A series with an empty label is not in the legend.
 #[derive(Debug, Clone)]
+#[must_use]
 pub struct Series {
     pub(super) label: String,
     slot: Option<Look>,
@@ -156,21 +157,18 @@ impl Series {
 
     /// Sets the palette entry `slot` (counted from 0), so that a quantity looks the same in every panel, or a theory line as its
     /// measured points.
-    #[must_use]
     pub fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(Look::Slot(slot));
         self
     }
 
     /// Sets the colour of vector component 0, 1 or 2 (x, y or z): the line is solid, with the same colour in every panel and picture.
-    #[must_use]
     pub fn axis(mut self, component: usize) -> Self {
         self.slot = Some(Look::Axis(component));
         self
     }
 
     /// Draws the line thin, solid and pale, as one of many similar lines.
-    #[must_use]
     pub fn faint(mut self) -> Self {
         self.weight = Weight::Faint;
         self

@@ -36,6 +36,7 @@ impl Coverage {
 /// counts as zero. All NaNs count as equal and zero has no sign, because they differ between processors and compilers.
 /// The digest distinguishes runs, but is not cryptographic: it is no protection against forgery.
 #[derive(Clone, Default)]
+#[must_use]
 pub struct TraceDigest {
     coverage: Coverage,
     hash: Xxh3,
@@ -44,13 +45,11 @@ pub struct TraceDigest {
 
 impl TraceDigest {
     /// Creates a digest without ticks, with the default [`Coverage`].
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
     /// Creates a digest without ticks, with this coverage.
-    #[must_use]
     pub fn covering(coverage: Coverage) -> Self {
         Self { coverage, ..Self::default() }
     }

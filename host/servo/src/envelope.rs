@@ -93,7 +93,6 @@ impl Envelope {
     }
 
     /// Returns the largest force (N) and torque (N·m) that may reach the hand.
-    #[must_use]
     pub fn most(&self) -> [Bound; 2] {
         [self.force.bound(), self.torque.bound()]
     }

@@ -56,7 +56,6 @@ impl Port {
 
     /// Returns the outputs of models and couplings in this tick. Real-time: bounded, no allocation.
     #[inline]
-    #[must_use]
     pub fn outputs(&self) -> ModelOutputs {
         let Self { at_hand, computed, requested, unfelt_torque_nm, energy_j, .. } = self;
         let wrench = if at_hand.contains(Demand::TORQUE) {
@@ -76,13 +75,6 @@ impl Port {
             (Wrench::from_force(wrench.force()), wrench.torque())
         };
         (self.requested, self.energy_j, self.computed) = (self.by_models, energy_j, demand.computed());
-    }
-
-    /// Returns the held wrench of the couplings: the command less the models' request. Exact for a device without models; with
-    /// models, a reduction by the envelope is attributed to the coupling.
-    #[inline]
-    fn held_for_couplings(&self) -> Wrench {
-        self.commanded - self.by_models
     }
 
     /// Adds the pull of a coupling to the request.
@@ -154,7 +146,9 @@ impl Coupled {
     /// Computes the pulls of the coupling. Real-time: bounded, no allocation.
     #[inline]
     fn step(&mut self, tick: &Tick, ports: &[Port]) {
-        let grip = |port: &'_ Port| (port.state, port.held_for_couplings());
+        // Held wrench of the couplings: the command less the models' request. Exact for a device without models; with models, a
+        // reduction by the envelope is attributed to the coupling.
+        let grip = |port: &'_ Port| (port.state, port.commanded - port.by_models);
         match self {
             Self::Here { coupling, devices, pulls } => {
                 let [Some(first), Some(second)] = devices.map(|device| ports.get(device).map(grip)) else {

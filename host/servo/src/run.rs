@@ -5,6 +5,7 @@ use flotor_core::trace::TickRecord;
 use flotor_hal::SampleWait;
 
 /// Loop of a servo with its schedule, the same on the real and the virtual clock.
+#[must_use]
 pub struct Loop {
     servo: Servo,
     schedule: Schedule,
@@ -16,14 +17,12 @@ pub struct Loop {
 
 impl Loop {
     /// Creates a loop before its first tick, for a run of at most `duration_ns`. Not real-time.
-    #[must_use]
     pub fn new(servo: Servo, schedule: Schedule, duration_ns: u64) -> Self {
         Self { servo, schedule, duration_ns, release_ns: u64::MAX, end: None }
     }
 
     /// Makes the loop fade the force out over the ramp time before the end of the duration, so that the force does not drop
     /// abruptly. Unnecessary on the virtual clock, which has no hand.
-    #[must_use]
     pub fn releasing(self) -> Self {
         Self { release_ns: self.duration_ns.saturating_sub(self.servo.ramp_ns()), ..self }
     }

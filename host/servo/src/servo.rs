@@ -33,6 +33,16 @@ pub struct RunConfig {
     pub emergency_buttons: u32,
 }
 
+/// Parts of a servo that exist before its devices are energised.
+pub(crate) struct Parts {
+    pub(crate) forces: Forces,
+    pub(crate) observers: ObserverDemand,
+    pub(crate) parameters: ParameterQueue,
+    pub(crate) swaps: LoopSwaps,
+    pub(crate) config: RunConfig,
+    pub(crate) heartbeat: Heartbeat,
+}
+
 /// State of the loop: devices with their envelopes, models and couplings.
 pub struct Servo {
     /// Dropped first: if a plugin unwinds the loop, the devices stop before anything else is dropped.
@@ -40,12 +50,7 @@ pub struct Servo {
     stations: Box<[Station]>,
     /// Ports of the devices, in the same order.
     ports: Box<[Port]>,
-    forces: Forces,
-    observers: ObserverDemand,
-    parameters: ParameterQueue,
-    swaps: LoopSwaps,
-    config: RunConfig,
-    heartbeat: Heartbeat,
+    parts: Parts,
     run: RunState,
     timing: Timing,
     stage_timer: StageTimer,
@@ -54,28 +59,15 @@ pub struct Servo {
 }
 
 impl Servo {
-    /// Creates a servo without a [`LastStop`], the emergency stop on process death ([`crate::Standby::activate`] attaches one). Not
-    /// real-time.
-    pub fn new(
-        stations: Vec<Station>,
-        forces: Forces,
-        observers: ObserverDemand,
-        parameters: ParameterQueue,
-        swaps: LoopSwaps,
-        config: RunConfig,
-        heartbeat: Heartbeat,
-    ) -> Self {
+    /// Creates a servo with its [`LastStop`], the emergency stop on process death. Not real-time.
+    pub(crate) fn new(stations: Vec<Station>, parts: Parts, last_stop: Option<(Unwound, LastStop)>) -> Self {
+        let (unwound, last_stop) = last_stop.unzip();
         Self {
-            _unwound: None,
-            _last_stop: None,
+            _unwound: unwound,
+            _last_stop: last_stop,
             ports: stations.iter().map(|station| Port::at_rest(station.at_hand)).collect(),
             stations: stations.into(),
-            forces,
-            observers,
-            parameters,
-            swaps,
-            config,
-            heartbeat,
+            parts,
             run: RunState::START,
             timing: Timing::default(),
             stage_timer: StageTimer::new(),
@@ -85,12 +77,6 @@ impl Servo {
     /// Registers the calling thread as the loop thread, in place of the thread that energised the devices. Not real-time.
     pub fn register_loop_thread(&self) {
         self._last_stop.iter().for_each(LastStop::register_loop_thread);
-    }
-
-    /// Attaches the last stop, the emergency stop on process death. Not real-time.
-    pub(crate) fn guarded_by(mut self, last_stop: Option<(Unwound, LastStop)>) -> Self {
-        (self._unwound, self._last_stop) = last_stop.unzip();
-        self
     }
 
     /// Runs one tick and passes a record for each device to `on_record`. Real-time: bounded by devices and models, no allocation.
@@ -139,28 +125,31 @@ impl Servo {
         let mut watch = StageWatch::start(tick.index, started);
         let mut events = if *missed > 0 { Events::MISSED } else { Events::NONE };
 
-        if self.parameters.is_due(tick) || self.swaps.is_due(tick) || self.forces.is_fading() {
+        if self.parts.parameters.is_due(tick)
+            || self.parts.swaps.is_due(tick)
+            || self.parts.forces.is_fading()
+        {
             self.apply_changes(tick, &mut events);
         }
         let (sample, buttons) = self.read(tick);
         self.follow(sample, buttons, tick, stop, &mut events);
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Read);
 
-        self.forces.step(tick, &mut self.ports, self.observers.now(), &self.heartbeat);
+        self.parts.forces.step(tick, &mut self.ports, self.parts.observers.now(), &self.parts.heartbeat);
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Models);
 
-        let gate = self.run.gate(tick.time_ns, self.config.ramp_ns);
+        let gate = self.run.gate(tick.time_ns, self.parts.config.ramp_ns);
         for (station, port) in self.stations.iter_mut().zip(&mut self.ports) {
             station.limit(tick, gate, port);
             if station.envelope.is_unstable() {
                 let failed = RunEvent::Failed(Cause::Oscillation);
-                self.run = self.run.after(failed, tick.time_ns, self.config.ramp_ns);
+                self.run = self.run.after(failed, tick.time_ns, self.parts.config.ramp_ns);
             }
         }
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Envelope);
 
         self.write(tick);
-        self.heartbeat.enter(tick.index, Place::Waiting);
+        self.parts.heartbeat.enter(tick.index, Place::Waiting);
         watch.lap(&self.stage_timer, &mut self.timing, Stage::Write);
 
         let compute_ns = self.stage_timer.between_ns(started, self.stage_timer.now());
@@ -179,13 +168,13 @@ impl Servo {
 
     /// Returns the time over which the force fades in and out, ns.
     pub fn ramp_ns(&self) -> u64 {
-        self.config.ramp_ns
+        self.parts.config.ramp_ns
     }
 
     /// Applies the parameter changes and model replacements that are due.
     #[inline(never)] // seldom called; its instructions are counted: tests/instructions
     fn apply_changes(&mut self, tick: &Tick, events: &mut Events) {
-        let Self { stations, forces, parameters, swaps, .. } = self;
+        let Self { stations, parts: Parts { forces, parameters, swaps, .. }, .. } = self;
         let devices = stations.len();
         // Counted before the replacements: a change sent after a replacement must not overtake it.
         let waiting = parameters.waiting();
@@ -218,7 +207,7 @@ impl Servo {
     fn read(&mut self, tick: &Tick) -> (RunEvent, u32) {
         let (mut worst, mut buttons) = (RunEvent::SamplesBack, 0);
         for (device, (station, port)) in (0..).zip(self.stations.iter_mut().zip(&mut self.ports)) {
-            self.heartbeat.enter(tick.index, Place::DeviceRead(device));
+            self.parts.heartbeat.enter(tick.index, Place::DeviceRead(device));
             port.events = Events::NONE;
             let sample = station.read(tick, port);
             buttons |= port.state.buttons;
@@ -231,7 +220,7 @@ impl Servo {
 
     /// Sends the commands to all devices.
     fn write(&mut self, tick: &Tick) {
-        let Self { stations, ports, heartbeat, run, config, .. } = self;
+        let Self { stations, ports, parts: Parts { heartbeat, config, .. }, run, .. } = self;
         for (device, (station, port)) in (0..).zip(stations.iter_mut().zip(ports)) {
             heartbeat.enter(tick.index, Place::DeviceWrite(device));
             if heartbeat.is_silenced() {
@@ -264,10 +253,10 @@ impl Servo {
         if stop.is_stop_requested() {
             self.change_state(RunEvent::StopRequested, tick);
         }
-        if self.heartbeat.fired_at().is_some() || tick.dt_ns > self.config.longest_gap_ns {
+        if self.parts.heartbeat.fired_at().is_some() || tick.dt_ns > self.parts.config.longest_gap_ns {
             self.change_state(RunEvent::Failed(Cause::Watchdog), tick);
         }
-        let pressed = buttons & self.config.emergency_buttons != 0;
+        let pressed = buttons & self.parts.config.emergency_buttons != 0;
         if let Some(source) = stop.emergency().or(pressed.then_some(EmergencySource::Button)) {
             self.change_state(RunEvent::Emergency(source), tick);
         }
@@ -276,7 +265,7 @@ impl Servo {
 
     /// Updates the run state after an event.
     fn change_state(&mut self, event: RunEvent, tick: &Tick) {
-        self.run = self.run.after(event, tick.time_ns, self.config.ramp_ns);
+        self.run = self.run.after(event, tick.time_ns, self.parts.config.ramp_ns);
     }
 
     fn record_timing(&mut self, lateness_ns: Option<u64>, compute_ns: u64, missed: u64) {
@@ -285,7 +274,7 @@ impl Servo {
         self.timing.missed += missed;
         if let Some(lateness_ns) = lateness_ns {
             self.timing.lateness.record(lateness_ns);
-            self.timing.late += u64::from(lateness_ns > self.config.period_ns / 10);
+            self.timing.late += u64::from(lateness_ns > self.parts.config.period_ns / 10);
         }
     }
 
@@ -298,8 +287,8 @@ impl Servo {
         Dismantled {
             devices: self.stations.into_iter().map(device).collect(),
             last_stop: self._last_stop,
-            forces: self.forces,
-            swaps: self.swaps,
+            forces: self.parts.forces,
+            swaps: self.parts.swaps,
             timing: self.timing,
         }
     }
@@ -311,7 +300,7 @@ impl Servo {
 
     /// Returns the heartbeat that the watchdog reads.
     pub fn heartbeat(&self) -> &Heartbeat {
-        &self.heartbeat
+        &self.parts.heartbeat
     }
 
     /// Iterates over the devices in the scene's order, each with its report.
@@ -324,7 +313,7 @@ impl Servo {
 
     /// Returns the models and couplings.
     pub fn forces(&mut self) -> &mut Forces {
-        &mut self.forces
+        &mut self.parts.forces
     }
 }
 

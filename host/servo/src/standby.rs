@@ -1,5 +1,6 @@
 //! Parts of a servo before its start: devices are opened, not yet energised.
 
+use crate::servo::Parts;
 use crate::{Envelope, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
 use flotor_core::demand::ObserverDemand;
 use flotor_core::limits::Bound;
@@ -20,13 +21,8 @@ pub struct Guarded {
 /// sometimes after a few milliseconds.
 pub struct Standby {
     devices: Vec<Guarded>,
-    forces: Forces,
-    observers: ObserverDemand,
-    parameters: ParameterQueue,
-    swaps: LoopSwaps,
     config: LoopConfig,
-    run: RunConfig,
-    heartbeat: Heartbeat,
+    parts: Parts,
 }
 
 impl Standby {
@@ -40,17 +36,18 @@ impl Standby {
         run: RunConfig,
     ) -> Self {
         let (observers, heartbeat) = (ObserverDemand::default(), Heartbeat::default());
-        Self { devices, forces, observers, parameters, swaps, config, run, heartbeat }
+        let parts = Parts { forces, observers, parameters, swaps, config: run, heartbeat };
+        Self { devices, config, parts }
     }
 
     /// Returns the heartbeat that the servo's watchdog will read.
     pub fn heartbeat(&self) -> Heartbeat {
-        self.heartbeat.clone()
+        self.parts.heartbeat.clone()
     }
 
     /// Returns the shared demand of observers for model outputs.
     pub fn observers(&self) -> ObserverDemand {
-        self.observers.clone()
+        self.parts.observers.clone()
     }
 
     /// Returns the largest force (N) and torque (N·m) that may reach a hand at any device, per axis and as a norm.
@@ -86,18 +83,18 @@ impl Standby {
     pub fn activate(self, names: Vec<String>, enters: impl Fn(usize)) -> Result<Servo, (usize, Refusal)> {
         let stoppers = self.stoppers();
         let last_stop = LastStop::arm(stoppers.clone(), names, self.heartbeat());
-        let Self { devices, forces, observers, parameters, swaps, config, run, heartbeat } = self;
+        let Self { devices, config, parts } = self;
         let station = |(number, guarded): (usize, Guarded)| {
             let Guarded { mut device, capabilities, envelope } = guarded;
             enters(number);
             // The loader rejects capabilities that differ from those the envelope was made for.
-            device.capabilities().map_err(|refusal| (number, refusal))?;
+            let _ = device.capabilities().map_err(|refusal| (number, refusal))?;
             let device = device.activate(&config).map_err(|(_, refusal)| (number, refusal))?;
             Ok(Station::new(device, envelope, &capabilities, config.period_ns))
         };
         let stations =
             devices.into_iter().enumerate().map(station).collect::<Result<Vec<_>, (usize, Refusal)>>();
         let stations = stations.inspect_err(|_| stoppers.iter().for_each(Stopper::safe_stop))?;
-        Ok(Servo::new(stations, forces, observers, parameters, swaps, run, heartbeat).guarded_by(last_stop))
+        Ok(Servo::new(stations, parts, last_stop))
     }
 }

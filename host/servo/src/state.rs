@@ -187,7 +187,6 @@ impl RunState {
 
     /// Returns the events of this state for the record of a tick. Real-time: bounded, no allocation.
     #[inline]
-    #[must_use]
     pub const fn events(self) -> Events {
         match self {
             Self::Ramping { .. } => Events::RAMPING,

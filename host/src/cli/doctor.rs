@@ -6,7 +6,7 @@ use crate::diagnosis::{Diagnosis, Grade};
 use crate::platform::doctor::{MEMORY_REMEDY, core_remedy, of_the_system, priority_remedy};
 use crate::platform::usb;
 use clap::Args;
-use flotor_command::options::{JsonOption, KeyValue, PluginPathOption};
+use flotor_command::options::{KeyValue, PluginResultOptions};
 use flotor_command::say;
 use flotor_command::{CommandError, style, write_json};
 use flotor_servo::{PRIORITY_NAME, Privilege, RealTimeReport, probe_real_time};
@@ -31,18 +31,16 @@ pub(crate) struct DoctorArguments {
     #[arg(long, value_name = "DIR", default_value = "/", hide = true)]
     root: PathBuf,
     #[command(flatten)]
-    json: JsonOption,
-    #[command(flatten)]
-    plugin_path: PluginPathOption,
+    options: PluginResultOptions,
 }
 
 pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
-    let registry = arguments.plugin_path.registry();
+    let registry = arguments.options.plugin_path.registry();
     let diagnoses = match &arguments.device {
         Some(id) => device::diagnose(&registry, id, &arguments.sets, &usb::Machine::at(&arguments.root))?,
         None => machine(&registry, &arguments.root),
     };
-    if let Some(file) = arguments.json.file() {
+    if let Some(file) = arguments.options.json.file() {
         write_json(file, &diagnoses)?;
     }
     let bad = diagnoses.iter().filter(|diagnosis| diagnosis.grade == Grade::Bad).count();
@@ -52,7 +50,7 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
         }
         _ => Ok(()),
     };
-    if arguments.json.is_on_standard_output() {
+    if arguments.options.json.is_on_standard_output() {
         return verdict;
     }
     for diagnosis in &diagnoses {

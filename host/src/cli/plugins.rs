@@ -1,7 +1,7 @@
 //! `flotor plugins`: lists the installed plugins from their files, without running any of them.
 
 use clap::Args;
-use flotor_command::options::{JsonOption, KeyValue, PluginPathOption, settings};
+use flotor_command::options::{JsonOption, KeyValue, PluginResultOptions, settings};
 use flotor_command::say;
 use flotor_command::{CommandError, style, while_preparing, write_json};
 use flotor_hal::abi::PluginKind;
@@ -26,9 +26,7 @@ pub(crate) struct PluginsArguments {
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "id", conflicts_with = "json")]
     sets: Vec<KeyValue>,
     #[command(flatten)]
-    json: JsonOption,
-    #[command(flatten)]
-    plugin_path: PluginPathOption,
+    options: PluginResultOptions,
 }
 
 #[derive(Serialize)]
@@ -43,10 +41,10 @@ struct Listed<'a> {
 }
 
 pub(crate) fn run(arguments: &PluginsArguments) -> Result<(), CommandError> {
-    let registry = arguments.plugin_path.registry();
+    let registry = arguments.options.plugin_path.registry();
     match &arguments.id {
-        Some(id) => describe(&registry, id, &arguments.sets, &arguments.json),
-        None => list(&registry, &arguments.json),
+        Some(id) => describe(&registry, id, &arguments.sets, &arguments.options.json),
+        None => list(&registry, &arguments.options.json),
     }
 }
 

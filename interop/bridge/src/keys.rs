@@ -24,6 +24,7 @@ pub const ROOT: &str = "flotor";
 
 /// Name of a bridge or a member: one part of a key.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[must_use]
 pub struct Name(String);
 
 /// Error: the text is not a valid name.
@@ -45,14 +46,12 @@ impl Name {
     }
 
     /// Returns the member name of all peers of a bridge without keys.
-    #[must_use]
     pub fn anyone() -> Self {
         Self(crate::request::ANYONE.to_owned())
     }
 
     /// Returns the host name of this machine in lower case, other characters replaced by hyphens, truncated to 40; `host` if there
     /// is none.
-    #[must_use]
     pub fn of_this_machine() -> Self {
         let system = rustix::system::uname();
         let host = system.nodename().to_string_lossy().to_lowercase();

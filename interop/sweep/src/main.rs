@@ -1,7 +1,7 @@
 //! Program `flotor-sweep`, started by `flotor sweep`.
 
 use clap::Parser;
-use flotor_command::options::{JsonOption, PluginPathOption, arguments};
+use flotor_command::options::{PluginResultOptions, arguments};
 use flotor_command::{CommandError, exit_code_of, progress_bar, say};
 use flotor_sweep::executor::execute;
 use flotor_sweep::plan::Plan;
@@ -38,9 +38,7 @@ struct Arguments {
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     draw: Vec<String>,
     #[command(flatten)]
-    json: JsonOption,
-    #[command(flatten)]
-    plugin_path: PluginPathOption,
+    options: PluginResultOptions,
 }
 
 fn main() -> ExitCode {
@@ -52,7 +50,7 @@ fn run(arguments: &Arguments) -> Result<(), CommandError> {
     let other = |error: &dyn std::fmt::Display| CommandError::Failed(error.to_string());
     let unwritten = |path: &Path, cause| CommandError::Failed(format!("{}: {cause}", path.display()));
     let plan = Plan::load(&arguments.plan).map_err(|error| usage(&error))?;
-    let sweep = Sweep::prepare(plan, arguments.plugin_path.folders()).map_err(|error| usage(&error))?;
+    let sweep = Sweep::prepare(plan, arguments.options.plugin_path.folders()).map_err(|error| usage(&error))?;
     let out = arguments.out.clone().unwrap_or_else(|| arguments.plan.with_extension(""));
     let store = Store::open(&out).map_err(|error| other(&error))?;
     let jobs =
@@ -79,7 +77,7 @@ fn run(arguments: &Arguments) -> Result<(), CommandError> {
         "wall_s": started.elapsed().as_secs_f64(),
         "results": results,
     });
-    match arguments.json.file() {
+    match arguments.options.json.file() {
         Some(path) if path.as_os_str() == "-" => println!("{summary:#}"),
         Some(path) => {
             std::fs::write(path, format!("{summary:#}\n")).map_err(|cause| unwritten(path, cause))?;

@@ -143,7 +143,6 @@ impl Flotor {
     }
 
     /// Returns the pose at the end of the last period, in the model frame.
-    #[must_use]
     pub fn pose(&self) -> Pose {
         self.pose
     }

@@ -35,7 +35,6 @@ pub fn prepared(plugin: &Plugin, settings: &[Setting], seed: u64) -> Result<Mode
 }
 
 /// Returns the input of a tick of a 1 kHz loop with the handle at rest.
-#[must_use]
 pub fn input_of(tick: u64, pose: Pose) -> Input {
     Input { tick, time_ns: tick * PERIOD_NS, dt_ns: PERIOD_NS, ..Input::at_rest(pose) }
 }
@@ -187,7 +186,6 @@ impl<'a> Subject<'a> {
     }
 
     /// Returns the input of a pose without history.
-    #[must_use]
     pub fn at_rest(&self, pose: Pose) -> Input {
         Input { demand: self.demand, ..Input::at_rest(pose) }
     }
@@ -234,7 +232,6 @@ impl<'a> Subject<'a> {
     }
 
     /// Returns the kind of the model's memory.
-    #[must_use]
     pub fn memory(&self) -> Memory {
         self.model.memory()
     }

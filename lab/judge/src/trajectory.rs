@@ -9,13 +9,11 @@ use std::f64::consts::{SQRT_2, TAU};
 const HARMONICS: usize = 3;
 
 /// Returns the pose at a position, m, and a rotation vector, rad.
-#[must_use]
 pub fn at(position_m: DVec3, rotation_rad: DVec3) -> Pose {
     Pose::new(position_m, orientation_from_rotation_vector(rotation_rad))
 }
 
 /// Quantises a pose like a sensor with these steps (m, rad); zero steps leave it unchanged.
-#[must_use]
 pub fn sensed(pose: Pose, quantum_m: f64, quantum_rad: f64) -> Pose {
     let step = |vector: DVec3, quantum: f64| match quantum > 0.0 {
         true => (vector / quantum).round() * quantum,
@@ -94,14 +92,12 @@ impl Trajectory {
     }
 
     /// Returns the pose at a parameter.
-    #[must_use]
     pub fn pose(&self, parameter: f64) -> Pose {
         self.at(parameter).0
     }
 
     /// Returns the pose with derivatives with respect to the parameter: of the position, m, and of the rotation as an angular
     /// velocity, rad.
-    #[must_use]
     pub fn at(&self, parameter: f64) -> (Pose, DVec3, DVec3) {
         let (position_m, shift_m) = self.position.at(parameter);
         let (rotation_rad, slope_rad) = self.rotation.at(parameter);

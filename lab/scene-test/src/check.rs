@@ -330,11 +330,8 @@ fn measure(json: &Value, id: &str, demand: MeasureDemand) -> Option<Failure> {
 }
 
 fn with_settings(command: &[&str], set: &[(String, String)]) -> Vec<String> {
-    let mut arguments: Vec<String> = command.iter().map(ToString::to_string).collect();
-    for (key, value) in set {
-        arguments.extend(["--set".to_owned(), format!("{key}={value}")]);
-    }
-    arguments
+    let set = set.iter().flat_map(|(key, value)| ["--set".to_owned(), format!("{key}={value}")]);
+    command.iter().map(ToString::to_string).chain(set).collect()
 }
 
 #[cfg(test)]

@@ -39,15 +39,9 @@ pub(crate) fn run_arguments(
         ["run", &scene, "--clock", "virtual", "--seed"].into_iter().map(str::to_owned).collect();
     arguments.push(seed.to_string());
     arguments.extend(file.plugin_path.arguments().map(|word| word.to_string_lossy().into_owned()));
-    for (key, value) in set {
-        arguments.extend(["--set".to_owned(), format!("{key}={value}")]);
-    }
-    for output in file.outputs() {
-        arguments.extend(["--compute".to_owned(), output.to_owned()]);
-    }
-    if let Some(duration) = duration {
-        arguments.extend(["--duration".to_owned(), duration.to_owned()]);
-    }
+    arguments.extend(set.iter().flat_map(|(key, value)| ["--set".to_owned(), format!("{key}={value}")]));
+    arguments.extend(file.outputs().into_iter().flat_map(|output| ["--compute", output]).map(str::to_owned));
+    arguments.extend(duration.into_iter().flat_map(|duration| ["--duration", duration]).map(str::to_owned));
     arguments
 }
 

@@ -9,6 +9,7 @@ use crate::entire::EntireFunctions;
 
 /// Quotients of entire functions at one argument, with `x = sqrt z`.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct StabilityFunctions<R = f64> {
     /// `C0 / G0 = x cot x`: bow stiffness relative to the unloaded rod.
     pub bow: R,
@@ -25,7 +26,6 @@ impl<R: Real> StabilityFunctions<R> {
     ///
     /// Accurate for every `z <= 60`, however negative; above, see [`EntireFunctions::at`].
     #[inline(always)]
-    #[must_use]
     pub fn at(z: R) -> Self {
         let f = EntireFunctions::at(z);
         let inverse = f.g0.inverse();
@@ -54,7 +54,6 @@ impl<R: Real> StabilityFunctions<R> {
     /// Evaluates the functions at a large negative argument through `x coth x`, which does not overflow. Nothing
     /// cancels, as `x coth x` is far from one there.
     #[inline(always)]
-    #[must_use]
     pub fn in_strong_tension(z: R) -> Self {
         // Lanes that are not in tension have no root; their results are discarded.
         let x = (-z).sqrt();

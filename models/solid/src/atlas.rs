@@ -86,6 +86,7 @@ const SHARPNESS_ROOTS: u32 = 3; // 2^3 = 8
 
 /// Energy of a contact with its gradient, and depth of the contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Answer {
     /// Stored energy, J, with its gradient, N; the force on the sphere is minus the gradient.
     pub energy: Jet,
@@ -105,7 +106,6 @@ impl Answer {
 impl Atlas {
     /// Returns energy, force and depth of the contact with a sphere centred at `centre_m` (finite). Real-time: bounded,
     /// no allocation.
-    #[must_use]
     pub fn answer(&self, centre_m: [f64; 3]) -> Answer {
         let centre = [0, 1, 2].map(|axis| Jet::variable(centre_m[axis], axis));
         let touch = match &self.body {
@@ -134,7 +134,6 @@ impl Atlas {
     /// fades in over half a radius inside them. The force of this contact grows with the depth; that of
     /// [`Self::answer`] does not where another face is nearer. On other bodies the same as [`Self::answer`]. Real-time:
     /// bounded, no allocation.
-    #[must_use]
     pub fn top(&self, centre_m: [f64; 3]) -> Answer {
         let TouchedBody::Block { size, ratios, rounding_m } = &self.body else {
             return self.answer(centre_m);

@@ -114,7 +114,6 @@ impl<'a> Body<'a> {
 
     /// Tabulates the remainder, m/N, for all pairs of points of a grid; `nearest` moves each point onto the face. Not
     /// real-time.
-    #[must_use]
     pub fn table(&self, nodes_m: [Vec<f64>; 2], nearest: impl Fn([f64; 2]) -> [f64; 2]) -> Table {
         let points: Vec<[f64; 2]> =
             nodes_m[1].iter().flat_map(|&y| nodes_m[0].iter().map(move |&x| [x, y])).map(nearest).collect();

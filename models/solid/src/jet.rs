@@ -4,6 +4,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Value with its gradient. Real-time: bounded, no allocation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[must_use]
 pub struct Jet {
     /// Value of the number.
     pub value: f64,
@@ -13,13 +14,11 @@ pub struct Jet {
 
 impl Jet {
     /// Creates a number with zero slope.
-    #[must_use]
     pub const fn constant(value: f64) -> Self {
         Self { value, slope: [0.0; 3] }
     }
 
     /// Creates a coordinate: slope one along `axis`.
-    #[must_use]
     pub fn variable(value: f64, axis: usize) -> Self {
         let mut slope = [0.0; 3];
         slope[axis] = 1.0;
@@ -27,33 +26,28 @@ impl Jet {
     }
 
     /// Applies a function, given its value and derivative at this number.
-    #[must_use]
     pub fn chain(self, value: f64, derivative: f64) -> Self {
         Self { value, slope: self.slope.map(|s| s * derivative) }
     }
 
     /// Returns the square root; slope zero at zero, as for a length at the origin.
-    #[must_use]
     pub fn sqrt(self) -> Self {
         let root = self.value.sqrt();
         self.chain(root, if root > 0.0 { 0.5 / root } else { 0.0 })
     }
 
     /// Returns the reciprocal.
-    #[must_use]
     pub fn recip(self) -> Self {
         let inverse = 1.0 / self.value;
         self.chain(inverse, -inverse * inverse)
     }
 
     /// Returns the larger of this number and a constant; slope zero where both are equal.
-    #[must_use]
     pub fn at_least(self, least: f64) -> Self {
         if self.value > least { self } else { Self::constant(least) }
     }
 
     /// Returns the absolute value.
-    #[must_use]
     pub fn abs(self) -> Self {
         if self.value < 0.0 { -self } else { self }
     }

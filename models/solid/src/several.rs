@@ -185,7 +185,6 @@ impl Spheres {
 
     /// Evaluates the law at a pose (finite) of the handle; at its home all spheres touch. Real-time: bounded, no
     /// allocation.
-    #[must_use]
     pub fn answer(&self, position_m: DVec3, orientation: DQuat) -> Answer {
         let count = self.count();
         let home = DVec3::Z * self.atlas.radius_m;

@@ -11,6 +11,7 @@ use std::f64::consts::TAU;
 
 /// Triangle mesh, counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[must_use]
 pub struct Skin {
     /// Undeformed positions of the corners, m.
     pub places_m: Vec<DVec3>,
@@ -50,7 +51,6 @@ impl Focus {
 impl Skin {
     /// Triangulates top and sides of a block with the middle of its top at the origin; `steps`: numbers of steps along
     /// x, y, z.
-    #[must_use]
     pub fn block(half_m: [f64; 2], height_m: f64, focus: Focus, steps: [usize; 3]) -> Self {
         let [half_x, half_y] = half_m;
         let x = focus.steps(0, -half_x, half_x, steps[0]);
@@ -61,7 +61,6 @@ impl Skin {
 
     /// Triangulates the given faces of a box on the grid lines `x`, `y`, `z` (m, ascending); the box spans the first to
     /// the last line of each.
-    #[must_use]
     pub fn boxed(x: &[f64], y: &[f64], z: &[f64], faces: &[Face]) -> Self {
         let mut skin = Self::default();
         let last = |steps: &[f64]| steps.last().copied().unwrap_or_default();
@@ -108,7 +107,6 @@ impl Skin {
 
     /// Triangulates a disc about the origin: lines from the focus to evenly spaced points of the rim, divided at
     /// growing distances.
-    #[must_use]
     pub fn disc(radius_m: f64, focus: Focus) -> Self {
         /// Largest distance of the focus from the centre, in radii.
         const MOST: f64 = 0.97;
@@ -129,7 +127,6 @@ impl Skin {
     }
 
     /// Triangulates top and side of a round cylinder with the middle of its top at the origin.
-    #[must_use]
     pub fn cylinder(radius_m: f64, height_m: f64, focus: Focus) -> Self {
         let mut skin = Self::disc(radius_m, focus);
         let rim: Vec<DVec3> = skin.places_m[..SECTORS].to_vec();
@@ -143,7 +140,6 @@ impl Skin {
     }
 
     /// Triangulates the surface of a mesh; returns also the node of each corner. Touched and free faces meet in a sharp edge.
-    #[must_use]
     pub fn of_mesh(mesh: &Mesh) -> (Self, Vec<usize>) {
         let (mut skin, mut nodes) = (Self::default(), Vec::new());
         for facets in [&mesh.touched, &mesh.free] {

@@ -198,7 +198,6 @@ impl Volume {
     }
 
     /// Returns the value at coordinates between first and last nodes. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn at(&self, coordinates: [Jet; 3]) -> Jet {
         let cells = [0, 1, 2].map(|axis| cell(&self.nodes[axis], coordinates[axis].value));
         let shares = [0, 1, 2].map(|axis| hermite(&self.nodes[axis], cells[axis], coordinates[axis].value));

@@ -5,6 +5,7 @@ use crate::remainder::{Face, Remainder};
 
 /// Remainder of a face for all pairs of points of a grid.
 #[derive(Clone, Debug)]
+#[must_use]
 pub struct Table {
     /// Grid coordinates along `p` and `q`, m, ascending.
     nodes_m: [Vec<f64>; 2],
@@ -45,7 +46,6 @@ fn mirrored(half: &[f64]) -> Vec<f64> {
 impl Table {
     /// Solves for the remainder of all pairs of grid points. `half_m`: coordinates in the quarter of positive x and y;
     /// along `p` from zero on, along `q` from zero on (top) or all of them (a side). Not real-time.
-    #[must_use]
     pub fn new(remainder: &Remainder, face: Face, half_m: [&[f64]; 2]) -> Self {
         let quarter: Vec<[f64; 2]> =
             half_m[1].iter().flat_map(|&q| half_m[0].iter().map(move |&p| [p, q])).collect();
@@ -89,7 +89,6 @@ impl Table {
 
     /// Builds a table from compliances for all pairs of points of a grid (`p` fastest): `answers[source][target]` is
     /// the displacement of the target per force at the source, m/N. Not real-time.
-    #[must_use]
     pub fn of(nodes_m: [Vec<f64>; 2], answers: &[Vec<Block>]) -> Self {
         let mut table = Self { nodes_m, blocks: answers.concat() };
         table.make_reciprocal();

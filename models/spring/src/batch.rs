@@ -26,6 +26,7 @@ const UNANSWERED: f64 = 2.0;
 
 /// Evaluator of laws at many poses, with a given instruction set.
 #[derive(Clone, Copy, Debug)]
+#[must_use]
 pub struct Batch {
     instructions: Arch,
 }
@@ -38,13 +39,11 @@ impl Default for Batch {
 
 impl Batch {
     /// Creates an evaluator with the best instruction set of this machine. Not real-time.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
     /// Creates an evaluator with a given instruction set, for comparisons.
-    #[must_use]
     pub fn on(instructions: Arch) -> Self {
         Self { instructions }
     }

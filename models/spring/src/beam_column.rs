@@ -64,7 +64,6 @@ impl Column {
     /// (a + b) / L = Lam / (2 l) G0 / (G0 / beta + Lam L G1 / (12 alpha))
     /// ```
     #[inline(always)]
-    #[must_use]
     pub fn ends<R: Real>(&self, axial_force_n: R, length_m: R, reference_m: R) -> EndStiffness<R> {
         self.ends_with(axial_force_n, length_m, reference_m, |argument| argument)
     }
@@ -72,7 +71,6 @@ impl Column {
     /// Returns the end stiffnesses with the argument saturated short of the pole, from [`TRUSTED_ARGUMENT`] on: bounded
     /// wherever `Lam` is positive. Real-time: bounded, no allocation.
     #[inline(always)]
-    #[must_use]
     pub fn bounded_ends<R: Real>(&self, axial_force_n: R, length_m: R, reference_m: R) -> EndStiffness<R> {
         let short_of_pole = |argument| saturate_above(argument, TRUSTED_ARGUMENT, REACH).value;
         self.ends_with(axial_force_n, length_m, reference_m, short_of_pole)
@@ -117,6 +115,7 @@ impl Column {
 
 /// End stiffnesses of the printed law or of its correction, see [`Column::ends`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct EndStiffness<R = f64> {
     /// `a - b` (N·m/rad).
     pub bow_nm_per_rad: R,

@@ -33,6 +33,7 @@ pub enum Form {
 
 /// The closed-form law of one spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct ClosedForm {
     form: Form,
     precision: Precision,
@@ -44,7 +45,6 @@ pub struct ClosedForm {
 
 impl ClosedForm {
     /// Prepares the law, in double precision. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn new(spring: &Spring, form: Form) -> Self {
         let rigidities = spring.rigidities();
         let free_length_m = spring.geometry().free_length_m;
@@ -60,7 +60,6 @@ impl ClosedForm {
 
     /// Sets the storage precision. Single precision costs up to 1e-5 N in the workspace of the thesis. Real-time:
     /// bounded, no allocation.
-    #[must_use]
     pub fn with_precision(self, precision: Precision) -> Self {
         Self { precision, ..self }
     }
@@ -76,7 +75,6 @@ impl ClosedForm {
     ///   wrench, [`Validity::OutOfDomain`](crate::validity::Validity);
     /// - NaN, infinity or a quaternion that is not of unit length: no wrench,
     ///   [`Validity::InvalidInput`](crate::validity::Validity).
-    #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         self.respond_at(pose, demand)
     }

@@ -29,7 +29,6 @@ impl AxialContact {
     }
 
     /// Returns the response at a pose with the contact force added. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn added_to(&self, response: &Response, pose: &Pose) -> Response {
         let Ok(chord) = pose.chord(self.free_length_m) else { return *response };
         let overlap_m = chord.shortening_m - self.gap_m;

@@ -42,6 +42,7 @@ const LEAST_OVERTURN: f64 = 1e-3;
 
 /// Conservative law of one spring, with prepared constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct EnergyForm {
     free_length_m: f64,
     /// `gamma / L0`
@@ -54,14 +55,12 @@ pub struct EnergyForm {
 impl EnergyForm {
     /// Prepares the law. Real-time: bounded, no allocation; tens of microseconds, to fit
     /// the fourth-order coefficients.
-    #[must_use]
     pub fn new(spring: &Spring) -> Self {
         Self::with_bending(spring, Bending::new(spring))
     }
 
     /// Returns the law of `to`, derived from this law of `from`. Equal to [`Self::new`], but takes only nanoseconds
     /// where the stiffness has changed and not the proportions. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn retuned(&self, from: &Spring, to: &Spring) -> Self {
         if to.is_proportional_to(from) {
             Self::with_bending(to, self.bending.restiffened(to))
@@ -91,7 +90,6 @@ impl EnergyForm {
     ///   million free lengths, for a wire with `G > E` also any length at which the rod has no shear stiffness
     ///   left: no wrench, [`Validity::OutOfDomain`](crate::validity::Validity::OutOfDomain);
     /// - NaN, infinity or a quaternion not of unit length: no wrench, [`Validity::InvalidInput`](crate::validity::Validity::InvalidInput).
-    #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         self.respond_at(pose, demand)
     }

@@ -20,6 +20,7 @@ pub enum Demand {
 /// Response of a law: wrench of the spring **on the hand**, at the centre of the upper plate, components in the model
 /// frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Response {
     /// Force (N).
     pub force_n: DVec3,

@@ -120,6 +120,7 @@ impl Effort {
 
 /// Exact rod of one spring, which follows the pose from tick to tick.
 #[derive(Clone, Debug, PartialEq)]
+#[must_use]
 pub struct Rod {
     solver: Solver,
     coils: Coils,
@@ -150,13 +151,11 @@ macro_rules! either {
 
 impl Rod {
     /// Builds the rod at rest. Not real-time: allocates.
-    #[must_use]
     pub fn new(spring: &Spring, accuracy: Accuracy) -> Self {
         Self::with_coils(spring, accuracy, Coils::Pass)
     }
 
     /// Builds the rod at rest, with or without contact of its coils. Not real-time: allocates.
-    #[must_use]
     pub fn with_coils(spring: &Spring, accuracy: Accuracy, coils: Coils) -> Self {
         let ratios = Ratios::new(spring, coils);
         let solver = match accuracy {
@@ -178,7 +177,6 @@ impl Rod {
     /// Builds the rod at rest with the servo's polynomials and each equilibrium solved to rounding, so that an answer
     /// does not depend on the history: for laws that minimise the energy of the rod ([`crate::seat`]). Not real-time:
     /// allocates.
-    #[must_use]
     pub fn to_rounding(spring: &Spring, coils: Coils) -> Self {
         let equilibrium = Equilibrium::new(Ratios::new(spring, coils), TO_ROUNDING.with(coils));
         Self::solved_by(Solver::Servo(Box::new(equilibrium)), spring, coils)
@@ -187,7 +185,6 @@ impl Rod {
     /// Builds the rod at rest for a law that blends its energy with another ([`crate::rod_blend`]) and finds the
     /// equilibrium anew at each pose. The equilibrium is solved to rounding while followed, to 1e-10 of the angles when
     /// found from the pose. Not real-time: allocates.
-    #[must_use]
     pub(crate) fn for_a_blend(spring: &Spring) -> Self {
         // A base that lifts off needs two searches in a tick.
         let effort = Effort { most_matrices: 5, ..TO_ROUNDING };

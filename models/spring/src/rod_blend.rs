@@ -39,6 +39,7 @@ pub const TOLERANCE_N: f64 = 0.005;
 
 /// Law `energy` and exact rod of one spring, blended.
 #[derive(Clone, Debug, PartialEq)]
+#[must_use]
 pub struct RodBlend {
     energy: EnergyForm,
     remainder: Option<Remainder>,
@@ -63,13 +64,11 @@ enum Follows {
 
 impl RodBlend {
     /// Prepares both laws for the default tolerance. Not real-time: the rod allocates.
-    #[must_use]
     pub fn new(spring: &Spring) -> Self {
         Self::within(spring, TOLERANCE_N)
     }
 
     /// Prepares both laws for a tolerance of the force. Not real-time: the rod allocates.
-    #[must_use]
     pub fn within(spring: &Spring, tolerance_n: f64) -> Self {
         let (energy, mut rod) = (EnergyForm::new(spring), Rod::for_a_blend(spring));
         let remainder = Remainder::new(spring, &energy, &mut rod);

@@ -84,7 +84,6 @@ impl Thesis {
 
     /// Returns the wrench on the hand at a pose; this law has no energy. Defined for every pose, see the module.
     /// Real-time: bounded, no allocation.
-    #[must_use]
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         if !pose.is_valid() {
             return Response::none(Validity::InvalidInput);

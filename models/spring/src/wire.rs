@@ -71,7 +71,6 @@ impl Wire {
     }
 
     /// Returns the response of the rod at a pose, corrected for the wire. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn added_to(&self, response: &Response, pose: &Pose, demand: Demand) -> Response {
         let q = pose.orientation;
         let sign = if q.w < 0.0 { -1.0 } else { 1.0 };

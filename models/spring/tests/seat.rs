@@ -441,7 +441,7 @@ fn a_reset_seat_answers_as_a_new_one() {
         for _ in 0..of(2000, 400) {
             for _ in 0..3 {
                 let pose = wild.pose(&mut sampler, spring.geometry().free_length_m);
-                seat.step(&mut law, &pose, Demand::WrenchAndEnergy);
+                let _ = seat.step(&mut law, &pose, Demand::WrenchAndEnergy);
             }
             law.reset();
             seat.reset();

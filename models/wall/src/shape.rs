@@ -23,6 +23,7 @@ pub enum Shape {
 
 /// Place on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Place {
     /// Position, m.
     pub point_m: DVec3,
@@ -44,7 +45,6 @@ impl Shape {
 
     /// Finds the face that a straight path from `outside_m` to `inside_m` crosses first; returns the place on it
     /// nearest to the end. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn entry(&self, outside_m: DVec3, inside_m: DVec3) -> Place {
         let normal = match *self {
             Self::Plane | Self::Sphere { .. } => DVec3::Z,
@@ -55,7 +55,6 @@ impl Shape {
 
     /// Returns the place on the surface nearest to a point inside. On a cube it is on the face of entry, with normal
     /// `entered`: the handle does not leave at the back. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn nearest(&self, inside_m: DVec3, entered: DVec3) -> Place {
         let from_centre_m = inside_m - self.centre_m();
         match *self {
@@ -75,7 +74,6 @@ impl Shape {
     /// Slides a proxy on the surface towards the place nearest to the handle, as far as Coulomb's friction requires:
     /// until the tangential spring force is at most `mu` times the normal force, `K |t| <= mu F_n`. The energy that the
     /// spring loses is dissipated. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn slide(&self, proxy: &Place, surface: &Surface, handle_m: DVec3, velocity_m_per_s: DVec3) -> Place {
         let nearest = self.nearest(handle_m, proxy.normal);
         if surface.friction == 0.0 {

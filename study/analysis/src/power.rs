@@ -31,7 +31,6 @@ pub struct Power {
 
 /// Returns a population whose thresholds without vision are `ratio` times the thresholds with vision, and whose lapse rate is
 /// `lapse`.
-#[must_use]
 pub fn population(ratio: f64, lapse: f64) -> Population {
     let usual = Population::default();
     let h = Sensitivity { sigma: usual.vh.sigma * ratio, ..usual.vh };

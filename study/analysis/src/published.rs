@@ -5,6 +5,7 @@ use flotor_study::protocol::{JndProtocol, MagnitudeProtocol, Stimulus};
 
 /// Comparability of a study with the thesis, whose results hold only for springs with the bases and stimuli of the thesis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[must_use]
 pub enum ThesisComparison {
     /// The settings match the thesis.
     Thesis,
@@ -16,7 +17,6 @@ pub enum ThesisComparison {
 impl ThesisComparison {
     /// Compares the settings of a difference experiment with the thesis: springs with bases of 17, 26 and 35 N, larger
     /// comparisons, a target of 75 %.
-    #[must_use]
     pub fn jnd(protocol: &JndProtocol) -> Self {
         let usual = JndProtocol::default();
         let is_same = is_of_springs(&protocol.stimulus)
@@ -27,7 +27,6 @@ impl ThesisComparison {
     }
 
     /// Compares the settings of a magnitude experiment with the thesis: springs with twelve stimuli of 12 to 48 N.
-    #[must_use]
     pub fn magnitude(protocol: &MagnitudeProtocol) -> Self {
         let is_same =
             is_of_springs(&protocol.stimulus) && protocol.values == MagnitudeProtocol::default().values;

@@ -72,7 +72,6 @@ impl Cohort {
     }
 
     /// Returns the simulated subject with this number.
-    #[must_use]
     pub fn subject(&self, subject: SubjectNumber) -> SimulatedSubject {
         SimulatedSubject::new(&self.population, self.seed, subject, self.middle())
             .about(self.protocol.stimulus())

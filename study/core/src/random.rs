@@ -3,6 +3,7 @@
 //! A sitting resumed after a crash therefore needs no generator state: trial 57 of subject 3 draws the same numbers on every
 //! machine, regardless of other draws.
 
+use crate::protocol::SubjectNumber;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
@@ -29,6 +30,20 @@ pub(crate) enum Purpose {
     CheckTrial = 8,
     /// Simulated answers of a fitted observer.
     GoodnessOfFit = 9,
+}
+
+/// Streams of a subject in an experiment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Draws {
+    pub(crate) seed: u64,
+    pub(crate) subject: SubjectNumber,
+}
+
+impl Draws {
+    /// Creates the stream for a purpose and index.
+    pub(crate) fn stream(self, purpose: Purpose, index: u32) -> Stream {
+        Stream::new(self.seed, purpose, self.subject.get(), index)
+    }
 }
 
 /// Stream of random numbers.

@@ -1,7 +1,7 @@
 //! Orders of blocks, demonstrations, stimuli and checks, determined by the subject's number and the seed.
 
-use crate::protocol::{JndProtocol, MagnitudeProtocol, SubjectNumber};
-use crate::random::{Purpose, Stream};
+use crate::protocol::{JndProtocol, MagnitudeProtocol};
+use crate::random::{Draws, Purpose};
 use crate::trial::{Modality, Phase};
 
 /// Returns the order of the bases in each replication, as indices: rows of Latin squares, without repetition of a row before
@@ -10,9 +10,9 @@ use crate::trial::{Modality, Phase};
 /// The rows of a cyclic Latin square (each base once in each position) follow in random order, with the bases permuted and the
 /// square mirrored at random; after the last row the mirrored square follows. For the three bases of the thesis these two
 /// squares contain all six orders, so the orders of four replications all differ.
-pub(crate) fn base_orders(protocol: &JndProtocol, seed: u64, subject: SubjectNumber) -> Vec<Vec<usize>> {
+pub(crate) fn base_orders(protocol: &JndProtocol, draws: Draws) -> Vec<Vec<usize>> {
     let count = protocol.bases.len();
-    let mut stream = Stream::new(seed, Purpose::Schedule, subject.get(), 0);
+    let mut stream = draws.stream(Purpose::Schedule, 0);
     let mut labels: Vec<usize> = (0..count).collect();
     stream.shuffle(&mut labels);
     let mut mirrored = stream.coin();
@@ -42,11 +42,7 @@ pub(crate) fn alternating(first: Modality, replication: usize) -> Modality {
 /// shown.
 ///
 /// The differences of the three pairs are obvious, close, and nearly zero ([`JndProtocol::demo_values`]).
-pub(crate) fn jnd_demo(
-    protocol: &JndProtocol,
-    seed: u64,
-    subject: SubjectNumber,
-) -> Vec<(Modality, [f64; 2])> {
+pub(crate) fn jnd_demo(protocol: &JndProtocol, draws: Draws) -> Vec<(Modality, [f64; 2])> {
     if !protocol.demo.shown {
         return Vec::new();
     }
@@ -54,19 +50,14 @@ pub(crate) fn jnd_demo(
     let pairs = [[lowest, highest], [highest, close], [close, nearly]];
     let each = |modality: Modality| pairs.iter().map(move |pair| (modality, *pair));
     let mut demo: Vec<_> = Modality::ALL.into_iter().flat_map(each).collect();
-    Stream::new(seed, Purpose::Schedule, subject.get(), 1).shuffle(&mut demo);
+    draws.stream(Purpose::Schedule, 1).shuffle(&mut demo);
     demo
 }
 
 /// Returns the stimuli of one replication of a magnitude experiment, in random order.
-pub(crate) fn magnitude_order(
-    protocol: &MagnitudeProtocol,
-    seed: u64,
-    subject: SubjectNumber,
-    replication: u32,
-) -> Vec<f64> {
+pub(crate) fn magnitude_order(protocol: &MagnitudeProtocol, draws: Draws, replication: u32) -> Vec<f64> {
     let mut values = protocol.values.clone();
-    Stream::new(seed, Purpose::Schedule, subject.get(), 10 + replication).shuffle(&mut values);
+    draws.stream(Purpose::Schedule, 10 + replication).shuffle(&mut values);
     values
 }
 
@@ -75,13 +66,8 @@ pub(crate) fn magnitude_order(
 ///
 /// As far as the track has enough positions, a repeat check does not directly follow the pair that it repeats, and a counted
 /// trial separates any two repeat checks.
-pub(crate) fn track_checks(
-    protocol: &JndProtocol,
-    seed: u64,
-    subject: SubjectNumber,
-    track: u32,
-) -> Vec<(u32, Phase)> {
-    let mut stream = Stream::new(seed, Purpose::CheckPlace, subject.get(), track);
+pub(crate) fn track_checks(protocol: &JndProtocol, draws: Draws, track: u32) -> Vec<(u32, Phase)> {
+    let mut stream = draws.stream(Purpose::CheckPlace, track);
     let checks = protocol.checks;
     let obvious = checks.obvious.map_or(0, |pairs| pairs.count);
     // Obvious pairs are drawn last, so that the positions of the other checks do not depend on them.
@@ -111,12 +97,11 @@ fn taken<T: PartialOrd>(left: &mut Vec<T>, drawn: &T) -> Option<T> {
 /// stimulus; checks are all different in stimulus or position unless there are more checks than such combinations.
 pub(crate) fn with_repeat_checks(
     protocol: &MagnitudeProtocol,
-    seed: u64,
-    subject: SubjectNumber,
+    draws: Draws,
     replication: u32,
     order: &[f64],
 ) -> Vec<(Phase, f64)> {
-    let mut stream = Stream::new(seed, Purpose::CheckPlace, subject.get(), replication);
+    let mut stream = draws.stream(Purpose::CheckPlace, replication);
     let count = order.len();
     // Pairs of a stimulus index and the position of its check, with at least one other stimulus in between.
     let mut left: Vec<(usize, usize)> = (0..count.saturating_sub(2))
@@ -144,15 +129,10 @@ pub(crate) fn with_repeat_checks(
 
 /// Returns the demonstration before a modality of a magnitude experiment: the smallest, the largest and random other stimuli,
 /// in random order.
-pub(crate) fn magnitude_demo(
-    protocol: &MagnitudeProtocol,
-    seed: u64,
-    subject: SubjectNumber,
-    modality: Modality,
-) -> Vec<f64> {
+pub(crate) fn magnitude_demo(protocol: &MagnitudeProtocol, draws: Draws, modality: Modality) -> Vec<f64> {
     let mut sorted = protocol.values.clone();
     sorted.sort_by(f64::total_cmp);
-    let mut stream = Stream::new(seed, Purpose::Schedule, subject.get(), 2 + modality as u32);
+    let mut stream = draws.stream(Purpose::Schedule, 2 + modality as u32);
     let (Some(least), Some(most)) = (sorted.first().copied(), sorted.last().copied()) else {
         return Vec::new();
     };
@@ -166,10 +146,14 @@ pub(crate) fn magnitude_demo(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::Checks;
+    use crate::protocol::{Checks, SubjectNumber};
 
     fn subjects() -> impl Iterator<Item = SubjectNumber> {
         (1..=60).filter_map(SubjectNumber::new)
+    }
+
+    fn draws(subject: SubjectNumber) -> Draws {
+        Draws { seed: 7, subject }
     }
 
     /// Four replications of three bases: no order twice, and each base at each place once in the first three.
@@ -178,7 +162,7 @@ mod tests {
         let protocol = JndProtocol::default();
         let mut first_orders = std::collections::BTreeSet::new();
         for subject in subjects() {
-            let orders = base_orders(&protocol, 7, subject);
+            let orders = base_orders(&protocol, draws(subject));
             assert_eq!(orders.len(), 4);
             for place in 0..3 {
                 let mut column: Vec<usize> = orders.iter().take(3).map(|order| order[place]).collect();
@@ -198,8 +182,8 @@ mod tests {
         for repeat_checks in 1..=12 {
             let protocol = MagnitudeProtocol { repeat_checks, ..MagnitudeProtocol::default() };
             for (subject, replication) in subjects().zip((1..=6).cycle()) {
-                let order = magnitude_order(&protocol, 7, subject, replication);
-                let all = with_repeat_checks(&protocol, 7, subject, replication, &order);
+                let order = magnitude_order(&protocol, draws(subject), replication);
+                let all = with_repeat_checks(&protocol, draws(subject), replication, &order);
                 assert_eq!(all.len(), 12 + repeat_checks as usize);
                 assert!(all.windows(2).all(|two| two[0].1 != two[1].1), "{all:?}");
             }
@@ -208,7 +192,7 @@ mod tests {
             let checks = Checks { catch: 1, repeats, obvious: None };
             let protocol = JndProtocol { checks, ..JndProtocol::default() };
             for (subject, track) in subjects().zip((1..=12).cycle()) {
-                let checks = track_checks(&protocol, 7, subject, track);
+                let checks = track_checks(&protocol, draws(subject), track);
                 let mut places: Vec<u32> = checks
                     .iter()
                     .filter(|check| check.1 == Phase::RepeatCheck)
@@ -225,7 +209,7 @@ mod tests {
     fn the_magnitude_demo_has_the_extremes() {
         let protocol = MagnitudeProtocol::default();
         for subject in subjects() {
-            let demo = magnitude_demo(&protocol, 7, subject, Modality::H);
+            let demo = magnitude_demo(&protocol, draws(subject), Modality::H);
             assert_eq!(demo.len(), 5);
             assert!(demo.contains(&12.0) && demo.contains(&48.0));
             let mut distinct = demo.clone();

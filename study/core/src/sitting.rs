@@ -8,7 +8,7 @@ use crate::procedure::Track;
 use crate::protocol::{
     AtBoundary, ComparisonSide, JndProtocol, MagnitudeProtocol, PresentationOrder, Protocol, SubjectNumber,
 };
-use crate::random::{Purpose, Stream};
+use crate::random::{Draws, Purpose};
 use crate::schedule;
 use crate::trial::{Exploration, Judgement, Modality, Pair, Phase, Position, Presented, Response, Trial};
 use serde::{Deserialize, Serialize};
@@ -95,8 +95,7 @@ impl Running {
 #[derive(Clone, Debug)]
 pub struct Sitting {
     protocol: Protocol,
-    seed: u64,
-    subject: SubjectNumber,
+    draws: Draws,
     items: VecDeque<Item>,
     running: Option<Running>,
     tracks_begun: u32,
@@ -109,14 +108,14 @@ impl Sitting {
     /// Creates the sitting at its first trial.
     #[must_use]
     pub fn new(protocol: &Protocol, seed: u64, subject: SubjectNumber) -> Self {
+        let draws = Draws { seed, subject };
         let items = match protocol {
-            Protocol::Jnd(jnd) => jnd_items(jnd, seed, subject),
-            Protocol::Magnitude(magnitude) => magnitude_items(magnitude, seed, subject),
+            Protocol::Jnd(jnd) => jnd_items(jnd, draws),
+            Protocol::Magnitude(magnitude) => magnitude_items(magnitude, draws),
         };
         let mut sitting = Self {
             protocol: protocol.clone(),
-            seed,
-            subject,
+            draws,
             items,
             running: None,
             tracks_begun: 0,
@@ -131,7 +130,7 @@ impl Sitting {
     /// Returns the number of the subject.
     #[must_use]
     pub fn subject(&self) -> SubjectNumber {
-        self.subject
+        self.draws.subject
     }
 
     /// Returns the number of answered presentations so far, practice, checks and repeats included.
@@ -176,14 +175,14 @@ impl Sitting {
         let Some(Trial { modality, .. }) = self.next().filter(|next| next.phase != Phase::Practice) else {
             return Vec::new();
         };
-        let (seed, subject) = (self.seed, self.subject);
+        let draws = self.draws;
         let presented: Vec<Presented> = match &self.protocol {
             Protocol::Jnd(jnd) => {
-                let demo = schedule::jnd_demo(jnd, seed, subject).into_iter();
+                let demo = schedule::jnd_demo(jnd, draws).into_iter();
                 demo.filter(|(of, _)| *of == modality).map(|(_, values)| practice_pair(values)).collect()
             }
             Protocol::Magnitude(magnitude) => {
-                let demo = schedule::magnitude_demo(magnitude, seed, subject, modality).into_iter();
+                let demo = schedule::magnitude_demo(magnitude, draws, modality).into_iter();
                 demo.map(|value| Presented::One { value }).collect()
             }
         };
@@ -237,7 +236,7 @@ impl Sitting {
     fn begin_track(&mut self) {
         if let (Some(Item::Adapt { .. }), Protocol::Jnd(jnd)) = (self.items.front(), &self.protocol) {
             self.tracks_begun += 1;
-            let checks = schedule::track_checks(jnd, self.seed, self.subject, self.tracks_begun).into();
+            let checks = schedule::track_checks(jnd, self.draws, self.tracks_begun).into();
             self.running =
                 Some(Running { track: jnd.procedure.start(), trials: 0, checks, pairs: Vec::new() });
         }
@@ -266,8 +265,7 @@ impl Sitting {
                 let earlier = running.pairs.len().saturating_sub(1).max(1);
                 // If the check itself is repeated, present the same pair.
                 let name = number - self.repeat;
-                let which =
-                    Stream::new(self.seed, Purpose::CheckTrial, self.subject.get(), name).below(earlier);
+                let which = self.draws.stream(Purpose::CheckTrial, name).below(earlier);
                 let pair = running.pairs.get(which).copied();
                 (Phase::RepeatCheck, pair.unwrap_or_else(|| self.pair(base, 0.0, number)))
             }
@@ -284,7 +282,7 @@ impl Sitting {
         let Protocol::Jnd(jnd) = &self.protocol else {
             return pair(base, base, Position::Second, true);
         };
-        let mut stream = Stream::new(self.seed, Purpose::Presentation, self.subject.get(), number);
+        let mut stream = self.draws.stream(Purpose::Presentation, number);
         // Both numbers are drawn in any case, so that the setting of order does not affect the draw of the side.
         let (second, above) = (stream.coin(), stream.coin());
         let comparison_at = match jnd.order {
@@ -329,13 +327,13 @@ fn judge(pair: &Pair, response: Response) -> Option<Judgement> {
     }
 }
 
-fn jnd_items(jnd: &JndProtocol, seed: u64, subject: SubjectNumber) -> VecDeque<Item> {
-    let demo = schedule::jnd_demo(jnd, seed, subject).into_iter().map(|(modality, values)| {
+fn jnd_items(jnd: &JndProtocol, draws: Draws) -> VecDeque<Item> {
+    let demo = schedule::jnd_demo(jnd, draws).into_iter().map(|(modality, values)| {
         let presented = practice_pair(values);
         Item::Show { phase: Phase::Practice, replication: 0, modality, presented }
     });
-    let first = jnd.first_modality.of(subject);
-    let orders = schedule::base_orders(jnd, seed, subject).into_iter().zip(0_u32..);
+    let first = jnd.first_modality.of(draws.subject);
+    let orders = schedule::base_orders(jnd, draws).into_iter().zip(0_u32..);
     let tracks = orders.flat_map(|(order, index)| {
         let modality = schedule::alternating(first, index as usize);
         let bases = order.into_iter().filter_map(|base| jnd.bases.get(base).copied());
@@ -344,19 +342,19 @@ fn jnd_items(jnd: &JndProtocol, seed: u64, subject: SubjectNumber) -> VecDeque<I
     demo.chain(tracks).collect()
 }
 
-fn magnitude_items(magnitude: &MagnitudeProtocol, seed: u64, subject: SubjectNumber) -> VecDeque<Item> {
-    let first = magnitude.first_modality.of(subject);
+fn magnitude_items(magnitude: &MagnitudeProtocol, draws: Draws) -> VecDeque<Item> {
+    let first = magnitude.first_modality.of(draws.subject);
     let mut items = VecDeque::new();
     for (block, modality) in [first, first.other()].into_iter().enumerate() {
         let show = |phase, replication| {
             move |value| Item::Show { phase, replication, modality, presented: Presented::One { value } }
         };
-        let demo = schedule::magnitude_demo(magnitude, seed, subject, modality);
+        let demo = schedule::magnitude_demo(magnitude, draws, modality);
         items.extend(demo.into_iter().map(show(Phase::Practice, 0)));
         for replication in 1..=magnitude.replications {
             let stream = if block == 0 { replication } else { magnitude.replications + replication };
-            let order = schedule::magnitude_order(magnitude, seed, subject, stream);
-            let order = schedule::with_repeat_checks(magnitude, seed, subject, stream, &order);
+            let order = schedule::magnitude_order(magnitude, draws, stream);
+            let order = schedule::with_repeat_checks(magnitude, draws, stream, &order);
             items.extend(order.into_iter().map(|(phase, value)| show(phase, replication)(value)));
         }
     }

@@ -7,6 +7,7 @@ use serde::Serialize;
 
 /// Effect size with its 95 % confidence interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[must_use]
 pub struct EffectSize {
     /// Point estimate.
     pub value: f64,
@@ -28,7 +29,6 @@ const WIDTH: f64 = 1.0e-13;
 
 /// Returns Cohen's d of pairs: the mean difference divided by the standard deviation of the differences. Its sign is the sign
 /// of `t`, the result of a paired t-test.
-#[must_use]
 pub fn of_pairs(t: &TTest) -> EffectSize {
     let root_n = (t.df + 1.0).sqrt();
     let [low, high] = [1.0 - TAIL, TAIL].map(|below| noncentrality_of_t(t.value, t.df, below));
@@ -42,7 +42,6 @@ pub fn of_pairs(t: &TTest) -> EffectSize {
 /// The value follows from the noncentrality `df (F - 1)`, whose mean F equals the observed one; the interval of the
 /// noncentrality is converted by the same formula. Eta squared is larger on average and may lie outside this interval. An F
 /// below 1 gives the value 0.
-#[must_use]
 pub fn partial_omega_squared(f: f64, df: f64, error_df: f64) -> EffectSize {
     let share = |noncentrality: f64| {
         if noncentrality.is_finite() { noncentrality / (noncentrality + df + error_df + 1.0) } else { 1.0 }

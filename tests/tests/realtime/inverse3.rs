@@ -4,9 +4,13 @@ use super::counted;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, Tick, Wrench};
 use flotor_inverse3::session::{GripRequest, Request, Session};
-use flotor_inverse3::stand_in::{ARM, Said, StandIn, configured, state};
 use flotor_tests::TestSize;
+use service_with_faults::{ARM, Said, StandIn, configured, state};
 use std::time::Duration;
+
+#[path = "../../../devices/inverse3/tests/stand_in/mod.rs"]
+#[allow(dead_code, unused_imports)] // the tests of the plugin use the rest
+mod service_with_faults;
 
 fn stand_in() -> StandIn {
     let answer = state(DVec3::new(0.0123, -0.0456, 0.0789), DVec3::ZERO);

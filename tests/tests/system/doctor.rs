@@ -3,9 +3,13 @@
 
 use super::falcon::Emulator;
 use flotor_hal::DVec3;
-use flotor_inverse3::stand_in::{ARM, Said, StandIn, configured, state};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
+use service_with_faults::{ARM, Said, StandIn, configured, state};
+
+#[path = "../../../devices/inverse3/tests/stand_in/mod.rs"]
+#[allow(dead_code, unused_imports)] // the tests of the plugin use the rest
+mod service_with_faults;
 
 /// A machine with nothing on its bus, until something is connected.
 #[derive(Default)]

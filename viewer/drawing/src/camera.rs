@@ -7,6 +7,7 @@ use flotor_hal::glam::{DMat4, DVec4};
 
 /// Orbit camera: an eye on a sphere around its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Camera {
     /// Rotation about the vertical, rad; 0 looks along +y, away from the user; positive: the eye is further right (+x).
     pub azimuth_rad: f64,
@@ -81,7 +82,6 @@ const FARTHEST: f64 = 30.0;
 
 impl Camera {
     /// Returns the default view: from the front, right and above, with a whole body of this height visible.
-    #[must_use]
     pub fn experimenter(height_mm: f64) -> Self {
         Self {
             azimuth_rad: 0.55,
@@ -93,7 +93,6 @@ impl Camera {
 
     /// Returns the default view of bodies side by side, from so far away that all of them fit into a picture of this aspect ratio
     /// (width over height).
-    #[must_use]
     pub fn fitting(extent: Extent, aspect: f64) -> Self {
         /// Fraction of half the picture filled by the bodies.
         const FILLED: f64 = 0.92;
@@ -108,7 +107,6 @@ impl Camera {
     }
 
     /// Returns the requested view of bodies in a picture of this aspect ratio, or the default view without a request.
-    #[must_use]
     pub fn of(view: Option<View>, extent: Extent, aspect: f64) -> Self {
         let mut camera = Self::fitting(extent, aspect);
         if let Some(View { azimuth_rad, inclination_rad, zoom }) = view {

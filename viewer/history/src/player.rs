@@ -16,6 +16,7 @@ pub enum Motion {
 
 /// Displayed time and playback mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Player {
     /// Displayed time, s.
     pub now_s: f64,
@@ -29,13 +30,11 @@ pub struct Player {
 
 impl Player {
     /// Creates a player that follows a running host.
-    #[must_use]
     pub fn live() -> Self {
         Self { now_s: 0.0, motion: Motion::Follow, speed: 1.0, repeats: false }
     }
 
     /// Creates a player that is paused at a time of a recording, s.
-    #[must_use]
     pub fn at(now_s: f64) -> Self {
         Self { now_s, motion: Motion::Pause, speed: 1.0, repeats: true }
     }

@@ -204,7 +204,6 @@ impl Viewer {
     }
 
     /// Returns the player: displayed time and playback mode.
-    #[must_use]
     pub fn player(&self) -> &Player {
         &self.player
     }

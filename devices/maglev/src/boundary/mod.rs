@@ -78,6 +78,7 @@ pub struct Penetration {
 
 /// All walls of the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Walls {
     /// Sphere about the origin.
     pub sphere: Wall,
@@ -111,7 +112,6 @@ pub fn thesis_nm_per_rad(gamma_n: f64) -> f64 {
 
 impl Walls {
     /// Returns the walls of the makers' boundary mode, with a sphere of `radius_m` and the thesis's angle limit.
-    #[must_use]
     pub fn maker(radius_m: f64) -> Self {
         let [stiffness, damping, rotational, rotational_damping] = MAKER;
         let wall = Wall { limit: radius_m, stiffness, damping };
@@ -128,7 +128,6 @@ impl Walls {
 
     /// Returns the thesis's walls for a spring of `gamma_n`, with a sphere of `radius_m`: the angular stiffness grows with
     /// gamma. Values missing in the thesis (translational gains, damping) are the makers'.
-    #[must_use]
     pub fn thesis(radius_m: f64, gamma_n: f64) -> Self {
         let maker = Self::maker(radius_m);
         let stiffness = thesis_nm_per_rad(gamma_n);
@@ -141,7 +140,6 @@ impl Walls {
     }
 
     /// Returns these walls with each stiffness at most half of its stability limit in the loop.
-    #[must_use]
     pub fn stabilised(mut self, sampled: &SampledLoop) -> Self {
         let everywhere = self.rotation_damping_nms_per_rad;
         self.sphere = self.sphere.stabilised(sampled, 0.0);

@@ -53,7 +53,6 @@ impl Event {
     }
 
     /// Encodes the event as a frame.
-    #[must_use]
     pub fn encode(&self) -> Frame {
         let mut frame = Frame::new(self.kind().map_or(END, |kind| kind as i32));
         match self {
@@ -108,7 +107,6 @@ impl Acknowledgement {
     pub const UNHANDLED: Self = Self(-1);
 
     /// Encodes the acknowledgement as a frame.
-    #[must_use]
     pub fn encode(self) -> Frame {
         Frame::new(self.0)
     }

@@ -9,6 +9,7 @@ const LONGEST_SENT_BYTES: usize = 108;
 
 /// Encoded frame to send.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[must_use]
 pub struct Frame {
     bytes: [u8; LONGEST_SENT_BYTES],
     length: usize,
@@ -16,7 +17,6 @@ pub struct Frame {
 
 impl Frame {
     /// Creates a frame with this code (function, status or event) and no fields.
-    #[must_use]
     pub fn new(code: i32) -> Self {
         let mut frame = Self { bytes: [0; LONGEST_SENT_BYTES], length: 4 };
         frame.int(code);

@@ -42,6 +42,7 @@ pub enum Results {
 
 /// Reply of a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct Reply {
     /// Status of the call.
     pub status: Status,
@@ -172,26 +173,22 @@ impl Results {
 
 impl Reply {
     /// Creates a reply with status OK and these results.
-    #[must_use]
     pub const fn ok(results: Results) -> Self {
         Self { status: Status::OK, results }
     }
 
     /// Creates a reply with this status and no results.
-    #[must_use]
     pub const fn status(status: Status) -> Self {
         Self { status, results: Results::None }
     }
 
     /// Creates a reply with an error status and with zeros as the results of the function; without results for an unknown
     /// function.
-    #[must_use]
     pub fn failed(function: Option<Function>, status: Status) -> Self {
         Self { status, results: function.map_or(Results::None, Results::zero) }
     }
 
     /// Encodes the reply as a frame.
-    #[must_use]
     pub fn encode(&self) -> Frame {
         let mut frame = Frame::new(self.status.0);
         self.results.write(&mut frame);

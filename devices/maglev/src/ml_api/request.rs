@@ -97,7 +97,6 @@ impl Request {
     }
 
     /// Encodes the request as a frame.
-    #[must_use]
     pub fn encode(&self) -> Frame {
         let mut frame = Frame::new(self.function().id());
         match *self {

@@ -268,6 +268,7 @@ impl fmt::Display for Status {
 
 /// Fault bits; a fault switches the coils off.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[must_use]
 pub struct FaultBits(pub u32);
 
 impl FaultBits {
@@ -283,13 +284,11 @@ impl FaultBits {
     pub const OVER_SPEED: Self = Self(8);
 
     /// Returns the union of two sets of faults.
-    #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
     /// Returns the faults that are not in `other`.
-    #[must_use]
     pub const fn without(self, other: Self) -> Self {
         Self(self.0 & !other.0)
     }

@@ -94,6 +94,7 @@ impl Mode {
 
 /// Faults and active limits of the controller, one bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[must_use]
 pub struct Condition(u16);
 
 impl Condition {
@@ -124,7 +125,6 @@ impl Condition {
     const KNOWN: u16 = 0x077f;
 
     /// Returns the union of two conditions.
-    #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
@@ -136,7 +136,6 @@ impl Condition {
     }
 
     /// Returns the faults without the active limits.
-    #[must_use]
     pub const fn faults(self) -> Self {
         Self(self.0 & Self::FAULTS)
     }

@@ -87,7 +87,6 @@ impl OpenedDevice {
     }
 
     /// Returns the parameter schema of the device.
-    #[must_use]
     pub fn parameters(&self) -> &'static [Parameter] {
         self.handle.parameters
     }

@@ -156,7 +156,6 @@ impl Plugin {
     }
 
     /// Returns the parameter schema of the plugin.
-    #[must_use]
     pub fn parameters(&self) -> &'static [Parameter] {
         self.parameters
     }

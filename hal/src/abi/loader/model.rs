@@ -46,13 +46,11 @@ impl Model {
     }
 
     /// Returns the model's declaration, which holds for all settings.
-    #[must_use]
     pub fn info(&self) -> &ModelInfo {
         &self.table.info
     }
 
     /// Returns the parameter schema of the model.
-    #[must_use]
     pub fn parameters(&self) -> &'static [Parameter] {
         self.parameters
     }
@@ -64,13 +62,11 @@ impl Model {
     }
 
     /// Returns the demands that the model serves with the settings it was created with.
-    #[must_use]
     pub fn serves(&self) -> Demand {
         self.variant.serves()
     }
 
     /// Returns the path dependence of the model with the settings it was created with.
-    #[must_use]
     pub fn memory(&self) -> Memory {
         self.variant.memory()
     }

@@ -71,6 +71,7 @@ pub struct RunOptions {
 }
 
 /// Scene that is ready to run: plugins loaded, devices open, models created, no device energised.
+#[must_use]
 pub struct Session {
     prepared: PreparedLoop,
     clock: Clock,
@@ -168,7 +169,6 @@ impl Session {
 
     /// Lifts the host's ceiling on force and torque: only the limits of scene and device apply. Only a user who knows the device
     /// should decide this; a scene cannot. Not real-time.
-    #[must_use]
     pub fn allow_strong(mut self) -> Self {
         self.prepared.standby.guard_with(std::mem::take(&mut self.strong_envelopes));
         self.strength = Strength::Strong;
@@ -176,7 +176,6 @@ impl Session {
     }
 
     /// Applies [`Session::allow_strong`] if the strength is [`Strength::Strong`]. Not real-time.
-    #[must_use]
     pub fn with_strength(self, strength: Strength) -> Self {
         match (strength, self.strength) {
             (Strength::Strong, Strength::UnderCeiling) => self.allow_strong(),
@@ -208,7 +207,6 @@ impl Session {
     }
 
     /// Sets the core to which the loop's thread is pinned on the real clock; `None` pins it to no core.
-    #[must_use]
     pub fn on_core(mut self, core: Option<Core>) -> Self {
         self.real_clock.core = core;
         self
@@ -216,7 +214,6 @@ impl Session {
 
     /// Uses the latch in `directory` in place of the latch of this user; presses count from this call on. No effect on the virtual
     /// clock.
-    #[must_use]
     pub fn latched_in(mut self, directory: &Directory) -> Self {
         self.real_clock.latch = self.real_clock.latch.map(|_| LatchGuard::of(directory));
         self
@@ -290,7 +287,6 @@ impl Session {
     }
 
     /// Returns the capabilities of the devices, in the scene's order.
-    #[must_use]
     pub fn capabilities(&self) -> &[Capabilities] {
         &self.capabilities
     }

@@ -163,7 +163,7 @@ impl Epilogue {
         let models = models.map(|(name, (health, words))| (name, health, words)).collect();
         let layers = layers.into_iter().chain(waiting);
         let layers = layers.map(|(model, layer)| (names.model(model), layer)).collect();
-        let unfreed_plugins = UnfreedPlugins::new(closing, layers, last_stop, calls);
+        let unfreed_plugins = UnfreedPlugins { devices: closing, models: layers, last_stop, calls };
         let wall_s = started.elapsed().as_secs_f64();
         warnings.extend(controls.warnings());
         warnings.extend(stop_time.as_ref().and_then(|time| time.warning(names.all())));

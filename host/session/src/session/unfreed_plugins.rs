@@ -9,23 +9,14 @@ use flotor_servo::{LastStop, Layer};
 /// Models and devices of a finished run. Dropping the value frees them; [`Self::free`] also reports a plugin that hangs.
 #[derive(Default)]
 pub struct UnfreedPlugins {
-    devices: Vec<(String, OpenedDevice)>,
-    models: Vec<(String, Box<Layer>)>,
+    pub(super) devices: Vec<(String, OpenedDevice)>,
+    pub(super) models: Vec<(String, Box<Layer>)>,
     /// Also owns the devices, and closes a device that has no other owner.
-    last_stop: Option<LastStop>,
-    calls: CallThread,
+    pub(super) last_stop: Option<LastStop>,
+    pub(super) calls: CallThread,
 }
 
 impl UnfreedPlugins {
-    pub(super) fn new(
-        devices: Vec<(String, OpenedDevice)>,
-        models: Vec<(String, Box<Layer>)>,
-        last_stop: Option<LastStop>,
-        calls: CallThread,
-    ) -> Self {
-        Self { devices, models, last_stop, calls }
-    }
-
     /// Closes the devices and frees the models, each for no longer than 5 s. Not real-time.
     ///
     /// # Errors

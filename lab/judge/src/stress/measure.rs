@@ -108,6 +108,7 @@ impl From<Pose> for PoseRecord {
 
 /// Result of one measure: a row of the score.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[must_use]
 pub struct Measure {
     /// Identifier, "M0" to "M10".
     pub id: Cow<'static, str>,
@@ -146,14 +147,12 @@ impl Measure {
     }
 
     /// Adds a further number.
-    #[must_use]
     pub(super) fn with(mut self, name: impl Into<String>, value: f64, unit: &'static str) -> Self {
         self.values.push(Quantity { name: name.into(), value, unit: Cow::Borrowed(unit) });
         self
     }
 
     /// Adds a count.
-    #[must_use]
     pub(super) fn count(self, name: impl Into<String>, count: u64) -> Self {
         self.with(name, count as f64, "")
     }
@@ -165,7 +164,6 @@ impl Measure {
     }
 
     /// Replaces value and verdict of a measure with an empty sample.
-    #[must_use]
     pub(super) fn unless_empty(mut self, sample: u64, why: &str) -> Self {
         if sample == 0 {
             (self.value, self.verdict, self.pose) = (f64::NAN, Verdict::NothingToJudge, None);
@@ -175,7 +173,6 @@ impl Measure {
     }
 
     /// Replaces a pass by "not resolved" if the value may be as large as `possible`, beyond the bound.
-    #[must_use]
     pub(super) fn unless_uncertain(mut self, possible: f64, why: impl FnOnce() -> String) -> Self {
         // Written so that NaN counts as beyond the bound.
         let is_within = self.bound.is_some_and(|bound| possible <= bound);

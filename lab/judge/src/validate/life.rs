@@ -134,7 +134,7 @@ fn works(model: &mut Model, asked: &str) -> Result<(), String> {
 
 fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Outcome> {
     after("open", 0)?;
-    device.capabilities().map_err(|refusal| refusal.to_string())?;
+    let _ = device.capabilities().map_err(|refusal| refusal.to_string())?;
     after("capabilities", 0)?;
     for index in 0..device.parameters().len() {
         let _ = device.parameter(index);

@@ -6,7 +6,7 @@ use crate::bench::{
     BenchDevice, Case, Hand, Plan, Split, TickCost, WholeTick, Workspace, measure, time_round_trips,
 };
 use clap::Args;
-use flotor_command::options::{JsonOption, KeyValue, PluginPathOption, new_file, number, svg_file};
+use flotor_command::options::{KeyValue, PluginResultOptions, new_file, number, svg_file};
 use flotor_command::tables::table;
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::Detail;
@@ -76,9 +76,7 @@ pub(crate) struct BenchArguments {
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     #[command(flatten)]
-    json: JsonOption,
-    #[command(flatten)]
-    plugin_path: PluginPathOption,
+    options: PluginResultOptions,
 }
 
 /// Default cases of the spring that ships with Flotor: every variant and setting.
@@ -157,8 +155,8 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
     };
     let row = |device: BenchDevice| {
         let batches = if device == BenchDevice::Isolated { batches / SLOWER } else { batches };
-        let cost =
-            WholeTick::prepare(device, arguments.plugin_path.registry(), &arguments.model)?.time(batches);
+        let cost = WholeTick::prepare(device, arguments.options.plugin_path.registry(), &arguments.model)?
+            .time(batches);
         Ok(TickRow { device, cost })
     };
     let rows = BenchDevice::ALL.into_iter().map(row).collect::<Result<Vec<_>, CommandError>>()?;
@@ -183,11 +181,11 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
             .concat()
             .join("\n")
     };
-    print_result(arguments.json.file(), &report, text)
+    print_result(arguments.options.json.file(), &report, text)
 }
 
 fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
-    let registry = arguments.plugin_path.registry();
+    let registry = arguments.options.plugin_path.registry();
     let plugin = registry.load(&arguments.model, PluginKind::Model)?;
     let is_spring = plugin.metadata().id == "spring" && arguments.cases.is_empty();
     let is_under_plate = arguments.sets.iter().any(|set| set.parameter().value == "plate");
@@ -254,7 +252,7 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     line.0.finish_and_clear();
 
     let title = || style::title(&format!("{} {}", report.model, report.version));
-    print_result(arguments.json.file(), &report, || format!("{}\n{}", title(), report.to_text()))?;
+    print_result(arguments.options.json.file(), &report, || format!("{}\n{}", title(), report.to_text()))?;
     write_text(arguments.csv.as_deref(), || report.to_csv())?;
     write_text(arguments.plot.as_deref(), || report.to_svg())
 }

@@ -2,7 +2,7 @@
 
 use crate::jitter::{JitterReport, LoopTiming, MissedMore, measure};
 use clap::Args;
-use flotor_command::options::{JsonOption, PluginPathOption, core, duration_s, rate_hz, svg_file};
+use flotor_command::options::{PluginResultOptions, core, duration_s, rate_hz, svg_file};
 use flotor_command::stopping::stop_run_on_signals;
 use flotor_command::tables::table;
 use flotor_command::{CommandError, note, print_result, progress_bar, style, write_text};
@@ -30,9 +30,7 @@ pub(crate) struct JitterArguments {
     #[arg(long, value_parser = core, value_name = "N")]
     core: Option<Core>,
     #[command(flatten)]
-    json: JsonOption,
-    #[command(flatten)]
-    plugin_path: PluginPathOption,
+    options: PluginResultOptions,
     /// Plot both histograms
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -44,7 +42,7 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     stop_waits_with(&stop);
     let mut scene = Scene::demo().map_err(RunError::Scene)?;
     scene.rate_hz = arguments.rate;
-    arguments.plugin_path.put_before_those_of(&mut scene);
+    arguments.options.plugin_path.put_before_those_of(&mut scene);
     let options = RunOptions { clock: Clock::Real, seed: 0 };
     let session = Session::prepare(&scene, &Registry::search(&scene.plugin_folders), &options)?;
     let session = session.on_core(arguments.core);
@@ -57,7 +55,7 @@ pub(crate) fn run(arguments: &JitterArguments) -> Result<(), CommandError> {
     progress.finish_and_clear();
 
     report.real_time.advice().into_iter().for_each(note);
-    print_result(arguments.json.file(), &report, || to_text(&report))?;
+    print_result(arguments.options.json.file(), &report, || to_text(&report))?;
     write_text(arguments.plot.as_deref(), || picture(&report))
 }
 

@@ -3,7 +3,7 @@
 use crate::stability::theory::{Plant, Rendering, exact_limit_n_per_m, gil_limit_n_per_m};
 use crate::stability::{Case, Grip, LoopError, Row, default_cases, is_search_end, measure, worst_deviation};
 use clap::Args;
-use flotor_command::options::{JsonOption, PluginPathOption, count, number, rate_hz, svg_file};
+use flotor_command::options::{PluginResultOptions, count, number, rate_hz, svg_file};
 use flotor_command::tables::{table, to_csv};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_json, write_text};
 use flotor_hal::abi::PluginKind;
@@ -45,9 +45,7 @@ pub(crate) struct StabilityArguments {
     #[arg(long, value_enum, default_value_t)]
     hand: Grip,
     #[command(flatten)]
-    json: JsonOption,
-    #[command(flatten)]
-    plugin_path: PluginPathOption,
+    options: PluginResultOptions,
     /// Write the rows as CSV (- for standard output)
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -70,7 +68,7 @@ struct Report<'a> {
 
 pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
     let cases = cases(arguments);
-    let plugin = arguments.plugin_path.registry().load(DEVICE, PluginKind::Device)?;
+    let plugin = arguments.options.plugin_path.registry().load(DEVICE, PluginKind::Device)?;
     let progress = progress_bar(cases.len() as u64, "{percent:>3} %  case {pos} of {len}");
     let rows = measure(&plugin, &cases, || progress.inc(1)).map_err(refused)?;
     progress.finish_and_clear();
@@ -81,8 +79,8 @@ pub(crate) fn run(arguments: &StabilityArguments) -> Result<(), CommandError> {
     // CSV on standard output replaces the text result.
     let csv = arguments.csv.as_deref();
     if csv.is_none_or(|path| path.as_os_str() != "-") {
-        print_result(arguments.json.file(), &report, || to_text(&rows, worst_deviation))?;
-    } else if let Some(path) = arguments.json.file() {
+        print_result(arguments.options.json.file(), &report, || to_text(&rows, worst_deviation))?;
+    } else if let Some(path) = arguments.options.json.file() {
         write_json(path, &report)?;
     }
     write_text(csv, || to_csv([], &rows))?;

@@ -3,7 +3,7 @@
 use super::ProgressLine;
 use crate::Size;
 use clap::{Args, ValueEnum};
-use flotor_command::options::{JsonOption, KeyValue, PluginPathOption, duration_s, seed, settings, svg_file};
+use flotor_command::options::{KeyValue, PluginResultOptions, duration_s, seed, settings, svg_file};
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::abi::PluginKind;
 use flotor_judge::stress::{Part, Reach, StressOptions, Symmetry, deliver, score_in_processes};
@@ -48,9 +48,7 @@ pub(crate) struct StressArguments {
     #[arg(long, hide = true, value_parser = part)]
     deliver: Option<Part>,
     #[command(flatten)]
-    json: JsonOption,
-    #[command(flatten)]
-    plugin_path: PluginPathOption,
+    options: PluginResultOptions,
     /// Plot the score
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -65,7 +63,7 @@ fn part(word: &str) -> Result<Part, String> {
 }
 
 pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
-    let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
+    let plugin = arguments.options.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
     let settings = settings(&plugin, "--set", &arguments.sets)?;
     let StressArguments { size, seed, symmetry, .. } = *arguments;
     let options = StressOptions { size, seed, reach: Reach::default(), symmetry };
@@ -82,10 +80,8 @@ pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
         let mut command = Command::new(&program);
         command.args(["stress", "--deliver", part.word(), "--size", size.word()]);
         command.arg(format!("--seed={seed}")).arg(format!("--timeout={}", limit.as_secs_f64()));
-        command.arg("--model").arg(&arguments.model).args(arguments.plugin_path.arguments());
-        for (key, value) in arguments.sets.iter().map(KeyValue::pair) {
-            command.arg("--set").arg(format!("{key}={value}"));
-        }
+        command.arg("--model").arg(&arguments.model).args(arguments.options.plugin_path.arguments());
+        command.args(arguments.sets.iter().flat_map(|set| ["--set".to_owned(), set.to_string()]));
         if let Some(symmetry) = symmetry.and_then(|symmetry| symmetry.to_possible_value()) {
             command.arg("--symmetry").arg(symmetry.get_name());
         }
@@ -93,7 +89,7 @@ pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
     };
     let report = score_in_processes(&plugin, &settings, &options, &arguments.only, one_part)?;
     let text = || format!("{}\n{}", style::title(&report.subject()), report.to_text());
-    print_result(arguments.json.file(), &report, text)?;
+    print_result(arguments.options.json.file(), &report, text)?;
     write_text(arguments.plot.as_deref(), || report.to_svg())?;
     let stuck = |step: &String| CommandError::PluginRefused(format!("{}: {step}", report.model));
     report.stuck.as_ref().map_or(Ok(()), |step| Err(stuck(step)))

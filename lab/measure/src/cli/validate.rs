@@ -70,9 +70,7 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     let one_rule = |rule: Check| {
         let mut command = Command::new(&program);
         command.arg("validate").args(["--rule", rule.id(), "--deliver"]).arg(&arguments.plugin);
-        for (key, value) in arguments.sets.iter().map(KeyValue::pair) {
-            command.arg("--set").arg(format!("{key}={value}"));
-        }
+        command.args(arguments.sets.iter().flat_map(|set| ["--set".to_owned(), set.to_string()]));
         command
     };
     let findings =

@@ -193,7 +193,8 @@ impl Apparatus {
                 value,
                 cause: Box::new(cause),
             };
-            Session::prepare(&scene, &apparatus.registry, &options(Clock::Virtual, 0)).map_err(refused)?;
+            let prepared = Session::prepare(&scene, &apparatus.registry, &options(Clock::Virtual, 0));
+            drop(prepared.map_err(refused)?);
         }
         Ok(apparatus)
     }

@@ -39,6 +39,7 @@ pub enum Percept {
 /// The defaults are for stiffness and reproduce the result of the thesis (Weber fractions of 14.2 and 17.2 %, about 200 pairs
 /// per subject, t(15) of 3.3).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[must_use]
 pub struct Population {
     /// Mean sensitivity with vision and haptics.
     pub vh: Sensitivity,
@@ -88,7 +89,6 @@ impl Population {
     /// For forces the published Weber fractions are thresholds at about 75 %: 5.9 % of weights of 0.3 to 3 kg (Fechner's data,
     /// after Laming 1986), 7 % of constant resistances of 2.5 to 10 N (Pang, Tan and Durlach 1991, Percept. Psychophys.
     /// 49:531). No effect of vision is assumed for either.
-    #[must_use]
     pub fn judging(percept: Percept) -> Self {
         match percept {
             Percept::Stiffness => Self::default(),
@@ -99,7 +99,6 @@ impl Population {
 
     /// Returns the default population with other mean thresholds at 75 %, as fractions of the base:
     /// `[with vision, without vision]`.
-    #[must_use]
     pub fn with_thresholds([vh, h]: [f64; 2]) -> Self {
         let usual = Self::default();
         let of = |usual: Sensitivity, threshold: f64| {
@@ -121,6 +120,7 @@ impl Population {
 
 /// Simulated subject.
 #[derive(Clone, Debug)]
+#[must_use]
 pub struct SimulatedSubject {
     population: Population,
     seed: u64,
@@ -135,7 +135,6 @@ pub struct SimulatedSubject {
 
 impl SimulatedSubject {
     /// Draws a subject from a population; `middle` is the stimulus that is rated with the subject's modulus.
-    #[must_use]
     pub fn new(population: &Population, seed: u64, subject: SubjectNumber, middle: f64) -> Self {
         let mut stream = Stream::new(seed, Purpose::Subject, subject.get(), 0);
         let general = stream.normal() * population.subject_spread;
@@ -166,7 +165,6 @@ impl SimulatedSubject {
     }
 
     /// Returns the subject's observer parameters for a modality and base.
-    #[must_use]
     pub fn observer(&self, modality: Modality, base: f64) -> TernaryObserver {
         let observer = match modality {
             Modality::Vh => self.vh,
@@ -187,7 +185,6 @@ impl SimulatedSubject {
     }
 
     /// Selects the noise of the answers by the stimulus, so that a subject's answers to different objects are independent.
-    #[must_use]
     pub fn about(self, stimulus: &Stimulus) -> Self {
         Self { answer_seed: self.seed ^ xxh3_64(stimulus.to_string().as_bytes()), ..self }
     }

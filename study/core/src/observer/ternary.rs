@@ -7,6 +7,7 @@ use flotor_statistics::distribution::normal_below;
 /// Observer who compares two stimuli. The evidence is the noisy difference (second minus first) in standard deviations of the
 /// noise; if its magnitude is at most the criterion, the answer is "I don't know".
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[must_use]
 pub struct TernaryObserver {
     /// Standard deviation of the noise, as a fraction of the base.
     pub sigma: f64,
@@ -20,7 +21,6 @@ pub struct TernaryObserver {
 
 impl TernaryObserver {
     /// Returns the observer with a given threshold (fraction of the base) at a target of 75 %, without bias and lapses.
-    #[must_use]
     pub fn with_threshold(threshold: f64, criterion: f64) -> Self {
         let unit = Self { sigma: 1.0, criterion, bias: 0.0, lapse: 0.0 };
         Self { sigma: threshold / unit.threshold(0.75), ..unit }

@@ -84,6 +84,7 @@ struct Before {
 
 /// Screen state machine of a person's sitting.
 #[derive(Clone, Debug)]
+#[must_use]
 pub struct ScreenStateMachine {
     sitting: Sitting,
     quality: Quality,
@@ -107,7 +108,6 @@ pub struct ScreenStateMachine {
 
 impl ScreenStateMachine {
     /// Creates the state machine at the next trial of a sitting; offers a rest after every `rest_every` trials (0: never).
-    #[must_use]
     pub fn new(sitting: Sitting, protocol: &Protocol, rest_every: u32) -> Self {
         Self {
             sitting,
@@ -127,25 +127,21 @@ impl ScreenStateMachine {
     }
 
     /// Adds texts that the person reads before the next trial, such as consent or instructions.
-    #[must_use]
     pub fn after_reading(self, texts: impl IntoIterator<Item = String>) -> Self {
         Self { texts: texts.into_iter().collect(), ..self }
     }
 
     /// Limits the number of repetitions of a trial at the person's request.
-    #[must_use]
     pub fn with_again_at_most(self, times: u32) -> Self {
         Self { again_most: Some(times), ..self }
     }
 
     /// Offers practice before the sitting resumes ([`Input::Practise`]).
-    #[must_use]
     pub fn with_practice_offered(self) -> Self {
         Self { offered: self.sitting.practice(), ..self }
     }
 
     /// Marks the open trial as already answered and withdrawn; its next answer cannot be withdrawn.
-    #[must_use]
     pub fn with_answer_taken_back(self) -> Self {
         Self { undo: Undo::Used, ..self }
     }

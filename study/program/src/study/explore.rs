@@ -101,11 +101,8 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
 
 fn end(stop: &StopSwitch, run: RunThread, rate_hz: f64) -> Result<(), CommandError> {
     stop.stop();
-    let outcome = run.join().map_err(|_| RunError::Thread("panicked"))??;
-    match outcome.end {
-        end if end.is_in_order() => Ok(()),
-        end => Err(CommandError::run_ended(end, rate_hz)),
-    }
+    let end = run.join().map_err(|_| RunError::Thread("panicked"))??.end;
+    if end.is_in_order() { Ok(()) } else { Err(CommandError::run_ended(end, rate_hz)) }
 }
 
 /// Returns the scene to explore; by default a spring in the mode `physical`, so that all dimensions and the material are

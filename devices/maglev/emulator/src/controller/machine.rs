@@ -125,7 +125,6 @@ impl Controller {
     }
 
     /// Returns the faults and active limits.
-    #[must_use]
     pub fn condition(&self) -> Condition {
         self.condition
     }

@@ -143,10 +143,8 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         }
     }
     for text in &arguments.sets {
-        let (key, value) = text
-            .split_once('=')
-            .ok_or_else(|| Refusal::parameter(format!("--set {text}: write KEY=VALUE")))?;
-        settings.push(parse(key.trim(), value.trim())?);
+        let (key, value) = key_value(text)?;
+        settings.push(parse(key, value)?);
     }
     let (mut plant, capabilities) = LoadedPlant::open(plugin, settings, arguments.seed)?;
     if let Some((link, _)) = arguments.rig.rig() {
@@ -173,6 +171,12 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
         #[cfg(target_os = "linux")]
         TransportOption::Cdc => usb::serve(&mut emulator, arguments, Personality::Serial),
     }
+}
+
+/// Splits a value of `--set`.
+fn key_value(text: &str) -> Result<(&str, &str), Refusal> {
+    let pair = text.split_once('=').map(|(key, value)| (key.trim(), value.trim()));
+    pair.ok_or_else(|| Refusal::parameter(format!("--set {text}: write KEY=VALUE")))
 }
 
 /// Listens at the given address, or at this port of the loopback interface, and prints the address.

@@ -2,7 +2,7 @@
 //! run by the host with the safety layers of every run.
 
 use super::plant::SIMULATED;
-use super::{Arguments, ProtocolOption, plant};
+use super::{Arguments, ProtocolOption, key_value, plant};
 use flotor_emulation::port::Reach;
 use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Axes, Capabilities, Refusal};
@@ -45,13 +45,7 @@ fn anonymous_file(text: &str) -> std::io::Result<File> {
 fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> {
     // About a year: the run ends on Ctrl-C.
     let mut scene = format!("duration_s = 3.0e7\n[device]\nplugin = {device:?}\n[device.parameters]\n");
-    let mut sets = Vec::new();
-    for text in &arguments.sets {
-        let (key, value) = text
-            .split_once('=')
-            .ok_or_else(|| Refusal::parameter(format!("--set {text}: write KEY=VALUE")))?;
-        sets.push((key.trim(), value.trim()));
-    }
+    let mut sets = arguments.sets.iter().map(|text| key_value(text)).collect::<Result<Vec<_>, _>>()?;
     sets.splice(0..0, resting(device, &sets));
     for (key, value) in &sets {
         // Numbers are written as numbers, other values as strings.

@@ -194,7 +194,6 @@ impl Controller {
     }
 
     /// Returns the fault bits; a fault stays set until a client resets the faults.
-    #[must_use]
     pub fn faults(&self) -> FaultBits {
         self.faults
     }

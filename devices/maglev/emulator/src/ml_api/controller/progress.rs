@@ -106,7 +106,7 @@ impl Controller {
     fn finish(&mut self, procedure_id: ProcedureId, reply: Reply) {
         // Several calls may wait, and their clients may be disconnected: only the newest replies are stored.
         if self.finished.len() >= KEPT {
-            self.finished.remove(0);
+            let _ = self.finished.remove(0);
         }
         self.finished.push((procedure_id, reply));
     }

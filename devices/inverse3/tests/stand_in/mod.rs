@@ -2,63 +2,19 @@
 //!
 //! `flotor emulate haply-service` is a correct service; this one simulates faulty ones.
 
-use flotor_hal::DVec3;
 use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use tungstenite::handshake::derive_accept_key;
 
-/// Id of the arm under test.
-pub const ARM: &str = "049D";
-/// Id of the other arm.
-pub const OTHER_ARM: &str = "0001";
-/// Id of the grip.
-pub const GRIP: &str = "61B8";
+mod texts;
 
-/// Returns a state with the cursor at a position, m, and a force on the hand, N.
-#[must_use]
-pub fn state(position_m: DVec3, force_n: DVec3) -> String {
-    reply(position_m, force_n, "")
-}
-
-/// Returns the reply to a configuration with all required settings, for a gain of the force gate.
-#[must_use]
-pub fn configured(force_gate: f64) -> String {
-    let config = format!(
-        "\"config\":{{\"type\":\"inverse3\",\"basis\":{{\"permutation\":\"XYZ\"}},\"preset\":\"arm_front_centered\",\
-         \"filters\":{{\"force_gate\":{{\"gain\":{force_gate}}},\"damping\":{{\"scalar\":0.0}}}},\
-         \"gravity_compensation\":{{\"enabled\":true,\"scaling_factor\":1.0}}}},"
-    );
-    reply(DVec3::ZERO, DVec3::ZERO, &config)
-}
-
-fn reply(position_m: DVec3, force_n: DVec3, config: &str) -> String {
-    let vector = |DVec3 { x, y, z }: DVec3| format!("{{\"x\":{x:?},\"y\":{y:?},\"z\":{z:?}}}");
-    let arm = |id: &str, config: &str, position_m: DVec3, force_n: DVec3| {
-        format!(
-            "{{\"device_id\":\"{id}\",{config}\"state\":{{\"cursor_position\":{},\"cursor_velocity\":{},\
-             \"angular_position\":{{\"a0\":1.0,\"a1\":2.0,\"a2\":3.0}},\"current_cursor_force\":{},\
-             \"control_domain\":\"cartesian\",\"control_mode\":\"idle\",\"transform\":{{}}}},\
-             \"status\":{{\"calibrated\":true,\"in_use\":false,\"power_supply\":true,\"ready\":true,\"started\":true}}}}",
-            vector(position_m),
-            vector(DVec3::ZERO),
-            vector(force_n)
-        )
-    };
-    let half = std::f64::consts::FRAC_1_SQRT_2;
-    let (other, own) = (arm(OTHER_ARM, "", DVec3::ONE, DVec3::ONE), arm(ARM, config, position_m, force_n));
-    format!(
-        "{{\"session_id\":7,\"inverse3\":[{other},{own}],\"verse_grip\":[],\"wireless_verse_grip\":[\
-         {{\"device_id\":\"{GRIP}\",\"state\":{{\"battery_level\":0.9,\"buttons\":{{\"a\":true,\"b\":false,\"c\":true}},\
-         \"orientation\":{{\"w\":{half},\"x\":0.0,\"y\":0.0,\"z\":{half}}}}},\
-         \"status\":{{\"ready\":true,\"connected\":true,\"awake\":true}}}}]}}"
-    )
-}
+pub(crate) use texts::{ARM, GRIP, OTHER_ARM, configured, state};
 
 /// Reply to a message.
 #[derive(Clone, Debug)]
-pub enum Said {
+pub(crate) enum Said {
     /// A text message.
     Text(String),
     /// Raw bytes, for malformed frames.
@@ -71,7 +27,7 @@ pub enum Said {
 
 /// Scripted service on a port of this machine, for one client after another.
 #[derive(Debug)]
-pub struct StandIn {
+pub(crate) struct StandIn {
     /// Address, `host:port`.
     pub address: String,
     received: Arc<Mutex<Vec<String>>>,
@@ -84,7 +40,7 @@ impl StandIn {
     ///
     /// # Errors
     /// If there is no port, or no thread.
-    pub fn start(answer: impl FnMut(usize, &str) -> Said + Send + 'static) -> io::Result<Self> {
+    pub(crate) fn start(answer: impl FnMut(usize, &str) -> Said + Send + 'static) -> io::Result<Self> {
         let listener = TcpListener::bind("127.0.0.1:0")?;
         let address = listener.local_addr()?.to_string();
         let received = Arc::new(Mutex::new(Vec::new()));
@@ -102,20 +58,20 @@ impl StandIn {
 
     /// Returns the number of closed connections.
     #[must_use]
-    pub fn ended(&self) -> usize {
+    pub(crate) fn ended(&self) -> usize {
         self.ended.load(Ordering::Acquire)
     }
 
     /// Returns all received messages of all connections.
     #[must_use]
-    pub fn received(&self) -> Vec<String> {
+    pub(crate) fn received(&self) -> Vec<String> {
         self.received.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }
 
 /// Encodes a text as an unfragmented frame of a server.
 #[must_use]
-pub fn frame(text: &str) -> Vec<u8> {
+pub(crate) fn frame(text: &str) -> Vec<u8> {
     let mut frame = vec![0x81];
     match u16::try_from(text.len()) {
         Ok(short @ 0..126) => frame.extend(short.to_be_bytes().get(1)),
