@@ -62,9 +62,15 @@ pub(crate) fn hid_is_offered() -> Result<(), &'static str> {
     )
 }
 
-#[cfg(test)]
-#[cfg(feature = "usb")]
+#[cfg(all(test, any(feature = "usb", feature = "hid")))]
 mod tests {
+    #[cfg(feature = "hid")]
+    #[test]
+    fn hid_is_refused_because_sending_would_wait() {
+        assert!(super::hid_is_offered().is_err_and(|reason| reason.contains("not supported on Windows")));
+    }
+
+    #[cfg(feature = "usb")]
     #[test]
     fn a_device_without_winusb_needs_a_driver() {
         let remedy = super::driver_remedy(0x1209, 0xf107).expect("there is one");

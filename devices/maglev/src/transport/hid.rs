@@ -74,15 +74,3 @@ fn refused(address: &str, wanted: &UsbAddress, error: &HidError) -> OpenError {
         false => OpenError::Missing { address, cause },
     }
 }
-
-#[cfg(test)]
-#[cfg(windows)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn hid_is_refused_because_sending_would_wait() {
-        let refused = open("1209:f107").err().map(|error| error.to_string());
-        assert!(refused.is_some_and(|said| said.contains("not supported on Windows")));
-    }
-}

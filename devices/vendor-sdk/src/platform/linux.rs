@@ -21,6 +21,14 @@ pub(crate) fn missing_remedy(path: &Path) -> String {
     format!("`ldd {}` lists the required libraries and the missing ones", path.display())
 }
 
+/// Returns the file names of a library on this system, of those on Linux and on Windows.
+pub(crate) fn files(
+    files: &'static [&'static str],
+    _on_windows: &'static [&'static str],
+) -> &'static [&'static str] {
+    files
+}
+
 /// Returns the library search path from environment variables, in order: the folders of the SDK (`variables`),
 /// `LD_LIBRARY_PATH`, the user's `~/.local/lib`, and the library folders of the system.
 pub(crate) fn folders(variables: &[&str], said: impl Fn(&str) -> Option<String>) -> Vec<PathBuf> {
@@ -76,4 +84,55 @@ pub fn without_signals<T>(body: impl FnOnce() -> T) -> T {
         unsafe { libc::pthread_sigmask(libc::SIG_SETMASK, before.as_ptr(), std::ptr::null_mut()) };
     }
     value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use crate::search::{Sdk, fits};
+
+    const SDK: Sdk = Sdk {
+        name: "an SDK",
+        files: &["libsome.so.3", "libsome.so"],
+        files_on_windows: &["some64.dll"],
+        variables: &["SOMESDK"],
+    };
+
+    #[test]
+    fn the_folder_of_the_sdk_comes_before_those_of_the_system() {
+        let said = |variable: &str| match variable {
+            "SOMESDK" => Some("/opt/some".to_owned()),
+            "LD_LIBRARY_PATH" => Some("/first::relative:/second".to_owned()),
+            _ => None,
+        };
+        let places: Vec<String> = SDK.places(said).iter().map(|place| place.display().to_string()).collect();
+        let machine = std::env::consts::ARCH;
+        assert_eq!(places[0], format!("/opt/some/lib/release/lin-{machine}-gcc/libsome.so.3"));
+        let here = std::env::current_dir().unwrap().join("relative").display().to_string();
+        let folders = ["/first", &here, "/second"];
+        let files =
+            folders.map(|folder| ["libsome.so.3", "libsome.so"].map(|file| format!("{folder}/{file}")));
+        assert_eq!(places[6..12], files.concat(), "an empty folder is none");
+    }
+
+    #[test]
+    fn a_file_is_told_by_its_head() {
+        const CLASS: u8 = if usize::BITS == 64 { 2 } else { 1 };
+        const MACHINE: u16 = if cfg!(target_arch = "aarch64") { 183 } else { 62 };
+        let path = Path::new("/a/lib.so");
+        let head = |class: u8, machine: u16| {
+            let mut head = [0_u8; HEAD];
+            head[..5].copy_from_slice(&[0x7f, b'E', b'L', b'F', class]);
+            head[18..].copy_from_slice(&machine.to_le_bytes());
+            head
+        };
+        assert_eq!(fits(path, &head(CLASS, MACHINE)), Ok(()));
+        let told = |head: &[u8]| fits(path, head).expect_err("it does not fit").to_string();
+        assert!(told(&head(1, 3)).contains("is for 32-bit x86 and this program for 64-bit"));
+        assert!(told(&head(1, 40)).contains("is for 32-bit ARM"));
+        assert!(told(&head(2, 243)).contains("a 64-bit processor of number 243"));
+        assert!(told(b"#!/bin/sh\n").contains("not a shared library"));
+        assert!(told(&head(2, 62)[..19]).contains("not a shared library"), "a head that is cut off");
+    }
 }

@@ -1,7 +1,7 @@
 //! Largest stable stiffness of a virtual spring on a device: measured on the simulated flotor, compared with theory.
 //!
-//! A servo renders a spring by sampling the handle's position `x` once a period `T`, and by holding the force `-u` on
-//! the handle until the next sample (zero-order hold),
+//! A servo renders a spring by sampling the handle's position `x` once a period `T`; the force `-u` on the handle is constant
+//! until the next sample (zero-order hold),
 //!
 //! ```text
 //! u = K x[k] + B (x[k] - x[k-1]) / T
