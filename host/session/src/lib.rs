@@ -21,7 +21,6 @@ mod feel;
 pub mod headless;
 mod long_call;
 mod measurements;
-mod nanoseconds;
 mod platform;
 mod plugin_process;
 pub mod program;

@@ -10,11 +10,10 @@
 //! limited time after the first tick that reads it; then it fades to zero, and [`ProgramCounts`] counts the lapse. Force fades in
 //! when the program enables it. Neither side waits for the other.
 
-use crate::nanoseconds::whole_ns;
 use crate::scene::{ModelUse, Scene};
-use flotor_core::lock;
 use flotor_core::mapping::Mapping;
 use flotor_core::words::{Decoder, Encoder};
+use flotor_core::{lock, to_ns};
 use flotor_hal::abi::{Entry, model_entry};
 use flotor_hal::{
     Demand, ForceModel, Input, Memory, ModelInfo, Output, Parameter, Refusal, Settings, StepStatus, Wrench,
@@ -242,7 +241,7 @@ fn ramp_ns(model: &ModelUse) -> u64 {
 
 /// Converts ms of a parameter to ns.
 fn nanoseconds(time_ms: f64) -> u64 {
-    whole_ns(time_ms * 1.0e6)
+    to_ns(time_ms * 1.0e-3)
 }
 
 /// Force model with the wrench of a program. All times are tick times, so that a run on the virtual clock is repeatable.

@@ -46,8 +46,7 @@ pub enum RunError {
          correct the cause, or remove that line"
     )]
     WatchdogProcess(std::io::Error),
-    /// Only the watchdog process stops a device after the end of this process, and one kill of their control group ends both
-    /// processes.
+    /// Only the watchdog process stops a device after the end of this process, and one kill of their control group ends both processes.
     #[error(
         "the force of `{device}` would stay on if the control group (cgroup) `{group}` were killed, for \
          example at a service or container stop or when memory runs out: the watchdog process belongs to the \

@@ -36,13 +36,13 @@ pub use unfreed_plugins::UnfreedPlugins;
 pub use unguarded::Guardian;
 
 use crate::calls::EndReserve;
-use crate::nanoseconds::whole_ns;
 use crate::registry::Registry;
 use crate::scene::Scene;
 use ceiling::Guards;
 use controls::{ChangeLog, PluginTable};
 use fit::check_fit;
 use flotor_core::demand::ObserverDemand;
+use flotor_core::{period_ns, to_ns};
 use flotor_coupling::{Line, LinkTimeouts, Reach};
 use flotor_hal::abi::loader::Stopper;
 use flotor_hal::{Capabilities, LoopConfig};
@@ -96,7 +96,7 @@ impl Session {
     /// [`RunError`].
     pub fn prepare(scene: &Scene, registry: &Registry, options: &RunOptions) -> Result<Self, RunError> {
         let RunOptions { clock, seed } = *options;
-        let config = LoopConfig { period_ns: whole_ns(1.0e9 / scene.rate_hz), seed };
+        let config = LoopConfig { period_ns: period_ns(scene.rate_hz), seed };
         let latch = (clock == Clock::Real).then(LatchGuard::of_this_user);
 
         let (opened, mut plugins) = open_devices(registry, scene)?;
@@ -122,8 +122,7 @@ impl Session {
         let (swaps, host_swaps) = swap_queues(models.len(), replacements);
         let controls = Controls::new(table.clone(), sender, &scene.models, (config, clock), host_swaps);
 
-        let [ramp_ns, watchdog_ns] =
-            [scene.limits.ramp_s, scene.limits.watchdog_s].map(|seconds| whole_ns(seconds * 1.0e9));
+        let [ramp_ns, watchdog_ns] = [scene.limits.ramp_s, scene.limits.watchdog_s].map(to_ns);
         let capabilities: Vec<_> = opened.iter().map(|opened| opened.capabilities).collect();
         // A partner on another host has the same timeout as the loop.
         let timeouts = LinkTimeouts { silence_ns: watchdog_ns, fade_ns: ramp_ns };
@@ -143,7 +142,7 @@ impl Session {
                 plugins,
                 taps: Taps::default(),
                 period_ns: config.period_ns,
-                duration_ns: whole_ns(scene.duration_s * 1.0e9),
+                duration_ns: to_ns(scene.duration_s),
             },
             clock,
             real_clock: RealClock {

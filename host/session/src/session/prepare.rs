@@ -4,7 +4,6 @@ use super::{PluginReport, RunError, StopWithoutHost};
 use crate::calibration_file::{CalibrationFile, CalibrationFileError};
 use crate::calls::{Call, CallThread, Progress, is_to_begin, keeping_machine, limit};
 use crate::estimates;
-use crate::nanoseconds::whole_ns;
 use crate::registry::{LookupError, Registry, is_installed};
 use crate::scene::{
     CalibrationUse, DeviceUse, Isolation, ModelUse, ParameterText, PluginUse, Scene, SceneError,
@@ -12,6 +11,7 @@ use crate::scene::{
 use flotor_core::demand::hand_demand;
 use flotor_core::limits::Bound;
 use flotor_core::mapping::Mapping;
+use flotor_core::to_ns;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Metadata, OpenedDevice, Plugin, Setting};
 use flotor_hal::{
@@ -317,7 +317,7 @@ const PATIENCE_NS: u64 = 2_000_000_000;
 /// Returns the time limit of a step of a model, ns; `None` on the virtual clock unless the scene sets a limit: a limit on wall-clock
 /// time would make two runs differ.
 fn budget_ns(model: &ModelUse, clock: Clock, period_ns: u64) -> Option<u64> {
-    let set_ns = model.budget_s.map(|seconds| whole_ns(seconds * 1.0e9));
+    let set_ns = model.budget_s.map(to_ns);
     let usual_ns = match clock {
         Clock::Real => Some(period_ns / 2),
         Clock::Virtual => None,

@@ -2,10 +2,9 @@
 
 use super::controls::{ChosenBy, PluginTable, understands};
 use super::{ControlError, NewValue, PluginReport, RunError, prepare_model};
-use crate::nanoseconds::whole_ns;
 use crate::registry::Registry;
 use crate::scene::{Alternative, ChangeUse, ChangeWhat, ParameterText, Scene};
-use flotor_core::Random;
+use flotor_core::{Random, to_ns};
 use flotor_hal::LoopConfig;
 use flotor_servo::{Clock, Replacement, ScheduledChange};
 
@@ -29,7 +28,7 @@ pub(super) fn schedule(
     // Alternatives not drawn by this seed, per model.
     let mut passed_over: Vec<Vec<PluginReport>> = vec![Vec::new(); scene.models.len()];
     for (draw, change) in (0..).zip(in_time) {
-        let time_ns = whole_ns(change.at_s * 1.0e9);
+        let time_ns = to_ns(change.at_s);
         let wrong = |key: &str, error: ControlError| change.location.problem(format!("`{key}`: {error}"));
         let checked = match &change.what {
             ChangeWhat::Set { plugin, parameter: ParameterText { key, value, .. } } => {

@@ -21,8 +21,7 @@ use flotor_servo::{
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
-/// Number of records in a batch. Observers are called between two batches, so that a slow observer delays the run and loses no
-/// record.
+/// Number of records in a batch. Observers are called between two batches, so that a slow observer delays the run and loses no record.
 const BATCH: usize = 1024;
 /// Poll interval while a batch runs.
 const LOOK: Duration = Duration::from_millis(20);

@@ -48,8 +48,7 @@ pub fn publish(
     announce(directory, scene, run, session, Arc::new(host))
 }
 
-/// Publishes a prepared run in `directory`, so that clients can find and observe it; `host` handles all other requests. Not
-/// real-time.
+/// Publishes a prepared run in `directory`, so that clients can find and observe it; `host` handles all other requests. Not real-time.
 ///
 /// # Errors
 /// [`PublishError`]; the session can still run, without clients.

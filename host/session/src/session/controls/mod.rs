@@ -57,8 +57,7 @@ impl Controls {
         Self { shared: Arc::new(Shared { plugins, changes, models: models.to_vec(), config, clock, swaps }) }
     }
 
-    /// Returns name and parameter schema of each plugin of the run, replacements included: devices, then models, in the scene's
-    /// order.
+    /// Returns name and parameter schema of each plugin of the run, replacements included: devices, then models, in the scene's order.
     #[must_use]
     pub fn plugins(&self) -> Vec<(String, &'static [Parameter])> {
         let plugins = self.shared.plugins.lock();
@@ -77,8 +76,7 @@ impl Controls {
         self.set_parameters(&[NewValue { plugin, parameter, value }])
     }
 
-    /// Moves several live parameters to new values, all from the same tick on; each as [`Controls::set_parameter`] does. Not
-    /// real-time.
+    /// Moves several live parameters to new values, all from the same tick on; each as [`Controls::set_parameter`] does. Not real-time.
     ///
     /// # Errors
     /// [`ControlError`]; then no parameter changes.
