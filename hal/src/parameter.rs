@@ -236,7 +236,9 @@ pub enum SetParameterError {
 impl fmt::Display for SetParameterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Fixed => f.write_str("the parameter is fixed beside the present values of the others"),
+            Self::Fixed => {
+                f.write_str("the parameter cannot change with the present values of the other parameters")
+            }
             Self::OutOfRange(error) => error.fmt(f),
         }
     }

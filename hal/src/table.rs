@@ -71,7 +71,8 @@ impl<'a> Table<'a> {
             }
             first = lines.next();
         }
-        let (header_line, header) = first.ok_or_else(|| TextProblem::at(1, "the table is empty"))?;
+        let (header_line, header) = first
+            .ok_or_else(|| TextProblem::at(1, "the table is empty; write a header and at least one row"))?;
         let at = |problem| TextProblem::at(header_line, problem);
         if let Some(separator) =
             [";", "\t"].into_iter().find(|other| header.contains(other) && !header.contains(','))
@@ -125,7 +126,7 @@ impl<'a> Table<'a> {
                 _ => "",
             };
             let cells = if found == 1 { "cell" } else { "cells" };
-            Err(TextProblem::at(line, format!("{found} {cells} for {expected} columns{hint}")))
+            Err(TextProblem::at(line, format!("the line has {found} {cells} for {expected} columns{hint}")))
         })
     }
 }
@@ -194,7 +195,7 @@ fn cells(line: &str) -> Result<Vec<Cow<'_, str>>, String> {
         match after.strip_prefix(',') {
             Some(next) => rest = next,
             None if after.is_empty() => return Ok(cells),
-            None => return Err("a comma is expected after a closing quotation mark".to_owned()),
+            None => return Err("a comma must follow a closing quotation mark".to_owned()),
         }
     }
 }
@@ -204,7 +205,9 @@ fn quoted_cell(text: &str) -> Result<(String, &str), String> {
     let mut cell = String::new();
     let mut rest = text;
     loop {
-        let end = rest.find('"').ok_or("a quotation mark is not closed in this line")?;
+        let end = rest.find('"').ok_or(
+            "a quotation mark is not closed in this line; close it, or double a mark inside the text",
+        )?;
         cell.push_str(&rest[..end]);
         rest = &rest[end + 1..];
         match rest.strip_prefix('"') {
@@ -260,18 +263,18 @@ mod tests {
     #[test]
     fn what_is_refused_has_a_line_and_the_cause() {
         for (text, says) in [
-            ("", "t:1: the table is empty"),
+            ("", "t:1: the table is empty; write a header and at least one row"),
             ("x;y\n1,5;2\n", "t:1: columns are separated by `;`; separate them with commas"),
             ("sep=;\nx;y\n1;2\n", "t:1: columns are separated by `;`"),
             ("x\ty\n1\t2\n", "t:1: columns are separated by tabs"),
-            ("x,y\n1,2\n3;4\n", "t:3: 1 cell for 2 columns; separate them with commas"),
-            ("x,y\n0,5,1,5\n", "t:2: 4 cells for 2 columns; write numbers with a decimal point"),
+            ("x,y\n1,2\n3;4\n", "t:3: the line has 1 cell for 2 columns; separate them with commas"),
+            ("x,y\n0,5,1,5\n", "t:2: the line has 4 cells for 2 columns; write numbers with a decimal point"),
             ("x,y\n\"0,5\",\"1,5\"\n", "t:2: `x` must be a number, not `0,5`: write a decimal point"),
             ("x,y\n1,\n", "t:2: `y` must be a number, not ``"),
             (",x\n0,1\n", "t:1: column 1 has no name"),
             ("x,y,x\n0,1,2\n", "t:1: the column `x` is given twice; remove one"),
             ("x,y\n\"1,2\n", "t:2: a quotation mark is not closed"),
-            ("x,y\n\"1\"2,3\n", "t:2: a comma is expected"),
+            ("x,y\n\"1\"2,3\n", "t:2: a comma must follow"),
             ("x,y\n\u{1b}[31m,3\n", "t:2: `x` must be a number, not `\\u{1b}[31m`"),
         ] {
             let told = numbers(text).expect_err("refused");

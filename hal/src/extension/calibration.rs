@@ -52,13 +52,17 @@ pub enum InvalidCalibration {
 impl std::fmt::Display for InvalidCalibration {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Range([from, to]) => write!(f, "invalid range {from:?} m to {to:?} m"),
+            Self::Range([from, to]) => write!(
+                f,
+                "the range {from:?} m to {to:?} m is invalid; give two finite heights, the lower first"
+            ),
             Self::Count(count) => {
-                write!(f, "{count} coefficients; give 1 to {CALIBRATION_COEFFICIENTS}")
+                write!(f, "the polynomial has {count} coefficients; give 1 to {CALIBRATION_COEFFICIENTS}")
             }
             Self::Share { height_m, share } => write!(
                 f,
-                "the ratio of delivered to commanded force is {share:?} at {:.3} mm; a ratio between {} and {} is plausible",
+                "the ratio of delivered to commanded force is {share:?} at {:.3} mm, but must be between {} \
+                 and {}",
                 height_m * 1.0e3,
                 PLAUSIBLE_SHARE[0],
                 PLAUSIBLE_SHARE[1]

@@ -171,7 +171,7 @@ pub mod means {
     impl Independence {
         /// Checks a plugin's declaration and duplicates its descriptor; `None` without an independent stop.
         pub(crate) fn of(declared: &IndependentStop) -> Result<Option<Self>, Refusal> {
-            let wrong = |what: String| Refusal::broken(format!("its independent stop {what}"));
+            let wrong = |what: String| Refusal::broken(format!("the independent stop of the device {what}"));
             let state = match declared.state {
                 0 => StoppedState::Zero,
                 1 => StoppedState::Landed,
@@ -187,7 +187,9 @@ pub mod means {
             }
             let message = declared.message.get(..length).filter(|message| !message.is_empty());
             let Some(message) = message.map(<[u8]>::to_vec) else {
-                return Err(wrong(format!("has {length} bytes, but must have 1 to {STOP_MESSAGE_BYTES}")));
+                return Err(wrong(format!(
+                    "has a message of {length} bytes, but needs 1 to {STOP_MESSAGE_BYTES}"
+                )));
             };
             // SAFETY: the plugin keeps it open until the device is closed (contract), and the device is open.
             let handle = unsafe { writable_duplicate(declared.descriptor) }.map_err(wrong)?;

@@ -354,13 +354,13 @@ pub enum InvalidShape {
 impl std::fmt::Display for InvalidShape {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Failed => "the call failed",
-            Self::TooLarge => "more than a million corners, triangles or primitives",
-            Self::Empty => "neither a primitive nor a triangle",
-            Self::Missing => "a list is missing although its length is not 0",
-            Self::Corner => "a triangle has a corner that is not in the list",
-            Self::Number => "a number is not finite, or a side is negative",
-            Self::Text => "the name or the unit of its field is longer than 64 bytes",
+            Self::Failed => "the model returned an error instead of a shape",
+            Self::TooLarge => "the shape has more than a million corners, triangles or primitives",
+            Self::Empty => "the shape has neither a primitive nor a triangle",
+            Self::Missing => "the shape has a list that is null or misaligned although its length is not 0",
+            Self::Corner => "a triangle of the shape has an index beyond the list of corners",
+            Self::Number => "a number of the shape is not finite, or a side is negative",
+            Self::Text => "the name or the unit of the field is longer than 64 bytes",
         })
     }
 }

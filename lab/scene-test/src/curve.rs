@@ -249,7 +249,7 @@ mod tests {
             ("", "c:1: the table is empty"),
             ("z_m\n1", "no column to compare"),
             ("z_mm,fz_n\n1,1", "unknown column `z_mm`"),
-            ("z_m,fz_n\n1,1\n2", "c:3: 1 cell for 2"),
+            ("z_m,fz_n\n1,1\n2", "c:3: the line has 1 cell for 2"),
             ("z_m,fz_n\n1,x", "c:2: `fz_n` must be a number, not `x`"),
             ("z_m,fz_n\n", "the table has no row"),
         ] {

@@ -152,16 +152,16 @@ fn a_mistake_in_c_is_told_in_one_line() {
         return;
     }
     let wrong = [
-        ("WITHOUT_STEP", "`flotor.force/1` lacks `step`, which every plugin of this kind needs"),
-        ("WITHOUT_TABLE", "`flotor.force/1` lacks its function table, which every plugin of this kind needs"),
-        ("SHORT_TABLE", "`flotor.force/1` lacks part of its table, which every plugin of this kind needs"),
         (
-            "MISALIGNED_TABLE",
-            "`flotor.force/1` lacks an aligned table, which every plugin of this kind needs",
+            "WITHOUT_STEP",
+            "the table `flotor.force/1` has no `step`; use the export macros or the current header",
         ),
+        ("WITHOUT_TABLE", "the table `flotor.force/1` is missing; use the export macros"),
+        ("SHORT_TABLE", "the table `flotor.force/1` is shorter than in the contract; use the export macros"),
+        ("MISALIGNED_TABLE", "the table `flotor.force/1` is not aligned; use the export macros"),
         (
             "SHORT_EXTENSION",
-            "`flotor.active-region/1` lacks part of its table, which every plugin of this kind needs",
+            "the table `flotor.active-region/1` is shorter than in the contract; use the export macros",
         ),
         ("OTHER_KIND", "the metadata have the kind model, the entry's `kind` is 2 (device); make both equal"),
         ("ODD_KIND", "the metadata have the kind model, the entry's `kind` is 7 (unknown); make both equal"),

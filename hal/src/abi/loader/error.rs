@@ -118,13 +118,16 @@ pub enum LoadError {
         cause: String,
     },
     /// The interface of the plugin's kind, or a required function of the interface, is missing.
-    #[error("{}: `{interface}` lacks {missing}, which every plugin of this kind needs", path.display())]
+    #[error(
+        "{}: {} {missing}; use the export macros or the current header, and build the plugin again",
+        path.display(), table_words(interface)
+    )]
     MissingFunction {
         /// Path of the plugin.
         path: PathBuf,
-        /// Id of the interface.
+        /// Id of the table, or "the entry".
         interface: &'static str,
-        /// Name of the missing function or table.
+        /// Missing function or property, as a verb with its object.
         missing: &'static str,
     },
     /// The parameter schema has invalid counts or texts.
@@ -178,6 +181,11 @@ const fn advice(kind: RefusalKind) -> &'static str {
         RefusalKind::Broken => "; report this to the author of the plugin",
         RefusalKind::Parameter | RefusalKind::Unsupported | RefusalKind::Resource => "",
     }
+}
+
+/// Returns the subject of an error about a table.
+fn table_words(interface: &str) -> String {
+    if interface.starts_with("flotor.") { format!("the table `{interface}`") } else { interface.to_owned() }
 }
 
 fn kind_word(code: u32) -> &'static str {

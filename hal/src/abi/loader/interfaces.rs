@@ -33,7 +33,7 @@ impl Interface {
         kind: PluginKind,
     ) -> Result<Self, LoadError> {
         let Some(get_interface) = entry.get_interface else {
-            return Err(lack(path, "the entry", "`get_interface`"));
+            return Err(lack(path, "the entry", "has no `get_interface`"));
         };
         let offers = Offers { path, get_interface };
         match kind {
@@ -71,14 +71,14 @@ impl Offers<'_> {
     fn device(&self) -> Result<Interface, LoadError> {
         let device: &'static DeviceTable = self.required()?;
         let functions = [
-            ("`open`", device.open.is_some()),
-            ("`close`", device.close.is_some()),
-            ("`capabilities`", device.capabilities.is_some()),
-            ("`activate`", device.activate.is_some()),
-            ("`deactivate`", device.deactivate.is_some()),
-            ("`read`", device.read.is_some()),
-            ("`write`", device.write.is_some()),
-            ("`safe_stop`", device.safe_stop.is_some()),
+            ("has no `open`", device.open.is_some()),
+            ("has no `close`", device.close.is_some()),
+            ("has no `capabilities`", device.capabilities.is_some()),
+            ("has no `activate`", device.activate.is_some()),
+            ("has no `deactivate`", device.deactivate.is_some()),
+            ("has no `read`", device.read.is_some()),
+            ("has no `write`", device.write.is_some()),
+            ("has no `safe_stop`", device.safe_stop.is_some()),
         ];
         self.check_functions(DeviceTable::ID, &functions)?;
         let extensions = DeviceExtensions::of(self)?;
@@ -88,16 +88,16 @@ impl Offers<'_> {
     fn model(&self) -> Result<Interface, LoadError> {
         let force: &'static ForceTable = self.required()?;
         let functions = [
-            ("`create`", force.create.is_some()),
-            ("`destroy`", force.destroy.is_some()),
-            ("`step`", force.step.is_some()),
+            ("has no `create`", force.create.is_some()),
+            ("has no `destroy`", force.destroy.is_some()),
+            ("has no `step`", force.step.is_some()),
         ];
         self.check_functions(ForceTable::ID, &functions)?;
         Ok(Interface::Model(ModelTables { force, extensions: ModelExtensions::of(self)? }))
     }
 
     fn required<T: Table>(&self) -> Result<&'static T, LoadError> {
-        self.table()?.ok_or_else(|| self.lacks(T::ID, "its function table"))
+        self.table()?.ok_or_else(|| self.lacks(T::ID, "is missing"))
     }
 
     /// Returns the table of an id; `None` if the plugin does not offer the table. A table that is too short is a
@@ -110,13 +110,13 @@ impl Offers<'_> {
             return Ok(None);
         }
         if !table.is_aligned() {
-            return Err(self.lacks(T::ID, "an aligned table"));
+            return Err(self.lacks(T::ID, "is not aligned"));
         }
         // SAFETY: not null, and aligned for a `T`, hence for the number it starts with ([`Table`]); so much
         // of it is there, however short it is ([`Interface::find`]).
         let size = unsafe { table.cast::<u32>().read() };
         if (size as usize) < size_of::<T>() {
-            return Err(self.lacks(T::ID, "part of its table"));
+            return Err(self.lacks(T::ID, "is shorter than in the contract"));
         }
         // SAFETY: not null and aligned, as was seen above; a `T` by its id, whole by its own word, and a
         // static of a library that is never unloaded ([`Interface::find`]); it takes any bits ([`Table`]).
@@ -177,10 +177,10 @@ mod tests {
     }
 
     fn is_held_to_its_length<T: Table>() {
-        let told =
-            |what: &str| format!("some.so: `{}` lacks {what}, which every plugin of this kind needs", T::ID);
-        assert_eq!(refusal::<T>(short), told("part of its table"));
-        assert_eq!(refusal::<T>(askew), told("an aligned table"));
+        const REMEDY: &str = "use the export macros or the current header, and build the plugin again";
+        let told = |what: &str| format!("some.so: the table `{}` {what}; {REMEDY}", T::ID);
+        assert_eq!(refusal::<T>(short), told("is shorter than in the contract"));
+        assert_eq!(refusal::<T>(askew), told("is not aligned"));
         let offers = Offers { path: Path::new("some.so"), get_interface: nothing };
         assert!(offers.table::<T>().is_ok_and(|table| table.is_none()), "`{}` out of nothing", T::ID);
     }

@@ -31,14 +31,14 @@ fn rotations_are_followed_too() {
 #[test]
 fn complaints_name_the_line_and_the_column() {
     for (text, expected) in [
-        ("", "t:1: the table is empty"),
-        ("t,x,y,z\n0,0,0,0\n", "t:1: the columns are time_s,x_m,y_m,z_m or time_s,"),
+        ("", "t:1: the table is empty; write a header and at least one row"),
+        ("t,x,y,z\n0,0,0,0\n", "t:1: the columns must be time_s,x_m,y_m,z_m or time_s,"),
         ("time_s,x_m,y_m,z_m\n", "has no pose"),
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n1,0,up,0\n", "t:3: `y_m` must be a number, not `up`"),
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n0,0,0,0\n", "t:3: time 0 ns is not after 0 ns"),
         ("time_s,x_m,y_m,z_m\n0,0,0,nan\n", "t:2: `z_m` must be finite"),
         ("time_s,x_m,y_m,z_m\n0,0,0,4\n", "t:2: ([0, 0, 4]) m is outside the workspace of"),
-        ("time_s,x_m,y_m,z_m\n0,0,0\n", "t:2: 3 cells for 4 columns"),
+        ("time_s,x_m,y_m,z_m\n0,0,0\n", "t:2: the line has 3 cells for 4 columns"),
     ] {
         let problem = table(text).expect_err("refused");
         assert!(problem.starts_with(expected), "{problem}, not {expected}");
