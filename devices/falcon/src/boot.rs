@@ -100,7 +100,8 @@ impl fmt::Display for BootFailure {
             ),
             Self::NoPrompt => write!(
                 f,
-                "the boot loader did not answer {PROMPTS} times; switch the Falcon off and on, and try again"
+                "the boot loader answered none of {PROMPTS} prompts; switch the Falcon off and on, and try \
+                 again"
             ),
             Self::NotAgreed(None) => f.write_str(
                 "the boot loader did not accept the upload of a firmware; switch the Falcon off and on, and try again",

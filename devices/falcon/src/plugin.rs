@@ -36,11 +36,11 @@ const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "firmware",
         choices![],
-        "Firmware file of your own; not needed while the device has its firmware",
+        "Firmware file of your own, which the device needs once after power-off (default: none)",
     ),
     Parameter::text(
         "firmware_sha256",
-        "First digits of the SHA-256 of a firmware that is not in the built-in list",
+        "First digits of the SHA-256 of the firmware, to confirm a file that is not in the built-in list",
     ),
     Parameter::real("max_force_n", "N", 0.0, 20.0, 8.0, "Largest force on the hand"),
     Parameter::real(
@@ -57,7 +57,8 @@ const SCHEMA: &[Parameter] = &[
         0.0,
         600.0,
         30.0,
-        "Time limit for pushing the handle in and pulling it out; 0: the device must be homed already",
+        "Time limit for homing by hand (push the handle in, and pull it out); 0: the device must be homed \
+         already",
     ),
     Parameter::real(
         "velocity_cutoff_hz",
@@ -65,7 +66,8 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         500.0,
         30.0,
-        "Cutoff frequency of the low-pass filter of the velocity, which is the difference of positions",
+        "Cutoff frequency of the low-pass filter of the velocity, which is estimated by finite differences \
+         of the position",
     ),
     Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Timeout for messages of the device"),
 ];
@@ -257,7 +259,8 @@ impl FalconDevice {
         self.chip = Some(chip);
         let posture = posture(angles_rad(report.encoders), CENTRE_M).ok_or_else(|| {
             Refusal::resource(format!(
-                "the Falcon reports the counts {}, which its arms cannot have: switch the Falcon off and on, and start again",
+                "the encoder counts {} of the Falcon match no position of its arms: switch the Falcon off \
+                 and on, and start again",
                 report.encoders.map(|count| count.to_string()).join(", ")
             ))
         })?;

@@ -107,7 +107,8 @@ impl Dhd {
                     }
                 }
                 Err(Refusal::resource(format!(
-                    "no free device has the serial number {wanted}; found: {}",
+                    "no free device has the serial number {wanted} (serial numbers found: {}); correct \
+                     `serial`, or end the program that uses the device",
                     if found.is_empty() { "none".to_owned() } else { found.join(", ") }
                 )))
             }
@@ -117,8 +118,11 @@ impl Dhd {
     fn opened(functions: Functions, index: i8) -> Result<Self, Refusal> {
         let id = without_signals(|| functions.open(index));
         let id = checked(&functions, id, "opening the device").map_err(|failed| failed.refusal())?;
-        let id = i8::try_from(id)
-            .map_err(|_| Refusal::broken(format!("the SDK returned the invalid device number {id}")))?;
+        let id = i8::try_from(id).map_err(|_| {
+            Refusal::broken(format!(
+                "the SDK returned the invalid device number {id}; install another version of the SDK"
+            ))
+        })?;
         let wrist = match (functions.has_wrist(id), functions.has_active_wrist(id)) {
             (_, true) => Wrist::Driven,
             (true, false) => Wrist::Sensed,

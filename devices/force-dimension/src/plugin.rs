@@ -29,12 +29,20 @@ const SCHEMA: &[Parameter] = &[
         "Library of the SDK, libdrd.so.3 (default: searched in $FDSDK and in the library folders of the system)",
     ),
     STAND_IN,
-    Parameter::real("serial", "1", 0.0, 65_535.0, 0.0, "Serial number of the device; 0: the first one"),
+    Parameter::real(
+        "serial",
+        "1",
+        0.0,
+        65_535.0,
+        0.0,
+        "Serial number of the device; 0: the first device of the SDK",
+    ),
     Parameter::choice(
         "initialise",
         INITIALISE,
         0,
-        "automatic: when energised, a device without a reference position moves its arm to find the reference",
+        "Initialisation of a device without a reference position: never (the device is refused), or \
+         automatic (its arm moves to find the reference when energised)",
     ),
     max_force(100.0),
     max_torque(10.0),

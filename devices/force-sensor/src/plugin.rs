@@ -16,7 +16,7 @@ const SCHEMA: &[Parameter] = &[
         10.0,
         60_000.0,
         2000.0,
-        "Timeout for readings of the sensor; a slow sensor averages for a tenth of a second",
+        "Timeout for a reading of the sensor; a slow sensor needs 100 ms for each reading",
     ),
 ];
 
@@ -44,7 +44,8 @@ impl ForceSensor {
                 PollResult::Malformed => {
                     let answer = self.line.last();
                     return Err(format!(
-                        "the force sensor at {port} answers `{answer}` instead of a force like `F 1.234`"
+                        "the force sensor at {port} answers `{answer}` instead of a force like `F 1.234`; \
+                         set `port` to the port of the force sensor"
                     ));
                 }
                 PollResult::Nothing if self.line.silence() > self.timeout => {

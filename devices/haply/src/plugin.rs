@@ -44,7 +44,8 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         500.0,
         30.0,
-        "Cutoff frequency of the low-pass filter of the velocity, which is the difference of positions",
+        "Cutoff frequency of the low-pass filter of the velocity, which is estimated by finite differences \
+         of the position",
     ),
     Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 200.0, "Timeout for messages of the board"),
 ];
@@ -221,14 +222,15 @@ impl HaplyDevice {
             Refusal::resource(match no_answer {
                 NoAnswer::Lost => "the port of the board was closed; check that the board is plugged in",
                 NoAnswer::Silent => {
-                    "no board of this device replies at this port; check that the board is switched on"
+                    "no board of this device replies at this port; check that the board is switched on, and \
+                     that `port` is the port of the board"
                 }
             })
         })?;
         self.posture(angles_deg).ok_or_else(|| {
             Refusal::resource(format!(
-                "the arms cannot have the angles {:.1}° and {:.1}°: put the handle into its rest position, switch \
-                 the board off and on, and start again",
+                "the reported angles {:.1}° and {:.1}° match no position of the arms: put the handle into \
+                 its rest position, switch the board off and on, and start again",
                 angles_deg[0], angles_deg[1]
             ))
         })

@@ -40,7 +40,7 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         200.0,
         60.0,
-        "Largest distance from the centre of the arm's range",
+        "Radius of the workspace about the centre of the arm's range",
     ),
     Parameter::real("force_gate", "1", 0.0, 1.0, 0.0, "Gain of the service's force gate; 0: none"),
     Parameter::real(
@@ -49,7 +49,8 @@ const SCHEMA: &[Parameter] = &[
         0.0,
         100.0,
         0.5,
-        "Largest difference from the commanded force; above it another program commands the device, which is a fault",
+        "Largest difference between commanded and reported force; a larger difference is a fault: another \
+         program commands the device",
     ),
     Parameter::real(
         "spin_cutoff_hz",
@@ -57,7 +58,8 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         500.0,
         30.0,
-        "Cutoff frequency of the low-pass filter of the angular velocity, which is the difference of orientations",
+        "Cutoff frequency of the low-pass filter of the angular velocity, which is estimated by finite \
+         differences of the orientation",
     ),
     Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Timeout for messages of the service"),
 ];

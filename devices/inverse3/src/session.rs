@@ -136,13 +136,16 @@ fn choose(request: &Request, Inventory { arms, grips }: &Inventory) -> Result<Ch
     let ids: Vec<&str> = arms.iter().map(String::as_str).collect();
     let arm = match (&request.arm, arms.as_slice()) {
         (Some(named), _) => arms.iter().find(|id| id.eq_ignore_ascii_case(named)).ok_or_else(|| {
-            format!("the service has no device {named}; set `device` to one of its devices: {}", listed(&ids))
+            format!(
+                "the service has no device {named}; set `device` to the id of one of its devices: {}",
+                listed(&ids)
+            )
         })?,
         (None, [only]) => only,
         (None, []) => return Err("the service has no device; connect a device and switch it on".to_owned()),
         (None, _) => {
             return Err(format!(
-                "the service has several devices; choose one with `device`: {}",
+                "the service has several devices ({}); set `device` to one of their ids",
                 listed(&ids)
             ));
         }
@@ -153,7 +156,8 @@ fn choose(request: &Request, Inventory { arms, grips }: &Inventory) -> Result<Ch
         (GripRequest::OnlyOne, [only]) => Some(only.clone()),
         (GripRequest::OnlyOne, _) => {
             return Err(format!(
-                "the service has several grips; choose one with `grip`, or `none`: {}",
+                "the service has several grips ({}); set `grip` to one of their ids, or to `none` to use the \
+                 arm without a grip",
                 listed(&ids)
             ));
         }
@@ -161,7 +165,8 @@ fn choose(request: &Request, Inventory { arms, grips }: &Inventory) -> Result<Ch
             let found: Option<&Grip> = grips.iter().find(|grip| grip.id.eq_ignore_ascii_case(named));
             Some(found.cloned().ok_or_else(|| {
                 format!(
-                    "the service has no grip {named}; set `grip` to one of its grips, or `none`: {}",
+                    "the service has no grip {named} (its grips: {}); set `grip` to one of their ids, or to \
+                     `none` to use the arm without a grip",
                     listed(&ids)
                 )
             })?)

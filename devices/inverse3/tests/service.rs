@@ -233,12 +233,12 @@ fn what_cannot_be_opened_is_refused_in_one_sentence_with_what_to_do() {
         (
             plain(),
             vec![("device", "")],
-            format!("several devices; choose one with `device`: {OTHER_ARM}, {ARM}"),
+            format!("several devices ({OTHER_ARM}, {ARM}); set `device` to one of their ids"),
         ),
         (
             plain(),
             vec![("grip", "1234")],
-            format!("no grip 1234; set `grip` to one of its grips, or `none`: {GRIP}"),
+            format!("no grip 1234 (its grips: {GRIP}); set `grip` to one of their ids, or to `none`"),
         ),
         (answering(1, configured(0.3)), vec![], "`config.filters.force_gate.gain` of the device".to_owned()),
     ] {

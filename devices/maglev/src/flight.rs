@@ -44,9 +44,16 @@ pub(crate) enum Aborted {
 impl std::fmt::Display for Aborted {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Lost => f.write_str("the link to the controller broke"),
-            Self::Silent => f.write_str("the controller does not reply"),
-            Self::Faulted(condition) => write!(f, "the controller faulted ({condition})"),
+            Self::Lost => f.write_str(
+                "the link to the controller was lost; check the cable and the power of the controller",
+            ),
+            Self::Silent => f.write_str(
+                "the controller does not reply; check the power of the controller and the load of this \
+                 machine",
+            ),
+            Self::Faulted(condition) => {
+                write!(f, "the controller faulted ({condition}); check that the handle is free to move")
+            }
         }
     }
 }

@@ -145,7 +145,7 @@ impl OwnDevice {
         let (status, found_n) =
             holder.take_off(&mut self.link, status, self.options.take_off).map_err(|why| {
                 let _ = self.link.disarm(PATIENCE);
-                Refusal::resource(format!("homing failed: {why}; check that the handle is free to move"))
+                Refusal::resource(format!("homing failed: {why}"))
             })?;
         Ok((status, if self.options.finds_gravity() { found_n } else { 0.0 }))
     }

@@ -40,7 +40,8 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         1.0,
         1000.0,
         8.0,
-        "Watchdog of the controller: time without a command after which it ends the session and holds",
+        "Timeout of the controller's watchdog: without a command for this time the controller ends the \
+         session and holds the handle",
     ),
     Parameter::real("timeout_ms", "ms", 2.0, 10_000.0, 15.0, "Timeout for replies of the controller"),
     Parameter::real(
@@ -88,24 +89,57 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         1.0,
         5000.0,
         200.0,
-        "With ml-api: cutoff frequency of the low-pass filter of the velocity, which is the difference of poses",
+        "With ml-api: cutoff frequency of the low-pass filter of the velocity, which is estimated by finite \
+         differences of the pose",
     ),
     Parameter::file(
         "first_contact",
         choices![],
         "With ml-api: report of tests/hardware/first_contact.py; its parameters replace the defaults",
     ),
-    Parameter::real("landing_ms", "ms", 0.0, 10_000.0, 0.0, "Time in which the handle is lowered at the end"),
+    Parameter::real(
+        "landing_ms",
+        "ms",
+        0.0,
+        10_000.0,
+        0.0,
+        "Time in which the handle is lowered at the end; 0: the handle is not lowered",
+    ),
     Parameter::choice(
         "walls",
         WALLS,
         0,
-        "Walls of the device, inside the walls of the scene: off, as the maker's, or as in the thesis",
+        "Additional walls, inside those of the scene: off, as the maker's, or as in the thesis",
     ),
-    Parameter::real("wall_radius_mm", "mm", 1.0, 12.0, 11.0, "Distance of the spherical wall from home").live(),
-    Parameter::real("wall_x_mm", "mm", 0.5, 12.0, 12.0, "Distance of the walls on x from home").live(),
-    Parameter::real("wall_y_mm", "mm", 0.5, 12.0, 12.0, "Distance of the walls on y from home").live(),
-    Parameter::real("wall_z_mm", "mm", 0.5, 12.0, 12.0, "Distance of the walls on z from home").live(),
+    Parameter::real("wall_radius_mm", "mm", 1.0, 12.0, 11.0, "Radius of the spherical wall about home")
+        .live(),
+    Parameter::real(
+        "wall_x_mm",
+        "mm",
+        0.5,
+        12.0,
+        12.0,
+        "Distance from home to each of the two walls perpendicular to x",
+    )
+    .live(),
+    Parameter::real(
+        "wall_y_mm",
+        "mm",
+        0.5,
+        12.0,
+        12.0,
+        "Distance from home to each of the two walls perpendicular to y",
+    )
+    .live(),
+    Parameter::real(
+        "wall_z_mm",
+        "mm",
+        0.5,
+        12.0,
+        12.0,
+        "Distance from home to each of the two walls perpendicular to z",
+    )
+    .live(),
     Parameter::real(
         "wall_stiffness_n_per_m",
         "N/m",
@@ -116,15 +150,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     )
     .live(),
     Parameter::real("wall_damping_ns_per_m", "N s/m", 0.0, 40.0, 15.0, "Damping of the walls").live(),
-    Parameter::real(
-        "angle_limit_deg",
-        "°",
-        0.1,
-        7.0,
-        2.864_788_975_654_116,
-        "Limit of tilt and yaw",
-    )
-    .live(),
+    Parameter::real("angle_limit_deg", "°", 0.1, 7.0, 2.864_788_975_654_116, "Limit of tilt and yaw").live(),
     Parameter::real(
         "angle_stiffness_nm_per_rad",
         "N m/rad",
@@ -140,7 +166,8 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         100.0,
         17.0,
-        "Gamma of the spring, with the thesis's walls: the stiffness beyond the angle limit is 2.5 gamma, at least 30",
+        "With the walls of the thesis: gamma of the spring; the stiffness beyond the angle limit is 2.5 \
+         gamma in N m/rad, at least 30",
     )
     .live(),
     Parameter::real(
@@ -149,7 +176,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         1.0,
         0.15,
-        "Damping beyond the angle limit; thesis: at every angle",
+        "Damping beyond the angle limit; with the walls of the thesis at every angle",
     )
     .live(),
     Parameter::real(
@@ -268,16 +295,20 @@ impl Values {
         let parameters = table.get("device").and_then(|device| device.get("parameters"));
         let Some(parameters) = parameters.and_then(toml::Value::as_table) else {
             return Err(wrong(
-                &"the table [device.parameters] is missing; the script writes this table after the third step",
+                &"the table [device.parameters] is missing; complete three steps of \
+                     tests/hardware/first_contact.py, which then writes this table",
             ));
         };
         for (id, value) in parameters {
             let Some(index) = SCHEMA.iter().position(|parameter| parameter.id() == id) else {
-                return Err(wrong(&format_args!("the device has no parameter `{id}`")));
+                return Err(wrong(&format_args!(
+                    "the device has no parameter `{id}`; remove the line, or run the script of this \
+                     version again"
+                )));
             };
             #[allow(clippy::cast_precision_loss)] // numbers written by people
             let number = value.as_float().or_else(|| value.as_integer().map(|whole| whole as f64));
-            let checked = number.ok_or("a number is expected".to_owned()).and_then(|number| {
+            let checked = number.ok_or("must be a number".to_owned()).and_then(|number| {
                 SCHEMA[index].check(number).map_err(|error| error.to_string()).map(|_| number)
             });
             self.set(index, checked.map_err(|why| wrong(&format_args!("{id} = {value}: {why}")))?);

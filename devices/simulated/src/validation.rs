@@ -68,17 +68,18 @@ impl fmt::Display for InvalidParameter {
                 write!(f, "{name} has length {length}, but a rotation is a quaternion of length 1")
             }
             Self::DependentCoils => f.write_str(
-                "the six coils cannot push and turn in all directions: their wrenches depend on each other; set \
-                 coil_ring_a_deg and coil_ring_b_deg apart from each other and off the pole",
+                "the wrenches of the six coils are linearly dependent, so the coils cannot produce every \
+                 force and torque; set coil_ring_a_deg and coil_ring_b_deg to different angles, both away \
+                 from 0° (the pole)",
             ),
             Self::DiodesInALine => f.write_str(
-                "the three LEDs stand in a line, so the cells cannot see all six coordinates; set led_2_deg and \
-                 led_3_deg apart from each other and from 0",
+                "the three LEDs do not span a plane, so the sensors cannot measure all six coordinates; set \
+                 led_2_deg and led_3_deg to different angles, both away from 0°",
             ),
             Self::TooStiff { steps_per_ms, limit } => write!(
                 f,
-                "flotor and hand would need {steps_per_ms:.0} steps a millisecond, at most {limit:.0} are taken: lower \
-                 stiffness or damping, or raise mass and inertia"
+                "the simulation of flotor and hand would need {steps_per_ms:.0} steps per millisecond, above \
+                 the limit of {limit:.0}: lower stiffness or damping, or raise mass and inertia"
             ),
         }
     }

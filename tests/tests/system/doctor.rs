@@ -166,7 +166,7 @@ fn what_keeps_an_inverse3_from_starting_is_told() {
             String::new(),
             "1234",
             "the service has no device 1234; ",
-            "set `device` to one of its devices",
+            "set `device` to the id of one of its devices",
         ),
         (1, "nonsense".to_owned(), ARM, "malformed device state", "update the service to 3.5 or newer"),
         (2, busy, ARM, "another program commands this Inverse3", "end that program first"),

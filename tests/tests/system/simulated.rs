@@ -282,11 +282,11 @@ fn bad_parameters_are_refused_before_anything_moves_with_the_reason() {
         (&["fault=sensor-loss"], "`fault` has no effect in preset `plain`"),
         (&["velocity=kalman", "preset=plain"], "set `preset` to `full` as well"),
         (&["mass_kg=1", "sensor_noise_um=5"], "`sensor_noise_um` has no effect in preset `plain`"),
-        (&["preset=full", "led_2_deg=0"], "the three LEDs stand in a line"),
-        (&["preset=full", "led_2_deg=240", "led_3_deg=240"], "the three LEDs stand in a line"),
-        (&["preset=full", "coil_ring_a_deg=0"], "the six coils cannot push and turn"),
-        (&["preset=full", "coil_ring_b_deg=0"], "the six coils cannot push and turn"),
-        (&["hand_damping_ns_per_m=1000", "mass_kg=0.01", "hand_mass_kg=0"], "steps a millisecond"),
+        (&["preset=full", "led_2_deg=0"], "the three LEDs do not span a plane"),
+        (&["preset=full", "led_2_deg=240", "led_3_deg=240"], "the three LEDs do not span a plane"),
+        (&["preset=full", "coil_ring_a_deg=0"], "the wrenches of the six coils are linearly dependent"),
+        (&["preset=full", "coil_ring_b_deg=0"], "the wrenches of the six coils are linearly dependent"),
+        (&["hand_damping_ns_per_m=1000", "mass_kg=0.01", "hand_mass_kg=0"], "steps per millisecond"),
     ] {
         let ran = run_demo(settings);
         assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{settings:?}: {ran:?}");

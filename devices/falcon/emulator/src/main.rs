@@ -59,7 +59,7 @@ impl Arguments {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum TransportOption {
-    /// A connection, for the plugin with `address = "tcp:HOST:PORT"`
+    /// TCP connection; set `address = "tcp:HOST:PORT"` in the plugin
     Tcp,
     /// USB of this machine, for every program (with the module vhci_hcd, as root)
     #[cfg(target_os = "linux")]

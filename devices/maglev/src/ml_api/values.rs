@@ -252,7 +252,7 @@ impl fmt::Display for Status {
             Self::FREQUENCY => "frequency out of range",
             Self::SPEED => "speed out of range",
             Self::COMMUNICATION => "communication error",
-            Self::RECEIVE_ONLY => "another client commands",
+            Self::RECEIVE_ONLY => "another client controls the device",
             Self::NO_MATCH => "no match",
             Self::LANDED => "landed",
             Self::TAKEN_OFF => "taken off",

@@ -66,7 +66,10 @@ impl std::fmt::Display for Failed {
                 f,
                 "the controller stays faulted ({bits}); hold the handle within the range of the sensors"
             ),
-            Self::NoTick => f.write_str("the controller sends no ticks"),
+            Self::NoTick => f.write_str(
+                "the controller sends no ticks; check that no firewall blocks connections from the \
+                 controller, and restart the controller",
+            ),
         }
     }
 }

@@ -142,7 +142,9 @@ impl std::fmt::Display for OpenError {
                 write!(f, "{address} is in use by another program; close that program first")
             }
             Self::Forbidden { address, remedy } => write!(f, "this user may not use {address}; {remedy}"),
-            Self::Address { address, expected } => write!(f, "`address` = `{address}` is not {expected}"),
+            Self::Address { address, expected } => {
+                write!(f, "`address` = `{address}` is not valid; write {expected}")
+            }
             Self::UnknownHost { host } => {
                 write!(f, "unknown host `{host}` (`address`); check the name or use the IP address")
             }
@@ -152,8 +154,8 @@ impl std::fmt::Display for OpenError {
             }
             Self::NotBuilt { feature } => write!(
                 f,
-                "this plugin was built without this transport; build the plugin with `cargo build --release -p \
-                 flotor-maglev --features {feature}`"
+                "this plugin was built without the transport `{feature}`; build the plugin with `cargo build \
+                 --release -p flotor-maglev --features {feature}`, or choose another `transport`"
             ),
         }
     }

@@ -79,7 +79,7 @@ impl Recording {
     /// Creates a recording from samples in order of time; an error without any sample.
     fn new(samples: Vec<Sample>) -> Result<Self, String> {
         if samples.is_empty() {
-            return Err("has no pose".to_owned());
+            return Err("has no pose; record again, or write at least one row".to_owned());
         }
         Ok(Self(samples.into()))
     }

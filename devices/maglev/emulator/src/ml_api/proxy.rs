@@ -23,14 +23,14 @@ const SILENCE: Choices = choices!["land", "ignore"];
 const SCHEMA: &[Parameter] = &[
     Parameter::text(
         "listen",
-        "Address for clients, as host:port; without an address no client connects and the force is zero",
+        "Address for clients, as host:port (default: none, so that no client connects and the force is zero)",
     ),
     Parameter::choice(
         "reach",
         REACHES,
         0,
-        "Programs that may connect: programs of this user, of every user of this machine, or of all machines that \
-         reach the address",
+        "Programs that may connect: those of this user, of every user of this machine, or of every machine \
+         that reaches the address",
     ),
     Parameter::choice("force_command", FORCE_COMMANDS, 0, "Effect of a force command on the gains"),
     Parameter::choice(

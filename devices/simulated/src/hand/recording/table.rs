@@ -15,7 +15,7 @@ pub(super) fn read(text: &str) -> Result<Vec<Sample>, TextProblem> {
     let columns = table.columns().len();
     if ![LEAST_COLUMNS, COLUMNS.len()].contains(&columns) || *table.columns() != COLUMNS[..columns] {
         let [least, all] = [LEAST_COLUMNS, COLUMNS.len()].map(|count| COLUMNS[..count].join(","));
-        return Err(table.header_problem(format!("the columns are {least} or {all}")));
+        return Err(table.header_problem(format!("the columns must be {least} or {all}")));
     }
     let mut samples = Vec::new();
     let mut start_s = None;

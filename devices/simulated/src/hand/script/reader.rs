@@ -181,7 +181,7 @@ pub(super) fn read_file(path: &Path) -> Result<Script, ScriptError> {
         wrong(format!("cannot be read: {error}; a script is a TOML file or one of {names}"))
     })?;
     if !size.is_file() || size.len() > MAX_BYTES {
-        return Err(wrong(format!("is not a script: a script is a TOML file of at most {MAX_BYTES} bytes")));
+        return Err(wrong(format!("is not a script; write a TOML file of at most {MAX_BYTES} bytes")));
     }
     let text = read_text(path, "the script").map_err(|TextProblem { line, problem }| ScriptError {
         line,
@@ -203,7 +203,9 @@ pub(super) fn read(file: &str, text: &str) -> Result<Script, ScriptError> {
         return Err(whole("`step` is empty: a script needs at least one [[step]]".to_owned()));
     }
     if count > MAX_LEGS {
-        return Err(whole(format!("{count} movements, `repeat` included; write at most {MAX_LEGS}")));
+        return Err(whole(format!(
+            "the script has {count} movements, `repeat` included; write at most {MAX_LEGS}"
+        )));
     }
     let releases = script.step.iter().position(|step| matches!(step, StepText::Release(_)));
     if let Some(index) = releases

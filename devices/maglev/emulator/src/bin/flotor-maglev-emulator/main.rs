@@ -51,7 +51,7 @@ struct Arguments {
     listen: Option<String>,
     #[command(flatten)]
     reach: ReachArguments,
-    /// Pty: symbolic link to the terminal
+    /// Pty: path of a symbolic link to the terminal (default: none)
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
     /// Clock of the controller's cycles
@@ -88,7 +88,7 @@ enum ProtocolOption {
 
 #[derive(Clone, Copy, ValueEnum)]
 enum TransportOption {
-    /// A TCP connection
+    /// TCP connection
     Tcp,
     /// A pseudo terminal: a serial port to the host
     Pty,

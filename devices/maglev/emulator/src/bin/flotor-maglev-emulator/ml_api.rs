@@ -30,7 +30,7 @@ pub(crate) struct MlApiArguments {
     /// Recording file of the run with `--device`
     #[arg(long, default_value = "ml-api.mcap", value_name = "FILE")]
     pub(crate) record: std::path::PathBuf,
-    /// Longest time of a tick of the host that serves a device, in ms (default: the limit of every run)
+    /// With --device: watchdog limit of a tick of the host, in ms (default: as in a scene without `watchdog_ms`)
     #[arg(long, requires = "device", value_name = "MS", value_parser = watchdog_ms)]
     pub(crate) host_watchdog_ms: Option<f64>,
     /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device

@@ -90,10 +90,13 @@ impl LoadedPlant {
     /// Attaches a force sensor; the sensor gets the delivered force beyond the weight, as at rest.
     pub(crate) fn sense(&mut self, force: crate::rig::SensedForce) -> Result<(), Box<dyn Error>> {
         let mut opened = self.plugin.open_device(&self.settings)?;
-        let mut number = |id: &str| {
-            let at = opened.parameters().iter().position(|parameter| parameter.id() == id);
-            at.map(|at| opened.parameter(at)).ok_or_else(|| format!("the plant has no parameter `{id}`"))
-        };
+        let mut number =
+            |id: &str| {
+                let at = opened.parameters().iter().position(|parameter| parameter.id() == id);
+                at.map(|at| opened.parameter(at)).ok_or_else(|| format!(
+                "the plugin of --plant has no parameter `{id}`, which --calibration-rig needs; use the \
+                 simulated flotor"))
+            };
         let weight_n = number("mass_kg")? * number("gravity_m_per_s2")?;
         self.sensor = Some((number("feedforward_n")? - weight_n, force));
         Ok(())
