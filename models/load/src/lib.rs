@@ -84,7 +84,15 @@ impl ForceModel for Load {
 
     const PARAMETERS: &'static [Parameter] = &[
         Parameter::choice("kind", KINDS, 0, "A weight that pulls down, or a resistance to pushing down"),
-        Parameter::real("force_n", "N", 0.0, 100.0, 3.0, "The force").live(),
+        Parameter::real(
+            "force_n",
+            "N",
+            0.0,
+            100.0,
+            3.0,
+            "Weight (felt), or resistance at full depth (exerted)",
+        )
+        .live(),
         Parameter::real(
             "onset_mm",
             "mm",

@@ -53,7 +53,7 @@ impl ForceModel for Measured {
         Parameter::file(
             "curve",
             choices![],
-            "Table compression_mm,force_n (default: a straight line of 0.68 N/mm)",
+            "CSV file with the columns compression_mm,force_n (default: a straight line of 0.68 N/mm)",
         ),
         Parameter::real(
             "stiffness_scale",
@@ -61,11 +61,25 @@ impl ForceModel for Measured {
             0.0,
             20.0,
             1.0,
-            "Factor of the measured force at every length",
+            "Factor on the measured force, the same at every length",
         )
         .live(),
-        Parameter::real("free_length_mm", "mm", 1.0, 500.0, 25.0, "Length without load (drawing)"),
-        Parameter::real("coil_diameter_mm", "mm", 1.0, 200.0, 6.0, "Diameter of the coil (drawing)"),
+        Parameter::real(
+            "free_length_mm",
+            "mm",
+            1.0,
+            500.0,
+            25.0,
+            "Free length: length without load (only for the drawing)",
+        ),
+        Parameter::real(
+            "coil_diameter_mm",
+            "mm",
+            1.0,
+            200.0,
+            6.0,
+            "Diameter of the coil (only for the drawing)",
+        ),
     ];
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {

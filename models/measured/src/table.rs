@@ -23,7 +23,7 @@ pub const HEADER: &str = "compression_mm,force_n";
 pub fn parse(text: &str) -> Result<Curve, TextProblem> {
     let table = Table::parse(text, HashLines::Comments)?;
     if table.columns().join(",") != HEADER {
-        return Err(table.header_problem(format!("the header is `{HEADER}`")));
+        return Err(table.header_problem(format!("the header must be `{HEADER}`")));
     }
     let (mut numbers, mut knots) = (Vec::new(), Vec::new());
     for row in table.rows() {
@@ -34,7 +34,8 @@ pub fn parse(text: &str) -> Result<Curve, TextProblem> {
     Curve::new(&knots).map_err(|error| match error {
         CurveError::Count(count) => {
             let last = numbers.last().copied().unwrap_or(1);
-            TextProblem::at(last, format!("{count} rows up to this line; a curve needs 3 to {}", Curve::MOST_KNOTS))
+            TextProblem::at(last, format!(
+                "the curve has {count} rows up to this line, but needs 3 to {}", Curve::MOST_KNOTS))
         }
         CurveError::Start => {
             let first = numbers.first().copied().unwrap_or(1);

@@ -38,7 +38,10 @@ impl Obj {
             let mut text = first.trim_end().to_owned();
             while let Some(begun) = text.strip_suffix('\\') {
                 let (_, next) = lines.next().ok_or_else(|| {
-                    TextProblem::at(line, "the file ends after a `\\`, in the middle of a line")
+                    TextProblem::at(
+                        line,
+                        "the file ends after a `\\`, in the middle of a line; export the mesh again",
+                    )
                 })?;
                 text = format!("{begun} {}", next.trim_end());
             }
@@ -59,7 +62,7 @@ impl Obj {
                 let finite = |word: &str| word.parse::<f64>().ok().filter(|number| number.is_finite());
                 let numbers: Vec<f64> = words.take(3).filter_map(finite).collect();
                 let [x, y, z] = numbers[..] else {
-                    return Err("a vertex is `v X Y Z`, three finite numbers".to_owned());
+                    return Err("a vertex must be `v X Y Z` with three finite numbers".to_owned());
                 };
                 if self.vertices_m.len() >= MOST_VERTICES {
                     return Err(format!("there are more than {MOST_VERTICES} vertices; use a coarser mesh"));
@@ -71,7 +74,7 @@ impl Obj {
                 let corners = corners.collect::<Option<Vec<usize>>>();
                 let (least, word) = if kind == "f" { (3, "three") } else { (2, "two") };
                 let corners = corners.filter(|corners| corners.len() >= least).ok_or_else(|| {
-                    format!("`{kind}` needs {word} or more numbers of vertices of earlier lines")
+                    format!("`{kind}` needs the numbers of {word} or more vertices of earlier lines")
                 })?;
                 match kind {
                     "f" => self.faces.push(corners),
@@ -80,7 +83,10 @@ impl Obj {
             }
             Some(other) if !other.starts_with('#') && !UNUSED.contains(&other) => {
                 let other: String = other.chars().take(20).flat_map(char::escape_debug).collect();
-                return Err(format!("`{other}` is not a statement of a mesh in Wavefront OBJ"));
+                return Err(format!(
+                    "`{other}` is not a Wavefront OBJ statement for polygon meshes; export a polygon mesh \
+                     (`v`, `f`), or remove the line"
+                ));
             }
             _ => {}
         }

@@ -31,7 +31,7 @@ const SCHEMA: &[Parameter] = &[
         "Number of masses along a side of the sheet; the border is fixed",
     ),
     Parameter::real("side_mm", "mm", 1.0, 1000.0, 40.0, "Length of a side of the sheet"),
-    Parameter::real("mass_g", "g", 0.01, 1.0e5, 10.0, "Total mass"),
+    Parameter::real("mass_g", "g", 0.01, 1.0e5, 10.0, "Total mass of the sheet"),
     Parameter::real(
         "stiffness_n_per_m",
         "N/m",
@@ -46,9 +46,9 @@ const SCHEMA: &[Parameter] = &[
         0.5,
         3.0,
         1.25,
-        "Ratio of the length of a spring to its length without force",
+        "Pretension: ratio of the initial length of a spring to its length without force",
     ),
-    Parameter::real("gravity_m_per_s2", "m/s²", 0.0, 30.0, 0.0, "Gravity, downwards"),
+    Parameter::real("gravity_m_per_s2", "m/s²", 0.0, 30.0, 0.0, "Gravitational acceleration, downwards"),
     Parameter::real("damping_per_s", "1/s", 0.0, 1.0e4, 50.0, "Decay rate of the velocity by drag").live(),
     Parameter::real("ball_radius_mm", "mm", 0.1, 100.0, 5.0, "Radius of the ball at the handle"),
     Parameter::real(
@@ -62,7 +62,7 @@ const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "file",
         choices![],
-        "A mesh instead of the sheet: Wavefront OBJ, metres, z up; the border is fixed",
+        "Mesh file instead of the sheet: Wavefront OBJ, coordinates in m, z upwards; the border is fixed",
     ),
 ];
 
@@ -110,7 +110,7 @@ impl ForceModel for Membrane {
         let nodes = number("nodes_per_side");
         if nodes.fract() != 0.0 {
             return Err(Refusal::parameter(format!(
-                "`nodes_per_side` counts masses; {nodes} is not a whole number"
+                "`nodes_per_side` is {nodes}, but must be a whole number: it counts masses"
             )));
         }
         let (stiffness_n_per_m, stretch) = (number("stiffness_n_per_m"), number("stretch"));
@@ -131,7 +131,8 @@ impl ForceModel for Membrane {
         let radius_m = number("ball_radius_mm") * 1.0e-3;
         if radius_m < 0.75 * mesh.coarseness_m() {
             return Err(Refusal::parameter(format!(
-                "a ball of {} mm would fall through springs of {:.3} mm; make `ball_radius_mm` larger or the mesh finer",
+                "a ball of radius {} mm would fall through between springs of length {:.3} mm; increase \
+                 `ball_radius_mm`, or make the mesh finer",
                 radius_m * 1.0e3,
                 mesh.coarseness_m() * 1.0e3
             )));
@@ -147,8 +148,9 @@ impl ForceModel for Membrane {
         let steps_per_ms = 1.0e-3 / network.longest_step_s();
         if steps_per_ms > MOST_STEPS_PER_MS {
             return Err(Refusal::parameter(format!(
-                "the springs are so stiff and the masses so light that a millisecond needs {steps_per_ms:.0} steps \
-                 (at most {MOST_STEPS_PER_MS}); raise `mass_g` or lower the stiffness"
+                "the springs are so stiff and the masses so light that a millisecond needs {steps_per_ms:.0} \
+                 steps (at most {MOST_STEPS_PER_MS}); raise `mass_g`, or lower `stiffness_n_per_m` or \
+                 `contact_n_per_m`"
             )));
         }
         // Under gravity the sheet sags before the first touch.

@@ -160,7 +160,8 @@ impl Description {
             }
             None => {
                 return Err(Refusal::unsupported(
-                    "resolution = \"linear-tetrahedra\" is a comparison for plates on a block or a beam: set tool = \"plate\"",
+                    "resolution = \"linear-tetrahedra\" is available only for a plate on a block or a beam: \
+                     set tool = \"plate\" and body = \"block\" or \"beam\", or choose another resolution",
                 ));
             }
         };
@@ -191,7 +192,8 @@ impl Description {
         let limit_m = 0.9 * least_m;
         if extent_m > limit_m {
             return Err(Refusal::parameter(format!(
-                "{what} is {:.4} mm, but at most {:.4} mm for this body: make the tool smaller or the body larger",
+                "{what} is {:.4} mm, but may be at most {:.4} mm for this body: make the tool smaller, or \
+                 the body larger",
                 extent_m * 1.0e3,
                 limit_m * 1.0e3
             )));
@@ -203,7 +205,7 @@ impl Description {
     pub(crate) fn unfit(&self) -> Refusal {
         match self.body {
             Body::Beam { .. } => {
-                Refusal::unsupported("a beam is moved by a plate at its end: set tool = \"plate\"")
+                Refusal::unsupported("a beam is loaded only by a plate at its end: set tool = \"plate\"")
             }
             _ => Refusal::parameter("a half-space has no face for a plate: choose another `tool` or `body`"),
         }
@@ -213,7 +215,8 @@ impl Description {
         let mm = |m: f64| m * 1.0e3;
         if spacing_m < 2.0 * radius_m {
             return Err(Refusal::parameter(format!(
-                "`tool_spacing_mm` is {:.4} mm, but spheres of {:.4} mm are at least {:.4} mm apart: make the spheres smaller or the spacing larger",
+                "`tool_spacing_mm` is {:.4} mm, but spheres of radius {:.4} mm (`tool_radius_mm`) need at \
+                 least {:.4} mm, their diameter: reduce the radius, or increase the spacing",
                 mm(spacing_m),
                 mm(radius_m),
                 mm(2.0 * radius_m)
@@ -228,7 +231,8 @@ impl Description {
                     return Ok(());
                 }
                 Err(Refusal::parameter(format!(
-                    "`tool_spacing_mm` is {:.4} mm, but at most {:.4} mm for this face: make the spacing smaller or the body larger",
+                    "`tool_spacing_mm` is {:.4} mm, but may be at most {:.4} mm for this face: reduce the \
+                     spacing, or make the body larger",
                     mm(spacing_m),
                     mm(least_m / 0.6)
                 )))

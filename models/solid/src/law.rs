@@ -137,7 +137,9 @@ impl Description {
                 return self.solve_on(&mesh);
             }
             (Body::File { .. }, ..) => {
-                return Err(Refusal::parameter("body = \"file\" needs a mesh: set `file`"));
+                return Err(Refusal::parameter(
+                    "body = \"file\" needs a mesh: set `file` to the path of a Gmsh file (.msh)",
+                ));
             }
             (Body::Block(size), Tool::Sphere { radius_m }, _) => {
                 return Ok(sphere(sphere_on_block(poisson_ratio, radius_m, size, resolution)?));
@@ -174,8 +176,9 @@ impl Description {
         let uneven_m = body::unevenness_m(mesh);
         if uneven_m > 1.0e-6 * (right - left).max(back - front) {
             return Err(Refusal::parameter(format!(
-                "the touched face is not plane, or not the top of the body (by {:.4} mm): turn the mesh so that the \
-                 touched face is the top, across z; or set tool = \"plate\", which fits every face",
+                "the touched face is not planar, or not the top of the body (deviation {:.4} mm): turn the \
+                 mesh so that the touched face is the top, across z; or set tool = \"plate\", which fits \
+                 every face",
                 uneven_m * 1.0e3
             )));
         }
@@ -191,7 +194,8 @@ impl Description {
         let base = body::Body::new(mesh, solid)?;
         if !outline.rim().into_iter().all(|at| base.is_on_face(at)) {
             return Err(Refusal::parameter(
-                "the punch at the middle of the touched face reaches beyond the face: make the punch smaller",
+                "the punch at the middle of the touched face extends beyond the face: reduce \
+                 `tool_radius_mm` (round) or `tool_side_mm` (square)",
             ));
         }
         let nodes: Vec<f64> = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|share| share * extent_m).to_vec();

@@ -141,7 +141,8 @@ impl fmt::Display for MeshError {
             Self::Twins { at_m } => {
                 write!(
                     f,
-                    "two nodes at {}: the body has a crack there; merge the nodes (`Coherence Mesh;`)",
+                    "two nodes coincide at {}, so the body has a crack there; merge the nodes (`Coherence \
+                     Mesh;` in Gmsh)",
                     mm(at_m)
                 )
             }
@@ -171,7 +172,8 @@ impl fmt::Display for MeshError {
             }
             Self::Extent { extent_m } => write!(
                 f,
-                "the mesh is {extent_m} m long: coordinates are metres, and a body is at most 10 m long (`Mesh.ScalingFactor = 0.001` turns millimetres into metres)"
+                "the mesh is {extent_m} m long, but a body may be at most 10 m long: coordinates are in \
+                 metres (`Mesh.ScalingFactor = 0.001` turns millimetres into metres)"
             ),
         }
     }

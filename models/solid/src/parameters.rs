@@ -57,7 +57,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "body",
         BodyChoice::WORDS,
         0,
-        "Touched body; block, cylinder: bottom clamped; beam: clamped at -x",
+        "Touched body; a block or a cylinder is clamped at the bottom, a beam at its end at -x",
     ),
     Parameter::real(
         "size_x_mm",
@@ -108,16 +108,17 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "resolution",
         RESOLUTIONS,
         1,
-        "Elements and contact cells of the preparation, without effect on the time of a tick; linear-tetrahedra: \
-         for comparison, under a plate",
+        "Fineness of elements and contact cells in the preparation, without effect on the time of a tick; \
+         linear-tetrahedra: for comparison, only for a plate on a block or a beam",
     ),
     Parameter::file(
         "file",
         choices![],
-        "The mesh of body `file`: Gmsh 4.1 text, metres, tetrahedra of 10 nodes, bricks of 20",
+        "Mesh for `body = \"file\"`: Gmsh 4.1 ASCII (.msh), coordinates in m, 10-node tetrahedra or 20-node \
+         hexahedra",
     ),
-    Parameter::text("fixed_face", "Fixed physical surface of the mesh; `fixed`, if empty"),
-    Parameter::text("touched_face", "Touched physical surface of the mesh; `touched`, if empty"),
+    Parameter::text("fixed_face", "Name of the fixed physical surface of the mesh (default: fixed)"),
+    Parameter::text("touched_face", "Name of the touched physical surface of the mesh (default: touched)"),
 ];
 
 /// Returns the current parameter values; a beam has its own default sizes.

@@ -60,7 +60,9 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
         return if stray { Err(Refusal::parameter(refusal)) } else { Ok(None) };
     }
     let Some(path) = file else {
-        return Err(Refusal::parameter("body = \"file\" needs a mesh: set `file` to one of Gmsh (.msh)"));
+        return Err(Refusal::parameter(
+            "body = \"file\" needs a mesh: set `file` to the path of a Gmsh file (.msh)",
+        ));
     };
     let sizes = ["size_x_mm", "size_y_mm", "size_z_mm"];
     if let Some(id) = sizes.into_iter().find(|id| settings.number(id).is_some()) {

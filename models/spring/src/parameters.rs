@@ -100,8 +100,18 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         3,
         "Law: code of the thesis, its law without jumps, its corrected law, a conservative law in 3D, or the exact rod",
     ),
-    Parameter::choice("precision", PRECISIONS, 0, "Storage of numbers (variants thesis and closed-form)"),
-    Parameter::choice("accuracy", ACCURACIES, 0, "Accuracy for the servo or for reference (variant rod)"),
+    Parameter::choice(
+        "precision",
+        PRECISIONS,
+        0,
+        "Precision of the stored numbers: 64 or 32 bits (variants thesis and closed-form)",
+    ),
+    Parameter::choice(
+        "accuracy",
+        ACCURACIES,
+        0,
+        "Accuracy of the solution: for the servo, or tight as a reference (variant rod)",
+    ),
     Parameter::choice("seat", SEATS, 0, "Lower plate fixed, or free to roll up and lift off (energy, rod)"),
     Parameter::real(
         "seat_friction",
@@ -124,7 +134,8 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0005,
         0.1,
         TOLERANCE_N,
-        "Largest error of the force against the rod short of buckling (energy with hand_over)",
+        "Largest error of the force relative to the rod, below the buckling load (variant energy with \
+         hand_over)",
     )
     .live(),
     Parameter::choice("coil_contact", OFF_ON, 0, "Contact forces between coils (energy, rod)"),
@@ -134,9 +145,21 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0,
         "Effects of twist under compression and of the off-axis ends of the wire (energy, rod)",
     ),
-    Parameter::choice("mode", MODES, 0, "Constant that determines the stiffness and the other constants"),
-    Parameter::real("free_length_mm", "mm", 1.0, 1000.0, 25.0, "Distance of the end plates without load")
-        .live(),
+    Parameter::choice(
+        "mode",
+        MODES,
+        0,
+        "Constant given by the user, from which the stiffness and the other constants follow",
+    ),
+    Parameter::real(
+        "free_length_mm",
+        "mm",
+        1.0,
+        1000.0,
+        25.0,
+        "Free length: distance between the end plates without load",
+    )
+    .live(),
     Parameter::real("coil_diameter_mm", "mm", 0.5, 200.0, 6.07, "Diameter of the coil between wire centres")
         .live(),
     Parameter::real("youngs_modulus_mpa", "MPa", 1.0, 1.0e6, 203_395.0, "Young's modulus of the wire").live(),
@@ -150,7 +173,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.01,
         10_000.0,
         16.97,
-        "Compression rigidity (mode gamma); stiffness is gamma / L0",
+        "Compression rigidity (mode gamma); the axial stiffness is gamma over the free length",
     )
     .live(),
     Parameter::real(

@@ -278,7 +278,9 @@ impl fmt::Display for ParameterError {
             ),
             Self::SolidAtRest { solid_length_m, free_length_m } => write!(
                 f,
-                "the coils would touch without load: coils times wire is {:.4} mm, the free length {:.4} mm",
+                "the coils would touch without load: active coils times wire diameter is {:.4} mm, but must be \
+                 below the free length of {:.4} mm; reduce the coils or the wire diameter, or increase the free \
+                 length",
                 solid_length_m * 1e3,
                 free_length_m * 1e3
             ),

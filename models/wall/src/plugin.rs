@@ -57,7 +57,7 @@ impl ForceModel for Wall {
             10.0,
             "Radius of the ball, or half the edge of the cube",
         ),
-        Parameter::real("height_mm", "mm", -100.0, 100.0, 0.0, "Top of the solid above home"),
+        Parameter::real("height_mm", "mm", -100.0, 100.0, 0.0, "Height of the top of the solid above home"),
     ];
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
