@@ -59,13 +59,15 @@ const UNIT_TOLERANCE: f64 = 1.0e-6;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidDispatch {
     /// Wrong length.
-    #[error("peer message of {length} bytes, expected {DISPATCH_BYTES}; run the same release on both hosts")]
+    #[error(
+        "the peer message has {length} bytes instead of {DISPATCH_BYTES}; run the same release on both hosts"
+    )]
     Length {
         /// Bytes received.
         length: usize,
     },
     /// Wrong mark, or another version.
-    #[error("unsupported message version; run the same release on both hosts")]
+    #[error("the version of the peer message is not supported; run the same release on both hosts")]
     Mark,
     /// A number is not finite, the orientation has no unit length, or the energy passed on is negative.
     #[error(

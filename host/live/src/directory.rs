@@ -46,7 +46,9 @@ pub enum DirectoryError {
         cause: io::Error,
     },
     /// Other users may enter the folder: they could change a run.
-    #[error("{}: unsafe permissions: other users may enter the folder and change a run; `chmod 700` the folder, and make yourself its owner", path.display())]
+    #[error(
+        "{}: unsafe permissions: other users may enter the folder and change a run; run `chmod 700` on the \
+         folder, and make yourself its owner", path.display())]
     NotPrivate {
         /// Path of the folder.
         path: PathBuf,

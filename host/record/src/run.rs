@@ -89,7 +89,7 @@ impl RunDescription {
         let run = Run::decode(bytes).map_err(|cause| InvalidRun(cause.to_string()))?;
         if run.format > FORMAT {
             return Err(InvalidRun(format!(
-                "format {} is not supported; this version reads up to {FORMAT}",
+                "format {} is not supported; this version reads formats up to {FORMAT}: update flotor",
                 run.format
             )));
         }

@@ -95,8 +95,12 @@ pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
 
 /// Pins the calling thread to one core; other threads of the process are not affected.
 fn pin(Core(number): Core) -> Result<(), String> {
-    scheduling::pin(number)
-        .map_err(|_| format!("--core {number}: the machine lacks this core, or this process may not use it"))
+    scheduling::pin(number).map_err(|_| {
+        format!(
+            "--core {number}: the machine lacks this core, or this process may not use it; choose another \
+             core"
+        )
+    })
 }
 
 /// Requests the priority of a worker for the calling thread. Not real-time; without it the worker is only slower.

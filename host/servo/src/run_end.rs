@@ -67,12 +67,18 @@ impl RunEnd {
             Self::DeviceFault(fault) => format!("device fault, {}", fault.advice()),
             Self::EmergencyStop(source) => format!("emergency stop ({})", source.word()),
             Self::TooFast(samples_per_s) => {
-                format!("the device sends {samples_per_s} samples a second, too many")
+                format!(
+                    "the device sends {samples_per_s} samples a second, more than the `rate_hz` of the \
+                     scene; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
+                )
             }
-            Self::NotPaced => "the device does not set the pace".to_owned(),
+            Self::NotPaced => {
+                "the device does not set the pace with its present settings; remove `pacing = \"device\"`"
+                    .to_owned()
+            }
             Self::Oscillation => "the force oscillated between its limits".to_owned(),
             Self::Watchdog(_) => "a tick took longer than the watchdog allows".to_owned(),
-            Self::Unguarded => "the watchdog process had ended".to_owned(),
+            Self::Unguarded => "the watchdog process had ended, and the scene requires it".to_owned(),
             Self::Finished | Self::Stopped => "the run was stopped".to_owned(),
         }
     }

@@ -182,7 +182,8 @@ impl CalibrationFile {
             let message = wrong.message().lines().next().unwrap_or_default();
             let cause =
                 message.split(", expected one of").next().unwrap_or_default().replace(" field ", " key ");
-            let problem = format!("is not a calibration file ({cause})");
+            let problem =
+                format!("the file is not a calibration file ({cause}); write one with `flotor calibrate`");
             error(file, before.matches('\n').count() + 1, problem)
         })?;
         let wrong = |keys: &[&str], problem: String| error(file, line_of(text, keys), problem);
@@ -190,14 +191,18 @@ impl CalibrationFile {
             let found = read.format;
             return Err(wrong(
                 &["format"],
-                format!("format {found}, this program reads {FORMAT}; calibrate again"),
+                format!(
+                    "the file has format {found}, but this program reads format {FORMAT}; calibrate again"
+                ),
             ));
         }
         let calibration = read.vertical.calibration().map_err(|invalid| match invalid {
             // In the unit of the file.
             InvalidCalibration::Range(_) => {
                 let [from, to] = read.vertical.range_mm;
-                wrong(&["vertical", "range_mm"], format!("[vertical] invalid range {from:?} mm to {to:?} mm"))
+                wrong(&["vertical", "range_mm"], format!(
+                    "[vertical] the range {from:?} mm to {to:?} mm is invalid; write two finite heights, the \
+                     lower first"))
             }
             other => wrong(&["vertical", "coefficients_per_mm"], format!("[vertical] {other}")),
         })?;
@@ -284,18 +289,17 @@ mod tests {
             assert_ne!(text, EXAMPLE, "{from} stands in the example");
             CalibrationFile::parse("c.toml", &text).unwrap_err().to_string()
         };
-        let unknown =
-            "c.toml:4: is not a calibration file (unknown key `seriel`, expected `plugin` or `serial`)";
+        let unknown = "c.toml:4: the file is not a calibration file (unknown key `seriel`, expected `plugin` or `serial`); write one with `flotor calibrate`";
         assert_eq!(said("serial", "seriel"), unknown);
         assert_eq!(
             said("format = 1", "model = 1"),
-            "c.toml:1: is not a calibration file (unknown key `model`)"
+            "c.toml:1: the file is not a calibration file (unknown key `model`); write one with `flotor calibrate`"
         );
         assert!(said("[-7.0, 7.0]", "[-7.0, true]").starts_with("c.toml:6: "));
-        assert!(said("format = 1", "format = 2").contains("format 2, this program reads 1"));
+        assert!(said("format = 1", "format = 2").contains("format 2, but this program reads format 1"));
         assert!(said("1.05", "nan").contains("[vertical]"));
-        assert!(said("1.05", "0.01").contains("plausible"));
-        assert!(said("[-7.0, 7.0]", "[7.0, -7.0]").contains("invalid range 7.0 mm to -7.0 mm"));
+        assert!(said("1.05", "0.01").contains("must be between 0.5 and 2"));
+        assert!(said("[-7.0, 7.0]", "[7.0, -7.0]").contains("the range 7.0 mm to -7.0 mm is invalid"));
         assert!(said("-0.0011]", "0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]").contains("9 coefficients"));
     }
 

@@ -24,7 +24,7 @@ pub fn step_limit() -> Duration {
     crate::calls::limit_of(STEP_LIMIT_VARIABLE).unwrap_or(DEFAULT_LIMIT)
 }
 
-const REMEDY: &str = "`FLOTOR_STEP_LIMIT_S` allows more";
+const REMEDY: &str = "set `FLOTOR_STEP_LIMIT_S` to raise the limit";
 
 /// Limit that a call has exceeded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,11 @@ impl fmt::Display for Exceeded {
                 write!(f, " within {} s of processor time ({REMEDY})", limit.as_secs_f64())
             }
             Self::Waiting(limit) => {
-                write!(f, " within {} s, in which it needed no processor ({REMEDY})", limit.as_secs_f64())
+                write!(
+                    f,
+                    " within {} s and used no processor time: the call is blocked ({REMEDY})",
+                    limit.as_secs_f64()
+                )
             }
             Self::Stop(limit) => write!(f, " within {} s after the request to stop", limit.as_secs_f64()),
         }

@@ -280,11 +280,11 @@ impl ForceModel for ProgramModel {
             0.0,
             4.0e9,
             0.0,
-            "Number of the program that commands the model: set by `flotor lend` and the drop-in libraries",
+            "Number of the program that commands the model, set by `flotor lend` and the drop-in libraries",
         ),
         time("valid_ms", 1.0, 50.0, "Time for which a wrench is valid without a newer one"),
         time("fade_ms", 0.0, 50.0, "Time in which an expired wrench fades to zero"),
-        time("ramp_ms", 0.0, RAMP_MS, "Time in which force fades in once it is enabled"),
+        time("ramp_ms", 0.0, RAMP_MS, "Time in which the force fades in after the program has enabled it"),
     ];
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {

@@ -63,7 +63,8 @@ fn record_local(out: &Path) -> Result<(), CommandError> {
     let whole = match end {
         RecordingEnd::Complete(_) => Ok(()),
         RecordingEnd::Cut(_) => Err(CommandError::Failed(
-            "connection lost before the end of the run; the file contains the ticks received until then"
+            "the connection was lost before the end of the run, so the recording is incomplete; the file \
+             contains the ticks received until then"
                 .to_owned(),
         )),
     };

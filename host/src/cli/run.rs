@@ -60,10 +60,10 @@ pub(crate) struct RunArguments {
     /// Record every tick to an MCAP file (opens in Foxglove, Rerun, Python)
     #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]
     record: Option<PathBuf>,
-    /// Plot the run
+    /// Plot motion, force, energy and timing over time
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Draw a bound of the largest force or torque, peak_force_n=3.2 (repeatable)
+    /// Draw a bound of the largest force (N) or torque (N·m), such as peak_force_n=3.2 (repeatable)
     #[arg(long, hide = true, requires = "plot", value_name = "NUMBER=VALUE")]
     plot_bound: Vec<PeakBound>,
     #[command(flatten)]
@@ -279,7 +279,8 @@ const OPEN_FILES: u64 = 64;
 fn enough_files() -> Result<(), CommandError> {
     match most_open_files() {
         Some(most) if most < OPEN_FILES => Err(CommandError::Usage(format!(
-            "only {most} files may be open, and a run in real time needs {OPEN_FILES}; `ulimit -n {OPEN_FILES}` allows them"
+            "the process may open only {most} files, but a run in real time needs {OPEN_FILES}; raise the \
+             limit with `ulimit -n {OPEN_FILES}`"
         ))),
         _ => Ok(()),
     }

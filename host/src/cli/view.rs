@@ -29,7 +29,7 @@ pub(crate) struct ViewArguments {
     /// Second recording, drawn over the first: with dashed traces, and the handle as a transparent ball
     #[arg(value_name = "FILE.mcap", conflicts_with_all = ["export", "screen"])]
     second: Option<PathBuf>,
-    /// Write a picture of one moment; needs no display and no GPU
+    /// Write a picture of one moment (PNG); needs no display and no GPU
     #[arg(long, value_name = "OUT.png", requires = "file")]
     screenshot: Option<PathBuf>,
     /// With --screenshot: draw the whole window with its panels
@@ -65,7 +65,7 @@ pub(crate) struct ViewArguments {
     /// Time in the recording to show, s (default: the time of the largest force)
     #[arg(long, value_name = "SECONDS", requires = "file", conflicts_with = "export")]
     at: Option<String>,
-    /// Colours: dark or light
+    /// Colours: dark or light (default: dark; with --export: light)
     #[arg(long, value_name = "dark|light")]
     look: Option<String>,
     /// Width and height of picture or window (default: 1280x800)

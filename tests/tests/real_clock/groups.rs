@@ -228,7 +228,7 @@ fn assert_consent_is_needed(enter: impl Fn(&Board, &Scratch) -> String) {
     };
     let refused = ends("");
     assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{refused:?}");
-    for expected in ["leaves the force of `device` on", "--accept-shared-control-group"] {
+    for expected in ["the force of `device` would stay on", "--accept-shared-control-group"] {
         assert!(refused.error().contains(expected), "{expected}: {refused:?}");
     }
     let accepted = ends("accept_shared_control_group = true");
@@ -270,7 +270,7 @@ fn every_command_that_drives_a_device_needs_consent_to_a_shared_control_group() 
         let before = post.log().len();
         let refused = post.flotor(&words).through_shell(&enter.script).run();
         assert_eq!(post.log().len(), before, "{command:?}: nothing is energised");
-        for expected in ["leaves the force of `", "--accept-shared-control-group"] {
+        for expected in ["the force of `", "--accept-shared-control-group"] {
             assert!(refused.stderr.contains(expected), "{command:?}: {expected}: {refused:?}");
         }
         let mut words: Vec<&str> = command.iter().map(String::as_str).collect();

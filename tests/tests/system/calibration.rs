@@ -141,7 +141,7 @@ fn what_cannot_be_is_refused_in_one_line() {
         (&other, "`maglev` 7"),
         (&broken, "broken.toml:3"),
         (&missing, "cannot read"),
-        (&far, "far.toml:5: [vertical] invalid range -1e300 mm"),
+        (&far, "far.toml:5: [vertical] the range -1e300 mm"),
         (&steep, "steep.toml:6: [vertical] "),
     ] {
         let ran = Flotor::with(["calibrate", "verify", text(file), "--simulated"]).run();

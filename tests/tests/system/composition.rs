@@ -186,11 +186,11 @@ fn what_is_wrong_with_places_and_mixing_is_said() {
     for (wrong, expected) in [
         (
             "[model.mapping]\ngrid = { count = [1.5, 1, 1], spacing_mm = 1 }\n",
-            "scene.toml:7: `count` is three whole numbers from 1 on",
+            "scene.toml:7: `count` must be three whole numbers of 1 or more",
         ),
         (
             "[model.mapping]\ngrid = { count = 1000, spacing_mm = 1 }\n",
-            "scene.toml:7: a grid has at most 1000000 points",
+            "scene.toml:7: the grid has more than 1000000 points, the maximum; reduce `count`",
         ),
         (
             "[model.mapping]\npositions_mm = [[0, 0]]\n",
@@ -199,7 +199,7 @@ fn what_is_wrong_with_places_and_mixing_is_said() {
         ),
         (
             "[model.mapping]\npositions_mm = [[0, 0, 0]]\ngrid = { count = 1, spacing_mm = 1 }\n",
-            "scene.toml:7: a model has `positions_mm` or a `grid`, not both",
+            "scene.toml:7: a model has both `positions_mm` and `grid`; remove one of them",
         ),
         ("[model.blend]\nweight = 2\n", "scene.toml:7: `model.blend.weight` = 2: must be 0 to 1"),
         (

@@ -129,7 +129,7 @@ fn wrong_types_and_ranges_say_what_would_be_right() {
         (
             "motion_scale = 1.6666666666666667",
             "rotation_xyzw = [0, 0, 0, 2]",
-            "a rotation is a unit quaternion",
+            "a rotation must be a unit quaternion",
         ),
         ("motion_scale = 1.6666666666666667", "motion_scale = 0", "`model.mapping.motion_scale` = 0"),
         ("title = ", "title ", "scene.toml:1: not valid TOML"),

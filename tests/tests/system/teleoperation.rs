@@ -358,17 +358,20 @@ fn what_is_wrong_with_devices_and_couplings_is_said() {
             format!("{two}[[model]]\nplugin = \"spring\"\ndevice = \"left\"\nname = \"a@b\"\n"),
             "a name must not contain `@`, which separates a model from its device",
         ),
-        (format!("{two}[[coupling]]\nend = [{{ device = \"left\" }}]\n"), "a coupling has two ends"),
+        (format!("{two}[[coupling]]\nend = [{{ device = \"left\" }}]\n"), "a coupling has exactly two ends"),
         (
             format!("{two}[[coupling]]\nend = [{{ device = \"left\" }}, {{ device = \"left\" }}]\n"),
-            "a coupling needs two different devices",
+            "both ends of the coupling are on the same device",
         ),
-        (format!("{two}{COUPLING}partner = \"elsewhere\"\nname = \"pair\"\n"), "a coupling has one end here"),
+        (
+            format!("{two}{COUPLING}partner = \"elsewhere\"\nname = \"pair\"\n"),
+            "has exactly one end on this host",
+        ),
         (
             format!(
                 "{two}[[coupling]]\nname = \"Pair\"\npartner = \"elsewhere\"\nend = [{{ device = \"left\" }}]\n"
             ),
-            "invalid `name`, which identifies the coupling on both hosts",
+            "`name` is missing or invalid; it identifies the coupling on both hosts",
         ),
         (
             format!("{two}[[coupling]]\npartner = \"far\"\nend = [{{ device = \"left\" }}]\n"),

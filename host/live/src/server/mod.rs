@@ -225,9 +225,13 @@ impl Handler for Shared {
     fn answer(&self, payload: &[u8], outbox: &Outbox) -> Answer {
         let (number, done) = match Request::read(payload) {
             Ok(Request { number, ask }) => (number, self.carry_out(ask, outbox)),
-            Err((number, error)) => {
-                (number, Err((RefusalCause::Request, format!("unknown or malformed request: {error}"))))
-            }
+            Err((number, error)) => (
+                number,
+                Err((
+                    RefusalCause::Request,
+                    format!("unknown or malformed request: {error}; use both programs from one build"),
+                )),
+            ),
         };
         let (cause, refused) = done.err().map(|(cause, words)| (cause, Some(words))).unwrap_or_default();
         Answer { number, refused, cause }

@@ -45,10 +45,10 @@ impl fmt::Display for Notice {
             Self::Changed { who, restored, variables } => {
                 write!(f, "`{who}` changed ")?;
                 if !restored.is_empty() {
-                    write!(f, "{} of the host; restored by the host", restored.join(", "))?;
+                    write!(f, "{} of the host, which the host restored", restored.join(", "))?;
                 }
                 if !variables.is_empty() {
-                    let joined = if restored.is_empty() { "" } else { "; it also changed " };
+                    let joined = if restored.is_empty() { "" } else { "; the plugin also changed " };
                     write!(
                         f,
                         "{joined}environment variables of the host ({}), which the host does not restore",

@@ -50,19 +50,23 @@ fn coupling(
     let ends = ends.into_iter().map(|section| end(section, devices)).collect::<Result<Vec<_>, _>>()?;
     let ends = match (partner, ends.as_slice()) {
         (Partner::Here, [first, second]) if first.device == second.device => {
-            return Err(wrong("a coupling needs two different devices"));
+            return Err(wrong(
+                "both ends of the coupling are on the same device; name a different `device` in each \
+                 `[[coupling.end]]`",
+            ));
         }
         (Partner::Here, [first, second]) => CouplingEnds::Here([*first, *second]),
         (Partner::Elsewhere, [here]) => CouplingEnds::Remote(*here),
         (Partner::Here, _) => {
             return Err(wrong(
-                "a coupling has two ends: `[[coupling.end]]` twice, each with its `device`; for an end on another \
-                 host, write `partner = \"elsewhere\"`",
+                "a coupling has exactly two ends; write `[[coupling.end]]` twice, each with its `device`, \
+                 or, for an end on another host, once with `partner = \"elsewhere\"`",
             ));
         }
         (Partner::Elsewhere, _) => {
             return Err(wrong(
-                "with `partner = \"elsewhere\"` a coupling has one end here: `[[coupling.end]]` once",
+                "a coupling with `partner = \"elsewhere\"` has exactly one end on this host; write \
+                 `[[coupling.end]]` exactly once",
             ));
         }
     };
@@ -92,8 +96,8 @@ fn coupling(
         (Some(name), CouplingEnds::Remote(_)) if is_key(&name) => name,
         (_, CouplingEnds::Remote(_)) => {
             return Err(wrong(
-                "invalid `name`, which identifies the coupling on both hosts: use lower-case letters, digits and \
-                 hyphens, at most 40",
+                "`name` is missing or invalid; it identifies the coupling on both hosts: write at most 40 \
+                 lower-case letters, digits and hyphens",
             ));
         }
     };

@@ -41,7 +41,9 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError>
             );
         }
         if devices.len() >= MAX_DEVICES.into() {
-            return Err(here.problem(format!("a scene has at most {MAX_DEVICES} devices")));
+            return Err(here.problem(format!(
+                "the scene has more than {MAX_DEVICES} devices, the maximum; remove devices"
+            )));
         }
         let plugin = plugin_use(&mut section)?;
         let calibration = section.read("calibration", |value| {

@@ -367,7 +367,8 @@ fn rotation(value: Value<'_>) -> Result<[f64; 4], SceneError> {
         return Ok((rotation / rotation.length()).to_array());
     }
     Err(value.problem(format!(
-        "a rotation is a unit quaternion [x, y, z, w]; this quaternion has length {}",
+        "a rotation must be a unit quaternion [x, y, z, w], but this quaternion has length {}; divide its \
+         numbers by the length",
         rotation.length()
     )))
 }

@@ -17,7 +17,7 @@ pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneErro
         (Some(list), None) => list.points(-FARTHEST_MM..=FARTHEST_MM, 1..=MAX_PLACES)?,
         (None, Some(grid)) => points_of(grid)?,
         (Some(list), Some(_)) => {
-            return Err(list.problem("a model has `positions_mm` or a `grid`, not both"));
+            return Err(list.problem("a model has both `positions_mm` and `grid`; remove one of them"));
         }
     };
     let from_centre =
@@ -28,8 +28,9 @@ pub(super) fn read(mapping: &mut Section<'_>) -> Result<Vec<[f64; 3]>, SceneErro
 /// Returns the points of a grid about its centre, x fastest, mm.
 fn points_of(mut grid: Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
     let count_value = grid.require("count")?;
-    let too_many = count_value.problem(format!("a grid has at most {MAX_PLACES} points"));
-    let not_whole = count_value.problem("`count` is three whole numbers from 1 on");
+    let too_many = count_value
+        .problem(format!("the grid has more than {MAX_PLACES} points, the maximum; reduce `count`"));
+    let not_whole = count_value.problem("`count` must be three whole numbers of 1 or more");
     let counts = count_value.three(1.0..=MAX_PLACES as f64)?;
     let spacing_mm = grid.require("spacing_mm")?.three(0.0..=FARTHEST_MM)?;
     grid.finish()?;

@@ -35,7 +35,7 @@ pub enum RunError {
     #[error(transparent)]
     Calls(#[from] CallError),
     /// The servo thread failed.
-    #[error("the servo thread {0}; no device was moved")]
+    #[error("internal error: the servo thread {0}; please report this error with the scene")]
     Thread(&'static str),
     /// The system has no thread for this part of the run.
     #[error("cannot start the thread for {0}, so no device was moved; {THREAD_ADVICE}")]
@@ -48,10 +48,11 @@ pub enum RunError {
     WatchdogProcess(std::io::Error),
     /// Only the watchdog process stops a device when this process is gone, and a kill of one control group ends both.
     #[error(
-        "a kill of the control group `{group}`, as at the end of a service or a container or when memory runs out, leaves the force of \
-         `{device}` on: the watchdog process cannot leave that group, and the device has no watchdog of its own; \
-         `flotor doctor` describes how to start the program; `[limits] accept_shared_control_group = true` in a \
-         scene or `--accept-shared-control-group` accepts it"
+        "the force of `{device}` would stay on if the control group (cgroup) `{group}` were killed, for \
+         example at a service or container stop or when memory runs out: the watchdog process belongs to the \
+         same group, and the device has no watchdog of its own. Start the program as `flotor doctor` \
+         describes, or accept the risk with `[limits] accept_shared_control_group = true` or \
+         `--accept-shared-control-group`"
     )]
     SharedControlGroup {
         /// Name of the device in the scene.

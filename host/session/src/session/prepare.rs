@@ -204,8 +204,9 @@ fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolat
         Isolation::ByOrigin if is_outside && model.places_m.len() > MAX_PROCESSES => {
             let objects = model.places_m.len();
             let problem = format!(
-                "the plugin is from outside the installation, and each of its {objects} objects would have a process \
-                 of its own; set `isolation = \"process\"` or `isolation = \"none\"`"
+                "the plugin is not part of the installation, so each of its {objects} objects would get a \
+                 worker process, more than the limit of {MAX_PROCESSES}; set `isolation = \"process\"` to \
+                 start all of them, or `isolation = \"none\"` to run the model in the host process"
             );
             Err(complain(model, &problem))
         }

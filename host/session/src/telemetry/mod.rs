@@ -27,7 +27,7 @@ use flotor_live::{
     process_number,
 };
 use flotor_record::RunDescription;
-use flotor_servo::{EmergencySource, StopSwitch};
+use flotor_servo::{EmergencySource, StopSwitch, THREAD_ADVICE};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
@@ -145,9 +145,15 @@ impl Host {
         std::thread::scope(|scope| {
             let thread = std::thread::Builder::new().name("flotor-swap".to_owned());
             let making = thread.spawn_scoped(scope, make);
-            let making = making
-                .map_err(|error| refused(format!("cannot start a thread to create the model: {error}")))?;
-            making.join().unwrap_or_else(|_| Err(refused("the creation of the model panicked".to_owned())))
+            let making = making.map_err(|error| {
+                refused(format!("cannot start a thread to create the model: {error}; {THREAD_ADVICE}"))
+            })?;
+            making.join().unwrap_or_else(|_| {
+                Err(refused(
+                    "the plugin panicked while it created the model; the previous model is still active"
+                        .to_owned(),
+                ))
+            })
         })
     }
 }

@@ -106,10 +106,14 @@ impl Worker {
                 if is_late {
                     let create_timeout_s = config.create_timeout.as_secs_f64();
                     return Err(Refusal::broken(format!(
-                        "`create` or `prepare` did not return within {create_timeout_s} s in its process"
+                        "`create` or `prepare` did not return within {create_timeout_s} s in the worker \
+                         process; check the plugin with `flotor validate`"
                     )));
                 }
-                Err(Refusal::broken(format!("the worker process ended before the model was created ({end})")))
+                Err(Refusal::broken(format!(
+                    "the worker process ended before the model was created ({end}); check the plugin with \
+                     `flotor validate`"
+                )))
             }
         }
     }
@@ -332,6 +336,10 @@ pub(crate) fn program() -> io::Result<PathBuf> {
     }
     let folders = own.ancestors().skip(1).take(2).map(|folder| folder.join(&name));
     folders.into_iter().find(|file| file.is_file()).ok_or_else(|| {
-        io::Error::other(format!("`{name}` is neither this program nor in the folder of `{}`", own.display()))
+        io::Error::other(format!(
+            "the program `{name}` for worker processes is neither in the folder of `{}` nor in the folder \
+             above; copy it there",
+            own.display()
+        ))
     })
 }

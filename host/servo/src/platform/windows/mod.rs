@@ -8,7 +8,13 @@ pub(crate) mod scheduling;
 pub(crate) mod shared_memory;
 pub(crate) mod watchdog_process;
 
-/// Returns the error for a part that is not on this system yet.
+/// Returns the error of a worker process, which is not available on this system yet.
+fn no_workers() -> std::io::Error {
+    let problem = "models in worker processes are not supported on Windows yet; set `isolation = \"none\"` for the model";
+    std::io::Error::new(std::io::ErrorKind::Unsupported, problem)
+}
+
+/// Returns the error of a part that is not available on this system yet.
 fn not_yet(what: &str) -> std::io::Error {
     std::io::Error::new(std::io::ErrorKind::Unsupported, format!("{what} is not supported on Windows yet"))
 }

@@ -1,6 +1,6 @@
 //! Processes beside the host's own.
 
-use super::not_yet;
+use super::no_workers;
 use std::io;
 use std::os::windows::process::CommandExt;
 use std::process::{Command, ExitStatus};
@@ -17,7 +17,7 @@ impl HostProcess {
     /// # Errors
     /// Always.
     pub(crate) fn end_with(_: i32) -> io::Result<Self> {
-        Err(not_yet("a model in a process of its own"))
+        Err(no_workers())
     }
 
     /// Returns true if the host has ended.

@@ -1,6 +1,6 @@
 //! Shared memory of two processes: not available on this system yet.
 
-use super::not_yet;
+use super::no_workers;
 use crate::engine::process::SharedPage;
 use std::io;
 use std::os::windows::io::OwnedHandle;
@@ -14,7 +14,7 @@ pub(crate) enum SharedMemory {}
 /// # Errors
 /// Always.
 pub(crate) fn create_file() -> io::Result<OwnedHandle> {
-    Err(not_yet("a model in a process of its own"))
+    Err(no_workers())
 }
 
 impl SharedMemory {
@@ -23,7 +23,7 @@ impl SharedMemory {
     /// # Errors
     /// Always.
     pub(crate) fn of_standard_input() -> io::Result<Self> {
-        Err(not_yet("a model in a process of its own"))
+        Err(no_workers())
     }
 
     /// Maps a file of [`create_file`]. Not real-time.
@@ -31,7 +31,7 @@ impl SharedMemory {
     /// # Errors
     /// Always.
     pub(crate) fn map(_: &OwnedHandle) -> io::Result<Self> {
-        Err(not_yet("a model in a process of its own"))
+        Err(no_workers())
     }
 }
 

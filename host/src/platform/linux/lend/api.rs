@@ -87,17 +87,17 @@ impl Api {
     pub(super) fn find(self, own: &Path) -> Result<PathBuf, CommandError> {
         let folder = own.parent().unwrap_or(Path::new("."));
         let Library { built, package, .. } = self.library();
-        let installed = folder.join("../lib/flotor/compat").join(self.word());
-        let installed = self.names().iter().rev().map(|name| installed.join(name));
+        let compat = folder.join("../lib/flotor/compat").join(self.word());
+        let installed = self.names().iter().rev().map(|name| compat.join(name));
         let beside = [folder.join(built), folder.join("deps").join(built)];
         installed.chain(beside).find(|file| file.is_file()).ok_or_else(|| {
             let release = if folder.ends_with("debug") { "" } else { " --release" };
             CommandError::Usage(format!(
-                "the drop-in library for `--api {}` is missing: neither `{}` nor `../lib/flotor/compat/{}`; `cargo build{release} \
-                 -p {package}` builds it",
+                "the drop-in library for `--api {}` was found neither at `{}` nor in `{}`; build it with \
+                 `cargo build{release} -p {package}`",
                 self.word(),
                 folder.join(built).display(),
-                self.word()
+                compat.display()
             ))
         })
     }

@@ -35,7 +35,7 @@ pub(crate) struct LendArguments {
     pub(super) seed: u64,
     #[command(flatten)]
     pub(super) options: LendOptions,
-    /// Scene file (TOML); without it, a simulated flotor held by a hand
+    /// Scene file in TOML (default: a simulated flotor held by a hand)
     pub(super) scene: Option<PathBuf>,
     /// The program and its arguments
     #[arg(last = true, required = true, value_name = "PROGRAM")]

@@ -58,7 +58,7 @@ pub fn serve(host: i32) -> io::Result<()> {
         }
     }
     let Some(process) = host_number.and_then(|host| pidfd_open(host, PidfdFlags::empty()).ok()) else {
-        return Err(io::Error::other("no process has the number of the host"));
+        return Err(io::Error::other("the process of --host does not exist"));
     };
     if getppid() != host_number {
         return Ok(()); // ended, and its id is in use again
