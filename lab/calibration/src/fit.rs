@@ -71,7 +71,7 @@ pub fn fit(readings: &[Reading]) -> Result<Fit, CalibrationError> {
     };
     if forces.len() < 2 {
         return Err(too_few(
-            "at least two different forces are needed, to separate the weight from the field",
+            "measure at two or more different forces, to separate the weight from the field",
         ));
     }
     if stops.len() < MAX_DEGREE + 2 {

@@ -93,7 +93,7 @@ pub enum CalibrationError {
         height_mm: f64,
     },
     /// The user stopped the calibration.
-    #[error("calibration aborted; handle lowered, no file written")]
+    #[error("the calibration was aborted; the handle was lowered, and no file was written")]
     Aborted,
     /// The thread that holds the handle cannot be started.
     #[error("cannot start the thread of the holding controller: {0}; end other programs of this user")]
@@ -108,7 +108,10 @@ pub enum CalibrationError {
     #[error("device fault: {}", .0.advice())]
     Fault(Fault),
     /// The handle did not come to rest.
-    #[error("at {height_mm:.1} mm the handle still moves by {moved_um:.0} µm; check the sensor's stand")]
+    #[error(
+        "at {height_mm:.1} mm the handle does not come to rest: it moves by {moved_um:.0} µm; check the \
+         stand of the sensor"
+    )]
     NotAtRest {
         /// Height of the handle, mm.
         height_mm: f64,

@@ -77,7 +77,7 @@ pub(crate) fn linear_field(field: &LinearField) -> String {
 pub(crate) fn sample(state: &DeviceState) -> String {
     let DVec3 { x, y, z } = state.pose.position();
     format!(
-        "a sample at [{x}, {y}, {z}] m with the quaternion {}, moving with {}, delivering {}",
+        "position [{x}, {y}, {z}] m, quaternion {}, moving with {}, delivering {}",
         state.pose.orientation(),
         twist(&state.twist),
         wrench(&state.delivered)

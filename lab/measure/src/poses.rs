@@ -34,7 +34,10 @@ impl Poses {
         let wrong = |problem: &TextProblem| PosesError(problem.in_file(file));
         let text = text_from_bytes(bytes).map_err(|problem| wrong(&problem))?;
         if text.trim().is_empty() {
-            return Err(wrong(&TextProblem::of_file(format!("no poses; the header is {}", header_text()))));
+            return Err(wrong(&TextProblem::of_file(format!(
+                "the table is empty; write the header {} and one row for each pose",
+                header_text()
+            ))));
         }
         Self::of_table(&text).map_err(|problem| wrong(&problem))
     }
@@ -70,7 +73,8 @@ fn columns(header: &[String]) -> Result<[usize; 6], String> {
     let mut columns = [0; 6];
     for (column, name) in columns.iter_mut().zip(POSE_COLUMNS) {
         let found = header.iter().position(|found| found == name);
-        *column = found.ok_or_else(|| format!("column `{name}` is missing"))?;
+        *column =
+            found.ok_or_else(|| format!("column `{name}` is missing (the header is {})", header_text()))?;
     }
     Ok(columns)
 }

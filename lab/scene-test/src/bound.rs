@@ -36,13 +36,13 @@ impl Bound {
         let get = |key: &str| table.get(key).map(number).transpose();
         match (get("min")?, get("max")?, get("value")?, get("within")?) {
             (Some(min), Some(max), None, None) if min > max => {
-                Err(format!("min = {min} is above max = {max}: no value passes; exchange them"))
+                Err(format!("min = {min} is above max = {max}, so no value passes; exchange the numbers"))
             }
             (min, max, None, None) => Ok(Some(Self::Range { min, max })),
             (None, None, Some(value), Some(within)) if within >= 0.0 => {
                 Ok(Some(Self::Near { value, within }))
             }
-            (None, None, Some(_), Some(_)) => Err("within must be 0 or more".to_owned()),
+            (None, None, Some(_), Some(_)) => Err("`within` must be 0 or more".to_owned()),
             _ => Err("write { min, max }, { min }, { max } or { value, within }".to_owned()),
         }
     }

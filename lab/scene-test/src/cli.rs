@@ -117,7 +117,7 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
     let plots = arguments.plots.as_deref();
     let mut outcomes = in_parallel(jobs, &cases, |case| {
         let models = known.iter().find(|(file, _)| std::ptr::eq(*file, case.file)).map(|(_, models)| models);
-        check(&flotor, case, models.unwrap_or(&Err("the scene was not tried".to_owned())), plots)
+        check(&flotor, case, models.unwrap_or(&Err("the scene was not run".to_owned())), plots)
     });
     if arguments.bless {
         let blessed = if arguments.digest { Blessed::NumbersAndDigests } else { Blessed::Numbers };

@@ -43,7 +43,9 @@ impl Points {
         let of_wrench = WRENCH.map(|name| table.column(name));
         let compared: Vec<usize> = (0..6).filter(|index| of_wrench[*index].is_some()).collect();
         if compared.is_empty() {
-            return Err(table.header_problem("no column to compare, such as fz_n"));
+            return Err(
+                table.header_problem("the table has no column to compare; add at least one, such as fz_n")
+            );
         }
         let mut rows = Vec::new();
         for row in table.rows() {
@@ -246,8 +248,8 @@ mod tests {
     #[test]
     fn a_mistake_has_a_line() {
         for (text, says) in [
-            ("", "c:1: the table is empty"),
-            ("z_m\n1", "no column to compare"),
+            ("", "c:1: the table is empty; write a header and at least one row"),
+            ("z_m\n1", "the table has no column to compare"),
             ("z_mm,fz_n\n1,1", "unknown column `z_mm`"),
             ("z_m,fz_n\n1,1\n2", "c:3: the line has 1 cell for 2"),
             ("z_m,fz_n\n1,x", "c:2: `fz_n` must be a number, not `x`"),

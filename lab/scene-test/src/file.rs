@@ -204,10 +204,7 @@ impl TestFile {
         let seeds = match &written.seeds {
             None => vec![1],
             Some(none) if none.get_ref().is_empty() => {
-                return Err((
-                    none.span().start,
-                    "without a seed there is no case; write at least one seed".to_owned(),
-                ));
+                return Err((none.span().start, "`seeds` is empty; write at least one seed".to_owned()));
             }
             Some(seeds) => seeds.get_ref().clone(),
         };
@@ -234,7 +231,12 @@ impl TestFile {
                 .map_err(|wrong| (at, wrong))?;
             }
             if numbers.is_empty() {
-                return Err((at, "no number to compare; write within = { peak_force_n = 0.01 }".to_owned()));
+                return Err((
+                    at,
+                    "the reference has no number to compare; write, for example, within = \
+                     { peak_force_n = 0.01 }"
+                        .to_owned(),
+                ));
             }
             Ok(Reference { set, within: numbers })
         });
@@ -364,9 +366,7 @@ fn settings_with_values(
                 one => vec![scalar(one)?],
             };
             if values.is_empty() {
-                return Err(format!(
-                    "without a value for `{key}` there is no case; write at least one value"
-                ));
+                return Err(format!("`{key}` has an empty list; write at least one value"));
             }
             found.push((key.to_owned(), values));
             Ok(())
@@ -437,7 +437,7 @@ mod tests {
         for (rest, says) in [
             ("seedz = [1]", "F:2: unknown key `seedz`; did you mean `seeds`?"),
             ("\n[curve]\nfle = \"a\"\nwithin_n = 1", "did you mean `file`?"),
-            ("seeds = []", "F:2: without a seed"),
+            ("seeds = []", "F:2: `seeds` is empty"),
             ("seeds = [1, 9007199254740993]", "F:2: the seed 9007199254740993 is larger than"),
             ("duration = \"5 parsec\"", "F:2: unknown unit of time `parsec`"),
             ("[set]\nspring = 3", "F:3: `spring` is not PLUGIN.PARAMETER"),

@@ -54,7 +54,10 @@ impl Flotor {
             Trouble::Missing(error) => error.to_string(),
             Trouble::System(cause) => format!("cannot run flotor: {cause}"),
             Trouble::Late => {
-                format!("the process had not ended after {} s, and was killed", self.limit.as_secs_f64())
+                format!(
+                    "the process did not end within {} s, and was killed; raise the limit with --timeout",
+                    self.limit.as_secs_f64()
+                )
             }
         })
     }

@@ -336,7 +336,7 @@ fn the_motion_of_a_lent_run_is_replayed_with_a_model_in_the_place_of_the_program
     let ran = Flotor::with(["replay", &recording]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
     assert!(
-        ran.error().contains("a program commanded `program`")
+        ran.error().contains("the forces of `program` came from an external program")
             && ran.error().contains("--model program=spring")
     );
     let ran = Flotor::with(["replay", &recording, "--model", "program=spring"]).run();

@@ -285,7 +285,7 @@ fn a_calibration_that_is_broken_off_lets_the_handle_down() {
     running.signal(Signal::INT);
     let ran = running.wait();
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
-    assert!(ran.error().contains("calibration aborted; handle lowered"), "{}", ran.error());
+    assert!(ran.error().contains("the calibration was aborted; the handle was lowered"), "{}", ran.error());
     assert!(!file.exists());
     // Told to let go, not found dead.
     let line = emulator.wait_for(&["mode Disarmed"]);

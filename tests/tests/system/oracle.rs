@@ -163,8 +163,14 @@ fn a_wrong_file_is_told_with_file_and_line() {
             "id,x_m,y_m,z_m,rx_rad,ry_rad,rz_deg\n".to_owned() + good,
             format!("1: unknown column `rz_deg`; did you mean `rz_rad`? (the header is {expected})"),
         ),
-        ("x_m,y_m,z_m,rx_rad,ry_rad\n0,0,0,0,0\n".to_owned(), "1: column `rz_rad` is missing".to_owned()),
-        (String::new(), format!(" no poses; the header is {expected}")),
+        (
+            "x_m,y_m,z_m,rx_rad,ry_rad\n0,0,0,0,0\n".to_owned(),
+            format!("1: column `rz_rad` is missing (the header is {expected})"),
+        ),
+        (
+            String::new(),
+            format!(" the table is empty; write the header {expected} and one row for each pose"),
+        ),
         (
             format!("{POSE_HEADER}\n{good}\nb,0,0,zero,0,0,0\n"),
             "3: `z_m` must be a number, not `zero`".to_owned(),

@@ -21,10 +21,11 @@ use std::path::PathBuf;
     flotor calibrate import --excess 0.19,-0.026,-0.0045 --at 10 --device maglev --out mine.toml"
 )]
 pub(super) struct ImportArguments {
-    /// Coefficients of 1, z, z² ... in N, N/mm, N/mm² ...
+    /// Polynomial of the excess force over the height z in mm: coefficients of 1, z, z² ... in N, N/mm, N/mm² ...
+    /// (default: the polynomial of the thesis)
     #[arg(long, value_name = "C0,C1,...", value_delimiter = ',', value_parser = real, allow_hyphen_values = true)]
     excess: Vec<f64>,
-    /// Commanded force of the measured excess, in N
+    /// Commanded force at which the excess was measured, in N
     #[arg(long, default_value = "10", value_name = "N", value_parser = number("N", "force", FORCES_N))]
     at: f64,
     /// Lowest and highest measured height, in mm

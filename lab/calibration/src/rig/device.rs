@@ -176,7 +176,9 @@ fn without_wall() -> Boundary {
 }
 
 fn lost() -> CalibrationError {
-    CalibrationError::Refused(Refusal::resource("device disconnected; connect the device and start again"))
+    CalibrationError::Refused(Refusal::resource(
+        "the device is disconnected; connect the device and start again",
+    ))
 }
 
 impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {

@@ -78,7 +78,7 @@ fn schema(parameters: &[Parameter]) -> Result<(), String> {
         if !matches!(parameter.kind(), ParameterKind::Text | ParameterKind::File)
             && let Err(range) = parameter.check(parameter.default())
         {
-            return Err(format!("the default of `{id}`: {range}"));
+            return Err(format!("the default of `{id}` is invalid: {range}"));
         }
     }
     Ok(())

@@ -40,9 +40,11 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
             if running.ticks >= TICKS {
                 if started.elapsed() > PATIENCE {
                     return Err(match samples {
-                        0 => format!("no fresh sample within {}", wording::time(PATIENCE)),
-                        1 => format!("no second sample within {}", wording::time(PATIENCE)),
-                        _ => format!("no write accepted a command within {}", wording::time(PATIENCE)),
+                        0 => format!("read returned no fresh sample within {}", wording::time(PATIENCE)),
+                        1 => {
+                            format!("read returned no second fresh sample within {}", wording::time(PATIENCE))
+                        }
+                        _ => format!("write accepted no command within {}", wording::time(PATIENCE)),
                     });
                 }
                 std::thread::sleep(TICK);
@@ -51,7 +53,7 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
         if let Sampled { count: 2.., first, last } = running.sampled
             && first == last
         {
-            return Err(format!("every sample has the time {first} ns"));
+            return Err(format!("every sample has the same `sampled_ns`, {first} ns"));
         }
         device = running.device.deactivate().ok_or("deactivate failed")?;
     }
@@ -94,7 +96,7 @@ fn within(call: &str, took: Duration, limit: Duration) -> Result<(), String> {
         return Ok(());
     }
     let [took, limit] = [took, limit].map(wording::time);
-    Err(format!("{call} needs {took}, above the limit of {limit}"))
+    Err(format!("{call} takes {took}, above the limit of {limit}"))
 }
 
 pub(super) fn safe_stop(mut device: OpenedDevice) -> Result<(), Outcome> {
@@ -211,10 +213,8 @@ impl Running {
         if let Cycle::Fault(fault) = sampled {
             return Err(fault_of("read", fault));
         }
-        self.plausible(sampled, &tick).map_err(|words| Trouble {
-            fault: None,
-            words: format!("read at tick {index} returned {words}"),
-        })?;
+        self.plausible(sampled, &tick)
+            .map_err(|words| Trouble { fault: None, words: format!("read at tick {index}: {words}") })?;
         let started = Instant::now();
         let taken = self.device.write(&tick, wrench);
         for (took, time) in self.took.iter_mut().zip([read, started.elapsed()]) {
@@ -231,7 +231,7 @@ impl Running {
     fn plausible(&mut self, sampled: Cycle, tick: &Tick) -> Result<(), String> {
         let state = &self.state;
         if !state.is_finite() || !state.delivered.is_finite() {
-            return Err(format!("{} is not finite", wording::sample(state)));
+            return Err(format!("the sample is not finite: {}", wording::sample(state)));
         }
         // A sensor without a pose need not set one.
         if sampled != Cycle::Fresh || self.told.sensed == Axes::NONE {
@@ -239,27 +239,33 @@ impl Running {
         }
         let orientation = state.pose.orientation();
         if !is_rotation(orientation) {
-            return Err(format!("a quaternion of length {}, not 1", orientation.length()));
+            return Err(format!("the quaternion has length {}, not 1", orientation.length()));
         }
         if !PoseBounds::of(&self.told).contain(&state.pose) {
             let Capabilities { range_m, range_rad, .. } = self.told;
             return Err(format!(
-                "{}, beyond twice its range {} m and {} rad",
+                "the pose {} is beyond twice the declared range, {} m and {} rad",
                 wording::pose(&state.pose),
                 wording::vector(range_m.into()),
                 wording::vector(range_rad.into())
             ));
         }
         if !KNOWN.contains(state.conditions) {
-            return Err("`conditions` has bits that the contract does not define".to_owned());
+            return Err(format!(
+                "`conditions` has bits that the contract does not define ({:?}); clear them",
+                state.conditions
+            ));
         }
         let Sampled { count, first, last } = self.sampled;
         let now = state.sampled_ns;
         if now > tick.time_ns.saturating_add(AHEAD_NS) {
-            return Err(format!("a sample of {now} ns at {} ns", tick.time_ns));
+            return Err(format!(
+                "`sampled_ns` is {now}, more than a minute after the tick at {} ns",
+                tick.time_ns
+            ));
         }
         if count > 0 && now < last {
-            return Err(format!("a sample of {now} ns after one of {last} ns"));
+            return Err(format!("`sampled_ns` is {now}, before the previous {last}"));
         }
         self.sampled = Sampled { count: count + 1, first: if count == 0 { now } else { first }, last: now };
         Ok(())

@@ -106,13 +106,15 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
         if let Some((info, points)) = drawn {
             let is_drawn = points.is_some_and(|points| points.iter().all(Pose::is_finite));
             if info.is_none() || !is_drawn {
-                return Err("centerline returned no finite points".to_owned());
+                return Err(
+                    "centerline returned no info, no points, or a point that is not finite".to_owned()
+                );
             }
         }
         if model.has_shape() {
             let shape = model.shape(&input);
             works(model, "shape")?;
-            shape.map_err(|invalid| format!("shape returned an invalid drawing: {invalid}"))?;
+            shape.map_err(|invalid| format!("shape: {invalid}"))?;
         }
         let mut values = vec![f64::NAN; model.details().len()];
         let answer = model.read_details(&mut values);

@@ -63,7 +63,10 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
         CallStatus::Ok => (Took::Taken, value),
         CallStatus::OutOfRange => (Took::Refused, before),
         CallStatus::Unsupported => {
-            return Err(format!("`{id}` is declared live, but the plugin has no `set_parameter`"));
+            return Err(format!(
+                "`{id}` is declared live, but `set_parameter` returned `unsupported`; support the change, or \
+                 do not declare `{id}` live"
+            ));
         }
         CallStatus::Panicked => return Err(format!("`{id}` = {value}: the model {}", model.last_message())),
         CallStatus::WrongPhase => {
@@ -76,7 +79,7 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
     let limit = Duration::from_nanos(CONFIG.period_ns / 2);
     if usual > limit {
         let [usual, limit] = [usual, limit].map(wording::time);
-        return Err(format!("setting `{id}` to {value} needs {usual}, above the limit of {limit}"));
+        return Err(format!("setting `{id}` to {value} takes {usual}, above the limit of {limit}"));
     }
     // A model need not report its value; if it does, the value must match, up to rounding of a unit conversion.
     let read_back = model.parameter(index);

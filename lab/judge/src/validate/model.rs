@@ -179,7 +179,10 @@ pub(super) fn independent(subject: &Subject) -> Result<(), Outcome> {
 pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), Outcome> {
     let more = |when: &str| match state::threads()?.saturating_sub(before) {
         0 => Ok(()),
-        more => Err(Outcome::Violation(format!("the process has {more} more threads after {when}"))),
+        more => Err(Outcome::Violation(format!(
+            "after {when} the process has more threads than before the plugin was loaded ({more} more); join \
+             every thread before the call returns"
+        ))),
     };
     more("create and prepare")?;
     let _ = walked(&mut [&mut model])?;

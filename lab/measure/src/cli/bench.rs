@@ -36,25 +36,27 @@ pub(crate) struct BenchArguments {
     /// Id of the model, or path to its plugin file
     #[arg(long, value_name = "ID", default_value = "spring")]
     model: String,
-    /// Settings of a case; the setting `model=ID` selects another model (repeatable)
+    /// Settings of a case; the setting `model=ID` selects another model (repeatable; default: the cases of `spring` or
+    /// `solid`, else the defaults of the model)
     #[arg(long = "case", value_name = "KEY=VALUE,...")]
     cases: Vec<String>,
     /// Settings common to all cases (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
-    /// Reference case of the errors
+    /// Reference case for the errors, of high accuracy (default without --case: that of `spring` or `solid`, else none)
     #[arg(long, value_name = "KEY=VALUE,...")]
     reference: Option<String>,
-    /// Baseline case of the times [default: the first case]
+    /// Baseline case for the times (default: the first case)
     #[arg(long, value_name = "KEY=VALUE,...")]
     yardstick: Option<String>,
-    /// Depth of the middle of the motion below home
+    /// Depth of the middle of the motion below home, in mm
     #[arg(long, value_name = "MM", default_value_t = 4.0, value_parser = number("mm", "depth", 0.0..=100.0))]
     depth_mm: f64,
-    /// Radius of the workspace about home [default: 12, as the device; for a spring scaled by its free length over 15 mm]
+    /// Radius of the workspace about home, in mm (default: 12, as the device; for a spring scaled by its free length
+    /// over 15 mm)
     #[arg(long, value_name = "MM", value_parser = number("mm", "radius", 0.001..=1000.0))]
     workspace_mm: Option<f64>,
-    /// Largest rotation in the workspace
+    /// Largest rotation in the workspace, in degrees
     #[arg(long, value_name = "DEGREES", default_value_t = 7.0, value_parser = number("degrees", "rotation", 0.0..=180.0))]
     workspace_deg: f64,
     /// Report separately the calls that return more than zero for this detail (a column of `eval --details`)
@@ -70,7 +72,7 @@ pub(crate) struct BenchArguments {
     /// Write every measurement as CSV
     #[arg(long, value_parser = new_file, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
-    /// Plot error over time
+    /// Plot the error of each case against its computing time (work-precision diagram)
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     #[command(flatten)]

@@ -31,10 +31,10 @@ pub(crate) struct EvalArguments {
     /// Set a parameter of the model (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
-    /// Poses (- for standard input)
+    /// CSV file of the poses (- for standard input)
     #[arg(long, value_name = "IN.csv")]
     poses: PathBuf,
-    /// Wrenches (- for standard output)
+    /// CSV file for the wrenches (- for standard output)
     #[arg(long, value_name = "OUT.csv", default_value = "-", value_parser = new_file)]
     out: PathBuf,
     /// Rows are successive poses of one handle (default: each pose is reached from home)

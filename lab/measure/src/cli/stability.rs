@@ -24,16 +24,18 @@ use std::path::PathBuf;
     flotor stability --virtual-damping 15 --quantum-um 10 --hand relaxed"
 )]
 pub(crate) struct StabilityArguments {
-    /// Servo rates in Hz, 100 to 10000
+    /// Servo rates in Hz, 100 to 10000, separated by commas (default beside another list: 1000)
     #[arg(long, value_parser = rate_hz, value_name = "HZ", value_delimiter = ',')]
     rate: Vec<f64>,
-    /// Whole periods from a sample to its force, 0 to 100
+    /// Delays from a sample to its force in whole periods, 0 to 100, separated by commas (default beside another list:
+    /// 0)
     #[arg(long, value_parser = count(0..=100_u32), value_name = "TICKS", value_delimiter = ',')]
     delay: Vec<u32>,
-    /// Drag of the device in N s/m
+    /// Viscous damping of the device in N s/m, 0 to 100000, separated by commas (default beside another list: 0.5)
     #[arg(long, value_parser = number("N s/m", "damping", 0.0..=100_000.0), value_name = "B", value_delimiter = ',')]
     damping: Vec<f64>,
-    /// Virtual damping (backward difference) in N s/m
+    /// Virtual damping (backward difference) in N s/m, 0 to 100000, separated by commas (default beside another list:
+    /// 0)
     #[arg(long, value_parser = number("N s/m", "damping", 0.0..=100_000.0), value_name = "B", value_delimiter = ',')]
     virtual_damping: Vec<f64>,
     /// Step of the position sensor in µm, 0 to 100

@@ -51,8 +51,9 @@ pub enum ReplayError {
     },
     /// The forces of a model came from a program, which is not in the recording.
     #[error(
-        "a program commanded `{model}`, and the program is not in the recording; to compare the forces of a model \
-         on the same motion, replace `{model}` by that model: `--model {model}=spring`"
+        "the forces of `{model}` came from an external program, which a replay cannot repeat; replace \
+         `{model}` with a force model to evaluate that force model on the recorded motion, for example \
+         `--model {model}=spring`"
     )]
     Program {
         /// Name of the model in the scene.

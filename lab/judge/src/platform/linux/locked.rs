@@ -72,9 +72,17 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Outcome> {
         let is_there = folder.exists();
         match stage.load(Ordering::Acquire) {
             DONE => break,
-            FAILED => return Err(Outcome::Violation("a step of the path failed".to_owned())),
+            FAILED => {
+                return Err(Outcome::Violation(
+                    "a step of the path failed while system calls were forbidden".to_owned(),
+                ));
+            }
             NOT_ALLOWED => {
-                return Err(Outcome::Missing("the system does not allow seccomp (strict mode)".to_owned()));
+                return Err(Outcome::Missing(
+                    "the system does not allow seccomp in strict mode; run the check outside a container or \
+                     sandbox"
+                        .to_owned(),
+                ));
             }
             _ if !is_there => end_here(),
             _ => std::thread::sleep(LOOK),
