@@ -104,10 +104,11 @@ impl SubjectRecord {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// Estimate of the procedure: mean of the last differences, or posterior of QUEST+
+    /// Estimate of the procedure: mean of the differences from the first counted reversal on, or posterior mean of
+    /// QUEST+
     #[default]
     Procedure,
-    /// Threshold of the most likely observer, given all trials at a base
+    /// Maximum a posteriori: threshold of the most likely observer, given all trials at a base
     Map,
 }
 

@@ -115,7 +115,7 @@ struct Common {
     /// Number of the person (human; default: the first free number)
     #[arg(long, value_parser = count(1..=SubjectNumber::MOST), value_name = "N")]
     subject: Option<u16>,
-    /// Scene of the stimuli (TOML); without it, a spring on the simulated flotor
+    /// Scene of the stimuli in TOML (default: a spring on the simulated flotor)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Set a parameter of a plugin of the scene (repeatable)
@@ -213,44 +213,45 @@ struct JndArguments {
     /// for a force 3,6,9)
     #[arg(long, value_delimiter = ',', value_parser = real, allow_hyphen_values = true, value_name = "LIST")]
     bases: Option<Vec<f64>>,
-    /// Replications, in alternating modality
+    /// Number of replications, in alternating modality
     #[arg(long, default_value_t = 4, value_parser = count(1..=1000_u32), value_name = "N")]
     replications: u32,
     /// Adaptive procedure, which selects the next difference
     #[arg(long, value_enum, default_value_t)]
     procedure: ProcedureChoice,
-    /// QUEST+: trials per track
+    /// QUEST+: number of trials per track
     #[arg(long, default_value_t = 18, value_parser = count(1..=1000_u32), value_name = "N")]
     trials: u32,
-    /// First difference, as a share of the base
+    /// Weighted up-down: first difference, as a share of the base
     #[arg(long, default_value_t = 0.40, value_parser = real, value_name = "SHARE")]
     initial: f64,
-    /// First step down, as a share of the base
+    /// Weighted up-down: first step down, as a share of the base
     #[arg(long, default_value_t = 0.10, value_parser = real, value_name = "SHARE")]
     step: f64,
     /// Target share of correct answers
     #[arg(long, default_value_t = 0.75, value_parser = real, value_name = "SHARE")]
     target: f64,
-    /// Reversals that halve the step
+    /// Weighted up-down: numbers of the reversals that halve the step
     #[arg(long, value_delimiter = ',', default_value = "2,4", value_parser = count(1..=200_u32), value_name = "LIST")]
     halve_at: Vec<u32>,
-    /// Reversal that ends a track
+    /// Weighted up-down: number of reversals after which a track ends
     #[arg(long, default_value_t = 8, value_parser = count(1..=200_u32), value_name = "N")]
     stop_after: u32,
-    /// First reversal whose difference counts for the threshold
+    /// Weighted up-down: number of the first reversal whose difference counts for the threshold
     #[arg(long, default_value_t = 4, value_parser = count(1..=1000_u32), value_name = "N")]
     average_from: u32,
-    /// Mean for the threshold, from the first counted reversal to the last: with the trials of
-    /// both reversals, without the trial of the first, or without the trial of the last
+    /// Weighted up-down: trials in the mean for the threshold, from the first counted reversal to the last: with both
+    /// reversals, without the first, or without the last
     #[arg(long, value_enum, default_value_t)]
     averaging: Averaging,
-    /// Step size used at a reversal that halves the step size
+    /// Weighted up-down: step size used at a reversal that halves the step size
     #[arg(long, value_enum, default_value_t)]
     step_at_reversal: StepAtReversal,
-    /// Smallest difference, as a share of the base; above 0, because equal stimuli have no correct answer
+    /// Weighted up-down: smallest difference, as a share of the base; above 0, because equal stimuli have no correct
+    /// answer
     #[arg(long, default_value_t = 0.01, value_parser = real, value_name = "SHARE")]
     floor: f64,
-    /// Largest difference, as a share of the base
+    /// Weighted up-down: largest difference, as a share of the base
     #[arg(long, default_value_t = 0.95, value_parser = real, value_name = "SHARE")]
     ceiling: f64,
     /// Side of the base on which the comparison lies
@@ -280,13 +281,13 @@ struct JndArguments {
 struct MagnitudeArguments {
     #[command(flatten)]
     common: Common,
-    /// Smallest and largest stimulus, in its unit
+    /// Smallest and largest stimulus, in the unit of the stimulus
     #[arg(long, default_value = "12-48", value_parser = range, value_name = "LEAST-MOST")]
     range: (f64, f64),
     /// Number of equidistant stimuli
     #[arg(long, default_value_t = 12, value_parser = count(3..=1000_u32), value_name = "N")]
     stimuli: u32,
-    /// Replications in each modality
+    /// Number of replications in each modality
     #[arg(long, default_value_t = 3, value_parser = count(1..=1000_u32), value_name = "N")]
     replications: u32,
     /// Stimuli presented once more in each replication to check the consistency of ratings; they do not count
@@ -353,7 +354,7 @@ fn word(text: &str) -> Result<String, String> {
 
 /// Parses a duration above 0, s.
 fn feel_s(text: &str) -> Result<f64, String> {
-    duration_s(text).and_then(|s| if s > 0.0 { Ok(s) } else { Err("the range is above 0".to_owned()) })
+    duration_s(text).and_then(|s| if s > 0.0 { Ok(s) } else { Err("must be above 0 s".to_owned()) })
 }
 
 impl Common {
@@ -601,7 +602,8 @@ fn outside(cause: ApparatusOrFrontEndError, message: String) -> CommandError {
             end @ (RunEnd::DeviceFault(_)
             | RunEnd::EmergencyStop(_)
             | RunEnd::Watchdog(_)
-            | RunEnd::Oscillation),
+            | RunEnd::Oscillation
+            | RunEnd::Unguarded),
         )) => CommandError::RunEnded(*end),
         _ => {
             let error = cause.downcast().map(|error| CommandError::Run(*error));

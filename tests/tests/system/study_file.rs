@@ -100,7 +100,7 @@ fn a_rule_without_what_it_needs_is_refused() {
     let scratch = Scratch::default();
     for (rules, reason) in [
         ("most_retest_deviation = 0.5", "repeat_checks of an experiment with ratings"),
-        ("most_dont_know = 20", "a share from 0 to 1"),
+        ("most_dont_know = 20", "most_dont_know is 20; write a share from 0 to 1"),
         ("most_unsure = 0.2", "a.study.toml:11: unknown field `most_unsure`"),
     ] {
         let _ = scratch.file("a.study.toml", format!("{FILE}[exclusion]\n{rules}\n"));

@@ -205,7 +205,11 @@ impl<'a> RealTimeRig<'a> {
             Some(RunEnd::EmergencyStop(source)) => {
                 Incident::EmergencyStop { source: source.word().to_owned() }
             }
-            _ => Incident::RunEnded { reason: error.to_string() },
+            _ => {
+                let ended = error.downcast_ref::<RunEnded>();
+                let reason = ended.map_or_else(|| error.to_string(), |RunEnded(end)| end.cause());
+                Incident::RunEnded { reason }
+            }
         }
     }
 

@@ -24,12 +24,13 @@ use std::path::PathBuf;
 
 /// Run that ended before the experiment did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the run ended during a trial: {}", .0.cause())]
+#[error("the run ended: {}; correct the cause, and continue with `--resume`", .0.cause())]
 pub struct RunEnded(pub RunEnd);
 
 /// Stimulus that the model rejected although the check had accepted it.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("the model rejected {}.{} = {}", .0.plugin, .0.parameter, .0.value)]
+#[error(
+    "the model rejected {}.{} = {}; choose stimuli within the range of the model", .0.plugin, .0.parameter, .0.value)]
 pub struct StimulusRefused(pub Change);
 
 /// Paths of the trial recordings, one file per trial.

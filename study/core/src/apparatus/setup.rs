@@ -20,9 +20,9 @@ use std::path::{Path, PathBuf};
 /// Recorded data on how people moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kinematics {
-    /// Every tick of every trial (MCAP), and the measures
+    /// Every tick of every trial (MCAP), and the movement measures of each stimulus
     Full,
-    /// Measures of each stimulus
+    /// Movement measures of each stimulus
     Summary,
     /// No movement data
     None,

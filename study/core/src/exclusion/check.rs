@@ -19,30 +19,33 @@ impl ExclusionRules {
             ("most_excluded_trials", self.most_excluded_trials),
         ];
         for (rule, share) in shares {
-            if share.is_some_and(|share| !(0.0..=1.0).contains(&share)) {
-                return Err(format!("exclusion.{rule}: a share from 0 to 1"));
+            if let Some(share) = share.filter(|share| !(0.0..=1.0).contains(share)) {
+                return Err(format!("exclusion.{rule} is {share}; write a share from 0 to 1"));
             }
         }
         for (rule, value) in [
             ("most_retest_deviation", self.most_retest_deviation),
             ("least_movement_mm", self.least_movement_mm),
         ] {
-            if value.is_some_and(|value| !(value > 0.0 && value.is_finite())) {
-                return Err(format!("exclusion.{rule}: a number above 0"));
+            if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
+                return Err(format!("exclusion.{rule} is {value}; write a finite number above 0"));
             }
         }
         // A log is JSON, which cannot represent infinity: an infinite longest time would make the log unreadable.
         let are_times =
             |[shortest, longest]: [f64; 2]| 0.0 <= shortest && shortest < longest && longest.is_finite();
-        if self.response_time_s.is_some_and(|times| !are_times(times)) {
-            return Err(
-                "exclusion.response_time_s: the shortest and the longest time, s, both finite".to_owned()
-            );
+        if let Some(times) = self.response_time_s.filter(|times| !are_times(*times)) {
+            return Err(format!(
+                "exclusion.response_time_s is {times:?}; write the shortest and the longest time in s, both finite, \
+                 the shortest first"
+            ));
         }
         let has_trial_rule = self.least_movement_mm.is_some() || self.response_time_s.is_some();
         if self.most_excluded_trials.is_some() && !has_trial_rule {
             return Err(
-                "exclusion.most_excluded_trials needs response_time_s or least_movement_mm".to_owned()
+                "exclusion.most_excluded_trials needs response_time_s or least_movement_mm; write one of \
+                 them"
+                    .to_owned(),
             );
         }
         let (catch, has_obvious, repeats, is_jnd) = match protocol {

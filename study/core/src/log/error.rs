@@ -37,10 +37,10 @@ pub enum LogProblem {
     #[error("another process is running this sitting; end that process before you continue the sitting here")]
     InUse,
     /// The log has no complete line.
-    #[error("has no complete line, so it contains no data; remove the file")]
+    #[error("the log has no complete line, so it contains no data; remove the file")]
     Empty,
     /// A line with invalid syntax.
-    #[error("is not a line of an event log: {0}")]
+    #[error("the line does not belong to an event log: {0}; use an unchanged copy")]
     Text(String),
     /// The hash chain is broken.
     #[error(
@@ -50,7 +50,8 @@ pub enum LogProblem {
     Chain,
     /// Unknown format revision.
     #[error(
-        "format {found} is not supported, this version reads up to {FORMAT}; use the version that wrote the log"
+        "format {found} is not supported; this version reads formats up to {FORMAT}: use the version that \
+         wrote the log"
     )]
     Format {
         /// Revision found in the log.

@@ -67,8 +67,9 @@ impl SittingLog {
             let text = text.strip_suffix('\n').unwrap_or(text);
             // Line ends may have been changed by a copy through Windows or git.
             let text = text.strip_suffix('\r').unwrap_or(text);
-            let (found, event) = parts(text)
-                .ok_or_else(|| at(number, LogProblem::Text("no `chain` and `event`".to_owned())))?;
+            let (found, event) = parts(text).ok_or_else(|| {
+                at(number, LogProblem::Text("the line has no `chain` and `event`".to_owned()))
+            })?;
             before = chain(&before, event);
             if found != before {
                 return Err(at(number, LogProblem::Chain));
@@ -85,7 +86,12 @@ impl SittingLog {
                     }
                     log = Some(Self { began: time, ..Self::new(*begin, path) });
                 }
-                (None, _) => return Err(at(number, LogProblem::Order("a log starts with `begin`"))),
+                (None, _) => {
+                    return Err(at(
+                        number,
+                        LogProblem::Order("the log does not start with `begin`; use an unchanged copy"),
+                    ));
+                }
                 (Some(log), event) => log.take_in(event, time).map_err(|problem| at(number, problem))?,
             }
         }
@@ -117,19 +123,21 @@ impl SittingLog {
 
     fn take_in(&mut self, event: Event, time: Option<TimeOfDay>) -> Result<(), LogProblem> {
         if self.complete && !matches!(event, Event::Note { .. }) {
-            return Err(LogProblem::Order("after `end` only notes may follow"));
+            return Err(LogProblem::Order("an event other than a note follows `end`; use an unchanged copy"));
         }
         if !matches!(event, Event::Note { .. }) {
             self.has_reason_to_end =
                 matches!(&event, Event::Incident(incident) if incident.ends_the_sitting());
         }
         match event {
-            Event::Begin(_) => Err(LogProblem::Order("a second `begin`")),
+            Event::Begin(_) => {
+                Err(LogProblem::Order("a second `begin` is in the log; use an unchanged copy"))
+            }
             Event::Trial(event) => self.replay(*event),
             Event::Withdrawn { trial } => self.withdraw(trial),
-            Event::Resume { trials, .. } if trials != self.sitting.presented() => {
-                Err(LogProblem::Order("`resume` has another number of trials than the log"))
-            }
+            Event::Resume { trials, .. } if trials != self.sitting.presented() => Err(LogProblem::Order(
+                "`resume` has another number of trials than the log; use an unchanged copy",
+            )),
             Event::Resume { .. } => {
                 self.resumed += 1;
                 Ok(())
@@ -142,9 +150,9 @@ impl SittingLog {
                 self.incidents.push((self.sitting.presented(), time, incident));
                 Ok(())
             }
-            Event::End { trials } if !self.sitting.is_over() || trials != self.sitting.presented() => {
-                Err(LogProblem::Order("`end` before the experiment is over"))
-            }
+            Event::End { trials } if !self.sitting.is_over() || trials != self.sitting.presented() => Err(
+                LogProblem::Order("`end` is in the log before the experiment is over; use an unchanged copy"),
+            ),
             Event::End { .. } => {
                 self.complete = true;
                 Ok(())

@@ -40,7 +40,7 @@ impl QuestPlusRule {
         }
         let [least, most] = self.deltas;
         if !(least > 0.0 && least < most && most < 1.0) {
-            let legal = "must be above 0 and below the largest";
+            let legal = "must be above 0 and below the largest difference";
             return Err(InvalidRule::new("smallest difference", least, legal));
         }
         Ok(())

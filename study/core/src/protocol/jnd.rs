@@ -27,9 +27,9 @@ pub enum PresentationOrder {
     /// Drawn for each trial
     #[default]
     Random,
-    /// The base
+    /// The base first
     BaseFirst,
-    /// The comparison
+    /// The comparison first
     ComparisonFirst,
 }
 
@@ -107,8 +107,12 @@ impl JndProtocol {
         self.procedure.check()?;
         if !self.checks.are_none() && self.procedure.trials_least() < 2 {
             let value = f64::from(self.procedure.trials_least());
-            let what = "trials of a track with checks";
-            return Err(ProtocolError::Value { what, value, legal: "must be 2 or more" });
+            let what = match self.procedure {
+                Procedure::WeightedUpDown(_) => "--stop-after",
+                Procedure::QuestPlus(_) => "--trials",
+            };
+            let legal = "must be 2 or more with --catch-trials, --repeat-checks or --obvious-pairs";
+            return Err(ProtocolError::Value { what, value, legal });
         }
         if let Some(pairs) = self.checks.obvious {
             at_least_one("--obvious-pairs", pairs.count)?;

@@ -73,7 +73,11 @@ impl MagnitudeProtocol {
         at_least_one("--replications", self.replications)?;
         if self.values.len() < 3 {
             let value = self.values.len() as f64;
-            return Err(ProtocolError::Value { what: "--stimuli", value, legal: "a trend needs 3 or more" });
+            return Err(ProtocolError::Value {
+                what: "--stimuli",
+                value,
+                legal: "must be 3 or more, for the trend",
+            });
         }
         Ok(())
     }

@@ -232,7 +232,8 @@ pub enum ProtocolError {
     Rule(#[from] InvalidRule),
     /// Stimuli outside the range of the model's parameter.
     #[error(
-        "stimulus {stimulus} = {value} is outside its range {least} to {most}; change the values or the difference"
+        "stimulus {stimulus} = {value} is outside its range {least} to {most}; choose other stimuli, or a \
+         smaller largest difference"
     )]
     Range {
         /// The varied parameter.
@@ -360,7 +361,11 @@ fn positive_and_different(what: &'static str, values: &[f64]) -> Result<(), Prot
     };
     let wrong = values.iter().find(|value| !is_right(**value));
     wrong.map_or(Ok(()), |value| {
-        Err(ProtocolError::Value { what, value: *value, legal: "must be a finite number above 0, each once" })
+        Err(ProtocolError::Value {
+            what,
+            value: *value,
+            legal: "must be finite, above 0 and different from the others",
+        })
     })
 }
 

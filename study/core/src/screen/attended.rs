@@ -243,7 +243,7 @@ impl ScreenStateMachine {
                 Err(InputError::NotAbove0)
             }
             (Stage::Ask, Input::Answer { response }) => self.answer(&trial, response, time_s),
-            (Stage::Ask, Input::Continue) => Err(InputError::NotNow("an answer is expected")),
+            (Stage::Ask, Input::Continue) => Err(InputError::NotNow("give an answer first")),
             (_, Input::Answer { .. }) => Err(InputError::NotNow("no question is open yet")),
             (_, Input::Again) => Err(InputError::NotNow("the stimulus can be repeated after its end")),
         }

@@ -83,8 +83,8 @@ mod tests {
             (WindowMessage::Screen(Screen::Over), r#"{"screen":"over"}"#),
             (WindowMessage::Warning { warning: Warning::OutOfRange }, r#"{"warning":"out-of-range"}"#),
             (
-                WindowMessage::Refused { refused: "an answer is expected".to_owned() },
-                r#"{"refused":"an answer is expected"}"#,
+                WindowMessage::Refused { refused: "give an answer first".to_owned() },
+                r#"{"refused":"give an answer first"}"#,
             ),
         ];
         for (message, line) in lines {

@@ -22,10 +22,10 @@ const OBSERVERS: [(f64, f64); 7] =
     flotor study bias --tracks 1 --json bias.json"
 )]
 pub(super) struct BiasArguments {
-    /// Estimates per observer and method
+    /// Number of estimates per observer and method
     #[arg(long, default_value_t = 10_000, value_parser = count(2..=1_000_000_u32), value_name = "N")]
     runs: u32,
-    /// Tracks per estimate
+    /// Number of tracks per estimate
     #[arg(long, default_value_t = 2, value_parser = count(1..=100_u32), value_name = "N")]
     tracks: u32,
     /// Seed of the answers

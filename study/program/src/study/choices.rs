@@ -133,7 +133,7 @@ pub(super) fn thresholds(text: &str) -> Result<[f64; 2], String> {
     let (vh, h) = text.split_once(',').ok_or("write VH,H, like 0.14,0.17")?;
     let both = [real(vh)?, real(h)?];
     let are_shares = both.iter().all(|share| (0.0..1.0).contains(share) && *share > 0.0);
-    if are_shares { Ok(both) } else { Err("both must be shares above 0 and below 1".to_owned()) }
+    if are_shares { Ok(both) } else { Err("both shares must be above 0 and below 1".to_owned()) }
 }
 
 /// Parses `LEAST-MOST`, with the first value smaller.
@@ -143,6 +143,6 @@ pub(super) fn range(text: &str) -> Result<(f64, f64), String> {
     if least < most {
         Ok((least, most))
     } else {
-        Err(format!("{least}-{most} is empty: the first must be smaller"))
+        Err(format!("the range {least}-{most} is empty; write the smaller number first"))
     }
 }

@@ -43,7 +43,7 @@ const MATERIALS: [(&str, [&str; 2]); 4] = [
     flotor study explore\n  \
     flotor study explore --set spring.preset=thesis-3 --set spring.variant=rod")]
 pub(super) struct ExploreArguments {
-    /// Scene to explore (TOML); without it, a spring of wire on the simulated flotor
+    /// Scene to explore in TOML (default: a spring of wire on the simulated flotor)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Set a parameter of a plugin of the scene (repeatable)

@@ -220,7 +220,7 @@ fn words(
         let refuse = |why: String| CommandError::Usage(format!("{}: options.{key}: {why}", file.display()));
         if OF_THE_COMMAND_LINE.contains(&name.as_str()) {
             return Err(refuse(
-                "is valid only on the command line, after the name of the study file".to_owned(),
+                "write this option only on the command line, after the name of the study file".to_owned(),
             ));
         }
         let option = known.iter().find(|option| option.get_long() == Some(&name)).ok_or_else(|| {
@@ -232,14 +232,17 @@ fn words(
         let value_of = |value: &toml::Value| match plain(value) {
             Some(text) if PATHS.contains(&name.as_str()) => Ok(folder.join(text).into_os_string()),
             Some(text) => Ok(OsString::from(text)),
-            None => Err(refuse(format!("the option accepts no value of type {}", kind(value)))),
+            None => Err(refuse(format!(
+                "the option accepts no value of type {}; write a number, a text or a list",
+                kind(value)
+            ))),
         };
         let values = match (value, option.get_action()) {
             (toml::Value::Boolean(is_set), clap::ArgAction::SetTrue) => {
                 words.extend((*is_set && !said.has(&name)).then(|| format!("--{name}").into()));
                 continue;
             }
-            (_, clap::ArgAction::SetTrue) => return Err(refuse("true or false".to_owned())),
+            (_, clap::ArgAction::SetTrue) => return Err(refuse("write true or false".to_owned())),
             (toml::Value::Array(values), clap::ArgAction::Append)
                 if option.get_value_delimiter().is_none() =>
             {
@@ -388,8 +391,8 @@ mod tests {
             ("range = \"1-2\"", "options.range: `flotor study jnd` has no such option"),
             ("subjects = true", "options.subjects: the option accepts no value of type boolean"),
             ("subjects = [3, 4]", "options.subjects: the option accepts no value of type list"),
-            ("no_demo = 1", "options.no_demo: true or false"),
-            ("resume = true", "options.resume: is valid only on the command line"),
+            ("no_demo = 1", "options.no_demo: write true or false"),
+            ("resume = true", "options.resume: write this option only on the command line"),
         ] {
             let text = format!("task = \"jnd\"\n[options]\n{options}\n");
             let error = words(Path::new("a.study.toml"), &text, Vec::new()).expect_err(options).to_string();

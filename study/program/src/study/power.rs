@@ -19,7 +19,7 @@ pub(super) struct PowerArguments {
     /// Smallest and largest number of subjects; five sizes in this range are simulated
     #[arg(long, default_value = "8..32", value_parser = sizes, value_name = "FEWEST..MOST")]
     subjects: (u16, u16),
-    /// Simulated studies of each size
+    /// Number of simulated studies of each size
     #[arg(long, default_value_t = 200, value_parser = count(10..=100_000_u32), value_name = "N")]
     runs: u32,
     /// Ratio of the threshold without vision to the threshold with vision
@@ -31,7 +31,7 @@ pub(super) struct PowerArguments {
     /// Bases, in the unit of the stimulus
     #[arg(long, value_delimiter = ',', default_value = "17,26,35", value_parser = real, value_name = "LIST")]
     bases: Vec<f64>,
-    /// Replications, in alternating modality
+    /// Number of replications, in alternating modality
     #[arg(long, default_value_t = 4, value_parser = count(2..=1000_u32), value_name = "N")]
     replications: u32,
     /// Seed of the answers

@@ -21,10 +21,11 @@ pub(super) struct SpringArguments {
     /// Measured force over length or compression (CSV)
     #[arg(value_name = "FILE.csv")]
     curve: PathBuf,
-    /// Length without load (default: the longest length in the table; required for --scene if the table has compressions)
+    /// Free length: length without load, in mm (default: the longest length in the table; required for --scene if the
+    /// table has compressions)
     #[arg(long, value_parser = number("mm", "length", 0.01..=1000.0), value_name = "MM")]
     free_length_mm: Option<f64>,
-    /// Diameter of the coil between wire centres, for the scene (default: spring 1 of the thesis)
+    /// Diameter of the coil between wire centres, in mm, for the scene (default: that of spring 1 of the thesis)
     #[arg(long, value_parser = number("mm", "length", 0.01..=1000.0), value_name = "MM")]
     coil_diameter_mm: Option<f64>,
     /// Plot the measurement and the fitted spring
