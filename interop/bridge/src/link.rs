@@ -47,16 +47,17 @@ pub enum LinkError {
         reason: String,
     },
     /// A private key is readable by other users: a reader of the key is a member for as long as the certificate is valid.
-    #[error("other users may read the key in {}; `chmod 600 {}`, and make new keys if another user may have read \
-    the file", file.display(), file.display())]
+    #[error(
+        "other users can read the private key in {}; run `chmod 600 {}`, and create new keys with `flotor \
+         bridge keys` if another user could have read the file", file.display(), file.display())]
     ExposedKey {
         /// Path of the file with the key.
         file: PathBuf,
     },
     /// An endpoint is open to other users, and without keys they would have all rights of `--allow`.
     #[error(
-        "`{endpoint}` is open to other users, and only keys distinguish members: make keys for --config with \
-         `flotor bridge keys`, or add --without-keys"
+        "`{endpoint}` is open to other users, and only keys distinguish members: create keys for --config \
+         with `flotor bridge keys`, or accept every peer with --without-keys"
     )]
     WithoutKeys {
         /// Offending endpoint.

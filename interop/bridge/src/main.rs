@@ -52,17 +52,17 @@ enum Command {
     Serve(ServeArguments),
     /// Republish a remote run on this machine, for `flotor view`
     Attach {
-        /// The bridge
+        /// Name of the bridge, as `flotor bridge list` prints it
         name: Name,
     },
     /// Couple a hand here to a remote hand: forward the peer state of couplings with `partner = "elsewhere"`
     Couple {
-        /// The bridge
+        /// Name of the bridge, as `flotor bridge list` prints it
         name: Name,
     },
     /// Record a remote run until it ends
     Record {
-        /// The bridge
+        /// Name of the bridge, as `flotor bridge list` prints it
         name: Name,
         /// Recording to write
         #[arg(value_name = "FILE.mcap")]
@@ -70,7 +70,7 @@ enum Command {
     },
     /// Send a request to a remote run
     Ask {
-        /// The bridge
+        /// Name of the bridge, as `flotor bridge list` prints it
         name: Name,
         #[command(subcommand)]
         request: RequestArgument,
@@ -89,10 +89,10 @@ struct ServeArguments {
     /// Highest right whose requests are accepted; the access control of the network sets the right of each member
     #[arg(long, value_enum, default_value = "watch")]
     allow: Right,
-    /// A scene that may be started from the network, with `--allow own`
+    /// Scene that members may start from the network, with `--allow own` (default: none)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// Publish one tick in N
+    /// Publish every Nth tick only
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
 }
@@ -105,7 +105,7 @@ enum RequestArgument {
     Stop,
     /// Change live parameters, all in the same tick
     Set {
-        /// PLUGIN.KEY=VALUE
+        /// New value of a live parameter, such as spring.gamma_n=20 (repeatable)
         #[arg(required = true, value_name = "PLUGIN.KEY=VALUE", value_parser = set_value)]
         values: Vec<SetValue>,
     },
@@ -113,7 +113,7 @@ enum RequestArgument {
     Weight {
         /// Name of the model in the scene
         model: String,
-        /// 0 to 1
+        /// Blend weight, 0 to 1
         weight: f64,
     },
     /// Start the bridge's scene
@@ -124,7 +124,7 @@ enum RequestArgument {
 
 #[derive(Args)]
 struct KeysArguments {
-    /// Folder for the files
+    /// New folder for keys and configurations
     folder: PathBuf,
     /// Name or address under which the bridge is reached (repeatable)
     #[arg(long = "host", required = true, value_name = "HOST")]
@@ -145,7 +145,7 @@ struct KeysArguments {
 
 fn set_value(text: &str) -> Result<SetValue, String> {
     let parts = text.split_once('=').and_then(|(key, value)| Some((key.split_once('.')?, value)));
-    let ((plugin, parameter), value) = parts.ok_or("PLUGIN.KEY=VALUE, such as spring.gamma_n=20")?;
+    let ((plugin, parameter), value) = parts.ok_or("write PLUGIN.KEY=VALUE, such as spring.gamma_n=20")?;
     Ok(SetValue { plugin: plugin.to_owned(), parameter: parameter.to_owned(), value: value.to_owned() })
 }
 
@@ -258,7 +258,10 @@ fn record_run(remote: &Remote, file: &Path, stop: &AtomicBool) -> Result<(), Box
     println!("{}", escaped(&shown));
     if recorded.end == RecordingEnd::Cut {
         return Err(
-            "the recording ends before the run; the file contains the ticks received until then".into()
+            "the bridge became unreachable before the run ended, so the recording is incomplete; the file \
+             contains the ticks received until then. Check the network, or record on the remote host with \
+             `flotor run --record`"
+                .into(),
         );
     }
     Ok(())

@@ -162,7 +162,7 @@ impl NumberedRequest {
 #[serde(rename_all = "kebab-case")]
 pub enum Refusal {
     /// Not a request, or on the wrong key.
-    #[error("malformed request, or request on the wrong key; use both programs from one build")]
+    #[error("the request is malformed, or has the wrong key; use both programs from one build")]
     Malformed,
     /// Longer than [`MAX_REQUEST_BYTES`].
     #[error("the request is longer than {MAX_REQUEST_BYTES} bytes; use both programs from one build")]

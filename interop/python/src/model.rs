@@ -7,6 +7,7 @@ use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{DVec3, ParameterKind};
 use flotor_lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
 use flotor_session::registry::Registry;
+use flotor_session::scene::nearest;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyReadwriteArray1,
     PyUntypedArrayMethods,
@@ -97,7 +98,7 @@ impl Model {
     /// Returns the current value of a parameter, presets resolved.
     fn parameter(&self, id: &str) -> PyResult<f64> {
         let index = self.plugin.parameters().iter().position(|parameter| parameter.id() == id);
-        let index = index.ok_or_else(|| refuse(format!("`{}` has no parameter `{id}`", self.id())))?;
+        let index = index.ok_or_else(|| refuse(self.no_parameter(id)))?;
         Ok(self.lock()?.parameter(index))
     }
 
@@ -106,7 +107,9 @@ impl Model {
         let mut instance = self.lock()?;
         match instance.set_parameter(setting.index(), setting.value()) {
             CallStatus::Ok => Ok(()),
-            CallStatus::Unsupported => Err(refuse(format!("`{id}` cannot change while the model lives"))),
+            CallStatus::Unsupported => Err(refuse(format!(
+                "`{id}` cannot change in an existing model; create a new model with this value"
+            ))),
             _ => Err(refuse(format!("`{id}`: {}", instance.last_message()))),
         }
     }
@@ -133,7 +136,7 @@ impl Model {
         let (read_end, written_end) =
             (read + size_of_val(inputs), written + outputs.len() * size_of::<OutputRow>());
         if read < written_end && written < read_end {
-            return Err(refuse("inputs and outputs share memory; pass a copy of one of them"));
+            return Err(refuse("inputs and outputs share memory; pass a copy of one of the arrays"));
         }
         let outputs = OutputRow::peel_mut(outputs.as_slice_mut()?);
         if inputs.len() != outputs.len() {
@@ -187,6 +190,14 @@ impl Model {
 }
 
 impl Model {
+    /// Returns the error about an unknown parameter, with the most similar one.
+    fn no_parameter(&self, id: &str) -> String {
+        let known = self.plugin.parameters().iter().map(|parameter| parameter.id());
+        let hint = nearest(id, known)
+            .map_or("`parameters` lists the parameters".to_owned(), |near| format!("did you mean `{near}`?"));
+        format!("`{}` has no parameter `{id}`; {hint}", self.id())
+    }
+
     /// Locks the model. Ignores poisoning: the contract reports panics of a model as a status. Does not wait in a child of
     /// `os.fork()`.
     fn lock(&self) -> PyResult<MutexGuard<'_, flotor_hal::abi::loader::Model>> {

@@ -260,18 +260,21 @@ impl Plan {
             let most = flotor_lab::sampling::DIMENSIONS;
             if self.axes.len() > most {
                 return Err(format!(
-                    "{} axes are too many; the Sobol sequence has at most {most} dimensions",
+                    "the plan has {} axes, but the Sobol sequence has at most {most} dimensions; remove axes",
                     self.axes.len()
                 ));
             }
             if let Some(axis) = self.axes.iter().find(|axis| !matches!(axis.values, Values::Range { .. })) {
-                return Err(format!("`{}` lists values; layout = \"sobol\" needs from and to", axis.key));
+                return Err(format!(
+                    "`{}` lists values, but layout = \"sobol\" needs `from` and `to`; write a range",
+                    axis.key
+                ));
             }
         }
         match self.row_count() {
             Some(1..=MOST_ROWS) => Ok(()),
             Some(0) => Err("the plan has no points; give each axis at least one value".into()),
-            _ => Err(format!("the plan has more than {MOST_ROWS} rows; split it")),
+            _ => Err(format!("the plan has more than {MOST_ROWS} rows; split the plan")),
         }
     }
 
@@ -313,7 +316,9 @@ impl AxisText {
             (Some(values), None, None, None) if values.iter().all(|v| v.is_finite()) => {
                 Values::Numbers(values)
             }
-            (Some(_), None, None, None) => return Err(format!("axis `{key}`: a value is not finite")),
+            (Some(_), None, None, None) => {
+                return Err(format!("axis `{key}`: a value is not finite; write finite numbers"));
+            }
             (None, Some(words), None, None) => Values::Words(words),
             (None, None, Some(from), Some(to)) => {
                 if !(from.is_finite() && to.is_finite() && from < to) {
@@ -328,7 +333,11 @@ impl AxisText {
                 }
                 Values::Range { from, to, steps: steps.unwrap_or(2).max(2), scale }
             }
-            _ => return Err(format!("axis `{key}` needs one of: values = [..], words = [..], from and to")),
+            _ => {
+                return Err(format!(
+                    "axis `{key}` needs exactly one of: values = [..], words = [..], or from and to"
+                ));
+            }
         };
         if values.is_empty() {
             return Err(format!("axis `{key}` has no values"));

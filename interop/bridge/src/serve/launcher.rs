@@ -25,7 +25,7 @@ impl Launcher {
     /// The cause as text: the scene is running already, or the system refuses.
     pub fn start(&mut self) -> Result<(), String> {
         if self.runs() {
-            return Err("the scene is running already".to_owned());
+            return Err("the scene is running already; stop the run first".to_owned());
         }
         let mut command = Command::new(&self.program);
         command.arg("run").arg(&self.scene).stdin(Stdio::null()).stdout(Stdio::null());

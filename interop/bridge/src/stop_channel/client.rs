@@ -108,8 +108,9 @@ fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Optio
     // Any press may be answered; the reply to the last one comes after the hosts have confirmed.
     let mut presses: Vec<Nonce> = Vec::new();
     while Instant::now() < until {
-        let datagram =
-            pending.sealed(&stop.keys).ok_or_else(|| io::Error::other("the keys have no stop key"))?;
+        let datagram = pending.sealed(&stop.keys).ok_or_else(|| {
+            io::Error::other("the keys contain no stop key; create new keys with `flotor bridge keys`")
+        })?;
         for (socket, places) in &sockets {
             for place in places {
                 // Without a listener the next system call reports the error.

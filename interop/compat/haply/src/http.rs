@@ -261,14 +261,22 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         ("GET", _) => {}
         ("POST" | "PATCH", "transform") => {
             let patch = body.get("transform").unwrap_or(body);
-            view.workspace =
-                view.workspace.patched(patch).ok_or_else(|| failed(400, "the value is not a transform"))?;
+            view.workspace = view.workspace.patched(patch).ok_or_else(|| {
+                failed(
+                    400,
+                    "the value is not a transform; send position, rotation or scale with their components",
+                )
+            })?;
         }
         ("POST", _) => set(view, short, body).map_err(|why| failed(400, &why))?,
         ("PATCH", "mount") => {
             let patch = body.get("transform").unwrap_or(body);
-            let mount =
-                view.mount.patched(patch).ok_or_else(|| failed(400, "the value is not a transform"))?;
+            let mount = view.mount.patched(patch).ok_or_else(|| {
+                failed(
+                    400,
+                    "the value is not a transform; send position, rotation or scale with their components",
+                )
+            })?;
             view.set_mount(mount);
         }
         ("DELETE", "basis") => view.basis = plain.basis,
@@ -278,7 +286,7 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         ("DELETE", "damping") => view.damping = plain.damping,
         ("DELETE", "force_gate") => view.force_gate = plain.force_gate,
         ("DELETE", "transform") => view.workspace = plain.workspace,
-        _ => return Err(failed(405, "the setting does not support this method")),
+        _ => return Err(failed(405, "the setting does not support this HTTP method")),
     }
     match short {
         "basis" => Ok(json!({ "permutation": view.basis.name() })),

@@ -53,7 +53,7 @@ use std::time::Duration;
     flotor emulate haply-service proxy.toml --record run.mcap   the device of a scene, within the scene's limits\n  \
     flotor lend --api haply -- python3 my_program.py        the same for one program")]
 struct Arguments {
-    /// Scene file (TOML); without it, a simulated flotor held by a hand
+    /// Scene file in TOML (default: a simulated flotor held by a hand)
     scene: Option<PathBuf>,
     /// Address of the simulation channel and HTTP (port 0: any free port)
     #[arg(long, default_value = "127.0.0.1:10001", value_name = "HOST:PORT")]
@@ -63,13 +63,13 @@ struct Arguments {
     events: String,
     #[command(flatten)]
     reach: ReachArguments,
-    /// Allow connections of web pages with this origin, for example http://localhost:3000 (repeatable; default: none)
+    /// Accept connections from web pages of this origin, for example http://localhost:3000 (repeatable; default: none)
     #[arg(long, value_name = "ORIGIN")]
     allow_origin: Vec<String>,
-    /// Clock of the run
+    /// Clock of the run (default: FLOTOR_PACE, else real)
     #[arg(long, value_enum, value_name = "WHO")]
     pace: Option<PaceOption>,
-    /// Seed of all random numbers
+    /// Seed of all random numbers (default: FLOTOR_SEED, else 0)
     #[arg(long, value_parser = seed, value_name = "N")]
     seed: Option<u64>,
     #[command(flatten)]

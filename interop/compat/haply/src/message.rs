@@ -132,7 +132,7 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
         "preset" => {
             let preset = value.get("preset").or(Some(value)).and_then(Value::as_str).unwrap_or_default();
             if !view.set_preset(preset) {
-                return Err("unknown preset".to_owned());
+                return Err(format!("unknown preset `{preset}`"));
             }
         }
         "mount" => {
@@ -144,7 +144,7 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
             let along =
                 value.get("vector").filter(|vector| !vector.is_null()).map_or(Some(DVec3::ZERO), vector);
             let damping = along.map(|along| along + scalar).filter(|damping| damping.min_element() >= 0.0);
-            view.damping = damping.ok_or("the damping must be 0 or more, N·s/m")?;
+            view.damping = damping.ok_or("the damping must be 0 N·s/m or more")?;
         }
         "force_gate" => {
             let gain = value.get("gain").and_then(Value::as_f64).filter(|gain| (0.0..=1.0).contains(gain));
@@ -155,7 +155,7 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
                 set(view, name, value)?;
             }
         }
-        other => return Err(format!("`{other}` has no effect here")),
+        other => return Err(format!("the setting `{other}` is not supported")),
     }
     Ok(())
 }
