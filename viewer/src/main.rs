@@ -43,7 +43,7 @@ struct Arguments {
     /// Write a picture instead of opening a window; needs no display and no GPU
     #[arg(long, value_name = "OUT.png", requires = "recording")]
     screenshot: Option<PathBuf>,
-    /// Watch the run of this process (default: the newest)
+    /// Show the run of this process (default: the newest run)
     #[arg(long, value_name = "PID", conflicts_with = "recording")]
     run: Option<u32>,
     /// Show the screens of an experiment, controlled by lines of JSON on standard input and output
@@ -59,10 +59,10 @@ struct Arguments {
     #[arg(long, value_name = "AZIMUTH,INCLINATION[,ZOOM]", allow_hyphen_values = true)]
     #[arg(requires = "screenshot", conflicts_with = "window")]
     view: Option<View>,
-    /// Device for numbers and traces, if there are several (default: the first)
+    /// Device whose numbers and traces are shown, where there are several (default: the first)
     #[arg(long, value_name = "NAME", requires = "recording")]
     device: Option<String>,
-    /// Time to show, s (default: of the largest force)
+    /// Time in the recording to show, s (default: the time of the largest force)
     #[arg(long, value_name = "SECONDS", requires = "recording", conflicts_with = "export")]
     at: Option<f64>,
     /// Write the traces of the recording instead of opening a window: as a table (.csv) or a plot (.svg, .png); --look light
@@ -100,7 +100,9 @@ struct Arguments {
 /// Parses a force of an arrow in N, such as `20`.
 fn arrow_force(text: &str) -> Result<f64, String> {
     let force_n = text.parse().ok().filter(|force_n| (0.001..=10_000.0).contains(force_n));
-    force_n.ok_or_else(|| format!("`{text}` is not a force of an arrow; write 0.001 to 10000 N"))
+    force_n.ok_or_else(|| {
+        format!("`{text}` is not a valid force of an arrow; write a number from 0.001 to 10000, in N")
+    })
 }
 
 /// Parses an axis, such as `z`.
@@ -164,7 +166,9 @@ fn run(arguments: &Arguments) -> Result<(), Failure> {
         )));
     }
     if arguments.texts.is_some() && !arguments.sitting && arguments.screen.is_none() {
-        return Err(Failure::usage("--texts is for the screens of a sitting: add --sitting or --screen"));
+        return Err(Failure::usage(
+            "--texts has no effect without the screens of a sitting: add --sitting or --screen",
+        ));
     }
     fits_file(arguments).map_err(Failure::usage)?;
     let read = |path: &PathBuf| History::read(path).map_err(Failure::usage);
@@ -207,7 +211,8 @@ fn fits_file(arguments: &Arguments) -> Result<(), String> {
     let idle = of_picture.into_iter().find_map(|(is_there, name)| is_there.then_some(name));
     match (ExportFormat::of_file(out)?, idle) {
         (ExportFormat::Csv, Some(name)) => Err(format!(
-            "`{}` is a table, and `{name}` is for a plot of traces: omit the option, or write .svg or .png",
+            "`{}` is a table, and `{name}` applies only to a plot: omit the option, or name a file that ends \
+             in .svg or .png",
             out.display()
         )),
         _ => Ok(()),

@@ -24,13 +24,14 @@ const LEAST_SIZE_PT: [f32; 2] = [320.0, 200.0];
 pub enum WindowError {
     /// There is no display.
     #[error(
-        "no window: {0}; without a display, `flotor view --screenshot OUT.png FILE.mcap` draws a picture"
+        "cannot open a window: {0}; without a display, `flotor view --screenshot OUT.png FILE.mcap` draws a \
+         picture"
     )]
     NoDisplay(String),
     /// There is no adapter for drawing.
     #[error(
-        "no window: {0}; install a driver for your GPU, or `libegl1 libgl1-mesa-dri` for drawing on the processor; without \
-         either, `flotor view --screenshot OUT.png FILE.mcap` draws a picture"
+        "cannot open a window: {0}; install a driver for your GPU, or `libegl1 libgl1-mesa-dri` for drawing \
+         on the processor; without either, `flotor view --screenshot OUT.png FILE.mcap` draws a picture"
     )]
     NoAdapter(String),
     /// The display or the adapter of an open window was lost.
@@ -304,7 +305,7 @@ mod tests {
         let said = broken.expect_err("it broke").to_string();
         assert!(
             said.starts_with("internal error of the window: index out of bounds;")
-                && !said.contains("no window"),
+                && !said.contains("cannot open a window"),
             "{said}"
         );
 

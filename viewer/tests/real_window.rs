@@ -182,7 +182,7 @@ fn a_sitting_without_a_display_is_refused_before_it_begins() {
     let output = study.output().expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("no window") && said.contains("--screen terminal"), "{said}");
+    assert!(said.contains("cannot open a window") && said.contains("--screen terminal"), "{said}");
     assert!(!out.exists(), "nothing was begun");
 }
 
@@ -193,7 +193,7 @@ fn without_a_display_there_is_one_line_and_exit_code_2() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
-    assert!(said.starts_with("error: no window: ") && said.contains("--screenshot"), "{said}");
+    assert!(said.starts_with("error: cannot open a window: ") && said.contains("--screenshot"), "{said}");
 }
 
 /// A window on a recording that stands still costs nothing: no picture is made, so nothing but the system's own events can wake
@@ -247,7 +247,7 @@ fn without_a_driver_there_is_one_line_and_pictures_all_the_same() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert_eq!(said.lines().count(), 1, "{said}");
-    assert!(said.starts_with("error: no window: ") && said.contains("libgl1-mesa-dri"), "{said}");
+    assert!(said.starts_with("error: cannot open a window: ") && said.contains("libgl1-mesa-dri"), "{said}");
     assert!(said.contains("--screenshot"), "{said}");
 }
 

@@ -104,7 +104,9 @@ impl Texts {
             ("again_left", &texts.again_left, "{left}"),
         ] {
             if !text.contains(place) {
-                return Err(format!("`{key}` lacks `{place}`, the placeholder of its number"));
+                return Err(format!(
+                    "`{key}` lacks `{place}`, the placeholder of its number; insert the placeholder"
+                ));
             }
         }
         Ok(texts)
