@@ -270,14 +270,14 @@ mod tests {
             ("x;y\n1,5;2\n", "t:1: columns are separated by `;`; separate them with commas"),
             ("sep=;\nx;y\n1;2\n", "t:1: columns are separated by `;`"),
             ("x\ty\n1\t2\n", "t:1: columns are separated by tabs"),
-            ("x,y\n1,2\n3;4\n", "t:3: 1 cell for 2 columns; separate them with commas"),
-            ("x,y\n0,5,1,5\n", "t:2: 4 cells for 2 columns; write numbers with a decimal point"),
+            ("x,y\n1,2\n3;4\n", "t:3: the line has 1 cell for 2 columns; separate them with commas"),
+            ("x,y\n0,5,1,5\n", "t:2: the line has 4 cells for 2 columns; write numbers with a decimal point"),
             ("x,y\n\"0,5\",\"1,5\"\n", "t:2: `x` must be a number, not `0,5`: write a decimal point"),
             ("x,y\n1,\n", "t:2: `y` must be a number, not ``"),
             (",x\n0,1\n", "t:1: column 1 has no name"),
             ("x,y,x\n0,1,2\n", "t:1: the column `x` is given twice; remove one"),
             ("x,y\n\"1,2\n", "t:2: a quotation mark is not closed"),
-            ("x,y\n\"1\"2,3\n", "t:2: a comma is expected"),
+            ("x,y\n\"1\"2,3\n", "t:2: a comma must follow"),
             ("x,y\n\u{1b}[31m,3\n", "t:2: `x` must be a number, not `\\u{1b}[31m`"),
         ] {
             let told = numbers(text).expect_err("refused");

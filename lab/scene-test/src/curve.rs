@@ -249,9 +249,9 @@ mod tests {
     fn a_mistake_has_a_line() {
         for (text, says) in [
             ("", "c:1: the table is empty; write a header and at least one row"),
-            ("z_m\n1", "no column to compare"),
+            ("z_m\n1", "the table has no column to compare"),
             ("z_mm,fz_n\n1,1", "unknown column `z_mm`"),
-            ("z_m,fz_n\n1,1\n2", "c:3: 1 cell for 2"),
+            ("z_m,fz_n\n1,1\n2", "c:3: the line has 1 cell for 2"),
             ("z_m,fz_n\n1,x", "c:2: `fz_n` must be a number, not `x`"),
             ("z_m,fz_n\n", "the table has no row"),
         ] {

@@ -437,7 +437,7 @@ mod tests {
         for (rest, says) in [
             ("seedz = [1]", "F:2: unknown key `seedz`; did you mean `seeds`?"),
             ("\n[curve]\nfle = \"a\"\nwithin_n = 1", "did you mean `file`?"),
-            ("seeds = []", "F:2: without a seed"),
+            ("seeds = []", "F:2: `seeds` is empty"),
             ("seeds = [1, 9007199254740993]", "F:2: the seed 9007199254740993 is larger than"),
             ("duration = \"5 parsec\"", "F:2: unknown unit of time `parsec`"),
             ("[set]\nspring = 3", "F:3: `spring` is not PLUGIN.PARAMETER"),

@@ -66,10 +66,12 @@ fn what_is_no_curve_is_refused() {
 
     let refused = |text: &str| parse(text).unwrap_err().in_file("c");
     assert!(refused("").starts_with("c:1: the table is empty"));
-    assert!(refused("compression_mm,force_n\n0,0\n1,2\n").starts_with("c:3: 2 rows"));
+    assert!(refused("compression_mm,force_n\n0,0\n1,2\n").starts_with("c:3: the curve has 2 rows"));
     assert!(refused("compression_mm,force_n\n1,0\n2,3\n3,4\n").starts_with("c:2: the first row"));
     assert!(refused("length_mm,force_n\n25,0\n").starts_with("c:1: the header"));
-    assert!(refused("compression_mm,force_n\n0,0\n1;2\n").starts_with("c:3: 1 cell for 2 columns"));
+    assert!(
+        refused("compression_mm,force_n\n0,0\n1;2\n").starts_with("c:3: the line has 1 cell for 2 columns")
+    );
     assert!(refused("compression_mm,force_n\n0,0\n1,nan\n").starts_with("c:3: `force_n` must be finite"));
     assert!(refused("# bench\ncompression_mm,force_n\n0,0\n2,3\n1,4\n").starts_with("c:5: compression"));
     assert!(parse("# bench\n\ncompression_mm, force_n\n0, 0\n1, 2\n2, 4\n").is_ok());

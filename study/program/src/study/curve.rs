@@ -298,7 +298,7 @@ mod tests {
         assert!(refused("x,y\n1,2\n").starts_with("line 1: the header"));
         assert!(
             refused("length_mm,force_n\n1,2\n3;4\n")
-                .starts_with("line 3: 1 cell for 2 columns; separate them with commas")
+                .starts_with("line 3: the line has 1 cell for 2 columns; separate them with commas")
         );
         assert!(refused("length_mm,force_n\n1,nan\n").starts_with("line 2"));
         let few = MeasuredCurve::parse("compression_mm,force_n\n0,0\n1,2\n", Some(0.02)).unwrap();

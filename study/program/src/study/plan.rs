@@ -394,8 +394,8 @@ mod tests {
             ("range = \"1-2\"", "options.range: `flotor study jnd` has no such option"),
             ("subjects = true", "options.subjects: the option accepts no value of type boolean"),
             ("subjects = [3, 4]", "options.subjects: the option accepts no value of type list"),
-            ("no_demo = 1", "options.no_demo: true or false"),
-            ("resume = true", "options.resume: is valid only on the command line"),
+            ("no_demo = 1", "options.no_demo: write true or false"),
+            ("resume = true", "options.resume: write this option only on the command line"),
         ] {
             let text = format!("task = \"jnd\"\n[options]\n{options}\n");
             let error = words(Path::new("a.study.toml"), &text, Vec::new()).expect_err(options).to_string();

@@ -38,7 +38,7 @@ fn complaints_name_the_line_and_the_column() {
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n0,0,0,0\n", "t:3: time 0 ns is not after 0 ns"),
         ("time_s,x_m,y_m,z_m\n0,0,0,nan\n", "t:2: `z_m` must be finite"),
         ("time_s,x_m,y_m,z_m\n0,0,0,4\n", "t:2: ([0, 0, 4]) m is outside the workspace of"),
-        ("time_s,x_m,y_m,z_m\n0,0,0\n", "t:2: 3 cells for 4 columns"),
+        ("time_s,x_m,y_m,z_m\n0,0,0\n", "t:2: the line has 3 cells for 4 columns"),
     ] {
         let problem = table(text).expect_err("refused");
         assert!(problem.starts_with(expected), "{problem}, not {expected}");

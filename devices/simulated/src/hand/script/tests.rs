@@ -140,7 +140,7 @@ fn complaints_name_file_line_and_key() {
         ("step = []\n", "test.toml: `step` is empty"),
         (
             "repeat = 9999\n[[step]]\nhold = { duration_s = 1 }\n[[step]]\nhold = { duration_s = 1 }\n",
-            "test.toml: 19998 movements",
+            "test.toml: the script has 19998 movements",
         ),
         (
             "[[step]]\nrelease = {}\n[[step]]\nhold = { duration_s = 1 }\n",

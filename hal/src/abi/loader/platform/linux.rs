@@ -187,9 +187,9 @@ mod tests {
         for (wrong, words) in [
             (right, "cannot be written"),
             (IndependentStop { descriptor: 1_000_000, ..right }, "names the descriptor 1000000"),
-            (IndependentStop { descriptor: -7, ..right }, "names the descriptor -7"),
-            (IndependentStop { length: 65, ..right }, "has 65 bytes"),
-            (IndependentStop { length: 0, ..right }, "has 0 bytes"),
+            (IndependentStop { descriptor: -7, ..right }, "names the negative descriptor -7"),
+            (IndependentStop { length: 65, ..right }, "has a message of 65 bytes"),
+            (IndependentStop { length: 0, ..right }, "has a message of 0 bytes"),
             (IndependentStop { state: 2, ..right }, "state 2"),
             (IndependentStop { descriptor: -1, ..right }, "no descriptor"),
         ] {
