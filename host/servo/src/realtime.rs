@@ -97,12 +97,8 @@ pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
 
 /// Pins the calling thread to one core; other threads of the process are not affected.
 fn pin(Core(number): Core) -> Result<(), String> {
-    scheduling::pin(number).map_err(|_| {
-        format!(
-            "--core {number}: the machine lacks this core, or this process may not use it; choose another \
-             core"
-        )
-    })
+    scheduling::pin(number)
+        .map_err(|_| format!("--core {number}: the machine lacks this core, or this process may not use it"))
 }
 
 /// Locks the memory of the process and requests the priority of a worker, just below the loop, for the calling thread. Refusals are

@@ -1,7 +1,6 @@
 //! Limits of a call that may not return: processor time, waiting time, and time after a stop request.
 //!
-//! A call does not count the time in which other threads have the processor. So one limit is on its processor time, and another, ten
-//! times as long, on the time in which its thread needs no processor (sleeps or waits).
+//! Time in which other threads have the processor does not count: ten times the limit of the processor time is allowed for waiting.
 
 use crate::calls::STEP_LIMIT_VARIABLE;
 use crate::platform::ThreadClock;

@@ -100,6 +100,9 @@ mod tests {
         let mut bytes = b"x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,0,0,0,0\n0,0,".to_vec();
         bytes.extend([0xff, b',', b'0']);
         assert_eq!(told(&bytes), "poses.csv:3: the file is not UTF-8; save the file as UTF-8");
-        assert_eq!(told(b"x_m\n"), "poses.csv:1: column `y_m` is missing");
+        assert_eq!(
+            told(b"x_m\n"),
+            "poses.csv:1: column `y_m` is missing (the header is [id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad)"
+        );
     }
 }

@@ -66,7 +66,7 @@ mod tests {
         );
         for malformed in ["here", "127.0.0.1:port", ""] {
             assert!(
-                told(malformed).ends_with("is not host:port, like 127.0.0.1:5679"),
+                told(malformed).ends_with("is not valid; write host:port, like 127.0.0.1:5679"),
                 "{}",
                 told(malformed)
             );

@@ -1,5 +1,4 @@
-//! Run on the virtual clock that the caller advances by any number of ticks: for experiments, which decide between ticks how to
-//! continue.
+//! Run on the virtual clock that the caller advances by any number of ticks, for experiments.
 
 use super::virtual_loop::VirtualLoop;
 use super::{Controls, Observer, RunError, RunOptions, Session};
@@ -16,8 +15,7 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Prepares a session as [`Session::prepare`] does, on the virtual clock, and energises its devices; `stop` ends the run. Not
-    /// real-time.
+    /// Prepares a session on the virtual clock, and energises its devices; `stop` ends the run. Not real-time.
     ///
     /// # Errors
     /// [`RunError`]; then no device is energised.
