@@ -86,11 +86,7 @@ impl RealTimeReport {
 /// Requests real-time priority for the calling thread, pins the thread to `core` if given, and locks the memory of the process
 /// except in a guest. Not real-time.
 pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
-    // The memory of a guest belongs to another program: locked, its next allocation might fail.
-    let memory_lock = match is_guest() {
-        true => Privilege::NotRequested,
-        false => scheduling::lock_memory().map_or(Privilege::NotRequested, Privilege::of),
-    };
+    let memory_lock = lock_own_memory();
     let core = core.map_or(Privilege::NotRequested, |core| Privilege::of(pin(core)));
     RealTimeReport { fifo: enter_priority(Duty::Loop), memory_lock, core }
 }
@@ -101,10 +97,18 @@ fn pin(Core(number): Core) -> Result<(), String> {
         .map_err(|_| format!("--core {number}: the machine lacks this core, or this process may not use it"))
 }
 
-/// Locks the memory of the process and requests the priority of a worker, just below the loop, for the calling thread. Refusals are
-/// ignored: the worker is then only slower. Not real-time.
+/// Locks the memory of the process, except in a guest: its memory belongs to another program, whose next allocation might fail.
+fn lock_own_memory() -> Privilege {
+    match is_guest() {
+        true => Privilege::NotRequested,
+        false => scheduling::lock_memory().map_or(Privilege::NotRequested, Privilege::of),
+    }
+}
+
+/// Locks the memory of the process as [`enter_real_time`] does, and requests the priority of a worker, just below the loop, for the
+/// calling thread. Refusals are ignored: the worker is then only slower. Not real-time.
 pub fn enter_worker_priority() {
-    let _ = scheduling::lock_memory();
+    let _ = lock_own_memory();
     let _ = enter_priority(Duty::Worker);
 }
 
