@@ -46,7 +46,7 @@ fn single(criterion: &mut Criterion, name: &str, respond: impl Fn(&Pose) -> Resp
     group.bench_function(name, |bencher| {
         bencher.iter(|| {
             for pose in &poses {
-                black_box(respond(black_box(pose)));
+                let _ = black_box(respond(black_box(pose)));
             }
         });
     });

@@ -513,7 +513,11 @@ fn what_cannot_be_lent_is_said_in_one_line_with_what_helps() {
     let output =
         Command::new(&alone).args(["lend", "--api", "chai3d", "--", &program]).output().expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr);
-    assert!(said.contains("-p flotor-chai3d` builds it") && said.trim_end().lines().count() == 1, "{said}");
+    assert!(
+        said.contains("build it with `cargo build --release -p flotor-chai3d`")
+            && said.trim_end().lines().count() == 1,
+        "{said}"
+    );
 }
 
 /// What a run has told, as JSON.

@@ -191,7 +191,7 @@ fn what_a_model_prints_does_not_mix_with_a_summary_for_machines() {
 fn a_run_in_real_time_without_room_for_files_is_refused() {
     let ran = Flotor::with(["run", "--duration", "1s"]).through_shell("ulimit -n 20; exec \"$@\"").run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
-    assert!(ran.error().starts_with("only 20 files may be open"), "{ran:?}");
+    assert!(ran.error().starts_with("the process may open only 20 files"), "{ran:?}");
 }
 
 // ---------------------------------------------------------------- before a run

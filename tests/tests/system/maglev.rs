@@ -432,7 +432,7 @@ fn where_no_controller_is_one_line_says_so() {
     let scratch = Scratch::default();
     for (device, words) in [
         ("address = \"127.0.0.1:1\"", "no controller at 127.0.0.1:1"),
-        ("address = \"here\"", "is not host:port"),
+        ("address = \"here\"", "is not valid; write host:port"),
         ("transport = \"serial\"\naddress = \"/dev/no-such-port\"", "no controller at /dev/no-such-port"),
     ] {
         let scene = scratch

@@ -747,7 +747,7 @@ fn each_rule_of_a_loop_sees_the_model_that_breaks_it() {
             "shares",
             "two instances stepped alternately return other results than one instance alone",
         ),
-        ("no-threads", "starts-threads", "more threads after 500 steps"),
+        ("no-threads", "starts-threads", "after 500 steps the process has more threads than before"),
         ("energy-gradient", "wrong-energy", "force and energy disagree in"),
     ];
     for (rule, fault, words) in broken {

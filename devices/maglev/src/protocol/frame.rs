@@ -94,7 +94,6 @@ impl Mode {
 
 /// Faults and active limits of the controller, one bit each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[must_use]
 pub struct Condition(u16);
 
 impl Condition {

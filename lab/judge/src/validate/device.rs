@@ -251,10 +251,7 @@ impl Running {
             ));
         }
         if !KNOWN.contains(state.conditions) {
-            return Err(format!(
-                "`conditions` has bits that the contract does not define ({:?}); clear them",
-                state.conditions
-            ));
+            return Err("`conditions` has bits that the contract does not define; clear them".to_owned());
         }
         let Sampled { count, first, last } = self.sampled;
         let now = state.sampled_ns;
