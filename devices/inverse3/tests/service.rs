@@ -295,7 +295,7 @@ fn a_service_without_a_device_asks_for_cable_and_power() {
 
 #[test]
 fn a_service_without_the_wanted_device_lists_those_it_has() {
-    let listed = format!("no device 1234; set `device` to one of its devices: {OTHER_ARM}, {ARM}");
+    let listed = format!("no device 1234; set `device` to the id of one of its devices: {OTHER_ARM}, {ARM}");
     refused_with(&until(usize::MAX, Said::Nothing), &[("device", "1234")], &[&listed]);
 }
 

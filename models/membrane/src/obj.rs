@@ -126,7 +126,7 @@ mod tests {
         assert!(error("v 0 0 0\nf 1 2 3\n").starts_with("m:2: `f`"));
         assert!(error("").starts_with("m: the file has no face"));
         assert!(error("v 0 0 0\nv 1 0 0\nf 1 2\n").starts_with("m:3: `f` needs the numbers of three"));
-        assert!(error("v 0 0 0\n0 0 0\n").starts_with("m:2: `0` is not a statement"));
+        assert!(error("v 0 0 0\n0 0 0\n").starts_with("m:2: `0` is not a Wavefront OBJ statement"));
         let stl = "solid sheet\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n";
         assert_eq!(error(stl), "m:1: this is an STL file; export the mesh as Wavefront OBJ");
     }

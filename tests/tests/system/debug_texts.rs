@@ -8,9 +8,8 @@ use std::path::Path;
 /// Folders of the product.
 const FOLDERS: [&str; 8] = ["devices", "hal", "host", "interop", "lab", "models", "study", "viewer"];
 /// Sources that use `{:?}`, with the reader of the text.
-const READERS: [(&str, &str); 17] = [
+const READERS: [(&str, &str); 16] = [
     ("devices/emulation/src/rig.rs", "a scene in TOML"),
-    ("devices/inverse3/src/stand_in.rs", "JSON"),
     ("devices/maglev/emulator/src/bin/flotor-maglev-emulator/main.rs", "a log: the name of a mode"),
     ("devices/maglev/emulator/src/bin/flotor-maglev-emulator/ml_api.rs", "a scene in TOML"),
     ("devices/maglev/emulator/src/bin/flotor-maglev-emulator/proxy.rs", "a scene in TOML"),

@@ -34,9 +34,9 @@ impl ExclusionRules {
         // A log is JSON, which cannot represent infinity: an infinite longest time would make the log unreadable.
         let are_times =
             |[shortest, longest]: [f64; 2]| 0.0 <= shortest && shortest < longest && longest.is_finite();
-        if let Some(times) = self.response_time_s.filter(|times| !are_times(*times)) {
+        if let Some([shortest, longest]) = self.response_time_s.filter(|times| !are_times(*times)) {
             return Err(format!(
-                "exclusion.response_time_s is {times:?}; write the shortest and the longest time in s, both finite, \
+                "exclusion.response_time_s is [{shortest}, {longest}]; write the shortest and the longest time in s, both finite, \
                  the shortest first"
             ));
         }
