@@ -50,7 +50,8 @@ fn run(arguments: &Arguments) -> Result<(), CommandError> {
     let other = |error: &dyn std::fmt::Display| CommandError::Failed(error.to_string());
     let unwritten = |path: &Path, cause| CommandError::Failed(format!("{}: {cause}", path.display()));
     let plan = Plan::load(&arguments.plan).map_err(|error| usage(&error))?;
-    let sweep = Sweep::prepare(plan, arguments.options.plugin_path.folders()).map_err(|error| usage(&error))?;
+    let sweep =
+        Sweep::prepare(plan, arguments.options.plugin_path.folders()).map_err(|error| usage(&error))?;
     let out = arguments.out.clone().unwrap_or_else(|| arguments.plan.with_extension(""));
     let store = Store::open(&out).map_err(|error| other(&error))?;
     let jobs =
