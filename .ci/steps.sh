@@ -121,14 +121,16 @@ format() {
     cargo fmt --all --manifest-path examples/Cargo.toml --check
 }
 
-# The checks of every change beside the tests, cheapest first: those that build nothing, and those that do.
+# The checks of every change that build nothing.
 before_tests() {
     step machine machine
     step format format
     step size .ci/lines
+    step circles .ci/circles
     step deny deny
 }
 
+# The checks of every change that build, after the tests, whose libraries they use.
 after_tests() {
     step lint lint
     # With the features and examples of `lint`: else what wgpu and serde depend on is checked a second time, with fewer features.

@@ -6,17 +6,21 @@ use crate::platform;
 use crate::transport::OpenError;
 use flotor_hal::{IndependentStop, SafeStop, StoppedState};
 use std::io::{Read, Write};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicU8, Ordering};
 use std::sync::{Arc, Mutex};
 
 /// Longest duration of a landing, ns.
 const LANDING_NS: u64 = 30_000_000_000;
 
+/// States of a stop: none since arming, one whose Land frame is due, and one whose frame was sent.
+const ARMED: u8 = 0;
+const DUE: u8 = 1;
+const SENT: u8 = 2;
+
 /// State shared by the loop and the stopping threads.
 pub(crate) struct Stop {
-    is_stopped: AtomicBool,
-    /// True between a stop and its Land frame.
-    is_frame_due: AtomicBool,
+    /// [`ARMED`], [`DUE`] or [`SENT`].
+    state: AtomicU8,
     /// A stop does not wait for the lock: the thread that holds the lock sends the due frame after unlocking.
     line: Mutex<Line>,
     frame: Frame,
@@ -25,23 +29,18 @@ pub(crate) struct Stop {
 impl Stop {
     /// Opens the connection. Not real-time.
     pub(crate) fn open(address: &str) -> Result<Self, OpenError> {
-        Ok(Self {
-            is_stopped: AtomicBool::new(false),
-            is_frame_due: AtomicBool::new(false),
-            line: Mutex::new(Line::open(address)?),
-            frame: Request::Plain(Function::Land).encode(),
-        })
+        let frame = Request::Plain(Function::Land).encode();
+        Ok(Self { state: AtomicU8::new(ARMED), line: Mutex::new(Line::open(address)?), frame })
     }
 
     /// Returns true after a stop. Real-time: bounded, no allocation.
     pub(crate) fn is_stopped(&self) -> bool {
-        self.is_stopped.load(Ordering::SeqCst)
+        self.state.load(Ordering::SeqCst) != ARMED
     }
 
     /// Clears earlier stops and discards the replies to them; a stop from now on lands the flotor. Not real-time.
     pub(crate) fn rearm(&self) {
-        self.is_frame_due.store(false, Ordering::SeqCst);
-        self.is_stopped.store(false, Ordering::SeqCst);
+        self.state.store(ARMED, Ordering::SeqCst);
         if let Ok(line) = self.line.lock() {
             let mut replies = [0; 64];
             while line.stream().read(&mut replies).is_ok_and(|length| length > 0) {}
@@ -55,30 +54,31 @@ impl Stop {
         if let Ok(mut line) = self.line.lock() {
             *line = anew;
         }
-        if self.is_stopped() {
-            self.is_frame_due.store(true, Ordering::SeqCst);
-        }
+        self.change(SENT, DUE);
         self.send_due_frame();
         Ok(())
     }
 
     /// Sends the Land frame once, without waiting for a reply.
     fn stop(&self) {
-        if !self.is_stopped.swap(true, Ordering::SeqCst) {
-            self.is_frame_due.store(true, Ordering::SeqCst);
-            self.send_due_frame();
-        }
+        self.change(ARMED, DUE);
+        self.send_due_frame();
     }
 
     /// Sends the Land frame if it is due, unless another thread holds the connection and will send it.
     fn send_due_frame(&self) {
         // Checked again after unlocking: meanwhile another thread may have found the lock taken.
-        while self.is_frame_due.load(Ordering::SeqCst) {
+        while self.state.load(Ordering::SeqCst) == DUE {
             let Ok(line) = self.line.try_lock() else { return };
-            if self.is_frame_due.swap(false, Ordering::SeqCst) {
+            if self.change(DUE, SENT) {
                 let _ = line.stream().write(self.frame.bytes());
             }
         }
+    }
+
+    /// Changes one state to another; returns false in any other state.
+    fn change(&self, from: u8, to: u8) -> bool {
+        self.state.compare_exchange(from, to, Ordering::SeqCst, Ordering::SeqCst).is_ok()
     }
 
     /// Declares the independent stop of the device: the Land frame on this connection.
@@ -121,7 +121,7 @@ mod tests {
     #[test]
     fn a_stop_during_rearming_sends_one_land_frame() {
         let (_listener, _, stop, controller) = opened();
-        stop.is_stopped.store(true, Ordering::SeqCst);
+        stop.state.store(SENT, Ordering::SeqCst);
         let frame = stop.frame;
         std::thread::scope(|scope| {
             let line = stop.line.lock().expect("the line");

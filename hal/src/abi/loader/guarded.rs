@@ -25,7 +25,7 @@ pub(crate) struct GuardedInstance {
     pub(crate) float_changes: u64,
 }
 
-// SAFETY: the contract lets an instance be used by any one thread at a time; `&mut self` sees to "one".
+// SAFETY: the contract lets an instance be used by one thread at a time, any; `&mut self` excludes a second.
 unsafe impl Send for GuardedInstance {}
 
 impl GuardedInstance {
