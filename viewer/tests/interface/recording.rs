@@ -218,7 +218,7 @@ fn a_file_too_low_for_its_traces_is_refused_and_the_least_height_is_enough() {
     for format in [ExportFormat::Svg, ExportFormat::Png] {
         plots.export.size_px = [1800.0, 1000.0];
         let said = written(&plots, format).expect_err("nine traces do not fit").to_string();
-        assert!(said.contains("9 readable traces") && said.contains("higher"), "{said}");
+        assert!(said.contains("9 readable traces") && said.contains("increase the height"), "{said}");
         plots.export.size_px[1] = flotor_viewer::export::least_height_px(&plots);
         written(&plots, format).expect("they fit");
     }
