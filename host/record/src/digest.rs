@@ -59,8 +59,9 @@ impl TraceDigest {
         let mut bytes = [0; DIGEST_WORDS * size_of::<u64>()];
         let words = self.coverage.of(record).to_words();
         // The shorter side ends the iteration: the timing words at the end are left out.
-        for (place, word) in bytes.chunks_exact_mut(size_of::<u64>()).zip(words) {
-            place.copy_from_slice(&canonical(word).to_le_bytes());
+        for (index, (place, word)) in bytes.chunks_exact_mut(size_of::<u64>()).zip(words).enumerate() {
+            let word = if is_integer(index) { word } else { canonical(word) };
+            place.copy_from_slice(&word.to_le_bytes());
         }
         self.hash.update(&bytes);
         self.ticks += 1;
@@ -73,7 +74,12 @@ impl TraceDigest {
     }
 }
 
-/// Returns the canonical bits of a number; counts and flags of a record are never as large as the changed bit patterns.
+/// Returns true for a word of a record that is an integer: index, time and period of the tick first, events and buttons last.
+fn is_integer(index: usize) -> bool {
+    index < 3 || index == DIGEST_WORDS - 1
+}
+
+/// Returns the canonical bits of a number.
 fn canonical(word: u64) -> u64 {
     match f64::from_bits(word) {
         number if number.is_nan() => f64::NAN.to_bits(),

@@ -8,13 +8,14 @@ use super::schema::{DESCRIPTOR_SET, ENCODING, FORMAT, Topic};
 use super::*;
 use flotor_core::Clock;
 use flotor_core::mapping::MappingConfig;
-use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
+use flotor_core::trace::{Events, RECORD_WORDS, TIMING_WORDS, TickRecord};
 use flotor_hal::Demand;
 use flotor_sync::Words;
 use mcap::records::op;
 use plugin_description::described;
 use prost::Message;
 use random::Random;
+use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
 use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -526,6 +527,19 @@ fn the_digest_is_xxh3_of_the_words_little_endian() {
     assert_eq!(digest.finish(), "xxh3:93137961786a04cc-1");
     digest.update(&record);
     assert_eq!(digest.finish(), "xxh3:1420234c6443381c-2");
+}
+
+/// As bits of a number these would be a zero with a sign, and numbers that are none.
+#[test]
+fn every_combination_of_buttons_has_a_digest_of_its_own() {
+    let digest = |buttons: u32| {
+        let mut digest = TraceDigest::new();
+        digest.update(&TickRecord { buttons, events: Events::default(), ..tick(3, 1_000_000) });
+        digest.finish()
+    };
+    let most = 0b111_1111_1111 << 20;
+    let digests = BTreeSet::from([0, 1 << 31, most | 1, most | 2, most | 1 << 31].map(digest));
+    assert_eq!(digests.len(), 5, "{digests:#?}");
 }
 
 /// Bits of the first word that are set where an output of the models is absent.
