@@ -25,15 +25,22 @@ pub enum AttachError {
 }
 
 impl Serve for RequestClient {
-    /// Forwards the request to the remote host and waits for the reply. Rejects a swap; ignores requests that concern this machine
-    /// only.
+    /// Forwards the request to the remote host and waits for the reply. Rejects a swap, and the stop of all runs of this machine; ignores
+    /// requests for ticks, which are sent anyway.
     fn serve(&self, ask: Ask) -> Result<(), (RefusalCause, String)> {
-        if matches!(ask, Ask::Swap { .. }) {
-            let words = "a remote model cannot be swapped; swap the model on the machine of the host, which has the plugin file";
-            return Err((RefusalCause::Request, words.to_owned()));
+        let reject = |words: &str| Err((RefusalCause::Request, words.to_owned()));
+        match ask {
+            Ask::Swap { .. } => reject(
+                "a remote model cannot be swapped; swap the model on the machine of the host, which has the plugin file",
+            ),
+            Ask::MachineStop => reject(
+                "the run is on another machine, and continues; press its emergency stop there or in `flotor view`",
+            ),
+            ask => {
+                let done = Request::of_ask(ask).map_or(Ok(()), |request| self.run(request));
+                done.map_err(|words| (RefusalCause::Other, words))
+            }
         }
-        let done = Request::of_ask(ask).map_or(Ok(()), |request| self.run(request));
-        done.map_err(|words| (RefusalCause::Other, words))
     }
 }
 

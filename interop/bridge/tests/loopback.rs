@@ -255,6 +255,17 @@ fn a_remote_run_can_be_watched_as_if_it_ran_here() {
         wait_until("the request arrives", || {
             host.asked.0.lock().unwrap().iter().any(|ask| matches!(ask, Ask::Weight { .. }))
         });
+        // A stop of the runs of this machine does not confirm one that goes on elsewhere.
+        client.request_client().ask(Ask::MachineStop).unwrap();
+        let mut refused = None;
+        wait_until("the stop is rejected", || {
+            if let Ok(Some(Event::Answer(answer))) = client.next(Duration::from_millis(20)) {
+                refused = answer.refused.or(refused.take());
+            }
+            refused.is_some()
+        });
+        assert!(refused.is_some_and(|words| words.contains("another machine")));
+        assert!(!host.asked.0.lock().unwrap().contains(&Ask::MachineStop));
         host.end("enough");
         let mut words = None;
         wait_until("the end appears", || {
