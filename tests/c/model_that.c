@@ -4,6 +4,7 @@
 #include "fixture.h"
 #include <math.h>
 #include <sched.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <locale.h>

@@ -39,7 +39,7 @@ pub use estimates::estimates;
 pub use flotor_servo::THREAD_ADVICE;
 pub use long_call::{Exceeded, LongCall, step_limit};
 pub use measurements::{Measurements, RunRecording};
-pub use platform::{ThreadClock, end_with_this_thread};
+pub use platform::ThreadClock;
 pub use plugin_process::PluginProcess;
 pub use session::{
     ControlError, Controls, DeviceOutcome, FaultyPlugin, Guardian, LatchGuard, LatchWatch, Lockstep,

@@ -365,8 +365,8 @@ const UNSAFE: &[(&str, &str)] = &[
         "the one place of the host that loads a plugin file, which the user guarantees",
     ),
     (
-        "host/session/src/platform/linux/process_group.rs",
-        "what a child does between `fork` and `exec`: it asks for its end with its parent",
+        "host/servo/src/platform/linux/process_group.rs",
+        "what a child does between `fork` and `exec`: it asks for its end with its parent, and starts the guard of its group",
     ),
     (
         "interop/compat/",

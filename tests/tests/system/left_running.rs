@@ -175,6 +175,34 @@ fn kill_again_and_again(command: &[&str], kills: usize) {
     );
 }
 
+/// Commands that run the plugin in a process of its own.
+const ISOLATING: [&[&str]; 4] = [
+    &["run", "isolated.toml", "--clock", "virtual"],
+    &["test", "hangs.test.toml"],
+    &["validate", "MODEL", "--timeout", "600s"],
+    &["stress", "--model", "MODEL", "--timeout", "600s"],
+];
+
+/// Processes that a plugin has started end with the command, too, even if they ignore every request to end.
+#[test]
+fn nothing_is_left_of_a_plugin_that_starts_processes() {
+    if !required(Tool::Cc) {
+        return;
+    }
+    let hanging =
+        Hanging::by("{ signal(SIGTERM, SIG_IGN); signal(SIGHUP, SIG_IGN); (void)!fork(); hang(); }");
+    let scene = std::fs::read_to_string(hanging.path().join("scene.toml")).expect("it is written");
+    let _ = hanging.folder.file("isolated.toml", scene + "isolation = \"process\"\nrate_hz = 100\n");
+    for command in ISOLATING {
+        let _ = std::fs::remove_file(hanging.path().join("hangs"));
+        let started = hanging.flotor(command).env("FLOTOR_STEP_LIMIT_S", "600").leading_a_group().start();
+        soon(&format!("{command:?} hangs"), || hanging.path().join("hangs").exists());
+        End::Kill.bring_about(&started);
+        no_process_is_left_in(hanging.path(), &format!("{command:?}"));
+        started.wait();
+    }
+}
+
 /// Lets commands of this process take SIGINT, which it may have inherited as ignored itself: `exec` restores the default action of a
 /// signal that has a handler.
 fn take_interrupts() {

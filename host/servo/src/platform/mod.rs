@@ -3,6 +3,7 @@
 //! - `scheduling`: priorities, cores, locked memory;
 //! - `last_stop`: stop of the devices when the process dies;
 //! - `shared_memory`, `processes`: resources shared by the loop and worker processes;
+//! - `process_group`: process of plugin code, which ends with its parent, and all processes that it has started;
 //! - `watchdog_process`: process that stops devices whose host has ended.
 //!
 //! Signals exist on Linux only, and so does the code in another crate that receives them.
@@ -23,6 +24,7 @@ pub use linux::group_limits::{GroupLimit, LimitValue, Use, group_limits};
 pub use linux::scheduling::real_time_budget_advice;
 #[cfg(not(windows))]
 pub use linux::{all_but, block_sent_signals, block_signals, set_blocked, set_of, wait_for_signal};
+pub use system::process_group;
 pub use system::scheduling::{PRIORITY_NAME, THREAD_ADVICE};
 pub(crate) use system::{clock, last_stop, processes, scheduling, shared_memory, watchdog_process};
 

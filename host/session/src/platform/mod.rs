@@ -3,7 +3,6 @@
 //! - `identity`, `changed`, `is_same_file`: identity of a file, and detection of changes;
 //! - `NOT_CAUGHT`: warning about ends of the process that stop no device;
 //! - `ThreadClock`: processor use of a thread;
-//! - `process_group`: process in a group of its own, which is killed when its parent ends;
 //! - `user_folder`, `distrust`: plugin folder of the user, and folders that are not searched.
 
 #[cfg(not(windows))]
@@ -12,14 +11,12 @@ mod linux;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use linux::{
-    MachineState, NOT_CAUGHT, UNKNOWN_PROGRAM, changed, distrust, identity, process_group, user_folder,
-};
+pub(crate) use linux::{MachineState, NOT_CAUGHT, UNKNOWN_PROGRAM, changed, distrust, identity, user_folder};
 #[cfg(not(windows))]
-pub use linux::{ThreadClock, end_with_this_thread, is_same_file};
+pub use linux::{ThreadClock, is_same_file};
 #[cfg(windows)]
 pub(crate) use windows::{
-    MachineState, NOT_CAUGHT, UNKNOWN_PROGRAM, changed, distrust, identity, process_group, user_folder,
+    MachineState, NOT_CAUGHT, UNKNOWN_PROGRAM, changed, distrust, identity, user_folder,
 };
 #[cfg(windows)]
-pub use windows::{ThreadClock, end_with_this_thread, is_same_file};
+pub use windows::{ThreadClock, is_same_file};

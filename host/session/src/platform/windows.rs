@@ -96,25 +96,3 @@ impl ThreadClock {
         None
     }
 }
-
-/// Does nothing: on Windows the process outlives its parent.
-pub fn end_with_this_thread(_: &mut std::process::Command) {}
-
-/// Process group: on Windows only the process itself, which outlives a killed parent.
-pub(crate) mod process_group {
-    use std::io;
-    use std::process::{Child, Command};
-
-    /// Does nothing.
-    pub(crate) fn lead_until_parent_ends(_: &mut Command) {}
-
-    /// Returns true once a child has ended.
-    pub(crate) fn has_ended(child: &mut Child) -> io::Result<bool> {
-        Ok(child.try_wait()?.is_some())
-    }
-
-    /// Kills a child.
-    pub(crate) fn kill(child: &mut Child) {
-        let _ = child.kill();
-    }
-}

@@ -43,10 +43,9 @@ pub type LoadFile = fn(&Path) -> Result<Plugin, LoadError>;
 /// If standard input is not the shared memory (the process was not started as a worker), or the system cannot bind this process to
 /// the host.
 pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
-    // Before any plugin code runs: the worker is killed when its host ends, and a fatal signal raised by the plugin ends the worker
-    // even if the signal was inherited as ignored. The host may already have ended.
+    // Before any plugin code runs: a fatal signal raised by the plugin ends the worker even if the signal was inherited as ignored.
     ignore_no_signal();
-    let host = HostProcess::end_with(arguments.host)?;
+    let host = HostProcess::new(arguments.host)?;
     let has_gone = || host.has_gone();
     if has_gone() {
         return Ok(());

@@ -6,8 +6,7 @@ use super::memory::{SharedMemory, create_file};
 use super::shared_words::{Operation, wait_for_change};
 use crate::engine::records::demand_of;
 use crate::engine::stepped::Stepped;
-use crate::last_stop::spawn_unblocked;
-use crate::platform::processes;
+use crate::platform::{process_group, processes};
 use crate::{THREAD_ADVICE, monotonic_ns};
 use flotor_core::lock;
 use flotor_hal::abi::CallStatus;
@@ -72,7 +71,7 @@ impl Worker {
         // Output of the plugin goes to the host's standard error, not into results on standard output.
         command.stdin(file).stdout(io::stderr());
         // Terminal signals go to the host alone: it needs the model until the force has faded out.
-        processes::keep_from_terminal(&mut command);
+        process_group::lead_until_parent_ends(&mut command);
         let child = spawn(command).map_err(|error| no_worker(with_advice(error)))?;
         let mut worker = Self {
             child,
@@ -249,7 +248,7 @@ impl Worker {
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        // The worker may hang: kill it without a request to end. No data is lost.
+        // The worker may hang: kill it, and with it all processes that it has started, without a request to end. No data is lost.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -311,7 +310,7 @@ fn start_starter() -> io::Result<Sender<Start>> {
     let thread = std::thread::Builder::new().name("flotor-starter".to_owned());
     thread.spawn(move || {
         for (mut command, reply) in orders {
-            let _ = reply.send(spawn_unblocked(&mut command));
+            let _ = reply.send(command.spawn());
         }
     })?;
     Ok(starter)

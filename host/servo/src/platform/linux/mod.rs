@@ -4,6 +4,7 @@ pub(crate) mod clock;
 mod control_group;
 pub(crate) mod group_limits;
 pub(crate) mod last_stop;
+pub mod process_group;
 pub(crate) mod processes;
 pub(crate) mod scheduling;
 pub(crate) mod shared_memory;

@@ -1,9 +1,9 @@
-//! Worker processes: lifetime, process group and exit status.
+//! Worker processes: their host, and their exit status.
 
-use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
+use rustix::process::{Pid, getppid};
 use std::io;
-use std::os::unix::process::{CommandExt, ExitStatusExt};
-use std::process::{Command, ExitStatus};
+use std::os::unix::process::ExitStatusExt;
+use std::process::ExitStatus;
 
 /// Host process of this worker.
 pub(crate) struct HostProcess {
@@ -11,12 +11,12 @@ pub(crate) struct HostProcess {
 }
 
 impl HostProcess {
-    /// Makes the system kill this process when its parent, the host, ends; the host may already have ended. Not real-time.
+    /// Creates the host process with an id; it may already have ended. Not real-time.
     ///
     /// # Errors
-    /// If the system call fails.
-    pub(crate) fn end_with(number: i32) -> io::Result<Self> {
-        set_parent_process_death_signal(Some(Signal::KILL))?;
+    /// None on Linux.
+    #[allow(clippy::unnecessary_wraps)] // as on other systems
+    pub(crate) fn new(number: i32) -> io::Result<Self> {
         Ok(Self { number: Pid::from_raw(number) })
     }
 
@@ -24,11 +24,6 @@ impl HostProcess {
     pub(crate) fn has_gone(&self) -> bool {
         getppid() != self.number
     }
-}
-
-/// Gives the process to be started a process group of its own, which terminal signals do not reach.
-pub(crate) fn keep_from_terminal(command: &mut Command) {
-    command.process_group(0);
 }
 
 /// Returns the signal that ended a process; `None` if it exited.

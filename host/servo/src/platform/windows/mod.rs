@@ -3,6 +3,7 @@
 
 pub(crate) mod clock;
 pub(crate) mod last_stop;
+pub mod process_group;
 pub(crate) mod processes;
 pub(crate) mod scheduling;
 pub(crate) mod shared_memory;

@@ -2,11 +2,9 @@
 
 mod locale;
 mod machine;
-pub(crate) mod process_group;
 mod thread_clock;
 
 pub(crate) use machine::MachineState;
-pub use process_group::end_with_this_thread;
 pub use thread_clock::ThreadClock;
 
 use rustix::process::geteuid;

@@ -6,8 +6,8 @@
 
 use clap::Args;
 use flotor_command::{CommandError, note, stopping};
+use flotor_servo::platform::process_group::end_with_this_thread;
 use flotor_servo::platform::{block_signals, wait_for_signal};
-use flotor_session::end_with_this_thread;
 use rustix::process::{
     Pid, Signal, WaitOptions, getpgrp, getpid, getppid, kill_process, set_child_subreaper,
     set_parent_process_death_signal, wait,

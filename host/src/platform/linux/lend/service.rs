@@ -6,7 +6,7 @@ use super::stop_request::{Early, Stage, StopRequest, has_ended};
 use flotor_command::separate::{Built, SeparateProgram};
 use flotor_command::{CommandError, INTERRUPTED, note, say};
 use flotor_servo::last_stop::spawn_unblocked;
-use flotor_session::end_with_this_thread;
+use flotor_servo::platform::process_group::end_with_this_thread;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
