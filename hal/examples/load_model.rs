@@ -2,8 +2,8 @@
 //!
 //! `cargo run -p flotor-hal --features loader --example load_model -- target/debug/libflotor_wall.so`
 //!
-//! Prints one line per file: id, version, last force and a checksum of all wrenches, or why the file was rejected. The
-//! same model prints the same line on every system.
+//! Prints one line per file: id, version, last force and a checksum of all wrenches, or the reason why the file was
+//! rejected. The same model prints the same line on every system.
 
 #![allow(unsafe_code)] // a plugin file is loaded: its user trusts it
 

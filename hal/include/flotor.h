@@ -4,9 +4,10 @@
  * A wrench is the force and torque on the hand. Orientation is a unit quaternion [x, y, z, w].
  * A plugin exports one FlotorEntry and one FLOTOR_METADATA text; see the book, "Plugin contract".
  *
- * What the host passes by pointer is initialised, out parameters too, and the callee's for the call. One instance is used
- * by one thread at a time, except `safe_stop`, which may come from any thread; `get_interface`, `create` and `open` may
- * come from several threads at once. The host checks indices and values of parameters before a plugin sees them.
+ * Memory that the host passes by pointer is initialised, also for out parameters, and belongs to the callee during the
+ * call. One instance is used by one thread at a time, except `safe_stop`, which may come from any thread;
+ * `get_interface`, `create` and `open` may come from several threads at once. The host checks indices and values of
+ * parameters before a plugin sees them.
  */
 #ifndef FLOTOR_H
 #define FLOTOR_H
@@ -102,7 +103,7 @@ typedef uint32_t FlotorRefusalKind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
-// Kind of a parameter: the meaning of its number.
+// Kind of a parameter: the meaning of its numeric value.
 enum FlotorParameterKind
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
   : uint32_t
@@ -201,7 +202,7 @@ enum FlotorFault
     FlotorFault_OverTemperature = 2,
     // A coil carried too much current for too long: reduce the load.
     FlotorFault_OverCurrent = 3,
-    // The handle moved faster than the device allows.
+    // The handle moved faster than the device allows: move the handle more slowly.
     FlotorFault_OverSpeed = 4,
     // The device is disconnected: check cable and power.
     FlotorFault_Disconnected = 5,
@@ -420,7 +421,8 @@ typedef struct FlotorChoices {
     size_t len;
 } FlotorChoices;
 
-// Entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`].
+// Entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`] or
+// [`Parameter::file`].
 typedef struct FlotorParameter {
     struct FlotorStr id;
     struct FlotorStr unit;
@@ -617,7 +619,7 @@ typedef struct FlotorCapabilities {
     double max_stiffness_n_per_m;
     // Lowest and highest loop rate of the device, Hz.
     double rate_hz[2];
-    // Time from taking a sample to the resulting force, beyond one period, s.
+    // Time from a sample to the resulting force, s, in addition to the hold of the force over one period.
     double latency_s;
 } FlotorCapabilities;
 
@@ -638,7 +640,7 @@ typedef struct FlotorTick {
     uint64_t dt_ns;
 } FlotorTick;
 
-// Conditions of a sample beside pose and faults, as a bit set; no condition ends a run.
+// Conditions of a sample other than faults, as a bit set; no condition ends a run.
 typedef struct FlotorConditions {
     uint32_t bits;
 } FlotorConditions;
@@ -655,12 +657,13 @@ typedef struct FlotorDeviceState {
     uint64_t sampled_ns;
     // Buttons, one bit each: 1 while pressed.
     uint32_t buttons;
-    // Further conditions of this sample.
+    // Conditions of this sample other than faults.
     struct FlotorConditions conditions;
 } FlotorDeviceState;
 
 // Function table `flotor.device/1`. `open` and `activate` return 0, or a [`crate::RefusalKind`] with the reason in the
-// message; `read` and `write` return a [`CycleCode`]; the others a [`super::CallStatus`] code.
+// message; `read` and `write` return a [`CycleCode`]; the other functions with a `uint32_t` result return a
+// [`super::CallStatus`] code.
 typedef struct FlotorDeviceTable {
     // Size of this table in the plugin's build, bytes.
     uint32_t size;
@@ -705,7 +708,7 @@ typedef struct FlotorDeviceTable {
     void (*last_message)(FlotorInstance instance, struct FlotorMessage *message);
 } FlotorDeviceTable;
 
-// Drawing style of the body around its centreline: a tube, or a wire wound about it. 40 bytes.
+// Drawing style of the body around its centreline: a tube, or a wire wound about the centreline. 40 bytes.
 typedef struct FlotorCenterlineInfo {
     // Radius of the drawn tube or wire, m.
     double tube_radius_m;
@@ -882,7 +885,8 @@ typedef struct FlotorLinearField {
     struct FlotorPose anchor;
     // Wrench on the hand at the anchor, N and N·m.
     struct FlotorWrench wrench;
-    // Rows: force x, y, z (N), torque x, y, z (N·m); columns: position x, y, z (m), rotation x, y, z (rad).
+    // Stiffness matrix `K = -dW/dd`. Rows: force x, y, z (N), torque x, y, z (N·m); columns: position x, y, z (m),
+    // rotation x, y, z (rad).
     double stiffness[6][6];
     // Radius of validity about the anchor, m; beyond, a host uses the wrench at that distance in the same direction.
     double valid_m;
@@ -1096,7 +1100,7 @@ typedef struct FlotorPacingTable {
 #define FLOTOR_CONDITIONS_SATURATED 1u
 #define FLOTOR_CONDITIONS_EXCESS_FORCE 2u
 #define FLOTOR_CONDITIONS_NOISY 4u
-/* What `shape` of a FlotorActiveRegion says. */
+/* Codes of `shape` in a FlotorActiveRegion. */
 #define FLOTOR_REGION_EVERYWHERE 0u
 #define FLOTOR_REGION_SPHERE 1u
 #define FLOTOR_REGION_BOX 2u
@@ -1114,8 +1118,8 @@ static inline FlotorCycleCode flotor_cycle(uint32_t code) {
 #define FLOTOR_MAGIC_BYTES { 'F', 'L', 'O', 'T', 'O', 'R', '\r', '\n' }
 /* Text from a string literal. */
 #define FLOTOR_STR(literal) { (const uint8_t *)(literal), sizeof(literal) - 1 }
-/* What a host reads of the file without running it, in TOML: kind ("model" or "device"), id, name, doc, version,
- * abi (FLOTOR_CONTRACT) and entry (the name of the exported FlotorEntry). */
+/* Metadata that a host reads from the file without running it, in TOML: kind ("model" or "device"), id, name, doc,
+ * version, abi (FLOTOR_CONTRACT) and entry (the name of the exported FlotorEntry). */
 #define FLOTOR_METADATA(text) \
     __attribute__((used, section(".flotor"))) static const char flotor_metadata[] = text
 

@@ -42,7 +42,7 @@ pub enum Fault {
     OverTemperature = 2,
     /// A coil carried too much current for too long: reduce the load.
     OverCurrent = 3,
-    /// The handle moved faster than the device allows.
+    /// The handle moved faster than the device allows: move the handle more slowly.
     OverSpeed = 4,
     /// The device is disconnected: check cable and power.
     Disconnected = 5,
@@ -82,7 +82,9 @@ impl Fault {
             Self::SensorOutOfRange => "the handle left the sensor's range; move it back and start again",
             Self::OverTemperature => "a coil is too hot; let the device cool",
             Self::OverCurrent => "the current of a coil was too high for too long; reduce stiffness or load",
-            Self::OverSpeed => "the handle moved faster than the device allows",
+            Self::OverSpeed => {
+                "the handle moved faster than the device allows; move it more slowly, then start again"
+            }
             Self::Disconnected => "the device is gone; check cable and power",
             Self::Timeout => "the device did not answer in time; check cable, hub and machine load",
             Self::Protocol => "the device sent malformed data; check its firmware version",
@@ -122,11 +124,11 @@ pub struct DeviceState {
     pub sampled_ns: u64,
     /// Buttons, one bit each: 1 while pressed.
     pub buttons: u32,
-    /// Further conditions of this sample.
+    /// Conditions of this sample other than faults.
     pub conditions: Conditions,
 }
 
-/// Conditions of a sample beside pose and faults, as a bit set; no condition ends a run.
+/// Conditions of a sample other than faults, as a bit set; no condition ends a run.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -282,7 +284,7 @@ pub struct Capabilities {
     pub max_stiffness_n_per_m: f64,
     /// Lowest and highest loop rate of the device, Hz.
     pub rate_hz: [f64; 2],
-    /// Time from taking a sample to the resulting force, beyond one period, s.
+    /// Time from a sample to the resulting force, s, in addition to the hold of the force over one period.
     pub latency_s: f64,
 }
 
@@ -340,7 +342,7 @@ impl Capabilities {
         Self { max_stiffness_n_per_m, ..self }
     }
 
-    /// Sets the latency from a sample to the resulting force, beyond one period, s.
+    /// Sets the latency from a sample to the resulting force, s, in addition to the hold of the force over one period.
     pub const fn with_latency(self, latency_s: f64) -> Self {
         Self { latency_s, ..self }
     }

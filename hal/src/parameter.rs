@@ -26,7 +26,7 @@ macro_rules! choices {
     ($($word:literal),+ $(,)?) => { $crate::choices!(= &[$($word),+]) };
 }
 
-/// Kind of a parameter: the meaning of its number.
+/// Kind of a parameter: the meaning of its numeric value.
 #[repr(u32)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKind {
@@ -51,7 +51,8 @@ pub enum Mutability {
     Live = 1,
 }
 
-/// Entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`].
+/// Entry of a plugin's schema. Built with [`Parameter::real`], [`Parameter::choice`], [`Parameter::text`] or
+/// [`Parameter::file`].
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -231,9 +232,10 @@ pub enum SetParameterError {
 impl fmt::Display for SetParameterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Fixed => {
-                f.write_str("the parameter cannot change with the present values of the other parameters")
-            }
+            Self::Fixed => f.write_str(
+                "the parameter cannot change in this instance: it is not live, or has no effect with the \
+                 present values of the other parameters",
+            ),
             Self::OutOfRange(error) => error.fmt(f),
         }
     }
@@ -316,7 +318,7 @@ impl<'a> Settings<'a> {
         all[self.choice_or_default(id).min(N - 1)]
     }
 
-    /// Returns the text set for a text or the path set for a file, if any.
+    /// Returns the text set for a text or the path set for a file; `None` if not set or empty.
     #[must_use]
     pub fn text(&self, id: &str) -> Option<&'a str> {
         self.explicit(id).map(|value| value.text.as_str()).filter(|text| !text.is_empty())

@@ -59,7 +59,8 @@ impl<'a> Table<'a> {
     /// skipped. Not real-time.
     ///
     /// # Errors
-    /// For a separator other than a comma, a column without a name, a duplicate name, or no column at all.
+    /// For a separator other than a comma, a column without a name, a duplicate name, a malformed or overlong header,
+    /// or a table without a header.
     pub fn parse(text: &'a str, hash_lines: HashLines) -> Result<Self, TextProblem> {
         let text = text.trim_start_matches('\u{feff}');
         let mut lines = Lines { lines: text.lines().enumerate(), hash_lines };

@@ -3,7 +3,7 @@
 use crate::{DVec3, math};
 use std::f64::consts::TAU;
 
-/// Velocity estimator: difference quotient of positions or orientations, smoothed by a first-order low-pass filter.
+/// Velocity estimator: finite difference of positions or orientations, smoothed by a first-order low-pass filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityFilter {
     cutoff_hz: f64,

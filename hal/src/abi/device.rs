@@ -54,7 +54,8 @@ impl CycleCode {
 }
 
 /// Function table `flotor.device/1`. `open` and `activate` return 0, or a [`crate::RefusalKind`] with the reason in the
-/// message; `read` and `write` return a [`CycleCode`]; the others a [`super::CallStatus`] code.
+/// message; `read` and `write` return a [`CycleCode`]; the other functions with a `uint32_t` result return a
+/// [`super::CallStatus`] code.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]

@@ -8,8 +8,9 @@ use std::marker::PhantomData;
 /// A function table of the contract.
 ///
 /// # Safety
-/// The type is `repr(C)`, starts with a `u32`, which is its size in bytes, and takes any bits: the rest is numbers,
-/// pointers, texts and functions that may be null. It is what plugins of this contract have behind `ID`.
+/// The type is `repr(C)`, starts with a `u32`, which is its size in bytes, and is valid for any bits: the other fields
+/// are numbers, pointers, texts and functions that may be null. Plugins of this contract return a table of this type
+/// for `ID`.
 pub(crate) unsafe trait Table: Sized + 'static {
     /// Id of the interface or extension.
     const ID: &'static str;

@@ -9,7 +9,8 @@
 //! - The side that allocates memory frees it. Text is borrowed: for ever in info structs, for the call in arguments.
 //! - Memory that a host passes by pointer is initialised, also for out parameters.
 //! - One instance is used by one thread at a time, except `safe_stop`, which may come from any thread.
-//! - `get_interface`, `create` and `open` may be called by several threads at once: plugins must lock what their instances share.
+//! - `get_interface`, `create` and `open` may be called by several threads at once: plugins must synchronise the data
+//!   that their instances share.
 //! - Unknown interface ids get null; null function pointers mean "not offered".
 //! - Libraries are never unloaded.
 //!

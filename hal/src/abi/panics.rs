@@ -22,10 +22,11 @@ struct Place {
     line: u32,
 }
 
-/// Replaces the panic hook of a separately linked library, which has its own Rust runtime, by a hook that only stores the place:
-/// the default hook would print from inside the servo and walk the stack for tens of milliseconds. Called by the host after
-/// loading. The hook of a plugin linked into the host is unchanged. A plugin built with `-C prefer-dynamic` may share the host's
-/// runtime, which is not detectable here: the host's panics are then silenced too.
+/// Replaces the panic hook of a separately linked library, which has its own Rust runtime, by a hook that only stores
+/// the source location of the panic: the default hook would print from inside the servo and walk the stack for tens of
+/// milliseconds. Called by the host after loading. The hook of a plugin linked into the host is unchanged. A plugin
+/// built with `-C prefer-dynamic` may share the host's runtime, which is not detectable here: the host's panics are
+/// then silenced too.
 pub(super) unsafe extern "C" fn init(host: *const Host) {
     // SAFETY: the contract of `init`: null or a valid host struct for the call.
     let flags = unsafe { host.as_ref() }.map_or(0, |host| host.flags);
@@ -44,8 +45,8 @@ pub(super) unsafe extern "C" fn init(host: *const Host) {
     }
 }
 
-/// Writes the text of a caught panic, and its place if known, to `message`; then drops the payload, whose `Drop` may
-/// panic again.
+/// Writes the text of a caught panic, and its source location if known, to `message`; then drops the payload, and
+/// catches a second panic of its `Drop`.
 pub(super) fn record(payload: Box<dyn Any + Send>, message: &mut super::Message) {
     let words = payload.downcast_ref::<&str>().copied();
     let words = words.or_else(|| payload.downcast_ref::<String>().map(String::as_str));

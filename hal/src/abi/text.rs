@@ -44,7 +44,7 @@ impl Str {
     /// Borrows a text for the duration of a call.
     ///
     /// # Safety
-    /// The caller lets no copy of the result outlive `text`.
+    /// No copy of the result may outlive `text`.
     pub unsafe fn borrowed(text: &str) -> Self {
         Self { ptr: text.as_ptr(), len: text.len() }
     }
@@ -55,7 +55,7 @@ impl Str {
         if self.ptr.is_null() || self.len > isize::MAX as usize {
             return "";
         }
-        // SAFETY: not null, and the maker of this value vouched for `len` readable bytes (see `Sync`).
+        // SAFETY: not null, and the maker of this value guarantees `len` readable bytes (see `Sync`).
         let bytes = unsafe { std::slice::from_raw_parts(self.ptr, self.len) };
         match std::str::from_utf8(bytes) {
             Ok(text) => text,

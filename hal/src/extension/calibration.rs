@@ -16,7 +16,8 @@ use crate::{Device, Refusal};
 pub const CALIBRATION_COEFFICIENTS: usize = 8;
 
 /// Smallest and largest plausible ratio of delivered to commanded force. An uneven field is off by tens of percent at
-/// most; a ratio beyond is an error, and the command would multiply it.
+/// most; a ratio outside these limits is an error of the measurement, and a division by the ratio would carry the error
+/// into the command.
 const PLAUSIBLE_SHARE: [f64; 2] = [0.5, 2.0];
 /// Largest distance from the centre in a calibration, m.
 const MOST_RANGE_M: f64 = 1.0;
@@ -54,7 +55,7 @@ impl std::fmt::Display for InvalidCalibration {
         match self {
             Self::Range([from, to]) => write!(
                 f,
-                "the range {from:?} m to {to:?} m is invalid; give two finite heights, the lower first"
+                "the range {from:?} m to {to:?} m is invalid; give two heights within 1 m of the centre, the lower first"
             ),
             Self::Count(count) => {
                 write!(f, "the polynomial has {count} coefficients; give 1 to {CALIBRATION_COEFFICIENTS}")
@@ -81,7 +82,8 @@ impl VerticalCalibration {
     /// Builds a polynomial `c0 + c1 z + c2 z² ...` with z in m (so `ck` in 1/mᵏ), measured over `range_m`.
     ///
     /// # Errors
-    /// [`InvalidCalibration`], unless the ratio is plausible over the whole range.
+    /// [`InvalidCalibration`] for an invalid range, an invalid number of coefficients, or a ratio that is not between
+    /// 0.5 and 2 over the whole range.
     pub fn new(range_m: [f64; 2], coefficients: &[f64]) -> Result<Self, InvalidCalibration> {
         let mut calibration = Self { range_m, coefficients: [0.0; CALIBRATION_COEFFICIENTS] };
         match calibration.coefficients.get_mut(..coefficients.len()) {
@@ -95,7 +97,7 @@ impl VerticalCalibration {
     /// Checks the numbers of a calibration from another source.
     ///
     /// # Errors
-    /// [`InvalidCalibration`], unless the ratio is plausible over the whole range.
+    /// [`InvalidCalibration`] for an invalid range, or a ratio that is not between 0.5 and 2 over the whole range.
     pub fn check(&self) -> Result<(), InvalidCalibration> {
         let [from, to] = self.range_m;
         if !(from.abs() <= MOST_RANGE_M && to.abs() <= MOST_RANGE_M && from < to) {
@@ -259,7 +261,7 @@ impl OpenedDevice {
     /// Corrects the total vertical command from the next activation on.
     ///
     /// # Errors
-    /// A [`Refusal`] if the device supports no calibration.
+    /// A [`Refusal`] if the device supports no calibration, or rejects this one.
     pub fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
         let calibrate = self.extensions().calibration.and_then(|table| table.calibrate_vertical);
         let Some(calibrate) = calibrate else {

@@ -12,7 +12,7 @@ use crate::abi::loader::Model;
 use crate::abi::{CallStatus, Instance, ModelAdapter};
 use crate::{ForceModel, Input, Pose};
 
-/// Drawing style of the body around its centreline: a tube, or a wire wound about it. 40 bytes.
+/// Drawing style of the body around its centreline: a tube, or a wire wound about the centreline. 40 bytes.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
@@ -172,8 +172,8 @@ impl Centerline<'_> {
         self.model.calls.query(self.table.info, CenterlineInfo::default())
     }
 
-    /// Returns the centreline at an input, from the fixed end to the handle, in at most `capacity` points; `None` if the
-    /// model failed.
+    /// Returns the centreline at an input, from the fixed end to the handle, in at most `capacity` points; `None` if
+    /// `capacity` is 0 or the model failed.
     #[must_use]
     pub fn points(&mut self, input: &Input, capacity: usize) -> Option<Vec<Pose>> {
         let (ask, room) = (self.table.centerline?, u32::try_from(capacity).ok()?);

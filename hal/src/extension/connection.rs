@@ -97,7 +97,7 @@ impl UsbKind {
 /// #     fn deactivate(self) -> Crank { self }
 /// # }
 /// /// On a serial port of the kernel, behind a USB bridge: `export_device!(Crank, connection)`. `flotor doctor --device crank`
-/// /// looks for it before it opens the device.
+/// /// checks the connection before it opens the device.
 /// impl ConnectionDevice for Crank {
 ///     const USB: &'static [UsbKind] = &[UsbKind::new(0x1209, 0x0001, UsbAccess::Serial)];
 /// }

@@ -153,7 +153,8 @@ impl Model {
     }
 
     /// Writes the values of the last step to `values`, which needs an element for each of [`Self::details`]; NaN for a
-    /// missing value. Real-time: bounded by the model, no allocation.
+    /// missing value. Returns [`CallStatus::OutOfRange`] if `values` is too short, and [`CallStatus::Unsupported`]
+    /// without the extension. Real-time: bounded by the model, no allocation.
     pub fn read_details(&mut self, values: &mut [f64]) -> CallStatus {
         let Some(read) = self.extensions.details.and_then(|table| table.values) else {
             return CallStatus::Unsupported;

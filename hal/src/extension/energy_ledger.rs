@@ -109,7 +109,8 @@ table!(EnergyLedgerTable: "flotor.energy-ledger/1", D: [Device<Active: EnergyLed
 
 #[cfg(feature = "loader")]
 impl loader::ActiveDevice {
-    /// Returns the energy balance of the plant; `None` without the extension. Real-time: bounded, no allocation.
+    /// Returns the energy balance of the plant; `None` without the extension, or if the plugin failed. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn energy_ledger(&mut self) -> Option<EnergyLedger> {
         let ask = self.extensions()?.energy_ledger?.ledger;

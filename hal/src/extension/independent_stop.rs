@@ -189,7 +189,8 @@ pub mod means {
                     "has a message of {length} bytes, but needs 1 to {STOP_MESSAGE_BYTES}"
                 )));
             };
-            // SAFETY: the plugin keeps it open until the device is closed (contract), and the device is open.
+            // SAFETY: the plugin keeps the descriptor open until the device is closed (contract), and the device is
+            // open.
             let handle = unsafe { writable_duplicate(declared.descriptor) }.map_err(wrong)?;
             Ok(Some(Self::Message { handle, message, state }))
         }
@@ -201,7 +202,7 @@ impl OpenedDevice {
     /// Returns the independent stop of the device; `None` if there is none. Not real-time.
     ///
     /// # Errors
-    /// A [`Refusal`] if the plugin's declaration is invalid.
+    /// A [`Refusal`] if the plugin's declaration is invalid or missing.
     pub fn independent_stop(&mut self) -> Result<Option<Independence>, Refusal> {
         let ask = self.extensions().independent_stop.and_then(|table| table.independent_stop);
         if ask.is_none() {

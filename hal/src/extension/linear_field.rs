@@ -24,7 +24,8 @@ pub struct LinearField {
     pub anchor: Pose,
     /// Wrench on the hand at the anchor, N and N·m.
     pub wrench: Wrench,
-    /// Rows: force x, y, z (N), torque x, y, z (N·m); columns: position x, y, z (m), rotation x, y, z (rad).
+    /// Stiffness matrix `K = -dW/dd`. Rows: force x, y, z (N), torque x, y, z (N·m); columns: position x, y, z (m),
+    /// rotation x, y, z (rad).
     pub stiffness: [[f64; 6]; 6],
     /// Radius of validity about the anchor, m; beyond, a host uses the wrench at that distance in the same direction.
     pub valid_m: f64,
@@ -114,7 +115,7 @@ fn shortened(displacement: DVec3, longest: f64) -> (DVec3, bool) {
 /// #     }
 /// #     fn step(&mut self, _: &Input) -> Output { Wrench::ZERO.into() }
 /// # }
-/// /// A stiffness of 200 N/m along z about the pose of the question: `export_model!(Foam, linear_field)`.
+/// /// A stiffness of 200 N/m along z about the pose of the input: `export_model!(Foam, linear_field)`.
 /// impl LinearFieldModel for Foam {
 ///     fn linear_field(&mut self, input: &Input) -> LinearField {
 ///         let mut stiffness = [[0.0; 6]; 6];
@@ -132,7 +133,7 @@ fn shortened(displacement: DVec3, longest: f64) -> (DVec3, bool) {
 /// }
 /// # let mut foam = Foam { depth_m: 0.0, look: Shape::default() };
 /// let field = foam.linear_field(&Input::at_rest(Pose::new(DVec3::Z * -0.005, DQuat::IDENTITY)));
-/// // A millimetre deeper, a host that has no newer field takes this one.
+/// // One millimetre deeper, a host without a newer field evaluates this field.
 /// let (wrench, _) = field.at(&Pose::new(DVec3::Z * -0.006, DQuat::IDENTITY));
 /// assert!((wrench.force().z - 1.2).abs() < 1e-12);
 /// ```

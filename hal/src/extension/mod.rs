@@ -1,6 +1,6 @@
-//! Extensions: optional interfaces of a plugin beside its main interface. Each is one file, named like its trait, its
-//! table, its id and its name in [`crate::export_model!`] or [`crate::export_device!`]; one line in this module makes a
-//! host look for the extension.
+//! Extensions: optional interfaces of a plugin, in addition to its main interface. Each extension is one file, named
+//! like its trait, its table, its id and its name in [`crate::export_model!`] or [`crate::export_device!`]; one line in
+//! this module makes a host query the extension.
 #![allow(unsafe_code)]
 
 pub mod active_region;

@@ -129,7 +129,8 @@ impl loader::OpenedDevice {
 
 #[cfg(feature = "loader")]
 impl loader::ActiveDevice {
-    /// Waits for the device's next sample, for `timeout_ns` at most. Real-time except for the wait: no allocation.
+    /// Waits for the device's next sample, for `timeout_ns` at most; a failed call counts as a timeout. Real-time
+    /// except for the wait: no allocation.
     pub fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
         let pacing = self.extensions().and_then(|extensions| extensions.pacing);
         let Some(wait) = pacing.and_then(|table| table.wait_for_sample) else { return SampleWait::NotPaced };

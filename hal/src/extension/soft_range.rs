@@ -135,8 +135,8 @@ impl Plugin {
         table.map_or(&[], |table| unsafe { static_list(table.ranges, table.range_count) })
     }
 
-    /// Returns the soft range of a parameter, declared or [around](SoftRange::around) the current value; `None` for a
-    /// parameter that is not a number. Not real-time.
+    /// Returns the soft range of a parameter, declared or [around](SoftRange::around) the current value; `None` for an
+    /// unknown index, and for a parameter that is not a number. Not real-time.
     #[must_use]
     pub fn soft_range(&self, index: usize, value: f64) -> Option<SoftRange> {
         let parameter = self.parameters().get(index)?;

@@ -35,7 +35,7 @@ impl VariantInfo {
         Memory::from_code(self.memory)
     }
 
-    /// Returns this variant, with at most the demands of another one.
+    /// Returns this variant, with its demands limited to those of `most`.
     #[cfg(feature = "loader")]
     pub(crate) fn limited_to(&self, most: &Self) -> Self {
         Self::new(self.serves().limited_to(most.serves()), self.memory())

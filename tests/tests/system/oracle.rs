@@ -206,7 +206,7 @@ fn wrong_parameters_are_told_with_what_would_be_right() {
         (&["variant=energie"][..], "--set variant: `variant` = `energie`: must be thesis | closed-form | "),
         (&["gama_n=17"], "--set gama_n: no parameter `gama_n`; did you mean `gamma_n`?"),
         (&["spring.gamma_n=3"], "no parameter `spring.gamma_n`; did you mean `gamma_n`?"),
-        (&["port=1"], "--set port: no parameter `port`; `flotor plugins ID` lists them"),
+        (&["port=1"], "--set port: no parameter `port`; `flotor plugins ID` lists the parameters"),
         (&["gamma_n=many"], "--set gamma_n: `gamma_n` must be a number in N, not `many`"),
         (&["free_length_mm=0"], "--set free_length_mm: `free_length_mm` = 0: must be 1 to 1000 mm"),
         (&["gamma_n=nan"], "--set gamma_n: `gamma_n` = NaN: must be 0.01 to 10000 N"),

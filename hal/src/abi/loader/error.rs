@@ -73,7 +73,10 @@ pub enum LoadError {
         cause: String,
     },
     /// The private copy could not be created.
-    #[error("{}: cannot make a private copy of the plugin: {cause}; check memory limits", path.display())]
+    #[error(
+        "{}: cannot make a private copy of the plugin: {cause}; check memory limits (on Windows, the folder for \
+         temporary files)", path.display()
+    )]
     Copy {
         /// Path of the plugin.
         path: PathBuf,
@@ -164,7 +167,7 @@ pub enum LoadError {
 
 impl LoadError {
     /// Returns true if the configuration is at fault: an unreadable file, a plugin of the other kind, or a parameter
-    /// refused by the plugin. Otherwise the plugin is at fault.
+    /// refused by the plugin. Otherwise the plugin or the machine is at fault.
     #[must_use]
     pub fn is_configuration(&self) -> bool {
         match self {

@@ -5,7 +5,7 @@ use super::setting::{Setting, index_of, live_index, to_raw};
 use crate::abi::{CallStatus, Instance, Message};
 use crate::{Parameter, ParameterValue, Refusal, RefusalKind};
 
-/// Reason of a refusal without a function that every table has.
+/// Reason of a refusal if the table lacks a required function.
 pub(super) const INCOMPLETE: &str =
     "a required entry of the function table is null; set every required entry";
 

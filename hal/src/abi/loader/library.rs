@@ -45,8 +45,8 @@ impl Plugin {
     /// [`LoadError`], with file, cause and remedy; the process survives all of them.
     ///
     /// # Safety
-    /// The caller trusts the file, as whoever starts a program does: its code runs in this process, with all that the
-    /// process may do, from its initialisers on, and what bears the marks of a plugin keeps the contract.
+    /// The caller trusts the file as a program that is started: the code of the file, from its initialisers on, runs in
+    /// this process with all permissions of the process. An entry with the magic of a plugin fulfils the contract.
     pub unsafe fn load(path: &Path) -> Result<Self, LoadError> {
         let (mut original, _) = metadata_file::open_regular(path)?;
         let copy_error = |cause: std::io::Error| LoadError::Copy { path: path.into(), cause };
@@ -94,9 +94,9 @@ impl Plugin {
     /// Checks an entry and its tables, each part before its first use.
     ///
     /// # Safety
-    /// `entry` is null or the address of eight bytes and more that stay for ever. If those are the magic,
-    /// there is an entry that keeps the contract it names: it has the bytes it says, and its pointers and
-    /// functions are what they are declared to be.
+    /// `entry` is null or the address of at least eight bytes that stay valid for ever. If these bytes are the magic,
+    /// they begin an entry that fulfils its contract version: the entry has the declared size, and its pointers and
+    /// functions have the declared types.
     unsafe fn from_entry(
         metadata: Metadata,
         entry: *const Entry,
@@ -136,7 +136,7 @@ impl Plugin {
         let interface = unsafe { Interface::find(path, entry, metadata.kind) }?;
         let (parameters, count) = interface.parameters();
         // SAFETY: a table's schema is a static array of `parameter_count` parameters of the checked layout, unless that
-        // number is beyond all reason, when none of it is read.
+        // number is above the limit; then no parameter is read.
         let schema = unsafe { schema::checked(parameters, count) };
         let parameters = schema.map_err(|problem| LoadError::Schema { path: path.clone(), problem })?;
         Ok(Self { metadata, interface, parameters, proof })

@@ -18,7 +18,7 @@ pub struct Setting {
 pub enum SettingError {
     /// No parameter has this id.
     #[error("no parameter `{id}`; {}",
-        nearest.as_ref().map_or("`flotor plugins ID` lists them".to_owned(), |n| format!("did you mean `{n}`?")))]
+        nearest.as_ref().map_or("`flotor plugins ID` lists the parameters".to_owned(), |n| format!("did you mean `{n}`?")))]
     Unknown {
         /// Requested id.
         id: String,

@@ -47,7 +47,7 @@ pub(crate) unsafe fn writable_duplicate(descriptor: i32) -> Result<Handle, Strin
 pub(crate) struct PrivateCopy(File);
 
 impl PrivateCopy {
-    /// Copies a file to memory, under its file name for debuggers.
+    /// Copies `original` to memory; the copy has the file name of `path`, for debuggers.
     ///
     /// # Errors
     /// Errors of the operating system.

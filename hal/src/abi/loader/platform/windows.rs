@@ -50,7 +50,7 @@ pub(crate) struct PrivateCopy {
 }
 
 impl PrivateCopy {
-    /// Copies a file to the folder of the copies.
+    /// Copies `original` to a new file in [`FOLDER`], named after `path`; removes old unused copies first.
     ///
     /// # Errors
     /// Errors of the operating system.
