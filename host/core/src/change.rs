@@ -27,8 +27,9 @@ pub struct Change {
 }
 
 impl Change {
-    /// Returns true if both changes concern the same parameter and have the same outcome, so that the later change
-    /// replaces the earlier. A rejected value implies nothing about the present value.
+    /// Returns true if both changes concern the same parameter, weight or replacement of the same plugin and have the
+    /// same outcome, so that the later change replaces the earlier. A rejected value implies nothing about the present
+    /// value.
     #[must_use]
     pub fn is_of_the_same(&self, other: &Self) -> bool {
         let of = |change: &Self| (change.subject, change.outcome);
@@ -40,10 +41,9 @@ impl Change {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ChangeSubject {
-    /// A parameter of its schema.
+    /// A parameter of the plugin's schema.
     Parameter,
-    /// The blend weight of the plugin's wrench, which the host applies: it moves to the new value at the rate of the
-    /// fade.
+    /// The blend weight of the plugin's wrench; the host moves the weight to the new value at the rate of the fade.
     Weight,
     /// The plugin was replaced: `parameter` is the id of the new plugin, `value` its version.
     Plugin,
@@ -55,8 +55,8 @@ pub enum ChangeSubject {
 pub enum ChangeOutcome {
     /// The value is in force from this tick on.
     Applied,
-    /// The plugin rejected the value, for example because it does not fit the other values; the old value stays in
-    /// force.
+    /// The plugin rejected the value, for example because the value is inconsistent with other parameters; the old
+    /// value stays in force.
     Refused,
     /// The plugin panicked on the change.
     Broke,

@@ -26,7 +26,7 @@ pub fn to_ns(time_s: f64) -> u64 {
     rounded(time_s * 1.0e9)
 }
 
-/// Converts a rate in Hz to its period in whole ns, rounded and saturated.
+/// Converts a rate in Hz to its period in whole ns, rounded and saturated: 0 for a negative rate and for NaN.
 #[must_use]
 pub fn period_ns(rate_hz: f64) -> u64 {
     rounded(1.0e9 / rate_hz)

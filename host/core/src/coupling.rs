@@ -8,7 +8,7 @@ pub enum PassivityMode {
     /// The energy is only measured.
     #[default]
     Observe,
-    /// The energy is measured, and the passivity controller removes it.
+    /// The energy is measured, and the passivity controller prevents its generation.
     Control,
 }
 
@@ -106,7 +106,7 @@ impl CouplingEnds {
 pub struct CouplingDescription {
     /// Name in the scene.
     pub name: String,
-    /// Spring, damper, delay.
+    /// Spring, damper, delay, energy reserve and treatment of generated energy.
     pub config: CouplingConfig,
     /// Device and mapping of each end in this run; the other end may be on another host.
     pub ends: CouplingEnds,

@@ -62,7 +62,8 @@ impl ObserverDemand {
         DemandRequest { demand: self.clone(), counted }
     }
 
-    /// Returns force and the outputs with at least one request. Real-time: bounded, no allocation.
+    /// Returns the demand of all observers: force, and each output with at least one request. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub fn now(&self) -> Demand {
         let counts = self.counts.load(Ordering::Relaxed);

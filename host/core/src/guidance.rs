@@ -8,7 +8,7 @@ pub const GUIDE: &str = "hand_guide";
 /// Ids of the parameters with the target: x, y, z of the device frame, mm.
 pub const TARGET_MM: [&str; 3] = ["hand_target_x_mm", "hand_target_y_mm", "hand_target_z_mm"];
 
-/// Returns whether a parameter is one of those that guide a hand.
+/// Returns true if a parameter guides a hand: [`GUIDE`], or one of [`TARGET_MM`].
 #[must_use]
 pub fn is_guidance(parameter: &str) -> bool {
     parameter == GUIDE || TARGET_MM.contains(&parameter)

@@ -4,10 +4,10 @@
 //! - [`mapping`]: mapping between the device frame and a model's frame.
 //! - [`limits`]: limits of force and motion, the wall at the end of a device's range; [`rendered_boundary`]: the same wall on
 //!   a device, in a loop; [`region`]: the vectors that limits allow.
-//! - [`plausibility`]: checks of device samples.
-//! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between its two ends.
+//! - [`plausibility`]: checks of device samples; [`oscillation`]: detection of an unstable loop.
+//! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between the two ends of a coupling.
 //! - [`guidance`]: the parameters that guide a simulated hand.
-//! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: its number in the run.
+//! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: number of a plugin in the run.
 //! - [`words`]: encoding of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
 //!
 //! The crate reads no files, starts no threads and, apart from [`lock()`], makes no system calls.

@@ -133,7 +133,7 @@ impl Default for Limits {
 /// Spring-damper wall a little inside the device's range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Boundary {
-    /// Least distance of the wall inside the device's range, m.
+    /// Minimum distance of the wall inside the device's range, m.
     pub margin_m: f64,
     /// Distance of the wall inside the device's rotation range, rad.
     pub margin_rad: f64,

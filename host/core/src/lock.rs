@@ -2,7 +2,8 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Locks a mutex, also one whose last owner panicked: only for data that each owner leaves valid at every step. Not real-time.
+/// Locks a mutex, and ignores that an owner panicked: only for data that each owner keeps valid at every step. Not
+/// real-time.
 pub fn lock<T: ?Sized>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -30,7 +30,7 @@ impl Default for MappingConfig {
 /// Weight, priority and fade time of a model among the models of its scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {
-    /// Weight of its wrench, 0 to 1.
+    /// Weight of the model's wrench, 0 to 1.
     pub weight: f64,
     /// Priority: a model with a force suppresses the models of lower priority.
     pub priority: u8,

@@ -94,8 +94,9 @@ impl Oscillation {
     pub const NONE: Oscillation =
         Oscillation { force: Swing::NONE, torque: Swing::NONE, stage: Stage::Whole };
 
-    /// Records a wrench with the pose of the handle, and reduces the force at an oscillation; `cut` flags a limited
-    /// force and a limited torque. Real-time: bounded, no allocation.
+    /// Records a wrench with the pose of the handle; `cut` flags a limited force and a limited torque. An oscillation
+    /// reduces the gain; if the oscillation continues, the gain becomes 0 for the rest of the run. Real-time: bounded,
+    /// no allocation.
     #[inline(never)] // seldom called
     pub fn note(&mut self, wrench: &Wrench, cut: [bool; 2], pose: &Pose, now_ns: u64) {
         let [cuts_force, cuts_torque] = cut;

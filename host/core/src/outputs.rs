@@ -17,7 +17,7 @@ pub struct ModelOutputs {
 }
 
 impl ModelOutputs {
-    /// No force, no torque and no energy, all of them computed.
+    /// Zero force, zero torque and zero energy, with all outputs present.
     pub const ZERO: ModelOutputs = ModelOutputs::new(Wrench::ZERO, 0.0);
 
     /// Creates a set of all outputs: wrench, N and N·m, and stored energy, J. Real-time: bounded, no allocation.
@@ -26,8 +26,8 @@ impl ModelOutputs {
         Self { wrench, energy_j, computed: Demand::ALL }
     }
 
-    /// Returns the outputs without those outside `demand`, which become absent; force is always present. Real-time:
-    /// bounded, no allocation.
+    /// Returns the outputs in `demand`; the other outputs become absent, except force, which is always present.
+    /// Real-time: bounded, no allocation.
     #[inline]
     pub const fn limited_to(self, demand: Demand) -> Self {
         let computed = self.computed.limited_to(demand).with(Demand::FORCE);
@@ -61,7 +61,7 @@ impl ModelOutputs {
         self.computed.contains(Demand::TORQUE).then(|| self.wrench.torque())
     }
 
-    /// Returns force and torque, if both were computed.
+    /// Returns force and torque; `None` if the torque was not computed.
     #[inline]
     #[must_use]
     pub fn wrench(&self) -> Option<Wrench> {

@@ -11,21 +11,21 @@ pub struct PeerState {
     pub pose: Pose,
     /// Velocity of the handle, m/s and rad/s.
     pub twist: Twist,
-    /// Running total of energy that this end has passed on to the other, J.
+    /// Running total of energy that this end has passed on to the other end, J.
     pub passed_on_j: f64,
 }
 
-/// Energy tank of an end, for reports.
+/// State of the energy tank of an end, in the shared frame, for reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TankState {
     /// Energy available, J; below zero if more energy has come out than had gone in.
     pub level_j: f64,
-    /// Lowest level so far, J. With the controller on, it is below zero only by the energy that came out while a force
-    /// acted for longer than a period (late or missed ticks), or on a handle faster than expected.
+    /// Lowest level so far, J. With the controller on, the level is below zero only by the energy that came out while a
+    /// force acted for longer than a period (late or missed ticks), or on a handle faster than expected.
     pub lowest_j: f64,
     /// Energy that the hand has put in so far, less the energy that has come out, J.
     pub gone_in_j: f64,
-    /// Energy that was put in and then discarded, J.
+    /// Energy discarded from the tank so far, J.
     pub discarded_j: f64,
 }
 

@@ -57,7 +57,8 @@ pub enum Implausible {
     NotFinite,
     /// The length of the orientation is not one.
     Quaternion,
-    /// The pose is outside twice the range of the device.
+    /// The pose is outside twice the range of the device, or more than 10 m away along an axis without a declared
+    /// range.
     Range,
     /// The velocity, reported or since the last sample, is higher than a handle can have.
     Speed,
@@ -201,8 +202,9 @@ pub struct PlausibilityCheck {
     behind_ns: u64,
     stale_ticks: u32,
     last: Option<Believed>,
-    /// Consecutive samples equal to the one before, by their time, and by all bits of their pose.
+    /// Number of consecutive samples with the time of their predecessor.
     repeated: u32,
+    /// Number of consecutive samples of a noisy sensor with exactly the pose of their predecessor.
     unmoved: u32,
     /// Counter that grows by [`GOOD_FOR_A_BAD`] with each implausible sample and falls by one with each plausible one.
     distrust: u32,

@@ -70,8 +70,8 @@ impl Region {
         if self.holds(shrunk) { shrunk } else { shrunk * SURELY_INSIDE }
     }
 
-    /// Returns the ratio of the length of a vector to the longest vector of its direction in the region: above 1
-    /// outside. Real-time: bounded, no allocation.
+    /// Returns the length of a vector, divided by the length of the longest vector of the same direction in the region:
+    /// above 1 outside, 0 for a zero vector. Real-time: bounded, no allocation.
     #[must_use]
     pub fn excess(&self, vector: DVec3) -> f64 {
         // By the largest component: the square of a length may overflow.

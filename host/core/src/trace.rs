@@ -29,7 +29,7 @@ macro_rules! events {
 events! {
     /// The device had no new sample.
     STALE_SAMPLE = 0 "stale_sample",
-    /// A device or model number was not finite and was replaced by zero.
+    /// A requested wrench was not finite and was replaced by zero, or a sample was not finite and was not used.
     NOT_FINITE = 1 "not_finite",
     /// The force was limited.
     FORCE_LIMITED = 2 "force_limited",
@@ -45,11 +45,11 @@ events! {
     DEVICE_FAULT = 7 "device_fault",
     /// The force was fading in.
     RAMPING = 8 "ramping",
-    /// The model left its domain, clamped, or did not converge.
+    /// A model left its domain, saturated its output, or did not converge.
     MODEL_DEGRADED = 9 "model_degraded",
     /// One or more ticks were missed before this one.
     MISSED = 10 "missed",
-    /// The device's actuators were at their limit and gave less than was commanded.
+    /// The device's actuators were at their limit and delivered less than commanded.
     SATURATED = 11 "saturated",
     /// No usable sample arrived for a while: no force.
     HOLDING = 12 "holding",
@@ -83,7 +83,7 @@ impl Events {
     /// No events.
     pub const NONE: Events = Events { bits: 0 };
 
-    /// Events that end the run or disable a part of it.
+    /// Events that end the run, disable a model, or reduce the force after an oscillation.
     pub const FAULTS: Events =
         Self::EMERGENCY_STOP.with(Self::DEVICE_FAULT).with(Self::MODEL_FAULT).with(Self::OSCILLATION_DAMPED);
 

@@ -65,7 +65,8 @@ impl<const N: usize> Encoder<N> {
     }
 }
 
-/// Decoder of the words of a record, in order; zeros after its end. Real-time: bounded, no allocation.
+/// Decoder of the words of a record, in order; returns zeros after the end of the record. Real-time: bounded, no
+/// allocation.
 pub struct Decoder<'a> {
     words: std::slice::Iter<'a, u64>,
 }
@@ -83,7 +84,7 @@ impl<'a> Decoder<'a> {
         self.words.next().copied().unwrap_or(0)
     }
 
-    /// Returns the next numbers.
+    /// Returns the next `M` numbers.
     #[inline]
     pub fn numbers<const M: usize>(&mut self) -> [f64; M] {
         std::array::from_fn(|_| f64::from_bits(self.word()))
