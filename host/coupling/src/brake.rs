@@ -59,8 +59,8 @@ fn slowed(force: DVec3, place: DVec3, speed: DVec3, range: [f64; 3], damping: f6
         return force;
     }
     let edge = ahead / part;
-    // Normal of the ellipsoid there. From inside, the velocity along it is outwards and the damper only dissipates energy; from outside
-    // it also pushes back.
+    // Outward normal of the ellipsoid at `edge`. For a handle inside, the velocity along the normal is outwards, and
+    // the damper only dissipates energy; for a handle outside, the damper also pushes back.
     let Some(outwards) = (edge * inverse * inverse).try_normalize() else { return force };
     let excess = outwards.dot(ahead - edge) / AHEAD_S;
     force - outwards * (outwards.dot(force).max(0.0) + damping * excess)

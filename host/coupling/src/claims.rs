@@ -1,4 +1,5 @@
-//! Limits on the claims of a partner on another host, to what a hand on a device like the local one could do.
+//! Limits on the claims of a partner on another host, to the motion and the energy that are possible for a hand on a
+//! device like the local device.
 //!
 //! The content of a message is a claim. A message with an impossible position, orientation or velocity is ignored.
 //! Otherwise its pose is limited to the range of the local device and to the speed of a hand. The energy that the
@@ -70,8 +71,9 @@ pub(super) struct Claims {
     /// Total energy accepted from all partners, J. The energy delivered to the local hand is at most this energy plus
     /// the energy that the local hand put in.
     pub(super) accepted_j: f64,
-    /// Energy that the partner may still claim, and energy that its hand may still have put in, J.
+    /// Energy that the partner may still claim, J.
     open_j: f64,
+    /// Work that the partner's hand may still have done, J.
     hand_j: f64,
     /// Energy that this end had passed on in the last tick, J.
     passed_on_j: f64,

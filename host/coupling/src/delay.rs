@@ -15,7 +15,8 @@ impl DelayLine {
         Self { places: vec![None; delay_ticks as usize].into(), next: 0 }
     }
 
-    /// Stores the peer state of this tick and returns the one that arrives; `None` in the first ticks.
+    /// Stores the peer state of this tick and returns the peer state that arrives in this tick; `None` until the first
+    /// state has passed the delay.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]

@@ -35,7 +35,7 @@ impl End {
     /// Creates an end with an empty tank and without a peer state; until it receives a peer state, it requests no
     /// force. Not real-time.
     ///
-    /// `mapping` maps from the device's frame to the shared one; `period_s` is the time between ticks.
+    /// `mapping` maps from the device's frame to the shared frame; `period_s` is the time between ticks.
     #[must_use]
     pub fn new(config: &CouplingConfig, mapping: &MappingConfig, period_s: f64) -> Self {
         let mapping = Mapping::new(mapping);
@@ -69,8 +69,8 @@ impl End {
         self.controller.follow(&state.twist);
     }
 
-    /// Passes a fraction of the energy in the tank on to the partner; returns the state for the partner, shared frame.
-    /// Call once per tick. Real-time: bounded, no allocation.
+    /// Passes a fraction of the energy in the tank, without the energy stored in walls, on to the partner; returns the
+    /// state for the partner, shared frame. Call once per tick. Real-time: bounded, no allocation.
     #[inline]
     pub fn send_state(&mut self, state: &DeviceState) -> PeerState {
         let passed_on_j = self.tank.pass_on(self.bounce_j());
@@ -107,7 +107,7 @@ impl End {
         self.tank.passed_on_j()
     }
 
-    /// Returns the mapping from the device's frame to the shared one.
+    /// Returns the mapping from the device's frame to the shared frame.
     pub(super) fn mapping(&self) -> &Mapping {
         &self.mapping
     }
@@ -122,8 +122,8 @@ impl End {
         pull
     }
 
-    /// Returns the fraction `part`, 0 to 1, of the pull, limited by the brake: it takes no more energy than the whole
-    /// pull. Real-time: bounded, no allocation.
+    /// Returns the fraction `part`, 0 to 1, of the pull, limited by the brake: this part takes no more energy than the
+    /// whole pull. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn pull_part(&mut self, state: &DeviceState, part: f64, brake: &Brake) -> Pull {
         let whole = self.whole_pull(state);

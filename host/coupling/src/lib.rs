@@ -6,7 +6,7 @@
 //! passed on. As long as no tank is below zero, the pair generates no energy, *whatever the delay*, constant or not,
 //! and even if messages get lost: the energy passed on is sent as a running total. This holds for ends with true
 //! claims; the claims of a partner on another host are accepted only as far as they can be checked here (`claims`), so
-//! that false claims yield no more energy than that.
+//! that false claims yield no energy beyond the accepted energy.
 //!
 //! ```text
 //!  hand  <-- wrench --  End   -- PeerState: pose, twist, energy passed on -->  End  -- wrench -->  hand
@@ -52,7 +52,7 @@ use flotor_hal::{DeviceState, Wrench};
 pub struct PortSample<'a> {
     /// State of the handle, device frame.
     pub state: &'a DeviceState,
-    /// Part of the wrench applied since the last tick that the coupling had requested, device frame.
+    /// Coupling's part of the wrench applied since the last tick, device frame.
     pub held: Wrench,
 }
 

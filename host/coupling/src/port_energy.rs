@@ -1,10 +1,11 @@
-//! Energy at a port between a hand and a device: measurement, and a controller that prevents its generation.
+//! Passivity observer and passivity controller for the port between a hand and a device: measurement of the energy
+//! through the port, and prevention of energy generation.
 //!
 //! With the wrench held from one sample to the next, the energy that crosses the port between two samples is known
 //! exactly: the applied wrench times the displacement of the handle (the passivity observer of Hannaford and Ryu,
 //! "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and Automation 18(1), 2002, eq. 5). A
-//! passive object (spring, damper, wall) never gives back more energy than it received. A loop that does is active: its
-//! model generates energy, or sampling does.
+//! passive object (spring, damper, wall) never gives back more energy than it received. A loop that gives back more is
+//! active: the model or the sampling generates energy.
 //!
 //! The controller predicts the energy that the port may give until the next sample, from the velocity and from the
 //! accelerations of the recent past, and passes the fraction of the wrench for which the energy is available (the

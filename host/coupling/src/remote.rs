@@ -20,9 +20,9 @@ pub struct LinkTimeouts {
 /// Connection between an end in the loop and its peer link, in both directions. Neither side waits for the other: only
 /// the newest state counts.
 pub struct Line {
-    /// Last message of this end. Its fields `run`, `partner` and `since` are 0: the peer link sets them.
+    /// Newest message of this end. Its fields `run`, `partner` and `since` are 0: the peer link sets them.
     pub outgoing: Observer<Dispatch, DISPATCH_WORDS>,
-    /// Messages for this end, newest last.
+    /// Cell for the newest message to this end.
     pub incoming: Publisher<Dispatch, DISPATCH_WORDS>,
     /// Time without a message after which the partner is gone, ns.
     pub silence_ns: u64,
@@ -35,7 +35,7 @@ pub struct LinkStatistics {
     pub ticks: u64,
     /// Number of timeouts of the partner.
     pub silences: u64,
-    /// Longest wait for a message, without timeouts, ns.
+    /// Longest time without a message, shorter than the timeout, ns.
     pub longest_wait_ns: u64,
     /// Number of implausible messages, which were ignored.
     pub implausible: u64,
