@@ -39,7 +39,7 @@ pub fn latest<T: Words<N>, const N: usize>(initial: T) -> (Publisher<T, N>, Obse
     (publisher, Observer { cell, record: PhantomData })
 }
 
-/// Writing end of a cell. A cell has only one: the type is not `Clone`, and publishing takes it mutably.
+/// Writing end of a cell. A cell has only one writing end: the type is not `Clone`, and publishing takes it mutably.
 #[derive(Debug)]
 pub struct Publisher<T, const N: usize> {
     cell: Arc<Cell<N>>,
@@ -79,7 +79,7 @@ pub struct Observer<T, const N: usize> {
 }
 
 impl<T: Words<N>, const N: usize> Observer<T, N> {
-    /// Returns the newest value and its version: the number of values published before, 0 for the initial value. For
+    /// Returns the newest value and its version: the number of values published so far, 0 for the initial value. For
     /// one reader versions never decrease; an unchanged version means an unchanged value.
     ///
     /// Returns `None` if each of a few attempts overlapped with a write; retry later.
