@@ -152,11 +152,11 @@ impl ChunkedFile {
         self.flush_sink()
     }
 
-    /// Writes the last chunk and the summary, and closes the file; fails unless it is still the file at the path, in
-    /// full length.
+    /// Writes the last chunk and the summary, and closes the file; fails unless the file is still at the path, in full
+    /// length.
     ///
     /// # Errors
-    /// Errors of the system, or one around a [`FileError`](crate::FileError).
+    /// Errors of the system, or an error that wraps a [`FileError`](crate::FileError).
     pub(crate) fn finish(mut self, path: &Path) -> io::Result<()> {
         self.write_end()?;
         self.sink.file.close(path)

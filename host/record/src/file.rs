@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Change of a recording's file by another program, found by its writer.
+/// Change of a recording file by another program, detected by the recording's writer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FileError {
@@ -43,10 +43,10 @@ impl NewFile {
         Self { buffer: BufWriter::new(LengthChecked { file, written: 0 }) }
     }
 
-    /// Writes the buffered bytes; fails unless the file is still the file at the path, in full length.
+    /// Writes the buffered bytes; fails unless the file is still at the path, in full length.
     ///
     /// # Errors
-    /// Errors of the system, or one around a [`FileError`].
+    /// Errors of the system, or an error that wraps a [`FileError`].
     pub(crate) fn close(&mut self, path: &Path) -> io::Result<()> {
         self.buffer.flush()?;
         let checked = self.buffer.get_ref();
@@ -85,7 +85,7 @@ impl LengthChecked {
         if found == self.written { Ok(()) } else { Err(FileError::Length { written: self.written, found }) }
     }
 
-    /// Returns whether the path names this file.
+    /// Returns true if the path names this file.
     fn is_at(&self, path: &Path) -> bool {
         let written = self.file.try_clone().and_then(Handle::from_file);
         matches!((written, Handle::from_path(path)), (Ok(written), Ok(named)) if written == named)

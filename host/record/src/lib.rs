@@ -11,7 +11,7 @@
 //! | `/tf` | `foxglove.FrameTransform` | each tick and device: pose of `handle` in `device`, with several devices `NAME/handle` in `NAME` |
 //! | `/flotor/tick` | `flotor.Tick` | every tick and device: twist, wrenches, energy, events, timing |
 //! | `/flotor/change` | `flotor.Change` | when a parameter changed: before the first tick with the new value |
-//! | `/flotor/log` | `foxglove.Log` | on events described in words: faults |
+//! | `/flotor/log` | `foxglove.Log` | on text events, such as faults |
 //!
 //! [`RunDescription`] is written first (and once more as the metadata record `flotor.run`, for tools that list
 //! metadata), then [`Recorder::record`] appends ticks; [`Recording`] reads them back, bit for bit. [`TraceDigest`]

@@ -5,7 +5,7 @@ use flotor_core::Change;
 use flotor_core::trace::TickRecord;
 use prost::Message;
 
-/// Error: bytes are not a complete message of a recording.
+/// Error of bytes that are not a complete message of a recording.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("not a valid message {message}: {reason}")]
 pub struct InvalidMessage {

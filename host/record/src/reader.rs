@@ -144,7 +144,8 @@ impl Recording {
     /// Opens a recording and reads the description of the run. Not real-time.
     ///
     /// # Errors
-    /// If the file is not a recording, or is damaged before its first tick.
+    /// If the file cannot be opened, is not a recording, is compressed, has a later format, or is truncated or damaged
+    /// before the end of the run description.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let unreadable = |cause: io::Error| match cause.kind() {
             io::ErrorKind::InvalidInput => ReadError::NotMcap { path: path.into() },
@@ -181,7 +182,8 @@ impl Recording {
         &self.run
     }
 
-    /// Returns whether the recording is complete, known from the start; a repaired recording counts as cut off.
+    /// Returns the ending of the recording, finished or cut off, known since [`Self::open`]; a repaired recording
+    /// counts as cut off.
     #[must_use]
     pub fn ending(&self) -> Ending {
         if self.is_repaired() { Ending::CutOff } else { self.messages.ending() }

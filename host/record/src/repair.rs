@@ -32,7 +32,7 @@ pub struct Repaired {
     pub end_ns: u64,
     /// Planned duration of the run, s.
     pub planned_s: f64,
-    /// Damage in the middle of the file, if it is not only truncated: messages after it are lost.
+    /// Damage in the middle of the file, if the file is not only truncated: messages after the damage are lost.
     pub damage: Option<Damage>,
 }
 

@@ -8,7 +8,7 @@ use flotor_hal::Demand;
 use prost::Message;
 use std::collections::BTreeMap;
 
-/// Error: bytes do not describe a run.
+/// Error of bytes that do not describe a run.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("invalid run description: {0}")]
 pub struct InvalidRun(String);

@@ -58,7 +58,7 @@ pub enum RecordError {
         #[source]
         cause: io::Error,
     },
-    /// Another program removed, replaced or shortened the file during the run.
+    /// Another program removed or replaced the file, or changed its length, during the run.
     #[error("the recording `{}` is lost or damaged: {damage}; record again", path.display())]
     Lost {
         /// Path of the file.
@@ -71,7 +71,7 @@ pub enum RecordError {
 
 /// Writer of a recording.
 ///
-/// Dropped without [`Recorder::finish`], the writer still completes the file, but errors are lost.
+/// Dropped without [`Recorder::finish`], the writer still completes the file, but reports no errors.
 pub struct Recorder {
     path: PathBuf,
     file: ChunkedFile,
@@ -125,7 +125,7 @@ impl Recorder {
     /// Appends a tick. Not real-time: every quarter of a second it writes a chunk to the file.
     ///
     /// # Errors
-    /// [`RecordError::Write`], after which the recording is over: later calls fail too.
+    /// [`RecordError::Write`] or [`RecordError::Lost`], after which the recording is over: later calls fail too.
     pub fn record(&mut self, record: &TickRecord) -> Result<(), RecordError> {
         self.try_record(record).map_err(|cause| write_error(&self.path, cause))
     }
@@ -144,7 +144,7 @@ impl Recorder {
     /// Appends a text event and writes it to the file at once. Not real-time.
     ///
     /// # Errors
-    /// [`RecordError::Write`], after which the recording is over: later calls fail too.
+    /// [`RecordError::Write`] or [`RecordError::Lost`], after which the recording is over: later calls fail too.
     pub fn note(&mut self, note: &Note) -> Result<(), RecordError> {
         // Notes are rare and explain why a run ended, so they are written at once.
         self.write_now(Topic::Log, &Log::new(note), note.time_ns)
@@ -154,7 +154,7 @@ impl Recorder {
     /// Appends a message of another recording unchanged. Not real-time: every quarter of a second it writes a chunk to the file.
     ///
     /// # Errors
-    /// [`RecordError::Write`].
+    /// [`RecordError::Write`] or [`RecordError::Lost`].
     pub(crate) fn copy(&mut self, message: &StoredMessage<Topic>) -> Result<(), RecordError> {
         let StoredMessage { topic, sequence, time_ns, ref data } = *message;
         self.sequence = sequence;
@@ -170,7 +170,7 @@ impl Recorder {
     ///
     /// # Errors
     /// [`RecordError::Write`]: the index may be missing; chunks flushed before can be read. [`RecordError::Lost`]:
-    /// the file at the path is not the one written.
+    /// another program changed the length of the file, or removed or replaced the file.
     pub fn finish(self) -> Result<(), RecordError> {
         let Self { path, file, .. } = self;
         file.finish(&path).map_err(|cause| write_error(&path, cause))
