@@ -68,7 +68,7 @@ pub enum Event {
         /// Number of records dropped since the connection because the client's queue was full.
         dropped: u64,
     },
-    /// A parameter changed.
+    /// Change of a parameter, a weight or a plugin, applied or rejected.
     Change(Change),
     /// Answer to a request.
     Answer(Answer),
@@ -198,7 +198,7 @@ impl RequestClient {
     /// Sends a request; returns the number that the [`Answer`] will contain. Does not wait for the answer.
     ///
     /// # Errors
-    /// [`LiveError::Connection`] if the host has closed the connection, or does not read in time.
+    /// [`LiveError::Connection`] if the host has closed the connection, or does not read the request within 1 s.
     pub fn ask(&self, ask: Ask) -> Result<u64, LiveError> {
         let number = self.number.fetch_add(1, Ordering::Relaxed);
         let request = serde_json::to_vec(&Request { number, ask }).map_err(io::Error::from)?;

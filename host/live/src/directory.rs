@@ -36,10 +36,10 @@ pub struct FoundRun {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DirectoryError {
-    /// The folder, or a socket in it, cannot be created.
+    /// The folder, or a file or socket in the folder, cannot be created, read or written.
     #[error("{}: {cause}; {}", path.display(), remedy(cause))]
     Unusable {
-        /// Path of the folder or socket.
+        /// Path of the folder, file or socket.
         path: PathBuf,
         /// Error of the system.
         #[source]
@@ -76,7 +76,7 @@ pub fn process_number() -> u32 {
 fn remedy(cause: &io::Error) -> &'static str {
     match cause.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room on its disk",
-        _ if is_out_of_descriptors(cause) => "close some, or allow more (`ulimit -n`)",
+        _ if is_out_of_descriptors(cause) => "close some files, or allow more (`ulimit -n`)",
         _ => "set XDG_RUNTIME_DIR to a folder you may write to",
     }
 }
@@ -181,7 +181,7 @@ impl Directory {
     }
 }
 
-/// Listening socket that other programs can find; dropping it removes the file.
+/// Listening socket that other programs can find; dropping it removes the socket file.
 #[derive(Debug)]
 pub struct Listener {
     socket: Arc<Listening>,
@@ -221,7 +221,8 @@ impl Drop for Listener {
     }
 }
 
-/// Creates a folder that only this user may enter, if necessary; returns an error if others may.
+/// Creates a folder that only this user may enter, if necessary; returns an error if other users may enter an existing
+/// folder.
 pub(crate) fn private(path: &Path) -> Result<(), DirectoryError> {
     make_folder(path).map_err(unusable(path))?;
     let attributes = std::fs::symlink_metadata(path).map_err(unusable(path))?;

@@ -1,14 +1,15 @@
 //! Observation and control of a running host by other programs on the same machine: viewer, bridges, scripts.
 //!
-//! A running host listens on a Unix socket in a folder that only its user may enter ([`Directory`]); every program that may open
-//! the socket may observe and change the run. [`Publication`] is the host's end, [`Client`] the other:
+//! A running host listens on a Unix socket in a folder that only its user may enter ([`Directory`]); every program that
+//! may open the socket may observe and change the run. [`Publication`] is the host's end, [`Client`] the end of the
+//! other program:
 //!
 //! ```no_run
 //! use flotor_live::{Ask, Client, Directory, Event};
 //! use std::time::Duration;
 //!
 //! let mut client = Client::find(&Directory::of_this_user())?;
-//! client.request_client().ask(Ask::Watch { every: 10 })?; // one record in ten; of the others, what happened in them
+//! client.request_client().ask(Ask::Watch { every: 10 })?; // one record in ten, with the events of the skipped ticks
 //! while let Some(event) = client.next(Duration::from_secs(1))? {
 //!     if let Event::Ticks { records, .. } = event {
 //!         println!("{} ticks, up to {:?}", records.len(), records.last().map(|record| record.time_ns));
@@ -44,8 +45,9 @@
 //!
 //! # The latch
 //!
-//! An emergency stop of any run stops every run of the folder, and prevents new runs until it is released: by the [`Latch`], a file
-//! beside the sockets, and by a request to each socket, which the run confirms.
+//! An emergency stop of any run stops every run of the folder, and prevents new runs until the stop is released. Two
+//! means transport the stop: the [`Latch`], a file beside the sockets, and a request to each socket, which the run
+//! confirms.
 //!
 //! # Couplings
 //!

@@ -1,9 +1,14 @@
-//! Pairing of the two ends of a coupling: the partner is one run, which answers this run, until it has been silent.
+//! Pairing of the two ends of a coupling: the partner is one run, which answers this run, until the partner times out.
 //!
-//! Each message names the run that it comes from and the run that it answers. An end takes the first run that answers this end or none,
-//! names that run, and uses its messages from the first that names this run; the name informs all other runs of their rejection. So a
-//! third run is never accepted, and energy is counted by one at most. A bridge is a star: the server of a coupling gets all messages to
-//! it, and their senders get no others. (If all got all, three that start at once could take turns; energy would still be counted once.)
+//! Each message contains the number of its sender and of its addressee: the run that the sender answers, or 0. An end
+//! selects as its partner the first run whose message is addressed to this end or to no run, and addresses its own
+//! messages to the partner. The end uses the messages of the partner from the first message that is addressed to this
+//! end. The addressee also informs all other runs that they are rejected. So a third run is never accepted, and at most
+//! one run counts the energy.
+//!
+//! A bridge is a star: the server of a coupling receives all messages to the coupling, and the senders of these
+//! messages receive only the messages of the server. (If every end received all messages, three ends that start at once
+//! could alternate as partners; the energy would still be counted once.)
 
 use flotor_core::peer::Dispatch;
 use serde::Serialize;
@@ -11,15 +16,15 @@ use serde::Serialize;
 /// Counts of messages to a loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct LinkCounts {
-    /// Messages of the partner that arrived and were newer than the last.
+    /// Messages of the partner that answer this run and are newer than the last message.
     pub arrived: u64,
     /// Skipped ticks of the partner: their messages were lost, or came after newer ones.
     pub lost: u64,
-    /// Messages that came after newer ones, or twice.
+    /// Messages of the partner that arrived after a newer message, or twice.
     pub overtaken: u64,
-    /// Malformed messages, and those of this run itself.
+    /// Malformed messages, and messages of this run itself.
     pub refused: u64,
-    /// Messages of runs that are not the partner, or that answer another run.
+    /// Messages from runs other than the partner, and messages addressed to another run.
     pub others: u64,
 }
 
@@ -52,7 +57,8 @@ impl Pairing {
         Self { run, silence_ns, partner: None, counts: LinkCounts::default() }
     }
 
-    /// Addresses a message of this end to the run that it answers.
+    /// Returns a message of this end with this run as its sender and the partner as its addressee; the first message to
+    /// a partner sets `since`.
     #[must_use]
     pub fn address(&mut self, dispatch: &Dispatch) -> Dispatch {
         let of_partner = |held: &mut Partner| (held.run, *held.since.get_or_insert(dispatch.tick));
@@ -60,7 +66,8 @@ impl Pairing {
         Dispatch { run: self.run, partner, since, ..*dispatch }
     }
 
-    /// Returns the message if it is for the loop.
+    /// Checks a message, and updates the partner and the counts; returns the message if its sender is the partner, its
+    /// addressee is this run, and it is newer than the last message.
     pub fn take(&mut self, dispatch: Dispatch, now_ns: u64) -> Option<Dispatch> {
         let Self { run: us, silence_ns, partner, counts } = self;
         let Dispatch { run, partner: named, tick, .. } = dispatch;

@@ -89,8 +89,8 @@ impl PeerSocket {
         Self::bind(path)
     }
 
-    /// Creates the end of a bridge, a program that transports the peer state between this host and another. It receives states only
-    /// after [`Self::subscribe`] or [`Self::send`].
+    /// Creates the end of a bridge, a program that transports the peer state between this host and another. The bridge
+    /// receives states only after [`Self::subscribe`] or [`Self::send`].
     ///
     /// # Errors
     /// If the folder or the socket cannot be created, or other users may enter the folder.
@@ -139,8 +139,8 @@ impl PeerSocket {
         });
     }
 
-    /// Returns the next received state, without waiting; `None` when all have been read. At the host, the sender of a datagram
-    /// becomes a subscriber, up to eight.
+    /// Returns the next received state, without waiting; `None` if no state is pending. At the host, the sender of a
+    /// datagram becomes a subscriber, up to eight.
     ///
     /// # Errors
     /// If a datagram is malformed.

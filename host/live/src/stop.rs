@@ -1,4 +1,4 @@
-//! Emergency stop over the sockets of the other runs, which confirm it, in addition to the latch.
+//! Emergency stop over the sockets of the other runs, which confirm the stop, in addition to the latch.
 //!
 //! One thread sends the request to all runs and does not block on any. Not real-time.
 

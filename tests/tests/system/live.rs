@@ -296,7 +296,7 @@ fn one_watcher_too_many_is_told_and_can_still_press_the_emergency_stop() {
         let watching: Vec<Client> = (0..16).map(|_| watch(directory, 1000)).collect();
         let mut late = connect(directory);
         let refused = answer(&mut late, Ask::Watch { every: 1 }).refused.expect("sixteen are enough");
-        assert_eq!(refused, "16 clients are connected already, the maximum; close one of them");
+        assert_eq!(refused, "16 clients watch the run already, the maximum; close one of them");
         (watching, late, false)
     };
     let (_, _, outcome, _) = run_watched(Clock::Virtual, meet, |(_, client, pressed), _| {

@@ -55,7 +55,8 @@ pub(crate) fn private_file(options: &mut OpenOptions) -> &mut OpenOptions {
 /// Removes the socket file if no process has the socket open; returns true if so. The process id is not checked: containers that
 /// share the folder have separate process ids.
 pub(crate) fn remove_if_dead(path: &Path) -> bool {
-    // Works for sockets of any type, and does not connect to a listening socket.
+    // Probe with a datagram socket: if no process has the socket file open, the connection is refused, whatever the
+    // type of the socket. A listening stream socket reports another error and accepts no connection.
     let probed = UnixDatagram::unbound().and_then(|probe| probe.connect(path));
     let is_dead = probed.is_err_and(|error| error.kind() == ErrorKind::ConnectionRefused);
     if is_dead {

@@ -194,7 +194,7 @@ impl Shared {
         let watchers = self.watchers();
         if !outbox.wants_ticks() && self.watching.load(Ordering::Relaxed) >= MAX_WATCHERS {
             return Err(format!(
-                "{MAX_WATCHERS} clients are connected already, the maximum; close one of them"
+                "{MAX_WATCHERS} clients watch the run already, the maximum; close one of them"
             ));
         }
         outbox.want_ticks(every.max(1), self.demand.request(Demand::ALL));

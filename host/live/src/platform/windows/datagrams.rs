@@ -89,7 +89,8 @@ impl Datagrams {
         self.socket.send_to(&datagram, (Ipv4Addr::LOCALHOST, *port))
     }
 
-    /// Receives the next datagram; returns its length and sender. `WouldBlock` when all have been read, or many were discarded.
+    /// Receives the next datagram; returns its length and sender. `WouldBlock` if no datagram is pending, or after
+    /// [`MAX_DISCARDED`] discarded datagrams.
     pub(crate) fn recv_from(&self, buffer: &mut [u8]) -> io::Result<(usize, Address)> {
         let mut datagram = [0; LONGEST];
         for _ in 0..MAX_DISCARDED {

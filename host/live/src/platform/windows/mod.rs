@@ -29,7 +29,8 @@ pub(crate) fn is_out_of_descriptors(cause: &io::Error) -> bool {
     cause.raw_os_error() == Some(TOO_MANY_OPEN_FILES)
 }
 
-/// Creates a folder, if necessary. The folder inherits the permissions of its parent: in a profile, access for the user.
+/// Creates a folder, if necessary. The folder inherits the permissions of its parent: inside a user profile, other
+/// users have no access.
 pub(crate) fn make_folder(path: &Path) -> io::Result<()> {
     std::fs::create_dir_all(path)
 }
