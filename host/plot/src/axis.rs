@@ -16,7 +16,7 @@ const NARROWEST_RELATIVE_SPAN: f64 = 1e-9;
 /// Space between the data and the ends of a padded axis, as a fraction of the data's span.
 const PADDING: f64 = 0.06;
 
-/// Least range of a logarithmic axis, in decades: smaller differences are not visible.
+/// Minimum range of a logarithmic axis, in decades: smaller differences are not visible.
 const LEAST_DECADES: f64 = 0.1;
 
 /// Largest distance from the data to a round value at which a tight axis ends there, as a fraction of the data's span.
@@ -55,7 +55,8 @@ impl Axis {
         }
     }
 
-    /// Creates a linear axis in the unit of `quantity`, with the least range of `quantity`; values have to be given in that unit.
+    /// Creates a linear axis in the unit of `quantity`, with the minimum range of `quantity`; values have to be given
+    /// in that unit.
     pub fn of(label: impl Into<String>, quantity: Quantity) -> Self {
         let (unit, per_si) = quantity.unit();
         Self::linear(label, unit).least_range(quantity.least_range_si() * per_si)
@@ -73,8 +74,9 @@ impl Axis {
         self
     }
 
-    /// Widens an automatic range to at least `span`, in the unit of the axis, so that rounding errors do not look like a signal.
-    /// Ignored on a logarithmic axis, which has a least range of its own.
+    /// Widens an automatic range to at least `span`, in the unit of the axis, so that rounding errors do not look like
+    /// a signal. Ignored on a logarithmic axis, which has a minimum range of its own, and for a `span` that is negative
+    /// or not finite.
     pub fn least_range(mut self, span: f64) -> Self {
         if self.scale == Scale::Linear && (0.0..LARGEST_DRAWABLE).contains(&span) {
             self.least = span;
@@ -248,8 +250,8 @@ fn widened(fit: Fit, scale: Scale, [low, high]: [f64; 2], least: f64) -> (f64, f
     (middle - 0.5 * least, middle + 0.5 * least)
 }
 
-/// Returns a range with a constant in its middle: a tenth of the constant's magnitude to either side and at least half of `least`;
-/// one unit around zero without a least range; a third of a decade on a log axis.
+/// Returns a range with a constant in its middle: a tenth of the constant's magnitude to either side and at least half
+/// of `least`; one unit around zero without a minimum range; a third of a decade on a log axis.
 fn around_constant(scale: Scale, low: f64, high: f64, least: f64) -> (f64, f64) {
     let middle = 0.5 * low + 0.5 * high;
     let room = match scale {

@@ -32,7 +32,7 @@ const HEADING_TO_FRAME_PX: f64 = 5.0;
 const DESCENDER_PX: f64 = 5.0;
 const Y_LABEL_PITCH_PX: f64 = 21.0;
 const X_LABEL_GAP_PX: f64 = 26.0;
-/// Least width of a plotting area between gutters.
+/// Minimum width of a plotting area between gutters.
 const LEAST_FRAME_WIDTH_PX: f64 = 40.0;
 
 /// Arranged figure.

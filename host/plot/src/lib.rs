@@ -141,8 +141,8 @@ impl Figure {
         self
     }
 
-    /// Sets width and height of the whole picture, each clamped to 200 px to 8000 px (NaN: 960 px). The plotting areas divide the
-    /// height that titles and labels leave, at least 40 px each.
+    /// Sets width and height of the whole picture, each clamped to 200 px to 8000 px (NaN: 960 px). The plotting areas
+    /// divide the height without titles and labels equally, with at least 40 px each.
     pub fn size_px(mut self, [width_px, height_px]: [f64; 2]) -> Self {
         let held = |length: f64| if length.is_nan() { WIDTH_PX } else { length.clamp(200.0, 8000.0) };
         (self.width_px, self.height_px) = (held(width_px), Some(held(height_px)));
@@ -169,7 +169,7 @@ impl Figure {
         self
     }
 
-    /// Adds a panel; for an error adds its text, a quantity and the reason why it is not drawn, to a note under the subtitle.
+    /// Adds a panel; for an error, adds the error text (name of the quantity and reason) to a note under the subtitle.
     pub fn panel_or_note(mut self, panel: Result<Panel, String>) -> Self {
         match panel {
             Ok(panel) => self.panels.push(panel),

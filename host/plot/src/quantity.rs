@@ -1,7 +1,6 @@
-//! Measured quantities, with the unit and the least range of an axis.
+//! Measured quantities, with the unit and the minimum range of an axis.
 //!
-//! Differences far below the least range are rounding errors, which an automatic axis without a least range would enlarge to an
-//! apparent signal.
+//! Without a minimum range, an automatic axis would enlarge rounding errors to an apparent signal.
 
 /// Quantity that a run or an experiment measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,7 +37,7 @@ impl Quantity {
         (symbol, per_si)
     }
 
-    /// Formats a value given in the unit of the axis.
+    /// Formats a value, given in the unit of the axis, with this unit.
     pub(super) fn text(self, value: f64) -> String {
         match self {
             Self::Angle | Self::AngularVelocity => format!("{value}{}", self.unit().0),
@@ -46,14 +45,14 @@ impl Quantity {
         }
     }
 
-    /// Returns the least range of an axis, in SI units.
+    /// Returns the minimum range of an axis, in SI units.
     #[must_use]
     pub const fn least_range_si(self) -> f64 {
         self.entry().2
     }
 
-    /// Returns unit, factor from SI units, and least range in SI units. The ranges are far below the resolution of hands and
-    /// devices, and far above rounding errors.
+    /// Returns unit, factor from SI units, and minimum range in SI units. The ranges are far below the resolution of
+    /// hands and devices, and far above rounding errors.
     const fn entry(self) -> (&'static str, f64, f64) {
         const DEGREE: f64 = std::f64::consts::PI / 180.0;
         match self {

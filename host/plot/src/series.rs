@@ -113,8 +113,8 @@ impl Bin {
 }
 
 impl Series {
-    /// Creates a line of samples `(x, y)`, joined in the given order; x need not increase. A sample that is not finite breaks the
-    /// line; an isolated sample is drawn as a dot.
+    /// Creates a line of samples `(x, y)`, joined in the given order; x need not increase. A sample that is not finite,
+    /// or not positive on a log axis, breaks the line; an isolated sample is drawn as a dot.
     pub fn line(label: impl Into<String>, samples: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self::new(label, Shape::Line(samples.into_iter().collect()))
     }
@@ -141,7 +141,8 @@ impl Series {
         Self::new(label, Shape::Histogram(bins.into_iter().collect()))
     }
 
-    /// Creates error bars with caps at both ends, for standard errors or intervals. To be added after the series of the values.
+    /// Creates error bars with caps at both ends, for standard errors or intervals. Add this series after the series of
+    /// the values.
     pub fn errors(label: impl Into<String>, bars: impl IntoIterator<Item = ErrorBar>) -> Self {
         Self::new(label, Shape::Errors(bars.into_iter().collect()))
     }
@@ -155,8 +156,8 @@ impl Series {
         Self { label: label.into(), slot: None, weight: Weight::Full, shape, given }
     }
 
-    /// Sets the palette entry `slot` (counted from 0), so that a quantity looks the same in every panel, or a theory line as its
-    /// measured points.
+    /// Sets the palette entry `slot` (counted from 0), so that a quantity has the same style in every panel, or a
+    /// theory line the colour of its measured points.
     pub fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(Look::Slot(slot));
         self

@@ -43,7 +43,7 @@ pub(super) fn power_of_ten(exponent: i32) -> f64 {
     10.0_f64.powi(exponent)
 }
 
-/// Converts an integral `f64` to `i32`, clamped to the exponents of `f64`.
+/// Converts an integral `f64` to `i32`, clamped to ±400: beyond all decimal exponents of `f64`.
 #[expect(clippy::cast_possible_truncation, reason = "held within ±400 first")]
 pub(super) fn to_integer(value: f64) -> i32 {
     value.clamp(-400.0, 400.0) as i32

@@ -26,14 +26,14 @@ use super::theme::{Slot, font_px, style_sheet};
 const FAULT_CROSS_PX: f64 = 4.5;
 const FAULT_CROSS_DEPTH_PX: f64 = 8.0;
 
-/// Height of the bar over intervals in which a limit acted, and least drawn width of an interval.
+/// Height of the bar over intervals in which a limit acted, and minimum drawn width of an interval.
 const LIMITED_BAR_PX: f64 = 5.0;
 const LEAST_STRETCH_PX: f64 = 1.5;
 
 const MAJOR_TICK_PX: f64 = 5.0;
 const MINOR_TICK_PX: f64 = 3.0;
 
-/// Least length of a decade for which minor grid lines are drawn.
+/// Minimum length of a decade for which minor grid lines are drawn.
 const MINOR_GRID_DECADE_PX: f64 = 60.0;
 
 /// Writes the figure as an SVG document.

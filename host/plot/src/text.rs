@@ -1,7 +1,8 @@
 //! Text for pictures: escaping, formatting of numbers, and estimates of text widths without a font.
 
-/// Escapes characters that are reserved in XML and HTML, and replaces characters that XML 1.0 forbids (control characters, section
-/// 2.2), so that any string is safe as element content and as attribute value. Not real-time.
+/// Escapes line feeds and the characters that are reserved in XML and HTML, and replaces tabs, carriage returns and the
+/// characters that XML 1.0 forbids (control characters, section 2.2), so that any string is safe as element content and
+/// as attribute value. Not real-time.
 #[must_use]
 pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());

@@ -27,7 +27,7 @@ impl VectorTrace {
     /// capitalised.
     ///
     /// # Errors
-    /// `name` and the reason, if there is no data, or no component differs from zero by more than rounding.
+    /// `name` and the reason, if there is no data, or all components are within half of the minimum range around zero.
     pub fn panel(self, name: &str) -> Result<Panel, String> {
         let (_, per_si) = self.quantity.unit();
         let least = self.quantity.least_range_si() * per_si;
