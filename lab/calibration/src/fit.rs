@@ -18,7 +18,7 @@ use super::least_squares::{Solution, solve};
 use super::procedure::Reading;
 use flotor_hal::{CALIBRATION_COEFFICIENTS, VerticalCalibration, math};
 
-/// Highest degree of a fit. One less than the format has room for: the cross-validated curve has to bend down again.
+/// Highest degree of a fit: one below the highest degree of the file format.
 pub const MAX_DEGREE: usize = CALIBRATION_COEFFICIENTS - 2;
 
 /// Quantile of the normal distribution for a two-sided interval of 95 %; there are hundreds of readings.
@@ -42,7 +42,7 @@ pub struct Fit {
     pub calibration: VerticalCalibration,
     /// Degree of the curve.
     pub degree: usize,
-    /// Candidates of every degree.
+    /// Prediction errors of all degrees from 0 to [`MAX_DEGREE`].
     pub candidates: Vec<Candidate>,
     /// Weight of the moving part, N, with the half width of its 95 % interval.
     pub weight_n: [f64; 2],
@@ -57,8 +57,10 @@ pub struct Fit {
 
 /// Fits a calibration to the readings. Not real-time.
 ///
-/// # Errors [`CalibrationError::TooFew`] with fewer than two forces, or with no more heights than a curve of
-/// [`MAX_DEGREE`] has coefficients; [`CalibrationError::Implausible`] if the curve is not a valid calibration.
+/// # Errors
+/// [`CalibrationError::TooFew`] with fewer than two forces, with no more heights than a curve of [`MAX_DEGREE`] has
+/// coefficients, or if the readings do not determine the curve; [`CalibrationError::Implausible`] if the curve is not a
+/// valid calibration.
 pub fn fit(readings: &[Reading]) -> Result<Fit, CalibrationError> {
     let stops = distinct(readings.iter().map(|reading| u64::from(reading.stop)));
     let forces = distinct(readings.iter().map(|reading| reading.commanded_n.to_bits()));

@@ -15,7 +15,8 @@ pub(super) struct Solution {
 
 /// Solves the least-squares problem by QR decomposition; `None` if the rows do not determine every unknown.
 pub(super) fn solve(rows: &[Vec<f64>], values: &[f64]) -> Option<Solution> {
-    /// Smallest diagonal entry relative to the largest, above rounding errors.
+    /// Ratio of a diagonal entry of `R` to the largest one at or below which the rows count as rank-deficient; above rounding
+    /// errors.
     const RANK_TOLERANCE: f64 = 1.0e-12;
     let unknowns = rows.first()?.len();
     if rows.len() < unknowns || unknowns > MAX_UNKNOWNS || rows.len() != values.len() {

@@ -98,11 +98,11 @@ pub enum CalibrationError {
     /// The thread that holds the handle cannot be started.
     #[error("cannot start the thread of the holding controller: {0}; end other programs of this user")]
     NoThread(std::io::Error),
-    /// A general rule for programs that drive a device was violated.
+    /// The emergency-stop latch is pressed, or the watchdog process cannot be started as required.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The device rejects activation or calibration.
-    #[error("the device rejected the calibration: {0}")]
+    /// The device or the force sensor rejects a parameter, activation or calibration, or the device is disconnected.
+    #[error("the device or the force sensor rejected the request: {0}")]
     Refused(Refusal),
     /// The device faulted.
     #[error("device fault: {}", .0.advice())]

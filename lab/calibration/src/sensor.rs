@@ -21,10 +21,10 @@ pub struct ForceSensor {
 }
 
 impl ForceSensor {
-    /// Opens the force sensor of a plugin at the serial port `port`, with further settings. Not real-time.
+    /// Opens and activates the force sensor of a plugin at the serial port `port`, with further settings. Not real-time.
     ///
     /// # Errors
-    /// [`CalibrationError`] if there is no sensor, or the plugin has no parameter `port`.
+    /// [`CalibrationError`] if the plugin has no parameter `port`, or rejects the settings, opening or activation.
     pub fn open(plugin: &Plugin, port: &str, mut settings: Vec<Setting>) -> Result<Self, CalibrationError> {
         let setting = Setting::parse(plugin.parameters(), "port", port);
         settings
@@ -39,7 +39,7 @@ impl ForceSensor {
     /// Returns a reading that began after this call, N. Not real-time.
     ///
     /// # Errors
-    /// [`CalibrationError::Sensor`] if no reading arrives.
+    /// [`CalibrationError::Sensor`] if the sensor faults, a reading is not finite, or no reading arrives within a minute.
     pub fn read_n(&mut self) -> Result<f64, CalibrationError> {
         // The first reading may have begun before this call: discard it.
         self.next_n()?;

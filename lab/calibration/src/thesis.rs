@@ -26,7 +26,8 @@ pub fn calibration(feed_forward_n: f64) -> Result<VerticalCalibration, InvalidCa
     )
 }
 
-/// Returns the command of the thesis's program, N: uncorrected feed-forward, corrected spring force.
+/// Returns the command of the thesis's program for a total force of `total_n`, N: the feed-forward without correction, plus
+/// the corrected spring force.
 #[must_use]
 pub fn command_n(total_n: f64, height_m: f64) -> f64 {
     let z_mm = height_m * 1.0e3;

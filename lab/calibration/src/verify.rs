@@ -18,16 +18,17 @@ pub const PROBE_N: f64 = 11.0;
 /// Ratio of delivered to commanded force at heights from bottom to top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorCurve {
-    /// Height, m, and ratio; 1 without error.
+    /// Height, m, and ratio of delivered to commanded force (1 without error).
     pub ratios: Vec<(f64, f64)>,
 }
 
 impl ErrorCurve {
-    /// Number of heights.
+    /// Number of heights at which [`Self::measure`] measures.
     pub const HEIGHTS: u64 = 2 * STEPS as u64 + 1;
 
     /// Measures the curve with the present calibration of the rig's device; `command_n` returns the command, N, for a
-    /// height in m (usually [`PROBE_N`]). `stopped` is called after each height.
+    /// height in m. All ratios refer to [`PROBE_N`], even if a correction changes the command. `stopped` is called after each
+    /// height.
     ///
     /// # Errors
     /// [`CalibrationError`], from the rig.

@@ -20,7 +20,7 @@ enum Command {
     Calibrate(CalibrateArguments),
 }
 
-/// Parser of the commands. Not real-time.
+/// Function that returns the command-line parser of all commands. Not real-time.
 pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
 /// Runs the command of this process.

@@ -26,7 +26,7 @@ pub struct Waiting {
     pub target_m: f64,
     /// Actual height of the handle, m.
     pub height_m: f64,
-    /// Upward force on the handle, N.
+    /// Commanded upward force, N.
     pub command_n: f64,
 }
 
@@ -37,7 +37,7 @@ pub struct RigOptions {
     pub close_m: f64,
     /// Timeout for the handle to rest at its target.
     pub patience: Duration,
-    /// Limits of the device, under the host's limit, with the consents of the user.
+    /// Limits of force, torque and velocity, which the host's limit reduces further; requirements for an independent stop.
     pub limits: Limits,
 }
 
@@ -67,7 +67,8 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     /// the handle lowered. An emergency stop of `stop` stops the device. Not real-time.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the device rejects the call, or must not be driven without the user's consent.
+    /// [`CalibrationError`] if the device rejects the call, if the watchdog process cannot be started as required, or if the
+    /// user has to accept a control group shared with this process.
     pub fn open(
         plugin: &Plugin,
         settings: &[Setting],

@@ -67,7 +67,7 @@ impl Words<COMMAND_WORDS> for Command {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Report {
     pub(super) state: Holding,
-    /// Last complete mean of the height, m.
+    /// Last complete mean of the height, m; until two means are complete, the mean in progress (NaN without a sample).
     pub(super) height_m: f64,
     /// Absolute difference to the previous mean height, m; infinite until two means are complete.
     pub(super) moved_m: f64,
@@ -77,7 +77,7 @@ pub(super) struct Report {
     pub(super) means: u64,
     /// Number of means that differed from the previous one in height or force.
     pub(super) restless: u64,
-    /// Number of ticks of the last two means in which the device reported saturation.
+    /// Number of ticks with saturation reported by the device, in the last two complete means.
     pub(super) saturated: u64,
 }
 
@@ -116,7 +116,7 @@ impl Words<REPORT_WORDS> for Report {
 /// State of the thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Holding {
-    /// The force is ramping to its target, or has just reached it.
+    /// The force is ramping to its target, or two means at the target force are not complete yet.
     Changing,
     /// The force has had this value, N, for at least two complete means.
     Steady(f64),

@@ -24,18 +24,19 @@ pub struct Rest {
 
 /// Device with a force sensor above it.
 pub trait Rig {
-    /// Moves the sensor so that the handle rests at `target_m` under the command `command_n` (N, for a measured height
-    /// in m).
+    /// Moves the sensor, or waits until a person has moved it, so that the handle rests at `target_m` under the command
+    /// `command_n` (N, for a height in m).
     ///
     /// # Errors
-    /// [`CalibrationError`] if the device faults or the handle does not come to rest.
+    /// [`CalibrationError`] if the device faults, is saturated or too weak, if the handle does not come to rest at the target,
+    /// or if the user aborts.
     fn rest_at(&mut self, target_m: f64, command_n: &dyn Fn(f64) -> f64) -> Result<Rest, CalibrationError>;
 
     /// Returns a reading of the force sensor while the handle is at `rest`, N: delivered force less the weight of the
     /// moving part.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the sensor does not answer.
+    /// [`CalibrationError`] if the sensor does not answer or faults, or if the device faults.
     fn read_force_n(&mut self, rest: &Rest) -> Result<f64, CalibrationError>;
 
     /// Returns true if the handle has stayed at `rest` during all readings so far; always true in a simulation.

@@ -51,7 +51,7 @@ impl SimulatedRig {
     /// Returns the serial number of the device.
     ///
     /// # Errors
-    /// [`CalibrationError`] if the device cannot be opened.
+    /// [`CalibrationError`] if the plugin is not the simulated flotor, or the device cannot be opened.
     pub fn serial(&mut self) -> Result<String, CalibrationError> {
         Ok(self.plugin.open_device(&self.settings(0.0)?)?.serial())
     }
