@@ -5,7 +5,7 @@
 //!  |      head | block of `size` bytes | edge (0 to 15 bytes) |  guard page without any access |
 //! ```
 //!
-//! Every block ends at a guard, so that a read or write past its end ends the process there. Head and edge contain
+//! Every block ends at a guard, so that a read or write of the guard ends the process there. Head and edge contain
 //! known bytes, which are checked when the block is freed; freed memory becomes a guard itself and is never reused. The
 //! library replaces the C library's functions through `LD_PRELOAD`. It has no lists and no locks.
 #![allow(unsafe_code)]
