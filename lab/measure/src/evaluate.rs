@@ -37,33 +37,34 @@ impl Handle {
 /// Answer of a model at a pose. All numbers are finite.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// Force and torque on the hand, N and N·m; zero where there is no answer.
+    /// Force and torque on the hand, N and N·m; zero if the model returned no finite wrench.
     pub wrench: Wrench,
-    /// Stored energy, J; `None` if the model reports none.
+    /// Stored energy, J; `None` if the model has no output `energy`, or if energy or wrench is not finite.
     pub energy_j: Option<f64>,
-    /// Status of the answer.
+    /// Status returned by the model. Without a finite wrench or a known status: `OutOfDomain`, or `InvalidInput` for a pose that
+    /// is not finite.
     pub status: StepStatus,
-    /// Details in the order of the model's [`flotor_hal::Detail`]s; empty if not requested.
+    /// Details in the order of the model's [`flotor_hal::Detail`]s, `None` for a value that is not finite; empty if not requested.
     pub details: Vec<Option<f64>>,
 }
 
 /// Path to each pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Travel {
-    /// From home.
+    /// Straight path from home, with the model reset.
     FromHome,
-    /// From the previous pose.
+    /// Straight path from the previous pose.
     Successive,
-    /// In one step of a loop, one tick per pose.
+    /// No path: one step per pose, as in consecutive ticks of a loop.
     PerTick,
 }
 
-/// Choice of the model's details in an answer.
+/// Presence of the model's details in an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Details {
-    /// Wrench, energy and status only.
+    /// Answer with wrench, energy and status only.
     Omitted,
-    /// Details as well.
+    /// Answer with details, too.
     Asked,
 }
 
@@ -94,7 +95,7 @@ pub struct Evaluation<'a> {
     pub settings: &'a [Setting],
     /// Path to each pose.
     pub travel: Travel,
-    /// Choice of the model's details.
+    /// Presence of the model's details in the answers.
     pub details: Details,
 }
 

@@ -64,10 +64,12 @@ pub struct MissedMore {
     pub standard_error: Option<f64>,
 }
 
-/// Runs servo and bare loop alternately for `slices` seconds each. `progress` is called after each pair.
+/// Runs servo and bare loop alternately for `slices` seconds each, or until a stop request, then stops the devices. `progress`
+/// is called after each pair with the number of pairs so far.
 ///
 /// # Errors
-/// [`RunError::NoThread`] if the loop's thread cannot be started, [`RunError::Plugin`] if a device rejects activation.
+/// [`RunError::NoThread`] if a thread cannot be started, [`RunError::Latched`] if the emergency-stop latch is pressed,
+/// [`RunError::Plugin`] if a device rejects activation, [`RunError::Thread`] if the loop panicked.
 pub fn measure(
     session: Session,
     slices: u64,

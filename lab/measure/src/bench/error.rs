@@ -9,7 +9,7 @@ use serde::Serialize;
 const SETTLING_TICKS: u64 = 500;
 
 /// Error of a case relative to the reference along the path; NaN without a pose to compare. A pose at which case or
-/// reference has no valid answer is counted, not compared.
+/// reference has no valid wrench is counted, not compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Distance {
     /// Largest error of the force, N.
@@ -20,12 +20,12 @@ pub struct Distance {
     pub torque_max_nm: f64,
     /// Root mean square of the torque's error, N·m.
     pub torque_rms_nm: f64,
-    /// Number of poses at which case or reference has no valid answer.
+    /// Number of poses at which case or reference has no valid wrench.
     pub unanswered: usize,
 }
 
 impl Distance {
-    /// Compares the answers of a case with those of the reference.
+    /// Compares the wrenches of a case with the reference's wrenches, pose by pose.
     pub(super) fn between(answers: &[Option<Wrench>], truth: &[Option<Wrench>]) -> Self {
         let mut distance = Self { force_max_n: f64::NAN, torque_max_nm: f64::NAN, ..Self::default() };
         let mut compared = 0.0_f64;
@@ -49,13 +49,14 @@ impl Distance {
     }
 }
 
-/// Returns the answers tick by tick, after settling at the first pose; `None` where a model has none.
+/// Returns the model's wrench at each pose of the path, after settling at the first pose; `None` where the model returns no valid
+/// wrench.
 pub(super) fn walk(model: &mut Model, path: &[Pose]) -> Vec<Option<Wrench>> {
     settle(model, path);
     (SETTLING_TICKS..).zip(path).map(|(tick, pose)| answer(model, *pose, tick)).collect()
 }
 
-/// Resets a model and lets it converge at the first pose.
+/// Resets a model and steps it at the first pose until it has converged.
 pub(super) fn settle(model: &mut Model, path: &[Pose]) {
     model.reset();
     if let Some(first) = path.first() {
@@ -65,7 +66,8 @@ pub(super) fn settle(model: &mut Model, path: &[Pose]) {
     }
 }
 
-/// Returns the answer at a pose; `None` if it is invalid.
+/// Steps the model at a pose and returns its wrench; `None` if the call fails, the wrench is not finite, or the status is not
+/// `ok`, `clamped` or `not_converged`.
 pub(super) fn answer(model: &mut Model, pose: Pose, tick: u64) -> Option<Wrench> {
     let demand = Demand::WRENCH.limited_to(model.serves());
     let input = Input { demand, ..input_of(tick, pose) };

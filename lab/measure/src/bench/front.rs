@@ -23,18 +23,18 @@ pub struct Front {
 pub struct FrontRow {
     /// Name of the case.
     pub name: String,
-    /// Times for force and torque.
+    /// Times of calls that demand force and torque.
     pub times: Times,
     /// Error relative to the reference, force and torque.
     pub distance: Distance,
-    /// Most accurate case that is no slower and no less accurate; `None` on the Pareto front, and for a case that is
+    /// Name of the most accurate case that is no slower and no less accurate; `None` on the Pareto front, and for a case that is
     /// not judged.
     pub dominated_by: Option<String>,
 }
 
 impl Front {
-    /// Measures the cases, in turns, along a path through the workspace, and compares their answers with those of the
-    /// reference.
+    /// Measures the cases, in turns, along a path through the workspace, and compares their wrenches with those of the
+    /// reference. `done` is called after every round.
     pub(super) fn measure(
         named: &[&str],
         models: &mut [Model],
@@ -70,7 +70,8 @@ impl Front {
     }
 }
 
-/// Returns true if a case has answered all poses that any case has: an error over fewer poses is not comparable.
+/// Returns true if a case has an error and no other case has fewer poses without a valid wrench: an error over fewer poses is
+/// not comparable.
 pub(super) fn is_judged<'d>(distance: &Distance, all: impl IntoIterator<Item = &'d Distance>) -> bool {
     all.into_iter().all(|other| distance.unanswered <= other.unanswered) && !distance.force_max_n.is_nan()
 }

@@ -47,7 +47,7 @@ pub struct Case {
     pub name: String,
     /// Settings of the model.
     pub settings: Vec<Setting>,
-    /// Plugin of a different model on the same path; `None`: that of all cases.
+    /// Plugin of another model on the same path; `None`: the measured plugin.
     pub other: Option<Plugin>,
 }
 
@@ -81,7 +81,7 @@ pub struct Plan {
 /// Detail of the answer that splits calls into two kinds, with the cases and workspaces to measure.
 #[derive(Clone)]
 pub struct Split {
-    /// Id of the detail: calls with a value above zero, and the others.
+    /// Id of the detail. Calls with a value above zero are of the first kind, all other calls of the second.
     pub detail: String,
     /// Cases, each with its workspace.
     pub walks: Vec<(Case, Workspace)>,

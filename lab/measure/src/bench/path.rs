@@ -20,7 +20,8 @@ pub struct Hand {
 }
 
 impl Default for Hand {
-    /// Returns a depth of 4 mm below home: a spring of the thesis between free and a third of its length.
+    /// Returns a depth of 4 mm below home: with the amplitude of the motion, the thesis's first spring (25 mm) is compressed by
+    /// up to about a third of its length.
     fn default() -> Self {
         Self { depth_m: 4.0e-3 }
     }
@@ -56,7 +57,7 @@ pub struct Workspace {
 const SWEEPS_HZ: [[f64; 3]; 2] = [[0.618, 1.303, 1.732], [0.541, 1.618, 2.236]];
 
 impl Workspace {
-    /// Scales the workspace about home.
+    /// Returns the workspace with radius and rotation multiplied by `factor`.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self { radius_m: self.radius_m * factor, rotation_rad: self.rotation_rad * factor }

@@ -46,7 +46,7 @@ pub struct Losses {
     pub hold_n: f64,
     /// Error of an exact model whose force is held for a period, and delayed.
     pub delay_n: f64,
-    /// Error of an exact model that sees the sensor's steps.
+    /// Error of an exact model at poses quantised by the sensor.
     pub quantum_n: f64,
     /// Error with all causes together.
     pub all_n: f64,

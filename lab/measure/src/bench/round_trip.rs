@@ -39,7 +39,7 @@ fn await_other(word: &AtomicU32, last: u32) -> u32 {
     }
 }
 
-/// Times batches of round trips between two threads, ns each. Not real-time.
+/// Times batches of round trips between two threads, ns per round trip. Not real-time.
 ///
 /// # Errors
 /// Errors of starting the second thread.

@@ -10,7 +10,7 @@ use flotor_hal::{
 };
 use std::f64::consts::TAU;
 
-/// Name in a scene.
+/// Plugin id of the device in a scene.
 pub const SCRIPTED: &str = "scripted";
 
 /// Entry of the device as a linked-in plugin.

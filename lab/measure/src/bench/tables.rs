@@ -15,17 +15,17 @@ pub struct BenchReport {
     pub version: String,
     /// Name of the reference case of the errors; `None` without a reference.
     pub reference: Option<String>,
-    /// Baseline case of the times.
+    /// Name of the baseline case of the times; `None` without cases.
     pub yardstick: Option<String>,
     /// Length of the path, ticks of 1 ms.
     pub ticks: usize,
     /// Results of the cases.
     pub rows: Vec<CaseRow>,
-    /// Error of the force on the hand by cause, of each case in a whole loop.
+    /// Error of the force on the hand by cause, for each case (by name) in a whole loop; empty without a reference.
     pub losses: Vec<(String, Losses)>,
     /// Results over the whole workspace; `None` without a reference.
     pub front: Option<Front>,
-    /// Times of calls of two kinds.
+    /// Times of calls split by a detail; empty without a split.
     pub apart: Vec<SplitRow>,
 }
 
@@ -47,7 +47,7 @@ pub struct SplitRow {
     pub name: String,
     /// Radius of the workspace of its path, m.
     pub radius_m: f64,
-    /// Detail that splits the calls.
+    /// Id of the detail that splits the calls.
     pub detail: String,
     /// Times of the two kinds.
     pub apart: SplitTimes,
@@ -206,8 +206,8 @@ impl BenchReport {
         )
     }
 
-    /// Draws error over time as SVG, a point per case: the lower and the farther left, the better. Without errors,
-    /// draws the times.
+    /// Draws error over computing time as SVG, a point per case: the lower and the farther left, the better. Without
+    /// errors, draws the times.
     #[must_use]
     pub fn to_svg(&self) -> String {
         if self.rows.iter().all(|row| row.distance.is_none()) {

@@ -88,7 +88,7 @@ impl WholeTick {
     /// Prepares a model of the registry, by id or file, on a device. Not real-time.
     ///
     /// # Errors
-    /// [`RunError`] if the model is unknown, rejected, or does not fit.
+    /// [`RunError`] if the model cannot be loaded or created, or the run with the device cannot be prepared.
     pub fn prepare(device: BenchDevice, registry: Registry, model: &str) -> Result<Self, RunError> {
         let registry = registry.with_linked(&SCRIPTED_ENTRY)?;
         let scene = Scene::parse(Path::new("bench"), &device.scene(model))?;

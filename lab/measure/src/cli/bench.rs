@@ -69,10 +69,10 @@ pub(crate) struct BenchArguments {
     /// Extent of the measurement
     #[arg(long, value_enum, default_value = "short")]
     size: Size,
-    /// Write every measurement as CSV
+    /// Write times and errors of each case as CSV, one line per demand
     #[arg(long, value_parser = new_file, value_name = "FILE.csv")]
     csv: Option<PathBuf>,
-    /// Plot the error of each case against its computing time (work-precision diagram)
+    /// Plot the error of each case against its computing time (work-precision diagram); without a reference, the times
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     #[command(flatten)]

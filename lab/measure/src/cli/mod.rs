@@ -27,7 +27,7 @@ enum Command {
     Stress(stress::StressArguments),
 }
 
-/// Parser of the commands. Not real-time.
+/// Function that returns the command-line parser of all commands. Not real-time.
 pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
 /// Runs the command of this process.

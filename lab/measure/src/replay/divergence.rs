@@ -6,14 +6,14 @@ use flotor_record::RunDescription;
 use flotor_servo::Port;
 use serde::Serialize;
 
-/// Ticks of a run that can be compared. A tick without the record of a device cannot.
+/// Ticks of a run that can be compared. A tick without the record of a device counts as missing.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Coverage {
-    /// First comparable tick: above 0 if the recording began after the start of the run. `None` if there is no tick.
+    /// First comparable tick: above 0 if the recording began after the start of the run. `None` without a comparable tick.
     pub begins_at_tick: Option<u64>,
-    /// Last comparable tick; `None` if there is no tick.
+    /// Last comparable tick; `None` without a comparable tick.
     pub ends_at_tick: Option<u64>,
-    /// Number of missing ticks after the first.
+    /// Number of missing ticks after the first comparable one.
     pub missing_ticks: u64,
     /// First missing tick; `None` if none is missing.
     pub first_missing_tick: Option<u64>,
@@ -143,8 +143,8 @@ impl Evidence {
         }
     }
 
-    /// Records that the last tick differs. Its own events take precedence over earlier ones: all earlier ticks were
-    /// equal.
+    /// Records that the last tick differs. The events of this tick take precedence over earlier events: all earlier ticks
+    /// were equal.
     pub(super) fn differs(&mut self, tick: u64, records: &[TickRecord], ports: &[Port]) {
         if self.cause.is_some() {
             return;

@@ -5,10 +5,10 @@ use flotor_session::scene::{Location, ParameterText, SceneError};
 use std::path::{Path, PathBuf};
 
 /// Returns a setting of `model`, a file name replaced by that of a file of equal content: at its place in the run, or
-/// beside the recording, which may have been moved.
+/// beside the recording, which may have been moved. `parameters`: parameters in the model's description.
 ///
 /// # Errors
-/// If no file has that content. `parameters` are those of the model's description.
+/// [`SceneError`] if no file has that content.
 pub(super) fn as_recorded(
     set: &ParameterText,
     model: &str,

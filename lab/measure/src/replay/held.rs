@@ -16,7 +16,7 @@ impl Held {
     /// of them, or by its full name on one. Not real-time.
     ///
     /// # Errors
-    /// A message if the recording has no such model.
+    /// A message if the recording has no such model, or a setting applies to no model.
     pub(super) fn apply(
         models: &mut [ModelUse],
         others: &[KeyValue],

@@ -40,7 +40,7 @@ pub struct Row {
 
 impl Row {
     /// Returns the relative deviation of the measured from the exact limit: infinite where only the measured loop is
-    /// stable, 0 where neither is. `None` where a limit is above the search or NaN.
+    /// stable, 0 where neither is. `None` where a limit is beyond the end of the search or NaN.
     #[must_use]
     pub fn deviation(&self) -> Option<f64> {
         let Self { k_max_n_per_m: measured, exact_n_per_m: exact, search_ended, .. } = *self;

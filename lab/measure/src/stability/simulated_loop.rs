@@ -69,7 +69,7 @@ pub struct LoopSetup {
 const TOLERANCE: f64 = 1.0e-4;
 /// Time for the fast modes to decay, s.
 const SETTLE_S: f64 = 4.0;
-/// Length of each of the two windows, s.
+/// Length of each of the two consecutive windows whose mean squares are compared, s.
 const WINDOW_S: f64 = 8.0;
 /// Initial displacement with an ideal sensor, m: at 1e6 N/m a millinewton.
 const IDEAL_START_M: f64 = 1.0e-9;
