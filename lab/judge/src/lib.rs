@@ -37,7 +37,7 @@ pub enum Size {
 }
 
 impl Size {
-    /// Returns the name of the size.
+    /// Returns the name of the size on the command line and in reports.
     #[must_use]
     pub const fn word(self) -> &'static str {
         match self {

@@ -19,7 +19,7 @@ const POLYNOMIALS: [(usize, u32, [u32; 4]); DIMENSIONS - 1] = [
     (4, 1, [1, 1, 3, 3]),
 ];
 
-/// Sobol's sequence in six dimensions, digitally shifted by a seed.
+/// Sobol sequence in six dimensions, with a digital shift drawn from a seed.
 #[derive(Clone, Debug)]
 pub struct Sobol {
     directions: [[u32; DIGITS]; DIMENSIONS],

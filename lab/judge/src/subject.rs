@@ -39,7 +39,7 @@ pub fn input_of(tick: u64, pose: Pose) -> Input {
     Input { tick, time_ns: tick * PERIOD_NS, dt_ns: PERIOD_NS, ..Input::at_rest(pose) }
 }
 
-/// Makes one call under the watch of [`crate::watch`].
+/// Steps a model once; while the call lasts, the watchdog ([`crate::watch`]) monitors it.
 ///
 /// # Errors
 /// The call status of the model, if not `Ok`.
@@ -58,7 +58,8 @@ pub fn steps(way_m: DVec3, way_rad: DVec3) -> f64 {
     (way_m.length() / STEP_M).max(way_rad.length() / STEP_RAD).ceil()
 }
 
-/// Calls `step` along a path, whose parameter grows from 0 to 1, and at its end until the model has converged.
+/// Calls `step` along a path, whose parameter grows from 0 to 1, and at its end until the model has converged, at most 2000
+/// times more; returns the last output.
 ///
 /// # Errors
 /// The first error of `step`.
@@ -155,7 +156,8 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Walks to a pose; calls `on_the_way` after every step.
+    /// Moves the handle to a pose in small steps and holds it there until the model has converged; calls `on_the_way` after every
+    /// step. Returns the last output.
     ///
     /// # Errors
     /// [`Trouble`] with the kind of the failure and its pose.
@@ -173,7 +175,7 @@ impl<'a> Subject<'a> {
         walk(steps, between, end, |pose| self.advance(pose, Twist::ZERO, PERIOD_NS).inspect(|_| on_the_way()))
     }
 
-    /// Runs one tick of a loop: the pose `dt_ns` after the previous one.
+    /// Steps the model as in one tick of a loop, at a pose `dt_ns` after the previous tick.
     ///
     /// # Errors
     /// [`Trouble`] with the kind of the failure and its pose.
@@ -231,7 +233,7 @@ impl<'a> Subject<'a> {
         &mut self.model
     }
 
-    /// Returns the kind of the model's memory.
+    /// Returns the memory of the model: stateless or path-dependent.
     pub fn memory(&self) -> Memory {
         self.model.memory()
     }

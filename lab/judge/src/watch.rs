@@ -48,7 +48,7 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Guard of a call: while it exists, its thread counts as being in a step.
 pub struct CallGuard(());
 
-/// Marks this thread as being in `step` with these inputs, until the result is dropped. Takes some tens of nanoseconds.
+/// Marks this thread as being in `step` with these inputs, until the returned guard is dropped. Takes some tens of nanoseconds.
 #[must_use]
 pub fn enter_call(inputs: &[Input]) -> CallGuard {
     let steps = u32::try_from(inputs.len()).unwrap_or(u32::MAX);
@@ -69,9 +69,9 @@ impl Drop for CallGuard {
 /// Step that does not return.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StuckStep {
-    /// Tick of the step's input.
+    /// Tick of the input, of a batch the first.
     pub tick: u64,
-    /// Pose of the step's input.
+    /// Pose of the input, of a batch the first.
     pub pose: Pose,
     /// Limit that was exceeded.
     pub limit: Exceeded,
@@ -83,8 +83,8 @@ impl fmt::Display for StuckStep {
     }
 }
 
-/// Watches all threads of this process until a step exceeds `limit` of processor time, or ten times that in waiting;
-/// then reports the step, once, from the watchdog's thread.
+/// Starts a watchdog thread for all threads of this process. If a step exceeds `limit` of processor time, or ten times `limit`
+/// in waiting (a batch: as many times as it has steps), the thread calls `on_stuck` with the step and ends.
 ///
 /// # Errors
 /// If no thread can be started.

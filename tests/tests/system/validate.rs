@@ -74,7 +74,7 @@ fn every_mistake_of_a_model_is_found_under_its_rule() {
         ("ALLOCATES", "no-system-calls", "a step allocated memory or made another system call"),
         ("OPENS_FILES", "no-system-calls", "a step allocated memory or made another system call"),
         ("STARTS_THREADS", "no-system-calls", "a step allocated memory or made another system call"),
-        ("WRITES", "no-system-calls", "the model read or wrote"),
+        ("WRITES", "no-system-calls", "read or write system calls"),
     ];
     for (mistake, rule, words) in mistakes {
         // Not every kernel counts what a thread writes.

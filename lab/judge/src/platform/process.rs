@@ -2,11 +2,12 @@
 
 use std::time::Duration;
 
-/// Processor time of a process, with its readiness to run.
+/// Processor time of a process, with the runnable state of its threads.
 pub(crate) struct Used {
     /// Processor time so far.
     pub(crate) ran: Duration,
-    /// True if a thread is running or could run; false if the process is idle by choice.
+    /// True if a thread is running, runnable, or waiting for a disk or a page; false if the process is idle by choice, and always
+    /// on Windows.
     pub(crate) wants: bool,
 }
 

@@ -65,7 +65,7 @@ pub(crate) mod state {
         Err(Outcome::UnsupportedSystem("threads are not counted on Windows".to_owned()))
     }
 
-    /// Reports that there is no such library.
+    /// Reports that Windows cannot preload a library.
     ///
     /// # Errors
     /// [`Outcome::UnsupportedSystem`] always.

@@ -6,7 +6,6 @@
 //!
 //! Not every loop can: a spring of stiffness `K` is stable only up to `K < b / (T/2 + t_d)` (Gil, Sanchez, Hulin,
 //! Preusche and Hirzinger, J. Comput. Inf. Sci. Eng. 9, 2009; without virtual damping). A release that diverges
-//! Preusche and Hirzinger, J. Comput. Inf. Sci. Eng. 9, 2009; without virtual damping). A release that diverges
 //! although the stiffness along its path never exceeded this limit is an error of the model and fails; where the rule
 //! predicts divergence too, the stiffness is the cause. A release that comes to rest away from home is counted; if the
 //! model reports more energy there than at the start, its force has done work on the device, and the release fails too.

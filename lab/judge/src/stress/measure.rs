@@ -20,7 +20,7 @@ pub enum Verdict {
     /// The uncertainty of the measurement exceeds the bound.
     #[serde(rename = "not resolved")]
     NotResolved,
-    /// Beyond what is acceptable.
+    /// Beyond the acceptable limit, or not completed.
     #[serde(rename = "fail")]
     Fail,
 }
@@ -119,13 +119,13 @@ pub struct Measure {
     pub value: f64,
     /// Unit of the value; empty for a pure number.
     pub unit: Cow<'static, str>,
-    /// Largest value that passes; `None` where the literature gives no bound.
+    /// Largest value that passes; `None` for a measure that was not completed.
     pub bound: Option<f64>,
     /// Verdict on the value.
     pub verdict: Verdict,
     /// Pose of the worst value; `None` if there is none.
     pub pose: Option<PoseRecord>,
-    /// Comment on the number.
+    /// Comment on value and verdict.
     #[serde(rename = "remark")]
     pub comment: String,
     /// Further measured values.

@@ -38,7 +38,7 @@ pub enum Part {
     Determinism,
     /// Measure M9.
     Search,
-    /// Measure M10, of a model that declares a symmetry.
+    /// Measure M10, if the options name a symmetry.
     Symmetry,
 }
 
@@ -67,7 +67,7 @@ impl Part {
         parts.filter(move |part| *part != Self::Symmetry || has_symmetry)
     }
 
-    /// Returns the name of the part.
+    /// Returns the name of the part on the command line.
     #[must_use]
     pub fn word(self) -> &'static str {
         PARTS.iter().find(|(part, ..)| *part == self).map_or("", |(_, word, _)| word)
@@ -162,11 +162,11 @@ impl Delivery {
     }
 }
 
-/// Runs one part in this process, which was started for it, and writes the results into the file on standard input. A
-/// step that exceeds `limit` of processor time, or ten times that in waiting, ends the process. Not real-time.
+/// Runs one part in this process, which was started for the part, and writes the results into the file on standard input. A
+/// step that exceeds `limit` of processor time, or ten times `limit` in waiting, ends the process. Not real-time.
 ///
 /// # Errors
-/// If standard input is no such file, or no thread can be started.
+/// If standard input is not a writable file, or no thread can be started.
 pub fn deliver(
     plugin: &Plugin,
     settings: &[Setting],
@@ -225,7 +225,7 @@ pub fn score_in_processes(
     Ok(StressReport { stuck, ..StressReport::new(&setup, found.measures, found.spread) })
 }
 
-/// Returns the result of the process of a part, or a description of its end without one.
+/// Runs the process of a part and returns its result, or a description of how the process ended without a result.
 fn in_own_process(mut command: Command) -> io::Result<Result<Delivery, String>> {
     let mut told = anonymous_file("flotor-stress")?;
     let end = PluginProcess::start(command.stdin(told.try_clone()?).stdout(Stdio::null()))?.wait()?;

@@ -20,7 +20,8 @@ pub struct Reach {
 }
 
 impl Default for Reach {
-    /// Returns 12 mm and 7 degrees of the thesis's device (section 2.1), through its motion scale L0/V = 25/15.
+    /// Returns the range of the thesis's device (section 2.1), 12 mm and 7 degrees, with the position scaled by L0/V = 25/15 to
+    /// 20 mm.
     fn default() -> Self {
         Self { position_m: 12.0e-3 * 25.0 / 15.0, rotation_rad: 7.0 * PI / 180.0 }
     }
@@ -44,7 +45,7 @@ impl Reach {
             && rotation_rad.abs().max_element() <= self.rotation_rad
     }
 
-    /// Returns the pose at six coordinates in 0..1 across the workspace.
+    /// Returns the pose at six coordinates, from 0 to 1 across the workspace.
     pub(super) fn pose(self, unit: [f64; 6]) -> Pose {
         let [x, y, z, rx, ry, rz] = unit.map(|u| 2.0 * u - 1.0);
         at(DVec3::new(x, y, z) * self.position_m, DVec3::new(rx, ry, rz) * self.rotation_rad)

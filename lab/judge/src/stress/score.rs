@@ -28,7 +28,7 @@ pub struct StressReport {
     pub measures: Vec<Measure>,
     /// Distributions for pictures.
     pub distributions: Distributions,
-    /// First step that did not return, which a measure reports; `None` if all steps returned.
+    /// Description of the first step that did not return; its measure has failed. `None` if all steps returned.
     #[serde(skip)]
     pub stuck: Option<String>,
 }
@@ -40,9 +40,10 @@ pub struct Distributions {
     pub jumps: Vec<Jump>,
     /// M2: largest gain at each pose, N/m.
     pub gains_n_per_m: Decades,
-    /// M4: work of a lap on the hand over all work exchanged; 1e-18 stands for none.
+    /// M4: energy generated on a lap, less its uncertainty, divided by the absolute work exchanged with the hand; a lap without
+    /// generated energy counts as 1e-18.
     pub loop_energies: Decades,
-    /// M7: time of a call, ns.
+    /// M7: shortest time of each repeated call, ns.
     pub calls_ns: Decades,
 }
 
@@ -71,7 +72,7 @@ impl StressReport {
         }
     }
 
-    /// Returns the scored model with its settings, in one line.
+    /// Returns model, version, settings, size and seed, in one line.
     #[must_use]
     pub fn subject(&self) -> String {
         let settings = self.settings_text();

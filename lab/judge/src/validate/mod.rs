@@ -36,12 +36,12 @@ use std::path::Path;
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::Duration;
 
-/// Checks one rule on instances with these settings in this process, which was started for it, and writes the verdict
-/// into the file on standard input. A step that exceeds `limit` of processor time, or ten times that in waiting, ends
+/// Checks one rule on instances with these settings in this process, which was started for the rule, and writes the verdict
+/// into the file on standard input. A step that exceeds `limit` of processor time, or ten times `limit` in waiting, ends
 /// the process. Not real-time.
 ///
 /// # Errors
-/// If standard input is no such file, or no thread can be started.
+/// If standard input is not a writable file, or no thread can be started.
 pub fn deliver(path: &Path, settings: &[KeyValue], wanted: Check, limit: Duration) -> io::Result<()> {
     watch::start(limit, |stuck| {
         // End the process even if the write fails: nothing else ends a call that does not return.
@@ -58,8 +58,9 @@ fn write(verdict: &Verdict) -> io::Result<()> {
 
 /// Checks a plugin file against every rule that applies; stops after a failure that makes further checks pointless.
 /// `program` returns the command of this program that checks one rule of the file and [delivers](deliver()) the
-/// verdict. A rule may use `patience` of processor time, and be idle as long. `only` selects rules, the metadata are
-/// always checked; empty: all. Not real-time.
+/// verdict. `patience` limits the processor time of a rule, and also its idle time; the first instance has six times as long,
+/// and slow preparations of instances are added. `only` selects rules (empty: all); the metadata are always checked. Not
+/// real-time.
 #[must_use]
 pub fn validate(
     path: &Path,

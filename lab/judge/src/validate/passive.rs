@@ -2,13 +2,13 @@
 //!
 //! A law of pose and velocity alone is checked in two ways:
 //!
-//! - *On a closed path at rest* the work must be zero: traversed in reverse, it has the other sign. The circles lie in
-//!   all fifteen planes of the three directions and three rotations.
-//! - *Forward and back* through one pose, at the same speed, the part that depends on the pose cancels. The rest is the
-//!   work of the damping, which must dissipate energy.
+//! - *On a closed path at rest* the work must be zero: reversing the path reverses the sign of the work, so nonzero work would
+//!   mean generated energy in one direction. The circles lie in all fifteen planes of the three directions and three rotations.
+//! - *Forward and back* through one pose, at the same speed, the part of the wrench that depends on the pose cancels. The rest
+//!   is the wrench of the damping, which must dissipate energy.
 //!
-//! Both are exact but for rounding and for the law between two points of the circle, which its change from one to the
-//! next bounds.
+//! Both checks are exact except for rounding and, on a circle, for the law between two sampled points; the change of the wrench
+//! from one point to the next bounds this error.
 
 use super::outcome::{Figures, Outcome};
 use super::path::{FAST, finite, walk_at};

@@ -20,7 +20,8 @@ const ROTATION_RAD_PER_S: DVec3 = DVec3::new(3.0, 13.0, 2.0);
 const POSITION_M: f64 = 3.0e-3;
 const ROTATION_RAD: f64 = 0.03;
 
-/// Returns the poses on a grid of `size_m` and `size_rad`, all 27 x 27 corners, edges and centres.
+/// Returns the 27 x 27 poses of a grid: each component of the position is -`size_m`, 0 or `size_m`, each component of the
+/// rotation vector -`size_rad`, 0 or `size_rad`.
 pub(super) fn grid(size_m: f64, size_rad: f64) -> impl Iterator<Item = Pose> {
     directions().flat_map(move |position| {
         directions().map(move |rotation| {
@@ -30,7 +31,7 @@ pub(super) fn grid(size_m: f64, size_rad: f64) -> impl Iterator<Item = Pose> {
     })
 }
 
-/// Returns centre, corners, edges and sides of a cube of half-edge one.
+/// Returns the 27 points of a cube of half-edge 1: its centre, its corners, and the middles of its edges and faces.
 pub(super) fn directions() -> impl Iterator<Item = DVec3> {
     let three = [-1.0, 0.0, 1.0];
     let pairs = move || three.into_iter().flat_map(move |x| three.map(move |y| (x, y)));

@@ -14,7 +14,7 @@ pub enum Check {
     Demand,
     /// Live parameters can be set in time and report their value.
     LiveParameters,
-    /// The wrench is zero outside the declared active region.
+    /// Wrench and energy are zero outside the declared active region.
     Activity,
     /// A stateless law generates no energy.
     Passive,
@@ -38,7 +38,7 @@ impl Check {
         Rule::ALL.into_iter().map(Self::Contract).chain(Self::OF_THE_HOST)
     }
 
-    /// Returns the short name in reports.
+    /// Returns the short name on the command line and in reports.
     #[must_use]
     pub const fn id(self) -> &'static str {
         match self {

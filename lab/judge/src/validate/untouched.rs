@@ -53,7 +53,10 @@ impl Host {
         Self { parts, unknown, threads: state::threads() }
     }
 
-    /// Returns the number of threads at that time, if known.
+    /// Returns the number of threads when this state was recorded.
+    ///
+    /// # Errors
+    /// The reason why the number is unknown.
     pub(super) fn threads(&self) -> Result<usize, Outcome> {
         self.threads.clone()
     }

@@ -53,14 +53,18 @@ pub(crate) fn has_caught(signal: i32) -> bool {
     signal == CAUGHT.as_raw()
 }
 
-/// Steps the model in a sandboxed thread. **Ends this process** by [`CAUGHT`] if a step made a system call.
+/// Steps the model in a sandboxed thread. **Ends this process** by [`CAUGHT`] if a step made a system call other than read or
+/// write.
+///
+/// # Errors
+/// [`Outcome::Violation`] if a step fails, reads or writes; [`Outcome::Missing`] without a thread, `/proc` or seccomp.
 pub(crate) fn system_calls(model: Model) -> Result<(), Outcome> {
     let stage = Arc::new(AtomicU8::new(WAITING));
     let (ready, told) = channel();
     let of_thread = Arc::clone(&stage);
     let walking = std::thread::Builder::new().spawn(move || walk_locked_in(model, &ready, &of_thread));
     walking.map_err(|cause| Outcome::no_thread(&cause))?;
-    let ended = |_| Outcome::Violation("the thread of the plugin ended before the test".to_owned());
+    let ended = |_| Outcome::Violation("the thread of the check ended before its first step".to_owned());
     let thread = told.recv().map_err(ended)?;
     let folder = PathBuf::from(format!("/proc/self/task/{thread}"));
     if !folder.exists() {
@@ -91,7 +95,7 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Outcome> {
     }
     match (before, transfers(&folder)) {
         (Some(before), Some(after)) if after > before => Err(Outcome::Violation(format!(
-            "the model read or wrote {} times in {STEPS} steps",
+            "the model made {} read or write system calls in {STEPS} steps; move file access and printing out of `step`",
             after - before
         ))),
         _ => Ok(()),

@@ -43,8 +43,8 @@ pub(crate) fn processor_time() -> Duration {
     Duration::try_from(now).unwrap_or_default()
 }
 
-/// Returns the processor time of a process, and whether one of its threads is running, runnable, or waiting for a disk
-/// or a page.
+/// Returns the processor time of a process, with the state of its threads: running, runnable, or waiting for a disk or a
+/// page.
 pub(crate) fn used(process: u32) -> Used {
     let fields_of = |path: String| -> Vec<String> {
         let text = std::fs::read_to_string(path).unwrap_or_default();

@@ -12,7 +12,10 @@ fn no_files() -> Outcome {
     Outcome::Missing("the test needs /proc; mount /proc".to_owned())
 }
 
-/// Returns the parts of the state of this process and thread that only the kernel knows, or the reason of a failure.
+/// Returns the parts of the state of this process and thread that only the kernel knows.
+///
+/// # Errors
+/// [`Outcome::Missing`] without `/proc`.
 pub(crate) fn of_the_system() -> Result<Vec<Part>, Outcome> {
     let whole = |path: &str| fs::read_to_string(path).unwrap_or_default();
     let (process, thread) = (whole("/proc/self/status"), whole("/proc/thread-self/status"));
@@ -37,7 +40,10 @@ pub(crate) fn of_the_system() -> Result<Vec<Part>, Outcome> {
     ])
 }
 
-/// Returns the number of threads of this process, or the reason of a failure.
+/// Returns the number of threads of this process.
+///
+/// # Errors
+/// [`Outcome::Missing`] without `/proc`.
 pub(crate) fn threads() -> Result<usize, Outcome> {
     fs::read_dir("/proc/self/task").map(Iterator::count).map_err(|_| no_files())
 }
@@ -56,7 +62,7 @@ pub(crate) fn is_loaded_first(library: &str) -> Result<(), Outcome> {
     }
 }
 
-/// Returns whether this process has child processes, as text.
+/// Returns the presence of child processes as text: none, or at least one.
 fn children() -> &'static str {
     match waitpid(None, WaitOptions::NOHANG) {
         Err(Errno::CHILD) => "none",
