@@ -101,7 +101,7 @@ pub(crate) fn number(value: &toml::Value) -> Result<f64, String> {
     let number = match value {
         toml::Value::Integer(number) => *number as f64,
         toml::Value::Float(number) => *number,
-        other => return Err(format!("write a number, not a {}", other.type_str())),
+        other => return Err(format!("write a number instead of this {}", other.type_str())),
     };
     if number.is_finite() { Ok(number) } else { Err("write a finite number".to_owned()) }
 }

@@ -165,7 +165,7 @@ pub(crate) fn picture(folder: &Path, case: &Case<'_>) -> PathBuf {
     folder.join(case.name().chars().map(plain).collect::<String>() + ".svg")
 }
 
-/// Compares a model with a curve; draws a failure to `picture`, if given.
+/// Compares a model with a curve; draws a picture of a failure to the file `picture`, if given.
 fn curve(flotor: &Flotor, file: &TestFile, models: &[Model], picture: Option<&Path>, outcome: &mut Outcome) {
     let Some(curve) = &file.curve else { return };
     let named = |model: &&Model| curve.model.as_ref().is_none_or(|name| *name == model.name);

@@ -73,7 +73,7 @@ struct TestArguments {
     digest: bool,
 }
 
-/// Parser of the commands. Not real-time.
+/// Function that returns the command-line parser of all commands. Not real-time.
 pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
 /// Runs the command of this process.
@@ -175,7 +175,10 @@ fn found(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
             true => search(path, &mut found)?,
             false if path.display().to_string().ends_with(SUFFIX) => found.push(path.clone()),
             false => {
-                let wrong = format!("{} is neither a folder nor a file NAME{SUFFIX}", path.display());
+                let wrong = format!(
+                    "{} is neither a folder nor a file NAME{SUFFIX}; give one of these",
+                    path.display()
+                );
                 return Err(CommandError::Usage(wrong));
             }
         }

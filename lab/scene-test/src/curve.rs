@@ -12,7 +12,7 @@ pub(crate) const WRENCH: [&str; 6] = ["fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", 
 /// Poses and wrenches, in the model frame.
 #[derive(Debug)]
 pub(crate) struct Points {
-    /// Indices of the columns of [`WRENCH`] in the file.
+    /// Indices in [`WRENCH`] of the columns in the file.
     pub(crate) compared: Vec<usize>,
     rows: Vec<([f64; 6], [f64; 6])>,
 }
@@ -90,8 +90,8 @@ impl Points {
         self.rows.iter().map(answer).collect()
     }
 
-    /// Returns the point with the largest error relative to its tolerance, if above one. `answers`: output of `flotor
-    /// eval`.
+    /// Returns the value with the largest absolute error (N or N·m) among the values beyond their tolerance or with the status
+    /// `invalid_input` or `not_converged`; `None` if there is no such value. `answers`: output of `flotor eval`.
     ///
     /// # Errors
     /// A message if the answers do not match these poses.
@@ -194,7 +194,7 @@ const COLUMNS: [(&str, Quantity); 6] = [
     ("Torque, z", Quantity::Torque),
 ];
 
-/// Point that is outside the tolerance of the curve.
+/// Component of a wrench that is outside the tolerance of the curve or has a rejected status, with its pose.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Worst {
     pub(crate) column: &'static str,

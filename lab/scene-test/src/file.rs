@@ -95,7 +95,7 @@ pub(crate) struct Stress {
 /// Required verdict of a measure of a stress test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum MeasureDemand {
-    /// Any verdict but a failure: for a file without named measures, because not every one applies to every model.
+    /// Any verdict but a failure: for a file without named measures, because not every measure applies to every model.
     NotFailed,
     /// Pass or note: for a measure named in the file.
     Judged,
@@ -166,7 +166,7 @@ struct StressTable {
     set: BTreeMap<String, Value>,
 }
 
-/// Measures of a stress test that count by default: all that do not depend on the load of the machine, so not the cost.
+/// Measures of a stress test. By default all count except [`COST`], which depends on the load of the machine.
 const MEASURES: [&str; 10] = ["M0", "M1", "M2", "M3", "M4", "M5", "M6", "M7", "M8", "M9"];
 const COST: &str = "M7";
 
@@ -210,7 +210,10 @@ impl TestFile {
         };
         if let Some(large) = seeds.iter().find(|seed| **seed > LARGEST_SEED) {
             let start = written.seeds.as_ref().map_or(0, |seeds| seeds.span().start);
-            return Err((start, format!("the seed {large} is larger than {LARGEST_SEED} (2^53)")));
+            return Err((
+                start,
+                format!("the seed {large} is larger than {LARGEST_SEED} (2^53); write a smaller seed"),
+            ));
         }
         let duration = written.duration.as_ref().map(|duration| {
             let text = scalar(duration.get_ref()).map_err(|wrong| (duration.span().start, wrong))?;
@@ -336,7 +339,7 @@ fn scalar(value: &Value) -> Result<String, String> {
     match value {
         Value::String(text) => Ok(text.clone()),
         Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => Ok(value.to_string()),
-        other => Err(format!("write a number or a text, not a {}", other.type_str())),
+        other => Err(format!("write a number or a text instead of this {}", other.type_str())),
     }
 }
 

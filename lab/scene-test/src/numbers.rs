@@ -4,8 +4,8 @@ use flotor_core::trace::Events;
 use serde_json::Value;
 use std::sync::OnceLock;
 
-/// Returns the value at a path; `None` if there is none, or it is null. List entries are addressed by name, or by index
-/// from 0; an event that did not happen has the count 0.
+/// Returns the value at a path; `None` if the path does not exist or its value is null. List entries are addressed by name, or by
+/// index from 0; an event that did not happen has the count 0.
 pub(crate) fn at<'j>(json: &'j Value, path: &str) -> Option<&'j Value> {
     let found = path.split('.').try_fold(json, step);
     let is_event = || path.strip_prefix("events.").is_some_and(|event| Events::NAMES.contains(&event));
@@ -31,7 +31,7 @@ fn step<'j>(json: &'j Value, part: &str) -> Option<&'j Value> {
     }
 }
 
-/// Returns an error message with the nearest existing path if a path does not exist in the JSON of a run; `None` if it
+/// Returns an error message with the nearest existing path if a path does not exist in the JSON of a run; `None` if the path
 /// exists.
 pub(crate) fn misspelt(json: &Value, path: &str) -> Option<String> {
     let mut paths = Vec::new();

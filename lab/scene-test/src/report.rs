@@ -85,7 +85,7 @@ impl Report {
     }
 }
 
-/// Removes the results of an earlier call, so that a killed call leaves none.
+/// Removes the result file of an earlier call, so that a killed call has no result; does nothing for a pipe or a device.
 pub(crate) fn remove(path: &Path) -> Result<(), CommandError> {
     if is_special(path) {
         return Ok(());
@@ -103,7 +103,7 @@ fn is_special(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|known| !known.is_file() && !known.is_dir())
 }
 
-/// Writes a file atomically.
+/// Writes a file atomically; writes directly to a pipe or a device.
 pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), CommandError> {
     if is_special(path) {
         return std::fs::write(path, text)
