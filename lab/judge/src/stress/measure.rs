@@ -183,5 +183,5 @@ impl Measure {
     }
 }
 
-/// Reason of an empty sample after every call failed.
+/// Reason for an empty sample after every call failed.
 pub(super) const NO_ANSWER: &str = "the model returned no result to judge";
