@@ -91,7 +91,7 @@ impl Counts {
         MessageCounts { sent, received, rejected }
     }
 
-    /// Returns whether the other end is coupled to another run.
+    /// Returns true if the other end is coupled to another run.
     fn is_held_by_another(&self) -> bool {
         let [here, answered] = [&self.here, &self.answered].map(|run| run.load(Ordering::Relaxed));
         here != 0 && answered != 0 && here != answered

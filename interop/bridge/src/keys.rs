@@ -27,7 +27,7 @@ pub const ROOT: &str = "flotor";
 #[must_use]
 pub struct Name(String);
 
-/// Error: the text is not a valid name.
+/// Error of a text that is not a valid name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("invalid name `{0}`: use letters a to z, digits and hyphens, at most 40")]
 pub struct NoName(String);

@@ -38,8 +38,11 @@ pub struct LinkOptions {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError {
-    /// The configuration is invalid.
-    #[error("the configuration{} is invalid: {reason}", file.as_ref().map_or(String::new(), |f| format!(" {}", f.display())))]
+    /// The configuration, or an endpoint of `--listen` or `--connect`, is invalid.
+    #[error(
+        "{} is invalid: {reason}",
+        file.as_ref().map_or_else(|| "`--listen` or `--connect`".to_owned(), |f| format!("the configuration {}", f.display()))
+    )]
     Config {
         /// Path of the configuration; `None` without one.
         file: Option<PathBuf>,
@@ -112,15 +115,15 @@ pub struct Link {
 }
 
 impl Link {
-    /// Returns whether the keys lack stop keys, which older versions did not write: a member's emergency stop then relies on a
+    /// Returns true if the keys lack stop keys, which older versions did not write: a member's emergency stop then relies on a
     /// session alone, which a flood of connections can delay.
     #[must_use]
     pub fn lacks_stop_keys(&self) -> bool {
         self.lacks_stop_keys
     }
 
-    /// Returns the stop channel, the second path of an emergency stop; `None` without a TCP or TLS endpoint, and for a bridge with
-    /// access control but without stop keys.
+    /// Returns the stop channel, the second path of an emergency stop; `None` without a TCP or TLS endpoint with a fixed port, and
+    /// for a bridge with access control but without stop keys.
     #[must_use]
     pub fn stop_channel(&self) -> Option<&StopChannel> {
         self.stop_channel.as_ref()
@@ -180,7 +183,7 @@ impl LinkOptions {
     }
 }
 
-/// Returns whether an endpoint can be reached from this machine only.
+/// Returns true if an endpoint can be reached from this machine only.
 fn is_loopback(endpoint: &str) -> bool {
     let address = endpoint.split_once('/').map_or("", |(_, address)| address);
     let host = address.rsplit_once(':').map_or(address, |(host, _)| host).trim_matches(['[', ']']);
@@ -228,15 +231,17 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     Ok(Link { session, member, expires_s, stop_channel, lacks_stop_keys })
 }
 
-/// Returns a visitor's stop channel without opening a session, which may block; `None` without a TCP or TLS endpoint.
+/// Returns a visitor's stop channel without opening a session, which may block; `None` without a TCP or TLS endpoint with a fixed
+/// port.
 ///
 /// # Errors
-/// [`LinkError`] of the configuration.
+/// [`LinkError`] of the configuration or its stop keys.
 pub fn stop_channel(options: &LinkOptions) -> Result<Option<StopChannel>, LinkError> {
     stop_channel_of(options, &config_of(options)?, End::Visiting)
 }
 
-/// Returns the stop channel of one end. Without stop keys and access control, all peers use one public key.
+/// Returns the stop channel of one end; `None` without a TCP or TLS endpoint with a fixed port, or for a bridge with access control
+/// but without stop keys. In all other cases without stop keys, the HMAC key is the well-known (empty) one of the member `anyone`.
 fn stop_channel_of(
     options: &LinkOptions,
     config: &Config,

@@ -177,7 +177,7 @@ impl RequestClient {
     /// Sends a request and waits for the reply.
     ///
     /// # Errors
-    /// The cause as text: reason of the refusal, network error, or no reply within the timeout.
+    /// The cause as text: reason for the refusal, network error, or no reply within the timeout.
     pub fn run(&self, request: Request) -> Result<(), String> {
         let right = request.right();
         if right == Right::Watch {

@@ -233,8 +233,8 @@ impl AdmissionControl {
         Ticket { began: self.began, at_ms }
     }
 
-    /// Decodes and admits a request that arrived on `key` (`flotor/NAME/ask/REQUEST/MEMBER`); `run` is the process id of the current
-    /// run (0: none).
+    /// Decodes and admits a request that arrived on `key` (`flotor/NAME/ask/REQUEST/MEMBER`), and stores its number against replay;
+    /// `run` is the process id of the current run (0: no run).
     ///
     /// # Errors
     /// [`Refusal`], which is counted.
@@ -309,7 +309,7 @@ impl AdmissionControl {
     }
 }
 
-/// Returns whether a payload on its key is an emergency stop; needs neither state nor lock of the [`AdmissionControl`].
+/// Returns true if a payload on its key is an emergency stop; needs neither state nor lock of the [`AdmissionControl`].
 #[must_use]
 pub fn is_emergency_stop(key: &str, payload: &[u8]) -> bool {
     numbered_on(key, payload).is_some_and(|(_, numbered)| numbered.request == Request::EmergencyStop)

@@ -4,7 +4,7 @@ use flotor_live::{Directory, Latch};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Callback that sends the reply to a press; its argument is the reason of a refusal, `None` on success.
+/// Callback that sends the reply to a press; its argument is the reason for a refusal, `None` on success.
 pub(super) type SendAnswer = Box<dyn FnOnce(Option<String>) + Send>;
 
 /// Timeout of the hosts' confirmation; the peer's timeout is longer.
@@ -38,8 +38,8 @@ impl Emergency {
         &self.latch
     }
 
-    /// Presses the latch; `answer` is called after the hosts have confirmed. The latch comes first: a run that is not visible yet
-    /// checks the latch before it energises a device.
+    /// Presses the latch; `answer` is called after the hosts have confirmed or the timeout has passed, and not at all if too many
+    /// presses are pending. The latch comes first: a run that is not visible yet checks the latch before it energises a device.
     pub(super) fn press(&self, who: &str, answer: SendAnswer) {
         let problem = self.latch.press(who).err().map(|error| {
             format!("the emergency stop was not stored, so it does not prevent a later run: {error}")

@@ -27,7 +27,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Poll interval for a run.
+/// Poll interval while no run is published.
 const LOOK_PERIOD: Duration = Duration::from_millis(200);
 /// Timeout for the next event of the host, and interval of the checks for subscribers and for a changed status.
 const CHECK_PERIOD: Duration = Duration::from_millis(100);

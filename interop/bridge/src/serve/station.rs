@@ -40,7 +40,7 @@ impl Station {
         })
     }
 
-    /// Returns whether there are subscribers to ticks.
+    /// Returns true if there are subscribers to ticks or poses.
     pub(super) fn is_wanted(&self) -> Result<bool, LinkError> {
         Ok(self.tick.matching_status().wait_now()?.matching()
             || self.pose.matching_status().wait_now()?.matching())

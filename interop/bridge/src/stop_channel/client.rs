@@ -87,7 +87,7 @@ fn outcome(answers: &Receiver<Result<Option<String>, String>>) -> Result<(), Str
     }
 }
 
-/// Presses the emergency stop at one endpoint; returns the reason of a refusal, `None` on success.
+/// Presses the emergency stop at one endpoint; returns the reason for a refusal, `None` on success.
 fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Option<String>> {
     let places: Vec<SocketAddr> = address.to_socket_addrs()?.collect();
     let of_family = |is_ipv4: bool, any: &str| {

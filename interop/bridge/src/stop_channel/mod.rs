@@ -27,7 +27,7 @@ use std::path::Path;
 
 /// Limit on a datagram, bytes; the system truncates a longer one, whose HMAC is then wrong.
 pub(crate) const MOST_BYTES: usize = 2048;
-/// Limit on the reason of a refusal, characters.
+/// Limit on the reason for a refusal, characters.
 const MOST_REASON: usize = 200;
 /// Length of a key and of an HMAC, bytes.
 const KEY_BYTES: usize = 32;
@@ -105,7 +105,7 @@ fn random<const COUNT: usize>() -> io::Result<[u8; COUNT]> {
     Ok(bytes)
 }
 
-/// Unpredictable number for a single use.
+/// Nonce: unpredictable 128-bit number for a single use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Nonce([u8; 16]);
 
@@ -121,7 +121,7 @@ impl Nonce {
 pub(crate) struct StopMessage {
     pub(crate) bridge: String,
     pub(crate) member: String,
-    /// Chosen by the member, repeated in the reply.
+    /// Nonce of the member, repeated in the reply.
     pub(crate) nonce: Nonce,
     pub(crate) content: Content,
 }
@@ -132,7 +132,7 @@ pub(crate) enum Content {
     Hello,
     Challenge(Nonce),
     Press(Nonce),
-    /// Reason of a refusal; `None` if all runs have confirmed the stop.
+    /// Reason for a refusal; `None` if all runs have confirmed the stop.
     Answer(Option<String>),
 }
 
