@@ -61,7 +61,7 @@ fn set_held(number: usize, change: impl FnOnce(&mut Wrench)) -> Wrench {
     *held
 }
 
-/// Writes a vector of an open device to three outputs; returns whether the device is open.
+/// Writes a vector of an open device to three outputs; returns true if the device is open.
 fn vector(id: c_int, places: [Out<f64>; 3], of: impl FnOnce(&Station) -> DVec3) -> bool {
     let station = sampled(id);
     let values = station.map(|station| FRAME.of_flotor(of(station)).to_array());

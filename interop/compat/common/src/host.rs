@@ -38,17 +38,17 @@ pub fn host() -> Option<&'static Host> {
     }
     let prepare = || {
         let prepare = || Host::prepare(Settings::from_environment()?, &StopSwitch::default());
-        let prepared = guarded(Err("it panicked".to_owned()), || quietly(prepare));
+        let prepared = guarded(Err("the preparation of the run panicked".to_owned()), || quietly(prepare));
         prepared.map_err(|problem| report_line(&problem)).ok()
     };
     HOST.get_or_init(prepare).as_ref()
 }
 
-/// Prepares the run of this process with given settings instead of the environment's; `stop` ends the run. Call it once, before
-/// [`host`]. Not real-time.
+/// Prepares the run of this process with given settings instead of the environment's; `stop` ends the run. Call this function once,
+/// before [`host`]. Not real-time.
 ///
 /// # Errors
-/// The reason why the scene cannot be run, one line.
+/// One line: the reason why the scene cannot be run, or that this process already has a run.
 pub fn prepare(settings: Settings, stop: &StopSwitch) -> Result<&'static Host, String> {
     let prepared = Host::prepare(settings, stop)?;
     HOST.get_or_init(|| Some(prepared))
@@ -195,8 +195,8 @@ impl Host {
         }
     }
 
-    /// Opens a device; the first open device starts the run. Returns whether the device exists and the run is in progress. The start
-    /// takes some 50 ms; opening causes no motion. Not real-time.
+    /// Opens a device; the first open device starts the run. Returns true if the device exists and the run is in progress. The
+    /// start takes some 50 ms; opening causes no motion. Not real-time.
     pub fn open(&self, number: usize) -> bool {
         let Some(station) = self.stations.get(number) else { return false };
         if !self.begin() {
@@ -206,7 +206,7 @@ impl Host {
         true
     }
 
-    /// Starts the run unless started already; returns whether it is in progress.
+    /// Starts the run unless started already; returns true if the run is in progress.
     fn begin(&self) -> bool {
         let mut stage = self.stage();
         match std::mem::replace(&mut *stage, Stage::Over) {
@@ -238,7 +238,7 @@ impl Host {
             guarded((), || prepared.run(&stop, stations_so_far()));
         };
         let Ok(thread) = thread.spawn(run) else {
-            report_line("cannot start a thread for the run");
+            report_line("cannot start a thread for the run; end other programs of this user");
             return Stage::Over;
         };
         let since = Instant::now();
@@ -251,13 +251,13 @@ impl Host {
         Stage::Beside(thread)
     }
 
-    /// Returns whether the run is in progress, so that force can reach a hand.
+    /// Returns true if the run is in progress, so that force can reach a hand.
     #[must_use]
     pub fn is_running(&self) -> bool {
         self.stage().is_running()
     }
 
-    /// Returns whether the emergency stop ended the run, rather than the loss of a device.
+    /// Returns true if the emergency stop ended the run, rather than the loss of a device.
     #[must_use]
     pub fn is_stopped_for_safety(&self) -> bool {
         is_emergency_stopped()
@@ -280,7 +280,7 @@ impl Host {
         }
     }
 
-    /// Executes one tick in lockstep; returns whether there was a tick, false also without lockstep. Not real-time.
+    /// Executes one tick in lockstep; returns true if there was a tick, false also without lockstep. Not real-time.
     pub fn advance(&self) -> bool {
         self.reads.store(0, Ordering::Relaxed);
         match &mut *self.stage() {
@@ -290,7 +290,7 @@ impl Host {
     }
 
     /// Waits for a tick that the caller has not seen, usually for a period and never longer than 10 ms; in lockstep executes the tick.
-    /// Returns whether there was a tick. Not real-time.
+    /// Returns true if there was a tick. Not real-time.
     pub fn wait(&self, station: &Station) -> bool {
         self.wait_in(station, station.turn())
     }

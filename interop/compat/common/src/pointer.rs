@@ -25,7 +25,7 @@ impl<T: Copy> Out<T> {
         }
     }
 
-    /// Returns whether the pointer is null, so that the program does not request the value.
+    /// Returns true if the pointer is null, so that the program does not request the value.
     #[must_use]
     pub fn is_null(self) -> bool {
         self.0.is_null()

@@ -39,8 +39,8 @@ pub(crate) fn at_end(end: extern "C" fn()) {
     });
 }
 
-/// Returns whether this is the first drop-in of the process that prepares a run: a second drop-in has a run of its own, and must not
-/// write into the files of the first drop-in. Not real-time.
+/// Returns true if this is the first drop-in of the process that prepares a run: a second drop-in has a run of its own, and must
+/// not write into the files of the first drop-in. Not real-time.
 pub(crate) fn is_first() -> bool {
     static CLAIM: OnceLock<Option<UnixDatagram>> = OnceLock::new();
     let claim = || {

@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 /// True once the emergency stop was pressed.
 static IS_STOPPED: AtomicBool = AtomicBool::new(false);
 
-/// Returns whether the emergency stop ended the run of this process.
+/// Returns true if the emergency stop ended the run of this process.
 pub(crate) fn is_emergency_stopped() -> bool {
     IS_STOPPED.load(Ordering::Acquire)
 }
@@ -201,7 +201,7 @@ pub(crate) struct LockstepRun {
 }
 
 impl LockstepRun {
-    /// Executes one tick; returns whether the run continues. Not real-time.
+    /// Executes one tick; returns true if the run continues. Not real-time.
     pub(crate) fn advance(&mut self) -> bool {
         self.lockstep.advance(&mut self.watched, &self.stop).is_none()
     }
@@ -299,7 +299,7 @@ fn end_of(outcome: &Outcome) -> Option<String> {
     (!outcome.end.is_in_order()).then(|| format!("the run ended before the program: {}", outcome.end.cause()))
 }
 
-/// Writes a result to a file, or to standard error if the path is `-`. Returns whether it was written.
+/// Writes a result to a file, or to standard error if the path is `-`; reports an error. Returns true if the result was written.
 fn write(path: &Path, text: String) -> bool {
     if path.as_os_str() == "-" {
         tell_plainly(text.trim_end());

@@ -47,11 +47,11 @@ pub struct Settings {
 pub enum SharedControlGroup {
     /// Consent as given by the scene.
     ByScene,
-    /// Consent given.
+    /// Consent given by the environment variable, whatever the scene says.
     Accepted,
 }
 
-/// Returns the value of a variable; `None` if it is unset or empty. Not real-time.
+/// Returns the value of an environment variable; `None` if the variable is unset, empty or not UTF-8. Not real-time.
 #[must_use]
 pub fn env_value(variable: &str) -> Option<String> {
     std::env::var(variable).ok().filter(|value| !value.is_empty())

@@ -136,7 +136,7 @@ impl Station {
         &self.plugin
     }
 
-    /// Returns which axes the device senses and drives.
+    /// Returns the sensed and driven axes of the device.
     #[must_use]
     pub fn axes(&self) -> Axes {
         let Capabilities { sensed, actuated, .. } = self.capabilities;
@@ -180,7 +180,7 @@ impl Station {
         self.opened.load(Ordering::Relaxed)
     }
 
-    /// Returns whether the device is open.
+    /// Returns true if the device is open.
     #[must_use]
     pub fn is_open(&self) -> bool {
         self.is_open.load(Ordering::Acquire)
@@ -192,7 +192,7 @@ impl Station {
         }
     }
 
-    /// Closes the device, whose force ends with the next tick; returns whether it was open.
+    /// Closes the device, whose force ends with the next tick; returns true if the device was open.
     pub fn close(&self) -> bool {
         self.disable();
         self.port.set_validity(0);
@@ -217,7 +217,7 @@ impl Station {
         self.ramp_ns
     }
 
-    /// Returns whether force is enabled.
+    /// Returns true if force is enabled.
     #[must_use]
     pub fn is_enabled(&self) -> bool {
         self.port.is_enabled()
@@ -288,7 +288,7 @@ impl Station {
         &self.turn
     }
 
-    /// Returns whether there is a tick that the caller has not waited for, and marks it as waited for.
+    /// Returns true if there is a tick that the caller has not waited for, and marks it as waited for.
     pub(crate) fn has_unseen_tick(&self, turn: &Turn) -> bool {
         let ticks = self.ticks();
         turn.waited.fetch_max(ticks, Ordering::AcqRel) < ticks

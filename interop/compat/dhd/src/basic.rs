@@ -95,17 +95,17 @@ export! {
     }
     /// Reports an intact memory of the controller.
     fn dhdCheckControllerMemory(id: i8) -> c_int [-1] { read(id, |_| ()) }
-    /// Returns whether the device has translations.
+    /// Returns true if the device exists: every device has translations.
     fn dhdHasBase(id: i8) -> bool [false] { any(id).is_ok() }
-    /// Returns whether the device senses rotations.
+    /// Returns true if the device senses rotations.
     fn dhdHasWrist(id: i8) -> bool [false] { any(id).is_ok_and(|open| open.has_wrist()) }
-    /// Returns whether the device drives its rotations.
+    /// Returns true if the device drives its rotations.
     fn dhdHasActiveWrist(id: i8) -> bool [false] { any(id).is_ok_and(|open| open.has_active_wrist()) }
     /// Returns false: no device of Flotor has a gripper.
     fn dhdHasGripper(_id: i8) -> bool [false] { false }
     /// Returns false: no device of Flotor has a gripper.
     fn dhdHasActiveGripper(_id: i8) -> bool [false] { false }
-    /// Returns whether the device is for the left hand, by its type.
+    /// Returns true if the device is for the left hand, by its type.
     fn dhdIsLeftHanded(id: i8) -> bool [false] {
         any(id).is_ok_and(|open| [36, 37, 105, 109, 132].contains(&kind(open.station)))
     }

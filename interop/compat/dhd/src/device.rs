@@ -1,4 +1,4 @@
-//! Device between the program and its station: settings of the program, and last command.
+//! DHD device as presented to the program: settings of the program, and last command.
 
 use crate::error::Code;
 use crate::regulation::Regulation;
@@ -180,8 +180,9 @@ pub(crate) fn set_default(id: i8) -> Result<i32, Code> {
     Ok(0)
 }
 
-/// Returns the type of device that a program sees, unless `FLOTOR_DHD_TYPE` sets one. Of the types with six driven axes, Python
-/// bindings accept 104 only, and an unknown type stops them; CHAI3D, in C++, shifts the position of a 104 by a centimetre.
+/// Returns the device type reported to the program: `FLOTOR_DHD_TYPE` if set, else by axes and language. Of the types with six
+/// driven axes, Python bindings accept 104 only and fail at an unknown type; CHAI3D, in C++, shifts the position of a 104 by a
+/// centimetre.
 pub(crate) fn kind(station: &Station) -> i32 {
     let set = env_value("FLOTOR_DHD_TYPE").and_then(|text| text.parse().ok());
     set.unwrap_or_else(|| match (station.axes(), language()) {
@@ -230,8 +231,8 @@ impl Open {
         }
     }
 
-    /// Limits the program's force and torque, and sends them in addition to regulation and vibration. Returns whether they are scaled
-    /// down, here or later by the envelope; [`Code::Invalid`] for a non-finite command.
+    /// Limits the program's force and torque, and sends both in addition to regulation and vibration. Returns true if force or
+    /// torque is scaled down, here or later by the envelope; [`Code::Invalid`] for a non-finite command.
     pub(crate) fn send(&self, device: &mut Device, force_n: DVec3, torque_nm: DVec3) -> Result<bool, Code> {
         if !(force_n.is_finite() && torque_nm.is_finite()) {
             // The port counts and rejects the command.

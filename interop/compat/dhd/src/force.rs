@@ -134,7 +134,7 @@ export! {
     fn dhdGetStatus(status: Out<c_int>, id: i8) -> c_int [-1] { read(id, |open| status.put_all(&status_of(open))) }
     /// Returns the rate of force commands, kHz.
     fn dhdGetComFreq(id: i8) -> f64 [0.0] { open(id).map_or(0.0, |open| open.station.command_rate_hz() * 1.0e-3) }
-    /// Sets a vibration along z, Hz and N, which is added to the force.
+    /// Sets a vibration along z, Hz and N, which is added to the force; ignores the profile.
     fn dhdSetVibration(frequency_hz: f64, amplitude_n: f64, _profile: c_int, id: i8) -> c_int [-1] {
         if !(frequency_hz.is_finite() && amplitude_n.is_finite()) {
             return failed(Code::Invalid);

@@ -135,7 +135,7 @@ export! {
     fn drdGetEncDGain(id: i8) -> f64 [-1.0] { gain(id, 2) }
     /// Returns the stored motor limit.
     fn drdGetMotRatioMax(id: i8) -> f64 [-1.0] { gain(id, 3) }
-    /// Stores the priorities without effect: the loop has its own.
+    /// Stores the thread priorities without effect: the loop has its own priority.
     fn drdSetPriorities(program: c_int, control: c_int, id: i8) -> c_int [-1] {
         keep(id, |device| device.priorities = [program, control])
     }

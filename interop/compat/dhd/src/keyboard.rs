@@ -1,4 +1,4 @@
-//! Entry points for keys of the terminal, and for threads of the program.
+//! Entry points for keyboard input from the terminal, and for starting a thread of the program.
 
 use crate::error::{Code, DONE, failed};
 use flotor_compat::export;
@@ -50,12 +50,12 @@ fn waiting() -> c_int {
 type Body = extern "C" fn(*mut c_void) -> *mut c_void;
 
 export! {
-    /// Returns whether a key was pressed.
+    /// Returns true if a pressed key is unread. The first call switches the terminal to single-key input.
     fn dhdKbHit() -> bool [false] {
         take_keys();
         waiting() > 0
     }
-    /// Returns the next key; 0 without one.
+    /// Returns the next key; 0 without a pressed key. The first call switches the terminal to single-key input.
     fn dhdKbGet() -> c_char [0] {
         take_keys();
         let mut key: u8 = 0;

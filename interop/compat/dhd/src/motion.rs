@@ -138,23 +138,23 @@ fn rotation(a: f64, b: f64, g: f64) -> Goal {
 export! {
     /// Returns true for an open device: no program then moves the device to initialise it.
     fn drdIsInitialized(id: i8) -> bool [false] { open(id).is_ok() }
-    /// Returns whether the device can be regulated.
+    /// Returns true for an open device: every device can be regulated.
     fn drdIsSupported(id: i8) -> bool [false] { open(id).is_ok() }
-    /// Returns whether the device is regulated.
+    /// Returns true if the device is regulated.
     fn drdIsRunning(id: i8) -> bool [false] { open(id).is_ok_and(|open| open.device().regulation.is_running) }
-    /// Returns whether a motion is in progress: until the handle has arrived, at most until 2 s after the planned end.
+    /// Returns true if a motion is in progress: until the handle has arrived, at most until 2 s after the planned end.
     fn drdIsMoving(id: i8) -> bool [false] {
         sampled(id).is_ok_and(|open| progress(&open).contains(&Progress::Moving))
     }
-    /// Holds the device: it needs no initialisation.
+    /// Starts the regulation as [`drdStart`]: the device needs no initialisation.
     fn drdAutoInit(id: i8) -> c_int [-1] { begin(id) }
-    /// Holds the device: it needs no initialisation.
+    /// Starts the regulation as [`drdStart`]: the device needs no initialisation.
     fn drdCheckInit(id: i8) -> c_int [-1] { begin(id) }
-    /// Holds the device: it needs no initialisation.
+    /// Starts the regulation as [`drdStart`]: the device needs no initialisation.
     fn drdPrecisionInit(id: i8) -> c_int [-1] { begin(id) }
-    /// Starts the regulation and holds the device at its position.
+    /// Enables force and starts the regulation, which holds the handle at its current pose.
     fn drdStart(id: i8) -> c_int [-1] { begin(id) }
-    /// Ends the regulation, and disables force unless `keeps_force`.
+    /// Ends the regulation and clears the program's command; disables force unless `keeps_force`.
     fn drdStop(keeps_force: bool, id: i8) -> c_int [-1] {
         read(id, |open| {
             let mut device = open.device();
@@ -168,7 +168,7 @@ export! {
             }
         })
     }
-    /// Holds the device at its position; an error if it is not regulated.
+    /// Holds the handle at its current pose; an error if the device is not regulated.
     fn drdHold(id: i8) -> c_int [-1] {
         result(live(id).and_then(|open| {
             let state = open.station.state();
@@ -180,27 +180,27 @@ export! {
             Ok(DONE)
         }))
     }
-    /// Enables or disables the regulation of the position.
+    /// Enables or disables the regulation of the position; holds the handle at its current pose.
     fn drdRegulatePos(on: bool, id: i8) -> c_int [-1] { regulate(id, 0, on) }
-    /// Enables or disables the regulation of the orientation.
+    /// Enables or disables the regulation of the orientation; holds the handle at its current pose.
     fn drdRegulateRot(on: bool, id: i8) -> c_int [-1] { regulate(id, 1, on) }
     /// Stores the switch for a gripper without effect.
     fn drdRegulateGrip(on: bool, id: i8) -> c_int [-1] { regulate(id, 2, on) }
-    /// Moves to a position, m.
+    /// Moves the handle to a position, m; with `block`, waits for the arrival.
     fn drdMoveToPos(x: f64, y: f64, z: f64, block: bool, id: i8) -> c_int [-1] { go(id, position(x, y, z), way(block)) }
-    /// Turns to angles, rad.
+    /// Turns the handle to angles, rad; with `block`, waits for the arrival.
     fn drdMoveToRot(a: f64, b: f64, g: f64, block: bool, id: i8) -> c_int [-1] { go(id, rotation(a, b, g), way(block)) }
     /// Checks the regulation and moves nothing: there is no gripper.
     fn drdMoveToGrip(_gap: f64, _block: bool, id: i8) -> c_int [-1] {
         go(id, Goal { position_m: None, angles_rad: None }, Way::Follow)
     }
-    /// Moves to a position, m, and turns to angles, rad.
+    /// Moves the handle to a position, m, and turns it to angles, rad; with `block`, waits for the arrival.
     fn drdMoveTo(place: In<f64>, block: bool, id: i8) -> c_int [-1] {
         eight(place).map_or_else(|| failed(Code::NullArgument), |goal| go(id, goal, way(block)))
     }
-    /// Follows a position, m.
+    /// Sets the target position, m, without a planned motion.
     fn drdTrackPos(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { go(id, position(x, y, z), Way::Follow) }
-    /// Follows angles, rad.
+    /// Sets the target angles, rad, without a planned motion.
     fn drdTrackRot(a: f64, b: f64, g: f64, id: i8) -> c_int [-1] { go(id, rotation(a, b, g), Way::Follow) }
     /// Checks the regulation and moves nothing: there is no gripper.
     fn drdTrackGrip(_gap: f64, id: i8) -> c_int [-1] {

@@ -119,12 +119,12 @@ impl Regulation {
         self.rotation = Motion::new(self.rotation.place(since_ns), turned_rad, fastest, since_ns);
     }
 
-    /// Holds the handle at a position from now on, m, Flotor's axes.
+    /// Sets the target position in Flotor's axes, m; takes effect at once, without a planned motion.
     pub(crate) fn follow_place(&mut self, place_m: DVec3) {
         self.position = Motion::at(place_m);
     }
 
-    /// Holds the handle at a rotation vector from now on, rad, Flotor's axes.
+    /// Sets the target orientation, a rotation vector in Flotor's axes, rad; takes effect at once, without a planned motion.
     pub(crate) fn follow_turn(&mut self, turned_rad: DVec3) {
         self.rotation = Motion::at(turned_rad);
     }

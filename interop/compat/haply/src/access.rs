@@ -23,7 +23,7 @@ enum Hosts {
     Any,
 }
 
-/// Reason of a refused connection.
+/// Reason for a refused connection.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Forbidden {
     #[error("pages of `{0}` may not connect; allow the connection with `--allow-origin {0}`")]
@@ -56,7 +56,7 @@ impl Access {
     }
 }
 
-/// Returns whether a `Host` header, with or without a port, names the loopback interface.
+/// Returns true if a `Host` header, with or without a port, names the loopback interface.
 fn is_loopback(host: &str) -> bool {
     if let Ok(address) = host.parse::<SocketAddr>() {
         return address.ip().is_loopback();

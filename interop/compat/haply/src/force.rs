@@ -53,8 +53,8 @@ impl Forces {
         self.0.is_empty()
     }
 
-    /// Returns whether the sum changes without a new command: it depends on the handle, or the command of one of several sessions may
-    /// fade.
+    /// Returns true if the sum changes without a new command: the sum depends on the handle, or the command of one of several
+    /// sessions may fade.
     pub(crate) fn follow_the_handle(&self) -> bool {
         let follows = |wanted: &SessionCommand| wanted.target_m.is_some() || wanted.damping != DVec3::ZERO;
         self.0.len() > 1 || self.0.iter().any(|(.., wanted)| follows(wanted))

@@ -166,7 +166,7 @@ fn of_query(shared: &Shared, query: &str) -> Vec<u64> {
     ids(place.and_then(|place| found.get(place).copied()).into_iter().collect())
 }
 
-/// Returns whether a name matches a pattern with `*` and `?`.
+/// Returns true if a name matches a pattern with `*` and `?`.
 fn is_like(name: &str, pattern: &str) -> bool {
     let (name, pattern): (Vec<char>, Vec<char>) = (name.chars().collect(), pattern.chars().collect());
     let (mut at, mut of, mut star) = (0, 0, None);

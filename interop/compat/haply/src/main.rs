@@ -133,8 +133,11 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
         accept(events, "flotor-events", |stream| channels::send_events(service, stream))?;
         accept(simulation, "flotor-accept", |stream| channels::answer_client(service, stream))
     });
-    started
-        .map_err(|cause| CommandError::Failed(format!("cannot start a thread for the service: {cause}")))?;
+    started.map_err(|cause| {
+        CommandError::Failed(format!(
+            "cannot start a thread for the service: {cause}; end other programs of this user"
+        ))
+    })?;
     say!("listening ws://{simulation_at}/ events ws://{events_at}/");
     while !stop.is_stop_requested() && host.is_running() {
         std::thread::sleep(LOOK);
@@ -156,6 +159,8 @@ fn listen(option: &str, at: &str, reach: Reach) -> Result<(Port, SocketAddr), Co
         Ok((port, address))
     });
     bound.map_err(|cause| {
-        CommandError::Usage(format!("{option}: {cause}; Haply's own service may be running"))
+        CommandError::Usage(format!(
+            "{option}: {cause}; if the port is in use, end Haply's own service or choose another port"
+        ))
     })
 }

@@ -132,7 +132,9 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
         "preset" => {
             let preset = value.get("preset").or(Some(value)).and_then(Value::as_str).unwrap_or_default();
             if !view.set_preset(preset) {
-                return Err(format!("unknown preset `{preset}`"));
+                return Err(format!(
+                    "unknown preset `{preset}`; the documentation of the service lists the presets"
+                ));
             }
         }
         "mount" => {
@@ -171,7 +173,7 @@ fn set_workspace(service: &Service, view: &mut View, command: &Value) {
     }
 }
 
-/// Returns whether a command takes effect: with `execute: false` a program sends a command for validation only.
+/// Returns true if a command takes effect: with `execute: false` a program sends a command for validation only.
 fn is_executed(command: &Value) -> bool {
     command.get("execute").and_then(Value::as_bool).unwrap_or(true)
 }

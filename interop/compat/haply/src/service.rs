@@ -51,7 +51,7 @@ pub(crate) struct Shared {
 const MOST_SETTINGS_BYTES: usize = 1 << 20;
 
 impl Shared {
-    /// Stores a setting of the service; returns whether there was room for it.
+    /// Stores a setting of the service; returns false, and stores nothing, without room for the setting.
     pub(crate) fn keep_setting(&mut self, key: &str, value: &Value) -> bool {
         let size = |key: &str, value: &Value| key.len() + value.to_string().len();
         let others = self.settings.iter().filter(|(other, _)| *other != key);

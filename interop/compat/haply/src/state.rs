@@ -1,4 +1,5 @@
-//! Encoder of messages to clients: the state of all devices; the first message, and any on request, includes the configuration.
+//! Encoder of messages to clients: the state of all devices. The first message of a session, and each message requested with
+//! `force_render_full_state`, also has configuration and session.
 
 use crate::device::{ARM_M, grip_id, inverse_id, joint_angles};
 use crate::service::{Service, Session, Shared};

@@ -21,7 +21,7 @@ const AXES: [char; 3] = ['X', 'Y', 'Z'];
 impl Basis {
     const PLAIN: Self = Self { axes: [0, 1, 2], signs: [1.0; 3] };
 
-    /// Parses `XZY`, `X-YZ` or `+X+Y+Z`: the session's x, y, z in terms of the device's.
+    /// Parses `XZY`, `X-YZ` or `+X+Y+Z`: the session's x, y, z in terms of the device's axes; `None` for any other text.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let (mut axes, mut signs, mut length, mut sign) = ([3; 3], [1.0; 3], 0, None);
         for letter in text.chars() {

@@ -58,7 +58,7 @@ fn list() -> MutexGuard<'static, List> {
     LIST.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns whether the calling thread is the scheduler's.
+/// Returns true if the calling thread is the scheduler's.
 pub(crate) fn is_here() -> bool {
     IS_SCHEDULER.try_with(Cell::get).unwrap_or(false)
 }
@@ -68,7 +68,7 @@ pub(crate) fn mark_here() {
     IS_SCHEDULER.with(|here| here.set(true));
 }
 
-/// Returns whether the scheduler runs.
+/// Returns true if the scheduler runs.
 pub(crate) fn is_running() -> bool {
     IS_RUNNING.load(Ordering::Acquire)
 }
@@ -119,13 +119,13 @@ impl Entry {
         Self { handle: 0, priority, callback, data: Data(data) }
     }
 
-    /// Calls the callback; returns whether to call it again.
+    /// Calls the callback; returns true if the callback requests a further call.
     pub(crate) fn call(&self) -> bool {
         // SAFETY: by the contract of `new`.
         unsafe { (self.callback)(self.data.0) != 0 }
     }
 
-    /// Returns whether the callback is still scheduled, and marks it as running.
+    /// Returns true if the callback is still scheduled, and marks it as running.
     pub(crate) fn enter(&self) -> bool {
         let list = list();
         let is_in = is_running() && list.is_in(self.handle);
@@ -135,7 +135,7 @@ impl Entry {
         is_in
     }
 
-    /// Clears the mark of a running callback, and unschedules one that has ended.
+    /// Clears the mark of the running callback; unschedules the callback unless `goes_on`.
     pub(crate) fn finish(&self, goes_on: bool) {
         UNDER_WAY.store(0, Ordering::Release);
         if !goes_on {
@@ -143,7 +143,8 @@ impl Entry {
         }
     }
 
-    /// Schedules the callback and returns its handle; on the scheduler's own thread also calls it at once.
+    /// Schedules the callback and returns its handle. On the scheduler's own thread, calls the callback first, and does not
+    /// schedule the callback if the call returns 0.
     ///
     /// # Errors
     /// [`Code::SchedulerFull`] without room.
@@ -176,7 +177,7 @@ impl List {
     }
 }
 
-/// Returns whether no callback is scheduled.
+/// Returns true if no callback is scheduled.
 pub(crate) fn is_empty() -> bool {
     list().entries.is_empty()
 }
@@ -195,7 +196,7 @@ pub(crate) fn wait_until_out(handle: u64) {
     }
 }
 
-/// Unschedules a callback, and waits at most 1 s for a running call on another thread; returns whether it was scheduled.
+/// Unschedules a callback, and waits at most 1 s for a running call on another thread; returns true if the callback was scheduled.
 pub(crate) fn unschedule(handle: c_ulong) -> bool {
     let was_in = take_out(handle);
     let since = Instant::now();
@@ -223,7 +224,7 @@ fn take_out(handle: u64) -> bool {
     was_in
 }
 
-/// Returns whether a callback is still scheduled; with `waits`, waits for its end first.
+/// Returns true if a callback is still scheduled; with `waits`, waits for its end first.
 pub(crate) fn is_scheduled(handle: c_ulong, waits: bool) -> bool {
     if waits && !is_here() {
         wait_until_out(handle);

@@ -1,4 +1,4 @@
-//! Device between the program and its station: snapshot and settings of a frame, and capabilities.
+//! HDAPI device as presented to the program: snapshot and settings of the current frame, and capabilities.
 
 use crate::callbacks;
 use crate::error::{Code, NO_DEVICE};
@@ -157,7 +157,7 @@ pub(crate) fn init(name: Option<&str>) -> Result<c_uint, Code> {
     Ok(handle)
 }
 
-/// Closes a device; returns whether it was open.
+/// Closes a device, and removes all callbacks with the last device; returns true if the device was open.
 pub(crate) fn disable(handle: c_uint) -> bool {
     let Some(mut device) = Devices::initialised(handle) else { return false };
     device.station().into_iter().for_each(|(_, station)| {
@@ -420,7 +420,8 @@ impl Device {
         }
     }
 
-    /// Returns the value of a parameter that does not depend on a frame.
+    /// Returns the value of a parameter outside the snapshot of an HDAPI frame (`hdBeginFrame`): a property or setting of device or
+    /// scheduler.
     fn constant(&self, parameter: c_uint, station: &Station) -> Result<Values, Code> {
         let six = station.axes() != Axes::Three;
         let [force_n, torque_nm] = station.most();

@@ -137,7 +137,7 @@ export! {
     fn hdEnable(capability: c_uint) -> () [()] { switch(capability, true) }
     /// Disables a capability of the current device.
     fn hdDisable(capability: c_uint) -> () [()] { switch(capability, false) }
-    /// Returns whether a capability of the current device is enabled.
+    /// Returns true if a capability of the current device is enabled.
     fn hdIsEnabled(capability: c_uint) -> c_uchar [0] {
         c_uchar::from(value_or(false, Devices::with_current(|device| device.is_on(capability))))
     }
@@ -184,7 +184,7 @@ export! {
     fn hdUnschedule(handle: c_ulong) -> () [()] {
         raise_unless(callbacks::unschedule(handle), Code::InvalidOperation, CURRENT.get());
     }
-    /// Returns whether a callback is still scheduled; with `how` = 1, waits for its end first.
+    /// Returns true if a callback is still scheduled; with `how` = 1, waits for its end first.
     fn hdWaitForCompletion(handle: c_ulong, how: c_uint) -> c_uchar [0] {
         c_uchar::from(callbacks::is_scheduled(handle, how != 0))
     }

@@ -1,4 +1,4 @@
-//! Numbers of the parameters, with count and type of their values.
+//! HDAPI parameter codes, with the number and type of each parameter's values.
 
 use crate::error::Code;
 use std::ffi::c_uint;
@@ -48,7 +48,7 @@ pub(crate) const FORCE_OUTPUT: c_uint = 0x4000;
 pub(crate) const FORCE_CLAMPING: c_uint = 0x4001;
 pub(crate) const ONE_FRAME_LIMIT: c_uint = 0x4004;
 
-/// Types of values.
+/// Type of a parameter's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     Boolean,

@@ -9,7 +9,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 unsafe extern "C" {
-    /// Declared as in the C library, for a body that the end of its thread may unwind.
+    /// Starts a thread. Declared here with a start routine that may unwind, because `pthread_exit` in a callback unwinds the stack.
     fn pthread_create(
         thread: *mut c_ulong,
         attributes: *const c_void,
@@ -62,7 +62,7 @@ extern "C-unwind" fn run(_data: *mut c_void) -> *mut c_void {
     std::ptr::null_mut()
 }
 
-/// Starts the scheduler unless it runs; returns whether it runs.
+/// Starts the scheduler unless it runs, and enables the force of the devices; returns true if the scheduler runs.
 pub(crate) fn start() -> bool {
     let mut started = thread();
     if is_running() {
@@ -102,7 +102,7 @@ fn next_calls() -> [Option<Entry>; MOST] {
     if wait_for_tick() { callbacks::begin_tick() } else { [None; MOST] }
 }
 
-/// Waits for the next tick at the program's rate; returns whether there are callbacks.
+/// Waits for the next tick at the program's rate; returns true if there are callbacks to call.
 fn wait_for_tick() -> bool {
     let is_idle = callbacks::is_empty();
     let Some((host, station)) = Devices::any() else {
