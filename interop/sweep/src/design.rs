@@ -16,13 +16,13 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// Creates a number cell; a non-finite number becomes a missing one.
+    /// Creates a number cell; a non-finite number becomes a missing number.
     #[must_use]
     pub fn number(value: f64) -> Self {
         Self::Number(value.is_finite().then_some(value))
     }
 
-    /// Formats the value as in a setting.
+    /// Formats the value as in a setting; `NaN` for a missing number.
     #[must_use]
     pub fn text(&self) -> String {
         match self {

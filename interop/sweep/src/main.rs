@@ -48,7 +48,12 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), CommandError> {
     let usage = |error: &dyn std::fmt::Display| CommandError::Usage(error.to_string());
     let other = |error: &dyn std::fmt::Display| CommandError::Failed(error.to_string());
-    let unwritten = |path: &Path, cause| CommandError::Failed(format!("{}: {cause}", path.display()));
+    let unwritten = |path: &Path, cause| {
+        CommandError::Failed(format!(
+            "{}: cannot write the file: {cause}; choose a folder where you may write",
+            path.display()
+        ))
+    };
     let plan = Plan::load(&arguments.plan).map_err(|error| usage(&error))?;
     let sweep =
         Sweep::prepare(plan, arguments.options.plugin_path.folders()).map_err(|error| usage(&error))?;

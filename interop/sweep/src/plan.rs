@@ -45,11 +45,11 @@ pub enum Question {
 pub enum Layout {
     /// Grid of all combinations.
     Grid,
-    /// First points of Sobol's sequence, shifted by a seed; requires ranges, at most six of them.
+    /// First points of the Sobol sequence with a random digital shift; every axis must be a range, at most six axes.
     Sobol {
         /// Number of points.
         points: u64,
-        /// Shift of the sequence.
+        /// Seed of the shift.
         seed: u64,
     },
 }
@@ -76,7 +76,7 @@ pub enum Values {
         from: f64,
         /// Last value.
         to: f64,
-        /// Number of values on a grid, ends included.
+        /// Number of values on a grid, ends included; at least 2.
         steps: u32,
         /// Linear or logarithmic spacing.
         scale: Scale,
@@ -106,7 +106,7 @@ pub enum PlanError {
         /// Error of the system.
         cause: std::io::Error,
     },
-    /// The file is not TOML, or a key is unknown or of the wrong type.
+    /// The file is not UTF-8 or not TOML, or a key is unknown or of the wrong type.
     #[error("{}:{line}: {problem}", path.display())]
     Malformed {
         /// Path of the plan.
@@ -189,7 +189,7 @@ impl Plan {
         Self::parse(&text, path)
     }
 
-    /// Parses a plan; `path` is for messages, and the base of relative scene files.
+    /// Parses and checks a plan; `path`: file for error messages, whose folder is the base of a relative scene file.
     ///
     /// # Errors
     /// [`PlanError`] of the text or its values.
@@ -243,7 +243,9 @@ impl Plan {
             return Err(format!("`{}` is the key of two axes; remove one", repeated.1.key));
         }
         if let Some(large) = self.seeds.iter().find(|seed| **seed > LARGEST_SEED) {
-            return Err(format!("the seed {large} is larger than {LARGEST_SEED} (2^53)"));
+            return Err(format!(
+                "the seed {large} is larger than {LARGEST_SEED} (2^53); write a smaller seed"
+            ));
         }
         if self.seeds.is_empty() || self.block == 0 {
             return Err("`seeds` needs at least one seed, and `block` must be 1 or more".into());
@@ -340,7 +342,7 @@ impl AxisText {
             }
         };
         if values.is_empty() {
-            return Err(format!("axis `{key}` has no values"));
+            return Err(format!("axis `{key}` has no values; write at least one"));
         }
         Ok(Axis { key, values })
     }

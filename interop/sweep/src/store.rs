@@ -14,7 +14,7 @@ pub struct Store {
 
 /// Error of a store.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {action}: {cause}", path.display())]
+#[error("{}: {action}: {cause}; check free space and permissions", path.display())]
 pub struct StoreError {
     /// Affected file or folder.
     pub path: PathBuf,
