@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 
-/// Reads a recording into a dictionary of arrays, one row per tick; also returns whether the recording is complete.
+/// Reads a recording; returns a dictionary of arrays, one row per tick, and true if the recording is complete.
 #[pyfunction]
 pub(crate) fn read_recording(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyDict>, bool)> {
     let (records, ending) = py

@@ -52,7 +52,7 @@ pub(crate) fn run_scene(
     folders.splice(0..0, scene.plugin_folders.iter().cloned());
     let registry = Registry::search(&folders);
     if seed > LARGEST_SEED {
-        return Err(refuse(format!("seed {seed} is larger than {LARGEST_SEED} (2^53)")));
+        return Err(refuse(format!("seed {seed} is larger than {LARGEST_SEED} (2^53); pass a smaller seed")));
     }
     let run = || flotor_session::headless::run(&scene, &registry, seed, recording.as_deref(), Demand::FORCE);
     let summary = py.detach(run);

@@ -50,20 +50,20 @@ __all__ = [
 INPUT = _flotor.input_dtype()
 #: NumPy record of one model output, 64 bytes: force, torque, energy, status.
 OUTPUT = _flotor.output_dtype()
-#: Words of the status codes in an output, by code.
+#: Names of the status codes in an output, by code.
 STATUS = ("ok", "clamped", "out_of_domain", "not_converged", "invalid_input")
-#: Bits of an input's ``demand``: what is not demanded need not be computed.
+#: Bits of an input's ``demand``: a model need not compute other outputs.
 DEMAND_FORCE, DEMAND_TORQUE, DEMAND_ENERGY, DEMAND_ALL = 1, 2, 4, 7
 
 
 def _folders() -> list[Path]:
-    """Plugin folders in search order: those of the environment, then the ones packed into this package."""
+    """Plugin folders in search order: the folders in ``FLOTOR_PLUGIN_PATH``, then the folder of this package."""
     listed = os.environ.get("FLOTOR_PLUGIN_PATH", "").split(os.pathsep)
     return [Path(folder) for folder in listed if folder] + [Path(__file__).parent / "plugins"]
 
 
 def _text(value: object) -> str:
-    """A parameter's value as it is typed in a scene; floats keep every bit."""
+    """Formats a parameter's value as in a scene; floats are exact."""
     if isinstance(value, bool):
         raise FlotorError(f"{value!r} is not a value of a parameter; write a choice as a word, like 'on' or 'off'")
     if isinstance(value, str):
@@ -72,16 +72,16 @@ def _text(value: object) -> str:
 
 
 class RunFailed(FlotorError):
-    """A run that ended by a fault, or in which a model failed: ``flotor run`` has another exit code than 0 then."""
+    """Error of a run that ended by a fault, or in which a model failed; ``flotor run`` has an exit code other than 0."""
 
     def __init__(self, problem: str, summary: dict[str, object]) -> None:
         super().__init__(problem)
-        #: What :func:`run` returns of a run without a failure.
+        #: Summary of the run, with the keys of the result of :func:`run`.
         self.summary = summary
 
 
 class PluginInfo(NamedTuple):
-    """A plugin that was found; it has not been opened."""
+    """Plugin in a searched folder; its code has not been loaded."""
 
     id: str
     kind: str  #: "model" or "device"
@@ -90,7 +90,7 @@ class PluginInfo(NamedTuple):
 
 
 class Evaluation(NamedTuple):
-    """Answers of a model at ``n`` poses."""
+    """Wrenches, energies and statuses of a model at ``n`` poses."""
 
     force_n: np.ndarray  #: force on the hand, (n, 3), N
     torque_nm: np.ndarray  #: torque on the hand, (n, 3), N m
@@ -98,7 +98,7 @@ class Evaluation(NamedTuple):
     status: list[str]  #: n words of :data:`STATUS`
 
     def to_pandas(self):
-        """A ``pandas.DataFrame`` with the columns of ``flotor eval``, one row a pose."""
+        """Returns a ``pandas.DataFrame`` with the columns of ``flotor eval``, one row per pose."""
         import pandas
 
         forces = dict(zip(("fx_n", "fy_n", "fz_n"), self.force_n.T))
@@ -107,12 +107,12 @@ class Evaluation(NamedTuple):
 
 
 class Model:
-    """A force model, loaded from a plugin.
+    """Force model, loaded from a plugin.
 
-    ``id`` is what scenes say ("spring") or a path to a plugin file; keyword arguments are its parameters, by the ids
-    its schema has (:attr:`parameters`). May be shared between threads; calls wait for each other.
+    ``id`` is the id in a scene ("spring") or the path of a plugin file; keyword arguments are parameters, by their ids
+    in the schema (:attr:`parameters`). May be shared between threads; calls are serialised.
 
-    Raises :class:`FlotorError` for an unknown id, a refused plugin, an unknown or illegal parameter.
+    Raises :class:`FlotorError` for an unknown id, a rejected plugin, an unknown or invalid parameter.
     """
 
     def __init__(self, id: str, **parameters: object) -> None:
@@ -120,7 +120,7 @@ class Model:
 
     @property
     def id(self) -> str:
-        """What scenes call it."""
+        """Id of the plugin, as in a scene."""
         return self._model.id
 
     @property
@@ -130,16 +130,16 @@ class Model:
 
     @property
     def path(self) -> Path:
-        """File it was loaded from."""
+        """Path of the plugin file."""
         return Path(self._model.path)
 
     @property
     def parameters(self) -> dict[str, Parameter]:
-        """The schema: id, unit, range, default, choices and doc of every parameter."""
+        """Schema: id, unit, range, default, choices and description of every parameter."""
         return {parameter.id: parameter for parameter in self._model.parameters}
 
     def __getitem__(self, id: str) -> float:
-        """The value in force of a parameter, presets resolved (for a choice, its index)."""
+        """Returns the current value of a parameter, presets resolved (for a choice, its index)."""
         return self._model.parameter(id)
 
     def __setitem__(self, id: str, value: object) -> None:
@@ -147,11 +147,11 @@ class Model:
         self._model.set_parameter(id, _text(value))
 
     def reset(self) -> None:
-        """Forgets history, for models that have one."""
+        """Resets the model to home; clears the history of a model with memory."""
         self._model.reset()
 
     def inputs(self, poses: np.ndarray, demand: int = DEMAND_ALL) -> np.ndarray:
-        """Inputs at rest for :meth:`step_batch` from poses (n, 6): m and rotation vector, rad."""
+        """Returns inputs at rest for :meth:`step_batch` from poses (n, 6): position, m, and rotation vector, rad."""
         poses = _poses(poses)
         rows = np.zeros(len(poses), INPUT)
         rows["position_m"] = poses[:, :3]
@@ -164,11 +164,11 @@ class Model:
         return rows
 
     def step_batch(self, inputs: np.ndarray, outputs: np.ndarray | None = None) -> np.ndarray:
-        """Steps through ``inputs`` (n,) of :data:`INPUT`, in order, into ``outputs`` (n,) of :data:`OUTPUT`.
+        """Steps through ``inputs`` (n,) of :data:`INPUT`, in order, into ``outputs`` (n,) of :data:`OUTPUT`; returns ``outputs``.
 
-        Both arrays are used where they lie, nothing is copied; pass ``outputs`` to reuse its memory. They may not share
-        memory, and nobody may move them meanwhile: ``ndarray.resize(..., refcheck=False)`` in another thread frees what
-        is being written to. A child of ``os.fork()`` makes models of its own.
+        Both arrays are used in place, without copies; pass ``outputs`` to reuse its memory. The arrays must not share
+        memory, and must not be resized during the call: ``ndarray.resize(..., refcheck=False)`` in another thread frees
+        the memory that the call writes to. A child of ``os.fork()`` has to create its own models.
         """
         if isinstance(inputs, np.ma.MaskedArray) or isinstance(outputs, np.ma.MaskedArray):
             raise FlotorError("inputs and outputs have no masks; pass unmasked rows (`inputs.compressed()`)")
@@ -178,11 +178,12 @@ class Model:
         return outputs
 
     def evaluate(self, poses: np.ndarray, *, path: bool = False) -> Evaluation:
-        """Answers at poses (n, 6) in m and rad (rotation vector), bit for bit what ``flotor eval`` prints.
+        """Evaluates the model at poses (n, 6) in m and rad (rotation vector), bit for bit as ``flotor eval``.
 
-        A data frame, a table of Arrow, a record array or a mapping goes by its column names, which have to be those of
-        ``flotor eval``; a masked number is NaN. Each pose is reached from home and held until converged; with ``path`` the rows are successive poses of one
-        handle. NaN and infinity are legal and answered with zero force and a status.
+        Columns of a data frame, an Arrow table, a record array or a mapping are selected by name; the names must be
+        those of ``flotor eval``. A masked number is NaN. Each pose is reached from home and held until the model has
+        converged; with ``path`` the rows are successive poses of one handle. NaN and infinity are valid, and give zero
+        force with a status.
         """
         force_n, torque_nm, energy_j, status = self._model.evaluate(_poses(poses), path)
         return Evaluation(force_n, torque_nm, energy_j, status)
@@ -196,7 +197,7 @@ _POSE = ("x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad")
 
 
 def _column_names(table: object) -> list | None:
-    """Names of the columns of a data frame, a table of Arrow, a record array or a mapping; None for what has no names."""
+    """Returns the column names of a data frame, an Arrow table, a record array or a mapping; None for any other object."""
     if isinstance(table, Mapping):
         return list(table)
     names = getattr(table, "column_names", None)
@@ -210,7 +211,7 @@ def _column_names(table: object) -> list | None:
 
 
 def _numbers(values: object) -> np.ndarray:
-    """Values as numbers: NaN where they are masked."""
+    """Converts values to an array of floats; masked values become NaN."""
     if isinstance(values, list | tuple) and any(isinstance(row, np.ma.MaskedArray) for row in values):
         values = np.ma.array(values)
     if isinstance(values, np.ma.MaskedArray):
@@ -231,7 +232,7 @@ def _poses(poses: object) -> np.ndarray:
 
 
 def plugins() -> list[PluginInfo]:
-    """Every plugin that is found, without opening any."""
+    """Returns all plugins in the searched folders, without loading their code."""
     return [PluginInfo(id, kind, version, Path(path)) for id, kind, version, path in _flotor.plugins(_folders())]
 
 
@@ -244,13 +245,13 @@ def run(
     settings: dict[str, object] | None = None,
     record: str | os.PathLike[str] | None = None,
 ) -> dict[str, object]:
-    """Runs a scene (the demo if None) in virtual time; the summary, with the keys of ``flotor run --json``.
+    """Runs a scene (the demo if None) in virtual time; returns the summary, with the keys of ``flotor run --json``.
 
     ``settings`` are parameters by plugin and id: ``{"spring.variant": "closed-form", "device.preset": "full"}``, or
     ``{"spring": {"variant": "closed-form"}}``. Equal arguments give an equal ``trace_digest``.
 
-    Raises :class:`FlotorError` for what is refused, and :class:`RunFailed`, which has the summary, where a model failed or the run ended
-    by a fault.
+    Raises :class:`FlotorError` for an invalid scene or argument, and :class:`RunFailed`, which has the summary, if a model failed
+    or the run ended by a fault.
     """
     summary = _flotor.run_scene(
         None if scene is None else Path(scene),
@@ -269,7 +270,7 @@ def run(
 
 
 def _by_plugin_and_id(settings: Mapping[str, object]) -> Iterator[tuple[str, object]]:
-    """Each setting as ``plugin.id`` and its value; settings may be grouped by plugin."""
+    """Yields each setting as ``plugin.id`` and its value; settings may be grouped by plugin."""
     for key, value in settings.items():
         if isinstance(value, Mapping):
             yield from ((f"{key}.{id}", each) for id, each in value.items())
@@ -278,7 +279,7 @@ def _by_plugin_and_id(settings: Mapping[str, object]) -> Iterator[tuple[str, obj
 
 
 def _problem(summary: dict[str, object]) -> str | None:
-    """The first model that failed in a run, or the fault by which the run ended; None if there was neither."""
+    """Returns the first failure of a model in a run, or the fault that ended the run; None without a failure."""
     for plugin in summary["plugins"]:
         if plugin["kind"] == "model" and plugin["health"] != "ok":
             return f"`{plugin['name']}` {plugin['health']}"
@@ -287,11 +288,11 @@ def _problem(summary: dict[str, object]) -> str | None:
 
 
 class Recording:
-    """A recording as columns, one row a tick: ``recording["position_m"]`` is an array (n, 3)."""
+    """Recording as columns, one row per tick: ``recording["position_m"]`` is an array (n, 3)."""
 
     def __init__(self, columns: dict[str, np.ndarray], finished: bool) -> None:
         self.columns = columns
-        #: False if the file breaks off (a killed process, a full disk).
+        #: False if the file is truncated (a killed process, a full disk).
         self.finished = finished
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -301,13 +302,16 @@ class Recording:
         return len(self.columns["tick"])
 
     def event(self, name: str) -> np.ndarray:
-        """The ticks with an event, as booleans (n,): ``recording.event("force_limited")``; the names are :data:`EVENTS`."""
+        """Returns the presence of an event in each tick, booleans (n,): ``recording.event("force_limited")``.
+
+        The names are :data:`EVENTS`.
+        """
         if name not in EVENTS:
             raise FlotorError(f"unknown event {name!r}; the events are {', '.join(EVENTS)}")
         return self.columns["events"] & np.uint32(1 << EVENTS.index(name)) != 0
 
     def flat(self) -> dict[str, np.ndarray]:
-        """Columns of one number each: ``position_m`` becomes ``position_m_x``, ``_y``, ``_z``."""
+        """Returns the columns split into scalar columns: ``position_m`` becomes ``position_m_x``, ``_y``, ``_z``."""
         flat = {}
         for name, column in self.columns.items():
             if column.ndim == 1:
@@ -318,13 +322,13 @@ class Recording:
         return flat
 
     def to_pandas(self):
-        """A ``pandas.DataFrame``, indexed by tick."""
+        """Returns the scalar columns as a ``pandas.DataFrame``, indexed by tick."""
         import pandas
 
         return pandas.DataFrame(self.flat()).set_index("tick")
 
     def to_polars(self):
-        """A ``polars.DataFrame``."""
+        """Returns the scalar columns as a ``polars.DataFrame``."""
         import polars
 
         return polars.DataFrame(self.flat())

@@ -1,4 +1,4 @@
-"""The native half. Use the package's own names; these are its building blocks."""
+"""Native part of the package; use the public names of `flotor` instead."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ EVENTS: tuple[str, ...]
 class FlotorError(Exception): ...
 
 class Parameter:
-    """One parameter of a plugin's schema."""
+    """Parameter of a plugin's schema."""
 
     id: str
     unit: str

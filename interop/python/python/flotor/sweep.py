@@ -1,10 +1,10 @@
-"""Sweeps on any executor: threads here, Dask or Ray elsewhere; the same plan, the same bytes.
+"""Sweeps on any executor: threads of this process, Dask or Ray; one plan gives the same bytes with every executor.
 
     >>> from dask.distributed import Client                       # doctest: +SKIP
     >>> flotor.sweep.run("plan.toml", "results", flotor.sweep.dask(Client()))  # doctest: +SKIP
 
-A task is a pure function of its content and leaves one file, named by its key, in ``OUT/tasks``. Workers need the
-plan and ``OUT`` on a file system they share. A killed sweep resumes with the next run.
+A task is a pure function of its content and writes one file, named by its key, to ``OUT/tasks``. Workers need the
+plan and ``OUT`` on a shared file system. A killed sweep resumes with the next run.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from . import _flotor, _folders
 
 __all__ = ["Executor", "dask", "ray", "run", "threads"]
 
-#: Calls a function on every number, in any order, anywhere, and returns when all are done; raises what one raised.
+#: Function that calls a given function with every number, in any order and on any worker, and returns after the last
+#: call; raises the exception of a failed call.
 Executor = Callable[[Callable[[int], None], Iterable[int]], None]
 
 
 class _DoTask:
-    """Does task ``number`` of a plan. Travels to workers as two paths; each process prepares the sweep once."""
+    """Callable that executes a task of a plan by number. Sent to workers as two paths; each process prepares the sweep once."""
 
     def __init__(self, plan: str, out: str) -> None:
         self.plan, self.out = plan, out
@@ -39,9 +40,9 @@ def _prepared(plan: str, out: str) -> _flotor.Sweep:
 
 
 def run(plan: str | os.PathLike[str], out: str | os.PathLike[str], executor: Executor | None = None) -> Path:
-    """Does every task of ``plan`` that is not finished in ``out``; the path of ``results.parquet``.
+    """Executes every task of ``plan`` that is not finished in ``out``; returns the path of ``results.parquet``.
 
-    Raises :class:`flotor.FlotorError` if the plan is refused; what was finished before stays finished.
+    Raises :class:`flotor.FlotorError` if the plan is rejected; finished tasks stay in ``out``.
     """
     plan, out = os.path.abspath(plan), os.path.abspath(out)
     sweep = _flotor.Sweep(Path(plan), Path(out), _folders())
@@ -50,7 +51,7 @@ def run(plan: str | os.PathLike[str], out: str | os.PathLike[str], executor: Exe
 
 
 def threads(workers: int | None = None) -> Executor:
-    """Threads of this process: tasks run without the GIL."""
+    """Returns an executor with threads of this process; tasks run without the GIL."""
 
     def execute(do: Callable[[int], None], numbers: Iterable[int]) -> None:
         with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
@@ -61,17 +62,17 @@ def threads(workers: int | None = None) -> Executor:
 
 
 def dask(client) -> Executor:
-    """Workers of a ``dask.distributed.Client``; a task of a worker that dies is done by another."""
+    """Returns an executor with the workers of a ``dask.distributed.Client``; tasks of a dead worker are executed again."""
 
     def execute(do: Callable[[int], None], numbers: Iterable[int]) -> None:
-        # Not pure: what a task leaves is its file, so Dask may not answer from its memory.
+        # Not pure: the result of a task is its file, so Dask must not return a cached result.
         client.gather(client.map(do, list(numbers), pure=False))
 
     return execute
 
 
 def ray(ray) -> Executor:
-    """Workers of an initialised ``ray`` (pass the module)."""
+    """Returns an executor with the workers of an initialised ``ray`` (pass the module)."""
 
     def execute(do: Callable[[int], None], numbers: Iterable[int]) -> None:
         remote = ray.remote(do.__call__)
