@@ -27,8 +27,8 @@ const STEPS_MOST: usize = 200;
 /// Tolerance of a root: relative above 1, absolute below.
 const WIDTH: f64 = 1.0e-13;
 
-/// Returns Cohen's d of pairs: the mean difference divided by the standard deviation of the differences. Its sign is the sign
-/// of `t`, the result of a paired t-test.
+/// Returns Cohen's d of pairs with its confidence interval: the mean difference divided by the standard deviation of the
+/// differences. `t` is the result of the paired t-test, and determines the sign.
 pub fn of_pairs(t: &TTest) -> EffectSize {
     let root_n = (t.df + 1.0).sqrt();
     let [low, high] = [1.0 - TAIL, TAIL].map(|below| noncentrality_of_t(t.value, t.df, below));
@@ -36,12 +36,12 @@ pub fn of_pairs(t: &TTest) -> EffectSize {
     EffectSize { value: t.value / root_n, interval: ends.map(|end| end / root_n) }
 }
 
-/// Returns partial omega squared for an F with `df` and `error_df` degrees of freedom: the fraction of the variance of effect
-/// and error in the population that the effect explains.
+/// Returns partial omega squared with its confidence interval for an F with `df` and `error_df` degrees of freedom: the fraction
+/// of the variance of effect and error in the population that the effect explains.
 ///
-/// The value follows from the noncentrality `df (F - 1)`, whose mean F equals the observed one; the interval of the
-/// noncentrality is converted by the same formula. Eta squared is larger on average and may lie outside this interval. An F
-/// below 1 gives the value 0.
+/// The value follows from the noncentrality `df (F - 1)`, for which the mean F of many error degrees of freedom equals the
+/// observed F; the interval of the noncentrality is converted by the same formula. Eta squared is larger on average and may lie
+/// outside this interval. An F below 1 gives the value 0.
 pub fn partial_omega_squared(f: f64, df: f64, error_df: f64) -> EffectSize {
     let share = |noncentrality: f64| {
         if noncentrality.is_finite() { noncentrality / (noncentrality + df + error_df + 1.0) } else { 1.0 }

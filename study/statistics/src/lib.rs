@@ -64,7 +64,7 @@ pub enum StatisticsError {
         /// Length of the second list.
         right: usize,
     },
-    /// The values do not vary, so there is no error variance to test against.
+    /// The values (of a fitted line, the abscissae) do not vary, so the statistic is undefined.
     #[error("{what}: the values do not vary, so the statistic is undefined")]
     Constant {
         /// Name of the result.
@@ -73,7 +73,7 @@ pub enum StatisticsError {
     /// Both values of a pair are equal in every subject.
     #[error("no difference in any subject")]
     NoDifference,
-    /// The differences do not vary between subjects.
+    /// The differences of pairs, or the linear contrasts, do not vary between subjects.
     #[error("the same difference in every subject")]
     SameDifference,
     /// The means are equal at all levels.
@@ -126,7 +126,7 @@ impl<T> Outcome<T> {
         self.result().map_or_else(not_testable_text, text)
     }
 
-    /// Converts the statistic with `of`; keeps the reason for a missing one.
+    /// Converts the statistic with `of`; keeps the reason for a missing statistic.
     pub fn map<U>(self, of: impl FnOnce(T) -> U) -> Outcome<U> {
         match self {
             Self::Tested(tested) => Outcome::Tested(of(tested)),

@@ -6,7 +6,8 @@ const FRACTION_TERMS_MOST: u32 = 10_000;
 /// Lower limit of the denominators of the continued fraction (Lentz's method).
 const TINY: f64 = 1.0e-300;
 
-/// Returns the regularised incomplete beta function I_x(a, b). The caller passes `y = 1 - x` as well, computed without cancellation.
+/// Returns the regularised incomplete beta function I_x(a, b). The caller passes `y = 1 - x` as well, computed without
+/// cancellation.
 ///
 /// Uses the continued fraction of Abramowitz and Stegun 26.5.8, evaluated forward (Lentz 1976), on the side of the mean where
 /// it converges fast. On the other side the result is 1 minus the opposite tail, which is the smaller one: a small result is

@@ -37,7 +37,8 @@ pub struct ContrastTest {
 /// Fits a line to the means of `responses[subject][level]` over the values `levels` of a factor, and tests the linear contrast.
 ///
 /// # Errors
-/// If there are fewer than three levels, a row has the wrong length, a value is not finite, or the means do not vary.
+/// If there are fewer than three levels or no responses, a row has the wrong length, a value is not finite, or the levels or the
+/// means do not vary.
 pub fn linear(levels: &[f64], responses: &[Vec<f64>]) -> Result<LinearTrend, StatisticsError> {
     const WHAT: &str = "a linear trend";
     for row in responses {

@@ -61,8 +61,9 @@ impl Design {
     /// levels of the last factor varying fastest; without within-subject factors, one value.
     ///
     /// # Errors
-    /// [`StatisticsError::Design`] for wrong counts, a group without subjects, or a value that is not finite;
-    /// [`StatisticsError::TooFew`] if no combination of groups has two subjects.
+    /// [`StatisticsError::Design`] if a factor has fewer than two levels or groups, a factor or a row has the wrong length, a
+    /// combination of groups has no subject, or a response is not finite; [`StatisticsError::TooFew`] if no combination of groups
+    /// has two subjects.
     pub fn new(
         between: Vec<BetweenFactor>,
         within: Vec<WithinFactor>,
@@ -87,7 +88,10 @@ impl Design {
         for factor in &between {
             if factor.groups.len() != responses.len() {
                 let (groups, subjects) = (factor.groups.len(), responses.len());
-                return refuse(format!("`{}` groups {groups} subjects of {subjects}", factor.name));
+                return refuse(format!(
+                    "`{}` has the groups of {groups} subjects; give a group for each of {subjects}",
+                    factor.name
+                ));
             }
             if factor.count() < 2 {
                 return refuse(format!("`{}` has only one group", factor.name));

@@ -10,7 +10,7 @@
 //! - **Type II**: each effect adjusted for all others that do not contain it.
 //!
 //! Greenhouse and Geisser's epsilon (1959) and Huynh and Feldt's (1976, with Lecoutre's correction of 1991) scale the degrees
-//! of freedom of effects that violate sphericity: whose contrasts have unequal variances or are correlated.
+//! of freedom of effects that violate sphericity, because their contrasts have unequal variances or are correlated.
 
 mod design;
 
@@ -90,12 +90,12 @@ const LEAST_LEFT: f64 = 1.0e-9;
 pub struct Sphericity {
     /// Greenhouse-Geisser epsilon: 1 if the orthonormal contrasts have equal variances and are uncorrelated (sphericity).
     pub epsilon_gg: f64,
-    /// p-value with degrees of freedom scaled by `epsilon_gg`.
+    /// p-value with degrees of freedom scaled by `epsilon_gg` within its limits, one over the number of contrasts and 1.
     pub p_gg: f64,
-    /// Huynh-Feldt epsilon (corrected by Lecoutre), which may exceed 1; its minimum, one over the number of contrasts, if the
-    /// residuals have a single degree of freedom.
+    /// Huynh-Feldt epsilon (corrected by Lecoutre), which may exceed 1. With a single degree of freedom of the residuals, it is one
+    /// over the number of contrasts.
     pub epsilon_hf: f64,
-    /// p-value with degrees of freedom scaled by `epsilon_hf`, limited to 1.
+    /// p-value with degrees of freedom scaled by `epsilon_hf` within its limits, one over the number of contrasts and 1.
     pub p_hf: f64,
 }
 
