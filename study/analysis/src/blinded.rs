@@ -9,7 +9,7 @@ use serde::Serialize;
 /// Response in a coded condition: a row of the exported table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct BlindedRow {
-    /// Subject: `sub-01`.
+    /// Label of the subject: `sub-01`.
     pub subject: String,
     /// Code of the subject's first modality.
     pub first_modality: &'static str,
@@ -47,7 +47,8 @@ pub struct BlindedAnalysis {
 }
 
 impl BlindedAnalysis {
-    /// Replaces the conditions of a result with codes.
+    /// Replaces the conditions of a result with codes, divides thresholds by their base, and averages the responses in each
+    /// condition.
     #[must_use]
     pub fn of(analysis: &Analysis, codes: &Codes) -> Self {
         let (task, subjects, anova) = match analysis {

@@ -10,7 +10,7 @@ use serde::Serialize;
 /// Results of one subject's check trials.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubjectChecks {
-    /// Subject: `sub-01`.
+    /// Label of the subject: `sub-01`.
     pub subject: String,
     /// Number of catch trials: pairs of equal stimuli.
     pub catch_trials: usize,

@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 /// Result of applying the exclusion rules.
 #[derive(Clone, Debug, Default)]
 pub struct Applied {
-    /// Data that no rule has excluded.
+    /// Records of the subjects that are not excluded, without their excluded trials and tracks.
     pub kept: Vec<SubjectRecord>,
     /// Excluded trials, tracks and sittings with rule and value.
     pub excluded: Vec<Exclusion>,
@@ -178,7 +178,7 @@ impl Applied {
         }
     }
 
-    /// Returns the warnings of all rules that have excluded something and depend on more than the subject.
+    /// Returns the warnings of the rules that have excluded data and depend on the stimulus as well as on the subject.
     pub fn warnings(&self) -> impl Iterator<Item = &'static str> {
         let mut rules: Vec<&str> = self.excluded.iter().map(|exclusion| exclusion.rule).collect();
         rules.sort_unstable();
@@ -186,7 +186,7 @@ impl Applied {
         rules.into_iter().filter_map(ExclusionRules::warning)
     }
 
-    /// Formats a table of the exclusions, of the rules without exclusions and of the rules that could not be applied.
+    /// Formats a table of the exclusions, the rules without exclusions, the rules that could not be applied, and the warnings.
     #[must_use]
     pub fn to_text(&self, rules: &ExclusionRules) -> String {
         let mut lines = vec![

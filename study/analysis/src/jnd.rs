@@ -77,13 +77,13 @@ pub struct JndAnalysis {
     pub linear_r2: f64,
     /// Thresholds by condition.
     pub thresholds: Vec<ThresholdCell>,
-    /// Mean number of presented pairs per subject.
+    /// Mean number of counted pairs per subject.
     pub pairs_per_subject: f64,
-    /// Number of tracks without a threshold, which are not analysed.
+    /// Number of tracks without a threshold; [`Estimator::Procedure`] omits these tracks.
     pub unfinished_tracks: usize,
     /// Pairwise comparisons of the modalities at each base, and of the Weber fractions of the bases.
     pub post_hoc: Vec<PostHoc>,
-    /// Movement measures; empty without kinematics.
+    /// Movement measures; empty if a subject has no movement data in a condition.
     pub kinematics: Vec<KinematicMeasure>,
     /// Comparability with the thesis.
     #[serde(skip)]
@@ -96,7 +96,8 @@ pub struct JndAnalysis {
 /// Analyses the thresholds of a study.
 ///
 /// # Errors
-/// [`AnalysisError`] if a subject has no threshold in some condition, or there are too few subjects.
+/// [`AnalysisError`] if a subject has no threshold in some condition, or a statistic cannot be computed, for instance with fewer
+/// than two subjects.
 pub fn analyse_jnd(
     protocol: &JndProtocol,
     subjects: &[SubjectRecord],

@@ -171,7 +171,8 @@ impl Analysis {
     /// Analyses a study from the records of its complete sittings.
     ///
     /// # Errors
-    /// [`AnalysisError`] for too few subjects, missing thresholds, or ratings that cannot be normalised.
+    /// [`AnalysisError`] for too few subjects, a missing threshold or rating, ratings that cannot be normalised, or a statistic
+    /// that cannot be computed.
     pub fn of(
         protocol: &Protocol,
         subjects: &[SubjectRecord],
@@ -218,7 +219,7 @@ pub fn order_note(effects: &[Effect]) -> Option<&'static str> {
 /// Response of one subject in one condition: a row of the exported table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ResponseRow {
-    /// Subject: `sub-01`.
+    /// Label of the subject: `sub-01`.
     pub subject: String,
     /// First modality of the subject.
     pub first_modality: Modality,
@@ -266,7 +267,7 @@ fn means_of_both(vh: &[f64], h: &[f64]) -> Vec<f64> {
     vh.iter().zip(h).map(|(vh, h)| 0.5 * (vh + h)).collect()
 }
 
-/// Returns the mean over subjects in each condition, of `responses[subject][modality by level]`.
+/// Returns the mean over subjects with its confidence interval for each condition, from `responses[subject][modality by level]`.
 fn mean_responses(
     levels: &[f64],
     responses: &[Vec<f64>],

@@ -48,7 +48,7 @@ pub struct MagnitudeAnalysis {
     pub repeated: usize,
     /// Pairwise comparisons of the modalities at each stimulus.
     pub post_hoc: Vec<PostHoc>,
-    /// Movement measures; empty without kinematics.
+    /// Movement measures; empty if a subject has no movement data in a condition.
     pub kinematics: Vec<KinematicMeasure>,
     /// Comparability with the thesis.
     #[serde(skip)]
@@ -61,7 +61,8 @@ pub struct MagnitudeAnalysis {
 /// Analyses the ratings of a study.
 ///
 /// # Errors
-/// [`AnalysisError`] if ratings cannot be normalised as requested, a stimulus was never rated, or there are too few subjects.
+/// [`AnalysisError`] if ratings cannot be normalised as requested, a stimulus was never rated in a modality, or a statistic cannot
+/// be computed, for instance with fewer than two subjects.
 pub fn analyse_magnitude(
     protocol: &MagnitudeProtocol,
     subjects: &[SubjectRecord],

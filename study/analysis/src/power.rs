@@ -1,4 +1,5 @@
-//! Power of a difference experiment: simulates whole studies without apparatus and counts significant differences between the modalities.
+//! Power of a difference experiment: simulates whole studies without apparatus and counts significant differences between the
+//! modalities.
 //!
 //! The test is the paired t-test of `flotor analyse`. With equal observers in both modalities the fraction of significant
 //! studies is the type I error rate, which must equal the significance level.
@@ -29,8 +30,8 @@ pub struct Power {
     pub weber: [f64; 2],
 }
 
-/// Returns a population whose thresholds without vision are `ratio` times the thresholds with vision, and whose lapse rate is
-/// `lapse`.
+/// Returns the default population with the lapse rate `lapse`, and with thresholds without vision that are `ratio` times the
+/// thresholds with vision.
 pub fn population(ratio: f64, lapse: f64) -> Population {
     let usual = Population::default();
     let h = Sensitivity { sigma: usual.vh.sigma * ratio, ..usual.vh };
@@ -41,7 +42,8 @@ pub fn population(ratio: f64, lapse: f64) -> Population {
 /// haptics, haptics alone.
 ///
 /// # Errors
-/// [`AnalysisError`] if the study cannot be analysed: a subject has no threshold in some condition.
+/// [`AnalysisError`] if the study cannot be analysed: a subject has no threshold in some condition, or there are fewer than two
+/// subjects.
 pub fn study(
     protocol: &JndProtocol,
     population: &Population,

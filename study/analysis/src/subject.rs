@@ -33,7 +33,7 @@ pub struct SubjectCondition {
 /// Data quality of one subject.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SubjectQuality {
-    /// Subject: `sub-01`.
+    /// Label of the subject: `sub-01`.
     pub subject: String,
     /// Number of counted answers.
     pub answers: usize,
