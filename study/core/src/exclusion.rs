@@ -47,8 +47,8 @@ pub struct ExclusionRules {
     pub most_excluded_trials: Option<f64>,
 }
 
-/// Reason for exclusion without a rule: a subject has no result in some condition, because trial rules excluded all of it or no
-/// track reached a threshold.
+/// Reason for exclusion without a rule: a subject has no result in some condition, because trial rules excluded all data of the
+/// condition or no track reached a threshold.
 pub const EMPTY_CONDITION: &str = "empty_condition";
 
 /// Extent of an exclusion.

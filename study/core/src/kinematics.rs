@@ -36,7 +36,7 @@ pub struct StimulusKinematics {
     /// Number of complete cycles, each one movement down and one up.
     pub cycles: u32,
     /// Stiffness felt by the hand: negative slope of the vertical force over the handle's height (least squares), N/m; positive
-    /// for a spring, `None` if the handle did not move.
+    /// for a spring, `None` if the standard deviation of the height is at most 0.05 mm.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub felt_stiffness_n_per_m: Option<f64>,
 }

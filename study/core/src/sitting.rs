@@ -59,7 +59,7 @@ pub struct TrackResult {
     pub base: f64,
     /// Threshold as a fraction of the base; `None` if the track ended without a threshold.
     pub threshold: Option<f64>,
-    /// Sides on which the answers do not bound the threshold; `None` if they bound both, or for weighted up-down.
+    /// Sides on which the answers do not bound the threshold; `None` if the answers bound both sides, or for weighted up-down.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_bounded: Option<NotBounded>,
     /// Number of counted trials.
@@ -168,8 +168,8 @@ impl Sitting {
         Some(Trial { number, phase, replication, track, modality, presented, repeat: self.repeat })
     }
 
-    /// Returns practice trials for a resumed sitting, in the modality of its next trial; they are not part of the sitting. Empty if
-    /// practice comes next anyway, or the protocol has none.
+    /// Returns practice trials for a resumed sitting, in the modality of its next trial; these trials are not part of the sitting.
+    /// Empty if the next trial is practice, the protocol has no practice, or the sitting is over.
     #[must_use]
     pub fn practice(&self) -> Vec<Trial> {
         let Some(Trial { modality, .. }) = self.next().filter(|next| next.phase != Phase::Practice) else {
@@ -194,7 +194,7 @@ impl Sitting {
     /// Processes the answer to the trial of [`Sitting::next`], and advances to the next trial or to a repeat.
     ///
     /// # Errors
-    /// If the answer is of the wrong kind or the sitting is over; the state is unchanged.
+    /// If the answer is of the wrong kind, a rating is not finite, or the sitting is over; the state is unchanged.
     pub fn answer(&mut self, response: Response, exploration: &Exploration) -> Result<Verdict, AnswerError> {
         let trial = self.next().ok_or(AnswerError::Over)?;
         check_kind(&trial, response)?;

@@ -53,8 +53,8 @@ impl SittingClock {
         TimeOfDay(self.began.0.saturating_add(passed_ms))
     }
 
-    /// Returns the jump of the system clock since the last reported jump, ms, positive forward; `None` if it changed by less
-    /// than a second.
+    /// Returns the jump of the system clock since the last reported jump, ms, positive forward, and marks it as reported; `None`
+    /// if the clock jumped by less than a second.
     pub fn take_jump_ms(&mut self) -> Option<i64> {
         self.jump_to(TimeOfDay::now())
     }

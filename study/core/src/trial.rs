@@ -251,7 +251,8 @@ pub struct Exploration {
     /// simulated observers.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub response_time_s: Option<f64>,
-    /// Movement measures of each stimulus in the order of presentation, again for each repetition on request; empty without a device.
+    /// Movement measures of each stimulus in the order of presentation, again for each repetition on request; empty without stored
+    /// movement.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub kinematics: Vec<StimulusKinematics>,
     /// Number of ticks the servo missed during the presentation.

@@ -28,11 +28,11 @@ pub struct MinimumExploration {
 }
 
 impl MinimumExploration {
-    /// Half a second and 2 mm. Once a stimulus has been felt this much, the previous answer can no longer be withdrawn.
+    /// Usual minimum: 0.5 s and 2 mm. An exploration of this extent makes the previous answer final.
     pub const USUAL: MinimumExploration = MinimumExploration { time_s: 0.5, path_length_m: 2.0e-3 };
 
-    /// Returns a hint for the person if a stimulus was not felt long or far enough; `None` if it was, or without a path length
-    /// if the time suffices.
+    /// Returns a hint for the person if a stimulus was not felt long or far enough; `None` if time and path length suffice. Without
+    /// a path length, only the time counts.
     fn is_missed(&self, time_s: f64, path_length_m: Option<f64>) -> Option<&'static str> {
         if time_s < self.time_s {
             Some("feel the stimulus a little longer")
@@ -72,8 +72,8 @@ pub trait FrontEnd {
     fn refuse(&mut self, why: &str) -> Result<(), ApparatusOrFrontEndError>;
 }
 
-/// Runs a sitting until it is complete or stopped, and logs each interruption and disturbance. `least` is required of each
-/// stimulus.
+/// Runs a sitting until it is complete or stopped, and logs each answer, note, interruption and disturbance. `least` is the
+/// minimum exploration of each stimulus.
 ///
 /// # Errors
 /// Errors of apparatus, front end or log; the log stays valid and can be resumed.
@@ -87,7 +87,7 @@ pub fn attend(
     let mut parties = Parties { attended, log, rig, front };
     let result = sit(&mut parties, least);
     if let Err(error) = &result {
-        // Return the first error: a failure to log it matters less.
+        // Return the error of the sitting: a failure to log this error matters less.
         let _ = parties.log.write(&Event::Incident(parties.rig.incident_of(error.as_ref())));
     }
     result

@@ -63,7 +63,7 @@ impl<'a> RealTimeRig<'a> {
     /// ([`Self::viewer_error`]).
     ///
     /// # Errors
-    /// [`RunError`], or the loop's rejection of the first change.
+    /// [`RunError`], an error of the thread's creation, or the loop's rejection of the first change.
     pub fn start(
         apparatus: &'a Apparatus,
         kinematics: Kinematics,
@@ -113,11 +113,11 @@ impl<'a> RealTimeRig<'a> {
         self.viewer_error.as_deref()
     }
 
-    /// Sets the stimulus, fades it in, and waits until it can be felt. Returns the reason if the recording of the movement
-    /// fails; `None` if it works or none was requested.
+    /// Sets the stimulus, fades it in, waits until it can be felt, and starts the recording of the movement. Returns the reason if
+    /// the recording cannot start; `None` if the recording has started or was not requested.
     ///
     /// # Errors
-    /// If the run has ended, or the model rejected the value.
+    /// If the run has ended, or the loop or the model rejected the change.
     pub fn begin(&mut self, trial: &Trial, value: f64) -> Result<Option<String>, ApparatusOrFrontEndError> {
         self.check()?;
         self.set(value)?;
@@ -146,7 +146,7 @@ impl<'a> RealTimeRig<'a> {
         Ok(None)
     }
 
-    /// Returns the vertical path length of the handle since the stimulus can be felt, m; `None` without a stimulus, or before
+    /// Returns the vertical path length of the handle since the stimulus began to fade in, m; `None` without a stimulus, or before
     /// its first sample.
     #[must_use]
     pub fn path_length_m(&self) -> Option<f64> {
@@ -158,7 +158,7 @@ impl<'a> RealTimeRig<'a> {
     /// Fades the object out and returns the measures of its exploration.
     ///
     /// # Errors
-    /// If the run has ended.
+    /// If the run has ended, or the loop rejected the change.
     pub fn end(&mut self) -> Result<StimulusExploration, ApparatusOrFrontEndError> {
         let (meter, missed_ticks) = {
             let mut watch = self.shared.lock();
@@ -220,7 +220,7 @@ impl<'a> RealTimeRig<'a> {
     /// is dropped, so that the handle is still held during the final screen.
     ///
     /// # Errors
-    /// If a fault or an emergency stop ended the run.
+    /// If an error, a fault or an emergency stop ended the run.
     pub fn finish_after(&mut self, ending: Ending) -> Result<Ending, ApparatusOrFrontEndError> {
         if ending == Ending::Complete {
             return Ok(ending);

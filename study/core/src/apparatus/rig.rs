@@ -50,7 +50,8 @@ impl TrialFiles {
         Ok(Self { folder, prefix })
     }
 
-    /// Returns an unused path for a trial: the recording of an interrupted trial is not overwritten by its repetition.
+    /// Returns an unused path for a trial, so that a repetition does not overwrite the recording of an interrupted trial. After
+    /// 1000 recordings of a trial, returns the path of the first recording.
     #[must_use]
     pub fn next_of(&self, trial: &Trial) -> PathBuf {
         let first = self.of(trial);
@@ -115,7 +116,8 @@ impl<'a> Rig<'a> {
         })
     }
 
-    /// Presents the stimuli of a trial one after the other, and passes every tick to `also` as well.
+    /// Presents the stimuli of a trial one after the other, and returns the exploration. Records the movement if requested, and
+    /// passes every tick to `also` as well.
     ///
     /// # Errors
     /// Errors of the apparatus; [`RunEnded`] after a stop request.

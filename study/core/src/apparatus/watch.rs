@@ -22,8 +22,8 @@ pub struct Watch {
     pub meter: Option<KinematicsMeter>,
     /// Recording of the trial in progress.
     pub recording: RunRecording,
-    /// Model outputs requested already before the recordings of later trials, because the loop applies a request some ticks
-    /// later; `None` without recordings.
+    /// Outputs requested in advance for the recordings of later trials, because the loop applies a request some ticks later;
+    /// `None` without recordings.
     pub ahead: Option<Demand>,
     /// Number of ticks missed since the last reset.
     pub missed_ticks: u64,

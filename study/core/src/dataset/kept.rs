@@ -8,8 +8,8 @@ use serde_json::{Map, Value};
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Unmergeable {
-    /// The table lacks its key column.
-    #[error("the first line has no column `{0}`; separate the columns with tabs")]
+    /// The first column of the table is not the key column.
+    #[error("the first column is not `{0}`; write `{0}` first, and separate the columns with tabs")]
     NoKey(&'static str),
     /// The number of cells in a line differs from the number of columns.
     #[error("line {line} has {cells} cells instead of {columns}, one for each column")]

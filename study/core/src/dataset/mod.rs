@@ -176,7 +176,7 @@ impl Dataset {
         self.root.join(format!("{subject}/beh/{subject}_task-{task}_beh.tsv"))
     }
 
-    /// Reads and verifies all logs, in the order of their subjects.
+    /// Reads and verifies all logs, in the order of their paths.
     ///
     /// # Errors
     /// If a log is invalid or misplaced, there is no log, or logs belong to different studies.
@@ -228,7 +228,7 @@ impl Dataset {
     ///
     /// # Errors
     /// If a log is invalid or in use, `existing_log` is [`ExistingLogPolicy::Refuse`] and there is a log, or the study began
-    /// with another configuration.
+    /// with another configuration or other input files.
     pub fn progress(&self, begin: &Begin, existing_log: ExistingLogPolicy) -> Result<Progress, DatasetError> {
         let (subject, root) = (begin.subject, self.root.clone());
         let path = self.log_path(subject, begin.protocol.task());
@@ -274,10 +274,10 @@ impl Dataset {
         Ok((sitting, writer))
     }
 
-    /// Writes the tables of all complete sittings, the list of participants, and the description files.
+    /// Writes the tables of all complete sittings, the lists of participants and scans, and the description files.
     ///
     /// # Errors
-    /// If a log is invalid, or a file cannot be merged or written.
+    /// Errors of [`Self::logs`], or if a file cannot be read, merged or written.
     pub fn write_tables(&self) -> Result<(), DatasetError> {
         let mut participants = table::PARTICIPANTS_HEAD.to_owned();
         let mut first = None;

@@ -32,7 +32,7 @@ const COLUMNS: [(&str, &str); 30] = [
     ("response", "first, second, dont_know, rating or seen"),
     ("rating", "Rating, in the subject's own scale"),
     ("judgement", "correct, wrong or unsure"),
-    ("is_reversal", "1 if the answer turned the direction of the track"),
+    ("is_reversal", "1 if the answer reversed the direction of the track"),
     ("repeated", "1 if the presentation is repeated and its answer does not count"),
     ("threshold", "Threshold of the track as a share of the base, on its last trial"),
     ("response_time", "From the end of the presentation to the answer, s"),
@@ -47,7 +47,7 @@ const COLUMNS: [(&str, &str); 30] = [
     ("missed_ticks", "Ticks missed by the servo"),
     (
         "onset",
-        "When the first stimulus could be felt, s after the begin of the sitting (acq_time in the list of scans)",
+        "Time from which the first stimulus could be felt, s after the start of the sitting (acq_time in the list of scans)",
     ),
     ("observer", "human, or simulated: no person was tested"),
 ];
@@ -60,8 +60,9 @@ pub(super) fn trials(log: &SittingLog) -> String {
     [head.join("\t")].into_iter().chain(rows).fold(String::new(), |text, line| text + &line + "\n")
 }
 
-/// Returns all trials of all sittings as one comma-separated table for other programs: subject and first modality, the columns of a
-/// sitting's table, movement per stimulus, and the rule that excluded the trial; lists within a cell are separated by spaces.
+/// Returns all trials of all sittings as one comma-separated table for other programs: subject and first modality, the columns
+/// of a sitting's table, movement per stimulus, and the rule that excluded the trial. Spaces separate the items of a list within
+/// a cell.
 #[must_use]
 pub fn trials_csv(logs: &[SittingLog], excluded: &[Exclusion]) -> String {
     let head = COLUMNS.iter().map(|(name, _)| *name);
@@ -158,7 +159,7 @@ fn row(record: &TrialRecord, codes: &Codes, log: &SittingLog) -> Vec<String> {
     ]
 }
 
-/// Returns the JSON sidecar of the tables, and those of its keys that the program overwrites.
+/// Returns the JSON sidecar of the tables, and the keys that the program overwrites.
 pub(super) fn columns(protocol: &Protocol) -> (Map<String, Value>, &'static [&'static str]) {
     let mut sidecar = Map::new();
     sidecar.insert("TaskName".to_owned(), json!(protocol.task()));
@@ -170,7 +171,7 @@ pub(super) fn columns(protocol: &Protocol) -> (Map<String, Value>, &'static [&'s
     (sidecar, &["TaskName", "Stimulus", "Protocol"])
 }
 
-/// Returns the description of the data set, and those of its keys that the program overwrites.
+/// Returns the description of the data set, and the keys that the program overwrites.
 pub(super) fn description(begin: &Begin) -> (Map<String, Value>, &'static [&'static str]) {
     let description = json!({
         "Name": format!("Perception study: {}", begin.protocol.task()),

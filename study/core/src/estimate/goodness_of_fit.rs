@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// Number of simulated answer sets.
 const SETS: u32 = 999;
-/// Maximum number of classes; below, number of answers per class from which on there are more classes than one.
+/// Maximum number of classes; below, minimum mean number of answers per class if there are several classes.
 const CLASSES_MOST: usize = 4;
 const ANSWERS_LEAST: usize = 6;
 

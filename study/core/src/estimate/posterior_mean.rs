@@ -7,8 +7,8 @@ use super::{Estimate, Observation, Prior};
 /// Node counts for the means.
 const NODES: Nodes = Nodes { thresholds: 24, criteria: 16, lapses: 1 };
 
-/// Estimates the observer by posterior means (geometric means for sigma and threshold); also returns on which sides the answers
-/// do not bound the threshold, `None` if they bound both.
+/// Estimates the observer by posterior means (geometric means for sigma and threshold); also returns the sides on which the
+/// answers do not bound the threshold, `None` if the answers bound both sides.
 pub(crate) fn posterior_mean(
     observations: &[Observation],
     prior: &Prior,

@@ -30,7 +30,7 @@ pub struct Psychometric {
     pub threshold: f64,
     /// 95 % credible interval of the threshold, as fractions of the base; `None` at an end that only the prior bounds.
     pub threshold_interval: [Option<f64>; 2],
-    /// Sides on which the answers do not bound the threshold; `None` if they bound both.
+    /// Sides on which the answers do not bound the threshold; `None` if the answers bound both sides.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_bounded: Option<NotBounded>,
     /// Posterior mean of the criterion, in standard deviations of the noise.
@@ -39,12 +39,12 @@ pub struct Psychometric {
     pub lapse: f64,
     /// Upper bound of the lapse rate (97.5 % quantile of the posterior).
     pub lapse_most: f64,
-    /// Goodness of fit.
+    /// Goodness of fit of the observer with these estimates of threshold, criterion and lapse rate.
     pub fit: GoodnessOfFit,
 }
 
-/// Unbounded sides of a threshold's interval: bounded by the prior alone, because the answers' 95 % likelihood-ratio interval
-/// is unbounded there.
+/// Unbounded sides of a threshold's interval: sides on which the 95 % likelihood-ratio interval of the answers is unbounded, so
+/// that only the prior bounds the threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NotBounded {

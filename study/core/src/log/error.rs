@@ -57,7 +57,7 @@ pub enum LogProblem {
         /// Revision found in the log.
         found: u32,
     },
-    /// An event is out of sequence; the text says which.
+    /// An event is out of sequence; the text names the event.
     #[error("{0}")]
     Order(&'static str),
     /// The replayed experiment presents another trial or reaches another verdict.

@@ -181,7 +181,7 @@ impl SittingLog {
 
     /// Restores the state before the last trial by a replay of all earlier answers.
     fn withdraw(&mut self, number: u32) -> Result<(), LogProblem> {
-        const LAST: &str = "`withdrawn` of another trial than the last";
+        const LAST: &str = "`withdrawn` names another trial than the last; use an unchanged copy";
         let is_last = |last: &TrialRecord| last.event.trial.number == number;
         let last = self.trials.pop_if(|last| is_last(last)).ok_or(LogProblem::Order(LAST))?;
         self.withdrawn.push(last.event);

@@ -1,6 +1,7 @@
 //! Simulated subjects with known thresholds.
 //!
-//! Answers depend only on the seed, the subject's number and the trial number, so a sitting resumed after a crash gets the same answers.
+//! The noise of an answer depends only on the seed, the stimulus parameter, the subject's number and the trial number, so a sitting
+//! resumed after a crash gets the same answers.
 
 mod hand;
 mod ternary;

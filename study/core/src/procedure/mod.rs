@@ -128,8 +128,8 @@ impl Track {
         }
     }
 
-    /// Returns on which sides the answers do not bound the threshold; `None` if they bound both, before the end of the track,
-    /// and for weighted up-down.
+    /// Returns the sides on which the answers do not bound the threshold; `None` if the answers bound both sides, before the end of
+    /// the track, and for weighted up-down.
     #[must_use]
     pub fn not_bounded(&self) -> Option<NotBounded> {
         match self {

@@ -91,8 +91,8 @@ impl QuestPlus {
         self.answers.len() >= self.rule.trials as usize
     }
 
-    /// Estimates the observer from the answers so far; also returns on which sides these answers do not bound the threshold,
-    /// `None` if they bound both.
+    /// Estimates the observer from the answers so far; also returns the sides on which these answers do not bound the threshold,
+    /// `None` if the answers bound both sides.
     #[must_use]
     pub fn estimate(&self) -> (Estimate, Option<NotBounded>) {
         posterior_mean(&self.answers, &self.rule.prior, self.rule.target)

@@ -28,7 +28,7 @@ pub enum StepAtReversal {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Averaging {
-    /// Both included
+    /// Both trials included
     #[default]
     BothEnds,
     /// Trial of the first reversal excluded

@@ -9,14 +9,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum RatingScale {
-    /// Divided by the subject's mean
+    /// Ratings divided by the subject's mean rating
     #[default]
     #[value(name = "mean")]
     DividedByMean,
-    /// Divided by the subject's geometric mean (modulus equalisation); needs positive ratings
+    /// Ratings divided by the subject's geometric mean (modulus equalisation); needs positive ratings
     #[value(name = "geometric-mean")]
     DividedByGeometricMean,
-    /// Unchanged
+    /// Ratings unchanged
     Raw,
 }
 

@@ -1,6 +1,7 @@
 //! Settings of the experiments.
 //!
-//! A protocol defines the stimuli; their order for each subject follows from the subject's number and the seed ([`crate::sitting`]).
+//! A protocol defines the stimuli; the order for each subject follows from the subject's number and the seed
+//! ([`crate::sitting`]).
 
 mod jnd;
 mod magnitude;
@@ -161,7 +162,7 @@ impl Checks {
 pub struct SubjectNumber(u16);
 
 impl SubjectNumber {
-    /// Largest number; three digits in file names.
+    /// Largest number, so that a number has at most three digits in file names.
     pub const MOST: u16 = 999;
 
     /// Creates a subject number; `None` outside 1 to 999.

@@ -126,7 +126,7 @@ impl ScreenStateMachine {
         }
     }
 
-    /// Adds texts that the person reads before the next trial, such as consent or instructions.
+    /// Sets the texts that the person reads before the next trial, such as a consent form or instructions.
     pub fn after_reading(self, texts: impl IntoIterator<Item = String>) -> Self {
         Self { texts: texts.into_iter().collect(), ..self }
     }

@@ -50,7 +50,7 @@ impl StopKey {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "screen", rename_all = "kebab-case")]
 pub enum Screen {
-    /// A text of the experimenter, such as a consent or instructions; [`Input::Continue`] confirms it.
+    /// Text by the experimenter, such as a consent form or instructions; [`Input::Continue`] confirms the text.
     Read {
         /// Text; its first line is the title.
         text: String,
@@ -113,7 +113,8 @@ pub enum Pause {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Question {
-    /// Which stimulus had more of the quality: [`Response::First`], [`Response::Second`] or [`Response::DontKnow`].
+    /// Choice of the stimulus with more of the judged quality: [`Response::First`], [`Response::Second`] or
+    /// [`Response::DontKnow`].
     WhichIsMore,
     /// Magnitude on a free scale: [`Response::Rating`], any number above 0.
     HowMuch,
