@@ -228,7 +228,7 @@ struct JndArguments {
     /// Weighted up-down: first step down, as a share of the base
     #[arg(long, default_value_t = 0.10, value_parser = real, value_name = "SHARE")]
     step: f64,
-    /// Target share of correct answers
+    /// Target share of correct answers; "I don't know" counts half
     #[arg(long, default_value_t = 0.75, value_parser = real, value_name = "SHARE")]
     target: f64,
     /// Weighted up-down: numbers of the reversals that halve the step
@@ -349,7 +349,7 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
 /// Parses one word for a table: 1 to 20 letters or digits.
 fn word(text: &str) -> Result<String, String> {
     let is_word = !text.is_empty() && text.len() <= 20 && text.chars().all(char::is_alphanumeric);
-    if is_word { Ok(text.to_owned()) } else { Err("write one word of at most 20 letters".to_owned()) }
+    if is_word { Ok(text.to_owned()) } else { Err("write one word, 1 to 20 letters or digits".to_owned()) }
 }
 
 /// Parses a duration above 0; returns seconds.

@@ -23,8 +23,8 @@ pub(super) struct MeasuredCurve {
     pub(super) free_length_m: Option<f64>,
 }
 
-/// Fitted range of the deflection, as fractions of the largest deflection. Outside it, spring ends that are not yet seated and
-/// coils that begin to touch falsify the stiffness (EN 15800 measures the spring rate between 30 and 70 %).
+/// Fitted range of the deflection, as fractions of the largest deflection. Outside this range, spring ends that are not yet
+/// seated and coils that begin to touch distort the stiffness (EN 15800 measures the spring rate between 30 and 70 %).
 pub(super) const FITTED: [f64; 2] = [0.3, 0.7];
 
 /// Linear spring fitted to a curve.

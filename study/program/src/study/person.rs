@@ -198,7 +198,9 @@ impl Front {
         match common.screen {
             ScreenOption::Viewer => match rig.viewer_error() {
                 None => Ok(Self::Window(Window::open(common.stop_key, common.texts.as_deref())?)),
-                Some(why) => Err(CommandError::Failed(format!("the viewer cannot show the session: {why}"))),
+                Some(why) => Err(CommandError::Failed(format!(
+                    "the viewer cannot show the session: {why}; use --screen terminal"
+                ))),
             },
             ScreenOption::Terminal => Terminal::listen().map(Self::Terminal).map_err(failed),
             ScreenOption::Json => {

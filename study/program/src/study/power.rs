@@ -16,7 +16,7 @@ use rayon::prelude::*;
     flotor study power --subjects 16..16 --ratio 1.1 --replications 6 --runs 400"
 )]
 pub(super) struct PowerArguments {
-    /// Smallest and largest number of subjects; five sizes in this range are simulated
+    /// Smallest and largest number of subjects; up to five evenly spaced sizes in this range are simulated
     #[arg(long, default_value = "8..32", value_parser = sizes, value_name = "FEWEST..MOST")]
     subjects: (u16, u16),
     /// Number of simulated studies of each size

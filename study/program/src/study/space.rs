@@ -57,7 +57,7 @@ pub(super) fn check(folder: &Path, need: Need) -> Result<(), CommandError> {
         let advice = if need.bytes_per_s > 0.0 {
             "free disk space, or record less with --kinematics summary"
         } else {
-            "free some"
+            "free disk space"
         };
         let (folder, [free, bytes]) = (folder.display(), [free, bytes].map(|bytes| bytes / 1.0e6));
         format!("{folder}: {free:.1} MB are free, but {what} needs about {bytes:.1} MB; {advice}")

@@ -26,7 +26,7 @@ pub(super) struct SpringArguments {
     /// table has compressions)
     #[arg(long, value_parser = number("mm", "length", 0.01..=1000.0), value_name = "MM")]
     free_length_mm: Option<f64>,
-    /// Diameter of the coil between wire centres, in mm, for the scene (default: that of spring 1 of the thesis)
+    /// Diameter of the coil between wire centres, in mm, for --scene (default: 6.07) and --curve-scene (default: 6)
     #[arg(long, value_parser = number("mm", "length", 0.01..=1000.0), value_name = "MM")]
     coil_diameter_mm: Option<f64>,
     /// Plot the measurement and the fitted spring
