@@ -1,4 +1,4 @@
-//! The contact of a handle with the bodies of a model, and its mark: a disc at the point of contact and an arrow along the normal.
+//! Contact of a handle with the bodies of a model, and its mark: a disc at the point of contact and an arrow along the normal.
 
 use crate::geometry::{Color, Mesh, Section, SurfacePoint, closest_surface_point, force_arrow, plate};
 use flotor_hal::glam::DQuat;
@@ -15,10 +15,11 @@ const LENGTH: f64 = 0.3;
 const ON_SURFACE_M: f64 = 1.0e-9;
 
 /// Returns the contact of a handle inside a primitive body, with the depth of the handle; inside several bodies, the deepest
-/// contact; `None` outside of all bodies.
+/// contact; `None` outside of all bodies, or inside a cylinder alone.
 ///
-/// The point of contact is the proxy, if the model draws one on the surface: with friction the proxy stays behind, and at a box it is
-/// on the face through which the handle came. Without a proxy it is the closest point of the surface.
+/// The point of contact is the proxy, if the model draws a proxy on the surface: with friction the proxy lags behind the handle,
+/// and at a box the proxy is on the face through which the handle entered. Without a proxy, the point of contact is the closest
+/// point of the surface.
 #[must_use]
 pub fn contact(shape: &Shape, handle_m: DVec3) -> Option<SurfacePoint> {
     let bodies = shape.primitives.iter().filter(|primitive| primitive.part() == Part::Body);

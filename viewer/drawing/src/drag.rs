@@ -32,12 +32,12 @@ impl Ray {
     }
 }
 
-/// Plane in which a point is dragged, along two axes of the device frame or nearly so: a pointer that moves down moves the point
-/// straight down.
+/// Plane in which a point is dragged: vertical, so that a pointer that moves down moves the point straight down, or horizontal in a
+/// view from above.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DragPlane {
     point_mm: DVec3,
-    /// Unit vector away from the eye.
+    /// Unit normal of the plane, away from the eye.
     away: DVec3,
 }
 

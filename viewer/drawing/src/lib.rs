@@ -1,4 +1,4 @@
-//! 3D view: triangles for the description of a model, and pictures of them.
+//! 3D view: tessellation of the scene, and rendering of its triangles.
 //!
 //! - [`geometry`]: triangles of wires, primitives, surfaces, arrows, ground.
 //! - [`camera`] and [`light`]: projection and shading.

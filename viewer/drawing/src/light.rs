@@ -7,7 +7,7 @@ use flotor_hal::DVec3;
 
 /// Direction towards the key light: left, front and above. Not a unit vector.
 pub const KEY: DVec3 = DVec3::new(-0.45, -0.65, 0.9);
-/// Direction towards the fill light, opposite the key light. Not a unit vector.
+/// Direction towards the fill light, on the side opposite the key light: right, behind and above. Not a unit vector.
 pub const FILL: DVec3 = DVec3::new(0.8, 0.35, 0.25);
 /// Weights of the light sources, as fractions of the colour.
 const KEY_PART: f64 = 0.62;

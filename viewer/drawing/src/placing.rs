@@ -1,4 +1,5 @@
-//! Places of the devices of a run in the picture: side by side, each in its own frame, because the positions of their bases are unknown.
+//! Places of the devices of a run in the picture: side by side, each in its own frame, because the positions of their bases are
+//! unknown.
 
 use flotor_hal::DVec3;
 

@@ -27,9 +27,9 @@ pub struct Backdrop {
 /// Camera, background and size of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// Camera.
+    /// Camera from which the scene is seen.
     pub camera: &'a Camera,
-    /// Background.
+    /// Colours of the background.
     pub backdrop: Backdrop,
     /// Width and height, pixels.
     pub size: [usize; 2],

@@ -11,7 +11,8 @@ const SIDES: usize = 72;
 const HEAD_LENGTH: f64 = 6.0;
 const HEAD_RADIUS: f64 = 2.6;
 
-/// Adds an arrow from a point along a vector, m. An arrow shorter than two heads is scaled down as a whole.
+/// Adds an arrow from a point along a vector, m; adds nothing for a vector of length zero. An arrow shorter than two heads is
+/// scaled down as a whole.
 pub fn force_arrow(mesh: &mut Mesh, from_m: DVec3, vector_m: DVec3, shaft_radius_m: f64, color: Color) {
     let length_m = vector_m.length();
     let Some(direction) = vector_m.try_normalize() else { return };
@@ -23,8 +24,8 @@ pub fn force_arrow(mesh: &mut Mesh, from_m: DVec3, vector_m: DVec3, shaft_radius
     revolve(mesh, &Frame::along(from_m, direction), &profile, SIDES, color);
 }
 
-/// Adds an arc with a head, right-handed about an axis, for a torque; `angle_rad` is the angle of the arc with its head. Adds
-/// nothing if the head does not fit.
+/// Adds an arc with a head, right-handed about an axis, for a torque; `angle_rad` is the angle of the arc with its head, clamped to
+/// 0.95 of a turn. Adds nothing for an axis or an angle of zero.
 pub fn torque_arrow(
     mesh: &mut Mesh,
     center_m: DVec3,

@@ -1,5 +1,4 @@
-//! Triangles for the description of a model: the wire wound about a centreline, primitives, surfaces, end plates, ground,
-//! arrows.
+//! Tessellation of the scene: wire along a centreline, primitives, surfaces, end plates, ground, arrows.
 //!
 //! Coordinates are in metres and `f64` until a vertex is written. Frames are right-handed with z up.
 

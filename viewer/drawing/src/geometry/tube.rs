@@ -1,7 +1,7 @@
-//! Tube of the wire, swept along its centre with a frame that is transported along the curve, never fixed to an axis.
+//! Tube of the wire, swept along its centre with a rotation-minimising frame (parallel transport along the curve).
 //!
-//! Rings in a fixed plane would fold to a ribbon where the wire runs along that plane; a frame transported along
-//! the curve has no such place. The number of rings is fixed beforehand, so that the last one lies in the plate.
+//! Rings in a fixed plane would fold to a ribbon where the wire runs along that plane; a transported frame has no such place. The
+//! number of rings is fixed beforehand, so that the last ring lies in the plate.
 
 use super::{Body, Color, Curve, Detail, LocalStrain, Mesh, Strain};
 use flotor_hal::DVec3;
