@@ -5,8 +5,8 @@ use flotor_hal::Pose;
 use flotor_record::ReadError;
 use std::path::Path;
 
-/// Recording whose traces and handles are shown with the traces and handles of another run. Times count from the start of each run, and
-/// devices are matched by their order in the scenes.
+/// Recording with traces and handles that are shown over another run. Times count from the start of each run, and devices are
+/// matched by their order in the scenes.
 #[derive(Clone, Debug)]
 pub struct Compared {
     name: String,
@@ -29,7 +29,7 @@ impl Compared {
         self.histories.get(device)
     }
 
-    /// Returns the pose of each handle in its device frame at a time, s; `None` if the recording has no sample then.
+    /// Returns the pose of each handle in its device frame at a time, s; `None` if the recording has no sample at this time.
     #[must_use]
     pub fn handles(&self, now_s: f64) -> Vec<Option<Pose>> {
         let pose = |history: &History| history.seen_at(now_s).map(|sample| sample.pose);

@@ -128,7 +128,7 @@ impl History {
         Ok(histories)
     }
 
-    /// Returns the number of the device.
+    /// Returns the number of the device, from 0 in the order of the scene.
     #[must_use]
     pub fn device(&self) -> u16 {
         self.device
@@ -161,8 +161,8 @@ impl History {
         self.samples.push_back(sample);
     }
 
-    /// Adds a change of a parameter, not earlier than the last change. Ignores a change that guides a hand: each motion of a pointer
-    /// sends one.
+    /// Adds a change of a parameter, not earlier than the last change, and removes the changes before the first retained sample.
+    /// Ignores a change that guides a hand, because each motion of a pointer sends such a change.
     pub fn push_change(&mut self, time_ns: u64, parameter: &str) {
         let [first_s, _] = self.span_s();
         while self.retention != Retention::All
