@@ -46,13 +46,13 @@ impl Devices {
         self.seen.iter().map(|seen| seen.name.as_str())
     }
 
-    /// Returns the number of the chosen device.
+    /// Returns the number of the chosen device, from 0.
     #[must_use]
     pub fn chosen(&self) -> usize {
         self.chosen
     }
 
-    /// Chooses a device; returns true if the choice has changed.
+    /// Chooses a device, and ignores the number of an absent device; returns true if the choice has changed.
     pub fn choose(&mut self, number: usize) -> bool {
         let is_another = number < self.seen.len() && number != self.chosen;
         if is_another {

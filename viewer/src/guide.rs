@@ -47,13 +47,14 @@ impl Guide {
         self.hands.get(device).is_some_and(Option::is_some)
     }
 
-    /// Returns the number of the device whose hand is guided; `None` if no hand is.
+    /// Returns the number of the device with the guided hand; `None` if no hand is guided.
     #[must_use]
     pub fn held(&self) -> Option<usize> {
         self.held.as_ref().map(|held| held.device)
     }
 
-    /// Starts to guide the hand of a device, with the position of its handle, m, as the target.
+    /// Starts to guide the hand of a device, with the position of its handle, m, as the target; guides no hand if the device has
+    /// none.
     pub fn take(&mut self, device: usize, handle_m: DVec3) {
         self.held = self.has_hand(device).then(|| Held { device, target_mm: handle_m * 1.0e3, sent: None });
     }
@@ -72,8 +73,8 @@ impl Guide {
         Some(Ask::Set { values: vec![self.value(device, GUIDE, "0".to_owned())] })
     }
 
-    /// Returns the request that is due at a time: changed coordinates, or the repetition of an unchanged target; `None` if no request
-    /// is due.
+    /// Returns the request that is due at a time: the client's number with the changed coordinates, or alone to keep an unchanged
+    /// target; `None` if no request is due.
     pub fn due(&mut self, now: Instant) -> Option<Ask> {
         let held = self.held.as_mut()?;
         let (device, target_mm, sent) = (held.device, held.target_mm, held.sent);
@@ -91,7 +92,8 @@ impl Guide {
         Some(Ask::Set { values })
     }
 
-    /// Processes a change; if the device refused this client because another client guides the hand, releases the hand and returns true.
+    /// Processes a change; if the device refused this client because another client guides the hand, releases the hand and returns
+    /// true.
     pub fn apply(&mut self, change: &ChangeMessage) -> bool {
         let is_ours = change.parameter == GUIDE && change.number == f64::from(self.number);
         let is_refused = is_ours && change.outcome != Outcome::Applied && self.held.is_some();

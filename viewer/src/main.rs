@@ -69,7 +69,8 @@ struct Arguments {
     /// is the default
     #[arg(long, value_name = "OUT", requires = "recording", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
-    /// Traces shown (default: force,position; in a window: the traces of the last window)
+    /// Traces shown: force, torque, position, rotation, velocity, angular-velocity, energy, stiffness, lateness (default:
+    /// force,position; in a window: the traces of the last window)
     #[arg(
         long,
         value_name = "LIST",

@@ -39,7 +39,7 @@ pub struct PanelEntry {
     pub name: String,
     /// Displayed value.
     pub value: Value,
-    /// Editability.
+    /// Permission to edit the parameter, or the reason against edits.
     pub editability: Editability,
     /// Current value in the loop.
     in_force: Value,
@@ -65,7 +65,7 @@ pub struct Panel {
     pub id: String,
     /// Parameters in the order of the schema.
     pub entries: Vec<PanelEntry>,
-    /// Reason for the rejection of the last change.
+    /// Reason for the failure of a change; `None` once a change was applied.
     pub refusal: Option<String>,
     /// Undo history: index of the parameter and its value before each change of the user.
     earlier: Vec<(usize, Value)>,

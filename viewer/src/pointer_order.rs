@@ -21,8 +21,8 @@ pub struct PointerOrder {
 }
 
 impl PointerOrder {
-    /// Limits the input of a picture to the events up to the next press or release; returns true if more events are pending and another
-    /// picture should be drawn at once.
+    /// Limits the input of a picture to the events up to the next press or release of a button; returns true if more events are
+    /// pending, so that another picture should be drawn at once.
     pub fn split(&mut self, input: &mut RawInput) -> bool {
         let arrived = std::mem::take(&mut input.events);
         let (ordered, others): (Vec<_>, Vec<_>) = arrived.into_iter().partition(is_in_order);

@@ -1,8 +1,8 @@
 //! Shapes of the models of a run, computed by the viewer's own model instances.
 //!
-//! The viewer loads the plugins of a run and queries their shapes (extensions
-//! `flotor.centerline/1` and `flotor.shape/1`). The servo never computes a shape, and a recording contains none: 65 sections at 60 Hz would
-//! double its size, and only the recorded parameters could be shown (docs/src/adr/0008-viewer-process.md).
+//! The viewer loads the plugins of a run and queries their shapes (extensions `flotor.centerline/1` and `flotor.shape/1`). The
+//! servo never computes a shape, and a recording contains no shape: 65 sections at 60 Hz would double its size, and only the
+//! recorded parameters could be shown (docs/src/adr/0008-viewer-process.md).
 
 use flotor_core::mapping::Mapping;
 use flotor_drawing::geometry::{Body, Curve, Strain};
@@ -90,7 +90,7 @@ pub enum ShapeError {
     #[error(transparent)]
     Refused(#[from] LoadError),
     /// A recorded setting does not fit the plugin.
-    #[error("model `{name}`: {problem}; the recording was made with another version of the plugin")]
+    #[error("model `{name}`: {problem}; another version of the plugin made the recording: use that version")]
     Setting {
         /// Name of the model in the scene.
         name: String,
@@ -125,8 +125,8 @@ pub fn file_of<'a>(plugin_files: &'a [PathBuf], id: &str) -> Option<&'a PathBuf>
 /// [`LoadError`], with file, cause and remedy.
 #[allow(unsafe_code)] // listed in tests/tests/system/architecture.rs
 pub fn load_file(file: &Path) -> Result<Plugin, LoadError> {
-    // SAFETY: whoever watches a run guarantees for its plugins, which are those the host runs or that lie in folders of the
-    // viewer's command line.
+    // SAFETY: the user guarantees that the plugin is sound: the host runs the same file, or the viewer's command line names the
+    // file.
     unsafe { Plugin::load(file) }
 }
 
@@ -195,7 +195,7 @@ impl Shape {
         &self.mapping
     }
 
-    /// Sets a live parameter of the viewer's instance and updates the body at rest; ignores an unknown key.
+    /// Sets a live parameter of the viewer's instance and updates the body at rest; ignores an unknown key and an invalid number.
     pub fn set_parameter(&mut self, key: &str, number: f64) {
         if let Ok(setting) = Setting::number(self.model.parameters(), key, number) {
             self.model.set_parameter(setting.index(), setting.value());
@@ -205,7 +205,7 @@ impl Shape {
         }
     }
 
-    /// Returns the value of a parameter of the viewer's instance; `None` if not a number.
+    /// Returns the value of a parameter of the viewer's instance; `None` if the value is not a finite number.
     #[must_use]
     pub fn parameter(&mut self, index: usize) -> Option<f64> {
         let number = self.model.parameter(index);
@@ -215,7 +215,7 @@ impl Shape {
     /// Checks that a parameter can be set: a parameter that refuses its own value follows from others, or has no effect.
     ///
     /// # Errors
-    /// The plugin's message, if the parameter cannot be set.
+    /// The plugin's message if the parameter cannot be set, or a message about a value that is not a number.
     pub fn accepts_its_own(&mut self, index: usize) -> Result<(), String> {
         let Some(number) = self.parameter(index) else { return Err("the value is not a number".to_owned()) };
         match self.model.set_parameter(index, number) {
@@ -224,7 +224,7 @@ impl Shape {
         }
     }
 
-    /// Computes the body with the handle at a pose in the device frame; `None` if the model has no shape there.
+    /// Computes the body with the handle at a pose in the device frame; `None` if the model has no shape at this pose.
     #[must_use]
     pub fn at(&mut self, handle: &Pose) -> Option<Posed> {
         let input = Input::at_rest(self.mapping.pose_to_model(handle));

@@ -24,7 +24,7 @@ pub struct Bell {
 }
 
 impl Bell {
-    /// Plays the tone, unless the last tone was less than a second ago.
+    /// Plays the tone, or without a player writes a bell character to the terminal; does nothing within a second of the last tone.
     pub fn ring(&mut self) {
         if self.last.is_some_and(|last| last.elapsed() < QUIET) {
             return;

@@ -46,8 +46,9 @@ impl Trace {
         self.visited
     }
 
-    /// Returns the points of each component between two times, s: at most two points for each of `buckets` buckets, with values
-    /// multiplied by `per_si`. A component has a list of points for each stretch without a gap.
+    /// Processes the new samples, and returns the points of each component between two times, s: at most two points for each of
+    /// about `buckets` buckets, with values multiplied by `per_si`. A component has a list of points for each stretch without a
+    /// gap.
     pub fn points(
         &mut self,
         history: &History,

@@ -161,9 +161,9 @@ pub fn open(
     Ok(watched.try_recv().ok())
 }
 
-/// Runs a window, which sets the flag when open, and converts its end to a result. Missing libraries of the display cause a panic in the
-/// crates that load them: until the window is open, a panic means that there is no display, and becomes one line; afterwards it is a bug,
-/// printed with its place by the previous hook, whether it can be caught or not.
+/// Runs a window, which sets the flag when open, and converts its end to a result. Missing libraries of the display cause a panic
+/// in the crates that load them: until the window is open, a panic means that there is no display, and becomes one line.
+/// Afterwards a panic is a bug; the previous hook prints the panic with its place, whether it can be caught or not.
 fn watched_over(run: impl FnOnce(&Arc<AtomicBool>) -> eframe::Result) -> Result<(), WindowError> {
     let opened = Arc::new(AtomicBool::new(false));
     let before = Arc::new(panic::take_hook());
@@ -182,7 +182,7 @@ fn watched_over(run: impl FnOnce(&Arc<AtomicBool>) -> eframe::Result) -> Result<
             Err(WindowError::NoAdapter(one_line(&error.to_string())))
         }
         (Ok(Err(error)), false) => Err(WindowError::NoDisplay(one_line(&error.to_string()))),
-        (Err(panic), true) => Err(WindowError::Broken(words_of(&*panic, "without a word"))),
+        (Err(panic), true) => Err(WindowError::Broken(words_of(&*panic, "a panic without a message"))),
         (Err(panic), false) => {
             Err(WindowError::NoDisplay(words_of(&*panic, "the libraries of the display cannot be loaded")))
         }

@@ -57,7 +57,7 @@ impl Viewer {
         self.source.is_running() && self.player.motion == Motion::Follow && self.guide.has_hand(device)
     }
 
-    /// Returns whether the hint for dragging is shown: a handle can be dragged, and none is.
+    /// Returns whether the hint for dragging is shown: a handle can be dragged, and no handle is dragged now.
     pub(super) fn wants_drag_hint(&self) -> bool {
         self.drag.is_none() && (0..self.devices.count()).any(|device| self.can_drag(device))
     }

@@ -20,7 +20,7 @@ use texts::Texts;
 /// Meaning of a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StudyKey {
-    /// Continue.
+    /// Continue, or confirm a typed rating.
     Enter,
     /// Feel the stimulus again.
     Again,
@@ -109,7 +109,7 @@ impl Prompt {
         self.waker.clone()
     }
 
-    /// Reports to the experiment that the window is open.
+    /// Connects the waker to the window, and reports to the experiment that the window is open.
     pub fn open(&mut self, window: &Context) {
         let _ = self.waker.0.set(window.clone()); // a window opens once
         self.say(WindowReply::Window { window: WindowState::Open });
@@ -179,7 +179,7 @@ impl Prompt {
         self.warned.and_then(|since| WARNED.checked_sub(since.elapsed()))
     }
 
-    /// Returns the reason for the rejection of the last answer; `None` if accepted.
+    /// Returns the reason for the rejection of the last input; `None` if the input was accepted.
     #[must_use]
     pub fn refused(&self) -> Option<&str> {
         self.refused.as_deref()
@@ -191,7 +191,8 @@ impl Prompt {
         matches!(&self.screen, Some(Screen::Feel { trial, .. }) if trial.object_is_shown)
     }
 
-    /// Processes a key; ignores a key without meaning on the current screen.
+    /// Processes a key: edits the typed rating, or sends an input to the experiment. Ignores a key without meaning on the current
+    /// screen.
     pub fn key(&mut self, key: StudyKey) {
         let Some(screen) = self.screen.as_ref().filter(|_| self.is_persons_turn) else { return };
         let answer = |response| Some(Input::Answer { response });

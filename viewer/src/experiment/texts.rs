@@ -1,4 +1,4 @@
-//! Texts of the screens of a sitting, from a file: English unless the study names another.
+//! Texts of the screens of a sitting, from a file; English texts unless the study names a file.
 //!
 //! The file has one text for each key (`viewer/texts/english.toml`). A key that is missing or unknown is an error, so that no
 //! screen is partly in another language.

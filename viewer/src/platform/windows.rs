@@ -10,7 +10,7 @@ use windows_sys::Win32::System::Threading::{GetCurrentProcess, GetProcessTimes};
 /// Returns the processor time of this process so far.
 pub(crate) fn processor() -> Duration {
     let [mut made, mut ended, mut kernel, mut user] = [FILETIME { dwLowDateTime: 0, dwHighDateTime: 0 }; 4];
-    // SAFETY: the handle that means this process is always there, and the four times are written during the call.
+    // SAFETY: the pseudo-handle of this process is always valid, and the four times are written during the call.
     unsafe {
         GetProcessTimes(GetCurrentProcess(), &raw mut made, &raw mut ended, &raw mut kernel, &raw mut user)
     };
@@ -26,8 +26,7 @@ pub(crate) fn processor() -> Duration {
 pub(crate) fn resident_mib() -> Option<u64> {
     let size = u32::try_from(size_of::<PROCESS_MEMORY_COUNTERS>()).ok()?;
     let mut memory = PROCESS_MEMORY_COUNTERS { cb: size, ..Default::default() };
-    // SAFETY: the handle that means this process is always there, and the numbers are written during the call, as many bytes as
-    // there are.
+    // SAFETY: the pseudo-handle of this process is always valid, and the call writes at most `size` bytes to `memory`.
     let told = unsafe { GetProcessMemoryInfo(GetCurrentProcess(), &raw mut memory, size) };
     (told != 0).then(|| u64::try_from(memory.WorkingSetSize >> 20).unwrap_or(u64::MAX))
 }

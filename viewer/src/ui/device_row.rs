@@ -6,8 +6,8 @@ use egui::{Button, ComboBox, Role, TextStyle, Ui, WidgetInfo};
 /// Smallest width of a name on a button, points.
 const LEAST_NAME_PT: f32 = 60.0;
 
-/// Shows the names as buttons, if necessary shortened to equal widths, or as a list if these are too narrow; returns the number of a newly
-/// chosen device.
+/// Shows the names as buttons, if necessary shortened to equal widths, or as a list if the buttons would be too narrow; returns the
+/// number of a newly chosen device.
 pub fn choose(ui: &mut Ui, names: &[&str], chosen: usize) -> Option<usize> {
     let around_pt = 2.0 * ui.spacing().button_padding.x + ui.spacing().item_spacing.x;
     let name_pt = |name: &&str| width_pt(ui.painter(), name, TextStyle::Button.resolve(ui.style()));

@@ -151,7 +151,8 @@ pub fn axes(overlay: &mut Overlay, facts: &SceneFacts, camera: &Camera, palette:
     }
 }
 
-/// Paints the name of each device below the device, shortened to the distance of the next device; the chosen device's name is brighter.
+/// Paints the name of each device below the device, shortened to the distance of the next device, with more contrast for the chosen
+/// device; paints nothing for a single device.
 pub fn names<'a>(
     overlay: &mut Overlay,
     area: Rect,

@@ -80,7 +80,8 @@ impl Overlay {
         }
     }
 
-    /// Reserves a rectangle centred below a point, moved into the area if necessary; `None` if it overlaps an earlier rectangle.
+    /// Reserves a rectangle centred below a point, moved into the area if necessary; `None` if the rectangle overlaps an earlier
+    /// rectangle or does not fit into the area.
     pub fn take_below(&mut self, point: Pos2, size: Vec2) -> Option<Rect> {
         let most = (self.inside.right() - size.x).max(self.inside.left());
         let left = (point.x - 0.5 * size.x).clamp(self.inside.left(), most);
