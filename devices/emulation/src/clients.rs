@@ -40,7 +40,7 @@ impl Clients {
     /// disconnected after [`FIRST_MESSAGE`], or earlier if too many such clients are connected.
     ///
     /// # Errors
-    /// The error of `poll`.
+    /// Errors of `poll` and of the socket.
     pub fn wait_for_one(&mut self) -> io::Result<TcpStream> {
         loop {
             if let Some(place) = self.look(&CHECK)? {
@@ -129,8 +129,8 @@ impl<'c> Tenure<'c> {
         self.part.get_or_insert_with(Instant::now);
     }
 
-    /// Returns true if the client must be disconnected: a message has been incomplete for too long, or the client has
-    /// been silent for 5 s and another client waits. Does not block.
+    /// Returns true if the client must be disconnected: a message has been incomplete for more than 200 ms, or the client has been
+    /// silent for more than 5 s and another client waits. Does not block.
     pub fn is_over(&mut self) -> bool {
         self.part.is_some_and(|since| since.elapsed() > REST_OF_MESSAGE)
             || self.message.elapsed() > LONGEST_SILENCE && self.others.is_one_waiting()

@@ -6,7 +6,8 @@ use std::error::Error;
 use std::io::Write;
 use std::path::Path;
 
-/// Parses the arguments of this process. Ends the process on an error, with a message without control characters.
+/// Parses the arguments of this process. Ends the process on an error, and after help or version; control characters in messages
+/// are escaped.
 #[must_use]
 pub fn arguments<T: Parser>() -> T {
     T::try_parse().unwrap_or_else(|error| {

@@ -11,10 +11,10 @@ use std::sync::Once;
 /// Command line options that admit programs of other users or machines.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ReachArguments {
-    /// Tcp: let programs of every user of this machine connect
+    /// TCP: allow connections of every user of this machine
     #[arg(long)]
     allow_users: bool,
-    /// Tcp: listen beyond this machine: every program that reaches the port commands the device
+    /// TCP: listen beyond this machine: every program that reaches the port commands the device
     #[arg(long)]
     allow_remote: bool,
 }

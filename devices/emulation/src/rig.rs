@@ -10,8 +10,8 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Height of the top of the stand's travel above its middle, mm, and depth of the bottom below: the range that the thesis measured
-/// (Varadharajan 2007, section 3.4).
+/// Height of the top of the stand's travel above the middle of the travel, and depth of the bottom below the middle, mm: the range
+/// measured in the thesis (Varadharajan 2007, section 3.4).
 const TOP_MM: f64 = 7.0;
 /// Time of one step down, s.
 const MOVE_S: f64 = 0.15;
@@ -74,7 +74,8 @@ impl Stand {
         (2.0 * TOP_MM / self.step_mm).round() as u32
     }
 
-    /// Returns the height of the stand above its middle at a time, m. The stand begins at the bottom.
+    /// Returns the height of the stand above the middle of its travel at time `at`, m. The motion begins at the bottom of the
+    /// travel.
     #[must_use]
     pub fn height_m(&self, at: Duration) -> f64 {
         let round_s: f64 = self.round().map(|(_, move_s)| move_s + self.stop_s).sum();
