@@ -5,6 +5,7 @@
 //! 140 kbaud     host 41            device 41
 //!               host firmware      device echoes each byte
 //! 1.5 Mbaud     the firmware runs: a report for each command
+//! ```
 
 use crate::chip::{Chip, ChipLost, PACKET_BYTES, PAYLOAD_BYTES, Request, payload};
 use crate::protocol::{Command, Frames, Parsed, Report};

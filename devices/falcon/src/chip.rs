@@ -17,13 +17,13 @@ pub const PAYLOAD_BYTES: usize = PACKET_BYTES - STATUS_BYTES;
 /// Vendor request to the chip, with its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Value 0 resets the chip; 1, 2: clear the buffer towards the host, from the host.
+    /// Reset: value 0 resets the chip, 1 clears its buffer towards the host, 2 clears its buffer from the host.
     Reset = 0,
-    /// DTR in bit 0, RTS in bit 1, and in the high byte which of them to change.
+    /// Modem lines: DTR in bit 0, RTS in bit 1; the high byte is the mask of the lines to change.
     ModemLines = 1,
     /// Flow control; 0: none.
     FlowControl = 2,
-    /// Divisor of 3 MHz, eighths in the upper bits.
+    /// Baud rate, as a divisor of 3 MHz; the upper bits encode eighths.
     BaudRate = 3,
     /// Frame format; 8: eight bits, no parity, one stop bit.
     DataFormat = 4,

@@ -24,7 +24,7 @@ pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
     let bytes = read_file(Path::new(path), MOST_BYTES).map_err(|error| match error.kind() {
         ErrorKind::FileTooLarge => {
             format!(
-                "firmware {path} has more than {MOST_BYTES} bytes, the limit of a Falcon; choose another file"
+                "firmware {path} has more than {MOST_BYTES} bytes, the limit of this plugin; set `firmware` to another file"
             )
         }
         _ => format!("firmware {path}: {error}"),

@@ -13,7 +13,7 @@
 //! - [`chip`]: the FTDI chip: its requests, and the status bytes in its packets.
 //! - [`boot`]: the handshake with the boot loader, and the errors of a start.
 //! - [`firmware`]: the user's firmware file.
-//! - `usb`, `remote`: the chip on the bus, and an emulated one over TCP.
+//! - `usb`, `remote`: the chip on the bus, and an emulated chip over TCP.
 //! - [`exchange`]: a reader thread, and a writer thread that keeps one command in flight.
 
 pub mod boot;

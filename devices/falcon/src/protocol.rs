@@ -70,7 +70,7 @@ pub struct Report {
 pub const ALL_HOMED: u8 = 0b111;
 
 impl Command {
-    /// Command of zero torque.
+    /// Command of zero torque, with a blue lamp and without homing.
     pub const REST: Self = Self { motors: [0; 3], lamp: Lamp::Blue, homing: Homing::Done };
 
     /// Encodes the command. Real-time: bounded, no allocation.

@@ -22,10 +22,10 @@ const WORDS_PER_NM: f64 = 10_000.0;
 /// Power history of a device that was just plugged in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Power {
-    /// Power was off: the boot loader waits, the arms are not homed.
+    /// Power was off: the boot loader waits for a firmware, the arms are not homed.
     #[value(help = "After power-off: the boot loader waits for a firmware and accepts any bytes")]
     Off,
-    /// Firmware runs since an earlier program; the arms are homed.
+    /// Power stayed on since an earlier program: the firmware runs, the arms are homed.
     #[value(help = "The firmware runs, and the arms are homed")]
     On,
 }
@@ -208,7 +208,7 @@ impl Machine {
         Some(force_n.with_y(force_n.y * self.share.share(place_m.y - CENTRE_M.y)))
     }
 
-    /// Carries out a request of the host to the chip and returns the reply; `None` for an unknown request.
+    /// Carries out a request from the host to the chip and returns the reply; `None` for an unknown request.
     pub fn request(&mut self, number: u8, value: u16) -> Option<Vec<u8>> {
         match number {
             _ if number == Request::Reset as u8 => {
@@ -245,7 +245,7 @@ impl Machine {
         }
     }
 
-    /// Returns the reply to a read request of the host; `None` for an unknown request.
+    /// Returns the reply to a read request from the host; `None` for an unknown request.
     #[must_use]
     pub fn question(&self, number: u8) -> Option<Vec<u8>> {
         match number {
@@ -258,7 +258,7 @@ impl Machine {
         }
     }
 
-    /// Processes bytes of the host on the serial line: prompt, firmware or commands, whose replies become due packets.
+    /// Processes bytes from the host on the serial line: prompt, firmware or commands, whose replies become due packets.
     pub fn output(&mut self, bytes: &[u8], at: Duration) {
         for byte in bytes {
             match (self.stage, self.divisor) {
@@ -348,8 +348,8 @@ impl Machine {
         }
     }
 
-    /// Returns the due packet for a waiting host: bytes of the serial line, or the status bytes alone when the latency timer has
-    /// expired; `None` if no packet is due.
+    /// Removes and returns the due packet for a waiting host, and restarts the latency timer: status bytes, then bytes of the
+    /// serial line, if any. A packet is due when full or when the latency timer has expired; `None` if no packet is due.
     pub fn packet(&mut self, at: Duration) -> Option<Vec<u8>> {
         let latency = Duration::from_millis(u64::from(self.latency_ms));
         let is_due = at.saturating_sub(self.last_packet) >= latency;
@@ -367,7 +367,8 @@ impl Machine {
     }
 }
 
-/// Returns the position of the handle for encoder counts, m; `None` for counts outside the linkage's geometry.
+/// Returns the position of the handle for encoder counts, m, in the maker's frame; `None` for counts outside the linkage's
+/// geometry.
 #[must_use]
 pub fn place_of(encoders: [i16; 3]) -> Option<DVec3> {
     Some(posture(angles_rad(encoders), CENTRE_M)?.position_m())

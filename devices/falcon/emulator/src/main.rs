@@ -24,7 +24,7 @@ struct Arguments {
     /// Connection to the host
     #[arg(long, value_enum, default_value = "tcp")]
     transport: TransportOption,
-    /// Tcp: address to listen at (port 0: any free port)
+    /// TCP: address to listen at (port 0: any free port)
     #[arg(long, default_value = "127.0.0.1:4108", value_name = "HOST:PORT")]
     listen: String,
     #[command(flatten)]

@@ -1,5 +1,5 @@
-//! Emulated device in the rig for vertical calibration: a stand holds the handle, the motors deliver more or less force
-//! than commanded, and a force sensor measures the delivered force less the weight of the arms.
+//! Emulated device in the rig for vertical calibration: a stand holds the handle, the motors deliver more or less force than
+//! commanded, and a force sensor measures the delivered force less the weight of handle, plate and screws.
 
 use crate::in_process::InProcess;
 use crate::machine::{Machine, Motion, Power};
@@ -23,7 +23,7 @@ pub const ERROR_PERCENT: f64 = 6.406_666_7;
 /// device and the path of the terminal.
 ///
 /// # Errors
-/// Errors of the pseudo terminal.
+/// If the pseudo terminal, the link or the thread of the sensor cannot be created.
 pub fn device_on(stand: Stand, link: &Path, power: Power) -> Result<(InProcess, PathBuf), Box<dyn Error>> {
     let mut machine = Machine::new(power, Motion::OnStand(stand));
     machine.delivers(VerticalCalibration::new(RANGE_M, &SHARE_PER_M)?);

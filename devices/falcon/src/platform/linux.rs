@@ -1,9 +1,9 @@
-//! Linux: permissions of a USB device by udev.
+//! Linux: detection of a USB bus, udev rule for access to the device, descriptor of a connection.
 
 use std::net::TcpStream;
 use std::os::fd::AsRawFd;
 
-/// Remedy for all other errors.
+/// Remedy for USB errors other than a missing permission.
 pub(crate) const OTHER_REMEDY: &str = "connect the Falcon without a hub, and try again";
 
 /// Returns whether programs can reach a USB bus: a container has none by default.
@@ -11,7 +11,7 @@ pub(crate) fn has_bus() -> bool {
     std::path::Path::new("/dev/bus/usb").is_dir()
 }
 
-/// Returns the remedy for a missing permission: a line for udev.
+/// Returns the remedy for a missing permission: a udev rule.
 pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     format!(
         "put this line into /etc/udev/rules.d/70-flotor.rules, run `sudo udevadm control --reload` and reconnect \
@@ -21,7 +21,7 @@ pub(crate) fn access_remedy(vendor: u16, product: u16) -> String {
     )
 }
 
-/// Returns the descriptor of a connection.
+/// Returns the file descriptor of a connection.
 pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
     stream.as_raw_fd()
 }

@@ -1,4 +1,4 @@
-//! Parts that differ between systems: remedies for USB errors, and the descriptor of a connection.
+//! Parts that differ between systems: detection of a USB bus, remedies for USB errors, and the descriptor of a connection.
 
 #[cfg(not(windows))]
 mod linux;

@@ -1,12 +1,12 @@
-//! Windows: access to a USB device by its driver; libusb needs WinUSB.
+//! Windows: remedies for USB errors (libusb needs the driver WinUSB), and the socket handle of a connection.
 
 use std::net::TcpStream;
 use std::os::windows::io::AsRawSocket;
 
-/// Remedy for all other errors.
+/// Remedy for USB errors other than a missing permission.
 pub(crate) const OTHER_REMEDY: &str = "install the driver WinUSB for the Falcon with the program Zadig, connect the Falcon without a hub, and try again";
 
-/// Returns whether programs can reach a USB bus.
+/// Returns true: programs can always reach a USB bus.
 pub(crate) fn has_bus() -> bool {
     true
 }
