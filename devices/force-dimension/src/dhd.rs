@@ -50,7 +50,7 @@ impl Failed {
     pub(crate) fn refusal(&self) -> Refusal {
         let remedy = match self.code {
             NO_DRIVER => {
-                "this user may not open the USB device: `flotor doctor --device force-dimension` prints the rule for udev"
+                "this user may not open the USB device: `flotor doctor --device force-dimension` prints the udev rule"
             }
             NO_DEVICE => "connect the device and switch it on; `lsusb -d 1451:` lists the detected devices",
             IN_USE => "end the other program that uses the device",
@@ -201,7 +201,7 @@ impl Dhd {
         self.send(&Wrench::ZERO).map(drop)
     }
 
-    /// Disables force and applies the brakes; a failed call does not skip the next ones.
+    /// Sends a zero wrench, disables force and applies the brakes; a failed call does not skip the next calls.
     pub(crate) fn relax(&self) {
         let Self { functions, id, .. } = self;
         let _ = functions.set_wrench([0.0; 3], [0.0; 3], *id);
@@ -250,7 +250,8 @@ impl Dhd {
         Ok(if code == SATURATED { Given::Saturated } else { Given::All })
     }
 
-    /// Reads the cause of disabled force; `None` while force is enabled.
+    /// Reads an error of the device or the cause of disabled force from the status; `None` while force is enabled, and for other
+    /// causes.
     pub(crate) fn force_off(&self) -> Result<Option<Fault>, Failed> {
         let (code, status) = self.functions.status(self.id);
         self.check(code, "reading the status")?;

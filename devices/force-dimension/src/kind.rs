@@ -1,17 +1,16 @@
 //! Ranges and limits of the devices, by the type number of the SDK.
 //!
-//! Checked against CHAI3D (`CDeltaDevices.cpp`, BSD): type numbers 31 to 37, 60 to 64 and 104 to 107, 12 N of an
-//! omega.3 and 20 N of a delta.3. Deviations: CHAI3D treats type 31 as an early delta and allows 0.2 N·m for a delta.6
-//! (61, 62, 64); the limits here are lower for these types. All other figures (workspace, continuous force and torque)
-//! are believed to be the manufacturer's, but are not verified against data sheets; a scene's `[limits]` can lower the
-//! limits.
+//! Checked against CHAI3D (`CDeltaDevices.cpp`, BSD): type numbers 31 to 37, 60 to 64 and 104 to 107, 12 N of an omega.3 and 20 N
+//! of a delta.3. Deviations: CHAI3D treats type 31 as an early delta and allows 0.2 N·m for a delta.6 (61, 62, 64); the limits
+//! here are lower for these types. All other figures (workspace, continuous force and torque) are assumed to be the
+//! manufacturer's, but were not compared with data sheets; a scene's `[limits]` can lower the limits.
 
 use std::f64::consts::PI;
 
 /// Range and limits of a device type.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Kind {
-    /// Half the range to the right, away from the user, and up, m.
+    /// Half-extents of the workspace to the right, away from the user, and up, m.
     pub(crate) range_m: [f64; 3],
     /// Largest rotation about any axis, rad.
     pub(crate) range_rad: f64,
@@ -28,7 +27,7 @@ const LAMBDA: Kind = Kind { range_m: [0.12, 0.085, 0.12], range_rad: 1.2, force_
 const FALCON: Kind = Kind { range_m: [0.05, 0.05, 0.05], range_rad: PI, force_n: 8.0, torque_nm: 0.0 };
 
 impl Kind {
-    /// Returns the entry of a type number; an unknown type gets the lowest limits.
+    /// Returns the entry of a type number; an unknown type gets the range of an omega, and the lowest limits of force and torque.
     pub(crate) fn of_number(number: i32) -> Self {
         match number {
             60 => FALCON,
