@@ -45,7 +45,7 @@ impl SensorLine {
         Ok(Self { port, lines: Lines::default(), requested_at: None })
     }
 
-    /// Requests a reading unless a request is pending. Real-time: bounded, no allocation; one call of the system.
+    /// Requests a reading unless a request is pending. Real-time: bounded, no allocation; one system call.
     ///
     /// # Errors
     /// If the sensor is gone.
@@ -62,8 +62,8 @@ impl SensorLine {
         Ok(())
     }
 
-    /// Reads the received bytes and returns the result of the last line that they complete; a completed line ends the
-    /// pending request. Real-time: bounded, no allocation; two calls of the system.
+    /// Reads the received bytes and returns the result of the last line that they complete; a completed line ends the pending
+    /// request. Real-time: bounded, no allocation; two system calls.
     ///
     /// # Errors
     /// If the sensor is gone.

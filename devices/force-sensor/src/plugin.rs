@@ -35,7 +35,7 @@ impl ForceSensor {
     /// Waits for the first reading, so that a faulty sensor is reported at open.
     fn prove(&mut self, port: &str) -> Result<(), String> {
         let gone = |LineLost| {
-            format!("the force sensor at {port} is disconnected; connect the sensor and measure again")
+            format!("the force sensor at {port} is disconnected; connect the sensor and try again")
         };
         loop {
             self.line.request().map_err(gone)?;

@@ -8,7 +8,7 @@
 //!
 //! Lines end in a line feed; a carriage return before the line feed is ignored.
 
-/// Request of a reading.
+/// Request for a reading, with its line feed.
 pub const QUESTION: &[u8] = b"R\n";
 /// Limit on the length of a line, bytes: a number of any precision, or a sentence.
 pub const LONGEST_LINE_BYTES: usize = 200;
