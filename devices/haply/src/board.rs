@@ -103,8 +103,8 @@ impl Board {
         }
     }
 
-    /// Requests torques of the arms, N·m, and a reply with the angles; drops the request while the previous request is
-    /// pending, because a newer one will follow. Real-time: bounded, no allocation; one or two calls of the system.
+    /// Requests torques of the arms, N·m, and a reply with the angles; drops the request while the previous request is pending,
+    /// because a newer request will follow. Real-time: bounded, no allocation; one or two system calls.
     ///
     /// # Errors
     /// If the board is gone.
@@ -125,8 +125,8 @@ impl Board {
         Ok(())
     }
 
-    /// Returns the angles of the arms, °, of the newest received reply; `None` if no reply was completed. Real-time:
-    /// bounded, no allocation; two calls of the system.
+    /// Returns the angles of the arms, °, of the newest received reply; `None` if no reply was completed. Real-time: bounded, no
+    /// allocation; two system calls.
     ///
     /// # Errors
     /// If the board is gone.

@@ -186,7 +186,8 @@ impl SimpleDevice for HaplyDevice {
 
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         let Ok(polled) = self.board.poll() else { return Cycle::Fault(Fault::Disconnected) };
-        // Angles outside the linkage's geometry are malformed data: the next reply will be right.
+        // Angles outside the linkage's geometry are malformed data: the last posture stays, and the cycle is stale until a valid
+        // reply.
         if let Some(posture) = polled.and_then(|angles_deg| self.posture(angles_deg)) {
             (self.posture, self.is_fresh) = (Some(posture), true);
         }

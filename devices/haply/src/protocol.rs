@@ -90,11 +90,11 @@ fn put(bytes: &mut [u8], head: &[u8], numbers: impl Iterator<Item = f32>) {
 /// Request as received by a board: the inverse of [`setup`] and [`torques`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
-    /// Clear the configuration.
+    /// Request to clear the configuration.
     Reset,
-    /// Configure the arms.
+    /// Request to configure the first and the second arm.
     Setup([Arm; 2]),
-    /// Exert these torques on the arms, N·m, and reply.
+    /// Request to exert torques on the first and the second arm, N·m, and to reply.
     Torques([f32; 2]),
 }
 
