@@ -53,7 +53,11 @@ impl Exchange {
         Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Returns the newest sample since the last call. Real-time: bounded, no allocation, no wait.
+    /// Returns the newest sample since the last call; `None` if no sample has arrived, or the lock is contended. Real-time:
+    /// bounded, no allocation, no wait.
+    ///
+    /// # Errors
+    /// The fault that ended the exchange.
     pub(crate) fn take(&self) -> Result<Option<Sample>, SessionError> {
         match self.shared.slots.try_lock() {
             Ok(mut slots) => slots.error.map_or(Ok(slots.sample.take()), Err),

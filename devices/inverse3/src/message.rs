@@ -139,7 +139,7 @@ pub fn settings(force_gate: f64) -> [Setting; 15] {
     ]
 }
 
-/// Encodes the message that changes the settings and requests all of them. Not real-time.
+/// Encodes the message that changes the settings and requests a full state, which contains all settings. Not real-time.
 #[must_use]
 pub fn configure(chosen: &Chosen, force_gate: f64) -> String {
     let view = "\"preset\":\"arm_front_centered\",\"basis\":{\"permutation\":\"XYZ\"}";
@@ -192,7 +192,8 @@ pub fn differing(
     Ok(None)
 }
 
-/// Encodes the command of a force, N, replacing the contents of `text`. Real-time: bounded, no allocation beyond the first.
+/// Encodes the command of a force, N, replacing the contents of `text`. Real-time: bounded, no allocation once `text` has the
+/// capacity.
 pub fn force(text: &mut Vec<u8>, arm: &str, force_n: DVec3) {
     let DVec3 { x, y, z } = force_n;
     text.clear();

@@ -40,7 +40,7 @@ const SCHEMA: &[Parameter] = &[
         1.0,
         200.0,
         60.0,
-        "Radius of the workspace about the centre of the arm's range",
+        "Half-extent of the workspace along each axis, about the centre of the arm's range",
     ),
     Parameter::real("force_gate", "1", 0.0, 1.0, 0.0, "Gain of the service's force gate; 0: none"),
     Parameter::real(
@@ -49,8 +49,8 @@ const SCHEMA: &[Parameter] = &[
         0.0,
         100.0,
         0.5,
-        "Largest difference between commanded and reported force; a larger difference is a fault: another \
-         program commands the device",
+        "Largest deviation of a component of the reported force from the range of recent commands; a larger \
+         deviation is a fault: another program commands the device",
     ),
     Parameter::real(
         "spin_cutoff_hz",

@@ -23,7 +23,7 @@ pub struct Request {
     pub grip: GripRequest,
     /// Gain of the service's force gate, 0 to 1; 0: no force gate.
     pub force_gate: f64,
-    /// Timeout of a reply of the service, after which it is at fault.
+    /// Timeout of a reply from the service; a missing reply is a fault.
     pub timeout: Duration,
     /// Largest deviation of the exerted force from recent commands of this session, N; a larger deviation is a fault.
     pub foreign_force_n: f64,

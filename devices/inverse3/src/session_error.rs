@@ -7,7 +7,8 @@ use std::fmt;
 /// Remedy for messages outside the documented interface.
 const UPDATE: &str = "update the service to 3.5 or newer";
 
-/// Fault of a session. After each fault the session has ended, and the service has removed its force.
+/// Fault of a session. After a fault, [`Session::end`](crate::session::Session::end) ends the session, and the service removes its
+/// force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SessionError {
     /// The service closed the connection, or is gone.

@@ -41,7 +41,7 @@ impl Socket {
     /// write. Not real-time.
     ///
     /// # Errors
-    /// One clause with the error of the system or of the upgrade.
+    /// Error text: unknown host name, error of the operating system, or a server that rejects the WebSocket upgrade.
     pub fn connect(address: &str, patience: Duration) -> Result<Self, String> {
         let lookup = address.to_socket_addrs().map_err(|error| error.to_string())?;
         let mut failed = "unknown host name; check the address".to_owned();
@@ -105,7 +105,7 @@ impl Socket {
     /// Sends a text message. Real-time except for the system call: bounded, no allocation.
     ///
     /// # Errors
-    /// If the connection is closed.
+    /// If the connection is closed, or the write times out.
     pub fn send(&mut self, text: &[u8]) -> Result<(), SessionError> {
         self.send_frame(OpCode::Data(Data::Text), text)
     }
@@ -123,8 +123,8 @@ impl Socket {
         self.stream.write_all(&self.sent).map_err(|_| SessionError::Gone)
     }
 
-    /// Waits for the next text message, which stays in the buffer until the next call. Real-time except for the wait: bounded,
-    /// no allocation.
+    /// Waits for the next text or binary message, which stays in the buffer until the next call. Answers pings. Real-time except
+    /// for the wait: bounded, no allocation.
     ///
     /// # Errors
     /// A [`SessionError`]: the connection is closed, no message arrived until the timeout, or a message is oversized,
@@ -184,7 +184,7 @@ impl Socket {
 
     /// Waits for more bytes in the receive buffer.
     fn fill(&mut self, until: Instant) -> Result<(), SessionError> {
-        // Move the partial frame to the front, to have room for the longest.
+        // Move the partial frame to the front, to have room for the longest frame.
         self.buffer.copy_within(self.start..self.end, 0);
         (self.start, self.end) = (0, self.end - self.start);
         let late = if self.end == 0 { SessionError::Silent } else { SessionError::Unfinished };
@@ -204,7 +204,7 @@ impl Socket {
         }
     }
 
-    /// Sets the timeout of a reply. Not real-time.
+    /// Sets the timeout of a reply, and of each read and write. Not real-time.
     ///
     /// # Errors
     /// Errors of the system.
