@@ -69,7 +69,7 @@ impl HostLink {
         self.transport.as_mut().ok_or(LinkLost)?.send(&frame.encode())
     }
 
-    /// Reads all pending replies and returns the newest status not returned before. Real-time: bounded, no allocation.
+    /// Reads pending replies, at most 32, and returns the newest status not returned before. Real-time: bounded, no allocation.
     pub(crate) fn take(&mut self) -> Result<Option<AcknowledgedStatus>, LinkLost> {
         for _ in 0..ANSWERS_PER_LOOK {
             match self.receive()? {

@@ -80,12 +80,13 @@ impl MlDevice {
         &self.stop
     }
 
-    /// Returns the version of the controller as its serial number: the protocol has none.
+    /// Returns the version of the controller in place of a serial number, which the protocol does not have.
     pub(crate) fn serial(&self) -> String {
         format!("ml-api {}", self.facts.version.text())
     }
 
-    /// Returns the smaller of the controller's limits and the published ones.
+    /// Returns the published capabilities, with force and torque scaled down in proportion to the controller's smallest current
+    /// limit.
     pub(crate) fn capabilities(&self, lockstep: bool) -> Capabilities {
         let share = self.facts.current_limits_a.iter().fold(1.0_f64, |share, limit| {
             let limit = f64::from(*limit) / facts::MAX_COIL_CURRENT_A;

@@ -89,8 +89,8 @@ impl OwnDevice {
         self.description.serial_text()
     }
 
-    /// Describes the controller's own stop: three periods after a command it only damps, and after its watchdog it lands. A
-    /// stop message from another process would be rejected for its session and sequence number.
+    /// Describes the controller's own stop: three periods after a command the controller only damps, and after the watchdog
+    /// timeout it lands. A stop message from another process would be rejected for its session and sequence number.
     pub(crate) fn independent_stop(&self) -> IndependentStop {
         let watchdog_us = self.options.watchdog_us.min(self.description.limits.longest_watchdog_us);
         IndependentStop::by_itself(StoppedState::Landed, u64::from(watchdog_us) * 1000)

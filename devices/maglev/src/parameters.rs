@@ -109,7 +109,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "walls",
         WALLS,
         0,
-        "Additional walls, inside those of the scene: off, as the maker's, or as in the thesis",
+        "Additional walls, inside the walls of the scene: off, maker (the maker's boundary mode), or thesis",
     ),
     Parameter::real("wall_radius_mm", "mm", 1.0, 12.0, 11.0, "Radius of the spherical wall about home")
         .live(),

@@ -24,8 +24,8 @@ impl Shaping {
         Self { walls: None, calibration, weight, own_n, commanded: Wrench::ZERO, warning }
     }
 
-    /// Returns the wrench to command: walls and weight added, total vertical force corrected. Real-time: bounded, no
-    /// allocation.
+    /// Returns the wrench to command: walls and weight added, total vertical force corrected. Stores the wrench without weight and
+    /// correction, and updates the warning. Real-time: bounded, no allocation.
     pub(crate) fn command(&mut self, wrench: &Wrench, state: &DeviceState) -> [f32; 6] {
         let wrench = if wrench.is_finite() { *wrench } else { Wrench::ZERO };
         let walls = self.walls.as_ref().map_or(Wrench::ZERO, |walls| walls.wrench(state));

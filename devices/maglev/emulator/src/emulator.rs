@@ -28,7 +28,7 @@ pub enum Pace {
     /// The machine's clock: a cycle each period, independent of the host, as on hardware.
     #[value(name = "real", help = "Cycles by the machine's clock")]
     RealTime,
-    /// The host's commands: a cycle for each, so that a host on a virtual clock gets bit-identical runs.
+    /// The host's commands: a cycle for each command, so that a host on a virtual clock gets bit-identical runs.
     #[value(help = "A cycle for each command of the host, for a host on a virtual clock")]
     Lockstep,
 }

@@ -23,9 +23,9 @@ pub struct Wall {
 }
 
 impl Wall {
-    /// Returns this wall with its stiffness reduced, if necessary, to the largest one to render in the loop
-    /// ([`SampledLoop::largest_stiffness`]). The damper of the wall resists outward motion only, except for the part
-    /// `everywhere` of its damping (N·s/m or N·m·s/rad), which acts in both directions.
+    /// Returns this wall with its stiffness reduced, if necessary, to the largest stiffness to render in the loop
+    /// ([`SampledLoop::largest_stiffness`]). The damper of the wall resists outward motion only, except for the part `everywhere`
+    /// of its damping (N·s/m or N·m·s/rad), which acts in both directions.
     #[must_use]
     pub fn stabilised(self, sampled: &SampledLoop, everywhere: f64) -> Self {
         let most = sampled.largest_stiffness(everywhere, Damper::OneWay(self.damping - everywhere));
@@ -104,7 +104,7 @@ const THESIS_PER_GAMMA: f64 = 2.5;
 /// Angle limit of the thesis, rad: 2.86 degrees.
 pub const THESIS_ANGLE_LIMIT_RAD: f64 = 0.05;
 
-/// Returns the stiffness of the thesis's angle limit for a spring of `gamma_n`, N·m/rad.
+/// Returns the stiffness of the thesis's angle limit, N·m/rad, for a spring of compression rigidity `gamma_n`, N.
 #[must_use]
 pub fn thesis_nm_per_rad(gamma_n: f64) -> f64 {
     (THESIS_PER_GAMMA * gamma_n).max(THESIS_LEAST_NM_PER_RAD)
@@ -126,8 +126,8 @@ impl Walls {
         }
     }
 
-    /// Returns the thesis's walls for a spring of `gamma_n`, with a sphere of `radius_m`: the angular stiffness grows with
-    /// gamma. Values missing in the thesis (translational gains, damping) are the makers'.
+    /// Returns the thesis's walls for a spring of compression rigidity `gamma_n`, with a sphere of `radius_m`: the angular
+    /// stiffness grows with gamma. Values missing in the thesis (translational gains, damping) come from [`Self::maker`].
     pub fn thesis(radius_m: f64, gamma_n: f64) -> Self {
         let maker = Self::maker(radius_m);
         let stiffness = thesis_nm_per_rad(gamma_n);

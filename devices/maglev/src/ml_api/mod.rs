@@ -7,9 +7,8 @@
 //! ack       8      i32, value    i32                   client to controller, callback connection
 //! ```
 //!
-//! Little endian, every number 4 bytes, no checksum, no number that pairs a reply with its request: one call is outstanding
-//! on a connection at a time. Metres, radians, seconds, newtons, amperes, degrees Celsius; axes x, y, z and the rotations
-//! about them, the device frame.
+//! Little endian, every number 4 bytes, no checksum and no sequence number: one call is outstanding on a connection at a time.
+//! Metres, radians, seconds, newtons, amperes, degrees Celsius; axes x, y, z and the rotations about them, the device frame.
 //!
 //! - [`frame`]: encoding and decoding of one frame; [`intake`]: frames from a stream.
 //! - [`values`]: types of the fields; [`angles`]: three angles as an orientation.

@@ -1,5 +1,5 @@
-//! Replies: a status and always the full results. A client decodes results even with an error status: after a truncated
-//! reply the numbers of an earlier one would remain.
+//! Replies: a status and always the full results. A client decodes results even with an error status: from a truncated reply the
+//! client would take numbers of an earlier reply.
 
 use super::frame::{Fields, Frame};
 use super::function::Function;

@@ -5,7 +5,7 @@ use super::frame::{Fields, Frame};
 use super::function::Function;
 use super::values::{Axis, AxisValues, CellOffset, Gain, GainSet, Pid, Status, WirePose, of_code};
 
-/// Request of a client. Units of [`super`].
+/// Request from a client. Units of [`super`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
     /// A function without arguments.

@@ -13,17 +13,17 @@ pub(super) fn of_code<T: Copy>(all: &[T], code: i32) -> Option<T> {
 /// Axis of translation or rotation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
-    /// Along x.
+    /// Translation along x.
     X = 0,
-    /// Along y.
+    /// Translation along y.
     Y = 1,
-    /// Along z.
+    /// Translation along z.
     Z = 2,
-    /// About x.
+    /// Rotation about x.
     Rx = 3,
-    /// About y.
+    /// Rotation about y.
     Ry = 4,
-    /// About z.
+    /// Rotation about z.
     Rz = 5,
 }
 
@@ -53,11 +53,11 @@ impl GainSet {
 /// Kind of a gain in the controller of an axis (PID with feed-forward).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Gain {
-    /// Proportional.
+    /// Proportional gain.
     P = 0,
-    /// Integral.
+    /// Integral gain.
     I = 1,
-    /// Derivative.
+    /// Derivative gain.
     D = 2,
     /// Feed-forward.
     Ff = 3,
@@ -108,14 +108,14 @@ pub struct WirePose {
 /// Control mode of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum AxisMode {
-    /// Free.
+    /// Free axis.
     #[default]
     Normal = 0,
-    /// Locked at its position.
+    /// Axis locked at its position.
     Locked = 1,
-    /// Constrained to a range.
+    /// Axis constrained to a range.
     Constrained = 2,
-    /// Beyond the boundary sphere.
+    /// Axis of a flotor beyond the boundary sphere.
     Boundary = 3,
 }
 

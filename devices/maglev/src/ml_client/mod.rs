@@ -4,7 +4,7 @@
 //! - [`session`]: take-off, commands and landing.
 //! - [`stop`]: a Land frame, encoded before the coils are energised.
 //!
-//! A connection with an overdue reply is lost: replies have no number, so the next one could be the overdue one. Lost
+//! A connection with an overdue reply is lost: replies have no sequence number, so the next reply could be the overdue reply. Lost
 //! connections are reset when dropped.
 
 pub(crate) mod connection;

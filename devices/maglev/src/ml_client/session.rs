@@ -74,12 +74,12 @@ impl std::fmt::Display for Failed {
     }
 }
 
-/// A session with a controller.
+/// Session with a controller: control connection, callback connection for events, and count of unacknowledged ticks.
 pub(crate) struct Session {
     control: Control,
     events: Option<Events>,
     address: String,
-    /// Gains before the fade.
+    /// Gains of the sets in [`FORCED`] before the fade, restored for the landing.
     kept: [[Pid; 6]; 3],
     /// Ticks received and not yet acknowledged.
     owed: u32,
@@ -134,7 +134,8 @@ impl Session {
         Ok(Facts { version, current_limits_a, speed_limits })
     }
 
-    /// Clears faults, lifts and weighs the flotor, fades the gains to a force command, and registers for events.
+    /// Clears faults, lifts and weighs the flotor, fades the gains to a force command, registers for events, and waits for the
+    /// first tick.
     pub(crate) fn take_off(&mut self, plan: &Plan) -> Result<TakenOff, Failed> {
         self.clear_faults()?;
         self.call(&Request::Number(Function::SetServoFrequency, plan.rate_hz))?;
@@ -305,8 +306,8 @@ impl Session {
         Ok(())
     }
 
-    /// Commands a wrench; returns true if the controller confirms within the budget. Waits for the confirmation of an
-    /// earlier command first, and drops the new command if that is missing. Real-time: bounded, no allocation.
+    /// Commands a wrench; returns true if the controller confirms within the budget. Waits for the confirmation of an earlier
+    /// command first, and drops the new command if the earlier confirmation is missing. Real-time: bounded, no allocation.
     pub(crate) fn command(&mut self, wrench: AxisValues, budget: Duration) -> Result<bool, NoResults> {
         if self.control.outstanding_since().is_some() && !self.is_confirmed(budget)? {
             return Ok(false);

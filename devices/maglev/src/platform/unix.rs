@@ -5,7 +5,7 @@ use std::net::TcpStream;
 use std::os::fd::AsRawFd;
 use std::time::Duration;
 
-/// Makes the system reset the connection when dropped, so that the other end detects it at once. Not real-time.
+/// Makes the system reset the connection when dropped, so that the other end detects the loss at once. Not real-time.
 pub(crate) fn reset_when_dropped(stream: &TcpStream) {
     let _ = rustix::net::sockopt::set_socket_linger(stream, Some(Duration::ZERO));
 }
@@ -20,7 +20,7 @@ pub(crate) fn wait_for(stream: &TcpStream, most: Duration) {
     let _ = poll(&mut [PollFd::new(stream, PollFlags::IN)], Some(&most));
 }
 
-/// Returns the descriptor of a connection.
+/// Returns the file descriptor of a connection.
 pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
     stream.as_raw_fd()
 }

@@ -10,7 +10,7 @@ const AWAKE: Duration = Duration::from_millis(2);
 /// Poll interval before the last part.
 const NAP: Duration = Duration::from_millis(1);
 
-/// Makes the system reset the connection when dropped, so that the other end detects it at once. Not real-time.
+/// Makes the system reset the connection when dropped, so that the other end detects the loss at once. Not real-time.
 pub(crate) fn reset_when_dropped(stream: &TcpStream) {
     let _ = set_socket_linger(stream, Some(Duration::ZERO));
 }
@@ -32,7 +32,7 @@ pub(crate) fn wait_for(stream: &TcpStream, most: Duration) {
     }
 }
 
-/// Returns the handle of a connection, of which the system uses 32 bits.
+/// Returns the lower 32 bits of a connection's handle; the system uses no others.
 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // as the contract says
 pub(crate) fn descriptor(stream: &TcpStream) -> i32 {
     stream.as_raw_socket() as i32

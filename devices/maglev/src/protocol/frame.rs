@@ -16,7 +16,7 @@ const ANSWER_MAGIC: u16 = u16::from_le_bytes(*b"MS");
 /// Offset of the payload.
 const PAYLOAD: usize = 20;
 
-/// Request of the host.
+/// Request from the host.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
     /// Request for a page of the description.
@@ -46,7 +46,7 @@ pub enum Request {
     Disarm,
 }
 
-/// Request of the host, with its envelope.
+/// Request from the host, with its envelope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RequestFrame {
     /// Sequence number, incremented with every frame of a session.

@@ -11,7 +11,7 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// Clears the last sequence number for a new session; keeps the counts.
+    /// Clears the last sequence number for a new session, but not the counts.
     pub fn restart(&mut self) {
         self.last = None;
     }

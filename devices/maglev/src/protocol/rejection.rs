@@ -17,7 +17,7 @@ pub enum Rejection {
     Kind,
     /// A number is NaN or infinite.
     NotFinite,
-    /// Sequence number of the last accepted frame.
+    /// Sequence number repeated from the last accepted frame.
     Duplicate,
     /// Sequence number older than that of the last accepted frame.
     Old,

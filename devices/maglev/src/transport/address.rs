@@ -15,7 +15,7 @@ pub struct UsbAddress {
 }
 
 impl UsbAddress {
-    /// Parses `vendor:product` or `vendor:product:serial`, ids in hex.
+    /// Parses `vendor:product` or `vendor:product:serial`, ids in hex; `None` for any other text.
     #[must_use]
     pub fn parse(text: &str) -> Option<Self> {
         let mut parts = text.splitn(3, ':');

@@ -35,7 +35,7 @@ pub fn open(address: &str) -> Result<TcpStream, OpenError> {
     stream.and_then(prepared).map_err(|error| match error.kind() {
         ErrorKind::PermissionDenied => OpenError::Forbidden {
             address: address.to_owned(),
-            remedy: "a firewall or sandbox forbids the connection".to_owned(),
+            remedy: "allow the connection in the firewall or the sandbox".to_owned(),
         },
         _ => OpenError::Missing { address: address.to_owned(), cause: error.to_string() },
     })

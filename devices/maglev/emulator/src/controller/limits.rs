@@ -23,8 +23,7 @@ pub struct LimitConfig {
     pub edge_m: f64,
     /// Time ahead for which the distance is predicted before the comparison with `edge_m`, s.
     pub edge_ahead_s: f64,
-    /// Limit of the root mean square of the load, as a fraction of full load: the largest ratio of the wrench on an axis
-    /// to its limit.
+    /// Limit of the root mean square of the load. The load is the largest ratio of a component of the wrench to its limit.
     pub continuous_load: f64,
     /// Time constant of the mean square of the load, s.
     pub load_time_s: f64,

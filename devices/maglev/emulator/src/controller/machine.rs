@@ -215,7 +215,8 @@ impl Controller {
         Some(Reply::Status(frame.sequence))
     }
 
-    /// Switches the coils off at once after the loss of the link, and ends the session.
+    /// Switches the coils off at once after the loss of the link, ends the session, and sets the condition `LINK_LOST` unless the
+    /// controller was disarmed.
     pub fn link_lost(&mut self, now_us: u64) {
         if self.mode != Mode::Disarmed {
             self.disarm(now_us);
@@ -347,7 +348,7 @@ impl Controller {
         self.mode_since_us = now_us;
     }
 
-    /// Returns a status frame with mode, condition and the newest sample; `acknowledged` is the sequence number of the
+    /// Creates the next status frame, with mode, condition and the newest sample; `acknowledged` is the sequence number of the
     /// newest accepted request.
     pub fn status(&mut self, acknowledged: u32) -> AnswerFrame {
         let Sample { pose, twist, .. } = self.sample;

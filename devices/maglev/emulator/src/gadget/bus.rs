@@ -19,7 +19,7 @@ use std::os::unix::net::UnixStream;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Packets queued for a host that does not fetch them; beyond that the oldest is dropped.
+/// Limit on the packets queued in each direction; a further packet replaces the oldest.
 const KEPT_PACKETS: usize = 32;
 /// Pause after which a HID host counts as detached: a reading host requests the next report within microseconds.
 const FETCHES_NO_MORE: Duration = Duration::from_millis(5);

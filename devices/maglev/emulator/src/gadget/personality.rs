@@ -55,7 +55,7 @@ pub(super) const REPORT_DESCRIPTOR: [u8; 27] = [
 ];
 
 impl Personality {
-    /// Returns the product id: a different id for each kind, so that no system mistakes the driver.
+    /// Returns the product id: a different id for each kind, so that no system binds the driver of another kind.
     #[must_use]
     pub const fn product(self) -> u16 {
         match self {

@@ -132,7 +132,8 @@ impl FromStr for InjectedFault {
     }
 }
 
-/// Pending faults, and the affected client.
+/// Injected faults: pending faults with their time in the required state, the active machine fault with its remaining time, and
+/// the client that receives no more replies.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plan {
     pending: Vec<(InjectedFault, f64)>,

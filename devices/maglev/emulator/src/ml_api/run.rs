@@ -17,9 +17,9 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Period of a lockstep loop without clients.
 const NAP: Duration = Duration::from_millis(1);
 
-/// Returns the timeout for tick acknowledgements, for the present delay of the loop and its period. Most machines suspend a
-/// client for some milliseconds now and then: the loop is delayed as well and catches up later. Beyond [`LENIENCE`] it
-/// catches up without waiting for slow clients, and still waits half a period for the others.
+/// Returns the timeout for tick acknowledgements, for the present delay of the loop and its period. Most machines suspend a client
+/// for some milliseconds now and then: the loop is delayed as well and catches up later. Beyond [`LENIENCE`] the loop catches up
+/// without waiting for slow clients, and still waits half a period for all other clients.
 fn patience(late: Duration, period: Duration) -> Duration {
     LENIENCE.saturating_sub(late).max(period / 2)
 }
@@ -96,7 +96,7 @@ impl<P: Plant> Machine<P> {
     fn advance(&mut self, period_s: f64) -> crate::controller::Sample {
         let wrench = self.hub.drive(period_s);
         self.now_s += period_s;
-        // A period need not be a whole number of µs: the plant is accurate to one.
+        // A period need not be a whole number of µs: the time of the plant is accurate to 1 µs.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a time, positive
         let until_us = (self.now_s * 1.0e6).round() as u64;
         let dt_us = until_us - self.now_us;

@@ -32,7 +32,7 @@ use std::sync::atomic::AtomicBool;
 /// Emulate the controller of the magnetic-levitation device.
 #[derive(Parser)]
 #[command(name = "flotor emulate maglev", version, max_term_width = 110)]
-#[command(after_help = "The first line on standard output has the addresses.\n\nExamples:\n  \
+#[command(after_help = "The first lines on standard output have the addresses.\n\nExamples:\n  \
     flotor emulate maglev\n  \
     flotor emulate maglev --protocol ml-api\n  \
     flotor emulate maglev --transport pty --link /tmp/flotor-tty\n  \
@@ -46,7 +46,7 @@ struct Arguments {
     /// Transport to the host
     #[arg(long, value_enum, default_value = "tcp")]
     transport: TransportOption,
-    /// Tcp: address to listen at (port 0: any free one; default 127.0.0.1, port 5679, with the ML API 5678)
+    /// TCP: address to listen at (port 0: any free port; default 127.0.0.1, port 5679, with the ML API 5678)
     #[arg(long, value_name = "HOST:PORT")]
     listen: Option<String>,
     #[command(flatten)]

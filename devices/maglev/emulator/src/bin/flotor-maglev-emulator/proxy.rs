@@ -95,8 +95,8 @@ fn capabilities(device: &str, sets: &[(&str, &str)]) -> Option<Capabilities> {
     plugin.open_device(&settings).ok()?.capabilities().ok()
 }
 
-/// Returns the force limits of a device without actuators on all three axes, N; else `None`. The host requires an explicit
-/// limit of 0 on the others, as the controller model commands all six axes.
+/// Returns the force limits of a device without actuators on all three axes, N; else `None`. The host requires an explicit limit
+/// of 0 on the axes without actuators, as the controller model commands all six axes.
 fn felt(device: &Capabilities) -> Option<[f64; 3]> {
     let is_driven = [Axes::X, Axes::Y, Axes::Z].map(|axis| device.actuated.contains(axis));
     let mut felt_n = device.max_force_n;

@@ -187,7 +187,7 @@ impl Controller {
             moves && !matches!(request.function(), Function::SetDesiredPosition | Function::SetVelocity);
         match self.flight {
             Flight::TakingOff | Flight::Landing if moves => return Status::OFF_LINE,
-            // A program that continues after a landing must not lift the flotor with bare forces.
+            // After a landing, forces and currents are rejected: a program that continues must not lift the flotor open-loop.
             Flight::Landed if drives => return Status::LANDED,
             _ => {}
         }

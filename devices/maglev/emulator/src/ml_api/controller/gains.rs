@@ -52,7 +52,7 @@ impl Gains {
         *self.of(set, axis).gain_mut(gain)
     }
 
-    /// Sets the gains of some axes: all, or none if one is invalid.
+    /// Sets the gains of the listed axes; if a gain is invalid, sets none and returns [`Status::GAIN_RANGE`].
     pub(super) fn take(&mut self, set: GainSet, gains: &[(Axis, Pid)]) -> Status {
         let legal = |pid: &Pid| {
             [pid.p, pid.i, pid.d].iter().all(|gain| gain.is_finite() && *gain >= 0.0) && pid.ff.is_finite()
@@ -79,7 +79,7 @@ impl Gains {
         }
     }
 
-    /// Returns the gains for a landing: the defaults with the present feed-forward.
+    /// Returns the gains for a landing: the defaults, with the present feed-forward where it is not zero.
     pub(super) fn landing(&self) -> [Pid; 6] {
         let mut gains = default_of(GainSet::Normal);
         for (pid, carried) in gains.iter_mut().zip(self.set(GainSet::Normal)) {

@@ -242,7 +242,7 @@ impl Controller {
         narrow(user * vector(&self.speed, 0), user * vector(&self.speed, 3))
     }
 
-    /// Begins a servo interval of `dt_s`: stores its first sample, checks for faults and advances procedures.
+    /// Begins a servo interval of `dt_s`: stores its first sample, checks for faults, queues events and advances procedures.
     pub fn sense(&mut self, sample: &Sample, dt_s: f64) {
         self.observe(sample);
         self.watch();
@@ -347,7 +347,8 @@ impl Controller {
         found.map_or(Status::OFF_LINE, |(_, status)| *status)
     }
 
-    /// Returns the temperatures of the coils, °C; 260 °C for the first coil if the over-temperature is injected.
+    /// Returns the temperatures of the coils, °C; 260 °C for the first coil if the over-temperature is injected or reported by the
+    /// plant alone.
     pub(super) fn temperatures_c(&self) -> AxisValues {
         let mut all = self.coils.temperatures_c();
         if self.is_too_hot() && !self.coils.is_too_hot() {

@@ -1,5 +1,5 @@
-//! Procedures that take seconds: take-off, landing and the search for gravity, one at a time; a new one replaces the
-//! previous one. A reset of gains runs in parallel and neither ends nor delays a landing.
+//! Procedures that take seconds: take-off, landing and the search for gravity, one at a time; a new procedure replaces the
+//! previous procedure. A reset of gains runs in parallel and neither ends nor delays a landing.
 
 use super::machine::{Command, Controller, Flight, KEPT, narrow, vector};
 use super::procedure::{GainReset, Procedure, ProcedureId, Search};
@@ -27,13 +27,13 @@ const FOUND_N: f64 = 2.0e-3;
 const FOUND_NM: f64 = 1.0e-4;
 
 impl Controller {
-    /// Returns the reply of a finished procedure; `None` while in progress, and after many later replies.
+    /// Returns the reply of a finished procedure; `None` while in progress, and after 64 later replies.
     #[must_use]
     pub fn reply(&self, procedure_id: ProcedureId) -> Option<Reply> {
         self.finished.iter().find(|(of, _)| *of == procedure_id).map(|(_, reply)| *reply)
     }
 
-    /// Begins a landing if the flotor is levitating, without a waiting call.
+    /// Begins a landing if the flotor takes off or levitates; no call waits for the landing.
     pub fn land(&mut self) {
         if matches!(self.flight, Flight::TakingOff | Flight::Flying) {
             self.begin_landing();

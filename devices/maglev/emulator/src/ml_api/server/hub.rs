@@ -58,14 +58,15 @@ impl Hub {
         std::mem::take(&mut self.state().is_restart_wanted)
     }
 
-    /// Begins a servo interval of `dt_s`: stores its first sample and queues events for clients.
+    /// Begins a servo interval of `dt_s`: stores its first sample, advances injected faults and procedures, queues events for
+    /// clients, and lands the flotor after the loss of a client's acknowledgements.
     pub fn begin(&self, sample: &Sample, dt_s: f64) {
         self.state().begin(sample, dt_s, &self.log);
         self.changed.notify_all();
     }
 
-    /// Runs a whole servo interval, for a loop that must not wait; `None` while a connection holds the lock. Real-time:
-    /// bounded, no allocation; one system call.
+    /// Runs a whole servo interval of `dt_s` without waiting for the lock, and returns the wrench over the interval; `None` if a
+    /// connection holds the lock. Real-time: bounded, no allocation; one system call.
     #[must_use]
     pub fn try_cycle(&self, sample: &Sample, dt_s: f64) -> Option<Wrench> {
         let mut state = self.state.try_lock().ok()?;
@@ -76,7 +77,7 @@ impl Hub {
         Some(wrench)
     }
 
-    /// Returns the wrench over a servo interval of `dt_s`.
+    /// Advances the coil temperatures and the integrals by a servo interval of `dt_s`, and returns the wrench over the interval.
     #[must_use]
     pub fn drive(&self, dt_s: f64) -> Wrench {
         self.state().controller.drive(dt_s)
@@ -87,7 +88,8 @@ impl Hub {
         self.state().controller.observe(sample);
     }
 
-    /// Waits until all ticks are acknowledged by the clients that respond, or until the timeout.
+    /// Waits until all ticks are acknowledged by the clients that respond, or until the timeout; returns at once if no client is
+    /// registered for ticks.
     #[must_use]
     pub fn wait_for_ticks_taken(&self, patience: Duration) -> TickWait {
         let taken = self.wait(patience, |state| {
@@ -223,7 +225,8 @@ impl Hub {
         self.changed.notify_all();
     }
 
-    /// Returns the cause of an end without an end event, if due.
+    /// Returns the reason to close the callback connection without an end event; `None` if the connection stays open or an end
+    /// event is pending.
     pub(super) fn is_over(&self, token: Id) -> Option<CallbackEnd> {
         let mut state = self.state();
         state
@@ -264,7 +267,7 @@ pub enum TickWait {
     Busy,
     /// No client is registered for ticks.
     Unwanted,
-    /// All ticks are acknowledged.
+    /// All ticks are acknowledged, or older than 60 ms.
     Taken,
     /// A tick is still unacknowledged.
     Open,
