@@ -45,7 +45,7 @@ pub enum Damage {
     #[error("the file is compressed with `{0}`; make a readable copy with `mcap decompress`")]
     Compressed(String),
     /// A chunk is not filled exactly by schemas, channels and messages.
-    #[error("the records of a chunk are shorter than the chunk")]
+    #[error("the records of a chunk do not fill the chunk exactly")]
     Chunk,
 }
 
