@@ -18,7 +18,7 @@ pub(crate) struct ErrorInfo {
     device: c_uint,
 }
 
-/// Client of the scheduler, which calls it once per tick.
+/// Client of the SDK's scheduler: the scheduler calls [`Self::step`] once per tick.
 pub(crate) trait Client: Send + 'static {
     /// Runs a tick; returns true to be called again.
     fn step(&mut self) -> bool;

@@ -85,8 +85,9 @@ pub(crate) struct Hd {
 /// Properties reported by a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Facts {
-    /// Middle of the usable workspace and half its size, m, axes of the contract.
+    /// Centre of the usable workspace in the contract's axes, m.
     pub(crate) centre_m: DVec3,
+    /// Half-extents of the usable workspace along the contract's axes, m.
     pub(crate) range_m: DVec3,
     pub(crate) is_turned: bool,
     pub(crate) gives_torque: bool,
@@ -245,7 +246,7 @@ impl Hd {
         })
     }
 
-    /// Sets the wrench of the frame and ends it; on the thread of the scheduler.
+    /// Sets the wrench of the frame and ends the frame; on the thread of the scheduler.
     pub(crate) fn finish(&self, wrench: &Wrench) -> Result<(), Fault> {
         self.functions.set(FORCE, to_hd(wrench.force()));
         if self.facts.gives_torque {
