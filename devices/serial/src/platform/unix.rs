@@ -34,7 +34,7 @@ pub(crate) fn reason(path: &str, error: Error) -> NotOpened {
     }
 }
 
-/// Reads the received bytes.
+/// Reads pending bytes without blocking and returns their number; an error if no bytes are pending.
 pub(crate) fn read(port: &mut TTYPort, bytes: &mut [u8]) -> io::Result<usize> {
     port.read(bytes)
 }

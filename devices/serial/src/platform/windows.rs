@@ -36,7 +36,8 @@ fn words(code: i32) -> String {
     said.strip_suffix(&format!(" (os error {code})")).unwrap_or(&said).trim().to_owned()
 }
 
-/// Reads the received bytes; a request for more would wait for them.
+/// Reads pending bytes without blocking and returns their number; `WouldBlock` if no bytes are pending. A request for more than
+/// the pending bytes would block.
 pub(crate) fn read(port: &mut COMPort, bytes: &mut [u8]) -> io::Result<usize> {
     let room = bytes.len().min(usize::try_from(port.bytes_to_read()?).unwrap_or(0));
     match bytes.get_mut(..room) {
@@ -45,7 +46,7 @@ pub(crate) fn read(port: &mut COMPort, bytes: &mut [u8]) -> io::Result<usize> {
     }
 }
 
-/// Returns the handle of a port, of which the system uses 32 bits.
+/// Returns the lower 32 bits of a port's handle; the system uses no others.
 #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // as the contract says
 pub(crate) fn descriptor(port: &COMPort) -> i32 {
     port.as_raw_handle() as usize as i32
