@@ -33,7 +33,7 @@ use thermal::{Thermal, ThermalParameters};
 /// Parameters of coils, amplifiers and field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ActuationParameters {
-    /// Placement of the coils.
+    /// Geometry of the coils, and the force of one coil at the current limit.
     pub geometry: CoilGeometry,
     /// Bandwidth of the current amplifiers, Hz.
     pub amplifier_bandwidth_hz: f64,

@@ -63,8 +63,8 @@ impl Faults {
         Ok(Self { plan, noise: Noise::new(seed, Stream::Faults), until_ns: 0 })
     }
 
-    /// Returns the fault at `time_ns`, `dt_s` (s) after the previous call; `None` outside episodes. Real-time: bounded,
-    /// no allocation.
+    /// Draws whether a random episode begins, and returns the fault at `time_ns`, `dt_s` (s) after the previous call; `None`
+    /// outside episodes. Real-time: bounded, no allocation.
     pub fn at(&mut self, time_ns: u64, dt_s: f64) -> Option<FaultKind> {
         let FaultPlan { kind, start_ns, duration_ns, rate_per_s } = self.plan?;
         let active = if rate_per_s > 0.0 {

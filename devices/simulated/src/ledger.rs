@@ -46,8 +46,8 @@ pub struct Work {
 }
 
 impl Work {
-    /// Returns the sum of all works on the mechanical energy, J: dissipated energy counts negative. Real-time: bounded,
-    /// no allocation.
+    /// Returns the net work on the flotor, J: work of coils, feed-forward and hand, less the dissipated energy. Real-time:
+    /// bounded, no allocation.
     #[must_use]
     pub fn net_j(&self) -> f64 {
         self.coils_j + self.feed_forward_j + self.hand_j - self.dissipated_j

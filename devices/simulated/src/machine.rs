@@ -29,7 +29,7 @@ pub struct MachineParameters {
 }
 
 impl MachineParameters {
-    /// The commercial device without a fault: published values, and estimates where none are published.
+    /// Parameters of the commercial device without a fault: published values, and estimates of unpublished values.
     pub const MAGLEV: Self =
         Self { actuation: ActuationParameters::MAGLEV, sensing: SensingParameters::MAGLEV, fault: None };
 
@@ -69,9 +69,9 @@ impl Machine {
         })
     }
 
-    /// Advances the simulation by `tick` under the `commanded` wrench (finite), and writes the sample that arrives to
-    /// `state`. Returns `Fresh`, `Stale` (an injected fault) or the fault; without a valid pose, pose, twist and
-    /// sampling time in `state` stay as they are. Real-time: bounded, no allocation.
+    /// Advances the simulation by `tick` under the `commanded` wrench (finite), and writes the sample that arrives to `state`.
+    /// Returns `Fresh`, `Stale` (an injected fault) or the fault. Delivered wrench and conditions in `state` are always set;
+    /// without a valid pose, pose, twist and sampling time in `state` stay as they are. Real-time: bounded, no allocation.
     pub fn cycle(
         &mut self,
         simulation: &mut Simulation,

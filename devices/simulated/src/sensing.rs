@@ -45,9 +45,9 @@ pub struct SensingParameters {
 }
 
 impl SensingParameters {
-    /// The commercial device: quantisation of 2 µm (brochure); noise of 1 µm, edge error of 1 % and one tick of delay
-    /// are usual for lateral-effect cells and a bus, not published. Velocity as in the University of Utah's control
-    /// program: a low-pass filter of 200 Hz.
+    /// Parameters of the commercial device: quantisation of 2 µm (brochure); noise of 1 µm, edge error of 1 % and one tick of
+    /// delay are usual for lateral-effect cells and a bus, not published. Velocity as in the University of Utah's control program:
+    /// a low-pass filter of 200 Hz.
     pub const MAGLEV: Self = Self {
         geometry: OpticsGeometry::MAGLEV,
         noise_m: 1.0e-6,

@@ -48,7 +48,7 @@ impl Setup {
     };
 }
 
-/// Incidents of a tick. None stops the simulation.
+/// Incidents of a tick. No incident stops the simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Incidents {
     /// The wrench contained a NaN or an infinity; the coils delivered zero instead.
@@ -291,7 +291,8 @@ impl Stroke {
         if guidance.is_free() {
             self.start = self.scripted; // the trajectory continues as without a guide
         } else if let (Some(start), Some(end), Some(scripted)) = (&mut self.start, end, scripted) {
-            // For an intended force the intended position follows the handle; the damper of the hand does not.
+            // Along an axis with an intended force the guided aim follows the handle, but the damper of the hand acts on the
+            // velocity of the guide alone: the start is set so that the slope of the intended position is this velocity.
             let from_m = end.pose.position_m - velocity_m_per_s * dt_s;
             start.pose.position_m = DVec3::select(scripted.yielding, from_m, start.pose.position_m);
         }

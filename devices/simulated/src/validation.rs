@@ -9,19 +9,19 @@ use std::fmt;
 /// Reason for the rejection of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InvalidParameter {
-    /// NaN or infinite.
+    /// NaN or infinite number.
     NotFinite {
         /// Name of the parameter, unit included.
         name: &'static str,
     },
-    /// Zero or negative where only positive numbers are valid.
+    /// Zero or negative number where only positive numbers are valid.
     NotPositive {
         /// Name of the parameter, unit included.
         name: &'static str,
         /// The value given.
         value: f64,
     },
-    /// Negative where zero is the minimum.
+    /// Negative number where zero is the minimum.
     Negative {
         /// Name of the parameter, unit included.
         name: &'static str,

@@ -22,7 +22,7 @@ pub type Currents = [f64; COILS];
 /// Current limit of a coil, A (public interface of the device: ±3.5 A).
 pub const CURRENT_LIMIT_A: f64 = 3.5;
 
-/// Placement of the coils.
+/// Geometry of the coils, and the force of one coil at the current limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoilGeometry {
     /// Radius of the hemisphere, m.
@@ -36,7 +36,7 @@ pub struct CoilGeometry {
 }
 
 impl CoilGeometry {
-    /// Geometry of the module documentation.
+    /// Synthetic geometry described in the module documentation.
     pub const MAGLEV: Self = Self {
         radius_m: 0.115,
         meridian_ring_rad: 65.0 * PI / 180.0,

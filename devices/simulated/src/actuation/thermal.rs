@@ -1,15 +1,15 @@
 //! Heating of the coils: an I²t model with the two faults reported by the device.
 //!
-//! The mean square current `L` (load) and the temperature `T` follow the square of the current with a first-order lag:
+//! The mean square current `L` (load, A²) and the temperature `T` (°C) follow the square of the current with a first-order lag:
 //!
 //! ```text
-//! minute:       L' = (i^2 - L) / 60 s        over-current when the square root of L exceeds 2 A
-//! temperature:  T' = (T_ambient + r i^2 - T) / tau      over-temperature above 250 degrees
+//! load:         L' = (i^2 - L) / 60 s                   over-current when the square root of L exceeds 2 A
+//! temperature:  T' = (T_ambient + r i^2 - T) / tau      over-temperature above 250 °C
 //! ```
 //!
-//! The limits (about 2 A over a minute, 250 °C) are published in the interface of the device. The heating `r` and the
-//! time constant `tau` were never published; with the values here, a constant 2 A leads to 180 °C after some minutes.
-//! So a cool device reaches the current limit first; the temperature limit needs a hot room, or badly cooled coils.
+//! The limits (about 2 A over a minute, 250 °C) are published in the interface of the device. The steady-state temperature rise
+//! `r` (K/A²) and the time constant `tau` (s) were never published; with the values here, a constant 2 A leads to 180 °C after
+//! some minutes. So a cool device reaches the current limit first; the temperature limit needs a hot room, or badly cooled coils.
 
 use super::coils::{COILS, Currents};
 use crate::lag::Lag;

@@ -28,7 +28,7 @@ const FOLLOWING_PER_S: f64 = 50.0;
 /// s.
 const SPEED_LIMIT_M_PER_S: f64 = 0.25;
 
-/// Error: the client does not guide the hand, because another client does, or none.
+/// Error: the client does not guide the hand; another client guides the hand, or no client does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NotGuiding {
     /// Number of the guiding client; 0 for none.
@@ -132,9 +132,8 @@ impl Guidance {
         self.is_guide_speaking = false;
     }
 
-    /// Advances by `dt_s` (s) to the time `now_ns`. Returns the aim of the hand, and the contribution of the guide to
-    /// its velocity, m/s. `scripted` is the aim of the trajectory at `now_ns`, `handle` the motion of the handle
-    /// before.
+    /// Advances by `dt_s` (s) to the time `now_ns`. Returns the aim of the hand, and the contribution of the guide to its
+    /// velocity, m/s. `scripted` is the aim of the trajectory at `now_ns`, `handle` the motion of the handle before the step.
     ///
     /// Real-time: bounded, no allocation.
     pub(crate) fn advance(

@@ -7,9 +7,8 @@
 //! time_s,x_m,y_m,z_m                      or      time_s,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad
 //! ```
 //!
-//! in the device frame, rotation as a rotation vector. Times increase from row to row and count from the first row;
-//! between two rows, the intended pose is interpolated linearly. Before the first and after the last row it is
-//! constant.
+//! in the device frame, rotation as a rotation vector. Times increase from row to row and count from the first row; between two
+//! rows, the intended pose is interpolated linearly. Before the first and after the last row the pose is constant.
 
 mod mcap_file;
 mod table;
@@ -42,7 +41,7 @@ struct Sample {
 /// Reason why a file is rejected as a trajectory. Prints file, place, and the expected content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordingError {
-    /// The file.
+    /// Path of the file.
     pub file: String,
     /// Place in the file (a line, a message) and problem.
     pub problem: String,
@@ -109,7 +108,7 @@ impl Sample {
         let pose = Pose { position_m, orientation };
         // Written so that NaN is rejected.
         if !(0.0..=1.0e6).contains(&time_s) {
-            return Err(format!("time {time_s} s is outside 0 to 1000000 s after the first"));
+            return Err(format!("time {time_s} s is outside 0 to 1000000 s after the first pose"));
         }
         pose.check().map_err(|error| error.to_string())?;
         let inside = position_m.abs().max_element() <= FARTHEST_M;

@@ -13,7 +13,7 @@ const TARGET: [usize; 3] =
 /// Index of the parameter with the number of the guiding client.
 const GUIDE: usize = index_of("hand_guide");
 
-/// Returns the index of a parameter; compilation fails for an unknown one.
+/// Returns the index of a parameter; compilation fails for an unknown id.
 const fn index_of(id: &str) -> usize {
     let mut index = 0;
     while !is_same(SCHEMA[index].id().as_bytes(), id.as_bytes()) {

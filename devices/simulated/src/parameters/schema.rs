@@ -250,7 +250,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Full: resolution of each coordinate at the LED (devices have 2, 5 or 10; 0: no steps)",
     ),
     Parameter::real("sensor_edge_percent", "%", 0.0, 20.0, 1.0, 
-        "Full: nonlinearity of a position-sensing cell at its edge, as a share of its half width (grows with \
+        "Full: nonlinearity of a position-sensing cell at its edge, as a fraction of its half width (grows with \
          the cube of the distance from the centre)"),
     Parameter::real(
         "sensor_bandwidth_hz",

@@ -106,7 +106,8 @@ impl Body {
         (stiffness_nm / least_kg_m2).sqrt().max(damping_nms / least_kg_m2)
     }
 
-    /// Returns kinetic energy and potential energy above home of the flotor. Real-time: bounded, no allocation.
+    /// Returns the kinetic energy of the flotor, and its gravitational potential energy relative to home. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub(super) fn energy(&self, motion: &Motion) -> MechanicalEnergy {
         let (centre_m, spin) = (self.flotor.centre_of_mass_m, motion.spin_rad_per_s);

@@ -40,7 +40,7 @@ pub struct FlotorParameters {
     pub inertia_kg_m2: DVec3,
     /// Centre of mass in the flotor frame, m.
     pub centre_of_mass_m: DVec3,
-    /// Gravity, m/s², pointing down.
+    /// Gravitational acceleration, m/s², downwards.
     pub gravity_m_per_s2: f64,
     /// Feed-forward that compensates gravity.
     pub feed_forward: FeedForward,

@@ -23,7 +23,7 @@ pub(super) struct Grid {
     pub(super) gramian: Gramian,
 }
 
-/// A time during a step, with the response of the oscillator from the start to it and back.
+/// A time during a step, with the response of the oscillator from the start of the step to this time and back.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Node {
     /// Time since the start of the step, s.

@@ -56,7 +56,7 @@ pub struct OpticsGeometry {
 }
 
 impl OpticsGeometry {
-    /// Layout of the module documentation. Cells of 18 mm cover every pose of ±12 mm and ±8 degrees.
+    /// Synthetic layout described in the module documentation. Cells of 18 mm cover every pose of ±12 mm and ±8 degrees.
     pub const MAGLEV: Self = Self {
         diode_azimuths_rad: [0.0, 2.0 * PI / 3.0, 4.0 * PI / 3.0],
         diode_radius_m: 60.0e-3,
@@ -96,8 +96,8 @@ impl Optics {
     /// Computes positions and directions of diodes and lenses. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a length is not positive, an azimuth is not finite, or the diodes stand in a line: the rotation about that
-    /// line would be unobservable.
+    /// If a length or the gap between diodes and lenses is not positive, an azimuth is not finite, or the diodes stand in a line:
+    /// the rotation about that line would be unobservable.
     pub fn new(geometry: &OpticsGeometry) -> Result<Self, InvalidParameter> {
         number("led_radius_mm", geometry.diode_radius_m, Domain::Positive)?;
         let gap_m = geometry.lens_radius_m - geometry.diode_radius_m - REGION_M;

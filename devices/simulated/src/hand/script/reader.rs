@@ -34,7 +34,7 @@ const FASTEST_HZ: f64 = 20.0;
 /// Error in a script. Prints file, line, key, and the expected content.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScriptError {
-    /// The file, or the name of a built-in script.
+    /// Path of the file, or name of a built-in script.
     pub file: String,
     /// Line, from 1; 0 for the file as a whole.
     pub line: usize,
@@ -212,7 +212,7 @@ pub(super) fn read(file: &str, text: &str) -> Result<Script, ScriptError> {
         && (index + 1 < script.step.len() || script.repeat.0 > 1)
     {
         return Err(whole(format!(
-            "[[step]] {} is `release`, which opens the hand for good: make it the last, without `repeat`",
+            "[[step]] {} is `release`, which opens the hand permanently: make `release` the last step, without `repeat`",
             index + 1
         )));
     }
