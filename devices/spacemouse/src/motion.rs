@@ -55,9 +55,9 @@ fn share([x, y, z]: [i16; 3]) -> DVec3 {
 /// Motion requested in a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotionRequest {
-    /// Move at the velocity that the deflection sets.
+    /// Motion at the velocity set by the deflection.
     Follow(Deflection),
-    /// Move home at the speed of full deflection.
+    /// Motion to home at the speed of full deflection.
     Home,
 }
 

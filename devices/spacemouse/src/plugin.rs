@@ -23,7 +23,7 @@ const HOME_BUTTON: usize = 5;
 const SCHEMA: &[Parameter] = &[
     Parameter::real("speed_mm_per_s", "mm/s", 0.1, 1000.0, 20.0, "Speed at full deflection").live(),
     Parameter::real("spin_deg_per_s", "°/s", 0.0, 360.0, 20.0, "Angular speed at full deflection").live(),
-    Parameter::real("dead_zone", "1", 0.0, 0.9, 0.08, "Dead zone, as a share of full deflection").live(),
+    Parameter::real("dead_zone", "1", 0.0, 0.9, 0.08, "Dead zone, as a fraction of full deflection").live(),
     Parameter::real("range_mm", "mm", 0.1, 1000.0, 12.0, "Largest distance of the pose from home"),
     Parameter::real("range_deg", "°", 0.0, 170.0, 7.0, "Largest rotation of the pose from home"),
     Parameter::real(
@@ -66,8 +66,8 @@ impl Values {
     }
 }
 
-/// Opened puck, with the pose that its reports move. The source of reports is a type parameter so that tests can supply
-/// their own.
+/// Opened puck, with the pose that its reports move. The source of reports is a type parameter so that tests can supply a source
+/// of their own.
 pub struct SpaceMouse<S = HidPuck> {
     source: S,
     values: Values,

@@ -28,8 +28,8 @@ pub trait Reports: Sized + Send + 'static {
     /// A [`Refusal`] with the cause and the remedy.
     fn open(path: Option<&str>) -> Result<Self, Refusal>;
 
-    /// Reads the next pending report and returns its length; 0 if none is pending. Never waits. Real-time: bounded, no
-    /// allocation; one call of the system.
+    /// Reads the next pending report and returns its length; 0 if none is pending. Never waits. Real-time: bounded, no allocation,
+    /// one system call.
     ///
     /// # Errors
     /// If the puck is gone.

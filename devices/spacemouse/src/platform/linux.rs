@@ -1,4 +1,4 @@
-//! Linux: hidraw, with permissions by udev.
+//! Linux: paths of hidraw devices, and the udev rule for access.
 
 use hidapi::HidError;
 use std::io::ErrorKind;
