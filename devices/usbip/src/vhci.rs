@@ -5,7 +5,7 @@ use std::os::fd::AsRawFd;
 use std::os::unix::net::UnixStream;
 
 const FOLDER: &str = "/sys/devices/platform/vhci_hcd.0";
-/// USB speed of a device, with the number of the kernel (`enum usb_device_speed`).
+/// USB speed of a device, with the value of the kernel's `enum usb_device_speed`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Speed {
     /// Full speed, 12 Mbit/s: frames of 1 ms.
@@ -23,7 +23,8 @@ const FAR_BUS: u32 = 1 << 16;
 /// at `speed`.
 ///
 /// # Errors
-/// Errors of the system: usually the module `vhci_hcd` is not loaded, or the user has no permission.
+/// Errors of the system: usually the module `vhci_hcd` is not loaded, or the user has no permission. `ResourceBusy` if no virtual
+/// port is free.
 pub fn attach(stream: &UnixStream, speed: Speed) -> io::Result<()> {
     let explained = |error: io::Error| {
         let hint = match error.kind() {

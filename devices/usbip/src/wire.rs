@@ -15,7 +15,7 @@ const LONGEST_DATA: usize = 1 << 20;
 const STALLED: i32 = -32;
 const TAKEN_BACK: i32 = -104;
 
-/// Request of the host controller.
+/// Request from the host controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Message {
     /// Request to start a transfer.
@@ -29,7 +29,7 @@ pub enum Message {
     },
 }
 
-/// Transfer that the host controller has submitted.
+/// Transfer submitted by the host controller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Transfer {
     /// Sequence number, which assigns the completion to the transfer.
@@ -51,7 +51,7 @@ impl Message {
     /// Reads the next request from a stream; blocks until the request is complete.
     ///
     /// # Errors
-    /// Errors of the stream; `InvalidData` for an unknown message or too much data.
+    /// Errors of the stream; `InvalidData` for an unknown message or more than 1 MiB of data.
     pub fn read(stream: &mut impl Read) -> io::Result<Self> {
         let mut header = [0; HEADER_BYTES];
         stream.read_exact(&mut header)?;
