@@ -42,7 +42,7 @@ pub struct Sample {
     pub delivered: Wrench,
     /// Buttons, one bit each.
     pub buttons: u32,
-    /// Conditions of the device, such as saturation.
+    /// Conditions of the device; [`Exchange::publish`] transmits saturation only.
     pub conditions: Conditions,
 }
 
@@ -93,7 +93,7 @@ impl Exchange {
 
     // ------------------------------------------------------------ the thread of the SDK
 
-    /// Publishes a new sample. Called by the thread of the SDK.
+    /// Publishes a new sample, with saturation as its only condition. Called by the thread of the SDK.
     pub fn publish(&self, sample: &Sample) {
         let mut words = [0; SAMPLE_WORDS];
         let Sample { pose, twist, delivered, buttons, conditions } = sample;
@@ -116,9 +116,9 @@ impl Exchange {
         self.tell();
     }
 
-    /// Returns the wrench to send: the newest wrench of the loop, or zero after [`Self::stop`] or [`Self::end`], and,
-    /// in real pace, if the loop has not renewed the wrench within [`VALID`]. In lockstep, waits for the loop, a second
-    /// at most. Called by the thread of the SDK.
+    /// Returns the wrench to send and marks it as pending until [`Self::note_sent`]. The wrench is the newest of the loop, or zero
+    /// after [`Self::stop`] or [`Self::end`], and, in real pace, if the loop has not renewed the wrench within [`VALID`]. In
+    /// lockstep, waits for the loop, a second at most. Called by the thread of the SDK.
     pub fn next_wrench(&self, cursor: &mut CommandCursor) -> Wrench {
         if self.pace == Pace::Lockstep {
             self.wait_for_command(cursor.seen);
@@ -167,8 +167,8 @@ impl Exchange {
 
     // ------------------------------------------------------------ the loop and other threads
 
-    /// Resets wrench, fault and stop for a new run; the sample count continues. Returns the cursor for the thread of
-    /// the SDK. Not real-time.
+    /// Resets wrench, fault, stop and end for a new run; the sample count continues. Returns the cursor for the thread of the SDK.
+    /// Not real-time.
     #[must_use]
     pub fn begin(&self) -> CommandCursor {
         self.command.put(&[0; 6]);

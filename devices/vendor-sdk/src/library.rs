@@ -90,7 +90,7 @@ impl Library {
 /// Copies a static text of an SDK; empty for a null pointer.
 ///
 /// # Safety
-/// `text` is null, or a text that ends in a null byte and stays for ever.
+/// `text` is null, or a text that ends in a null byte and is never freed or changed.
 #[must_use]
 pub unsafe fn static_text(text: *const c_char) -> String {
     if text.is_null() {

@@ -38,8 +38,9 @@ impl LoopEnd {
         Self { exchange, most, timeout, seen, awaited: seen, fresh: Instant::now(), state: DeviceState::HOME }
     }
 
-    /// Writes the newest sample to `state`; without a new sample, the last one, as [`Cycle::Stale`] or, after the
-    /// timeout, [`Fault::Timeout`]. Real-time: bounded, no allocation; in lockstep it waits, a second at most.
+    /// Writes the newest sample to `state`; without a new sample, the last one, as [`Cycle::Stale`] or, after the timeout,
+    /// [`Fault::Timeout`]. A fault of the exchange takes precedence, with the last sample. Real-time: bounded, no allocation; in
+    /// lockstep it waits, a second at most.
     pub fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
         if let Some(patience) = self.exchange.lockstep_patience() {
             self.exchange.wait_for_sample(self.seen, patience);
@@ -59,8 +60,8 @@ impl LoopEnd {
         cycle
     }
 
-    /// Publishes the wrench, limited in magnitude; a force or torque that is not finite counts as zero. Real-time:
-    /// bounded, no allocation.
+    /// Publishes the wrench, limited in magnitude; a force or torque that is not finite counts as zero. Returns the fault of the
+    /// exchange, if any. Real-time: bounded, no allocation.
     pub fn write(&mut self, wrench: &Wrench) -> Cycle {
         let [force_n, torque_nm] = [wrench.force(), wrench.torque()];
         let within = |vector: DVec3, most: f64| {

@@ -10,7 +10,7 @@ pub(crate) type Loaded = Library;
 
 /// Library folders of the system.
 const SYSTEM: [&str; 5] = ["/usr/local/lib", "/usr/lib", "/usr/lib64", "/lib", "/opt/lib"];
-/// Bytes of an ELF header up to the processor.
+/// Length of an ELF header up to the machine type (field `e_machine`) inclusive, bytes.
 pub(crate) const HEAD: usize = 20;
 
 /// User text about the ending of a library's name.
@@ -21,7 +21,7 @@ pub(crate) fn missing_remedy(path: &Path) -> String {
     format!("`ldd {}` lists the required libraries and the missing ones", path.display())
 }
 
-/// Returns the file names of a library on this system, of those on Linux and on Windows.
+/// Returns the file names of a library on Linux, `files`.
 pub(crate) fn files(
     files: &'static [&'static str],
     _on_windows: &'static [&'static str],

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Handle of an open library.
 pub(crate) type Loaded = Library;
 
-/// Bytes of a file up to the processor in the PE header: the DOS stub before it is short.
+/// Number of bytes read from the start of a file, enough for the PE header after a usual DOS stub.
 pub(crate) const HEAD: usize = 4096;
 
 /// User text about the ending of a library's name.
@@ -18,7 +18,7 @@ pub(crate) fn missing_remedy(path: &Path) -> String {
     format!("a library that {} needs is missing; install the whole SDK", path.display())
 }
 
-/// Returns the file names of a library on this system, of those on Linux and on Windows.
+/// Returns the file names of a library on Windows, `on_windows`.
 pub(crate) fn files(
     _files: &'static [&'static str],
     on_windows: &'static [&'static str],
@@ -49,7 +49,7 @@ pub(crate) fn processor(head: &[u8]) -> Option<String> {
     })
 }
 
-/// Returns the processor number of a PE file.
+/// Returns the machine type of a PE file (field `Machine` of the COFF header); `None` for any other file.
 fn machine(head: &[u8]) -> Option<u16> {
     let place = match head {
         [b'M', b'Z', ..] => u32::from_le_bytes(head.get(0x3c..0x40)?.try_into().ok()?),
