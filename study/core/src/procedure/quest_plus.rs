@@ -39,7 +39,10 @@ impl QuestPlusRule {
             return Err(InvalidRule::new("--target", self.target, legal));
         }
         let [least, most] = self.deltas;
-        if !(least > 0.0 && least < most && most < 1.0) {
+        if !(most > 0.0 && most < 1.0) {
+            return Err(InvalidRule::new("largest difference", most, "must be above 0 and below 1"));
+        }
+        if !(least > 0.0 && least < most) {
             let legal = "must be above 0 and below the largest difference";
             return Err(InvalidRule::new("smallest difference", least, legal));
         }

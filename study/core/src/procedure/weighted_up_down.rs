@@ -129,7 +129,10 @@ impl WeightedUpDownRule {
             let legal = "must be above --floor and up to --ceiling";
             return Err(InvalidRule::new("--initial", self.initial_delta, legal));
         }
-        if self.stop_after == 0 || self.average_from == 0 || self.average_from > self.stop_after {
+        if self.stop_after == 0 {
+            return Err(InvalidRule::new("--stop-after", self.stop_after, "must be 1 or more"));
+        }
+        if self.average_from == 0 || self.average_from > self.stop_after {
             let legal = format!("must be 1 to --stop-after ({})", self.stop_after);
             return Err(InvalidRule::new("--average-from", self.average_from, legal));
         }
