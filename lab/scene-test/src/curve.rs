@@ -90,7 +90,7 @@ impl Points {
         self.rows.iter().map(answer).collect()
     }
 
-    /// Returns the value with the largest absolute error (N or N·m) among the values beyond their tolerance or with the status
+    /// Returns the value with the largest error relative to its tolerance among the values beyond it or with the status
     /// `invalid_input` or `not_converged`; `None` if there is no such value. `answers`: output of `flotor eval`.
     ///
     /// # Errors
@@ -107,7 +107,8 @@ impl Points {
                 let error = (got - expected[index]).abs();
                 let is_inside =
                     error <= tolerance(index) && status != "invalid_input" && status != "not_converged";
-                let excess = if is_inside { continue } else { error };
+                // NaN if both are 0, or if the value is not a number: as bad as any error.
+                let excess = if is_inside { continue } else { error / tolerance(index) };
                 if worst.as_ref().is_none_or(|(largest, _)| excess > *largest || excess.is_nan()) {
                     let column = WRENCH[index];
                     let found =
@@ -221,6 +222,9 @@ mod tests {
         let worst = points.worst(&answers(0.6, 1.0), |_| 0.05).unwrap().unwrap();
         assert_eq!((worst.column, worst.expected, worst.got), ("fz_n", 2.0, 1.0));
         assert!(points.worst("fz_n\n", |_| 0.0).is_err());
+        let both = Points::parse("z_m,fz_n,tx_nm\n-0.001,0.5,0\n-0.004,2.0,0.1\n").unwrap();
+        let found = both.worst(&answers(0.5, 3.0), |index| [1.0, 0.01][index / 3] / 2.0).unwrap().unwrap();
+        assert_eq!(found.column, "tx_nm", "a tenth of N·m is 20 tolerances, a newton 2");
         assert!(points.worst(&answers(0.5, 2.0).replace("ok", "invalid_input"), |_| 0.0).unwrap().is_some());
     }
 
