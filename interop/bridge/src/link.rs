@@ -201,8 +201,7 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     if let Some(file) = exposed_key(options, &config) {
         return Err(LinkError::ExposedKey { file });
     }
-    let wrong =
-        |error: zenoh::Error| LinkError::Config { file: options.config.clone(), reason: error.to_string() };
+    let wrong = |error: zenoh::Error| LinkError::Config { file: None, reason: error.to_string() };
     let has_rules = has_rules(&config);
     // A visitor's configuration is the user's own; its access rules are not known here.
     let is_known = end == End::Serving || options.config.is_none();
@@ -297,7 +296,10 @@ fn config_of(options: &LinkOptions) -> Result<Config, LinkError> {
         config.insert_json5("connect/endpoints", &list(&options.connect)).map_err(wrong)?;
         return Ok(config);
     };
-    let mut config = Config::from_file(path).map_err(wrong)?;
+    let mut config = Config::from_file(path).map_err(|error| LinkError::Config {
+        file: options.config.clone(),
+        reason: error.to_string(),
+    })?;
     for (key, given) in [("listen/endpoints", &options.listen), ("connect/endpoints", &options.connect)] {
         if !given.is_empty() {
             config.insert_json5(key, &list(given)).map_err(wrong)?;
