@@ -142,8 +142,8 @@ pub fn posture(angles_rad: DVec3, near_m: DVec3) -> Option<Posture> {
     let mut position_m = near_m;
     for _ in 0..STEPS {
         let (g, rows, h) = closure(position_m, angles_rad);
-        // With shorter levers any position would pass as a solution.
-        if h.abs().min_element() < LEAST_LEVER_M * A_M {
+        // With shorter levers any position would pass as a solution. `h` is twice arm length times lever.
+        if h.abs().min_element() < 2.0 * A_M * LEAST_LEVER_M {
             return None;
         }
         let by_position = DMat3::from_cols(rows[0], rows[1], rows[2]).transpose();
