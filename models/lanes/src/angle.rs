@@ -3,15 +3,15 @@
 //! An elastic energy needs the square of an angle between two directions, or a twist, and their derivatives. An arc
 //! cosine loses half its digits near zero and has a kink at half a turn. Both measures below are truncated Taylor
 //! series in `1 - cos`, which follows from a pose without cancellation as half the squared distance of two unit
-//! vectors. Up to [`TRUSTED_VERSINE`] they equal the angle to a relative 2e-5 (to rounding below 17 degrees). Beyond,
-//! up to half a turn and over it, they are less than the angle but smooth, so that an energy built on them is smooth on
-//! all rotations and its derivative is exact.
+//! vectors. Up to [`TRUSTED_VERSINE`] they equal the squared angle and the twist to a relative 2e-5 (to rounding below 17
+//! degrees). For larger angles, also at half a turn, the measures are too small but smooth: an energy built on them is smooth
+//! on all rotations, and its derivative is exact.
 //!
 //! Source: series of `asin² s` and `asin s / sqrt(1 - s²)` at `s = sin(angle / 2)`, NIST DLMF 4.24.
 
 use crate::{Real, polynomial};
 
-/// Versine `1 - cos` of 60 degrees: above it the measures are smooth but no longer equal to the angle.
+/// Versine `1 - cos` of 60 degrees. For larger versines the measures are smooth but less than the angle.
 pub const TRUSTED_VERSINE: f64 = 0.5;
 
 /// Coefficients of `angle² / c` by powers of `c = 1 - cos`: `2^(n+2) / ((n+1)² binomial(2n+2, n+1))`, `n = 0, 1, ...`.
@@ -32,7 +32,7 @@ const fn series<const TERMS: usize>(first: f64, is_square: bool) -> [f64; TERMS]
     coefficients
 }
 
-/// Square of the angle between two directions.
+/// Square of the angle between two directions, as a polynomial of the versine, with its derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SquaredAngle<R = f64> {
     /// Squared angle `angle²` (rad²).
@@ -41,7 +41,7 @@ pub struct SquaredAngle<R = f64> {
     pub slope: R,
 }
 
-/// Signed angle of rotation about a known axis.
+/// Signed angle of rotation about a known axis, as a polynomial of the versine times the sine, with its derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Twist<R = f64> {
     /// Angle (rad); odd, and zero again at half a turn.

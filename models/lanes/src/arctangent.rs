@@ -8,8 +8,8 @@
 //! atan(t) = t q(t²)        q(u) = 1 - u P(u) / Q(u),  0 <= u <= 1
 //! ```
 //!
-//! `P` and `Q` are the minimax quotient of degrees 5 and 6 in the relative error of `q`, 6e-18; all coefficients
-//! are positive, so nothing cancels. Found by weighted least squares on Chebyshev nodes with Lawson's iteration
+//! `P` and `Q`, of degrees 5 and 6, minimise the largest relative error of `q` (minimax): 6e-18. All coefficients
+//! are positive, so nothing cancels. They were found by weighted least squares on Chebyshev nodes with Lawson's iteration
 //! of the weights (Rice, *The Approximation of Functions*, volume 2, 1969), in 40 digits.
 
 use crate::Real;

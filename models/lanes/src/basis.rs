@@ -18,17 +18,17 @@ use std::f64::consts::PI;
 /// Each table exists in both index orders, so that sums over bubbles and over stations both read consecutive memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Basis<const K: usize, const Q: usize> {
-    /// Gauss weights; their sum is 1.
+    /// Weights of the Gauss quadrature; their sum is 1.
     pub weight: [f64; Q],
-    /// Scaled arc length of the stations; also the value of the straight line there.
+    /// Scaled arc length of the stations, 0 to 1; also the value at each station of the line from 0 to 1.
     pub station: [f64; Q],
-    /// Bubbles at the stations, `[k][i]`.
+    /// Values of the bubbles at the stations, indexed by bubble, then station.
     pub bubble: [[f64; Q]; K],
-    /// Slopes of the bubbles per scaled arc length, `[k][i]`.
+    /// Slopes of the bubbles at the stations, per scaled arc length, indexed by bubble, then station.
     pub slope: [[f64; Q]; K],
-    /// Bubbles at the stations, `[i][k]`.
+    /// Values of the bubbles at the stations, indexed by station, then bubble.
     pub bubble_at: [[f64; K]; Q],
-    /// Slopes of the bubbles per scaled arc length, `[i][k]`.
+    /// Slopes of the bubbles at the stations, per scaled arc length, indexed by station, then bubble.
     pub slope_at: [[f64; K]; Q],
 }
 

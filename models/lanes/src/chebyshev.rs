@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use flotor_hal::glam::DVec4;
 use flotor_hal::math;
 
-/// Interpolates functions on -1..1 at the Chebyshev nodes; returns the coefficients of the powers, from the constant
-/// on. Real-time: bounded, no allocation.
+/// Interpolates the four components of `function` on -1..1 at `TERMS` (at least two) Chebyshev nodes, and returns the
+/// coefficients of the powers, from the constant on. Real-time: bounded, no allocation.
 #[must_use]
 pub fn interpolated<const TERMS: usize>(mut function: impl FnMut(f64) -> DVec4) -> [DVec4; TERMS] {
     let terms = TERMS as f64;

@@ -16,18 +16,18 @@
 //! Stegun, 10.1), so that neighbours are tied by recurrences, `C0 = G0 - z G1 / 3`, `G0 = G1 - z G2 / 15`, and
 //! derivatives are neighbours too, `dG0/dz = -G1 / 6`, `dG1/dz = -G2 / 10`.
 //!
-//! Evaluation: power series of `G1` and `G2` at `z / 16`, recurrences for the rest, then two angle doublings.
+//! Evaluation: power series of `G1` and `G2` at `z / 16`, recurrences for `G0` and `C0`, then two angle doublings.
 
 use crate::Real;
 
-/// Terms of the power series: at `z / 16 = -3.75` the first omitted one is below 1e-17 of the sum.
+/// Number of terms of the power series: at `z / 16 = -3.75` the first omitted term is below 1e-17 of the sum.
 const TERMS: usize = 12;
 
 /// Coefficients of `G1` and `G2` by powers of `-z`.
 const G1_SERIES: [f64; TERMS] = power_series(1);
 const G2_SERIES: [f64; TERMS] = power_series(2);
 
-/// Computes the coefficients of `Gn`: `(-1/2)^k (2n+1)!! / (k! (2n+2k+1)!!)`, by quotients of successive ones.
+/// Computes the coefficients of `Gn`, `(-1/2)^k (2n+1)!! / (k! (2n+2k+1)!!)`, from quotients of successive coefficients.
 const fn power_series(n: usize) -> [f64; TERMS] {
     let mut coefficients = [1.0; TERMS];
     let mut k = 1;
@@ -69,11 +69,11 @@ pub struct EntireFunctions<R = f64> {
 }
 
 impl EntireFunctions {
-    /// Smallest argument: deeper in tension use the quotients of
-    /// [`StabilityFunctions`](crate::stability::StabilityFunctions), which do not grow.
+    /// Smallest argument `z`. For stronger tension use the quotients of
+    /// [`StabilityFunctions`](crate::stability::StabilityFunctions), which do not overflow.
     pub const MIN_ARGUMENT: f64 = -60.0;
 
-    /// Largest argument: two and a half half-waves, past every pole a spring can reach.
+    /// Largest argument `z`: almost two and a half half-waves, above every pole that a spring can reach.
     pub const MAX_ARGUMENT: f64 = 60.0;
 }
 
@@ -81,8 +81,7 @@ impl<R: Real> EntireFunctions<R> {
     /// Evaluates all four functions at `z`. Real-time: bounded, no allocation, no branch.
     ///
     /// Error below 5e-15 of the larger of 1 and the value for -60 <= z <= 9.5 (a half-wave is at 9.87), below
-    /// 2e-14 up to 60. An argument outside -60..60 is moved to the nearer end and NaN to the lower one, so the
-    /// result is always finite.
+    /// 2e-14 up to 60. An argument outside -60..60 is clamped, and NaN counts as -60, so the result is always finite.
     #[inline(always)]
     #[must_use]
     pub fn at(z: R) -> Self {

@@ -1,16 +1,17 @@
-//! Numerical formulas that run on one pose or on several side by side.
+//! SIMD numerics: formulas that run on one pose, or on several poses side by side.
 //!
 //! The laws of a model are written once, over any [`Real`]: `f64` for the servo's one pose, [`Wide`] for a batch, several
 //! poses in the lanes of one vector register. Every operation rounds as IEEE 754 says, in the order written, and no product is
 //! fused with a sum, so a lane of a batch holds *the same bits* as the scalar law, on every machine.
 //!
-//! A comparison returns a mask, a truth value per lane. Rare cases (strong tension, saturation, a plate below the
-//! other) stand behind `if R::any(mask)`: for one pose an ordinary branch, for several a branch taken if any lane needs
-//! it; [`Real::select`] restores the other lanes.
+//! A comparison returns a mask, a truth value per lane. Rare cases (strong tension, saturation, one plate below the
+//! other) are guarded by `if R::any(mask)`: for one pose an ordinary branch; for several poses a branch taken if any lane
+//! needs the rare case, after which [`Real::select`] restores the other lanes.
 //!
-//! [`angle`] computes squared angles and twists, [`arctangent`] angles from sides, [`saturation`] limits a quantity below a pole:
-//! polynomials over [`Real`], without the functions of a math library. [`entire`] and [`stability`] are the functions of a loaded column.
-//! [`chebyshev`] fits polynomials, [`basis`] has polynomials of a field along a rod, and [`matrix`] solves small symmetric systems.
+//! Modules over [`Real`], without the functions of a math library: [`angle`] computes squared angles and twists, [`arctangent`]
+//! angles from sides of triangles, and [`saturation`] limits a quantity below a pole. [`entire`] and [`stability`] compute the
+//! functions of a loaded column. [`chebyshev`] interpolates by polynomials, [`basis`] has polynomials of a field along a rod, and
+//! [`matrix`] solves small symmetric systems.
 //!
 //! The lanes come from the crate `pulp`, which detects the instruction set of the machine at run time.
 
@@ -37,7 +38,7 @@ macro_rules! in_lanes {
     };
 }
 
-/// Real number, or one real number per lane. All methods are real-time: bounded, no allocation.
+/// Real number, or one real number per SIMD lane. All methods are real-time: bounded, no allocation.
 pub trait Real:
     Copy
     + Neg<Output = Self>
@@ -52,7 +53,7 @@ pub trait Real:
     /// Truth value per lane.
     type Mask: Copy + BitAnd<Output = Self::Mask> + BitOr<Output = Self::Mask>;
 
-    /// Returns `value` in every lane of `self`.
+    /// Returns a number with as many lanes as `self` and `value` in every lane.
     #[must_use]
     fn like(self, value: f64) -> Self;
 
@@ -157,7 +158,7 @@ impl Real for f64 {
     }
 }
 
-/// Vector register of numbers for the instruction set `S`.
+/// SIMD register of `f64` numbers for the instruction set `S`.
 #[derive(Clone, Copy, Debug)]
 pub struct Wide<S: Simd> {
     simd: S,
@@ -283,7 +284,7 @@ impl<S: Simd> Real for Wide<S> {
     }
 }
 
-/// Two numbers, or two registers, computed together: while one waits for a division the other proceeds.
+/// Two numbers, or two registers, computed together: while one waits for a division, the processor computes the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pair<R>(pub R, pub R);
 

@@ -1,10 +1,10 @@
 //! Factorisation `L D Lᵀ` of a small symmetric matrix, with the number of its negative eigenvalues.
 //!
-//! By Sylvester's law of inertia the signs of the pivots `D` are those of the eigenvalues. The number of
-//! negative ones of a second variation is the Morse index of the equilibrium: zero where it is stable.
+//! By Sylvester's law of inertia as many pivots `D` as eigenvalues are negative. The number of negative eigenvalues of a
+//! second variation is the Morse index of the equilibrium: zero if the equilibrium is stable.
 //!
-//! Source: Golub and Van Loan, *Matrix Computations*, 4.1 and 8.1.5. Without pivoting: a definite matrix needs none; of
-//! an indefinite one only the negative pivots are counted, before it is shifted until definite.
+//! Source: Golub and Van Loan, *Matrix Computations*, 4.1 and 8.1.5. Without pivoting: a definite matrix needs none, and of
+//! an indefinite matrix the caller uses only the number of negative pivots, then shifts the matrix until it is definite.
 
 /// Steps of inverse iteration: they give the smallest eigenvalue to a few percent.
 const INVERSE_ITERATIONS: u32 = 3;
@@ -27,7 +27,8 @@ impl<const N: usize> Factored<N> {
         Self { column: [[0.0; N]; N], row: [[0.0; N]; N], inverse_pivot: [1.0; N], negative: 0 }
     }
 
-    /// Factorises `matrix + shift * unit`; reads only the lower triangle. Real-time: bounded, no allocation.
+    /// Factorises `matrix + shift * unit` and counts the negative pivots; reads only the lower triangle. A zero pivot gives
+    /// non-finite factors. Real-time: bounded, no allocation.
     pub fn new(matrix: &[[f64; N]; N], shift: f64) -> Self {
         let mut rest = *matrix;
         let mut factored = Self::unit();
@@ -69,7 +70,7 @@ impl<const N: usize> Factored<N> {
         1.0 / inverse
     }
 
-    /// Returns the number of negative pivots, which is that of negative eigenvalues. Real-time: bounded, no allocation.
+    /// Returns the number of negative eigenvalues, counted by the negative pivots. Real-time: bounded, no allocation.
     pub fn negative(&self) -> usize {
         self.negative
     }

@@ -5,14 +5,14 @@
 
 use crate::Real;
 
-/// Result of a saturation.
+/// Saturated quantity, with its derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Saturated<R: Real = f64> {
     /// Saturated quantity.
     pub value: R,
     /// Derivative of `value` with respect to the original quantity.
     pub slope: R,
-    /// True where the quantity was changed.
+    /// True in the lanes in which the saturation changed the quantity.
     pub saturated: R::Mask,
 }
 
@@ -37,7 +37,7 @@ pub fn saturate_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<
     }
 }
 
-/// Limits a quantity above `knee - reach`; the mirror image of [`saturate_above`].
+/// Limits a quantity above `knee - reach`; the mirror image of [`saturate_above`]. Real-time: bounded, no allocation.
 #[inline(always)]
 pub fn saturate_below<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<R> {
     let saturated = quantity.below(knee);

@@ -1,21 +1,22 @@
-//! Stability functions of a straight column under axial load: its resistance to rotations of its ends.
+//! Stability functions of a straight column under axial load: factors on its stiffness and flexibility without load.
 //!
-//! Quotients of the entire functions of [`crate::entire`] in the signed argument `z` of the load.
+//! They are quotients of the entire functions of [`crate::entire`] in the signed argument `z` of the load: positive in
+//! compression, negative in tension.
 
 use flotor_hal::math;
 
 use crate::Real;
 use crate::entire::EntireFunctions;
 
-/// Quotients of entire functions at one argument, with `x = sqrt z`.
+/// Stability functions at one argument `z`, with `x = sqrt z`; all but the slope are 1 without load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use]
 pub struct StabilityFunctions<R = f64> {
     /// `C0 / G0 = x cot x`: bow stiffness relative to the unloaded rod.
     pub bow: R,
-    /// `G1 / G0 = 3 (1 - x cot x) / x²`: bending share of the sway flexibility, relative to the unloaded rod.
+    /// `G1 / G0 = 3 (1 - x cot x) / x²`: bending part of the sway flexibility, relative to the unloaded rod.
     pub sway: R,
-    /// `h / G0²`: fraction of writhe in a bow and a sway at right angles.
+    /// `h / G0²`: writhe of a bow and a sway at right angles, relative to the unloaded rod.
     pub writhe: R,
     /// `d(sway)/dz`.
     pub sway_slope: R,
