@@ -1,4 +1,4 @@
-//! Load: a force independent of the handle's position, felt or exerted. Stimulus of a force-discrimination experiment.
+//! Load: a weight in the hand, or a resistance to pushing down. Stimulus of a force-discrimination experiment.
 //!
 //! CMU-RI-TR-07-21 (section 7) asks why people discriminate weights so much better than springs, and whether it matters
 //! if a force is experienced or applied. The two kinds here differ in that alone:
@@ -22,12 +22,12 @@ const REACH_M: f64 = 1.0;
 
 const KINDS: Choices = choices!["felt", "exerted"];
 
-/// Kind of a load.
+/// Kind of a load: force without or with an action of the hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Weight: pulls down.
+    /// Weight: pulls down at every height.
     Felt,
-    /// Resistance: opposes being pushed down.
+    /// Resistance: pushes up below home, no force above.
     Exerted,
 }
 
@@ -42,11 +42,11 @@ pub struct Load {
 
 /// Radius and half height of the drawn disc in the hand, m.
 const DRAWN_HANDLE_M: [f64; 2] = [8.0e-3, 1.0e-3];
-/// Half a side of the drawn block beneath the disc, m: equal for every force, so that the picture does not reveal the stimulus.
+/// Half-extent of the drawn block beneath the disc, m: equal for every force, so that the picture does not reveal the stimulus.
 const DRAWN_HALF_M: f64 = 10.0e-3;
 
 impl Load {
-    /// Creates a load of `force_n` newtons. `onset_m`: depth `d0` over which the force of a resistance rises, m.
+    /// Creates a load of `force_n` newtons. `onset_m`: depth `d0`, m, at which a resistance has `tanh 1` = 76 % of its force.
     #[must_use]
     pub fn new(kind: Kind, force_n: f64, onset_m: f64) -> Self {
         Self { kind, force_n, onset_m, drawn: Shape::default() }
@@ -62,7 +62,7 @@ impl Load {
         }
     }
 
-    /// Returns the energy stored at a height above home, J; zero at home. Real-time: bounded, no allocation.
+    /// Returns the potential energy at a height above home, J; zero at home. Real-time: bounded, no allocation.
     #[must_use]
     pub fn energy_j(&self, height_m: f64) -> f64 {
         match self.kind {
@@ -90,7 +90,7 @@ impl ForceModel for Load {
             0.0,
             100.0,
             3.0,
-            "Weight (felt), or resistance at full depth (exerted)",
+            "Weight (felt), or resistance far below `onset_mm` (exerted)",
         )
         .live(),
         Parameter::real(
@@ -99,7 +99,7 @@ impl ForceModel for Load {
             0.01,
             100.0,
             1.0,
-            "Depth over which a resistance rises to its full force (exerted)",
+            "Depth at which a resistance has 76 % of its full force (exerted)",
         )
         .live(),
     ];
