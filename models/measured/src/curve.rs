@@ -85,8 +85,8 @@ impl Curve {
         self.deepest_m
     }
 
-    /// Returns the force against compression, N, and the stored energy, J: along the tangent beyond the last knot, zero
-    /// without compression. Real-time: bounded, no allocation.
+    /// Returns the force against compression, N, and the stored energy, J: zero without compression, and beyond the last knot
+    /// along the tangent there. Real-time: bounded, no allocation.
     #[must_use]
     pub fn at(&self, compression_m: f64) -> (f64, f64) {
         if compression_m <= 0.0 {

@@ -1,14 +1,14 @@
 //! Measured spring: force-length curve of a real spring, served as measured.
 //!
-//! CMU-RI-TR-07-21 (section 7) proposes to compare the virtual spring with real ones. A fitted spring has the real
-//! one's stiffness; this model has its whole curve, with ends that do not yet lie flat and coils that begin to touch.
+//! CMU-RI-TR-07-21 (section 7) proposes to compare the virtual spring with real springs. A fitted spring has only the
+//! stiffness of the real spring; this model has the whole curve, with ends that are not yet seated and coils that begin to touch.
 //!
 //! ```text
 //! table (compression_mm, force_n) -> [`table`] -> [`curve`] -> F_z = s F(x),  x = -z,  E = s ∫ F dx
 //! ```
 //!
-//! A table of lengths and forces covers one direction: there is no torque and no sideways force, and above its free
-//! length the spring is loose. `stiffness_scale` s scales the whole force, as a parameter for experiments.
+//! A table of compressions and forces covers one direction: there is no torque and no sideways force, and above its free
+//! length the spring has no force. `stiffness_scale` s scales the whole force, as a parameter for experiments.
 
 pub mod curve;
 mod plugin;

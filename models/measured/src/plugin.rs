@@ -28,8 +28,8 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// Returns force on the hand along z, N, stored energy, J, and status, at a height above home, m. Real-time:
-    /// bounded, no allocation.
+    /// Returns force on the hand along z, N, stored energy, J, and status, at a height above home, m. The status is `Clamped`
+    /// beyond the workspace limit of 1 m, `OutOfDomain` beyond the last row of the table. Real-time: bounded, no allocation.
     #[must_use]
     pub fn at(&self, height_m: f64) -> (f64, f64, StepStatus) {
         let reached_m = height_m.clamp(-REACH_M, REACH_M);
@@ -137,7 +137,7 @@ impl CenterlineModel for Measured {
         CenterlineInfo::coil(wire_radius_m, coil_radius_m, DRAWN_TURNS, coil_radius_m + wire_radius_m)
     }
 
-    /// Draws the spring from its fixed end up, leaning to the handle; at its free length under a higher handle.
+    /// Draws the spring from its fixed end to the handle; under a handle above home, at its free length.
     fn centerline(&mut self, input: &Input, points: &mut [Pose]) -> usize {
         let foot_m = -DVec3::Z * self.free_length_m;
         let handle_m = input.pose.position();

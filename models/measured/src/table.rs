@@ -1,4 +1,4 @@
-//! Reader of the table of a curve.
+//! Parser of a table of compression and force.
 //!
 //! ```text
 //! # comments and empty lines are skipped
@@ -7,8 +7,8 @@
 //! 2,1.36
 //! ```
 //!
-//! `flotor study spring MEASURED.csv --curve-scene SCENE.toml` writes such a table from a measurement: both strokes
-//! averaged, the force never falling.
+//! `flotor study spring MEASURED.csv --curve-scene SCENE.toml` writes such a table from a measurement: the mean of loading and
+//! unloading, made monotone.
 
 use crate::curve::{Curve, CurveError};
 use flotor_hal::{HashLines, Table, TextProblem};
@@ -19,7 +19,7 @@ pub const HEADER: &str = "compression_mm,force_n";
 /// Parses a table and builds the curve through its knots. Not real-time.
 ///
 /// # Errors
-/// A [`TextProblem`] with the line and the problem.
+/// A [`TextProblem`] with the line: wrong header, malformed row, number that is not finite, or knots without a [`Curve`].
 pub fn parse(text: &str) -> Result<Curve, TextProblem> {
     let table = Table::parse(text, HashLines::Comments)?;
     if table.columns().join(",") != HEADER {
