@@ -12,7 +12,7 @@ use flotor_hal::{
 /// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
 const REACH_M: f64 = 1.0;
 
-/// Half the side of the drawn piece of a plane, m: a plane is infinite.
+/// Half-extent of the drawn part of a plane, m: a plane is infinite.
 const DRAWN_HALF_M: f64 = 0.03;
 /// Radius of the drawn balls at handle and proxy, m.
 const DRAWN_HANDLE_M: f64 = 1.5e-3;
@@ -26,7 +26,7 @@ pub struct Wall {
     height_m: f64,
     surface: Surface,
     proxy: Proxy,
-    /// Proxy of an observer's pictures, separate from the ticks.
+    /// Proxy for the drawing, which follows the drawn poses instead of the ticks.
     drawn_proxy: Proxy,
     drawn: hal::Shape,
 }

@@ -35,8 +35,8 @@ impl Proxy {
         self.contact
     }
 
-    /// Moves the proxy with the handle at `handle_m` (finite), moving at `velocity_m_per_s`; returns the force on the
-    /// handle and the energy, zero while the handle is outside. Real-time: bounded, no allocation.
+    /// Moves the proxy for a handle at `handle_m` (finite, from the top of the solid) with `velocity_m_per_s`; returns the force
+    /// on the handle and the energy of the spring, zero while the handle is outside. Real-time: bounded, no allocation.
     pub fn follow(
         &mut self,
         shape: &Shape,

@@ -25,14 +25,14 @@ pub enum Shape {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use]
 pub struct Place {
-    /// Position, m.
+    /// Position from the top of the solid, m.
     pub point_m: DVec3,
     /// Outward unit normal.
     pub normal: DVec3,
 }
 
 impl Shape {
-    /// Returns true inside the solid. Real-time: bounded, no allocation.
+    /// Returns true for a point inside the solid, false on its surface. Real-time: bounded, no allocation.
     #[must_use]
     pub fn contains(&self, point_m: DVec3) -> bool {
         let from_centre_m = point_m - self.centre_m();
@@ -43,8 +43,8 @@ impl Shape {
         }
     }
 
-    /// Finds the face that a straight path from `outside_m` to `inside_m` crosses first; returns the place on it
-    /// nearest to the end. Real-time: bounded, no allocation.
+    /// Returns the place where a proxy begins after a straight path from `outside_m` to `inside_m`: nearest to the end of the
+    /// path on the surface, on a cube on the face that the path crosses. Real-time: bounded, no allocation.
     pub fn entry(&self, outside_m: DVec3, inside_m: DVec3) -> Place {
         let normal = match *self {
             Self::Plane | Self::Sphere { .. } => DVec3::Z,
@@ -53,8 +53,9 @@ impl Shape {
         self.nearest(inside_m, normal)
     }
 
-    /// Returns the place on the surface nearest to a point inside. On a cube it is on the face of entry, with normal
-    /// `entered`: the handle does not leave at the back. Real-time: bounded, no allocation.
+    /// Returns the place on the surface nearest to a point inside; on a cube, nearest on the face of entry, even if another
+    /// face is nearer. `entered`: normal at the entry, and for a handle at the centre of a sphere. Real-time: bounded, no
+    /// allocation.
     pub fn nearest(&self, inside_m: DVec3, entered: DVec3) -> Place {
         let from_centre_m = inside_m - self.centre_m();
         match *self {
@@ -112,7 +113,7 @@ impl Shape {
         }
     }
 
-    /// Returns the centre of the solid, m; of a plane, the origin.
+    /// Returns the centre of the solid, from its top, m; of a plane, the origin.
     #[must_use]
     pub fn centre_m(&self) -> DVec3 {
         match *self {
