@@ -1,4 +1,4 @@
-//! Ball that touches a network.
+//! Contact between a ball and the masses of a network.
 
 use crate::vectors::Vectors;
 use flotor_hal::DVec3;

@@ -7,15 +7,16 @@
 //! m a = sum k (1 - l0 / |d|) d  +  m g  -  m c v  +  contact,      F = - sum contact
 //! ```
 //!
-//! The thesis names such networks in its introduction as the common way to display a deformable body, and as too simple
-//! to be accurate; here they are the large model with state, as a test of the contract.
+//! The thesis mentions such networks in its introduction as the common way to display a deformable body, and as too simple
+//! to be accurate. Here the membrane tests the contract with a large model that has a state.
 //!
 //! - [`mesh`]: links between masses: a stretched sheet, the edges of a mesh file.
 //! - `obj`, `topology`: reader of a mesh file, and its connections by position.
 //! - [`network`]: state and time step; [`vectors`]: one array per coordinate.
 //! - `links`: springs in runs of equal distance between their ends, so that a run is a loop over slices.
-//! - `regions`: blocks of masses at rest, skipped until something moves beside them.
-//! - [`ball`]: ball that pushes the masses; [`touch`]: ball that moves through a network, and its field: force and stiffness for a faster loop.
+//! - `regions`: blocks of masses at rest, skipped until the ball or a linked block activates them.
+//! - [`ball`]: ball that pushes the masses; [`touch`]: ball that moves through a network, and its local linear model, force and
+//!   stiffness for a faster loop.
 //! - `plugin`: parameters and the contract.
 
 pub mod ball;

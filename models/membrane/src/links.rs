@@ -9,7 +9,7 @@ use crate::regions::{BLOCK, Regions};
 use crate::vectors::Vectors;
 use std::ops::Range;
 
-/// Springs from the masses `first..first + count` to those `distance` further on.
+/// Springs from consecutive masses, beginning with `first`, each to the mass `distance` indices later.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Run {
     first: usize,
@@ -18,18 +18,18 @@ struct Run {
     springs: Range<usize>,
 }
 
-/// All springs.
+/// All springs of a network, in runs.
 #[derive(Clone, Debug)]
 pub(crate) struct Links {
     runs: Vec<Run>,
     rest_m: Vec<f64>,
     stiffness_n_per_m: Vec<f64>,
-    /// Forces of one run on the masses at its first ends, N.
+    /// Forces of the springs of one run on their first masses, N.
     scratch: Vectors,
 }
 
 impl Links {
-    /// Sorts the springs into runs. Not real-time.
+    /// Sorts springs by index distance into runs that end at each block. Not real-time.
     pub(crate) fn new(links: &[Link]) -> Self {
         let mut sorted: Vec<Link> = links.to_vec();
         sorted.sort_by_key(|link| (link.ends[1] - link.ends[0], link.ends[0]));
@@ -55,7 +55,7 @@ impl Links {
         }
     }
 
-    /// Returns the pairs of blocks that springs connect. Not real-time.
+    /// Returns the two blocks of each spring's ends; the blocks may be equal, and pairs repeat. Not real-time.
     pub(crate) fn joined_blocks(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         self.runs.iter().flat_map(|run| {
             let ends = run.first..run.first + run.springs.len();
@@ -63,7 +63,8 @@ impl Links {
         })
     }
 
-    /// Adds the forces of all springs that touch an active block. Real-time: bounded, no allocation.
+    /// Adds the forces of the springs of every run with an end in an active block to `forces_n`. Real-time: bounded, no
+    /// allocation.
     #[inline]
     pub(crate) fn add_forces(&mut self, positions_m: &Vectors, forces_n: &mut Vectors, regions: &Regions) {
         for run in &self.runs {

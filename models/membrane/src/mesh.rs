@@ -24,27 +24,27 @@ pub struct Mesh {
     pub masses_kg: Vec<f64>,
     /// Springs between the masses.
     pub links: Vec<Link>,
-    /// Triangles of masses, for drawing.
+    /// Triangles for drawing, as indices of masses.
     pub triangles: Vec<[u32; 3]>,
 }
 
 /// Parameters of a sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sheet {
-    /// Number of masses along a side, at least 3; those of the border are fixed.
+    /// Number of masses along a side, at least 3; the masses on the border are fixed.
     pub nodes_per_side: usize,
     /// Length of a side, m.
     pub side_m: f64,
-    /// Mass of the whole sheet, kg.
+    /// Mass of the whole sheet, kg; each free mass has that of one cell.
     pub mass_kg: f64,
     /// Stiffness of a spring, N/m.
     pub stiffness_n_per_m: f64,
-    /// Initial length of a spring over its rest length; 1 is a slack sheet.
+    /// Ratio of the initial length of a spring to its rest length; 1 for a sheet without tension.
     pub stretch: f64,
 }
 
 impl Mesh {
-    /// Builds a square sheet at height 0 with its middle at the origin. Each mass is linked to its four neighbours: the
+    /// Builds a square sheet at height 0 with its middle at the origin. Each free mass is linked to its four neighbours: the
     /// five-point Laplacian of a membrane under the tension `stiffness (spacing - rest)` per spacing.
     #[must_use]
     pub fn sheet(sheet: &Sheet) -> Self {
@@ -82,10 +82,11 @@ impl Mesh {
     }
 
     /// Builds a network from the edges of a Wavefront OBJ file (`v`, `f`, `l` lines; metres, z up): springs at `stretch` times
-    /// their rest length. Edges of one face only are the border; their ends are fixed. The mass is distributed evenly.
+    /// their rest length. Edges of one face only are the border; their ends are fixed. The free masses are equal.
     ///
     /// # Errors
-    /// A [`TextProblem`] with the line or the place that is wrong.
+    /// A [`TextProblem`]: a malformed line, no face, too many vertices, two edges of the border that coincide but are not joined,
+    /// a part without a fixed border, or no free mass.
     pub fn from_obj(
         text: &str,
         mass_kg: f64,

@@ -28,7 +28,7 @@ pub struct Surroundings {
     pub contact_n_per_m: f64,
 }
 
-/// State that changes from step to step.
+/// Positions, velocities and activity of the masses: the state that a step changes.
 #[derive(Debug)]
 pub struct State {
     positions_m: Vectors,
@@ -66,9 +66,9 @@ impl Clone for State {
 pub struct Network {
     state: State,
     forces_n: Vectors,
-    /// Inverse of each mass; 0 for a fixed one.
+    /// Inverse of each mass, 1/kg; 0 for a fixed mass.
     inverse_masses_per_kg: Vec<f64>,
-    /// Gravity on each mass, m/s²; 0 for a fixed one.
+    /// Gravitational acceleration of each mass along z, m/s²; 0 for a fixed mass.
     weights_m_per_s2: Vec<f64>,
     links: Links,
     surroundings: Surroundings,
@@ -110,7 +110,7 @@ impl Network {
         }
     }
 
-    /// Returns the longest stable step, s.
+    /// Returns the longest permitted step, s: 0.8 of the stability limit.
     #[must_use]
     pub fn longest_step_s(&self) -> f64 {
         self.longest_step_s
@@ -144,8 +144,8 @@ impl Network {
         self.state.regions.activate_all();
     }
 
-    /// Advances the network by a step of `step_s`, at most [`Self::longest_step_s`]; returns the force on the ball, N.
-    /// Real-time: bounded, no allocation.
+    /// Advances the network by a step of `step_s`, at most [`Self::longest_step_s`]; returns the force on the ball, N, zero
+    /// without a ball. Real-time: bounded, no allocation.
     pub fn step(&mut self, step_s: f64, ball: Option<&Ball>) -> DVec3 {
         let Self { state: State { positions_m, velocities_m_per_s, regions }, forces_n, .. } = self;
         if let Some(ball) = ball {
@@ -176,7 +176,8 @@ impl Network {
         on_ball_n
     }
 
-    /// Steps until all masses are inactive, at most `most_steps` times; returns true if they are. Not real-time.
+    /// Steps without a ball until all masses are inactive, at most `most_steps` times; returns true if all masses are inactive.
+    /// Not real-time.
     pub fn come_to_rest(&mut self, most_steps: usize) -> bool {
         (0..most_steps).any(|_| {
             self.step(self.longest_step_s, None);
@@ -214,8 +215,7 @@ impl Network {
         rests
     }
 
-    /// Sets the damping. The contact stiffness is fixed, because the longest step depends on it. Real-time: bounded, no
-    /// allocation.
+    /// Sets the rate of velocity decay by drag, 1/s. Real-time: bounded, no allocation.
     pub fn set_damping_per_s(&mut self, damping_per_s: f64) {
         self.surroundings.damping_per_s = damping_per_s;
     }

@@ -26,7 +26,7 @@ impl Obj {
     /// Parses the text of a file.
     ///
     /// # Errors
-    /// A [`TextProblem`] with the line that is wrong, or the format of the file if it is not OBJ.
+    /// A [`TextProblem`]: a malformed line, more than [`MOST_VERTICES`] vertices, no face, or an STL file.
     pub(crate) fn read(text: &str) -> Result<Self, TextProblem> {
         let head = text.trim_start();
         if head.starts_with("solid") && head.contains("facet") {
@@ -94,7 +94,8 @@ impl Obj {
     }
 }
 
-/// Returns the vertex index of `7`, `7/1/3` or `-1`: from the first vertex on or, below 0, back from the last.
+/// Parses a vertex reference (`7`, `7/1/3` or `-1`) and returns the index of the vertex, from 0. Positive numbers count from the
+/// first vertex (1), negative ones back from the last (-1). `None` for an invalid or out-of-range reference.
 fn corner(word: &str, vertices: usize) -> Option<usize> {
     let number: i64 = word.split('/').next()?.parse().ok()?;
     let count = i64::try_from(vertices).ok()?;

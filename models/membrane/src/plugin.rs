@@ -12,7 +12,7 @@ use std::path::Path;
 
 /// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
 const REACH_M: f64 = 1.0;
-/// Longest time between two steps that is simulated, s: after a longer one the network stands still.
+/// Longest simulated time between two ticks, s: the network skips the rest of a longer time.
 const LONGEST_TIME_S: f64 = 0.02;
 /// Maximum number of network steps per millisecond.
 const MOST_STEPS_PER_MS: f64 = 100.0;
@@ -70,7 +70,7 @@ const SCHEMA: &[Parameter] = &[
 pub struct Membrane {
     touch: Touch,
     radius_m: f64,
-    /// Distance between masses, m: the scale on which the sheet is no longer linear.
+    /// Initial length of the longest spring, m: the scale on which the sheet is no longer linear.
     coarseness_m: f64,
     parameters: [f64; SCHEMA.len()],
     /// State of the last picture, at rest.
@@ -239,7 +239,7 @@ impl ShapeModel for Membrane {
     }
 }
 
-/// Displacement of the ball for the slope, relative to the distance of two masses: several masses come into contact on the way.
+/// Displacement of the ball for the slope, relative to the longest spring: several masses come into contact on the way.
 const PROBE_SHARE: f64 = 0.125;
 
 impl LinearFieldModel for Membrane {
@@ -247,7 +247,7 @@ impl LinearFieldModel for Membrane {
         let Ok((handle_m, _)) = Self::reached(input) else { return LinearField::NONE };
         let (centre_m, time_s) = (self.centre_m(handle_m), input.dt_s().min(LONGEST_TIME_S));
         let measured = self.touch.measure_slope(centre_m, time_s, PROBE_SHARE * self.coarseness_m);
-        // Within half the distance of two masses other masses make or lose contact.
+        // Farther than half the longest spring, other masses make or lose contact.
         LinearField::of_force(input, measured.force_n, measured.slope_n_per_m, 0.5 * self.coarseness_m)
     }
 }

@@ -1,8 +1,8 @@
-//! Blocks of masses at rest: skipped until something moves beside them.
+//! Activity of blocks of masses: blocks at rest are skipped until the ball or a linked block activates them.
 //!
-//! A block is 64 consecutive masses. It becomes inactive when all of them have been slow for a while, and active when
-//! the ball comes near or a mass of a linked block is no longer slow. The masses of an inactive block stand still: the
-//! omitted motion is slower than [`QUIET_M_PER_S`].
+//! A block is 64 consecutive masses. A block becomes inactive when all its masses have been slow in [`QUIET_LOOKS`] checks, and
+//! active when the ball comes near or a mass of a linked block is faster than [`ACTIVATING_M_PER_S`]. The masses of an inactive
+//! block do not move: the omitted motion is slower than [`QUIET_M_PER_S`].
 
 use crate::ball::Ball;
 use crate::vectors::Vectors;
@@ -35,7 +35,7 @@ pub(crate) struct Regions {
 struct Block {
     active: bool,
     quiet_looks: u8,
-    /// Bounding box of the masses when the block became inactive, m.
+    /// Lowest and highest corner of the masses' bounding box when the block became inactive, m.
     lowest_m: DVec3,
     highest_m: DVec3,
 }
@@ -55,13 +55,13 @@ impl Clone for Regions {
 }
 
 impl Regions {
-    /// Creates active blocks without links: none is ever deactivated, or activated by another. For tests.
+    /// Creates active blocks without links, for tests.
     #[cfg(test)]
     pub(crate) fn all_active(nodes: usize) -> Self {
         Self::new(nodes, std::iter::empty())
     }
 
-    /// Creates active blocks; `joined`: pairs of linked blocks. Not real-time.
+    /// Creates active blocks for `nodes` masses; `joined`: pairs of linked blocks. Not real-time.
     pub(crate) fn new(nodes: usize, joined: impl Iterator<Item = [usize; 2]>) -> Self {
         let count = nodes.div_ceil(BLOCK);
         let mut neighbours = vec![std::collections::BTreeSet::new(); count];
@@ -80,7 +80,7 @@ impl Regions {
         self.blocks.get(block).is_some_and(|block| block.active)
     }
 
-    /// Returns the masses of each active block. Real-time: bounded, no allocation.
+    /// Returns the index range of the masses of each active block. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn active(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         let active = self.blocks.iter().enumerate().filter(|(_, block)| block.active);
@@ -103,8 +103,8 @@ impl Regions {
         }
     }
 
-    /// Updates activity after a step: deactivates slow blocks, and activates the neighbours of fast ones. Real-time:
-    /// bounded, no allocation.
+    /// Updates activity after a step: deactivates slow blocks and sets their velocities to zero, and activates the neighbours of
+    /// fast blocks. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn settle(&mut self, positions_m: &Vectors, velocities_m_per_s: &mut Vectors) {
         self.steps += 1;

@@ -11,7 +11,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Distance at which vertices are merged, over the largest coordinate: some roundings in single precision.
 const SAME_PLACE: f64 = 1.0e-6;
-/// Distance between border vertices that counts as a crack, over the length of the edge there.
+/// Largest distance of a border vertex from a border edge at which they form a crack, over the length of the edge.
 const CRACK: f64 = 1.0e-3;
 /// Maximum number of distinct vertices: those of the finest sheet.
 const MOST_PLACES: usize = 40_000;
@@ -19,16 +19,17 @@ const MOST_PLACES: usize = 40_000;
 /// Distinct vertices with their connections.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Topology {
-    /// Positions, in order of x, then y, then z, m.
+    /// Positions of the vertices, sorted by x, then y, then z, m.
     pub(crate) places_m: Vec<DVec3>,
-    /// Corners of each face, at least three.
+    /// Corners of each face, at least three, as indices of vertices.
     pub(crate) faces: Vec<Vec<usize>>,
-    /// Number of faces of each edge, by its ends in ascending order.
+    /// Number of faces of each edge, 0 for a segment of a line; the key is the edge's ends in ascending order.
     pub(crate) edges: BTreeMap<[usize; 2], usize>,
 }
 
 impl Topology {
-    /// Merges the vertices of an OBJ file by position. Vertices without a face or a line are omitted.
+    /// Merges the vertices of an OBJ file by position. Omits vertices without a face or a line, repeated faces, and faces with
+    /// fewer than three distinct corners.
     ///
     /// # Errors
     /// A [`TextProblem`] with the place of a crack, or with the number of vertices if there are too many.
@@ -78,7 +79,7 @@ impl Topology {
         self.faces.push(corners);
     }
 
-    /// Returns the ends of all edges with a single face.
+    /// Returns the vertices at the ends of all edges with a single face.
     #[must_use]
     pub(crate) fn border(&self) -> BTreeSet<usize> {
         self.border_edges().flatten().collect()
@@ -88,7 +89,7 @@ impl Topology {
         self.edges.iter().filter(|(_, faces)| **faces == 1).map(|(ends, _)| *ends)
     }
 
-    /// Returns a vertex of a connected part that contains no vertex of `held`; `None` without such a part.
+    /// Returns the position of a vertex of a connected part without a vertex of `held`, m; `None` without such a part.
     #[must_use]
     pub(crate) fn part_without(&self, held: &BTreeSet<usize>) -> Option<DVec3> {
         let mut neighbours = vec![Vec::new(); self.places_m.len()];
@@ -109,7 +110,7 @@ impl Topology {
         reached.iter().position(|reached| !reached).map(|vertex| self.places_m[vertex])
     }
 
-    /// Returns a vertex of the border that touches an edge of the border without being its end.
+    /// Returns the position of a vertex of the border that touches an edge of the border without being its end, m.
     fn crack_m(&self) -> Option<DVec3> {
         let axis = longest_axis(&self.places_m);
         let along = |vertex: usize| self.places_m[vertex][axis];
@@ -129,7 +130,7 @@ impl Topology {
     }
 }
 
-/// Formats a place in millimetres.
+/// Formats a position, m, in millimetres.
 pub(crate) fn in_mm(at_m: DVec3) -> String {
     let [x, y, z] = (at_m * 1.0e3).to_array();
     format!("({x:.3}, {y:.3}, {z:.3}) mm")

@@ -40,7 +40,7 @@ impl Touch {
         &self.network
     }
 
-    /// Returns the network for changes of its parameters.
+    /// Returns the network, mutable, for changes of its parameters.
     pub fn network_mut(&mut self) -> &mut Network {
         &mut self.network
     }
@@ -52,8 +52,8 @@ impl Touch {
         (duration_s / self.network.longest_step_s()).ceil().max(1.0) as u32
     }
 
-    /// Moves the ball to `centre_m` in `duration_s` at constant speed; returns the force on the ball at the end, N.
-    /// Real-time: bounded by [`Self::steps_in`], no allocation.
+    /// Advances the network by `duration_s` while the ball moves to `centre_m` at constant speed; returns the force on the ball
+    /// in the last step, N. Real-time: bounded by [`Self::steps_in`], no allocation.
     pub fn advance(&mut self, centre_m: DVec3, duration_s: f64) -> DVec3 {
         let (from_m, steps) = (self.ball.centre_m, self.steps_in(duration_s));
         let step_s = duration_s / f64::from(steps);
@@ -66,10 +66,10 @@ impl Touch {
         force_n
     }
 
-    /// Moves the ball as [`Self::advance`] does, and measures the slope of the force: repeats the movement three times,
-    /// each with the ball ending `probe_m` farther along one axis, in its direction of motion. So the slope contains
-    /// the network's inertia and compliance over this time, and upcoming contacts. A short probe mistakes the impact of
-    /// a single mass for stiffness. Real-time: bounded by four times [`Self::steps_in`], no allocation.
+    /// Advances the network as [`Self::advance`] does, and returns force and slope of the force by finite differences: the
+    /// movement is repeated three times, each to a point `probe_m` farther along one axis, in the direction of motion. The slope
+    /// thus contains the network's inertia and compliance over this time, and upcoming contacts. With a short probe the impact of
+    /// a single mass would count as stiffness. Real-time: bounded by four times [`Self::steps_in`], no allocation.
     pub fn measure_slope(&mut self, centre_m: DVec3, duration_s: f64, probe_m: f64) -> ForceSlope {
         let from_m = self.ball.centre_m;
         let way_m = centre_m - from_m;

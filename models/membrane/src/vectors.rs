@@ -1,9 +1,9 @@
-//! Vectors of all masses, one array per coordinate.
+//! Vectors of all masses, stored as one array per coordinate.
 
 use flotor_hal::DVec3;
 use std::ops::Range;
 
-/// Vectors stored as one array per coordinate.
+/// Vectors as a structure of arrays, one array per coordinate.
 #[derive(Debug)]
 pub struct Vectors {
     /// Components along x.
@@ -63,12 +63,12 @@ impl Vectors {
         self.slices_mut(range).into_iter().for_each(|component| component.fill(0.0));
     }
 
-    /// Returns the sum of the squares of all lengths.
+    /// Returns the sum of the squared lengths of all vectors.
     pub(crate) fn sum_of_squares(&self) -> f64 {
         [&self.x, &self.y, &self.z].iter().map(|component| component.iter().map(|c| c * c).sum::<f64>()).sum()
     }
 
-    /// Returns the square of the longest vector of a range.
+    /// Returns the squared length of the longest vector of a range.
     #[inline]
     pub(crate) fn longest_square(&self, range: Range<usize>) -> f64 {
         let [x, y, z] = self.slices(range);
