@@ -7,9 +7,9 @@ FLOTOR_METADATA("kind = \"model\"\nid = \"honey\"\nname = \"Honey\"\ndoc = \"Slo
                 "version = \"0.1.0\"\nabi = \"" FLOTOR_CONTRACT "\"\nentry = \"flotor_entry_honey\"\n");
 
 static const double DAMPING_NS_PER_M = 2.0;
-static const double FASTEST_M_PER_S = 10.0; /* no speed may give a force without end */
+static const double FASTEST_M_PER_S = 10.0; /* limits the force at any speed */
 
-/* Every honey is the same: an instance has no memory of its own, and its address is that of a constant. */
+/* All instances are equal: an instance has no state, so the address of a constant serves as its handle. */
 static const char instance;
 
 static uint32_t create(const FlotorParameterValue *values, uint32_t count, FlotorMessage *message, FlotorInstance *out) {

@@ -20,7 +20,7 @@ public:
         output = FlotorOutput{};
         for (int axis = 0; axis < 3; axis++) {
             const double at_m = input.pose.position_m[axis];
-            // Also for what is no number: farther off its energy could be none.
+            // True for NaN too. Far beyond this distance the energy would overflow.
             if (!(std::fabs(at_m) < farthest_m)) {
                 output = FlotorOutput{};
                 output.status = FlotorStepStatus_InvalidInput;

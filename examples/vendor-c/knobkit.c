@@ -1,4 +1,4 @@
-/* A knob in numbers only: it goes up and down, 3 mm each way in 200 calls, whatever force it gets. */
+/* Simulated knob: it moves between -3 and 3 mm, one way in 200 calls, whatever the force. */
 #include "knobkit.h"
 #include <stddef.h>
 

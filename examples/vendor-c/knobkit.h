@@ -1,5 +1,5 @@
-/* The interface of a maker's library, as makers write them: a handle, calls that return 0 or an error, and a thread of the library's
- * own behind them. This one stands in for a real one, so that the example runs: knobkit.c has a knob in numbers only. */
+/* Interface of a typical maker's library: a handle, functions that return 0 or an error, and a thread of the library. knobkit.c
+ * simulates a knob in place of a real library, so that the example runs. */
 #ifndef KNOBKIT_H
 #define KNOBKIT_H
 
@@ -11,7 +11,7 @@ typedef struct KkDevice KkDevice;
 
 int kk_open(KkDevice **device);                        /* waits until the hardware answers */
 int kk_enable(KkDevice *device, int on);               /* motors on or off */
-int kk_get_position_mm(KkDevice *device, double *mm);  /* the newest, without waiting */
+int kk_get_position_mm(KkDevice *device, double *mm);  /* newest position, without waiting */
 int kk_set_force_n(KkDevice *device, double n);        /* without waiting */
 const char *kk_last_error(void);
 void kk_close(KkDevice *device);

@@ -1,7 +1,7 @@
 /* A device behind a maker's C library: each call of the contract becomes one of the library's.
  *
- * The library may wait, allocate and start threads in `open`, `activate` and `close`. What `read` and `write` call must do none of
- * that; where the maker's call waits, call it in a thread of the plugin and let `read` take the newest value. */
+ * The library may wait, allocate and start threads in `open`, `activate` and `close`. A function that `read` or `write` calls must
+ * not: if the maker's function waits, call it in a thread of the plugin, and let `read` take the newest value. */
 #include "flotor.h"
 #include "knobkit.h"
 #include <stdatomic.h>
@@ -26,7 +26,7 @@ typedef struct {
     bool active, has_sample;
 } MakerKnob;
 
-/* The maker's words reach the user: a refusal without a reason helps nobody. */
+/* Copies the error text of the maker's library into the message of the refusal, which the host shows to the user. */
 static uint32_t refuse(FlotorMessage *message) {
     const char *text = kk_last_error();
     size_t length = strlen(text);
