@@ -1,6 +1,7 @@
-//! Random attacks of strangers on a service: half-open, slow, huge, random, reordered and abandoned connections, then many at a time.
+//! Random attacks of strangers on a service: half-open, slow, huge, random, reordered and abandoned connections, then thousands of
+//! silent connections at a time.
 //!
-//! Needs nothing of this crate: the emulators, the service and the bridge include this file with `#[path]`.
+//! The file uses no other module of this crate: the emulators, the service and the bridge include it with `#[path]`.
 
 #![allow(dead_code)] // each test program uses its part
 
@@ -15,21 +16,21 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Connections that an attacker holds open during the random attacks.
+/// Maximum number of connections held open during the random attacks.
 const HELD: usize = 100;
-/// Descriptors of this process that attacks leave alone.
+/// File descriptors of this process not available to attacks.
 const OWN_DESCRIPTORS: u64 = 200;
-/// Threads and memory that strangers may cost.
+/// Maximum increase of threads and of memory, kB, that attacks may cause.
 const MOST_THREADS: u64 = 64;
 const MOST_KB: u64 = 64 << 10;
-/// Longest time until a client is served after the attacks: twice that of a silent connection, and a margin for a busy machine.
+/// Timeout for serving a client during attacks: twice the timeout of a silent connection, and a margin for a busy machine.
 const PATIENCE: Duration = Duration::from_secs(30);
-/// A user who owns no process of a test.
+/// User id that owns no process of a test.
 const STRANGER: u32 = 65_534;
 
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// Number of random attacks, and of connections that are then opened in turn.
+/// Returns the number of random attacks, and of silent connections opened after them, for the size of this test run.
 fn size() -> (usize, usize) {
     match std::env::var("FLOTOR_TEST_SIZE").as_deref() {
         Ok("full") => (500, 10_000),
@@ -38,7 +39,7 @@ fn size() -> (usize, usize) {
     }
 }
 
-/// The place that a service listens at.
+/// Address of a service: TCP port or Unix socket.
 #[derive(Clone, Debug)]
 pub(crate) enum Place {
     Port(SocketAddr),
@@ -46,7 +47,7 @@ pub(crate) enum Place {
 }
 
 impl Place {
-    /// Connects; the calls of a stream serve either family.
+    /// Connects to the address. A Unix socket is returned as a `TcpStream` too: reads and writes work on both.
     pub(crate) fn connect(&self) -> io::Result<TcpStream> {
         match self {
             Self::Port(at) => TcpStream::connect_timeout(at, Duration::from_secs(5)),
@@ -54,7 +55,7 @@ impl Place {
         }
     }
 
-    /// Sends a request; returns whether anything is answered in time.
+    /// Sends a request on a new connection; returns true if a reply of at least one byte arrives within a second.
     pub(crate) fn answers(&self, request: &[u8]) -> bool {
         let asked = self.connect().and_then(|mut stream| {
             stream.set_read_timeout(Some(Duration::from_secs(1)))?;
@@ -65,14 +66,14 @@ impl Place {
     }
 }
 
-/// A process that listens.
+/// Service under attack: process id and address.
 pub(crate) struct Target {
     pub(crate) process: u32,
     pub(crate) place: Place,
 }
 
 impl Target {
-    /// Threads and anonymous memory in kB.
+    /// Returns the number of threads, and the anonymous memory in kB.
     fn usage(&self) -> [u64; 2] {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.process)).expect("it runs");
         ["Threads:", "RssAnon:"].map(|key| {
@@ -81,9 +82,10 @@ impl Target {
         })
     }
 
-    /// Attacks the service, then expects a client to be served; meanwhile threads and memory stay within their bounds.
+    /// Attacks the service, and asserts that clients are served during and after the attacks and that the increase of threads and
+    /// memory stays within its bounds. `request`: request of a client; `is_served`: true if a new client is served.
     pub(crate) fn withstand(&self, request: &[u8], is_served: impl Fn(&Place) -> bool) {
-        // The descriptors of a process are for one attack at a time.
+        // The file descriptors of this process suffice for one attack at a time.
         let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
         assert!(is_served(&self.place), "before the attacks");
         let idle = self.usage();
@@ -119,7 +121,7 @@ impl Target {
         assert!(kb <= MOST_KB, "{most:?} above {idle:?}");
     }
 
-    /// Serves a client in time, while others hold connections.
+    /// Asserts that a new client is served within [`PATIENCE`]; `when` completes the message of a failure.
     #[track_caller]
     fn assert_serves(&self, is_served: &impl Fn(&Place) -> bool, when: &str) {
         let since = Instant::now();
@@ -128,7 +130,7 @@ impl Target {
         }
     }
 
-    /// A client that was served and is silent then makes room for another one.
+    /// Asserts that the service, after a client has been served and is silent, serves another client.
     pub(crate) fn makes_room(&self, request: &[u8], is_served: impl Fn(&Place) -> bool) {
         let mut silent = self.place.connect().expect("it listens");
         silent.write_all(request).expect("it reads");
@@ -136,7 +138,8 @@ impl Target {
         self.assert_serves(&is_served, "while one is silent");
     }
 
-    /// Bytes that a program of another user gets for a request; none where only root could be another user.
+    /// Sends a request as another user, and returns the number of bytes received: 0 or 1. `None` on a Unix socket, or if this test
+    /// does not run as root.
     pub(crate) fn answers_to_stranger(&self, request: &[u8]) -> Option<usize> {
         let Place::Port(at) = self.place else { return None };
         if !getuid().is_root() {
@@ -155,7 +158,7 @@ impl Target {
     }
 }
 
-/// The most threads and kB seen.
+/// Largest observed number of threads, and largest observed memory, kB.
 #[derive(Debug)]
 struct Most([u64; 2]);
 
@@ -165,14 +168,14 @@ impl Most {
     }
 }
 
-/// A program that listens, ended with the test.
+/// Running program with a service; dropping it kills the program.
 pub(crate) struct Listening {
     supervisor: Child,
     pub(crate) target: Target,
 }
 
 impl Listening {
-    /// Starts a program whose first line names its address after `before`.
+    /// Starts a program and reads the address of its service from the first line of its output, after the text `before`.
     pub(crate) fn start(program: &str, arguments: &[&str], before: &str) -> Self {
         let mut process =
             Command::new(program).args(arguments).stdout(Stdio::piped()).spawn().expect("it starts");
@@ -199,7 +202,7 @@ impl Drop for Listening {
     }
 }
 
-/// Strangers with the connections that they hold.
+/// Attackers of one service, with the connections that they hold open.
 pub(crate) struct Attackers {
     place: Place,
     request: Vec<u8>,
@@ -209,7 +212,7 @@ pub(crate) struct Attackers {
 }
 
 impl Attackers {
-    /// Attackers of a place; a request that would make them clients, of which they send parts.
+    /// Creates attackers of a service without connections. `request`: request of a client; attackers send only parts of it.
     pub(crate) fn new(place: Place, request: &[u8]) -> Self {
         let limit = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
         let most_held = usize::try_from(limit.saturating_sub(OWN_DESCRIPTORS)).unwrap_or(usize::MAX);
@@ -222,7 +225,8 @@ impl Attackers {
         }
     }
 
-    /// Carries out a random attack, and sends a byte more on a connection that is slow.
+    /// Carries out a random attack, and sends one more byte on a random connection if it is slow. At most [`HELD`] connections stay
+    /// open: a random one is closed for a new one.
     pub(crate) fn attack(&mut self) {
         if let Ok(stream) = self.place.connect()
             && let Some(attacker) = attacked(stream, &self.request, &mut self.dice)
@@ -243,7 +247,8 @@ impl Attackers {
         self.held.clear();
     }
 
-    /// Opens a silent connection, and holds as many as this process may; returns whether it came about.
+    /// Opens a silent connection and holds it open; closes the oldest one first at the limit of this process. Returns true if the
+    /// connection was accepted.
     fn hold_one_more(&mut self) -> bool {
         if self.held.len() >= self.most_held {
             self.held.remove(0);
@@ -255,17 +260,17 @@ impl Attackers {
     }
 }
 
-/// A connection that stays open.
+/// Connection that an attacker holds open.
 struct Attacker {
     stream: TcpStream,
-    /// Whether it sends single bytes.
+    /// True for a connection on which single bytes are sent.
     is_slow: bool,
 }
 
-/// Carries out a random attack; returns a connection that stays open.
+/// Carries out a random attack; returns the connection if the attack holds it open.
 fn attacked(mut stream: TcpStream, request: &[u8], dice: &mut Dice) -> Option<Attacker> {
     let _ = stream.set_write_timeout(Some(Duration::from_millis(200)));
-    // Completes no request: whoever sends one is a client.
+    // The random bytes are not ASCII, so they complete no request: the sender of a complete request would be a client.
     let random: Vec<u8> = (0..1 + dice.below(2000)).map(|_| dice.byte() | 0x80).collect();
     let (part, rest) = request.split_at(dice.below(request.len()));
     let attack = dice.below(7);
@@ -278,12 +283,12 @@ fn attacked(mut stream: TcpStream, request: &[u8], dice: &mut Dice) -> Option<At
         5 => random.repeat(100),
         _ => return None,
     };
-    // What the other end does not take is no failure.
+    // The service may close the connection before it has read all bytes.
     let _ = stream.write_all(&bytes);
     Some(Attacker { stream, is_slow: attack == 0 })
 }
 
-/// Numbers that are the same in every run.
+/// Pseudo-random numbers (xorshift), the same in every run.
 struct Dice(u64);
 
 impl Dice {

@@ -1,8 +1,8 @@
-//! The command line of Flotor as one program, with the commands that separate programs carry out.
+//! Command line of Flotor as one program, including the commands that separate programs carry out.
 
 use clap::Command;
 
-/// Returns `flotor` with the arguments of all its commands.
+/// Returns the parser of `flotor` with all its commands and their arguments.
 #[must_use]
 pub fn whole_program() -> Command {
     let separate = [

@@ -1,5 +1,5 @@
-//! What it costs to compute the membrane asynchronously: its local linear model against the membrane itself, at the
-//! poses of one run.
+//! Error of an asynchronous membrane: forces of its local linear model against forces of the membrane itself, at the poses of
+//! one run.
 
 use crate::watched::watch;
 use flotor_core::trace::{Events, TickRecord};
@@ -7,52 +7,52 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{DVec3, Demand, Input, LoopConfig, Output};
 
-/// What a run with a field shows.
+/// Result of a run with an asynchronous membrane (`field`), and of the membrane itself stepped at each tick (`direct`).
 #[derive(Clone, Debug)]
 pub struct FieldError {
-    /// The run, tick by tick.
+    /// Records of the run, one per tick.
     pub records: Vec<TickRecord>,
-    /// The force of the membrane itself at the same poses, stepped at each tick, N.
+    /// Force of the membrane itself at each tick, at the poses of the run, N.
     pub direct_n: Vec<DVec3>,
     /// Largest force of the membrane itself, N.
     pub peak_n: f64,
-    /// Largest change of the force from one tick to the next, N: of the field, and of the membrane itself.
+    /// Largest change of the field's force from one tick to the next, N.
     pub largest_step_n: f64,
-    /// The same of the membrane itself.
+    /// Largest change of the membrane's own force from one tick to the next, N.
     pub direct_step_n: f64,
-    /// The same if each force were held until the next came instead.
+    /// Largest change of the membrane's own force over one period of the field, N: the step of a zero-order hold.
     pub held_step_n: f64,
-    /// What the difference would be if each force were held until the next came instead, root of the mean square, N.
+    /// Difference between a zero-order hold of the membrane's force, a period late, and the membrane, root mean square, N.
     pub held_rms_n: f64,
-    /// Ticks in which the slew limit acted.
+    /// Number of ticks in which the slew limit acted.
     pub slewed_ticks: usize,
-    /// Difference between field and membrane, root of the mean square, N.
+    /// Difference between field and membrane, root mean square, N.
     pub rms_n: f64,
-    /// Largest difference, N.
+    /// Largest difference between field and membrane, N.
     pub worst_n: f64,
-    /// How far the field is behind the membrane: the delay that makes their difference least, s.
+    /// Delay of the field against the membrane, s: the delay with the smallest difference.
     pub delay_s: f64,
-    /// What is left of the difference then, root of the mean square, N.
+    /// Difference between field and membrane after compensation of the delay, in whole ticks, root mean square, N.
     pub rms_delayed_n: f64,
 }
 
-/// How the hand moves in [`field_error`]'s scene.
+/// Oscillation of the hand in the scene of [`field_error`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
-    /// How often it goes up and down, Hz.
+    /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Half the way, mm.
+    /// Amplitude, half the distance from lowest to highest, mm.
     pub amplitude_mm: f64,
 }
 
-/// Longest delay looked for, ticks.
+/// Bound of the search for the delay, ticks.
 const LONGEST_DELAY: usize = 40;
 
-/// Runs a membrane at `rate_hz` beside a loop of 1 kHz on the virtual clock, with a slew limit, the hand swinging into it
-/// and out again.
+/// Runs a membrane asynchronously at `rate_hz` with a loop at 1 kHz on the virtual clock and a slew limit; the hand oscillates
+/// into the membrane and out of it. Returns the run, compared with the membrane itself.
 ///
 /// # Panics
-/// If the plugins are not built.
+/// If the plugins are not built, or the run fails.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand ticks
 pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f64) -> FieldError {
@@ -71,7 +71,7 @@ pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f6
         let apart = forces.iter().zip(forces.iter().skip(apart));
         apart.map(|(a, b)| (*b - *a).length()).fold(0.0, f64::max)
     };
-    // The first two periods belong to a field that is not there yet.
+    // In the first two periods the field is not complete.
     let begun = 2 * held;
     let difference = |delay: usize| {
         let pairs = field_n.iter().skip(begun + delay).zip(direct_n.iter().skip(begun));
@@ -81,7 +81,7 @@ pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f6
         let (sum, count) = difference(delay).fold((0.0, 0.0), |(sum, count), e| (sum + e * e, count + 1.0));
         (sum / count).sqrt()
     };
-    // What was requested at a look is to be had a period later, and held for another.
+    // A force requested at one update is available a period later, and then held for a period.
     let held_back = (begun..direct_n.len()).map(|tick| direct_n[tick] - direct_n[(tick / held - 1) * held]);
     let (held_sum, held_count) =
         held_back.fold((0.0, 0.0), |(sum, count), off| (sum + off.length_squared(), count + 1.0));
@@ -103,7 +103,7 @@ pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f6
     }
 }
 
-/// The place of a minimum between samples, by the parabola through the squares of three.
+/// Returns the position of a minimum between samples, in samples, from the parabola through the squares of three samples.
 fn between(rms_of: &[f64], best: usize) -> f64 {
     let square = |index: usize| rms_of.get(index).map(|rms| rms * rms);
     let neighbours = best.checked_sub(1).and_then(square).zip(square(best)).zip(square(best + 1));
@@ -114,7 +114,7 @@ fn between(rms_of: &[f64], best: usize) -> f64 {
     best as f64 + shift
 }
 
-/// The membrane itself, led along the poses of a run at its ticks.
+/// Returns the force of the membrane itself, stepped at each tick of a run at the recorded pose, N.
 fn direct(records: &[TickRecord]) -> Vec<DVec3> {
     let plugin = Plugin::in_process(&flotor_membrane::FLOTOR_ENTRY).expect("the membrane is a plugin");
     let mut model = plugin.create_model(&[]).expect("it has defaults");

@@ -1,6 +1,6 @@
-//! What the cross-crate tests share: where the workspace is, what lies in it, and how long tests may take.
+//! Shared code of the cross-crate tests: files of the workspace, programs under test, and size of the tests.
 //!
-//! The documents whose Rust code is compiled and run as doctests are listed at the end of this file.
+//! The end of this file lists the documents whose Rust code is compiled and run as doctests.
 
 pub mod commands;
 pub mod field_error;
@@ -20,17 +20,17 @@ pub mod watched;
 use flotor_record::Recording;
 use std::path::{Path, PathBuf};
 
-/// The root of the workspace: the folder with the README.
+/// Returns the root of the workspace: the folder with the README.
 #[must_use]
 pub fn workspace_root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().map(Path::to_path_buf).unwrap_or_default()
 }
 
-/// All files under a folder of the workspace whose name ends in `.extension`, as paths relative to the root,
-/// sorted. Build output and hidden folders are left out.
+/// Returns all files with the extension `extension` in a folder of the workspace and its subfolders, as sorted paths relative
+/// to the root. Skips hidden folders and folders named `target`.
 ///
 /// # Errors
-/// What the file system says about a folder that cannot be read.
+/// The system's error if a folder cannot be read.
 pub fn files_under(folder: &str, extension: &str) -> std::io::Result<Vec<PathBuf>> {
     let root = workspace_root();
     let mut found = Vec::new();
@@ -51,7 +51,7 @@ pub fn files_under(folder: &str, extension: &str) -> std::io::Result<Vec<PathBuf
     Ok(found)
 }
 
-/// The folders of all plugins of the workspace, relative to its root, sorted.
+/// Returns the folders of all plugins of the workspace, as sorted paths relative to its root.
 ///
 /// # Panics
 /// If the workspace cannot be read.
@@ -70,15 +70,15 @@ pub fn plugin_folders() -> Vec<String> {
     folders
 }
 
-/// The manifest of a folder, if it has one.
+/// Returns the text of a folder's `Cargo.toml`; `None` without a readable one.
 fn manifest(folder: &str) -> Option<String> {
     std::fs::read_to_string(workspace_root().join(folder).join("Cargo.toml")).ok()
 }
 
-/// The crate of a plugin's folder: its own name, because a drop-in library may have that of the folder.
+/// Returns the name of the crate in a plugin's folder. It may differ from the folder's name, which a drop-in library may have.
 ///
 /// # Panics
-/// If the folder has no crate.
+/// If the folder has no manifest, or its manifest has no name.
 #[must_use]
 pub fn crate_name_of(plugin_folder: &str) -> String {
     let text = manifest(plugin_folder).expect("a plugin's folder has a manifest");
@@ -86,31 +86,31 @@ pub fn crate_name_of(plugin_folder: &str) -> String {
     name.expect("a manifest names its crate").to_owned()
 }
 
-/// True once ticks have reached a recording that is being written: its loop runs.
+/// Returns true if a recording, also one that is being written, contains a tick: its loop then runs.
 #[must_use]
 pub fn holds_ticks(recording: &Path) -> bool {
     Recording::open(recording).is_ok_and(|mut recording| matches!(recording.next(), Some(Ok(_))))
 }
 
-/// How much work tests that scale may do.
+/// Size of the tests that scale, from the environment variable [`TestSize::VARIABLE`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum TestSize {
-    /// Seconds: what a plain `cargo test` runs.
+    /// Few cases, without the longest tests; the default of `cargo test`.
     Quick,
-    /// The same, and the tests that take longer: what every change runs (`.ci/run`).
+    /// Few cases, with the longest tests; the size of `.ci/run`.
     Daily,
-    /// Minutes: what `.ci/full` runs.
+    /// All cases; the size of `.ci/full`.
     Full,
 }
 
 impl TestSize {
-    /// Environment variable that chooses the size: `quick` (also when unset), `daily` or `full`.
+    /// Name of the environment variable of the size: `quick` (the default), `daily` or `full`.
     pub const VARIABLE: &str = "FLOTOR_TEST_SIZE";
 
-    /// The size this run asks for.
+    /// Returns the size of this test run, from [`Self::VARIABLE`].
     ///
     /// # Panics
-    /// If the variable holds another word: a typing error must not turn a long test into a short one.
+    /// If the variable has another value: a typing error must not turn a long test into a short one.
     #[must_use]
     pub fn of_this_run() -> Self {
         match std::env::var(Self::VARIABLE) {
@@ -122,7 +122,7 @@ impl TestSize {
         }
     }
 
-    /// The number of cases (poses, ticks, seeds) for this size.
+    /// Returns the number of cases (poses, ticks, seeds) for this size: `quick` also for [`Self::Daily`].
     #[must_use]
     pub const fn pick(self, quick: usize, full: usize) -> usize {
         match self {
@@ -131,7 +131,7 @@ impl TestSize {
         }
     }
 
-    /// Whether a test that takes longer than others is left out; tells so.
+    /// Returns true if the longest tests are skipped at this size, and then reports the calling test as skipped.
     #[must_use]
     pub fn leaves_out_long_tests(self) -> bool {
         let is_quick = self == Self::Quick;
@@ -151,7 +151,7 @@ impl TestSize {
     }
 }
 
-/// Documents with Rust code in them: compiled and run by `cargo test`, so that no example in them can rot.
+/// Documents with Rust code: `cargo test` compiles and runs the code, so the examples stay valid.
 #[cfg(doctest)]
 mod documents {
     #[doc = include_str!("../../README.md")]

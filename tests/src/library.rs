@@ -1,15 +1,15 @@
-//! Shared libraries to load: the plugins cargo has built, copies of them with other bytes, and C compiled on
-//! the spot.
+//! Shared libraries for tests of the loader: plugins built by cargo, patched copies of their bytes, and libraries compiled from C
+//! by the test.
 
 use flotor_hal::abi::PluginKind;
 use flotor_judge::validate::Check;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Where cargo puts this build: the folder with the programs; libraries are in `deps` below it.
+/// Returns cargo's output folder of this build, with the programs; libraries are in its subfolder `deps`.
 ///
 /// # Panics
-/// If the tests do not run from a folder cargo has made.
+/// If the test program is not in the folder `deps` of cargo.
 #[must_use]
 pub fn build_folder() -> PathBuf {
     let own = std::env::current_exe().expect("a running test has a file");
@@ -17,16 +17,16 @@ pub fn build_folder() -> PathBuf {
     deps.parent().expect("and that folder is `deps`").to_path_buf()
 }
 
-/// How many rules `flotor validate` checks of a device.
+/// Returns the number of rules that `flotor validate` checks for a device.
 #[must_use]
 pub fn rules_of_a_device() -> usize {
     Check::all().filter(|check| check.applies_to(PluginKind::Device)).count()
 }
 
-/// The library of a plugin crate of this workspace, built with the tests because they depend on it.
+/// Returns the path of the library of a plugin crate of this workspace, which is a dependency of the tests and built with them.
 ///
 /// # Panics
-/// If it is not there.
+/// If the library is missing.
 #[must_use]
 pub fn plugin_file(package: &str) -> PathBuf {
     let name = format!(
@@ -40,19 +40,19 @@ pub fn plugin_file(package: &str) -> PathBuf {
     file
 }
 
-/// The bytes of the library of a plugin crate.
+/// Reads the library of a plugin crate and returns its bytes.
 ///
 /// # Panics
-/// If it cannot be read.
+/// If the library is missing or cannot be read.
 #[must_use]
 pub fn plugin_bytes(package: &str) -> Vec<u8> {
     std::fs::read(plugin_file(package)).expect("a library that is there can be read")
 }
 
-/// The same bytes with the one occurrence of `old` replaced by `new`.
+/// Returns `bytes` with the single occurrence of `old` replaced by `new`.
 ///
 /// # Panics
-/// If `old` occurs never or twice, or `new` has another length: offsets in the file would no longer hold.
+/// If `old` does not occur exactly once, or the lengths differ: offsets in the file would become invalid.
 #[must_use]
 pub fn patched(mut bytes: Vec<u8>, old: &[u8], new: &[u8]) -> Vec<u8> {
     assert_eq!(old.len(), new.len(), "a patch keeps the length");
@@ -63,20 +63,20 @@ pub fn patched(mut bytes: Vec<u8>, old: &[u8], new: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Compiles C source text to a shared library with the system's compiler.
+/// Compiles C source text to the shared library `library` with `cc`; writes the source beside it.
 ///
 /// # Panics
-/// If there is no compiler, or it has anything to say: warnings are errors.
+/// If the source cannot be written, there is no compiler, or it reports an error or a warning.
 pub fn compile_c(source: &str, library: &Path) {
     let file = library.with_extension("c");
     std::fs::write(&file, source).expect("a scratch folder can be written to");
     compile_c_file(&file, &[], library);
 }
 
-/// Compiles a C file to a shared library, with macros defined.
+/// Compiles the C file `file` to the shared library `library` with `cc`. `macros`: macros to define, `NAME` or `NAME=VALUE`.
 ///
 /// # Panics
-/// As [`compile_c`].
+/// If there is no compiler, or it reports an error or a warning.
 pub fn compile_c_file(file: &Path, macros: &[&str], library: &Path) {
     let mut compiler = Command::new("cc");
     compiler.args(["-std=c11", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O1", "-shared", "-fPIC"]);

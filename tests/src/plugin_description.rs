@@ -1,12 +1,12 @@
-//! A plugin of a recording, for tests of the format.
+//! Description of a plugin in a recording, for tests of the format.
 //!
-//! Needs the names of `flotor_record` from the module that includes this file with `#[path]`: one of them is in that crate.
+//! The including module (`#[path]`) provides `PluginDescription` and `Role` of `flotor_record`; one such module is in that crate.
 
 use super::{PluginDescription, Role};
 use flotor_core::mapping::{Blend, FieldTiming};
 use flotor_hal::Demand;
 
-/// Describes a plugin of this name with a value in each field.
+/// Returns a description of a plugin `name`; for a model each field has a value other than its default.
 pub(crate) fn described(name: &str, role: Role) -> PluginDescription {
     let pair = |key: &str, value: &str| (key.to_owned(), value.to_owned());
     let is_device = role == Role::Device;

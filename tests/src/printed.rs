@@ -1,13 +1,13 @@
-//! Numbers that the book prints, for the tests that compute them.
+//! Comparison of computed numbers with the numbers printed in the book.
 //!
-//! Needs nothing of this crate: crates that cannot depend on it include this file with `#[path]`.
+//! The file uses no other module of this crate: crates that cannot depend on the crate include it with `#[path]`.
 
 use std::path::Path;
 
-/// Holds a chapter of the book to a text, such as a row of a table; any white space counts as one space.
+/// Asserts that a chapter of the book contains a text, such as a row of a table; any white space counts as one space.
 ///
 /// # Panics
-/// If the chapter cannot be read, or does not have the text.
+/// If the chapter cannot be read, or does not contain the text.
 #[track_caller]
 pub fn assert_chapter_prints(chapter: &str, text: &str) {
     let mut folders = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors();

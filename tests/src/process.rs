@@ -1,49 +1,50 @@
-//! A process a test has started: it ends with the test, however the test ends.
+//! Child process of a test, killed at the end of the test, also after a panic.
 //!
-//! Needs nothing of this crate: the viewer and the bridge include this file with `#[path]`.
+//! The file uses no other module of this crate: the viewer and the bridge include it with `#[path]`.
 
 use rustix::process::{Pid, Signal, kill_process};
 use std::ops::{Deref, DerefMut};
 use std::process::{Child, Command, Output};
 use std::time::Duration;
 
-/// A process of the test's own. What has not ended when this is dropped, also by a panic, is killed: a host that hangs would else
-/// outlive the test that failed. Of a shell that is the shell, so that scripts `exec` what may hang.
+/// Child process of a test. Dropping it, also by a panic, kills the process if it still runs: otherwise a hanging host would
+/// continue after a failed test. Only the process itself is killed, so shell scripts `exec` a program that may hang.
 pub struct Owned(Option<Child>);
 
 impl Owned {
-    /// Starts it.
+    /// Starts a process.
     ///
     /// # Panics
-    /// If it cannot be started.
+    /// If the process cannot be started.
     #[must_use]
     pub fn start(command: &mut Command) -> Self {
         Self(Some(command.spawn().unwrap_or_else(|error| panic!("{command:?} does not start: {error}"))))
     }
 
-    /// Sends it a signal.
+    /// Sends the process a signal.
     ///
     /// # Panics
-    /// If it was waited for.
+    /// If the signal cannot be sent, as to a process whose exit code has been read.
     pub fn signal(&self, signal: Signal) {
         kill_process(self.pid(), signal).expect("it is ours");
     }
 
-    /// Its number. Nobody else has it until this value is gone.
+    /// Returns the process id. No other process gets this id before the value is dropped or its exit code is read.
     #[must_use]
     pub fn pid(&self) -> Pid {
         Pid::from_child(self)
     }
 
-    /// The process that carries out the command: the one that was started supervises it, its only child.
+    /// Waits for the process that carries out the command, the only child of the started process, which supervises it; returns
+    /// its process id.
     ///
     /// # Panics
-    /// If there is none, or there are several.
+    /// If there is no child within five seconds, or there are several children.
     #[must_use]
     pub fn host(&self) -> Pid {
         let number = self.pid().as_raw_nonzero();
         let list = format!("/proc/{number}/task/{number}/children");
-        // It starts right after the supervisor.
+        // The child starts soon after its supervisor.
         for _ in 0..1000 {
             let children = std::fs::read_to_string(&list).unwrap_or_default();
             if !children.is_empty() {
@@ -55,7 +56,7 @@ impl Owned {
         panic!("no process under {number}");
     }
 
-    /// Kills the process that carries out the command, unless it has ended.
+    /// Kills the process that carries out the command, the only child of the started process, if it runs.
     pub fn kill_host(&self) {
         let number = self.pid().as_raw_nonzero();
         let children = std::fs::read_to_string(format!("/proc/{number}/task/{number}/children"));
@@ -64,18 +65,18 @@ impl Owned {
         }
     }
 
-    /// Sends a signal to the process that carries out the command.
+    /// Sends a signal to the process that carries out the command, see [`Owned::host`].
     ///
     /// # Panics
-    /// As [`Owned::host`].
+    /// As [`Owned::host`], or if the signal cannot be sent.
     pub fn signal_host(&self, signal: Signal) {
         kill_process(self.host(), signal).expect("it is ours");
     }
 
-    /// Waits for its end, and for all it writes until then.
+    /// Waits for the end of the process; returns its exit status, and all its output if it was started with pipes.
     ///
     /// # Panics
-    /// If it cannot be waited for.
+    /// If waiting or reading fails.
     #[must_use]
     pub fn output(mut self) -> Output {
         self.0.take().expect(OURS).wait_with_output().expect("it ends")

@@ -1,4 +1,4 @@
-//! The `flotor` program as a user meets it: arguments in; exit code, standard output and standard error out.
+//! Runs of the `flotor` program as a user starts it: arguments in; exit code, standard output and standard error out.
 
 use crate::library::build_folder;
 use crate::process::Owned;
@@ -12,45 +12,46 @@ use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
-/// Exit codes of the command line, a contract with scripts.
+/// Exit codes of the command line, on which scripts rely.
 pub mod exit_code {
-    /// All went well.
+    /// Success.
     pub const OK: i32 = 0;
-    /// Anything that is none of the others.
+    /// Error without an exit code of its own.
     pub const OTHER: i32 = 1;
-    /// Usage or configuration.
+    /// Error in arguments or configuration.
     pub const CONFIGURATION: i32 = 2;
-    /// A plugin was refused.
+    /// Refused plugin.
     pub const PLUGIN_REFUSED: i32 = 3;
-    /// The device faulted.
+    /// Fault of the device.
     pub const DEVICE_FAULT: i32 = 4;
 }
 
-/// One call of the program, being put together.
+/// Builder for a run of the program.
 pub struct Flotor {
     command: Command,
     input: String,
-    /// Where its runs are found and its emergency stops stay: no test meets those of another, or of who runs the tests.
+    /// Runtime folder of the program's runs and emergency stops, separate from other tests and from the user.
     runtime: Scratch,
 }
 
-/// What came of a call.
+/// Exit code and output of a finished run of the program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Ran {
     /// Exit code; `None` if a signal ended the program.
     pub code: Option<i32>,
-    /// Everything on standard output.
+    /// Complete standard output.
     pub stdout: String,
-    /// Everything on standard error.
+    /// Complete standard error.
     pub stderr: String,
 }
 
 impl Flotor {
-    /// The program with these arguments, no plugin folders but its own, and no colours. `FLOTOR_RUNNER` is a command that runs
-    /// it, as an emulator of another processor does: `FLOTOR_RUNNER="qemu-x86_64 -cpu qemu64"`.
+    /// Prepares a run of the program with these arguments, only its own plugin folders, no colours, and a separate runtime folder.
+    /// The environment variable `FLOTOR_RUNNER` is a command that runs the program, such as an emulator of another processor:
+    /// `FLOTOR_RUNNER="qemu-x86_64 -cpu qemu64"`.
     ///
     /// # Panics
-    /// If the program is not built, or older than a source it is made of.
+    /// If the program or one of its separate programs is not built, or older than one of its sources.
     #[must_use]
     pub fn with<I: AsRef<OsStr>>(arguments: impl IntoIterator<Item = I>) -> Self {
         let mut command = match std::env::var("FLOTOR_RUNNER") {
@@ -62,17 +63,17 @@ impl Flotor {
             Err(_) => Command::new(program()),
         };
         command.args(arguments).env_remove(flotor_session::registry::PATH_VARIABLE).env("NO_COLOR", "1");
-        // What a plugin's panic would do to a terminal must not depend on how the tests were started.
+        // The output of a plugin's panic must not depend on the environment of the tests.
         command.env("RUST_BACKTRACE", "1");
         let runtime = Scratch::default();
         command.env("XDG_RUNTIME_DIR", runtime.path());
         Self { command, input: String::new(), runtime }
     }
 
-    /// Searches these folders for plugins, first to last, before the program's own.
+    /// Sets the folders that the program searches for plugins, first to last, before its own folders.
     ///
     /// # Panics
-    /// If a folder's name holds the separator of paths.
+    /// If the path of a folder contains the separator of path lists.
     #[must_use]
     pub fn searching(mut self, folders: &[&Path]) -> Self {
         let path = std::env::join_paths(folders).expect("a scratch folder has a plain name");
@@ -87,14 +88,14 @@ impl Flotor {
         self
     }
 
-    /// Runs it in this folder.
+    /// Sets the working folder of the program.
     #[must_use]
     pub fn inside(mut self, folder: &Path) -> Self {
         self.command.current_dir(folder);
         self
     }
 
-    /// Runs it through `sh`: `script` gets the program and its arguments as `"$@"`.
+    /// Runs the shell script `script` with `sh` instead of the program; the script gets the program and its arguments as `"$@"`.
     #[must_use]
     pub fn through_shell(mut self, script: &str) -> Self {
         let mut shell = Command::new("sh");
@@ -112,14 +113,14 @@ impl Flotor {
         self
     }
 
-    /// Runs it as the leader of a process group, as a shell does: what its terminal sends reaches the group.
+    /// Makes the program the leader of a process group, as an interactive shell does: signals of a terminal reach the group.
     #[must_use]
     pub fn leading_a_group(mut self) -> Self {
         self.command.process_group(0);
         self
     }
 
-    /// Text for standard input.
+    /// Sets the text of standard input.
     #[must_use]
     pub fn reading(mut self, input: impl Into<String>) -> Self {
         self.input = input.into();
@@ -129,16 +130,16 @@ impl Flotor {
     /// Runs the program to its end.
     ///
     /// # Panics
-    /// If it cannot be started, or its output is not text.
+    /// If the program cannot be started, or its output is not UTF-8.
     #[must_use]
     pub fn run(self) -> Ran {
         self.start().wait()
     }
 
-    /// Starts the program.
+    /// Starts the program, and a thread that writes its standard input.
     ///
     /// # Panics
-    /// If it cannot be started.
+    /// If the program cannot be started.
     #[must_use]
     pub fn start(mut self) -> Running {
         self.command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
@@ -150,7 +151,7 @@ impl Flotor {
     }
 }
 
-/// A call that has been started: an [`Owned`] process.
+/// Running program: an [`Owned`] process.
 pub struct Running {
     process: Owned,
     writer: JoinHandle<std::io::Result<()>>,
@@ -172,11 +173,11 @@ impl DerefMut for Running {
 }
 
 impl Running {
-    /// Waits for its end; returns the largest resident memory of the process that carries out the command as well, KiB.
-    /// For programs that write less than a pipe holds.
+    /// Waits for the end of the program; also returns the peak resident memory of the process that carries out the command, KiB.
+    /// The program must write less than the capacity of a pipe.
     ///
     /// # Panics
-    /// As [`Self::wait`].
+    /// As [`Self::wait`] and [`Owned::host`].
     #[must_use]
     pub fn wait_with_peak_kib(self) -> (Ran, u64) {
         let status = format!("/proc/{}/status", self.host().as_raw_nonzero());
@@ -189,14 +190,14 @@ impl Running {
         (self.wait(), peak_kib)
     }
 
-    /// Waits for its end.
+    /// Waits for the end of the program; returns its exit code and output.
     ///
     /// # Panics
-    /// If its output is not text.
+    /// If waiting fails, or the output is not UTF-8.
     #[must_use]
     pub fn wait(self) -> Ran {
         let output = self.process.output();
-        // A program that stops reading because its arguments are wrong closes the pipe: its business.
+        // A program that ends early, as with wrong arguments, closes the pipe; a write error is then expected.
         let _ = self.writer.join().expect("the writer only writes");
         let text = |bytes| String::from_utf8(bytes).expect("the program writes text");
         Ran { code: output.status.code(), stdout: text(output.stdout), stderr: text(output.stderr) }
@@ -204,10 +205,10 @@ impl Running {
 }
 
 impl Ran {
-    /// The one line on standard error, after `error: `.
+    /// Returns the text after `error: ` on standard error.
     ///
     /// # Panics
-    /// If there is more or less than that one line.
+    /// If standard error is not a single line `error: ...`.
     #[must_use]
     pub fn error(&self) -> &str {
         let mut lines = self.stderr.lines();
@@ -218,10 +219,10 @@ impl Ran {
     }
 }
 
-/// What `flotor` starts for its commands. Built, as itself, by the same `cargo test`, because each has an integration test.
+/// Separate programs that `flotor` starts for some commands. `cargo test` builds them, because each has an integration test.
 const SEPARATE: [&str; 4] = ["flotor-lab", "flotor-study", "flotor-calibration", "flotor-test"];
 
-/// The program beside the tests.
+/// Returns the path of `flotor` in the build folder; panics if it or a separate program is missing or not up to date.
 fn program() -> PathBuf {
     for name in SEPARATE {
         current(name);
@@ -229,7 +230,7 @@ fn program() -> PathBuf {
     current("flotor")
 }
 
-/// A program beside the tests, which must be as new as its sources.
+/// Returns the path of a program in the build folder; panics if the program is missing or older than one of its sources.
 fn current(name: &str) -> PathBuf {
     let file = build_folder().join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     let build = if cfg!(debug_assertions) { "cargo build" } else { "cargo build --release" };
@@ -246,8 +247,8 @@ fn current(name: &str) -> PathBuf {
     file
 }
 
-/// What a program was made of, as cargo noted it beside the program: `cargo test -p flotor-tests` does not build it
-/// again, so a test could meet the program of yesterday.
+/// Returns the sources of a program, from cargo's dependency file beside it: `cargo test -p flotor-tests` does not rebuild the
+/// program, so a test could run an old version.
 fn sources(name: &str) -> Vec<PathBuf> {
     let notes = std::fs::read_to_string(build_folder().join(format!("{name}.d"))).unwrap_or_default();
     let files = notes.lines().next().and_then(|line| line.split_once(": ")).map_or("", |(_, files)| files);
@@ -270,7 +271,7 @@ mod tests {
     use rustix::process::{Pid, test_kill_process};
     use std::panic::{AssertUnwindSafe, catch_unwind};
 
-    /// Fails as a test does that has started something, which has to be gone then.
+    /// Asserts that a process is killed by a panic in the test that started it.
     fn assert_gone_after_a_failure<T>(start: impl FnOnce() -> T, pid: impl Fn(&T) -> Pid) {
         let mut number = None;
         let failed = catch_unwind(AssertUnwindSafe(|| {

@@ -1,14 +1,14 @@
-//! Random numbers of tests: the same for a seed on every machine.
+//! Pseudo-random numbers for tests: the same for a seed on every machine.
 //!
-//! Needs nothing of this crate: crates that cannot depend on it include this file with `#[path]`.
+//! The file uses no other module of this crate: crates that cannot depend on the crate include it with `#[path]`.
 
 #![allow(dead_code, unreachable_pub)] // each test program uses its part
 
-/// SplitMix64 (Steele, Lea and Flood, OOPSLA 2014): short, fast, the same everywhere.
+/// SplitMix64 generator of pseudo-random numbers (Steele, Lea and Flood, OOPSLA 2014). The field is its state, at first the seed.
 pub struct Random(pub u64);
 
 impl Random {
-    /// Returns 64 random bits.
+    /// Advances the generator and returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut mixed = self.0;
@@ -17,23 +17,23 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
-    /// Returns a whole number below a bound; 0 if the bound is 0.
+    /// Returns a random whole number below `bound`; 0 if the bound is 0.
     #[allow(clippy::cast_possible_truncation)] // less than the bound
     pub fn below(&mut self, bound: usize) -> usize {
         (self.bits() % bound.max(1) as u64) as usize
     }
 
-    /// Returns a number from 0 to 1, both included.
+    /// Returns a random number from 0 to 1, both included.
     pub fn share(&mut self) -> f64 {
         self.bits() as f64 / u64::MAX as f64
     }
 
-    /// Returns a number from -1 to 1, both included.
+    /// Returns a random number from -1 to 1, both included.
     pub fn symmetric(&mut self) -> f64 {
         2.0 * self.share() - 1.0
     }
 
-    /// Returns one of the 2^53 evenly spaced numbers from 0 to below 1.
+    /// Returns a random number in the half-open interval from 0 to 1: a multiple of 2^-53.
     pub fn uniform(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }

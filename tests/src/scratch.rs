@@ -1,30 +1,32 @@
-//! A folder of a test's own, gone when the test is.
+//! Temporary folder of a test, deleted at the end of the test.
 
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
-/// A new, empty folder only this user may write to.
+/// New, empty temporary folder that only this user may write to. Dropping it deletes the folder.
 pub struct Scratch(TempDir);
 
 impl Default for Scratch {
+    /// Creates the folder.
+    ///
     /// # Panics
-    /// If the system has no place for temporary files.
+    /// If the system's folder for temporary files is not writable.
     fn default() -> Self {
         Self(tempfile::tempdir().expect("there is a place for temporary files"))
     }
 }
 
 impl Scratch {
-    /// The folder.
+    /// Returns the path of the folder.
     #[must_use]
     pub fn path(&self) -> &Path {
         self.0.path()
     }
 
-    /// Writes a file into the folder.
+    /// Writes a file in the folder and returns its path.
     ///
     /// # Panics
-    /// If it cannot be written.
+    /// If the file cannot be written.
     #[must_use]
     pub fn file(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let file = self.path().join(name);
@@ -32,21 +34,21 @@ impl Scratch {
         file
     }
 
-    /// Writes a scene for a run in real time into the folder: with a watchdog that bears a machine on which nothing moves for a
-    /// while. To be used where the test is not about that.
+    /// Writes a scene for a run in real time, with a watchdog timeout of one minute, in the folder and returns its path. A busy
+    /// machine does not expire this watchdog; a test of the watchdog itself needs another scene.
     ///
     /// # Panics
-    /// If it cannot be written, or has limits of its own.
+    /// If the file cannot be written, or the scene has a table `[limits]`.
     #[must_use]
     pub fn patient_scene(&self, scene: &str) -> PathBuf {
         assert!(!scene.contains("[limits]"), "it has limits: they can say `watchdog_ms` themselves");
         self.file("patient.toml", format!("{scene}\n[limits]\nwatchdog_ms = 60000\n"))
     }
 
-    /// Makes a folder in the folder.
+    /// Creates a subfolder and returns its path.
     ///
     /// # Panics
-    /// If it cannot be made.
+    /// If the subfolder cannot be created.
     #[must_use]
     pub fn folder(&self, name: &str) -> PathBuf {
         let folder = self.path().join(name);

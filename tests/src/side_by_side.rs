@@ -1,11 +1,11 @@
-//! Cases of a test that wait for most of their time, shown side by side.
+//! Parallel run of test cases that wait for most of their time.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Cases at a time.
+/// Number of cases that run at the same time.
 const AT_A_TIME: usize = 4;
 
-/// Shows each of the cases, some side by side. Fails if one does, when all are over.
+/// Runs `show` on each case, in parallel on [`AT_A_TIME`] threads. A panic in a case is passed on after the end of all threads.
 pub fn show_each<T: Sync>(cases: &[T], show: impl Fn(&T) + Sync) {
     let next = AtomicUsize::new(0);
     std::thread::scope(|scope| {

@@ -1,14 +1,16 @@
-//! What a device plugin is tested for on whatever stands in for its device: the rules of the contract, and the demo.
+//! Tests of a device plugin on an emulator or a service in place of its device: the rules of the contract, the demo, and the
+//! message about a missing torque.
 
 use crate::library::{plugin_file, rules_of_a_device};
 use crate::program::{Flotor, exit_code};
 use crate::scratch::Scratch;
 use crate::workspace_root;
 
-/// That `flotor validate` checks every rule of a device on a plugin with these parameters (`KEY=VALUE`), and each holds.
+/// Asserts that `flotor validate` checks every rule of a device on the plugin of crate `package` with these parameters
+/// (`KEY=VALUE`), and that every rule holds.
 ///
 /// # Panics
-/// If one does not hold, or is not checked.
+/// If a rule does not hold, or is not checked.
 pub fn assert_every_rule_holds(package: &str, parameters: &[&str]) {
     let library = plugin_file(package).display().to_string();
     let sets = parameters.iter().flat_map(|parameter| ["--set", *parameter]);
@@ -17,10 +19,11 @@ pub fn assert_every_rule_holds(package: &str, parameters: &[&str]) {
     assert_eq!(ran.stdout.matches("  ok ").count(), rules_of_a_device(), "{}", ran.stdout);
 }
 
-/// The demo with two lines changed: the plugin of the device, and one of its parameters. The path of the scene.
+/// Writes the scene of the demo with two changed lines, the plugin of the device and the line `preset = "plain"`; returns the
+/// path of the scene.
 ///
 /// # Panics
-/// If the demo has no such lines.
+/// If the demo does not have exactly these lines, or the scene cannot be written.
 #[must_use]
 pub fn demo_on(scratch: &Scratch, plugin: &str, parameter: &str) -> String {
     let demo = std::fs::read_to_string(workspace_root().join("host/scenes/demo.toml")).expect("it is there");
@@ -32,10 +35,11 @@ pub fn demo_on(scratch: &Scratch, plugin: &str, parameter: &str) -> String {
     scratch.file("demo.toml", changed).display().to_string()
 }
 
-/// That `flotor run` with these arguments, and these variables of the environment, runs to its end with a force.
+/// Asserts that `flotor run` with these arguments and environment variables runs to the end of its scene, with a peak force
+/// above 0.1 N.
 ///
 /// # Panics
-/// If it does not.
+/// If the run fails, ends early, or has a smaller peak force.
 pub fn assert_runs_with_force(scratch: &Scratch, arguments: &[&str], environment: &[(&str, &str)]) {
     let json = scratch.path().join("run.json");
     let name = json.display().to_string();
@@ -48,11 +52,12 @@ pub fn assert_runs_with_force(scratch: &Scratch, arguments: &[&str], environment
     assert!(summary["peak_force_n"].as_f64().is_some_and(|peak_n| peak_n > 0.1), "{summary}");
 }
 
-/// That a run says, when it pairs a device without torque with a model that has some, that the hand cannot feel it; and no longer
-/// where a scene sets that limit itself. `stderr_with` runs the device with a spring and such a table, and returns what it said.
+/// Asserts that a run of a device without torque and a model with torque reports the missing torque, unless the scene itself
+/// sets the torque limit to zero. `stderr_with` runs the device and a spring with this table in the scene, and returns standard
+/// error.
 ///
 /// # Panics
-/// If that is not so.
+/// If the message is missing, or appears with the limit in the scene.
 pub fn assert_missing_torque_is_told(stderr_with: impl Fn(&str) -> String) {
     let words = "`device` exerts no torque, so the hand cannot feel the torque of a model";
     let said = stderr_with("");
@@ -61,7 +66,7 @@ pub fn assert_missing_torque_is_told(stderr_with: impl Fn(&str) -> String) {
     assert!(!said.contains(words), "{said}");
 }
 
-/// What `flotor run` says of a spring on a device that an emulator or a service stands in for, with this table in the scene.
+/// Runs a spring on a device whose emulator or service is at `address`, with this table in the scene; returns standard error.
 ///
 /// # Panics
 /// If the run fails.

@@ -1,33 +1,33 @@
-//! Tables computed elsewhere with higher precision, and what `flotor eval` answers to their poses.
+//! Reference tables, computed with higher precision, and the output of `flotor eval` for their poses.
 
 use crate::program::{Flotor, Ran, exit_code};
 use crate::workspace_root;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Header of a file of poses.
+/// Header of the table of poses for `flotor eval`.
 pub const POSE_HEADER: &str = "id,x_m,y_m,z_m,rx_rad,ry_rad,rz_rad";
-/// Header of a file of wrenches.
+/// First columns of the header of the table of wrenches from `flotor eval`.
 pub const WRENCH_HEADER: &str = "id,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm,energy_j,status";
-/// A millimetre in metres, a newton millimetre in newton metres.
+/// Millimetre in metres, and newton millimetre in newton metres.
 pub const MM: f64 = 1.0e-3;
 
-/// One row of a table, by column.
+/// Row of a table: cell by column name.
 pub type Row = BTreeMap<String, String>;
 
-/// A number of a row.
+/// Returns the number in a cell.
 ///
 /// # Panics
-/// If there is no such column, or something else in it.
+/// If there is no such column, or the cell is not a number.
 #[must_use]
 pub fn number(row: &Row, column: &str) -> f64 {
     let text = row.get(column).unwrap_or_else(|| panic!("no column {column}"));
     text.parse().unwrap_or_else(|_| panic!("{column} = {text}"))
 }
 
-/// The rows of CSV text with a header and no quotes.
+/// Parses CSV text with a header and no quotes, and returns its rows.
 ///
 /// # Panics
-/// If a row has more or fewer fields than the header.
+/// If there is no header, or a row has more or fewer fields than the header.
 #[must_use]
 pub fn rows_of(text: &str) -> Vec<Row> {
     let mut lines = text.lines();
@@ -40,20 +40,20 @@ pub fn rows_of(text: &str) -> Vec<Row> {
     lines.map(row).collect()
 }
 
-/// A table of `tests/data/cases`.
+/// Reads a table in `tests/data/cases`.
 ///
 /// # Panics
-/// If it cannot be read.
+/// If the file cannot be read, or as [`rows_of`].
 #[must_use]
 pub fn table(name: &str) -> Vec<Row> {
     let file = workspace_root().join("tests/data/cases").join(name);
     rows_of(&std::fs::read_to_string(file).expect("the table is there"))
 }
 
-/// Preset and free length, m, of a spring of the tables.
+/// Returns preset and free length, m, of a spring of the tables.
 ///
 /// # Panics
-/// If the tables do not know it.
+/// If the table `springs.csv` has no such spring.
 #[must_use]
 pub fn spring(number_in_table: &str) -> (&'static str, f64) {
     let preset = match number_in_table {
@@ -66,30 +66,30 @@ pub fn spring(number_in_table: &str) -> (&'static str, f64) {
     (preset, number(&constants.expect("its constants are in the table"), "L0_mm") * MM)
 }
 
-/// Runs `flotor eval --model spring` from standard input to standard output.
+/// Runs `flotor eval --model spring` with `poses` on standard input and these further arguments; the result is on standard output.
 #[must_use]
 pub fn eval(poses: &str, arguments: &[&str]) -> Ran {
     let always = ["eval", "--model", "spring", "--poses", "-", "--out", "-"];
     Flotor::with(always.iter().chain(arguments)).reading(poses).run()
 }
 
-/// One line of an answer.
+/// Row of the output of `flotor eval`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// Its id.
+    /// Id of the pose.
     pub id: String,
     /// Force (N) and torque (N m).
     pub wrench: [f64; 6],
-    /// Stored energy (J), if there is one.
+    /// Stored energy (J); `None` for an empty cell.
     pub energy_j: Option<f64>,
-    /// Its status.
+    /// Status of the step.
     pub status: String,
-    /// Further columns, by name.
+    /// Columns beyond [`WRENCH_HEADER`], by name.
     pub details: Row,
 }
 
 impl Answer {
-    /// Distance of force, N, and torque, N m, from those of a table.
+    /// Returns the length of the difference from a reference force, N, and from a reference torque, N m.
     #[must_use]
     pub fn distance(&self, force_n: [f64; 3], torque_nm: [f64; 3]) -> (f64, f64) {
         let [fx, fy, fz, tx, ty, tz] = self.wrench;
@@ -97,16 +97,16 @@ impl Answer {
     }
 }
 
-/// Distance of two points.
+/// Returns the distance between two points.
 #[must_use]
 pub fn distance(a: [f64; 3], b: [f64; 3]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
 }
 
-/// The rows of a file of wrenches.
+/// Parses a table of wrenches.
 ///
 /// # Panics
-/// If it is none.
+/// If the header does not begin with [`WRENCH_HEADER`], or a row is malformed.
 #[must_use]
 pub fn answers(text: &str) -> Vec<Answer> {
     assert!(text.starts_with(WRENCH_HEADER), "{text}");
@@ -121,10 +121,10 @@ pub fn answers(text: &str) -> Vec<Answer> {
     rows_of(text).into_iter().map(answer).collect()
 }
 
-/// Answers to poses `(id, position m, rotation vector rad)`, which the command must give.
+/// Runs [`eval`] on poses `(id, position m and rotation vector rad)`, and returns the rows of its output.
 ///
 /// # Panics
-/// If it does not.
+/// If the command fails or writes to standard error.
 #[must_use]
 pub fn evaluate(poses: &[(String, [f64; 6])], arguments: &[&str]) -> Vec<Answer> {
     let line = |(id, numbers): &(String, [f64; 6])| {
@@ -137,10 +137,11 @@ pub fn evaluate(poses: &[(String, [f64; 6])], arguments: &[&str]) -> Vec<Answer>
     answers(&ran.stdout)
 }
 
-/// Rows of a table with the command's answer to each, details and all.
+/// Runs [`eval`] with `--details` on the poses of all rows, for each spring with its preset and the parameters `sets`; returns each
+/// row with its output.
 ///
 /// # Panics
-/// If there is not one for each, in order.
+/// If the command fails, or its rows differ from the poses in number or order.
 #[must_use]
 pub fn compared(rows: Vec<Row>, pose: fn(&Row, f64) -> [f64; 6], sets: &[&str]) -> Vec<(Row, Answer)> {
     let springs: BTreeSet<String> = rows.iter().map(|row| row["spring"].clone()).collect();
@@ -162,7 +163,8 @@ pub fn compared(rows: Vec<Row>, pose: fn(&Row, f64) -> [f64; 6], sets: &[&str]) 
         .collect()
 }
 
-/// Pose of a row of the thesis's law: device millimetres on a 15 mm range, left-handed angles.
+/// Returns the pose in a row of the thesis's law: position m and rotation vector rad. The table has device coordinates: 15 mm for
+/// the free length, and left-handed angles.
 #[must_use]
 pub fn thesis_pose(row: &Row, free_length_m: f64) -> [f64; 6] {
     let scale = free_length_m / 15.0;
@@ -170,8 +172,8 @@ pub fn thesis_pose(row: &Row, free_length_m: f64) -> [f64; 6] {
     [scale * input(0), scale * input(1), scale * input(2), -input(3), -input(4), input(5)]
 }
 
-/// Pose of a row of the rod tables: position of the upper plate over the lower one. What a planar table has no column
-/// for is zero.
+/// Returns the pose in a row of the rod tables: position m and rotation vector rad. The table has the position of the upper plate
+/// from the lower plate. Columns missing in a planar table count as zero.
 #[must_use]
 pub fn rod_pose(row: &Row, free_length_m: f64) -> [f64; 6] {
     let number = |column: &str| if row.contains_key(column) { number(row, column) } else { 0.0 };
@@ -180,7 +182,7 @@ pub fn rod_pose(row: &Row, free_length_m: f64) -> [f64; 6] {
     [x_m, y_m, z_m, number("vx_rad"), number(tilt), number("vz_rad")]
 }
 
-/// Force (N) and torque (N m) of a row of the rod tables.
+/// Returns force (N) and torque (N m) in a row of the rod tables. Columns missing in a planar table count as zero.
 #[must_use]
 pub fn rod_wrench(row: &Row) -> ([f64; 3], [f64; 3]) {
     let number = |column: &str| if row.contains_key(column) { number(row, column) } else { 0.0 };

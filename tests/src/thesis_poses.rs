@@ -2,8 +2,8 @@
 
 use flotor_hal::DVec3;
 
-/// Returns position, m, and rotation vector, rad, of pose number `index`: a quarter of the free length aside, from 40 % compressed
-/// to 20 % stretched, 7 degrees.
+/// Returns position, m, and rotation vector, rad, of pose number `index`: up to a quarter of the free length along x and y,
+/// between 40 % compression and 20 % extension, and up to 7 degrees about each axis.
 ///
 /// The poses are a low-discrepancy sequence: the additive recurrence of the generalised golden ratio in six dimensions.
 #[must_use]

@@ -1,35 +1,38 @@
-//! What a machine may lack: programs, a display, a graphics adapter. A test that is skipped for it says so on standard error, also
-//! where the harness keeps what tests print, and fails where `FLOTOR_REQUIRE` names the tool.
+//! Tools that a machine may lack: programs, a display, a graphics adapter. A test without its tool is reported as skipped on
+//! standard error, even if the test harness captures output; it fails if `FLOTOR_REQUIRE` names the tool.
 //!
-//! Needs nothing of this crate: crates that cannot depend on it include this file with `#[path]`.
+//! The file uses no other module of this crate: crates that cannot depend on the crate include it with `#[path]`.
 
 use std::io::Write;
 
-/// Environment variable: the tools a machine must have, `valgrind,display`. A test never skips for lack of one of them.
+/// Name of the environment variable with the tools that a machine must have, such as `valgrind,display`. A test that lacks one of
+/// these tools fails instead of being skipped.
 pub const VARIABLE: &str = "FLOTOR_REQUIRE";
 
-/// What tests use beyond Rust.
+/// Tool of a test that a Rust toolchain does not provide everywhere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tool {
-    /// A C compiler.
+    /// C compiler `cc`.
     Cc,
-    /// A C++ compiler.
+    /// C++ compiler `c++`.
     Cxx,
-    /// Counts instructions.
+    /// Valgrind, which counts instructions.
     Valgrind,
-    /// A virtual display, and what pushes its mouse and keys.
+    /// Virtual display Xvfb, and xdotool for mouse and keyboard events.
     Display,
-    /// Draws with a GPU or as one. No program: who looks for it calls [`lacks`].
+    /// Graphics adapter, a GPU or a software renderer. [`required`] cannot detect it: the test does, and calls [`lacks`].
     Adapter,
-    /// A virtual machine.
+    /// QEMU virtual machine.
     Qemu,
-    /// Python, without any package.
+    /// Python without packages.
     Python,
-    /// Python with numpy, pandas and scipy. Who needs it calls [`lacks`], as it may be another Python (`FLOTOR_SCIENCE_PYTHON`).
+    /// Python with numpy, pandas and scipy. [`required`] cannot detect it, because `FLOTOR_SCIENCE_PYTHON` may name another Python:
+    /// the test does, and calls [`lacks`].
     SciencePython,
-    /// R, without any package.
+    /// R without packages.
     R,
-    /// The formatter of Rust. A link of that name may lead nowhere: who needs it calls [`lacks`].
+    /// Rust formatter `rustfmt`. [`required`] cannot detect it, because a file `rustfmt` may belong to a missing toolchain: the
+    /// test does, and calls [`lacks`].
     Rustfmt,
 }
 
@@ -47,7 +50,7 @@ impl Tool {
         Self::Rustfmt,
     ];
 
-    /// Its word in [`VARIABLE`].
+    /// Returns the name of the tool in [`VARIABLE`].
     const fn word(self) -> &'static str {
         match self {
             Self::Cc => "cc",
@@ -77,7 +80,7 @@ impl Tool {
     }
 }
 
-/// True if the programs of a tool are installed; else the test that asks is to return: that it is skipped has been told.
+/// Returns true if the programs of a tool are in `PATH`. Otherwise reports the calling test as skipped, and the test must return.
 ///
 /// # Panics
 /// As [`lacks`].
@@ -92,17 +95,18 @@ pub fn required(tool: Tool) -> bool {
     missing.is_empty()
 }
 
-/// Tells that a test is skipped because the machine lacks a tool.
+/// Reports that a test is skipped because the machine lacks a tool.
 ///
 /// # Panics
-/// If [`VARIABLE`] names the tool, or holds a word that names none: a typing error must not skip a test.
+/// If [`VARIABLE`] names the tool, or contains an unknown name: a typing error must not skip a test.
 pub fn lacks(tool: Tool, why: &str) {
     let named = std::env::var(VARIABLE).unwrap_or_default();
     assert!(!names(&named, tool), "{VARIABLE}={named}, and this machine has no {}: {why}", tool.word());
     skipped(why);
 }
 
-/// Tells that a test, or a part of it, is skipped: past the harness, which keeps what tests print by macros.
+/// Reports on standard error that a test, or a part of it, is skipped. Bypasses the test harness, which captures the output of
+/// print macros only.
 ///
 /// # Panics
 /// If standard error cannot be written to.
@@ -119,7 +123,7 @@ fn names(words: &str, tool: Tool) -> bool {
             panic!("{VARIABLE}: no `{word}`; one of {:?} is expected", Tool::ALL.map(Tool::word))
         })
     });
-    // All are looked at, for the wrong one among them.
+    // Counts all matches instead of stopping at the first, so that every name is checked.
     named.filter(|named| *named == tool).count() > 0
 }
 

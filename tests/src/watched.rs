@@ -1,4 +1,4 @@
-//! A scene run through the library on the virtual clock, with every tick kept.
+//! Runs of a scene through the library, with a record of every tick.
 
 use crate::library::build_folder;
 use flotor_core::Change;
@@ -11,17 +11,17 @@ use flotor_session::scene::Scene;
 use flotor_session::{Observer, Outcome, RunOptions, Session};
 use std::path::Path;
 
-/// All ticks of a run and what is known after it.
+/// Ticks, parameter changes and outcome of a run.
 pub struct Watched {
-    /// One record a tick, in order.
+    /// Record of each tick, in order.
     pub records: Vec<TickRecord>,
-    /// Every change of a parameter, with the number of records seen before it.
+    /// Every change of a parameter, with the number of ticks recorded before it.
     pub changes: Vec<(usize, Change)>,
-    /// The rest.
+    /// Outcome of the run.
     pub outcome: Outcome,
 }
 
-/// Keeps everything it sees.
+/// Observer that stores all ticks and changes.
 #[derive(Default)]
 struct Keep {
     records: Vec<TickRecord>,
@@ -33,7 +33,7 @@ impl Observer for Keep {
         self.records.push(*record);
     }
 
-    /// Everything that a record can hold.
+    /// Requests all outputs of the models.
     fn demand(&self) -> Demand {
         Demand::ALL
     }
@@ -43,15 +43,15 @@ impl Observer for Keep {
     }
 }
 
-/// Makes the text of a scene ready to run on a clock, with the plugins built beside the tests.
+/// Prepares a session from the text of a scene, with the plugins built with the tests and seed 1.
 ///
 /// # Panics
-/// If the scene is wrong or a plugin is refused: such tests have other means.
+/// If the scene is invalid or a plugin is refused.
 pub fn prepared(clock: Clock, scene: &str) -> Session {
     prepared_with(&Registry::search(&[build_folder().join("deps")]), clock, scene)
 }
 
-/// The same with plugins that may have been loaded before: for many runs, which then load none.
+/// Prepares a session as [`prepared`], with the plugins of `registry`, which loads each plugin only once.
 fn prepared_with(registry: &Registry, clock: Clock, scene: &str) -> Session {
     seeded(registry, RunOptions { clock, seed: 1 }, scene)
 }
@@ -60,50 +60,50 @@ fn seeded(registry: &Registry, options: RunOptions, scene: &str) -> Session {
     let scene = Scene::parse(Path::new("scene.toml"), scene).expect("the scene is right");
     let session = Session::prepare(&scene, registry, &options);
     let session = session.unwrap_or_else(|error| panic!("it does not start: {error}"));
-    // No folder: an emergency stop of a test stays with its run.
+    // Without a folder for the latch, an emergency stop of a test concerns its own run only.
     session.latched_in(&Directory::at("/dev/null/no-folder"))
 }
 
-/// Runs the text of a scene on the virtual clock; as [`prepared`].
+/// Runs the text of a scene on the virtual clock, prepared as by [`prepared`].
 ///
 /// # Panics
-/// As [`prepared`].
+/// As [`prepared`], or if the run cannot start.
 #[must_use]
 pub fn watch(scene: &str) -> Watched {
     watch_on(Clock::Virtual, scene)
 }
 
-/// The same without the host's ceiling.
+/// Runs the text of a scene on the virtual clock as [`watch`], without the host's force ceiling.
 ///
 /// # Panics
-/// As [`prepared`].
+/// As [`watch`].
 #[must_use]
 pub fn watch_strong(scene: &str) -> Watched {
     keep(prepared(Clock::Virtual, scene).allow_strong())
 }
 
-/// The same with a seed of the caller's.
+/// Runs the text of a scene on the virtual clock as [`watch`], with another seed, and without the plugins built with the tests.
 ///
 /// # Panics
-/// As [`prepared`].
+/// As [`watch`].
 #[must_use]
 pub fn watch_seed(scene: &str, seed: u64) -> Watched {
     keep(seeded(&Registry::search(&[]), RunOptions { clock: Clock::Virtual, seed }, scene))
 }
 
-/// Runs the text of a scene; as [`prepared`].
+/// Runs the text of a scene on a clock, prepared as by [`prepared`].
 ///
 /// # Panics
-/// As [`prepared`].
+/// As [`watch`].
 #[must_use]
 pub fn watch_on(clock: Clock, scene: &str) -> Watched {
     keep(prepared(clock, scene))
 }
 
-/// Runs the text of one of many scenes on the virtual clock; `registry` loads each plugin once for all of them.
+/// Runs the text of one of many scenes on the virtual clock; `registry` loads each plugin once for all scenes.
 ///
 /// # Panics
-/// As [`prepared`].
+/// As [`watch`].
 #[must_use]
 pub fn watch_with(registry: &Registry, scene: &str) -> Watched {
     keep(prepared_with(registry, Clock::Virtual, scene))
