@@ -41,9 +41,9 @@ pub enum TouchedBody {
         /// Radius of the rounded rim, m.
         rounding_m: f64,
     },
-    /// Plane top of a body of any shape. The law extends over the whole plane and reports positions off the face's box.
+    /// Plane top of a body of any shape. The law extends over the whole plane; outside the outline it is extrapolated.
     Face {
-        /// Smallest and largest x and y of the face, m.
+        /// Bounding box of the face: smallest and largest x, then y, m.
         outline_m: [[f64; 2]; 2],
         /// Energy ratio over x and y.
         ratio: Box<Volume>,
@@ -65,10 +65,10 @@ pub struct Atlas {
     pub body: TouchedBody,
 }
 
-/// Width over which the energy ratio levels off behind the deepest solved depth, in `sqrt(d / R)`.
+/// Width before and after the deepest solved depth over which the energy ratio becomes constant, in `sqrt(d / R)`.
 const RATIO_END: f64 = 0.022;
 
-/// Width over which the stiffness falls to zero behind the deepest solved depth, radii.
+/// Width over which the stiffness falls to zero beyond [`Atlas::deepest_m`], in radii.
 const DEEPEST_FADE: f64 = 0.1;
 
 /// Square of a distance below which the distance counts as zero, m²: its reciprocal would not be finite.
@@ -92,7 +92,7 @@ pub struct Answer {
     pub energy: Jet,
     /// Depth of the undeformed face inside the sphere, m; not positive without contact.
     pub depth_m: f64,
-    /// True where the law is that of a nearby position: off a face, or on the side of a cylinder.
+    /// True if the law is extrapolated from a nearby position: off the face of a mesh, or on the side of a cylinder.
     pub is_extrapolated: bool,
 }
 
@@ -104,8 +104,8 @@ impl Answer {
 }
 
 impl Atlas {
-    /// Returns energy, force and depth of the contact with a sphere centred at `centre_m` (finite). Real-time: bounded,
-    /// no allocation.
+    /// Returns energy, with its gradient, and depth of the contact with a sphere centred at `centre_m` (finite). Real-time:
+    /// bounded, no allocation.
     pub fn answer(&self, centre_m: [f64; 3]) -> Answer {
         let centre = [0, 1, 2].map(|axis| Jet::variable(centre_m[axis], axis));
         let touch = match &self.body {
@@ -132,7 +132,7 @@ impl Atlas {
 
     /// Returns the contact with the top face of a block alone: its energy is zero beyond the edges of the face and
     /// fades in over half a radius inside them. The force of this contact grows with the depth; that of
-    /// [`Self::answer`] does not where another face is nearer. On other bodies the same as [`Self::answer`]. Real-time:
+    /// [`Self::answer`] does not where another face is nearer. For other bodies equal to [`Self::answer`]. Real-time:
     /// bounded, no allocation.
     pub fn top(&self, centre_m: [f64; 3]) -> Answer {
         let TouchedBody::Block { size, ratios, rounding_m } = &self.body else {
@@ -354,7 +354,7 @@ fn distance(beyond: [Jet; 3], width: f64) -> (Jet, [Jet; 3]) {
     (distance, weights.map(|weight| weight * sum))
 }
 
-/// Smooth step from zero at zero to one at one, constant beyond, with two continuous derivatives.
+/// Returns a smooth step from zero at zero to one at one, constant beyond, with two continuous derivatives.
 pub(crate) fn step(x: Jet) -> Jet {
     let s = x.value.clamp(0.0, 1.0);
     x.chain(s * s * s * (10.0 - s * (15.0 - 6.0 * s)), 30.0 * s * s * (1.0 - s) * (1.0 - s))

@@ -56,8 +56,8 @@ pub fn gauss(count: usize) -> Rule {
     Rule { points, weights }
 }
 
-/// Returns the nodes of an element of an order: both ends, and the extrema of the Legendre polynomial between
-/// (Gauss-Lobatto). Order 2 is the ordinary quadratic element. Not real-time.
+/// Returns the nodes on -1..1 of an element of this order (Gauss-Lobatto): both ends, and the extrema of the Legendre polynomial
+/// between them. Order 2 is the ordinary quadratic element. Not real-time.
 #[must_use]
 pub fn element_points(order: usize) -> Vec<f64> {
     let mut points = vec![-1.0];
@@ -68,7 +68,8 @@ pub fn element_points(order: usize) -> Vec<f64> {
     points
 }
 
-/// Evaluates at `x` the Lagrange polynomials of the points (each one at its point, zero at the others).
+/// Evaluates the Lagrange polynomials of `points` at `x`, into `values`: polynomial `i` is one at point `i` and zero at the
+/// other points.
 pub fn lagrange(points: &[f64], x: f64, values: &mut [f64]) {
     for (i, value) in values.iter_mut().enumerate() {
         *value = 1.0;
@@ -80,7 +81,7 @@ pub fn lagrange(points: &[f64], x: f64, values: &mut [f64]) {
     }
 }
 
-/// Evaluates the derivatives of the Lagrange polynomials at `x`.
+/// Evaluates the derivatives of the Lagrange polynomials of `points` at `x`, into `slopes`.
 pub fn lagrange_slopes(points: &[f64], x: f64, slopes: &mut [f64]) {
     for (i, slope) in slopes.iter_mut().enumerate() {
         *slope = 0.0;

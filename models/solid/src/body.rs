@@ -1,8 +1,8 @@
 //! Body of any shape with a plane touched top: difference between its response and that of a half-space.
 //!
-//! The half-space behind the touched face carries the singularity of every contact, as for a block
-//! ([`crate::remainder`]). The mesh carries the rest: tractions that cancel those of the half-space on the free
-//! surface, and displacements that cancel those on the fixed one. So the mesh need not be fine under the tool.
+//! The half-space behind the touched face contains the singularity of every contact, as for a block
+//! ([`crate::remainder`]). The finite elements solve for the difference: tractions that cancel those of the half-space on the
+//! free surface, and displacements that cancel those on the fixed surface. So the mesh need not be fine under the tool.
 
 use crate::dense::NotPositive;
 use crate::dissection::{Stiffness, subtract_forces};
@@ -18,7 +18,7 @@ use crate::table::Table;
 /// Number of forces solved for at once.
 const BATCH: usize = 8;
 
-/// Body with the Cholesky factors of its stiffness matrix.
+/// Body of a mesh, with the Cholesky factors of its stiffness matrix.
 #[derive(Debug)]
 pub struct Body<'a> {
     mesh: &'a Mesh,
@@ -39,8 +39,8 @@ pub fn outline_m(mesh: &Mesh) -> [[f64; 2]; 2] {
     })
 }
 
-/// Returns the larger of two lengths, m: height of the body above the touched face's middle, and distance of the
-/// touched face from its plane. Zero where the touched face is plane and the top.
+/// Returns the larger of two lengths, m: height of the body above the middle of the touched face, and largest distance of the
+/// touched face from the horizontal plane through its middle. Zero if the touched face is plane and the top of the body.
 #[must_use]
 pub fn unevenness_m(mesh: &Mesh) -> f64 {
     let above = mesh.free.iter().flat_map(|facet| &facet.nodes).map(|&node| mesh.nodes_m[node][2]);
@@ -48,7 +48,7 @@ pub fn unevenness_m(mesh: &Mesh) -> f64 {
     above.chain(beside).fold(0.0, f64::max)
 }
 
-/// Solves for the stiffness of a plate bonded to the touched face of a mesh; returns also its estimated relative error.
+/// Solves for the stiffness of a plate bonded to the touched face of a mesh; also returns its estimated relative error.
 /// Not real-time.
 ///
 /// # Errors
@@ -61,7 +61,7 @@ pub fn plate(mesh: &Mesh, lame: Lame) -> Result<(RigidPatch, f64), NotPositive> 
     Ok((patch, error))
 }
 
-/// Solves for the stiffness of a plate bonded to a mesh's touched face; returns also all nodal displacements by mode.
+/// Solves for the stiffness of a plate bonded to the touched face of a mesh; also returns all nodal displacements by mode.
 /// Not real-time.
 ///
 /// # Errors
@@ -91,7 +91,7 @@ impl<'a> Body<'a> {
         Ok(Self { mesh, solid, lame, stiffness, quadrature })
     }
 
-    /// Returns true if a point of the plane lies on the touched face.
+    /// Returns true if the point of the plane `z = 0` at x and y `at_m` lies on the touched face.
     #[must_use]
     pub fn is_on_face(&self, at_m: [f64; 2]) -> bool {
         let nodes_m = &self.mesh.nodes_m;
@@ -99,7 +99,7 @@ impl<'a> Body<'a> {
         self.mesh.touched.iter().any(holds)
     }
 
-    /// Finds the facet at or nearest to a point of the plane; returns also the weights of its nodes.
+    /// Finds the facet at or nearest to a point of the plane; also returns the weights of its nodes.
     fn sample(&self, at_m: [f64; 2]) -> (&Facet, Vec<f64>) {
         let mut best = (&self.mesh.touched[0], Vec::new());
         let mut least = f64::INFINITY;
@@ -112,7 +112,7 @@ impl<'a> Body<'a> {
         best
     }
 
-    /// Tabulates the remainder, m/N, for all pairs of points of a grid; `nearest` moves each point onto the face. Not
+    /// Solves for the remainder, m/N, of all pairs of points of a grid; `nearest` moves each point onto the face. Not
     /// real-time.
     pub fn table(&self, nodes_m: [Vec<f64>; 2], nearest: impl Fn([f64; 2]) -> [f64; 2]) -> Table {
         let points: Vec<[f64; 2]> =
@@ -123,8 +123,8 @@ impl<'a> Body<'a> {
         Table::of(nodes_m, &answers)
     }
 
-    /// Returns the largest estimated error of the compliance at some points of the touched face, relative to the
-    /// compliance of a half-space under a disc of half a radius. Not real-time.
+    /// Solves for the displacement under forces at `places_m` of the touched face, and returns the largest estimated error of the
+    /// compliance along z, relative to that of a half-space under a rigid disc of radius `0.5 * radius_m`. Not real-time.
     #[must_use]
     pub fn mesh_error(&self, radius_m: f64, places_m: &[[f64; 2]]) -> f64 {
         let nu = self.solid.poisson_ratio;

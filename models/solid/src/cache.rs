@@ -12,7 +12,7 @@ use std::sync::{Mutex, PoisonError};
 /// Magic bytes of a file. Raise the version when the same description would give other numbers.
 const MAGIC: &[u8; 16] = b"flotor-solid 02\n";
 
-/// Returns the `FNV-1a` hash over 64 bits: detects damage, not tampering.
+/// Returns the 64-bit FNV-1a hash of some bytes: detects damage, not tampering.
 pub(crate) fn digest(bytes: &[u8]) -> u64 {
     bytes
         .iter()
@@ -71,7 +71,7 @@ fn kept(description: &str) -> Option<Vec<f64>> {
     latest.iter().find(|(other, _)| other == description).map(|(_, numbers)| numbers.clone())
 }
 
-/// Returns the numbers of a description; `None` if they are not cached, or damaged. Not real-time.
+/// Returns the numbers of a description from memory or disk; `None` if they are not cached, unreadable or damaged. Not real-time.
 #[must_use]
 pub fn load(description: &str) -> Option<Vec<f64>> {
     if let Some(numbers) = kept(description) {
@@ -80,7 +80,7 @@ pub fn load(description: &str) -> Option<Vec<f64>> {
     decode(description, &fs::read(file(description)?).ok()?)
 }
 
-/// Stores numbers in memory and on disk. Ignores a failure: the next start prepares again. Not real-time.
+/// Stores the numbers of a description in memory and on disk. Ignores a failure: the next start prepares again. Not real-time.
 pub fn store(description: &str, numbers: &[f64]) {
     keep(description, numbers);
     let Some(path) = file(description) else { return };

@@ -93,8 +93,8 @@ impl Kind {
         nodes
     }
 
-    /// Returns the shape functions of all nodes at a point of the reference element, with their gradients there. The
-    /// corners of the tetrahedron are the origin and the unit points, the brick is -1..1.
+    /// Returns the shape functions of all nodes at a point of the reference element, with their gradients. The corners of the
+    /// reference tetrahedron are the origin and the unit points; the reference brick extends over -1..1 along each axis.
     #[must_use]
     pub fn shapes(self, at: [f64; 3]) -> Vec<(f64, [f64; 3])> {
         match self {
@@ -195,7 +195,7 @@ impl Geometry<'_> {
         (slopes, determinant)
     }
 
-    /// Returns the stiffness matrix, N/m: column-major, three degrees of freedom per node.
+    /// Returns the stiffness matrix of the element, N/m: column-major, three degrees of freedom per node.
     #[must_use]
     pub fn stiffness(&self, lame: Lame) -> Vec<f64> {
         let count = self.kind.nodes();
@@ -223,8 +223,8 @@ impl Geometry<'_> {
     }
 }
 
-/// Returns the shape functions of a face (3 corners or 4, then the middles of its edges) with their gradients. The
-/// corners of a triangle are the origin and the unit points, a square is -1..1.
+/// Returns the shape functions of a face (3 corners or 4, then the middles of its edges) with their gradients, at a point of the
+/// reference face. The corners of the triangle are the origin and the unit points; the square extends over -1..1.
 #[must_use]
 pub fn face_shapes(corners: usize, at: [f64; 2]) -> Vec<(f64, [f64; 2])> {
     let [x, y] = at;
@@ -258,7 +258,7 @@ pub fn face_shapes(corners: usize, at: [f64; 2]) -> Vec<(f64, [f64; 2])> {
     signs.into_iter().map(corner).chain((0..4).map(middle)).collect()
 }
 
-/// Returns quadrature points of a face, in four parts to resolve the peaks of nearby forces.
+/// Returns the quadrature points of a reference face with 3 or 4 corners, in four parts to resolve the peaks of nearby forces.
 #[must_use]
 pub fn face_rule(corners: usize) -> Vec<Point<2>> {
     let line = gauss(4);

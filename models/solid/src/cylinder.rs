@@ -11,7 +11,7 @@ impl Mesh {
     /// follow the rim; in the middle there is a square of `m` times `m` bricks. Lengths in m. Not real-time.
     ///
     /// # Errors
-    /// [`MeshError::Inverted`] if the numbers do not describe a cylinder.
+    /// [`MeshError::Inverted`] if the numbers do not describe a cylinder, [`MeshError::Extent`] for a side of more than 10 m.
     pub fn cylinder(radius_m: f64, height_m: f64, m: usize) -> Result<Self, MeshError> {
         let half = 0.45 * radius_m;
         // Positions are indexed by twice their number, so that middles of edges have whole indices too.
@@ -83,7 +83,7 @@ struct Gatherer {
 }
 
 impl Gatherer {
-    /// Adds one brick; `place` maps the coordinates of its reference nodes to positions, m.
+    /// Adds one brick, with its new nodes; `place` maps the coordinates of its reference nodes to positions, m.
     fn brick(&mut self, place: &dyn Fn([f64; 3]) -> [f64; 3]) {
         let corners = Kind::Brick.corner_places();
         let mut places = corners.clone();

@@ -1,4 +1,4 @@
-//! Solid with its tool, from the parameters: valid combinations.
+//! Description of a solid and its tool, from the parameters, and check of the combination.
 
 use crate::parameters::{BodyChoice, ToolChoice, bond, resolution};
 use crate::plate::PlateBox;
@@ -64,7 +64,7 @@ pub enum Tool {
 }
 
 impl Body {
-    /// Returns the elements under a plate on a body of boxes; `None` for another body.
+    /// Returns the elements under a plate on a block or a beam; `None` for another body.
     pub(crate) fn plate_box(self) -> Option<PlateBox> {
         match self {
             Self::Beam { size_m: [x, y, z] } => Some(PlateBox {
@@ -96,7 +96,8 @@ pub struct Description {
 }
 
 impl Description {
-    /// Reads the parameters. `value`: current value by id; `mesh_digest`: hash of the mesh's text and names. Not real-time.
+    /// Reads and checks the parameters. `value`: current value by id; `mesh_digest`: hash of the mesh's text and names. Not
+    /// real-time.
     ///
     /// # Errors
     /// A [`Refusal`] for a combination that is invalid or not supported.

@@ -18,11 +18,11 @@ pub trait Assembly {
     fn nodes(&self, element: usize) -> Vec<usize>;
     /// Returns the stiffness matrix of an element, N/m: column-major, three degrees of freedom per node.
     fn stiffness(&self, element: usize) -> Vec<f64>;
-    /// Divides a set of two or more elements into two parts.
+    /// Divides a set of two or more elements into two parts, neither of them empty.
     fn halves(&self, elements: Vec<usize>) -> [Vec<usize>; 2];
 }
 
-/// Stiffness of a grid of one material.
+/// Stiffness of a grid of one material, as an [`Assembly`].
 #[derive(Clone, Debug)]
 pub struct GridStiffness<'a> {
     grid: &'a Grid,
@@ -103,7 +103,7 @@ pub struct Stiffness {
     fixed: Vec<[bool; 3]>,
 }
 
-/// Stiffness of some elements, condensed to their border.
+/// Stiffness of some elements, condensed to their border (Schur complement).
 struct Rest {
     unknowns: Vec<u32>,
     /// Lower triangle, column-major.
@@ -116,13 +116,13 @@ struct Builder<'a, A> {
     fronts: Vec<Front>,
     /// Position of an unknown in the front that is being built.
     place: Vec<u32>,
-    /// Number of elements around a node, in all and in the part that is being built.
+    /// Number of elements around each node: in the whole body, and in the part that is being built.
     around: Vec<u32>,
     inside: Vec<u32>,
 }
 
 impl Stiffness {
-    /// Assembles and factorises the stiffness matrix. `fixed`: prescribed components of each node. Not real-time.
+    /// Assembles and factorises the stiffness matrix. `fixed`: for each node, true for each prescribed component. Not real-time.
     ///
     /// # Errors
     /// [`NotPositive`] if the body can move as a rigid body, or the material is not elastic.

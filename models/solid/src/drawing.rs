@@ -23,15 +23,15 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Order of the elements in the picture of a plate.
 const ORDER: usize = 2;
-/// Bricks of a cylinder along a side of the square in its middle.
+/// Number of bricks of a cylinder along a side of the square in its middle.
 const BRICKS: usize = 6;
-/// Cells of a punch from its middle to its rim.
+/// Number of cells of a punch from its middle to its rim.
 const FINENESS: usize = 6;
-/// Steps of a block's surface along x, y, z: about 5 000 triangles.
+/// Numbers of steps of a block's surface along x, y, z: about 5 000 triangles.
 const STEPS: [usize; 3] = [32, 32, 11];
-/// Steps of a block's surface while a side is touched.
+/// Numbers of steps of a block's surface while a side is touched.
 const SIDE_STEPS: [usize; 3] = [20, 20, 28];
-/// Radius of the drawn piece of a half-space, in radii of the tool.
+/// Radius of the drawn part of a half-space, in radii of the tool.
 const HALF_SPACE_RADII: f64 = 5.0;
 /// Thickness of a plate and height of a punch, relative to half the shortest side.
 const THICKNESS: f64 = 0.3;
@@ -47,16 +47,16 @@ struct Modal {
     displacement: Vec<[DVec3; MODES]>,
     /// Pressure by corner, Pa for a mode of one; if empty, the displacement is shown.
     pressure: Vec<[f64; MODES]>,
-    /// Form and half sides of the tool, m.
+    /// Form and half-extents of the tool, m.
     tool: (Form, [f64; 3]),
     /// Vector from the handle to the tool's centre, m.
     tool_centre_m: DVec3,
 }
 
-/// Method of drawing a solid.
+/// Drawn fields of a solid, by kind of tool.
 #[derive(Clone, Debug)]
 enum Look {
-    /// Modes of a plate or a punch.
+    /// Plate or punch, with the fields of its modes.
     Bonded(Box<Modal>),
     /// Contact with spheres; `Some`: the surface of a mesh.
     Sphere(Option<Skin>),
@@ -115,7 +115,7 @@ impl Drawing {
         self.under(&[contact], focus, atlas.radius_m)
     }
 
-    /// Draws the solid under several spheres; the surface sinks as under all of them together.
+    /// Draws the solid under several spheres; the displacement of the surface is the sum of those of all contacts.
     pub fn spheres(&mut self, spheres: &Spheres, answer: &several::Answer, modulus_pa: f64) -> &Shape {
         let atlas = &spheres.atlas;
         let contacts: Vec<Contact> = (0..spheres.count())
@@ -134,7 +134,7 @@ impl Drawing {
         self.under(&contacts, Focus { at_m: middle_m, width_m: away_m }, away_m + atlas.radius_m)
     }
 
-    /// Draws the solid under contacts, with a surface that is fine at `focus`; `tool_m`: reach of the tool from there.
+    /// Draws the solid under contacts, with a surface that is fine at `focus`; `tool_m`: extent of the tool from the focus.
     fn under(&mut self, contacts: &[Contact], focus: Focus, tool_m: f64) -> &Shape {
         let own;
         let skin = match (&self.look, self.body) {
@@ -257,7 +257,8 @@ impl Contact {
         if part > 0.0 && is_on_face { self.peak_kpa * part.sqrt() } else { 0.0 }
     }
 
-    /// Returns the depression of the surface at a distance from the middle: the sphere's inside the contact, Hertz's outside.
+    /// Returns the depression of the surface at a distance from the middle, m: the sphere's shape inside the contact, Hertz's
+    /// solution outside.
     fn depression_m(&self, distance_m: f64) -> f64 {
         if self.radius_m == 0.0 {
             return 0.0;
@@ -271,7 +272,7 @@ impl Contact {
     }
 }
 
-/// Returns the contact radius of a sphere at a depth, m: Hertz's, reduced at large depth, where a sphere is no paraboloid.
+/// Returns the contact radius of a sphere at a depth, m: Hertz's radius, reduced at large depth, where a sphere is no paraboloid.
 fn contact_radius_m(sphere_m: f64, depth_m: f64) -> f64 {
     (sphere_m * depth_m).sqrt() / (1.0 + 0.12 * depth_m / sphere_m)
 }

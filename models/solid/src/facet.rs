@@ -47,7 +47,7 @@ impl Facet {
             .collect()
     }
 
-    /// Returns false if a point, given by its x and y, is clearly outside. Not real-time.
+    /// Returns false if the point at x and y `at_m` lies clearly outside the facet. Not real-time.
     #[must_use]
     pub fn may_hold(&self, nodes_m: &[[f64; 3]], at_m: [f64; 2]) -> bool {
         (0..2).all(|k| {
@@ -58,8 +58,8 @@ impl Facet {
         })
     }
 
-    /// Finds a point given by its x and y. Returns the weights of the nodes, and the distance outside the facet (0:
-    /// inside) in the reference coordinates of the facet. Not real-time.
+    /// Finds the point at x and y `at_m` on the facet, by Newton's method. Returns the weights of the nodes, and the distance
+    /// outside the facet (0: inside) in the reference coordinates of the facet. Not real-time.
     #[must_use]
     pub fn locate(&self, nodes_m: &[[f64; 3]], at_m: [f64; 2]) -> (Vec<f64>, f64) {
         let mut at = if self.corners == 3 { [1.0 / 3.0; 2] } else { [0.0; 2] };

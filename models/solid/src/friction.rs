@@ -1,7 +1,7 @@
-//! Coulomb friction of a sphere: a slider behind a spring along the face, as in the wall.
+//! Coulomb friction of a sphere: a spring and a slider in series along the face, as in the wall.
 //!
-//! The spring's stiffness is constant: that of a sticking contact of a quarter of the sphere's radius. Its plane is constant
-//! too while a contact lasts. So the spring's force has a potential, and the slider only ever dissipates energy.
+//! The spring has the constant stiffness of a sticking contact with a quarter of the sphere's radius. Its plane is constant
+//! while a contact lasts. So the spring's force has a potential, and the slider only dissipates energy.
 
 use flotor_hal::DVec3;
 
@@ -23,7 +23,7 @@ struct Slider {
 }
 
 impl Friction {
-    /// Prepares the friction between a sphere and a solid. Not real-time.
+    /// Prepares the friction between a sphere and a solid, without contact. Not real-time.
     #[must_use]
     pub fn new(coefficient: f64, poisson_ratio: f64, radius_m: f64) -> Self {
         // A bonded disc of radius a moves by Q (2 - nu) / (8 G a): Mindlin 1949, J. Appl. Mech. 16, 259-268.
@@ -43,8 +43,8 @@ impl Friction {
         self.contact = None;
     }
 
-    /// Moves the slider with the handle. Returns the force along the face, N, and the spring's energy, J, under the
-    /// force `pressing_n` of the smooth contact on the sphere. Real-time: bounded, no allocation.
+    /// Moves the slider for a handle at `position_m` under the force `pressing_n` of the smooth contact on the sphere; a zero force
+    /// ends the contact. Returns the force along the face, N, and the spring's energy, J. Real-time: bounded, no allocation.
     pub fn follow(&mut self, position_m: DVec3, pressing_n: DVec3, modulus_pa: f64) -> (DVec3, f64) {
         if self.is_smooth() {
             return (DVec3::ZERO, 0.0);

@@ -47,7 +47,7 @@ impl<'a> Lines<'a> {
     fn words(&mut self) -> Result<Words<'a>, FormatError> {
         match self.next() {
             Some(text) => Ok(Words { words: text.split_ascii_whitespace(), line: self.line }),
-            None => self.fail("the file ends here, in the middle of a section"),
+            None => self.fail("the file ends here, in the middle of a section; export the mesh again"),
         }
     }
 }
@@ -64,8 +64,8 @@ impl Words<'_> {
         word.and_then(|word| word.parse().ok()).ok_or_else(|| FormatError {
             line: self.line,
             problem: match word {
-                Some(word) => format!("a number is expected instead of `{word}`"),
-                None => "a number is missing".to_owned(),
+                Some(word) => format!("a number is expected instead of `{word}`; export the mesh again"),
+                None => "a number is missing; export the mesh again".to_owned(),
             },
         })
     }
@@ -79,7 +79,7 @@ impl Words<'_> {
         let count: usize = self.number()?;
         if others.saturating_add(count) > MOST {
             let problem = format!(
-                "{count} entries are too many, at most {MOST} of a kind are solved: use a coarser mesh"
+                "{count} more entries are too many, a mesh may have at most {MOST} of a kind: use a coarser mesh"
             );
             return Err(FormatError { line: self.line, problem });
         }
@@ -103,10 +103,11 @@ struct Reader {
     has_format: bool,
 }
 
-/// Reads a mesh; coordinates in metres.
+/// Parses the text of a mesh file; coordinates in metres.
 ///
 /// # Errors
-/// A [`FormatError`] with the line number.
+/// A [`FormatError`] with the line number: another format, a malformed section, an element of another kind or with an unknown
+/// node, or more nodes or elements than 40 000.
 pub fn read(text: &str) -> Result<Parts, FormatError> {
     let mut lines = Lines { all: text.lines().enumerate(), line: 1 };
     let mut reader = Reader::default();
@@ -115,10 +116,12 @@ pub fn read(text: &str) -> Result<Parts, FormatError> {
             if line.is_empty() {
                 continue;
             }
-            return lines.fail("a section is expected here: this is not a Gmsh mesh (format 4.1, text)");
+            return lines.fail(
+                "a section is expected here: this is not a Gmsh mesh; export the mesh in Gmsh format 4.1, as text",
+            );
         };
         if !reader.has_format && section != "MeshFormat" && section != "Comments" {
-            return lines.fail("`$MeshFormat` is missing before this section");
+            return lines.fail("`$MeshFormat` is missing before this section; export the mesh again");
         }
         match section {
             "MeshFormat" => reader.format(&mut lines)?,
@@ -134,15 +137,15 @@ pub fn read(text: &str) -> Result<Parts, FormatError> {
             match lines.next() {
                 Some(line) if line == end => break,
                 Some(line) if is_known && !line.is_empty() => {
-                    return lines.fail(format!("`{end}` is expected here"));
+                    return lines.fail(format!("`{end}` is expected here; export the mesh again"));
                 }
                 Some(_) => {}
-                None => return lines.fail(format!("the file ends without `{end}`")),
+                None => return lines.fail(format!("the file ends without `{end}`; export the mesh again")),
             }
         }
     }
     if !reader.has_format {
-        return lines.fail("not a Gmsh mesh: there is no `$MeshFormat`");
+        return lines.fail("`$MeshFormat` is missing; export the mesh in Gmsh format 4.1, as text");
     }
     Ok(reader.parts)
 }

@@ -5,12 +5,12 @@
 
 use crate::basis::{Rule, element_points, gauss, lagrange, lagrange_slopes};
 
-/// Axis of a grid.
+/// Element borders and nodes along an axis of a grid.
 #[derive(Clone, Debug)]
 pub struct Axis {
     /// Borders of the elements, m, ascending.
     pub borders_m: Vec<f64>,
-    /// Positions of all nodes, m; `order` per element and one more.
+    /// Positions of all nodes, m, ascending; `order` nodes per element and one more.
     pub nodes_m: Vec<f64>,
 }
 
@@ -44,8 +44,8 @@ impl Axis {
     }
 }
 
-/// Returns the borders of elements from `near` to `far`; each element is longer than the one before by the factor
-/// `ratio`.
+/// Returns the borders of elements between `near` and `far`, ascending; from `near` on, each element is longer than the element
+/// before by the factor `ratio`.
 #[must_use]
 pub fn graded(near: f64, far: f64, elements: usize, ratio: f64) -> Vec<f64> {
     let mut step = 1.0;
@@ -63,7 +63,7 @@ pub fn graded(near: f64, far: f64, elements: usize, ratio: f64) -> Vec<f64> {
     borders
 }
 
-/// Block of elements. Nodes are numbered x first, then y, then z.
+/// Block of box-shaped elements. Nodes are numbered x first, then y, then z.
 #[derive(Clone, Debug)]
 pub struct Grid {
     /// Order of the elements.
@@ -75,14 +75,14 @@ pub struct Grid {
 /// Lamé's constants of a material, Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lame {
-    /// First constant.
+    /// Lamé's first constant, Pa.
     pub lambda_pa: f64,
-    /// Shear modulus.
+    /// Shear modulus, Pa.
     pub mu_pa: f64,
 }
 
 impl Lame {
-    /// Converts from Young's modulus and Poisson's ratio (below 0.5).
+    /// Computes the constants from Young's modulus and Poisson's ratio (below 0.5).
     #[must_use]
     pub fn new(youngs_modulus_pa: f64, poisson_ratio: f64) -> Self {
         Self {
@@ -115,7 +115,7 @@ impl Grid {
         [0, 1, 2].map(|axis| self.axes[axis].nodes_m.len())
     }
 
-    /// Returns the number of all nodes.
+    /// Returns the total number of nodes.
     #[must_use]
     pub fn node_count(&self) -> usize {
         self.nodes_along().iter().product()
@@ -161,7 +161,8 @@ impl Grid {
         nodes
     }
 
-    /// Evaluates the shape functions at a point of the block. Not real-time.
+    /// Returns the nodes of the element at a point, with their shape functions; a point outside is moved to the block. Not
+    /// real-time.
     #[must_use]
     pub fn sample(&self, position_m: [f64; 3]) -> Sample {
         let points = element_points(self.order);
@@ -196,7 +197,7 @@ pub struct Elements {
 }
 
 impl Elements {
-    /// Computes the integrals for an order. Not real-time.
+    /// Computes the integrals for elements of this order. Not real-time.
     #[must_use]
     pub fn new(order: usize) -> Self {
         let side = order + 1;

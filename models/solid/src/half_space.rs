@@ -2,8 +2,8 @@
 //!
 //! Frame: `p` and `q` along the surface, `w` out of it; the solid is `w < 0`. Point forces are those of Boussinesq
 //! (along `w`) and Cerruti (along the surface); K. L. Johnson, *Contact Mechanics* (1985), sections 3.2 and 3.6. At the
-//! surface all are of degree -1 in the distance, so that a uniform load on a polygon has a closed form along its edges:
-//! in polar coordinates about the evaluation point, `int k(angle) / r dA = contour integral of k r d(angle)`.
+//! surface all displacements are inversely proportional to the distance, so a uniform load on a polygon has a closed form along
+//! its edges: in polar coordinates about the evaluation point, `int k(angle) / r dA = contour integral of k r d(angle)`.
 
 use crate::jet::Jet;
 use flotor_hal::math;
@@ -18,7 +18,7 @@ pub struct HalfSpace {
     pub poisson_ratio: f64,
 }
 
-/// Displacement under three unit forces, with its gradient.
+/// Displacement at a point under a unit force along each direction, with its gradient.
 #[derive(Clone, Copy, Debug)]
 pub struct Field {
     /// Displacement along `p`, `q`, `w` (first index) under a unit force along `p`, `q`, `w` (second), m/N; each with
@@ -26,7 +26,7 @@ pub struct Field {
     pub displacement: [[Jet; 3]; 3],
 }
 
-/// Three-by-three matrix; first index displacement, second force.
+/// Compliance between two points, m/N: first index direction of the displacement, second index direction of the force.
 pub type Block = [[f64; 3]; 3];
 
 impl HalfSpace {
@@ -34,7 +34,7 @@ impl HalfSpace {
         self.youngs_modulus_pa / (2.0 * (1.0 + self.poisson_ratio))
     }
 
-    /// Returns the displacement field of unit forces at the origin, evaluated at another point of the solid.
+    /// Returns the displacement, with its gradient, at a point of the solid other than the origin, under unit forces at the origin.
     #[must_use]
     pub fn field(&self, point_m: [f64; 3]) -> Field {
         let nu = self.poisson_ratio;

@@ -19,7 +19,7 @@ use crate::table::Table;
 use crate::tetrahedra;
 use flotor_hal::Refusal;
 
-/// Law evaluated in a tick, for a Young's modulus of 1 Pa.
+/// Force law evaluated in a tick, for a Young's modulus of 1 Pa.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Law {
     /// Law of a punch or a plate.
@@ -30,9 +30,9 @@ pub enum Law {
     Spheres(Box<Spheres>),
 }
 
-/// Prepared law and the estimated error of its mesh, or the reason of a failure.
+/// Prepared law with the estimated error of its mesh, or the reason for the failure.
 type Prepares = Result<(Law, f64), Refusal>;
-/// Cached numbers of a law.
+/// Cached numbers of a law, or the reason for the failure of their computation.
 type Numbers = Result<Vec<f64>, Refusal>;
 
 impl Description {
@@ -42,11 +42,11 @@ impl Description {
         format!("{self:?}")
     }
 
-    /// Loads the law from the cache or solves for it; returns also the estimated error of its mesh. `mesh`: that of
+    /// Loads the law from the cache, or solves for it and caches it; also returns the estimated error of its mesh. `mesh`: mesh of
     /// [`Body::File`]. Not real-time: up to some seconds, for a large mesh a minute.
     ///
     /// # Errors
-    /// A [`Refusal`] if no solution exists for these numbers.
+    /// A [`Refusal`] if no solution exists for these numbers, the mesh is missing, or the tool does not fit the body.
     pub fn prepare(&self, mesh: Option<&Mesh>) -> Result<(Law, f64), Refusal> {
         if let Tool::Spheres { .. } = self.tool {
             return self.spheres(&|one| one.prepare(None), &|words, solve| match cache::load(words) {
@@ -121,10 +121,11 @@ impl Description {
         Some((Law::Bonded(Box::new(RigidPatch { stiffness })), mesh_error))
     }
 
-    /// Solves for the law without the cache; returns also the estimated error of its mesh. Not real-time: up to some seconds.
+    /// Solves for the law without the cache; also returns the estimated error of its mesh. Not real-time: up to some seconds.
     ///
     /// # Errors
-    /// A [`Refusal`] if no solution exists for these numbers, or a mesh is needed: see [`Self::solve_on`].
+    /// A [`Refusal`] if no solution exists for these numbers, the tool does not fit the body, or the body is a mesh from a file:
+    /// see [`Self::solve_on`].
     pub fn solve(&self) -> Result<(Law, f64), Refusal> {
         let Self { body, tool, poisson_ratio, resolution } = *self;
         let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
@@ -162,7 +163,7 @@ impl Description {
         Ok((Law::Bonded(Box::new(patch)), mesh_error))
     }
 
-    /// Solves for the law on a mesh; returns also the estimated error of the mesh. Not real-time.
+    /// Solves for the law on a mesh; also returns the estimated error of the mesh. Not real-time.
     ///
     /// # Errors
     /// A [`Refusal`] if no solution exists for these numbers, or the tool does not fit the touched face.

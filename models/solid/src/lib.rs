@@ -1,7 +1,7 @@
 //! Elastic solid, touched with a sphere, a punch or a plate.
 //!
-//! Linear elasticity, small strains, with the exact rotation of the tool. Everything slow is solved before the loop and
-//! cached; a tick evaluates one energy and its gradient.
+//! Linear elasticity, small strains, with the exact rotation of the tool. All systems of equations are solved before the loop
+//! and cached; a tick evaluates one energy and its gradient.
 //!
 //! - [`basis`], [`grid`], [`dissection`], [`dense`]: finite elements of any order on a block, and their sparse Cholesky
 //!   factorisation with one order of sums.
@@ -9,9 +9,9 @@
 //! - [`remainder`], [`table`]: difference between a block and a half-space, by finite elements.
 //! - [`gmsh`], [`cylinder`], [`mesh`], [`cells`], [`facet`]: bodies of any shape, their elements and surface; [`body`]:
 //!   difference between such a body and a half-space; [`recovery`]: error estimate of a mesh.
-//! - [`sphere`]: contact of a sphere in contact space. [`punch`], [`plate`]: rigid patches bonded to a surface.
+//! - [`sphere`]: contact solver of a sphere. [`punch`], [`plate`]: rigid patches bonded to a surface.
 //! - [`description`], [`prepare`], [`law`], [`cache`]: from a description to a law.
-//! - [`atlas`], [`several`], [`rigid`], [`friction`]: the laws, as a tick evaluates them; [`jet`], [`spline`] under them.
+//! - [`atlas`], [`several`], [`rigid`], [`friction`]: laws evaluated in a tick, with the numerics of [`jet`] and [`spline`].
 //! - [`drawing`], [`skin`]: pictures of the deformed solid.
 //! - [`tetrahedra`]: linear elements, for comparison.
 //! - `parameters`: schema; `plugin`: the contract.

@@ -11,7 +11,7 @@ use std::fmt;
 pub struct Element {
     /// Kind of the element.
     pub kind: Kind,
-    /// Nodes, in the order of [`Kind`].
+    /// Indices of the nodes, in the order of [`Kind`].
     pub nodes: Vec<usize>,
     /// Number of the element in the file.
     pub tag: usize,
@@ -22,24 +22,24 @@ pub struct Element {
 pub struct Facet {
     /// Number of corners, three or four.
     pub corners: usize,
-    /// Corners, counterclockwise seen from outside, then the middles of the edges.
+    /// Indices of the nodes: corners, counterclockwise seen from outside, then the middles of the edges.
     pub nodes: Vec<usize>,
 }
 
-/// Unchecked contents of a mesh.
+/// Contents of a mesh before validation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Parts {
     /// Positions of the nodes, m.
     pub nodes_m: Vec<[f64; 3]>,
     /// Volume elements.
     pub elements: Vec<Element>,
-    /// Corners of the named faces, by name.
+    /// Corners of the faces of each named surface, by name.
     pub surfaces: BTreeMap<String, Vec<Vec<usize>>>,
     /// Corners of all faces in the file.
     pub faces: Vec<Vec<usize>>,
 }
 
-/// Checked body; the origin is the middle of the touched face.
+/// Validated mesh of a body; the origin is the middle of the touched face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh {
     /// Positions of the nodes, m.
@@ -69,7 +69,7 @@ pub enum MeshError {
         /// Smallest Jacobian determinant of the element, m³.
         jacobian_m3: f64,
     },
-    /// Three elements share a face, or a face of four corners meets two of three.
+    /// Three elements share a face, or a face of four corners meets two faces of three corners.
     Overlap {
         /// Number of one of the elements.
         tag: usize,
@@ -88,7 +88,7 @@ pub enum MeshError {
         /// Names in the file.
         names: Vec<String>,
     },
-    /// A named face is not on the outer surface: elements are missing or superfluous there.
+    /// A face of a named surface is not on the outer surface of the elements.
     NotOnSurface {
         /// Name of the surface.
         name: String,
@@ -102,7 +102,7 @@ pub enum MeshError {
     },
     /// The fixed and the touched surface share nodes.
     Shared,
-    /// Coordinates are not metres, or not numbers.
+    /// The longest side is zero or above 10 m, or a coordinate is not finite.
     Extent {
         /// Longest side, m.
         extent_m: f64,
@@ -161,18 +161,26 @@ impl fmt::Display for MeshError {
             }
             Self::NotOnSurface { name, at_m } => write!(
                 f,
-                "the surface \"{name}\" is open: at {} the surface is not on the border of the elements; add the missing elements, or choose a surface on the border",
+                "the surface \"{name}\" is not on the border of the elements at {}; add the missing elements, or \
+                 choose a surface on the border",
                 mm(at_m)
             ),
             Self::Loose { tag } => {
-                write!(f, "element {tag} is connected to no fixed face: fix every part of the body")
+                write!(
+                    f,
+                    "element {tag} is not connected to the fixed face; join this part of the body to the rest, or add \
+                     a face of the part to the surface of `fixed_face`"
+                )
             }
             Self::Shared => {
-                write!(f, "the fixed and the touched face share nodes: leave a gap between them")
+                write!(
+                    f,
+                    "the surfaces of `fixed_face` and `touched_face` share nodes: leave a gap between the surfaces"
+                )
             }
             Self::Extent { extent_m } => write!(
                 f,
-                "the mesh is {extent_m} m long, but a body may be at most 10 m long: coordinates are in \
+                "the longest side of the mesh is {extent_m} m, but must be above 0 and at most 10 m: coordinates are in \
                  metres (`Mesh.ScalingFactor = 0.001` turns millimetres into metres)"
             ),
         }
@@ -189,7 +197,7 @@ fn sorted(corners: &[usize]) -> Vec<usize> {
     key
 }
 
-/// Returns the middle of an edge that an odd number of faces share.
+/// Returns the middle of an edge that an odd number of faces share, m; `None` for a closed surface.
 fn open_edge(nodes_m: &[[f64; 3]], faces: &[Vec<usize>]) -> Option<[f64; 3]> {
     let mut edges: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
     for face in faces {
@@ -201,7 +209,8 @@ fn open_edge(nodes_m: &[[f64; 3]], faces: &[Vec<usize>]) -> Option<[f64; 3]> {
 }
 
 impl Mesh {
-    /// Builds and checks a body; the names select the fixed and the touched surface. Not real-time.
+    /// Validates a mesh and moves the origin to the middle of the touched surface; the names select the fixed and the touched
+    /// surface. Not real-time.
     ///
     /// # Errors
     /// A [`MeshError`] that names the place and the remedy.
@@ -352,12 +361,12 @@ fn check_held(elements: &[Element], fixed: &[bool]) -> Result<(), MeshError> {
         .map_or(Ok(()), |index| Err(MeshError::Loose { tag: elements[index].tag }))
 }
 
-/// Stiffness of a mesh of one material, for [`crate::dissection`].
+/// Stiffness of a mesh of one material, as an [`Assembly`].
 #[derive(Clone, Copy, Debug)]
 pub struct MeshStiffness<'a> {
-    /// Body.
+    /// Mesh of the body.
     pub mesh: &'a Mesh,
-    /// Material.
+    /// Lamé's constants of the material.
     pub lame: Lame,
 }
 

@@ -5,20 +5,21 @@ use crate::dissection::{Assembly, GridStiffness, Stiffness, subtract_forces};
 use crate::grid::{Grid, Lame, graded};
 use crate::rigid::{MODES, RigidPatch};
 
-/// Boxes under a plate: the upper face of an axis is touched, the lower one clamped.
+/// Box-shaped body under a plate: the upper end of one axis is touched, the lower end clamped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PlateBox {
     /// Lower and upper end of each axis, m.
     pub(crate) ends_m: [[f64; 2]; 3],
+    /// Axis normal to the touched face.
     pub(crate) axis: usize,
-    /// Elements along half of each axis, finer towards both ends.
+    /// Number of elements along half of each axis, finer towards both ends.
     pub(crate) halves: [usize; 3],
-    /// Even cells along each axis, for linear tetrahedra.
+    /// Number of uniform cells along each axis, for linear tetrahedra.
     pub(crate) cells: [usize; 3],
 }
 
 impl PlateBox {
-    /// Returns the grid of an order.
+    /// Returns the grid with elements of this order.
     pub(crate) fn grid(&self, order: usize) -> Grid {
         let borders = [0, 1, 2].map(|k| {
             let ([near, far], half) = (self.ends_m[k], self.halves[k]);
@@ -30,7 +31,8 @@ impl PlateBox {
         Grid::new(borders, order)
     }
 
-    /// Solves with two element orders on one grid; returns the better result, and its [`difference`]. Not real-time.
+    /// Solves with elements of `order` and of one order less; returns the first result, and its [`difference`] from the second. Not
+    /// real-time.
     pub(crate) fn solve(&self, lame: Lame, order: usize) -> Result<(RigidPatch, f64), NotPositive> {
         let solve = |order| plate(&self.grid(order), lame, self.axis);
         let ((fine, _), (coarse, _)) = (solve(order)?, solve(order - 1)?);
@@ -39,7 +41,7 @@ impl PlateBox {
     }
 }
 
-/// Returns the largest relative difference of a stiffness from a better one.
+/// Returns the largest relative difference of the diagonal of a stiffness matrix from that of a finer solution.
 pub(crate) fn difference(coarse: &RigidPatch, fine: &RigidPatch) -> f64 {
     (0..MODES)
         .filter(|&i| fine.stiffness[i][i] > 0.0)
@@ -47,8 +49,8 @@ pub(crate) fn difference(coarse: &RigidPatch, fine: &RigidPatch) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Solves for a plate on the upper face of an axis, with the face at the lower end clamped; returns also the
-/// displacement of all nodes under each mode. `X` is relative to the face's centre. Not real-time.
+/// Solves for a plate on the face at the upper end of `axis`, with the face at the lower end clamped; also returns the
+/// displacement of all nodes under each mode. `X` of [`RigidPatch`] is relative to the centre of the touched face. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.
@@ -82,8 +84,8 @@ pub enum Hold {
     Plate([f64; 3]),
 }
 
-/// Solves for a plate bonded to some nodes of any body; returns also the displacement of all nodes under each mode. Not
-/// real-time.
+/// Solves for a plate bonded to some nodes of any body; also returns the displacement of all nodes under each mode. `hold`:
+/// support of each node. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.
@@ -120,7 +122,7 @@ pub fn plate_on(
     Ok((RigidPatch { stiffness: symmetric(&matrix) }, displacement))
 }
 
-/// Returns the symmetric part of a stiffness: reciprocity holds for the exact matrix.
+/// Returns the symmetric part of a stiffness matrix: by reciprocity the exact matrix is symmetric.
 #[must_use]
 pub fn symmetric(matrix: &[[f64; MODES]; MODES]) -> [[f64; MODES]; MODES] {
     let mut result = *matrix;

@@ -84,7 +84,7 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     Ok(Some((mesh, cache::digest(&named))))
 }
 
-/// Returns the status of several spheres: too deep has priority over unconverged, and that over a nearby position.
+/// Returns the status of several spheres. `Clamped` (too deep) has priority over `NotConverged`, and this over `OutOfDomain`.
 fn worse(status: StepStatus, answer: &several::Answer, is_too_deep: bool) -> StepStatus {
     if status != StepStatus::Ok {
         status
@@ -244,7 +244,7 @@ impl ShapeModel for Solid {
 }
 
 impl VariantModel for Solid {
-    /// Reports path-dependent memory with friction, else none.
+    /// Returns path-dependent memory for a coefficient of friction above zero, else a stateless law.
     fn variant_info(&self) -> VariantInfo {
         let memory = if self.friction[0].is_smooth() { Memory::Stateless } else { Memory::PathDependent };
         VariantInfo::new(Demand::ALL, memory)

@@ -43,9 +43,9 @@ const CYLINDER_ENDS: [[End; 2]; 3] = [[End::Level, End::Parabola], [End::Parabol
 pub struct Resolution {
     /// Order of the elements.
     pub order: usize,
-    /// Cells of a contact from its middle to its rim.
+    /// Number of cells of a contact from its middle to its rim.
     pub rings: i32,
-    /// Bricks along a side of the square in the middle of a cylinder.
+    /// Number of bricks along a side of the square in the middle of a cylinder.
     pub bricks: usize,
 }
 
@@ -57,7 +57,7 @@ impl Resolution {
     /// Slowest preparation, smallest error.
     pub const FINE: Self = Self { order: 4, rings: 8, bricks: 8 };
 
-    /// Returns numbers and order of the elements for the remainder.
+    /// Returns numbers and order of the elements for the remainder of a block.
     #[must_use]
     pub fn fineness(self) -> Fineness {
         Fineness { across: 4, high: 5, order: self.order }
@@ -69,11 +69,13 @@ impl Resolution {
 pub struct Prepared {
     /// Law for a Young's modulus of 1 Pa.
     pub atlas: Atlas,
-    /// Estimated relative error of the stiffness due to the elements, from a comparison of two grids.
+    /// Estimated relative error of the stiffness due to the elements: for a block from two grids, for a mesh from
+    /// [`crate::recovery`], zero for a half-space.
     pub mesh_error: f64,
 }
 
-/// Returns the cell size at which the contact fills about four fifths of the patch, m: Hertz's radius, less at large depth.
+/// Returns the cell size at which the contact fills about four fifths of the patch, m. The radius of the contact is Hertz's
+/// radius, reduced at large depth.
 fn cell_m(radius_m: f64, depth_m: f64, rings: i32) -> f64 {
     1.25 * (radius_m * depth_m).sqrt() / (1.0 + 0.12 * depth_m / radius_m) / f64::from(rings)
 }
@@ -102,7 +104,8 @@ fn roots() -> Vec<f64> {
     (1..=LEVELS).map(|level| DEEPEST_SOLVED.sqrt() * level as f64 / LEVELS as f64).collect()
 }
 
-/// Returns the ratios of a body's energy to a half-space's at one place, by growing depth; `on_face` tests for the face.
+/// Returns the ratios of a body's energy to a half-space's at one place, by growing depth; `on_face`: true for a point of the
+/// touched face.
 fn column(
     patch: &Patch,
     table: &Table,
@@ -139,12 +142,13 @@ fn column(
     ratios
 }
 
-/// Returns Hertz's energy of a sphere of radius one at a square root of depth, for a modulus of one.
+/// Returns Hertz's energy of a sphere of radius one at the depth `root²`, for a modulus of one.
 fn hertz(poisson_ratio: f64, root: f64) -> f64 {
     8.0 / 15.0 / (1.0 - poisson_ratio * poisson_ratio) * flotor_hal::math::powi(root, 5)
 }
 
-/// Returns the energy relative to Hertz's. The cells' own error, known at the smallest depth where Hertz is exact, is divided out.
+/// Returns the energy relative to Hertz's, by square root of depth. It is divided by its value at the smallest depth, where
+/// Hertz's law is exact, to remove the error of the cells.
 fn profile(solid: &HalfSpace) -> Curve {
     let top = DEEPEST_SOLVED.sqrt();
     let mut roots = vec![0.01];
@@ -209,8 +213,8 @@ pub fn sphere_on_block(
 /// Positions at which contacts on a block are compared, in halves of a side from the middle.
 const BEYOND_PLACES: [f64; 4] = [0.0, 0.4, 0.75, 0.97];
 
-/// Solves for the vertical compliance between places of a block's top beyond that of a half-space: the numbers of
-/// [`crate::several::ExtraCompliance`], for a modulus of 1 Pa. Not real-time: up to some seconds.
+/// Solves for the difference between the vertical compliance of a block's top and that of a half-space, and returns the numbers
+/// of [`crate::several::ExtraCompliance`], for a modulus of 1 Pa. Not real-time: up to some seconds.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.
@@ -245,7 +249,7 @@ fn rounding_m(size: Size, radius_m: f64) -> f64 {
 pub enum BodyKind {
     /// Half-space `z <= 0`.
     HalfSpace,
-    /// Block.
+    /// Block of these dimensions.
     Block(Size),
     /// Round cylinder: radius and height, m.
     Cylinder([f64; 2]),
@@ -258,8 +262,8 @@ fn around([radius_m, height_m]: [f64; 2]) -> Size {
     Size { half_x_m: radius_m, half_y_m: radius_m, height_m }
 }
 
-/// Prepares the law of a sphere on a mesh: top of a cylinder ([`BodyKind::Cylinder`]), or any plane face. Not real-time:
-/// some seconds.
+/// Prepares the law of a sphere on the touched face of a mesh: top of a cylinder ([`BodyKind::Cylinder`]), or any plane face.
+/// `rings`: number of cells of a contact from its middle to its rim. Not real-time: some seconds.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.
@@ -321,7 +325,7 @@ pub fn sphere_on_mesh(
         }
         TouchedBody::Face { outline_m, ratio: Box::new(Volume::new([x, y, levels], &values, FACE_ENDS)) }
     };
-    // Evaluate in the middle, and at a quarter of the side from an edge.
+    // Evaluate in the middle, and at an eighth of the side from an edge.
     let mesh_error = body.mesh_error(radius_m, &[[0.0; 2], [0.75 * outline_m[0][1], 0.0]]);
     Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), touched), mesh_error })
 }
@@ -474,8 +478,9 @@ impl Builder<'_> {
         Volume::new([a, b, levels], &values, ends(face))
     }
 
-    /// Estimates the change of the stiffness under the sphere against coarser elements, in the middle and at a quarter
-    /// of the side from an edge: twice the contribution of the remainder, for a contact of half the sphere's radius.
+    /// Estimates the relative error of the stiffness under the sphere, in the middle of the top and at an eighth of the side
+    /// from an edge: change of the compliance with coarser elements, relative to a contact of half the sphere's radius on a
+    /// half-space.
     fn mesh_error(&self) -> Result<f64, NotPositive> {
         let Fineness { across, high, order } = self.resolution.fineness();
         let coarse = Fineness { across: across.div_ceil(2).max(1), high: high.div_ceil(2).max(1), order };

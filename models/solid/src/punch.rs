@@ -21,7 +21,7 @@ pub enum Outline {
     },
     /// Square with sides along the axes.
     Square {
-        /// Half of the side, m.
+        /// Half-extent of the square, m.
         half_m: f64,
     },
 }
@@ -140,9 +140,8 @@ impl Outline {
 /// Fineness of the two extrapolated solutions.
 const FINENESS: [usize; 2] = [6, 9];
 
-/// Extrapolates two solutions of [`punch`] of different fineness (Richardson, second order). Returns the stiffness at
-/// the origin of the surface `z = 0`, and the relative change by the extrapolation, an upper estimate of the error. Not
-/// real-time.
+/// Solves for the stiffness of a punch at the origin of the surface `z = 0`, by Richardson extrapolation (second order) from two
+/// solutions of [`punch`]. Also returns the relative change by the extrapolation, an upper estimate of the error. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.
@@ -177,7 +176,8 @@ pub struct Loads {
     pub forces: Vec<[[f64; MODES]; 3]>,
 }
 
-/// Solves for the stiffness of a punch at the origin of the surface `z = 0`. Not real-time.
+/// Solves for the stiffness of a punch at the origin of the surface `z = 0`. `remainder`: that of a body, `None` for a half-space;
+/// `fineness`: number of cells from the middle to the rim. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.

@@ -1,7 +1,7 @@
-//! Error estimate of a mesh: stresses smoothed over the nodes against those of the elements.
+//! Error estimate of a mesh, by stress recovery: difference between the stress of each element and the mean at the nodes.
 //!
 //! Zienkiewicz and Zhu, *Int. J. Numer. Meth. Engng* 24 (1987) 337-357: elements have different stresses at a shared
-//! node, and the energy of the difference between their stress and its mean estimates the energy of the error.
+//! node, and the energy of the difference between the stress and its nodal mean estimates the energy of the error.
 
 use crate::cells::{Geometry, Kind};
 use crate::mesh::MeshStiffness;

@@ -1,10 +1,10 @@
 //! Remainder: difference between the response of a block and that of a half-space.
 //!
-//! A force on a face of a block displaces it as it would a half-space behind that face, plus a *remainder* that cancels
-//! the half-space's stress on the other free faces and its displacement of the clamped one. The half-space contains the
+//! A force on a face of a block causes the displacement of a half-space behind that face, plus a *remainder* that cancels
+//! the half-space's stress on the other free faces and its displacement of the clamped face. The half-space contains the
 //! singularity at the force. The remainder varies over the distance to the nearest edge, so that a coarse grid of
 //! elements resolves it for a force at any place. The block has two planes of mirror symmetry, and every load is a sum
-//! of four that are even or odd in each: four problems on a quarter of the block.
+//! of four loads that are even or odd in each plane: four problems on a quarter of the block.
 
 use crate::basis::{element_points, gauss, lagrange};
 use crate::dense::NotPositive;
@@ -15,9 +15,9 @@ use crate::half_space::{Block, HalfSpace};
 /// Dimensions of a block: top face at `z = 0` about the origin, bottom clamped. Lengths in m.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Size {
-    /// Half the side along x, m.
+    /// Half-extent along x, m.
     pub half_x_m: f64,
-    /// Half the side along y, m.
+    /// Half-extent along y, m.
     pub half_y_m: f64,
     /// Height, m.
     pub height_m: f64,
@@ -35,7 +35,7 @@ pub enum Face {
 }
 
 impl Face {
-    /// Returns the axes of the block that are `p`, `q` along the face and `w` out of it.
+    /// Returns the indices of the block axes along `p`, `q` (in the face) and `w` (normal to the face), in this order.
     #[must_use]
     pub fn axes(self) -> [usize; 3] {
         match self {
@@ -70,9 +70,9 @@ impl Face {
 /// Numbers of elements along half a side and along the height, and their order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fineness {
-    /// Elements from the middle to a side.
+    /// Number of elements from the middle to a side.
     pub across: usize,
-    /// Elements from bottom to top.
+    /// Number of elements from bottom to top.
     pub high: usize,
     /// Order of the elements.
     pub order: usize,
@@ -103,8 +103,9 @@ struct BoundaryPoint {
     position_m: [f64; 3],
     /// Axis of the outward normal (0, 1: a side; 2: the top).
     normal: usize,
-    /// Area with the shape functions that are not zero at the point.
+    /// Quadrature weight: area that the point represents.
     area_m2: f64,
+    /// Shape functions that are not zero at the point.
     shape: Sample,
 }
 
@@ -149,8 +150,8 @@ impl Remainder {
         Ok(Self { size, solid, lame, grid, stiffness, quadrature })
     }
 
-    /// Returns the remainder at `targets_m` of unit forces at `sources_m`, m/N, both points `p, q` of a face in the
-    /// quarter of positive x and y. Indices: source, target, mirror image of the target. Not real-time.
+    /// Solves for the remainder at `targets_m` under unit forces at `sources_m`, m/N. All are points `p, q` of a face in the
+    /// quarter of positive x and y. Indices of the result: source, target, mirror image of the target. Not real-time.
     #[must_use]
     pub fn responses(
         &self,
@@ -243,7 +244,7 @@ impl Remainder {
     }
 
     /// Computes the tractions that cancel those of the half-space at a mirror image of a point, Pa/N, one per force.
-    /// Returns false on the face of the force, where there is none.
+    /// Returns false on the face of the force, where the half-space has no tractions.
     fn traction(
         &self,
         face: Face,
@@ -301,8 +302,8 @@ impl Remainder {
     }
 }
 
-/// Returns the prescribed components of a node: all at the bottom; on a mirror plane, those across it for an even load
-/// and those along it for an odd one.
+/// Returns the prescribed components of a node: all at the bottom; on a mirror plane, the component normal to the plane for an
+/// even load, and the components in the plane for an odd load.
 fn fixed(grid: &Grid, node: usize, parity: usize) -> [bool; 3] {
     let index = grid.index(node);
     let mut fixed = [index[2] == 0; 3];

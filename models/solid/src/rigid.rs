@@ -1,23 +1,23 @@
 //! Rigid patch of a surface: wrench of a bonded plate or punch, from one quadratic energy.
 //!
-//! Every point of the patch is moved by `u = t + (R - I) X`, `X` from the patch's centre: twelve numbers, linear in the
-//! displacement, with the exact rotation `R`. The energy is `1/2 v.K v` in those twelve; force and torque are its
-//! derivatives with respect to the movement of the hand.
+//! The displacement of a point of the patch is `u = t + (R - I) X`, with its position `X` from the patch's centre and the exact
+//! rotation `R`: linear in twelve numbers `v`, the modes. The energy is `1/2 v.K v`; force and torque are its derivatives with
+//! respect to the movement of the hand.
 
 use flotor_hal::{DMat3, DQuat, DVec3, Demand, Wrench};
 
 /// Number of modes: three of `t`, nine of `R - I`.
 pub const MODES: usize = 12;
 
-/// Stiffness of a patch: translation along x, y, z first, then `R - I`, entry `(i, j)` at `3 + 3 i + j`.
+/// Stiffness of a patch in its modes: translation along x, y, z first, then `R - I`, entry `(i, j)` at index `3 + 3 i + j`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigidPatch {
-    /// Symmetric positive semidefinite matrix, N/m, N and N m.
+    /// Symmetric positive semidefinite stiffness matrix, N/m, N and N m.
     pub stiffness: [[f64; MODES]; MODES],
 }
 
 impl RigidPatch {
-    /// Returns the index of entry `(i, j)` of `R - I`.
+    /// Returns the index of the mode of entry `(i, j)` of `R - I`.
     #[must_use]
     pub const fn entry(i: usize, j: usize) -> usize {
         3 + 3 * i + j
@@ -38,8 +38,8 @@ impl RigidPatch {
         modes
     }
 
-    /// Returns the wrench on the hand, and the stored energy, J; zero where not requested. Real-time: bounded, no
-    /// allocation.
+    /// Returns the wrench on the hand, and the stored energy, J. If neither torque nor energy is requested, both are zero.
+    /// Real-time: bounded, no allocation.
     #[must_use]
     pub fn answer(&self, position_m: DVec3, orientation: DQuat, demand: Demand) -> (Wrench, f64) {
         let modes = Self::modes(position_m, orientation);

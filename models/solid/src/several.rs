@@ -31,15 +31,15 @@ use std::f64::consts::PI;
 pub const MAX_SPHERES: usize = 4;
 /// Maximum number of iterations of a solve.
 const STEPS: usize = 60;
-/// Largest relative change of a force at convergence, relative to the largest force.
+/// Largest error of a force at convergence, relative to the largest force.
 const TOLERANCE: f64 = 1.0e-12;
 /// Least distance between two depressions for a secant, m.
 const SECANT_M: f64 = 1.0e-12;
 /// Relative difference below which two energies count as equal.
 const ROUNDING: f64 = 1.0e-12;
 
-/// Compliance between places of the top face beyond that of a half-space, for a modulus of 1 Pa: cubic splines through
-/// the values for all pairs of nodes of a grid.
+/// Difference between the vertical compliance of a body's top face and that of a half-space, for a modulus of 1 Pa: cubic splines
+/// through the values for all pairs of nodes of a grid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExtraCompliance {
     /// Spline of each node of an axis: one at this node, zero at the others.
@@ -130,10 +130,10 @@ pub struct Spheres {
     pub beyond: Option<ExtraCompliance>,
 }
 
-/// Result of a tick with several spheres, for a modulus of 1 Pa.
+/// Response of several spheres at a pose, for a modulus of 1 Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
-    /// Wrench on the hand.
+    /// Wrench on the hand; the torque is about the middle of the spheres' centres.
     pub wrench: Wrench,
     /// Stored energy, J.
     pub energy_j: f64,
@@ -146,7 +146,7 @@ pub struct Answer {
     pub depths_m: [f64; MAX_SPHERES],
     /// Depression of the surface under each sphere by the other spheres, m.
     pub depressions_m: [f64; MAX_SPHERES],
-    /// True where the law of some sphere is that of a nearby position.
+    /// True if the law of a sphere is extrapolated from a nearby position.
     pub is_extrapolated: bool,
     /// True if the forces converged.
     pub is_settled: bool,
@@ -154,7 +154,7 @@ pub struct Answer {
 
 impl Spheres {
     /// Places two to four spheres at the corners of a regular polygon about the handle, normal to z; two spheres lie
-    /// along x. Not real-time.
+    /// along x. `spacing_m`: distance between neighbouring centres. Not real-time.
     #[must_use]
     pub fn new(
         atlas: Atlas,
@@ -183,8 +183,8 @@ impl Spheres {
         self.offsets_m.len()
     }
 
-    /// Evaluates the law at a pose (finite) of the handle; at its home all spheres touch. Real-time: bounded, no
-    /// allocation.
+    /// Evaluates the law at a pose (finite) of the handle; at home every sphere touches the undeformed face. Real-time: bounded,
+    /// no allocation.
     pub fn answer(&self, position_m: DVec3, orientation: DQuat) -> Answer {
         let count = self.count();
         let home = DVec3::Z * self.atlas.radius_m;
@@ -233,8 +233,8 @@ impl Spheres {
         answer
     }
 
-    /// Returns the compliance between each two spheres, m/N, and its derivatives with respect to the place of the
-    /// first.
+    /// Returns the compliance between each two spheres, m/N, and its derivatives with respect to the position of the first
+    /// sphere.
     fn compliance(
         &self,
         centres_m: &[DVec3; MAX_SPHERES],

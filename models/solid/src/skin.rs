@@ -19,7 +19,7 @@ pub struct Skin {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Region in which a surface is fine.
+/// Region in which a surface is divided finely.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Focus {
     /// Centre, m.
@@ -139,7 +139,7 @@ impl Skin {
         skin
     }
 
-    /// Triangulates the surface of a mesh; returns also the node of each corner. Touched and free faces meet in a sharp edge.
+    /// Triangulates the touched and the free surface of a mesh, which meet in a sharp edge; also returns the node of each corner.
     pub fn of_mesh(mesh: &Mesh) -> (Self, Vec<usize>) {
         let (mut skin, mut nodes) = (Self::default(), Vec::new());
         for facets in [&mesh.touched, &mesh.free] {

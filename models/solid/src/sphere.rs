@@ -9,7 +9,7 @@
 use crate::dense;
 use crate::half_space::{Block, HalfSpace};
 
-/// Cells of a patch with the half-space's compliance between any two of them.
+/// Cells of a round patch, with the half-space's compliance between any two cells.
 #[derive(Clone, Debug)]
 pub struct Patch {
     /// Number of cells from the middle to the rim.
@@ -29,13 +29,14 @@ pub struct Problem<'a> {
     pub depth_m: f64,
     /// Side of a cell, m.
     pub cell_m: f64,
-    /// Flags of the cells on the face; empty: all are.
+    /// For each cell, true if the cell is on the face; empty: all cells are.
     pub on_face: &'a [bool],
-    /// Remainder between the cells, by target, then source; empty: none.
+    /// Remainder of the block's compliance (see [`crate::remainder`]) for each pair of cells, m per unit of force, by target, then
+    /// source; empty: none.
     pub smooth: &'a [Block],
 }
 
-/// Result of a solve, and initial guess of the next one.
+/// Solution of a contact problem, and initial guess of the next solution.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {
     /// Stored energy, J.
@@ -111,8 +112,8 @@ impl Patch {
         &self.kernel[j * (4 * self.rings as usize + 1) + i]
     }
 
-    /// Solves a contact, with a nearby solution as initial guess. Without one, the solve starts from the undeformed
-    /// contact, and does not converge for a sphere deeper than about half its radius. Not real-time.
+    /// Solves a contact problem with a nearby solution as initial guess. Without a guess the iteration starts from the undeformed
+    /// face, and does not converge for a sphere deeper than about half its radius. Not real-time.
     #[must_use]
     pub fn solve(&self, problem: &Problem<'_>, start: Option<&Contact>) -> Contact {
         let count = self.cells.len();

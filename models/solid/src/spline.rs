@@ -11,7 +11,7 @@ pub enum End {
     Parabola,
 }
 
-/// Returns the nodal slopes of the spline through values: continuous second derivatives. At least three nodes. Not real-time.
+/// Returns the slopes at the nodes (at least three) of the cubic spline with continuous second derivatives. Not real-time.
 #[must_use]
 pub fn slopes(nodes: &[f64], values: &[f64], ends: [End; 2]) -> Vec<f64> {
     let last = nodes.len() - 1;
@@ -50,7 +50,7 @@ fn cell(nodes: &[f64], at: f64) -> usize {
     nodes[1..nodes.len() - 1].iter().take_while(|&&node| node <= at).count()
 }
 
-/// Returns Hermite's four functions and their derivatives: value at the lower and upper node, slope at the lower and upper.
+/// Returns Hermite's four functions and their derivatives: factors of the values at the lower and upper node, then of the slopes.
 fn hermite(nodes: &[f64], index: usize, at: f64) -> ([f64; 4], [f64; 4]) {
     let width = nodes[index + 1] - nodes[index];
     let s = (at - nodes[index]) / width;
@@ -61,7 +61,7 @@ fn hermite(nodes: &[f64], index: usize, at: f64) -> ([f64; 4], [f64; 4]) {
     )
 }
 
-/// Spline in one variable.
+/// Cubic spline in one variable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     nodes: Vec<f64>,
@@ -70,7 +70,7 @@ pub struct Curve {
 }
 
 impl Curve {
-    /// Interpolates values at nodes. Not real-time.
+    /// Interpolates values at ascending nodes, at least three. Not real-time.
     #[must_use]
     pub fn new(nodes: Vec<f64>, values: Vec<f64>, ends: [End; 2]) -> Self {
         let slopes = slopes(&nodes, &values, ends);
@@ -84,7 +84,7 @@ impl Curve {
         numbers.extend(&self.values);
     }
 
-    /// Removes count, nodes and values from the front; `None` if incomplete. Not real-time.
+    /// Removes count, nodes and values from the front and restores the spline; `None` if they are incomplete. Not real-time.
     #[must_use]
     pub fn from_numbers(numbers: &mut &[f64], ends: [End; 2]) -> Option<Self> {
         let count = whole(take(numbers, 1)?[0])?;
@@ -127,7 +127,7 @@ pub(crate) fn whole(number: f64) -> Option<usize> {
     (number.fract() == 0.0 && (3.0..=1000.0).contains(&number)).then_some(number as usize)
 }
 
-/// Spline in three variables: value and seven mixed first derivatives at each node.
+/// Tricubic spline in three variables: value and seven mixed first derivatives at each node.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
     nodes: [Vec<f64>; 3],
@@ -136,7 +136,8 @@ pub struct Volume {
 }
 
 impl Volume {
-    /// Interpolates values at nodes, first axis first. Not real-time.
+    /// Interpolates values at ascending nodes, at least three along each axis; the index of the first axis varies fastest. Not
+    /// real-time.
     #[must_use]
     pub fn new(nodes: [Vec<f64>; 3], values: &[f64], ends: [[End; 2]; 3]) -> Self {
         let counts = [0, 1, 2].map(|axis| nodes[axis].len());
@@ -174,7 +175,7 @@ impl Volume {
         numbers.extend(self.data.iter().map(|data| data[0]));
     }
 
-    /// Removes counts, nodes and values from the front; `None` if incomplete. Not real-time.
+    /// Removes counts, nodes and values from the front and restores the spline; `None` if they are incomplete. Not real-time.
     #[must_use]
     pub fn from_numbers(numbers: &mut &[f64], ends: [[End; 2]; 3]) -> Option<Self> {
         let mut counts = [0; 3];
@@ -197,7 +198,7 @@ impl Volume {
         (nodes[0], nodes[nodes.len() - 1])
     }
 
-    /// Returns the value at coordinates between first and last nodes. Real-time: bounded, no allocation.
+    /// Returns the value, with its gradient, at coordinates between first and last nodes. Real-time: bounded, no allocation.
     pub fn at(&self, coordinates: [Jet; 3]) -> Jet {
         let cells = [0, 1, 2].map(|axis| cell(&self.nodes[axis], coordinates[axis].value));
         let shares = [0, 1, 2].map(|axis| hermite(&self.nodes[axis], cells[axis], coordinates[axis].value));

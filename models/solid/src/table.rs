@@ -1,4 +1,4 @@
-//! Remainder of a face between any two points: values at a grid of points with cubic interpolation.
+//! Remainder of a face between any two points: values for the pairs of points of a grid, with cubic interpolation.
 
 use crate::half_space::Block;
 use crate::remainder::{Face, Remainder};
@@ -13,14 +13,14 @@ pub struct Table {
     blocks: Vec<Block>,
 }
 
-/// Interpolation nodes around a coordinate with their weights: a cubic, or as many nodes as there are.
+/// Interpolation nodes around a coordinate with their weights: four nodes (cubic), or all nodes if there are fewer.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
     first: usize,
     shares: [f64; 4],
 }
 
-/// Returns the weights of the cubic through the four nodes around a coordinate; constant outside the first and last.
+/// Returns the weights of the cubic through the four nodes around a coordinate, which is clamped to the first and last node.
 #[must_use]
 pub fn window(nodes: &[f64], coordinate: f64) -> Window {
     let count = nodes.len().min(4);
@@ -44,8 +44,8 @@ fn mirrored(half: &[f64]) -> Vec<f64> {
 }
 
 impl Table {
-    /// Solves for the remainder of all pairs of grid points. `half_m`: coordinates in the quarter of positive x and y;
-    /// along `p` from zero on, along `q` from zero on (top) or all of them (a side). Not real-time.
+    /// Solves for the remainder of all pairs of grid points. `half_m`: coordinates along `p` and `q`, ascending; those along `p`,
+    /// and on the top also those along `q`, begin at zero and are mirrored. Not real-time.
     pub fn new(remainder: &Remainder, face: Face, half_m: [&[f64]; 2]) -> Self {
         let quarter: Vec<[f64; 2]> =
             half_m[1].iter().flat_map(|&q| half_m[0].iter().map(move |&p| [p, q])).collect();
@@ -87,8 +87,8 @@ impl Table {
         table
     }
 
-    /// Builds a table from compliances for all pairs of points of a grid (`p` fastest): `answers[source][target]` is
-    /// the displacement of the target per force at the source, m/N. Not real-time.
+    /// Builds a table from compliances for all pairs of points of a grid, and makes it reciprocal. The index of `p` varies fastest;
+    /// `answers[source][target]` is the displacement of the target per force at the source, m/N. Not real-time.
     pub fn of(nodes_m: [Vec<f64>; 2], answers: &[Vec<Block>]) -> Self {
         let mut table = Self { nodes_m, blocks: answers.concat() };
         table.make_reciprocal();

@@ -6,8 +6,8 @@ use crate::grid::{Grid, Lame};
 use crate::plate::{Hold, PlateBox, difference, plate_on};
 use crate::rigid::RigidPatch;
 
-/// Solves for a plate on the even cells of a body, six tetrahedra each; returns also the difference from cells of half the side.
-/// Not real-time.
+/// Solves for a plate on a body of uniform cells, six tetrahedra each; also returns the largest relative difference from the
+/// solution with cells of half the edge length. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.
@@ -47,7 +47,7 @@ const PATHS: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
 
 impl<'a> Tetrahedra<'a> {
-    /// Divides a grid of order one. Not real-time.
+    /// Divides the cells of a grid of order one into tetrahedra. Not real-time.
     #[must_use]
     pub fn new(grid: &'a Grid, lame: Lame) -> Self {
         Self { cells: GridStiffness::new(grid, lame), grid, lame }

@@ -419,7 +419,7 @@ fn files_that_are_no_body_are_refused() {
         (inverted, "inverted"),
         (unknown, "999"),
         (short, "missing"),
-        (open, "is open"),
+        (open, "not on the border"),
         (surface_only, "open surface and no volume"),
         (good.replace("3 1 11 6", "3 1 4 6"), "quadratic"),
         (good.replace("3 1 11 6", "3 1 14 6"), "type 14"),
