@@ -16,7 +16,7 @@ use crate::pose::Coordinates;
 use crate::response::{Demand, LaneResponse, Law, Response};
 use flotor_lanes::{Pair, Real, Vector, Wide};
 
-/// Lanes of two of the widest registers, a multiple of those of the others.
+/// Number of lanes of two of the widest registers; a multiple of the lanes of two registers of any other instruction set.
 const MOST_LANES: usize = 16;
 
 /// Status of a lane's answer, as numbers in lanes.
@@ -48,8 +48,8 @@ impl Batch {
         Self { instructions }
     }
 
-    /// Computes one output per input, equal to single steps; surplus elements of either slice stay unchanged. Real-time
-    /// per pose: bounded, no allocation.
+    /// Computes one output per input, equal to single steps. The shorter slice determines the number; further outputs stay
+    /// unchanged. Real-time per pose: bounded, no allocation.
     pub fn respond<L: Law>(&self, law: &L, inputs: &[Input], outputs: &mut [Output]) {
         let count = inputs.len().min(outputs.len());
         let whole = count - count % MOST_LANES;

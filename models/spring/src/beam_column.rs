@@ -2,7 +2,7 @@
 //!
 //! Both ends of the rod are turned, by `psi_U` above and `psi_L` below, relative to the straight line between
 //! them (the chord). The thesis writes `M_U = a psi_U + b psi_L` and `M_L = -(a psi_L + b psi_U)`. Two shapes
-//! diagonalise this:
+//! diagonalise these equations:
 //! - **sway**, both ends turned alike: an S shape, stiffness `a + b`, in equilibrium with a transverse force;
 //! - **bow**, ends turned against each other: a C shape, stiffness `a - b`, in pure bending.
 //!
@@ -16,8 +16,8 @@ use flotor_lanes::entire::EntireFunctions;
 use flotor_lanes::saturation::saturate_above;
 use flotor_lanes::stability::StabilityFunctions;
 
-/// Argument above which a law of the linear column is not trusted, rounded down: `G0` is 0.3, and its torque 3 to 5 %
-/// wrong (spring 3).
+/// Argument above which a law of the linear column is not trusted, rounded down: there `G0` is 0.3, and the torque has an
+/// error of 3 to 5 % (spring 3).
 pub const TRUSTED_ARGUMENT: f64 = 5.552;
 
 /// Largest excess of the saturated argument of a closed form: `G0` stays above 0.175 and the bow stiffness above -5.1 times that
@@ -121,9 +121,9 @@ pub struct EndStiffness<R = f64> {
     pub bow_nm_per_rad: R,
     /// `(a + b) / L` (N/rad): transverse force per sum of the end angles.
     pub sway_n_per_rad: R,
-    /// `Lam` (m); where it is not positive, the rod has no shear stiffness, and the stiffnesses are meaningless.
+    /// `Lam` (m); if not positive, the rod has no shear stiffness, and the end stiffnesses are meaningless.
     pub sheared_m: R,
-    /// The argument `z = (q L)² / 4` of the load, not saturated; `pi²` is the first pole of the bow.
+    /// Argument `z = (q L)² / 4` of the load, not saturated; `pi²` is the first pole of the bow.
     pub argument: R,
 }
 

@@ -1,4 +1,4 @@
-//! Energy of bending as a function of the chord's length and three angles.
+//! Bending energy as a function of the chord's length and three angles.
 //!
 //! ```text
 //! E = (a + b)/2 (th_ke² + th_te²) - b/2 th_kt² + W4
@@ -43,7 +43,7 @@ impl Bending {
         Self::with_quartic(spring, Quartic::new(spring))
     }
 
-    /// Returns the bending of a spring of other stiffness but equal proportions. Real-time: bounded, no allocation.
+    /// Returns the constants of a spring of other stiffness but equal proportions. Real-time: bounded, no allocation.
     pub(crate) fn restiffened(&self, spring: &Spring) -> Self {
         Self::with_quartic(spring, self.quartic.with_gamma(spring.rigidities().gamma_n))
     }
@@ -69,8 +69,8 @@ impl Bending {
         length_m + shortening_m * self.shear_compliance
     }
 
-    /// Returns energy and derivatives at a chord length and shortening, and at the three squared angles. Real-time:
-    /// bounded, no allocation.
+    /// Returns the bending energy and its derivatives at a chord length, a shortening, and three squared angles: lower normal to
+    /// chord, upper normal to chord, lower to upper normal. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(crate) fn at<R: Real>(
         &self,

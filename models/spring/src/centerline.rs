@@ -1,11 +1,11 @@
-//! The shape of the spring between its plates, for drawing.
+//! Shape of the spring between its plates, for drawing.
 //!
 //! The thesis draws the coil around the bent axis of its beam-column (equations 37 and 61), with an end slope that does
 //! not match the drawn plates. Here the axis is the same linear beam-column in the form per current length (as in
-//! [`crate::energy`]), in space instead of in two planes, and exact at its ends: the first section lies in the lower
-//! plate and the last one in the upper plate, in position and orientation, at every pose. Between the plates the axis
-//! is the exact rod's shape to first order in the angles, see [`crate::shape`] (where the bending energy saturates
-//! short of buckling, so does the shape).
+//! [`crate::energy`]), in space instead of in two planes, and exact at its ends: the first section has position and
+//! orientation of the lower plate and the last section those of the upper plate, at every pose. Between the plates the axis
+//! is the exact rod's shape to first order in the angles, see [`crate::shape`]. Close to buckling the shape saturates, like
+//! the bending energy.
 
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::math;
@@ -15,14 +15,14 @@ use crate::rigidity::{Geometry, Spring};
 use crate::shape::{Shape, saturated_argument};
 use flotor_lanes::entire::EntireFunctions;
 
-/// The coil wound around the centerline, for drawing.
+/// Coil wound around the centerline, for drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Helix {
     /// Distance from the centerline to the centre of the wire (m), `D / 2`.
     pub coil_radius_m: f64,
     /// Radius of the wire (m), `d / 2`.
     pub wire_radius_m: f64,
-    /// Turns from plate to plate, `n`; a fraction `s` of the centerline carries `n s` of them.
+    /// Number of turns from plate to plate, `n`; a fraction `s` of the centerline has `n s` turns.
     pub turns: f64,
 }
 
@@ -38,7 +38,7 @@ impl Helix {
     }
 }
 
-/// A cross-section of the rod.
+/// Cross-section of the rod.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
     /// Centre, in the model frame (m).
@@ -47,7 +47,7 @@ pub struct Section {
     pub orientation: DQuat,
 }
 
-/// The bent axis of a spring at one pose.
+/// Bent axis of a spring at one pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Centerline {
     lower_plate_m: DVec3,
@@ -63,8 +63,8 @@ pub struct Centerline {
 }
 
 impl Centerline {
-    /// Computes the axis at a pose; `None` if the pose has no answer (see [`EnergyForm::respond`]) or a plate faces
-    /// exactly against the chord. Not real-time.
+    /// Computes the bent axis at a pose; `None` if the model has no wrench at the pose (see [`EnergyForm::respond`]) or the
+    /// normal of a plate is opposite to the chord. Not real-time.
     ///
     /// [`EnergyForm::respond`]: crate::energy::EnergyForm::respond
     #[must_use]
@@ -93,8 +93,8 @@ impl Centerline {
         })
     }
 
-    /// Returns the section at the fraction `s` of the coils, 0 at the lower plate and 1 at the upper; other values are
-    /// clamped. Not real-time.
+    /// Returns the section at the fraction `s` of the coils, 0 at the lower plate and 1 at the upper plate; other values are
+    /// clamped, and NaN counts as 0. Not real-time.
     #[must_use]
     pub fn section(&self, s: f64) -> Section {
         #[allow(clippy::manual_clamp)] // clamp would let NaN through

@@ -22,16 +22,16 @@ use crate::rigidity::Spring;
 use flotor_lanes::arctangent;
 use flotor_lanes::{Pair, Real, Vector};
 
-/// Kind of closed form.
+/// Form of the closed-form law: printed or corrected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Form {
-    /// Printed form (variant `closed-form`).
+    /// Form as printed in the thesis, errors included (variant `closed-form`).
     Printed,
     /// Printed form corrected: rigidities scaled by `L / L0`, torque `M_U` (variant `current-length`).
     CurrentLength,
 }
 
-/// The closed-form law of one spring.
+/// Closed-form law of one spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[must_use]
 pub struct ClosedForm {
@@ -58,7 +58,7 @@ impl ClosedForm {
         }
     }
 
-    /// Sets the storage precision. Single precision costs up to 1e-5 N in the workspace of the thesis. Real-time:
+    /// Sets the storage precision. Single precision causes an error of up to 1e-5 N in the workspace of the thesis. Real-time:
     /// bounded, no allocation.
     pub fn with_precision(self, precision: Precision) -> Self {
         Self { precision, ..self }
@@ -68,7 +68,7 @@ impl ClosedForm {
     ///
     /// Defined for every pose:
     /// - past the solid length the law continues, without coil contact;
-    /// - upper plate not above the lower one: the formulas are continued, [`Validity::Clamped`](crate::validity::Validity);
+    /// - upper plate not above the lower plate: the formulas are continued, [`Validity::Clamped`](crate::validity::Validity);
     /// - near buckling (`G0` below 0.3) and past it: the argument is saturated short of the pole, so that the wrench stays
     ///   bounded, [`Validity::Clamped`](crate::validity::Validity);
     /// - elongated until no shear stiffness is left, plates closer than a thousandth or farther than a million free lengths: no

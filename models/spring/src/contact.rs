@@ -9,7 +9,7 @@ use crate::response::Response;
 use crate::rigidity::Spring;
 use crate::rod::contact::STIFFNESS_N_PER_M;
 
-/// Contact of all coils at once.
+/// Contact of all coils at once, as a stiff spring along the chord.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxialContact {
     free_length_m: f64,
@@ -28,7 +28,8 @@ impl AxialContact {
         }
     }
 
-    /// Returns the response at a pose with the contact force added. Real-time: bounded, no allocation.
+    /// Returns the response at a pose with the force and energy of the contact added; unchanged without contact or at a pose
+    /// without a chord. Real-time: bounded, no allocation.
     pub fn added_to(&self, response: &Response, pose: &Pose) -> Response {
         let Ok(chord) = pose.chord(self.free_length_m) else { return *response };
         let overlap_m = chord.shortening_m - self.gap_m;

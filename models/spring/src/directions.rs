@@ -1,4 +1,4 @@
-//! Directions of a pose for the exact rod: sway, bow, twist and nearness to buckling, and gradients of functions of these.
+//! Variables of a pose for the exact rod: sway, bow, twist and nearness to buckling, and gradients of functions of these variables.
 //!
 //! With the lower normal `k`, the upper normal `t` and the chord's direction `e`, the half sum and the half difference of the
 //! angles of the ends against the chord have the sines
@@ -19,7 +19,7 @@ use crate::rigidity::Rigidities;
 
 /// Argument at which the straight rod buckles.
 pub(crate) const BUCKLING_ARGUMENT: f64 = PI * PI;
-/// Argument from which on the magnification stays as it is, short of where `G0` is computed to rounding.
+/// Argument above which the magnification is constant: below the largest argument at which `G0` is accurate to rounding.
 pub(crate) const DEEP_ARGUMENT: f64 = 7.5;
 
 /// Cosines of the angles at which [`Directions::upright`] begins to fall, 66 degrees, and is zero, 78 degrees.
@@ -65,7 +65,7 @@ impl Load {
         }
     }
 
-    /// Returns `z`.
+    /// Returns the argument `z` of a chord.
     #[inline(always)]
     pub(crate) fn argument(&self, chord: &Chord) -> f64 {
         self.unit_per_m2 * chord.shortening_m * (chord.length_m + self.ratio * chord.shortening_m)
@@ -94,7 +94,7 @@ pub(crate) fn upper_normal(q: DQuat) -> DVec3 {
     )
 }
 
-/// The directions of one pose.
+/// Variables of one pose, see the module.
 pub(crate) struct Directions {
     /// `e`
     chord: DVec3,

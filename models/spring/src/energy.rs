@@ -1,8 +1,8 @@
 //! Variant `energy`: the spring as one stored energy, in three dimensions.
 //!
 //! The thesis computes forces in two planes and turns them one after the other; the result depends on the order of the
-//! axes and feeds energy into the hand. Here the spring is a single function of the pose, the energy `W`, and force and
-//! torque are its exact derivatives. So no closed path gains or loses work, turning everything about the axis turns the
+//! axes, and closed paths generate energy. Here the spring is a single function of the pose, the energy `W`, and force and
+//! torque are its exact derivatives. So the work on a closed path is zero, a rotation of the pose about the axis rotates the
 //! wrench, and there is one law for all directions.
 //!
 //! Directions: `k` the lower plate's normal, `t` the upper plate's, `e` the chord between the plate centres, of
@@ -24,8 +24,8 @@
 //! well.
 //!
 //! Near buckling (`G0` towards zero, see [`flotor_lanes::entire`]) the bow stiffness runs to minus infinity. Short of
-//! the pole its argument saturates, see [`KNEE`](crate::shape::KNEE): from there on the spring behaves like one about
-//! to buckle that never does. `W` stays a smooth function of the pose.
+//! the pole its argument saturates, see [`KNEE`](crate::shape::KNEE): beyond, the spring has the stiffness of a spring just
+//! before buckling. `W` stays a smooth function of the pose.
 //!
 //! Derivation: the end stiffnesses are those of Haringx; the invariant form and the fourth order are this
 //! project's, in the book's chapter "The spring".
@@ -37,7 +37,7 @@ use crate::rigidity::Spring;
 use flotor_lanes::angle::{TRUSTED_VERSINE, measures};
 use flotor_lanes::{Real, Vector};
 
-/// Smallest `1 + k.t`. The twist has no meaning for a plate turned upside down; this is 177.4 degrees.
+/// Smallest `1 + k.t`, at 177.4 degrees: the twist is undefined for a plate turned upside down.
 const LEAST_OVERTURN: f64 = 1e-3;
 
 /// Conservative law of one spring, with prepared constants.
@@ -87,8 +87,8 @@ impl EnergyForm {
     ///   and chord or the twist exceeds 60 degrees, up to an upper plate below the lower one: still the
     ///   derivative of the same smooth `W`, but `W` is a continuation, [`Validity::Clamped`](crate::validity::Validity::Clamped);
     /// - upper plate upside down to within 2.6 degrees, plates closer than a thousandth or farther than a
-    ///   million free lengths, for a wire with `G > E` also any length at which the rod has no shear stiffness
-    ///   left: no wrench, [`Validity::OutOfDomain`](crate::validity::Validity::OutOfDomain);
+    ///   million free lengths, for a wire with `G > E` also any length at which the rod has no shear stiffness:
+    ///   no wrench, [`Validity::OutOfDomain`](crate::validity::Validity::OutOfDomain);
     /// - NaN, infinity or a quaternion not of unit length: no wrench, [`Validity::InvalidInput`](crate::validity::Validity::InvalidInput).
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         self.respond_at(pose, demand)

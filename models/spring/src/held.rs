@@ -23,7 +23,8 @@ pub trait HeldSpring {
         0.0
     }
 
-    /// Returns the cost of the last response, in evaluations of an energy. Real-time: bounded, no allocation.
+    /// Returns the cost of the last response, in evaluations of an energy; 1 for a closed formula. Real-time: bounded, no
+    /// allocation.
     fn cost(&self) -> u32 {
         1
     }
@@ -31,7 +32,7 @@ pub trait HeldSpring {
     /// Saves the state of the last response for [`Self::go_back`]. Real-time: bounded, no allocation.
     fn mark(&mut self) {}
 
-    /// Restores the state saved by [`Self::mark`] and discards later trials. Real-time: bounded, no allocation.
+    /// Restores the state saved by [`Self::mark`]. Real-time: bounded, no allocation.
     fn go_back(&mut self) {}
 
     /// Resets to the unloaded state and clears the history. Real-time: bounded, no allocation.
@@ -51,7 +52,7 @@ pub struct Held<L> {
     pub law: L,
     /// Contact of the coils; `None` if they may pass through each other, or the law has contact of its own.
     pub contact: Option<AxialContact>,
-    /// Twist and off-axis ends of the wire; `None` to leave these effects out.
+    /// Twist and off-axis ends of the wire; `None` for a law without these effects.
     pub wire: Option<Wire>,
 }
 

@@ -1,16 +1,16 @@
-//! A helical spring with end plates in three dimensions, as a force model.
+//! Force model of a helical spring with end plates in three dimensions.
 //!
 //! One topic per module, from the wire to the wrench:
 //! - [`rigidity`]: wire and coil become the rigidities of an equivalent rod; [`preset`]: springs with names.
 //! - [`pose`]: pose of the upper plate; [`response`], [`validity`]: response of a law.
-//! - [`flotor_lanes`]: formulas written once, for one pose and for several side by side, angles and saturation among them;
-//!   [`batch`] runs them over many.
+//! - [`flotor_lanes`]: SIMD numerics for one pose or several poses side by side, such as angles and saturation; [`batch`]
+//!   evaluates a law at many poses.
 //! - [`beam_column`]: resistance of a compressed rod to rotations of its ends, without branches or poles of its own.
 //! - [`thesis`]: the thesis's printed code with every branch, window and jump, for comparison.
 //! - [`closed_form`]: the thesis's printed law, regularised, and its current-length correction. [`precision`] defines
 //!   the storage format of its numbers.
 //! - [`energy`]: the conservative law in three dimensions, the default. Its bending part is in [`bending`], to
-//!   fourth order in the angles by [`shape`] and [`quartic`]; `remainder` adds what is beyond, fitted to the rod.
+//!   fourth order in the angles by [`shape`] and [`quartic`]; `remainder` adds the higher orders, fitted to the rod.
 //! - [`rod`]: the exact rod, past buckling too, with a history.
 //! - [`rod_blend`]: blending from the law `energy` to the rod where the tolerance requires it, as one energy;
 //!   `rod_share` computes the weight of the rod, in the variables of `directions`.

@@ -1,4 +1,4 @@
-//! Timing of a spring that moves by itself: in steps per second, not per tick.
+//! Timing of a spring in motion to its equilibrium: steps per second, independent of the tick rate.
 //!
 //! A rod that snaps and a base that rolls or falls over move for several steps of their law
 //! ([`Validity::NotConverged`]). The distance of a step is bounded, so a step needs a duration: a millisecond. Until

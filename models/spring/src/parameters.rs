@@ -1,8 +1,8 @@
 //! Parameter schema of the spring, and resolution of a set of values to a checked [`Spring`].
 //!
-//! A preset gives every value; explicit values replace those of the preset. One constant determines the stiffness
-//! (`mode`, the thesis's modes 0 to 3): the others are derived from it, and an explicit value of a derived constant is
-//! rejected as ambiguous.
+//! A preset gives every value; explicit values replace those of the preset. The parameter `mode` (the thesis's modes 0 to 3)
+//! selects the constants that determine the stiffness. The other constants are derived, and an explicit value of a derived
+//! constant is rejected as ambiguous.
 //!
 //! The numbers are live: a running loop may change them between two ticks, one at a time, and each change must be
 //! consistent with the other values. Such a change is a step of the force at the current pose of the hand. The model
@@ -20,15 +20,15 @@ use flotor_hal::{Choices, OutOfRange, Parameter, Refusal, SetParameterError, Set
 /// Law of the spring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Variant {
-    /// The thesis's printed code, with its branches and jumps.
+    /// Printed code of the thesis, with its branches and jumps.
     Thesis,
-    /// The thesis's printed law, regularised.
+    /// Printed law of the thesis, regularised.
     ClosedForm,
-    /// The regularised law with rigidities per current length, and the upper moment only.
+    /// Regularised law with rigidities per current length, and the upper moment only.
     CurrentLength,
-    /// The conservative law in three dimensions.
+    /// Conservative law in three dimensions.
     Energy,
-    /// The exact rod, past buckling too.
+    /// Exact rod, past buckling too.
     Rod,
 }
 
@@ -90,8 +90,8 @@ const MM: f64 = 1.0e-3;
 const MPA: f64 = 1.0e6;
 const N_MM2: f64 = 1.0e-6;
 
-/// Parameter schema. Defaults are those of preset `thesis-1`; other presets have their own. The kind of spring is
-/// fixed, its numbers are live.
+/// Parameter schema. Defaults are those of preset `thesis-1`; other presets have their own. Choices are fixed, numbers are
+/// live.
 pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::choice("preset", PRESETS, 0, "Spring of the thesis, or a slender spring that buckles"),
     Parameter::choice(
@@ -207,7 +207,7 @@ pub(crate) struct Choice {
 }
 
 impl Choice {
-    /// Resolves preset, mode and explicit values.
+    /// Resolves preset, mode and explicit values, and checks their combination.
     pub(crate) fn resolve(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let preset =
             Preset::ALL.get(settings.choice_or_default("preset")).copied().unwrap_or(Preset::Thesis1);
@@ -356,7 +356,7 @@ impl Choice {
         let Some(parameter) = SCHEMA.get(index) else {
             return SetParameterError::Fixed;
         };
-        // Coils must not touch at rest, the coil be wider than the wire, Poisson's ratio E/(2 G) - 1 be possible.
+        // Limits: coils that do not touch at rest, a coil wider than the wire, and a possible Poisson's ratio E/(2 G) - 1.
         let (min, max) = match parameter.id() {
             "free_length_mm" => (geometry.solid_length_m() / MM, f64::INFINITY),
             "coil_diameter_mm" => (geometry.wire_diameter_m / MM, f64::INFINITY),
@@ -408,7 +408,7 @@ impl Choice {
     }
 }
 
-/// Returns the value set of a choice of two; refuses the second one for any other law than `laws`.
+/// Returns the selected value of a choice of two; refuses the second value for a law that is not one of `laws`.
 fn second_only_for<T>(
     laws: &[Variant],
     (settings, variant): (&Settings<'_>, Variant),
@@ -439,13 +439,13 @@ fn rod_blend(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusa
     }
 }
 
-/// Returns the mode set, or else that of the preset.
+/// Returns the explicit mode, without one the mode of the preset.
 fn mode(settings: &Settings<'_>, preset: Stiffness) -> Mode {
     let set = settings.number("mode").and_then(|_| Mode::ALL.get(settings.choice_or_default("mode")));
     set.copied().unwrap_or_else(|| Mode::of(preset))
 }
 
-/// Refuses a value that the mode derives from others.
+/// Refuses an explicit value of a parameter that the mode derives from other parameters.
 fn refuse_derived(settings: &Settings<'_>, mode: Mode) -> Result<(), Refusal> {
     const RULED: [(&str, Mode); 5] = [
         ("gamma_n", Mode::Gamma),

@@ -1,4 +1,4 @@
-//! The spring as a force-model plugin.
+//! Plugin of the spring: parameters, step, details, centreline and workspace bounds.
 
 use crate::batch::Batch;
 use crate::centerline::{Helix, Section};
@@ -83,7 +83,7 @@ impl DetailsModel for SpringModel {
         Detail::word(
             "branch",
             BRANCHES,
-            "Branch of the rod: buckled if the plates are closer than the buckling length of a straight rod (rod)",
+            "Branch of the rod: buckled if the height between the plates is below that at which a straight rod buckles (rod)",
         ),
         Detail::flag("stable", "True if the shape is a minimum of the stored energy (rod)"),
         Detail::number(
@@ -91,7 +91,7 @@ impl DetailsModel for SpringModel {
             "rad",
             "Roll of the lower plate about y; no value for a spring in the air",
         ),
-        Detail::number("rod_share", "1", "Share of the exact rod in the energy (energy with hand_over)"),
+        Detail::number("rod_share", "1", "Weight of the exact rod in the energy (energy with hand_over)"),
     ];
 
     fn details(&self, values: &mut [f64]) {
@@ -129,7 +129,7 @@ impl CenterlineModel for SpringModel {
 }
 
 impl WorkspaceBoundsModel for SpringModel {
-    /// Returns a lower bound at the solid length, for a law without coil contact.
+    /// Returns a lower bound of the height at the solid length; no bounds for a law with coil contact.
     fn workspace_bounds(&self) -> WorkspaceBounds {
         if self.choice.coil_contact == Switch::On {
             return WorkspaceBounds::UNBOUNDED;

@@ -10,12 +10,12 @@ use crate::validity::Validity;
 use flotor_lanes::arctangent;
 use flotor_lanes::{Real, Vector};
 
-/// Shortest distance of the plates, as a fraction of the free length, for which a direction between them makes
-/// sense. Far below any solid length.
+/// Shortest distance between the plates, as a fraction of the free length, at which the chord has a direction. Far below any
+/// solid length.
 const SHORTEST_CHORD: f64 = 1e-3;
 
-/// Longest distance of the plates in free lengths. No spring gets there; the limit keeps every product of the laws far
-/// from overflow.
+/// Longest distance between the plates, in free lengths. No spring is so long; the limit prevents an overflow in the products
+/// of the laws.
 const LONGEST_CHORD: f64 = 1e6;
 
 /// Tolerance of the squared norm of the orientation. Rounding causes 1e-15; a larger error is not a rotation.
@@ -66,7 +66,7 @@ impl Pose {
         if usable { Ok(Chord { vector_m, length_m, shortening_m }) } else { Err(self.failure_reason()) }
     }
 
-    /// Returns the numbers of the pose, for formulas over one pose or many.
+    /// Returns the coordinates of the pose, for formulas over one pose or several.
     #[inline]
     pub(crate) fn coordinates(&self) -> Coordinates<f64> {
         let DVec3 { x, y, z } = self.position_m;
@@ -88,7 +88,7 @@ impl Pose {
     }
 }
 
-/// Seven numbers of a pose, or of one pose per lane.
+/// Coordinates of a pose, or of one pose per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct Coordinates<R> {
     /// Centre of the upper plate relative to home (m).
@@ -157,7 +157,7 @@ impl<R: Real> Coordinates<R> {
 pub(crate) struct Span<R: Real> {
     /// Vector from the lower to the upper plate (m).
     pub(crate) vector_m: Vector<R>,
-    /// Distance of the plate centres (m), `L`.
+    /// Distance between the plate centres (m), `L`.
     pub(crate) length_m: R,
     /// `L0 - L` (m), positive in compression.
     pub(crate) shortening_m: R,
@@ -185,7 +185,7 @@ pub(crate) fn quaternion(rotation_rad: DVec3) -> DQuat {
 pub(crate) struct Chord {
     /// Vector from the lower to the upper plate (m).
     pub(crate) vector_m: DVec3,
-    /// Distance of the plate centres (m), `L`.
+    /// Distance between the plate centres (m), `L`.
     pub(crate) length_m: f64,
     /// `L0 - L` (m), positive in compression.
     pub(crate) shortening_m: f64,

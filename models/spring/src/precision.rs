@@ -9,10 +9,10 @@ use flotor_lanes::Real;
 /// Storage precision of a law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Precision {
-    /// Double throughout.
+    /// Binary64 storage and intermediate results.
     #[default]
     Double,
-    /// Binary32 storage, double intermediates.
+    /// Binary32 storage, binary64 intermediate results.
     Single,
 }
 

@@ -1,20 +1,20 @@
-//! Named springs: the three of the thesis and one that really buckles.
+//! Named springs: springs 1 to 3 of the thesis, and a slender spring that buckles at a small compression.
 //!
 //! The thesis (table 2) gives each spring its wire, coil and free length *and* a compression rigidity `gamma`.
-//! The two do not agree for springs 1-3 (spring 1's constants are those of a free length of 30 mm, springs 2 and 3
-//! are 0.5 % off); the experiments were run with the stated `gamma`, so the presets carry it (mode `gamma`).
+//! The dimensions give another `gamma`: that of spring 1 belongs to a free length of 30 mm, those of springs 2 and 3 differ by
+//! 0.5 %. The experiments were run with the stated `gamma`, so the presets have mode `gamma`.
 
 use crate::rigidity::{Geometry, Material, Spring, Stiffness};
 
 /// Steel of the thesis, table 2.
 const SPRING_STEEL: Material = Material { youngs_modulus_pa: 203_395e6, shear_modulus_pa: 75_842e6 };
 
-/// A named spring.
+/// Named spring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Preset {
-    /// Spring 1 of the thesis: the default, short and even.
+    /// Spring 1 of the thesis, the default: short; does not buckle.
     Thesis1,
-    /// Spring 2 of the thesis: wide.
+    /// Spring 2 of the thesis: wide; does not buckle.
     Thesis2,
     /// Spring 3 of the thesis: narrow, soft; buckles at 54.5 % compression.
     Thesis3,
@@ -37,7 +37,7 @@ impl Preset {
         }
     }
 
-    /// Returns the parameters, which can be changed one by one before [`Spring::new`] checks them.
+    /// Returns the parameters of the spring, for [`Spring::new`].
     #[must_use]
     pub fn parameters(self) -> (Geometry, Material, Stiffness) {
         let millimetres = |free_length, wire_diameter, coil_diameter, active_coils| Geometry {

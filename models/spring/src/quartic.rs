@@ -1,9 +1,8 @@
 //! Bending energy of fourth order in the angles, from the exact rod.
 //!
-//! Stiffnesses that do not depend on the angles are right for small angles only. The next term follows without
-//! solving anything new: the shape of the linear column makes the energy of second order stationary, so the
-//! energy of fourth order is the exact rod's energy *evaluated on that shape* (a shape correction would enter
-//! with order six).
+//! Stiffnesses independent of the angles are accurate for small angles only. The next term needs no further equation to be
+//! solved: the shape of the linear column makes the energy of second order stationary, so the energy of fourth order is the
+//! exact rod's energy *evaluated on that shape* (a shape correction would enter with order six).
 //!
 //! **Derivation.** Of the rod's sections, let `n` be the normals. Eliminating strains and end force exactly, the
 //! rod of free length `L0` with ends a chord `L e` apart stores
@@ -30,9 +29,9 @@
 //! ```
 //!
 //! functions of the length alone. They are fitted once per spring by polynomials in `L`; `D` is scaled with a
-//! *magnification* that takes the buckling pole out of them. Twist at fourth order (`w² S²`, `w² D²`) is left
-//! out: it is the softening of a twisted column (Greenhill), about 1e-3 of the stiffness for a twist of a tenth of
-//! a radian and more close to buckling.
+//! *magnification* that removes the buckling pole from the coefficients. Twist at fourth order (`w² S²`, `w² D²`) is
+//! neglected: it is the softening of a twisted column (Greenhill), about 1e-3 of the stiffness for a twist of a tenth of
+//! a radian, and larger close to buckling.
 //!
 //! The series is invalid once the magnified angles are of order one; there the term fades out.
 

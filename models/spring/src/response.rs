@@ -6,7 +6,7 @@ use crate::pose::{Coordinates, Pose};
 use crate::validity::Validity;
 use flotor_lanes::{Real, Vector};
 
-/// Outputs the caller needs; each level includes those before it. Outputs not demanded are not computed.
+/// Requested outputs; each level includes the outputs of the levels before. Other outputs are not computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Demand {
     /// Force alone; the torque of the response is zero.
@@ -60,7 +60,7 @@ pub trait Law {
     /// True if the law has a stored energy.
     const HAS_ENERGY: bool;
 
-    /// Returns the answer at a pose, or at one pose per lane. Real-time: bounded, no allocation.
+    /// Evaluates the law at a pose, or at one pose per lane. Real-time: bounded, no allocation.
     ///
     /// The numbers of a lane without an answer are meaningless. Outputs not demanded are not computed and zero.
     fn evaluate<R: Real>(&self, at: &Coordinates<R>, demand: Demand) -> LaneResponse<R>;
@@ -83,14 +83,14 @@ pub trait Law {
     }
 }
 
-/// Answer of a [`Law`] before it is packed into a [`Response`].
+/// Response of a [`Law`] at a pose, or at one pose per lane.
 #[derive(Clone, Copy, Debug)]
 pub struct LaneResponse<R: Real> {
     /// Force on the hand (N).
     pub force_n: Vector<R>,
     /// Torque on the hand (N·m).
     pub torque_nm: Vector<R>,
-    /// Stored energy (J).
+    /// Stored energy (J), of a law that has one.
     pub energy_j: R,
     /// Lanes that have an answer.
     pub answered: R::Mask,

@@ -2,16 +2,16 @@
 //!
 //! A helical spring of many coils behaves like an elastic rod along its axis. Four *rigidities* describe the
 //! rod, each per unit of reference length: bending `alpha`, shear `beta`, compression `gamma` and torsion
-//! `tau`. They follow from wire and coil (thesis CMU-RI-TR-07-21, equations 7-9, after Haringx), or from one of
-//! them and the coil diameter (appendix A, `switch (change)`): the thesis measured one constant and derived the
-//! others. [`Spring`] holds a checked set of all of them; every law of this crate starts from it.
+//! `tau`. They follow from wire and coil (thesis CMU-RI-TR-07-21, equations 7-9, after Haringx), or from one rigidity
+//! and the coil diameter (appendix A, `switch (change)`): the thesis measured one constant and derived the other
+//! constants. [`Spring`] has a checked set of parameters and rigidities, from which every law of this crate is prepared.
 
 use std::fmt;
 
 /// Shape of the unloaded spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
-    /// Distance of the end plates without load (m), `L0`.
+    /// Distance between the end plates without load (m), `L0`.
     pub free_length_m: f64,
     /// Diameter of the wire (m), `d`.
     pub wire_diameter_m: f64,
@@ -47,10 +47,11 @@ impl Material {
 }
 
 /// Smallest valid Poisson's ratio. Positive moduli give a ratio above -1, at which a solid has no resistance to a
-/// change of volume: within a hundredth of -1 there is practically none.
+/// change of volume; within a hundredth of -1 this resistance is negligible.
 pub(crate) const LEAST_POISSON_RATIO: f64 = -0.99;
 
-/// Given constant of the stiffness; the others follow. The thesis calls these the modes 0 to 3 of `change`.
+/// Specification of the spring's stiffness: one rigidity, which determines the other rigidities, or the physical properties. The
+/// variants are the modes 0 to 3 of `change` in the thesis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Stiffness {
     /// Mode 0: compression rigidity `gamma` (N).
@@ -59,7 +60,7 @@ pub enum Stiffness {
     Alpha(f64),
     /// Mode 2: shear rigidity `beta` (N).
     Beta(f64),
-    /// Mode 3: all of them from wire, coil and material.
+    /// Mode 3: all rigidities from wire, coil and material.
     Physical,
 }
 
@@ -77,7 +78,7 @@ pub struct Rigidities {
 }
 
 impl Rigidities {
-    /// Derives all four from `stiffness` without checks; [`Spring::new`] checks.
+    /// Derives the four rigidities from `stiffness`, without checks; [`Spring::new`] checks.
     ///
     /// Modes 0-2 use `beta = gamma E / G` and `alpha = gamma D² / (4 G / E + 2)`, mode 3 equations 7-9. Torsion
     /// is not in the thesis: a coil of wire turned about the spring axis bends, so `tau` has the form of `beta`,
@@ -170,13 +171,13 @@ impl Spring {
         &self.rigidities
     }
 
-    /// Returns the rigidities of a spring of the same proportions with `gamma` of one newton: ratios of coil and material alone.
+    /// Returns the rigidities of a spring of equal proportions with `gamma` of one newton: functions of coil and material alone.
     pub(crate) fn rigidities_per_gamma(&self) -> Rigidities {
         Rigidities::derive(Stiffness::Gamma(1.0), &self.geometry, &self.material)
     }
 
-    /// Returns true if the rigidities of both springs differ by one common factor, and their free lengths are equal.
-    /// Wire and number of coils scale all rigidities alike, free length, coil and material do not.
+    /// Returns true if free length, coil diameter and material of both springs are equal: their rigidities then differ by one
+    /// common factor, because wire and number of coils scale all rigidities alike.
     #[must_use]
     pub fn is_proportional_to(&self, other: &Self) -> bool {
         self.material == other.material
@@ -190,7 +191,7 @@ impl Spring {
         self.rigidities.gamma_n / self.geometry.free_length_m
     }
 
-    /// Returns the lateral stiffness at rest (N/m) between level plates: a beam that shears (Timoshenko).
+    /// Returns the lateral stiffness at rest (N/m) between level plates, of a Timoshenko beam.
     #[must_use]
     pub fn lateral_stiffness_n_per_m(&self) -> f64 {
         let length_m = self.geometry.free_length_m;
@@ -199,8 +200,7 @@ impl Spring {
     }
 }
 
-/// # Errors
-/// If the value is not a positive, finite number.
+/// Checks that a quantity is positive and finite.
 fn positive(quantity: &'static str, value: f64) -> Result<(), ParameterError> {
     if !value.is_finite() {
         Err(ParameterError::NotFinite { quantity })
@@ -211,8 +211,7 @@ fn positive(quantity: &'static str, value: f64) -> Result<(), ParameterError> {
     }
 }
 
-/// # Errors
-/// If the coil is not wider than the wire, or the coils touch at rest.
+/// Checks that the coil is wider than the wire, and that the coils do not touch at rest.
 fn check_shape(geometry: &Geometry) -> Result<(), ParameterError> {
     let Geometry { free_length_m, wire_diameter_m, coil_diameter_m, .. } = *geometry;
     if coil_diameter_m <= wire_diameter_m {
@@ -254,11 +253,11 @@ pub enum ParameterError {
         /// `L0` (m).
         free_length_m: f64,
     },
-    /// No stable isotropic material has this ratio of `E` to `G`: `E / (2 G) - 1` must lie between -1 and 0.5.
+    /// Ratio of `E` to `G` of no stable isotropic material: `E / (2 G) - 1` must be at least -0.99 and below 0.5.
     ImpossiblePoissonRatio {
         /// `E / (2 G) - 1`.
         poisson_ratio: f64,
-        /// Both moduli.
+        /// Elastic constants of the wire.
         material: Material,
     },
 }
@@ -266,7 +265,7 @@ pub enum ParameterError {
 impl fmt::Display for ParameterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotFinite { quantity } => write!(f, "the {quantity} is not a finite number"),
+            Self::NotFinite { quantity } => write!(f, "the {quantity} must be finite, but is NaN or infinite"),
             Self::NotPositive { quantity, value } => {
                 write!(f, "the {quantity} must be positive, but is {value:e} in SI units")
             }
@@ -287,7 +286,7 @@ impl fmt::Display for ParameterError {
             Self::ImpossiblePoissonRatio { poisson_ratio, material } => write!(
                 f,
                 "Young's modulus {} MPa and shear modulus {} MPa give a Poisson ratio of {poisson_ratio:.6}, which \
-                 must be between -1 and 0.5",
+                 must be at least -0.99 and below 0.5; change one of the moduli",
                 material.youngs_modulus_pa * 1e-6,
                 material.shear_modulus_pa * 1e-6
             ),

@@ -2,7 +2,7 @@
 //!
 //! Between its plates the spring is an elastic line whose sections can turn by any angle: it bends, twists, shears and
 //! shortens, with one rigidity for each (Haringx's rod; Reissner and Simo's in space). Nothing is linearised, so there
-//! are several equilibria where a real spring has several, and only a stable one is felt. [`Rod`] finds a stable
+//! are several equilibria where a real spring has several, and the hand feels only a stable one. [`Rod`] finds a stable
 //! equilibrium by energy: a minimum of the stored energy among all shapes that meet the plates.
 //!
 //! One topic per module:
@@ -67,12 +67,12 @@ pub enum Accuracy {
     Tight,
 }
 
-/// Branch of the rod's equilibria, by the distance of the plates.
+/// Branch of the rod's equilibria, by the height of the upper plate above the lower plate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Branch {
-    /// Distance of the plates above that at which a straight rod buckles.
+    /// Height above that at which a straight rod buckles.
     Unbuckled,
-    /// Smaller distance: a stable shape bulges.
+    /// Smaller height: a stable shape bulges.
     Buckled,
 }
 
@@ -81,8 +81,8 @@ pub enum Branch {
 pub struct State {
     /// Branch at the current pose.
     pub branch: Branch,
-    /// Number of directions in which the energy of the shape falls, the Morse index; counted at the last renewal of the
-    /// matrix.
+    /// Number of independent directions in which the energy of the shape decreases, the Morse index, at the last computation of
+    /// the matrix of second derivatives.
     pub unstable_directions: usize,
 }
 
@@ -150,7 +150,7 @@ macro_rules! either {
 }
 
 impl Rod {
-    /// Builds the rod at rest. Not real-time: allocates.
+    /// Builds the rod at rest, without contact of its coils. Not real-time: allocates.
     pub fn new(spring: &Spring, accuracy: Accuracy) -> Self {
         Self::with_coils(spring, accuracy, Coils::Pass)
     }
@@ -209,7 +209,7 @@ impl Rod {
         self.last = Response::none(Validity::NotConverged);
     }
 
-    /// Changes the parameters at a tick boundary, with the shape unchanged. Real-time: bounded, no allocation.
+    /// Sets the parameters at a tick boundary, with the shape unchanged. Real-time: bounded, no allocation.
     pub fn set_spring(&mut self, spring: &Spring) {
         self.constants = Constants::new(spring);
         either!(&mut self.solver, equilibrium => equilibrium.set_ratios(Ratios::new(spring, self.coils)));
@@ -241,7 +241,7 @@ impl Rod {
     /// - in stable equilibrium: [`Validity::Ok`];
     /// - moving to an equilibrium (after a jump of the pose, or where the last equilibrium ceased to be stable):
     ///   [`Validity::NotConverged`], with the wrench of the present shape, which moves a bounded distance per tick.
-    ///   Call again, at the same pose or another. If even this wrench is not finite, the last finite one;
+    ///   The next call, at the same pose or another, continues the motion. If this wrench is not finite, the last finite wrench;
     /// - upper plate upside down to within 2.6 degrees, plates closer than a thousandth or farther than a
     ///   million free lengths: no wrench, [`Validity::OutOfDomain`];
     /// - NaN, infinity or a quaternion that is not of unit length: no wrench, [`Validity::InvalidInput`].
@@ -256,8 +256,8 @@ impl Rod {
     }
 
     /// Finds the equilibrium without a history, from the shape of the linear beam-column: a function of the pose alone.
-    /// If the search does not converge, [`Validity::NotConverged`], and [`Self::step`] continues it. `spring` is the
-    /// rod's own. Real-time: bounded, no allocation; some ten times a step.
+    /// If the search does not converge, [`Validity::NotConverged`], and [`Self::step`] continues it. `spring`: the spring of
+    /// this rod. Real-time: bounded, no allocation; about the time of ten steps.
     pub(crate) fn find(&mut self, spring: &Spring, pose: &Pose, demand: Demand) -> Response {
         self.last = Response::none(Validity::NotConverged);
         self.answer(

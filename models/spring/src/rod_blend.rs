@@ -1,4 +1,4 @@
-//! Blending of the law `energy` with its remainder and the exact rod, as one energy: the rod where the law is not accurate enough.
+//! Blending of the law `energy`, with its remainder, and the exact rod, as one energy: the rod where the law is not accurate.
 //!
 //! The weight `s` of the rod, from `rod_share`, depends on the pose alone: on a bound of the error against the
 //! tolerance, and on the nearness of the rod to buckling. The energies are blended, not the forces,
@@ -85,13 +85,13 @@ impl RodBlend {
         }
     }
 
-    /// Changes the parameters at a tick boundary. Real-time: bounded, no allocation; a spring of different proportions
-    /// ([`Spring::is_proportional_to`]) recomputes the remainder, 38 equilibrium solves of the rod.
+    /// Sets the parameters at a tick boundary. Real-time: bounded, no allocation; for a spring of different proportions
+    /// ([`Spring::is_proportional_to`]) the remainder is recomputed with 38 equilibrium solves of the rod.
     pub fn set_spring(&mut self, spring: &Spring) {
         self.set(spring, self.tolerance_n);
     }
 
-    /// Changes parameters and tolerance at a tick boundary, as [`Self::set_spring`] does.
+    /// Sets parameters and tolerance at a tick boundary, see [`Self::set_spring`].
     pub(crate) fn set(&mut self, spring: &Spring, tolerance_n: f64) {
         self.tolerance_n = tolerance_n;
         self.energy = self.energy.retuned(&self.spring, spring);
@@ -164,7 +164,7 @@ impl RodBlend {
         }
     }
 
-    /// Returns the rod's response: by the pose alone while the pose determines the equilibrium, else followed from the last tick.
+    /// Returns the rod's response: at an equilibrium found from the pose alone, or followed from the last tick, see [`Follows`].
     fn ask_rod(&mut self, pose: &Pose, is_buckled: bool, demand: Demand) -> Response {
         let response = match self.follows {
             Follows::Pose => self.rod.find(&self.spring, pose, demand),

@@ -1,6 +1,6 @@
 //! Free seat of a spring: the lower plate rolls up on its rim, slides, and lifts off.
 //!
-//! The laws clamp the lower plate. A real spring stands freely: it cannot be pulled, and its base tips over the rim as
+//! The laws clamp the lower plate. A real spring stands freely: a pull lifts it, and its base tips over the rim as
 //! soon as the moment at the base exceeds the axial force times the radius of the seat. The base takes the tilt of
 //! least stored energy,
 //!
@@ -23,7 +23,7 @@
 //!
 //! If a spring is pressed past buckling, its base may lose contact with the ground or roll on without end. If the
 //! spring would need more energy to stand straight than it has, it falls over: wrench and energy fade together, by an
-//! equal part in each step, and the spring carries nothing until it is lifted. The lost energy is dissipated.
+//! equal part in each step, and the spring has no load until it is lifted. The lost energy is dissipated.
 //!
 //! A tick in which the base slides ends where rolling and sliding agree: the tilt of least energy at a pull equal to the friction
 //! limit, found by rolling and sliding in turns. If a tick begins with the base pulled off the ground, the base gives way along
@@ -217,7 +217,7 @@ impl Seat {
         }
     }
 
-    /// Changes the parameters at a tick boundary, with the tilt unchanged. Real-time: bounded, no allocation.
+    /// Sets the parameters at a tick boundary, with tilt, slide and fall unchanged. Real-time: bounded, no allocation.
     pub fn set_spring(&mut self, spring: &Spring, friction: Friction) {
         let Self { at, lifted, hold, .. } = *self;
         *self = Self { at, lifted, hold, ..Self::new(spring, friction) };
@@ -262,10 +262,10 @@ impl Seat {
 
     /// Advances the base by one tick and returns the wrench of the spring on the hand at `pose`.
     ///
-    /// Defined wherever the law is; zero with [`Validity::Ok`] for a lifted or fallen spring.
-    /// [`Validity::NotConverged`] while the base is moving, since its tilt per tick is bounded, and while the spring
-    /// falls over. Real-time: bounded, no allocation; two to three evaluations of the law while the base moves, one
-    /// while seated.
+    /// Defined at every pose at which the law is defined. A lifted or fallen spring has zero wrench with [`Validity::Ok`].
+    /// The validity is [`Validity::NotConverged`] while the base moves over several ticks, because its tilt per tick is bounded,
+    /// and while the spring falls over. Real-time: bounded, no allocation; two to three evaluations of the law while the base
+    /// moves, one while seated.
     pub fn step(&mut self, spring: &mut dyn HeldSpring, pose: &Pose, demand: Demand) -> Response {
         if !pose.is_valid() {
             return Response::none(Validity::InvalidInput);

@@ -19,11 +19,12 @@ use flotor_lanes::Real;
 use flotor_lanes::entire::EntireFunctions;
 use flotor_lanes::saturation::{Saturated, saturate_above};
 
-/// Argument `z` at which its saturation begins, below the pole at 9.87, where the column buckles. Here `G0 = 0.062` and
-/// the bow stiffness is -16 times that of the unloaded rod.
+/// Argument `z` above which the argument is saturated, below the pole at 9.87, where the column buckles. At this argument
+/// `G0 = 0.062`, and the bow stiffness is -16 times that of the unloaded rod.
 pub const KNEE: f64 = 8.75;
 
-/// Largest excess of the saturated `z`, which stays below 9.25 (`G0 = 0.033`, bow stiffness -30 times).
+/// Largest excess of the saturated `z` over [`KNEE`]: `z` stays below 9.25 (`G0 = 0.033`, bow stiffness -30 times that of the
+/// unloaded rod).
 pub const REACH: f64 = 0.5;
 
 /// Saturates the argument short of the pole.
@@ -32,8 +33,8 @@ pub(crate) fn saturated_argument<R: Real>(z: R) -> Saturated<R> {
     saturate_above(z, KNEE, REACH)
 }
 
-/// Returns the relative length at which the argument is `z`, the longer one of two; `None` if there is none. `load` is
-/// `gamma L0²/(4 alpha)`, `excess` is `1 - gamma/beta`.
+/// Returns the relative length at which the argument is `z`, the longer of two lengths; `None` if no length has this argument.
+/// `load` is `gamma L0²/(4 alpha)`, `excess` is `1 - gamma/beta`.
 pub(crate) fn relative_length(load: f64, excess: f64, z: f64) -> Option<f64> {
     // z = load p (1 - excess p) with p = 1 - L / L0, solved for the smaller p without cancellation.
     let discriminant = load * (load - 4.0 * excess * z);
@@ -48,7 +49,7 @@ pub(crate) struct Lean {
     pub(crate) slope: f64,
 }
 
-/// Both shapes of a rod at one length.
+/// Sway and bow shape of a rod at one length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shape {
     z: f64,
@@ -71,8 +72,8 @@ impl Shape {
             .then(|| rigidities.gamma_n * shortening_m * sheared_m / (4.0 * rigidities.alpha_n_m2))
     }
 
-    /// Computes the shapes at a given argument, which may have been moved away from a pole: they are those of a rod
-    /// with the corresponding bending rigidity, and still meet their end conditions.
+    /// Computes the shapes at an argument, which may be saturated: they are then the shapes of a rod with the corresponding
+    /// bending rigidity, and still meet their end conditions. `None` without shear stiffness.
     pub(crate) fn new(rigidities: &Rigidities, free_length_m: f64, length_m: f64, z: f64) -> Option<Self> {
         let true_z = Self::argument(rigidities, free_length_m, length_m)?;
         // Rigidities per current length, and s = 1 + P / beta.
@@ -91,7 +92,7 @@ impl Shape {
         Some(Self { z, g0, softening, cosine, parabola, shear })
     }
 
-    /// Returns the lean of the section at `u`, from -1/2 to 1/2: of the sway (`S`) and of the bow (`D`).
+    /// Returns the lean, per radian, of the section at `u` (-1/2 to 1/2 along the chord): of the sway (`S`) and of the bow (`D`).
     pub(crate) fn lean(&self, u: f64) -> [Lean; 2] {
         // `theta` of the module documentation and its derivative with respect to `u`.
         let square = u * u;

@@ -47,7 +47,7 @@ const PRINTED_PI: f64 = 3.14159265;
 const MM_PER_M: f64 = 1e3;
 const NM_PER_NMM: f64 = 1e-3;
 
-/// The printed law of one spring.
+/// Printed law of one spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thesis {
     constants: Constants,
@@ -60,8 +60,8 @@ enum Constants {
 }
 
 impl Thesis {
-    /// Prepares the law. The printed code derives its constants from the given one in every tick, always with the same
-    /// result. Real-time: bounded, no allocation.
+    /// Prepares the law: derives the constants, which the printed code derives again in every tick, with the same result.
+    /// Real-time: bounded, no allocation.
     #[must_use]
     pub fn new(spring: &Spring, stiffness: Stiffness, precision: Precision) -> Self {
         let (geometry, material) = (spring.geometry(), spring.material());
@@ -136,7 +136,7 @@ impl CFloat for f64 {
     }
 }
 
-/// The printed function with its parameters: mm, N, N·mm², the names of appendix A.
+/// Printed function with its parameters: mm, N, N·mm², the names of appendix A.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Printed<T> {
     free_length: T,

@@ -1,9 +1,9 @@
-//! Effects of a coiled wire that a straight rod lacks: twist under compression, and ends that pull beside the axis.
+//! Effects of a coiled wire that a straight rod lacks: twist under compression, and ends off the axis.
 //!
-//! The equivalent rod of [`crate::rigidity`] has the wire's stiffness along and about its axis and across it, but its
-//! axis is a straight line and its ends lie on it. A wire is clamped at its ends, at one point of the coil's
-//! circumference, and it climbs. So compression turns the upper plate, and the force goes through a point beside the
-//! plate's centre. Both effects are a few per cent of the torques, and are added here as the energy
+//! The equivalent rod of [`crate::rigidity`] has the wire's stiffness along, about and across its axis, but its axis is a
+//! straight line, with the ends of the rod on the axis. A wire is a helix, clamped at each end at one point of the coil's
+//! circumference. So compression turns the upper plate, and the line of the force passes beside the plate's centre. Both
+//! effects are a few per cent of the torques, and are added here as the energy
 //!
 //! ```text
 //! W = q.(K_wire - K_rod) q / 2 + Q z² w / L0²         q = (r, 2 v)
@@ -70,7 +70,8 @@ impl Wire {
         Self { difference, flattening_n_per_m }
     }
 
-    /// Returns the response of the rod at a pose, corrected for the wire. Real-time: bounded, no allocation.
+    /// Returns a response of the rod at a pose with the wrench and energy of the correction added. Real-time: bounded, no
+    /// allocation.
     pub fn added_to(&self, response: &Response, pose: &Pose, demand: Demand) -> Response {
         let q = pose.orientation;
         let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
@@ -139,7 +140,7 @@ struct Compliance {
 impl Compliance {
     const NONE: Self = Self { ff: DMat3::ZERO, fm: DMat3::ZERO, mm: DMat3::ZERO };
 
-    /// Returns the compliance of the whole wire: equal coils, each shifted down by its place, and the fraction of one at the top.
+    /// Returns the compliance of the whole wire: equal coils, each shifted down by its position, and a part of a coil at the top.
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // hundreds of coils
     fn of_wire(geometry: &Geometry, material: &Material) -> Self {
         let section = Section::new(geometry, material);

@@ -27,7 +27,7 @@ const ROUNDING: f64 = 0.05;
 /// Maximum number of steps of [`solve`]: each updates the set of touching sections, from the ends of the stretch inwards.
 const MOST_STEPS: u32 = 12;
 
-/// Contact between the coils.
+/// Choice between coils that pass through each other and coils that touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Coils {
     /// Coils pass through each other.
@@ -50,7 +50,7 @@ pub(crate) struct Contact {
 }
 
 impl Contact {
-    /// Prepares the contact; `unit_n` is `alpha/L0²`.
+    /// Prepares the contact of a spring; `unit_n` is `alpha/L0²`.
     pub(crate) fn new(spring: &Spring, unit_n: f64) -> Self {
         let geometry = spring.geometry();
         let compliance = unit_n / spring.rigidities().gamma_n;

@@ -22,9 +22,9 @@ use crate::response::Demand;
 use crate::rigidity::Spring;
 use flotor_lanes::matrix::{Factored, added, dot, length, product};
 
-/// Largest change of shape in a tick that reaches no equilibrium, as the root mean square slope of `p`; in one that
-/// does, largest change beyond the prediction from the plates' motion. A full bulge has about 3. Smaller than 0.1 by
-/// the second-order effect of a bulge's lean on its torque.
+/// Largest change of shape in a tick that reaches no equilibrium, as the root mean square slope of `p`. In a tick that reaches
+/// one: largest change beyond the prediction from the plates' motion. A full bulge has about 3. The limit is smaller than 0.1
+/// by the second-order effect of a bulge's lean on its torque.
 const LONGEST_WAY: f64 = 0.097;
 /// Largest step of a search of which only the result is felt.
 const LONGEST_UNFELT_STEP: f64 = 0.4;
@@ -121,11 +121,11 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
 /// Reproducible in tests, unlike the time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Evaluations of energy and slope.
+    /// Number of evaluations of energy and slope.
     pub evaluations: u32,
-    /// Matrices of second derivatives.
+    /// Number of computed matrices of second derivatives.
     pub matrices: u32,
-    /// Factorisations of a matrix.
+    /// Number of factorisations of a matrix.
     pub factorings: u32,
 }
 
@@ -136,7 +136,7 @@ impl Work {
         self.evaluations + 9 * self.matrices + 3 * self.factorings
     }
 
-    /// Returns the sum of both costs.
+    /// Returns the sum of two costs.
     fn and(self, other: &Self) -> Self {
         Self {
             evaluations: self.evaluations + other.evaluations,
@@ -223,7 +223,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         (self.shape, self.damping) = (*shape, LEAST_DAMPING);
     }
 
-    /// Changes the rod, with the shape unchanged. Real-time: bounded, no allocation.
+    /// Sets the rigidity ratios of the rod, with the shape unchanged. Real-time: bounded, no allocation.
     pub(crate) fn set_ratios(&mut self, ratios: Ratios) {
         self.functional.set_ratios(ratios);
         self.matrix.steps_left = 0;
@@ -249,7 +249,8 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         Curve::new(&self.functional, &self.shape, self.history.plate())
     }
 
-    /// Runs one tick. Real-time: bounded, no allocation.
+    /// Advances the shape by one tick towards the equilibrium at `plate`, and stores the history. Real-time: bounded, no
+    /// allocation.
     pub(crate) fn advance(&mut self, plate: &Plate, demand: Demand) -> Outcome {
         let before = self.shape;
         self.work = Work::default();
@@ -277,7 +278,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         &self.functional.ratios
     }
 
-    /// Continues from an equilibrium of another search. Real-time: bounded, no allocation.
+    /// Adopts the equilibrium of another search as shape and history. Real-time: bounded, no allocation.
     pub(crate) fn settle(&mut self, plate: &Plate, found: &Found<N>) -> Outcome {
         self.work = Work { evaluations: found.energies, ..Work::default() };
         self.history.restart(plate, &found.shape);

@@ -75,10 +75,10 @@ pub(crate) struct Value<const N: usize, const Q: usize> {
     pub(crate) slope: Shape<N>,
     /// Derivatives with respect to the lean of the upper plate.
     pub(crate) by_lean: DVec2,
-    /// The derivatives with respect to the upper plate's displacement and turn are force and torsion.
+    /// Load of the sections; its force and torsion are the derivatives with respect to displacement and turn of the upper plate.
     pub(crate) load: Load,
     compliance: DMat3,
-    /// The sections that touch, and their contact.
+    /// Set of touching sections.
     pub(crate) touching: Touching,
     contact: Option<Contact>,
     sections: Sections<Q>,
@@ -121,12 +121,12 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         Self { basis: Basis::new(), ratios }
     }
 
-    /// Returns the polynomials of the shapes.
+    /// Returns the polynomial basis of the shapes.
     pub(crate) fn basis(&self) -> &Basis<K, Q> {
         &self.basis
     }
 
-    /// Changes the rod. Real-time: bounded, no allocation.
+    /// Sets the rigidity ratios of the rod. Real-time: bounded, no allocation.
     pub(crate) fn set_ratios(&mut self, ratios: Ratios) {
         self.ratios = ratios;
     }
@@ -140,7 +140,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
         2.0 * plate_moved / (PI * PI * axial_compliance) + 4.0 * shape_moved
     }
 
-    /// Returns energy, load and slope. Real-time: bounded, no allocation.
+    /// Returns the energy of a shape between plates, with load and first derivatives. Real-time: bounded, no allocation.
     #[inline(always)]
     pub(crate) fn value(&self, shape: &Shape<N>, plate: &Plate) -> Value<N, Q> {
         let sections = self.sections(shape, plate);

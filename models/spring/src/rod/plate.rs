@@ -69,7 +69,7 @@ impl Plate {
         sum
     }
 
-    /// Returns the distance of two poses, in free lengths and half radians.
+    /// Returns the distance between two poses, in free lengths and half radians.
     #[inline]
     pub(crate) fn distance(&self, other: &Self) -> f64 {
         let turn_rad = self.turn_rad - other.turn_rad;

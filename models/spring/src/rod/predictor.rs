@@ -54,7 +54,7 @@ impl<const N: usize> History<N> {
         self.length = DEPTH.min(self.length + 1);
     }
 
-    /// Returns the expected shape at a pose. Real-time: bounded, no allocation.
+    /// Predicts the shape at a pose by extrapolation from the last ticks. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn predict(&self, plate: &Plate) -> Shape<N> {
         let (mut best, mut least) = (&WEIGHTS[0], plate.distance(&self.plates[0]));

@@ -18,12 +18,13 @@ const LONGEST_SLIDE: f64 = 0.05;
 /// Friction between the base and the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Friction {
-    /// Ratio of the force along the ground to that onto the ground at which the base slides; for more than `D/L0`, see [`crate::seat`].
+    /// Coefficient of friction: ratio of the force along the ground to the force onto the ground at which the base slides; above
+    /// `D/L0`, see [`crate::seat`].
     pub coefficient: f64,
 }
 
 impl Friction {
-    /// Friction at which hardly any base slides.
+    /// Coefficient at which a base hardly ever slides.
     pub const STICKING: Self = Self { coefficient: 10.0 };
 }
 
