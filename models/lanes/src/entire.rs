@@ -13,8 +13,8 @@
 //! | `G2` | `15 ((3 - x²) sin x - 3 x cos x) / x⁵` | `1 - z/14 + ...` |
 //!
 //! They are the spherical Bessel functions scaled to one at zero, `Gn = (2n+1)!! jn(x) / xⁿ` (Abramowitz and
-//! Stegun, 10.1), so that neighbours are tied by recurrences, `C0 = G0 - z G1 / 3`, `G0 = G1 - z G2 / 15`, and
-//! derivatives are neighbours too, `dG0/dz = -G1 / 6`, `dG1/dz = -G2 / 10`.
+//! Stegun, 10.1). Recurrences relate successive functions, `C0 = G0 - z G1 / 3`, `G0 = G1 - z G2 / 15`, and give the
+//! derivatives, `dG0/dz = -G1 / 6`, `dG1/dz = -G2 / 10`.
 //!
 //! Evaluation: power series of `G1` and `G2` at `z / 16`, recurrences for `G0` and `C0`, then two angle doublings.
 
