@@ -22,7 +22,7 @@ const REACH_M: f64 = 1.0;
 
 const KINDS: Choices = choices!["felt", "exerted"];
 
-/// Kind of a load: force without or with an action of the hand.
+/// Kind of a load: weight or resistance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Weight: pulls down at every height.
