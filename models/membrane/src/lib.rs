@@ -1,7 +1,7 @@
 //! Membrane of masses and springs, touched with a ball.
 //!
 //! The masses are linked by springs that pull and push along the line between their ends. The handle is a ball that
-//! pushes the masses out of itself; the force on it is the sum of their reactions:
+//! pushes the masses out of its volume; the force on the ball is the sum of the reactions of the masses:
 //!
 //! ```text
 //! m a = sum k (1 - l0 / |d|) d  +  m g  -  m c v  +  contact,      F = - sum contact

@@ -35,7 +35,7 @@ pub struct Sheet {
     pub nodes_per_side: usize,
     /// Length of a side, m.
     pub side_m: f64,
-    /// Mass of the whole sheet, kg; each free mass has that of one cell.
+    /// Mass of the whole sheet, kg; each free mass has the mass of one cell.
     pub mass_kg: f64,
     /// Stiffness of a spring, N/m.
     pub stiffness_n_per_m: f64,
