@@ -55,9 +55,9 @@ pub enum TouchedBody {
 pub struct Atlas {
     /// Radius of the sphere, m.
     pub radius_m: f64,
-    /// `8/15 E* sqrt(R)`, J/m^(5/2).
+    /// Factor `8/15 E* sqrt(R)` of Hertz's energy, J/m^(5/2).
     pub hertz: f64,
-    /// `h` over `sqrt(d / R)`.
+    /// Correction `h` of Hertz's energy, a function of `sqrt(d / R)`.
     pub profile: Curve,
     /// Depth at which the stiffness starts to fall to zero, over a tenth of the radius, m.
     pub deepest_m: f64,
@@ -300,7 +300,7 @@ fn ease(x: Jet, knee: f64, width: f64) -> Jet {
     }
 }
 
-/// Limits a number to `end`, bent over `width` before `end` and as much behind it.
+/// Limits a number smoothly to `end`: the transition extends from `width` below `end` to `width` above it.
 pub(crate) fn ease_at(x: Jet, end: f64, width: f64) -> Jet {
     let eased = ease(x, end - width, width);
     // Rounding errors must not leave the table.

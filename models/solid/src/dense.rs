@@ -11,7 +11,7 @@ const TILE: usize = 4;
 /// Error for a pivot that is not positive: the matrix is not positive definite.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotPositive {
-    /// Index of the pivot.
+    /// Index of the pivot, from 0.
     pub pivot: usize,
 }
 

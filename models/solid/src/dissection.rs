@@ -146,8 +146,8 @@ impl Stiffness {
         Ok(Self { fronts, unknowns: 3 * nodes, fixed })
     }
 
-    /// Solves for `columns` right-hand sides at once, in place: forces, N, are replaced by displacements, m; all
-    /// columns of an unknown lie side by side. Fixed unknowns return as zero. Not real-time.
+    /// Solves for `columns` right-hand sides at once, in place: replaces forces, N, by displacements, m. The values of an
+    /// unknown in all right-hand sides are adjacent in memory. Fixed unknowns become zero. Not real-time.
     pub fn solve(&self, values: &mut [f64], columns: usize) {
         for (node, fixed) in self.fixed.iter().enumerate() {
             for (component, _) in fixed.iter().enumerate().filter(|(_, fixed)| **fixed) {

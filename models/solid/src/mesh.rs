@@ -54,7 +54,7 @@ pub struct Mesh {
     pub free: Vec<Facet>,
 }
 
-/// Defect of a mesh.
+/// Reason why a mesh is invalid.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeshError {
     /// No element has a volume.
@@ -97,7 +97,7 @@ pub enum MeshError {
     },
     /// A part of the body is not connected to the fixed surface.
     Loose {
-        /// Number of one of its elements.
+        /// Number of an element of the part.
         tag: usize,
     },
     /// The fixed and the touched surface share nodes.

@@ -1,10 +1,10 @@
-//! Parameters of the solid: schema, words of the choices, and values.
+//! Parameters of the solid: schema, names of the choices, and values.
 
 use crate::prepare::Resolution;
 use crate::punch::Bond;
 use flotor_hal::{Choices, Parameter, Settings, choices};
 
-/// Declares the values of a choice with their words, in the order of the schema.
+/// Declares the values of a choice with their names, in the order of the schema.
 macro_rules! choice {
     ($(#[$doc:meta])* $name:ident { $($value:ident = $word:literal),+ $(,)? }) => {
         $(#[$doc])*

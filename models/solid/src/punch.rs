@@ -1,7 +1,7 @@
 //! Flat rigid punch on a half-space or a block: uniform tractions on cells of the contact, refined towards the rim.
 //!
-//! The traction under a rigid punch is singular at its rim, like one over the square root of the distance; the cells shrink
-//! with the square of the distance to resolve that. The displacement at the cells' centres is that of the half-space
+//! The traction under a rigid punch is singular at its rim, as the inverse square root of the distance; the cells shrink
+//! with the square of the distance to resolve this. The displacement at the cells' centres is that of the half-space
 //! under uniform tractions, in closed form, plus that of the block's remainder, which is smooth.
 
 use crate::dense::{self, NotPositive};

@@ -9,10 +9,10 @@
 //! F_i = -dE_i/dz (c_i + w_i z),   w_i = sum_j C_ij F_j,   W = sum_i E_i(c_i + w_i z) + 1/2 sum_ij C_ij F_i F_j
 //! ```
 //!
-//! `W` is stationary in the forces, so its gradient at the centres is that of `E` at the lowered places and that of
-//! `C`: the force has a potential for any set of spheres in contact. The forces are one active set over all contacts:
-//! without contact `E` and its force are zero. The secant method solves for them in at most sixty steps, from the same
-//! start in every tick, so that the result is independent of the path.
+//! `W` is stationary in the forces, so its gradient with respect to the centres has only the parts of `E` at the lowered
+//! positions and of `C`: the force has a potential for any set of spheres in contact. A sphere without contact has zero `E` and
+//! force, so no search for the set of contacts is needed. The secant method solves for the forces in at most sixty steps, from
+//! the same start in every tick, so that the result is independent of the path.
 //!
 //! At an edge, and deeper than a solid of small strains is valid, the vertical force of `E` falls as a sphere goes down, and several
 //! solutions would exist. The lowered law is therefore that of the top face alone, `T` ([`Atlas::top`]), whose force grows with the
