@@ -1,10 +1,10 @@
 //! Vectorised evaluation of many independent poses, for sweeps and tables.
 //!
-//! Poses are stored one after the other; a vector register needs the same component of several poses. So as many poses
-//! as two registers have lanes are read, half a pose per register, and transposed inside the registers, four by four,
-//! into one register per component; the law runs over these; and the outputs are transposed back and written, in one
-//! pass without intermediate memory. The law is the very code of the servo, over [`Wide`] instead of `f64`: the
-//! results, and the status of every pose, are those of single steps, *bit for bit*.
+//! Poses are stored one after the other, but a vector register needs the same component of several poses. So a batch reads
+//! as many poses as two registers have lanes and transposes their numbers inside the registers, four by four, into one
+//! register per component. The law runs over these registers; its outputs are transposed back and written, in one pass
+//! without intermediate memory. The law is the code of the servo, over [`Wide`] instead of `f64`: the results, and the status
+//! of every pose, equal those of single steps *bit for bit*.
 //!
 //! The instruction set is detected when the [`Batch`] is created (AVX-512, AVX2, NEON, or scalar).
 
@@ -65,7 +65,7 @@ impl Batch {
     }
 }
 
-/// A law at a multiple of [`MOST_LANES`] poses, with as many outputs.
+/// Law at a multiple of [`MOST_LANES`] poses, with as many outputs.
 struct Rows<'a, L> {
     law: &'a L,
     inputs: &'a [Input],

@@ -6,7 +6,7 @@
 //! - **sway**, both ends turned alike: an S shape, stiffness `a + b`, in equilibrium with a transverse force;
 //! - **bow**, ends turned against each other: a C shape, stiffness `a - b`, in pure bending.
 //!
-//! Axial compression softens both, to zero (the rod buckles in a C) and beyond, as given by the *stability functions*
+//! Axial compression reduces both stiffnesses, to zero (the rod buckles in a C) and below, as given by the *stability functions*
 //! of column theory ([`flotor_lanes::stability`]), quotients of the entire functions of [`flotor_lanes::entire`] in
 //! `z = (q L)² / 4`, with the thesis's buckling factor `q` (equation 19).
 

@@ -2,8 +2,8 @@
 //!
 //! The thesis solves the linear beam-column in the two vertical planes separately, adds the axial force, and
 //! turns each planar result from the chord back to the plates, first in one plane and then in the other
-//! (section 3.2, appendix A). Its code switches formulas at the free length, returns NaN at rest and jumps at a
-//! buckling point that is not there. [`ClosedForm`] evaluates the same law through entire functions: one smooth
+//! (section 3.2, appendix A). Its code switches formulas at the free length, returns NaN at rest and jumps at a length at
+//! which the rod does not buckle. [`ClosedForm`] evaluates the same law through entire functions: one smooth
 //! expression for compression, rest and elongation.
 //!
 //! [`Form::Printed`] reproduces the source, errors included: rigidities per unloaded length and the sum `M_U + M_L` as

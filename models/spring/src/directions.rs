@@ -114,7 +114,7 @@ pub(crate) struct Directions {
     pub(crate) twist: [f64; 2],
 }
 
-/// Derivatives of a function of [`Directions`], as sums over its terms.
+/// Derivatives of a function with respect to the variables of [`Directions`].
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Slopes {
     pub(crate) by_sway: DVec3,

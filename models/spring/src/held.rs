@@ -50,7 +50,7 @@ impl HeldSpring for EnergyForm {
 pub struct Held<L> {
     /// Law without the effects.
     pub law: L,
-    /// Contact of the coils; `None` if they may pass through each other, or the law has contact of its own.
+    /// Contact of the coils; `None` for coils that pass through each other, and for a law with contact of its own.
     pub contact: Option<AxialContact>,
     /// Twist and off-axis ends of the wire; `None` for a law without these effects.
     pub wire: Option<Wire>,

@@ -12,7 +12,7 @@
 //! ```
 //!
 //! (`<>` is the mean along the rod). With `n = e cos|theta| + theta sin|theta| / |theta|`, `p = 1 - L/L0`,
-//! `c = 1 - gamma/beta`, `sigma = 1 - c p`, and a bar for `|theta|²`, fourth order collects to
+//! `c = 1 - gamma/beta`, `sigma = 1 - c p`, and a bar for `|theta|²`, the terms of fourth order are
 //!
 //! ```text
 //! W4 = L0/2 ( gamma (sigma - 1/2)² <bar>² + gamma p (1/12 - (1 - sigma)/3) <bar²>

@@ -75,7 +75,7 @@ pub(crate) struct RemainderEnergy {
     pub(crate) gradient: Gradient,
 }
 
-/// The terms beside `u³`: values of `u`, `1/S²` and of the factors of `c3` to `c6`.
+/// Terms in addition to `u³`: values of `u`, `1/S²` and of the factors of `c3` to `c6`.
 struct Terms {
     u: f64,
     inverse: f64,

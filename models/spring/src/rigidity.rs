@@ -8,7 +8,7 @@
 
 use std::fmt;
 
-/// Shape of the unloaded spring.
+/// Dimensions of the unloaded spring.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
     /// Distance between the end plates without load (m), `L0`.
@@ -153,7 +153,7 @@ impl Spring {
         Self { geometry, material, rigidities: Rigidities::derive(stiffness, &geometry, &material) }
     }
 
-    /// Returns the shape of the unloaded spring.
+    /// Returns the dimensions of the unloaded spring.
     #[must_use]
     pub fn geometry(&self) -> &Geometry {
         &self.geometry
@@ -265,7 +265,9 @@ pub enum ParameterError {
 impl fmt::Display for ParameterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotFinite { quantity } => write!(f, "the {quantity} must be finite, but is NaN or infinite"),
+            Self::NotFinite { quantity } => {
+                write!(f, "the {quantity} must be finite, but is NaN or infinite")
+            }
             Self::NotPositive { quantity, value } => {
                 write!(f, "the {quantity} must be positive, but is {value:e} in SI units")
             }

@@ -17,9 +17,9 @@
 //! - `descent`: fast search for the equilibrium of a pose without a history, from the straight `column`;
 //!   `search_energy`: the energy of this search.
 //!
-//! Shear, stretch and twist follow in closed form from the directions of the sections, two numbers each. So ten
-//! polynomials leave an error below a micronewton before buckling, twenty-eight leave rounding, and the matrix of
-//! Newton's method also distinguishes a stable equilibrium from an unstable one. The answer depends on the history only
+//! Shear, stretch and twist follow in closed form from the directions of the sections, two numbers each. So with ten
+//! polynomials the error before buckling is below a micronewton, with twenty-eight polynomials it is rounding, and the matrix
+//! of Newton's method also distinguishes a stable equilibrium from an unstable one. The response depends on the history only
 //! where there are several stable equilibria.
 //!
 //! Sources: Haringx, *On highly compressible helical springs and rubber rods* (1948); Simo, *A finite strain
@@ -104,7 +104,7 @@ const TO_ROUNDING: Effort = Effort {
     most_matrices: 6,
     matrix_life: 8,
     tolerance: 1e-13,
-    // A step costs a ninth of a matrix: better several with an old one, as long as they contract.
+    // A step costs a ninth of a matrix: several steps with an old matrix are better while they contract.
     renewal: 1e-3,
 };
 

@@ -215,7 +215,7 @@ impl RodBlend {
     }
 }
 
-/// The law `energy` with its remainder at a pose.
+/// Law `energy` with its remainder at a pose.
 #[derive(Clone, Copy)]
 struct Corrected<'a> {
     energy: &'a EnergyForm,

@@ -274,7 +274,7 @@ impl RodWeight {
         }
         let by_error = by_error(bound);
         let by_argument = nearness(at.argument);
-        // 1 minus the product of the weights that error and argument leave to the law.
+        // 1 minus the product of the weights of the law from the error and from the argument.
         let left = [1.0 - by_error.value, 1.0 - by_argument.value];
         let wanted = 1.0 - left[0] * left[1];
         let m = at.magnification;

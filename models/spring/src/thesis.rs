@@ -3,9 +3,9 @@
 //! This is `springControl()` of the thesis's appendix A, expression by expression: the four modes of `change`,
 //! three branches (buckled, elongation, compression), the window of 1e-4 mm around the free length, the buckling
 //! rule of section 3.2 (from `L <= L_buckling` on a tenth of the vertical force and nothing else), and the sum
-//! `M_U + M_L` with the printed signs. Of what the appendix prints, the rest belongs elsewhere and is left out:
-//! calibration polynomial, feed-forward and damping to the device, boundary and angle limits to the host, the
-//! scaling of device travel to the free length to the scene's mapping. The law starts from simulation coordinates.
+//! `M_U + M_L` with the printed signs. The other parts of the appendix are not in this law: the device has calibration
+//! polynomial, feed-forward and damping, the host has the limits of position and angle, and the scene's mapping has the scaling
+//! of device travel to the free length. The law starts from simulation coordinates.
 //!
 //! The printed code works in millimetres, and so does this module inside; its names are the thesis's. Poses come
 //! in and wrenches go out in the model frame: X, Z, Y are x, y, z; `fwpos[3]` and `fwpos[4]` are `-rx` and `-ry`,

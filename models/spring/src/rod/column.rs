@@ -68,7 +68,7 @@ impl Ends {
 }
 
 impl<S: Simd> Column<S> {
-    /// Solves for the coefficients.
+    /// Solves the system of the column for the right-hand side `right`.
     #[inline(always)]
     pub(super) fn solve(&self, right: &Fours<S>) -> Fours<S> {
         let mut x = *right;

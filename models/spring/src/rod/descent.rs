@@ -4,7 +4,7 @@
 //! second derivatives of the column are known. A quasi-Newton method (BFGS) starts from these and takes the effect of the angles
 //! from the slopes: each step adds a matrix of rank two to the inverse of the curvature. This matrix is stored as two vectors, so
 //! that all products with a slope can be formed at once, whereas the two loops of L-BFGS form one after the other. Each step
-//! costs one energy ([`super::search_energy`]); seven to ten of them reach the equilibrium.
+//! needs one evaluation of the energy ([`super::search_energy`]); seven to ten steps reach the equilibrium.
 //!
 //! Source: Nocedal and Wright, *Numerical Optimization*, 6.1 (BFGS).
 
@@ -15,7 +15,7 @@ use super::functional::{Ratios, Reading, Shape};
 use super::plate::Plate;
 use super::search_energy::{COEFFICIENTS, FOURS, Four, Fours, SearchEnergy, dot, four, in_order, numbers};
 
-/// Maximum number of energies per search; a longer search is left to Newton's method.
+/// Maximum number of energies per search; Newton's method continues a longer search.
 const MOST_ENERGIES: usize = 24;
 /// Maximum size of the last step, and of the error after it: about the square of the step over the step before.
 const LAST_STEP: f64 = 1e-8;

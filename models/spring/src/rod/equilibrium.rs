@@ -1,9 +1,9 @@
 //! Stable equilibrium of the rod, followed from tick to tick.
 //!
-//! Newton's method on the slope of the energy. Its matrix is reused for some ticks; the loss of accuracy is estimated
-//! at every step, see [`Effort`]. Where the matrix has a negative eigenvalue the shape is no minimum: the rod has
-//! buckled, or its branch has ended. From there the shape slides down the energy in a damped flow, a bounded distance
-//! per tick, so that the force changes fast but never jumps. Only a stable equilibrium is reported as one.
+//! Newton's method finds a zero of the slope of the energy. Its matrix is reused for some ticks; the loss of accuracy is
+//! estimated at every step, see [`Effort`]. Where the matrix has a negative eigenvalue the shape is no minimum: the rod has
+//! buckled, or its branch has ended. From there the shape moves to lower energy in a damped flow, a bounded distance per tick,
+//! so that the force changes fast but never jumps. Only a stable equilibrium counts as converged.
 //!
 //! Sources: Deuflhard, *Newton Methods for Nonlinear Problems* (2011), 2.1 (kept matrix) and 6.4
 //! (pseudo-transient continuation, the damped flow); Morse index by inertia, see [`flotor_lanes::matrix`].
@@ -63,8 +63,8 @@ const KINK: f64 = 1.0e-3;
 pub(crate) struct Effort {
     /// Maximum number of Newton steps per tick.
     pub(crate) most_steps: u32,
-    /// Maximum number of matrices computed per tick: each costs as much as nine steps. A tick that needs one more
-    /// leaves it to the next.
+    /// Maximum number of matrices computed per tick: each costs as much as nine steps. If a tick needs one more matrix, the next
+    /// tick computes it.
     pub(crate) most_matrices: u32,
     /// Number of steps for which a matrix is used.
     pub(crate) matrix_life: u32,
@@ -264,7 +264,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
             // from the last shape.
             self.shape = before;
             let work = std::mem::take(&mut self.work);
-            // If there is no time for this search, the next tick does it.
+            // If there is no time for this search, the next tick searches.
             let has_time = work.and(&work).cost() <= MOST_COST;
             outcome = if has_time { self.search(plate, demand) } else { self.moving(plate) };
             self.work = work.and(&self.work);

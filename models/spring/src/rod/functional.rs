@@ -40,7 +40,7 @@ pub(crate) struct Ratios {
     pub(super) softening: f64,
     /// `tau / alpha`
     pub(super) torsion: f64,
-    /// Contact of the coils; `None` lets them pass through each other.
+    /// Contact of the coils; `None` for coils that pass through each other.
     pub(super) contact: Option<Contact>,
 }
 
@@ -303,7 +303,7 @@ fn add_products<const M: usize>(sum: &mut [f64; M], vector: &[f64; M], factor: f
     }
 }
 
-/// Joins both components one after the other.
+/// Concatenates the coefficients of both components.
 #[inline(always)]
 pub(super) fn joined<const K: usize, const N: usize>(x: &[f64; K], y: &[f64; K]) -> Shape<N> {
     let mut shape = [0.0; N];
