@@ -1,8 +1,13 @@
 //! Errors of commands, and their exit codes.
 //!
-//! Exit codes are a contract: 0 success, 2 invalid usage or configuration, 3 a plugin was refused or failed, 4 device fault or
-//! emergency stop, 1 any other error; 130 after the third signal that requests an end, or after the first signal if no device has
-//! been energised.
+//! Exit codes are a contract:
+//!
+//! - 0: success
+//! - 1: any other error
+//! - 2: invalid usage or configuration
+//! - 3: a plugin was refused or failed
+//! - 4: device fault, or a run that ended by an emergency stop, the watchdog, oscillation or a device that paces the loop too fast
+//! - 130 ([`INTERRUPTED`](crate::INTERRUPTED), on Windows another code): forced end, see [`stopping`](crate::stopping)
 
 use flotor_hal::Fault;
 use flotor_hal::abi::loader::LoadError;
@@ -22,7 +27,7 @@ pub enum CommandError {
     /// A run could not start or be carried out.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// A device faulted; for commands without path and message of the device.
+    /// A device faulted; for commands that know neither the path of the device plugin nor the message of the device.
     #[error("device fault: {}", .0.advice())]
     DeviceFault(Fault),
     /// A device faulted, with its path and message.
@@ -35,7 +40,7 @@ pub enum CommandError {
         /// Message of the device; may be empty.
         words: String,
     },
-    /// A run ended, not in order.
+    /// A run ended abnormally, for a cause without an error of its own.
     #[error("{}", ended(*.0))]
     RunEnded(RunEnd),
     /// The device sets the pace, at a rate above the loop rate of the scene.
@@ -57,12 +62,12 @@ pub enum CommandError {
     File {
         /// Path of the file.
         path: PathBuf,
-        /// Failed action.
+        /// Text about the failed action, such as "cannot write the result".
         action: &'static str,
         /// Error of the system.
         cause: std::io::Error,
     },
-    /// A recording could not be written or read.
+    /// A recording could not be created or written.
     #[error(transparent)]
     Record(#[from] RecordError),
     /// A recording could not be read.
@@ -86,13 +91,13 @@ impl From<LoadError> for CommandError {
 }
 
 impl CommandError {
-    /// Creates the error of a file that could not be written or read.
+    /// Creates the error of a file that could not be written or read; `action` is the text about the failed action.
     #[must_use]
     pub fn file(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
         Self::File { path: path.into(), action, cause }
     }
 
-    /// Creates the error of a run with this end, not in order; `rate_hz` is the loop rate of its scene.
+    /// Creates the error of a run that ended abnormally; `rate_hz` is the loop rate of its scene.
     #[must_use]
     pub fn run_ended(end: RunEnd, rate_hz: f64) -> Self {
         match end {

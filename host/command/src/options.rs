@@ -28,7 +28,7 @@ pub fn arguments<T: Parser>() -> T {
     if let Some(bytes) = crate::platform::stack_limit_bytes().filter(|bytes| *bytes < LEAST_STACK_BYTES) {
         let (has, least) = (bytes >> 10, LEAST_STACK_BYTES >> 10);
         crate::print_error_line(format_args!(
-            "error: a stack of {has} kB is too small: allow {least} kB and more, `ulimit -s 8192`"
+            "error: the stack limit of {has} kB is too small; raise the limit to at least {least} kB, for example with `ulimit -s 8192`"
         ));
         std::process::exit(2);
     }
@@ -97,14 +97,15 @@ impl SceneOptions {
         if self.allow_strong { Strength::Strong } else { Strength::UnderCeiling }
     }
 
-    /// Adds the plugin folders and the consent to a shared control group to a scene.
+    /// Inserts the given plugin folders before the plugin folders of a scene, and sets the scene's consent to a shared control
+    /// group if it was given on the command line.
     pub fn apply(&self, scene: &mut Scene) {
         self.plugin_path.put_before_those_of(scene);
         self.control_group.apply(&mut scene.limits);
     }
 }
 
-/// Options of each command that lends a device to programs of other makers' interfaces.
+/// Options of each command that lends a device to programs written for another maker's interface.
 #[derive(Args, Clone, Debug, Default)]
 pub struct LendOptions {
     /// Record every tick to an MCAP file
@@ -213,7 +214,7 @@ pub struct PluginResultOptions {
     pub plugin_path: PluginPathOption,
 }
 
-/// Parses a duration in seconds from `10`, `10s`, `500ms`, `2min` or `1h`.
+/// Parses a duration such as `10`, `10s`, `500ms`, `2min` or `1h`, and returns it in seconds; a number without unit is in seconds.
 ///
 /// # Errors
 /// If the text is not a duration from 0 to 1 year.
@@ -336,7 +337,7 @@ fn file_of(text: &str, kind: &str) -> Result<Option<PathBuf>, String> {
     Ok(file.extension().is_none_or(|extension| extension.eq_ignore_ascii_case(kind)).then_some(file))
 }
 
-/// Parses a number, such as a fraction.
+/// Parses a floating-point number, without a check of its range: infinity and NaN are numbers, too.
 ///
 /// # Errors
 /// If the text is not a number.

@@ -116,7 +116,7 @@ pub fn first_error(results: impl IntoIterator<Item = Result<(), CommandError>>) 
 /// Writes a result as JSON to a file, `-` for standard output.
 ///
 /// # Errors
-/// If the file or standard output cannot be written.
+/// If the file or standard output cannot be written, or the value has no JSON form; a closed pipe is not an error.
 pub fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<(), CommandError> {
     let json =
         serde_json::to_string_pretty(value).map_err(|error| CommandError::Failed(error.to_string()))?;
@@ -130,7 +130,8 @@ pub fn write_json<T: serde::Serialize>(path: &Path, value: &T) -> Result<(), Com
 /// Writes a result as JSON if `json` is given (`-` for standard output), and prints it as text unless the JSON goes to standard output.
 ///
 /// # Errors
-/// If the file or standard output cannot be written.
+/// If the file or standard output cannot be written, or the value has no JSON form. If both outputs fail, the second error is
+/// printed.
 pub fn print_result<T: serde::Serialize>(
     json: Option<&Path>,
     value: &T,

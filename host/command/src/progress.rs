@@ -58,5 +58,5 @@ impl Drop for Redrawn {
     }
 }
 
-/// Interval between two frames of the spinner; shorter work shows none.
+/// Interval between two frames of the spinner.
 const SPINNER_STEP: Duration = Duration::from_millis(300);

@@ -38,7 +38,8 @@ impl SeparateProgram<'_> {
     /// Finds the executable and returns a command that starts it.
     ///
     /// # Errors
-    /// [`CommandError::Usage`] with the command line that builds the program, if the program is missing.
+    /// [`CommandError::Usage`] with the command line that builds the program, if the program is missing; [`CommandError::Failed`]
+    /// if the path of this program is unknown.
     pub fn command(&self) -> Result<Command, CommandError> {
         let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
         let (beside, own_build) = self.places(&own);

@@ -1,8 +1,8 @@
 //! Requests of a user to end a run: Ctrl-C for an orderly end; the space bar or `kill -USR1` for an emergency stop.
 //!
 //! If an orderly end takes too long, the user repeats the signal: the second signal is an emergency stop, the third ends the
-//! process. The process also ends if it is still running 5 s after the second signal. Before a device is energised, the first
-//! signal ends the process.
+//! process. The process also ends if it is still running 5 s after the second signal, or if a plugin call in the loop has lasted
+//! 1.5 s after a request. With [`stop_run_on_signals`], the first signal ends the process if no device has been energised yet.
 //!
 //! A dedicated thread waits for requests. On Linux these are signals, blocked in every other thread, so that a plugin that installs
 //! handlers or blocks signals cannot intercept them. On Windows they are events of the console, and Ctrl-Break is an emergency
@@ -42,7 +42,7 @@ enum First {
 
 /// Starts the thread that handles signals, and returns the stop switch that it operates: the first signal that requests an end
 /// (such as Ctrl-C) leads to an orderly end, the second to an emergency stop, the third ends the process; `SIGUSR1` leads to an
-/// emergency stop. To be called before other threads start.
+/// emergency stop. Call this function before other threads start.
 ///
 /// # Errors
 /// If the system cannot block the signals or start a thread.
@@ -59,7 +59,7 @@ pub fn stop_run_on_signals() -> Result<StopSwitch, CommandError> {
     take_signals(First::InOrderOnceEnergised)
 }
 
-/// Makes this process, which ends by itself, ignore all requests to end; prints a note if the system does not permit it.
+/// Blocks all requests to end for this process, which ends by itself; prints a note if the system does not permit this.
 pub fn outlive_signals() {
     if let Err(error) = outlive_requests() {
         note(format_args!("cannot block signals: {error}"));

@@ -4,7 +4,7 @@
 //! handlers are installed. The supervisor runs no plugin code. It forwards signals, and reports an error if the child ends without
 //! an end report of the host ([`flotor_servo::last_stop::report_end`]). If the supervisor is killed, the child is requested to end.
 //!
-//! On Windows the process is not divided.
+//! On Windows, and for process 1 of a container, the process is not divided.
 
 use crate::platform::{die_by, divide};
 use crate::{CommandError, exit_code_of, print_error_line, style};
@@ -46,8 +46,8 @@ pub(crate) enum End {
     Killed(i32),
 }
 
-/// Executes a command in a supervised child process (on Windows, in this process), and returns the exit code in both processes. To
-/// be called while the process has only one thread. Not real-time.
+/// Executes a command in a supervised child process (on Windows, and in process 1 of a container, in this process), and returns the
+/// exit code in both processes. Call this function while the process has only one thread. Not real-time.
 pub fn supervised(command: impl FnOnce() -> Result<(), CommandError>) -> ExitCode {
     match divide() {
         Ok(Side::Undivided) => exit_code_of(command()),

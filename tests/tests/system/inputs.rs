@@ -73,7 +73,7 @@ fn a_pipe_or_a_device_file_is_refused_in_place_of_every_input() {
 fn a_stack_that_is_too_small_is_refused_in_one_line() {
     let ran = Flotor::with(["plugins"]).through_shell("ulimit -s 256; exec \"$@\"").run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
-    assert!(ran.stderr.starts_with("error: a stack of 256 kB is too small"), "{}", ran.stderr);
+    assert!(ran.stderr.starts_with("error: the stack limit of 256 kB is too small"), "{}", ran.stderr);
     assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
 }
 

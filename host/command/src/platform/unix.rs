@@ -1,4 +1,4 @@
-//! Unix: signals, terminals, descriptors.
+//! Unix: signals, single-key terminal mode, redirection of standard output, and child processes.
 
 mod supervision;
 
@@ -41,7 +41,8 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
-    /// Blocks the signals in this thread and in all threads that it starts, to be received by [`Self::next`]. Not real-time.
+    /// Blocks the signals in this thread and in all threads that it starts, so that [`Self::next`] receives them. In a thread that
+    /// has unblocked the signals, a signal sets a flag of `stop` instead. Not real-time.
     ///
     /// # Errors
     /// Errors of the system.
@@ -65,7 +66,7 @@ impl Requests {
         Ok(Self { signals })
     }
 
-    /// Waits for the next request; `None` after `patience`. Not real-time.
+    /// Waits for the next request; `None` after the timeout `patience`. Not real-time.
     pub(crate) fn next(&self, patience: Duration) -> Option<Request> {
         let signal = wait_for_signal(&self.signals, patience)?;
         Some(if signal == SIGUSR1 { Request::Emergency } else { Request::End })
@@ -86,7 +87,7 @@ pub(crate) fn stack_limit_bytes() -> Option<u64> {
     getrlimit(Resource::Stack).current
 }
 
-/// Returns true if this process was started with a signal ignored.
+/// Returns true if this process ignores a signal.
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));

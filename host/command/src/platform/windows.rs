@@ -1,4 +1,4 @@
-//! Windows: events and modes of the console, handles.
+//! Windows: console events, single-key console mode, redirection of standard output, and child processes.
 #![allow(unsafe_code)] // calls of the console, and a function that it calls; tests/tests/system/architecture.rs lists it
 
 use super::request::Request;
@@ -45,7 +45,7 @@ pub(crate) fn die_by(_: i32) -> ! {
     std::process::exit(INTERRUPTED)
 }
 
-/// Exit code after a third request, when nothing else has ended the process: the same as of a program ended by Ctrl-C
+/// Exit code after a third request, when nothing else has ended the process: the code of a program ended by Ctrl-C
 /// (`STATUS_CONTROL_C_EXIT`).
 pub const INTERRUPTED: i32 = 0xc000_013a_u32.cast_signed();
 
@@ -72,7 +72,7 @@ impl Requests {
         Ok(Self { events })
     }
 
-    /// Waits for the next request; `None` after `patience`. Not real-time.
+    /// Waits for the next request; `None` after the timeout `patience`. Not real-time.
     pub(crate) fn next(&self, patience: Duration) -> Option<Request> {
         self.events.recv_timeout(patience).ok()
     }

@@ -45,7 +45,8 @@ pub(crate) fn accept_interrupts() {
 /// be killed together with a child of process 1. `flotor doctor` reports this.
 ///
 /// # Errors
-/// If the system cannot create the process or map the shared memory.
+/// If the system cannot map the shared memory or create the process; in the child, if the system cannot bind the child's life to
+/// the supervisor.
 pub(crate) fn divide() -> io::Result<Side> {
     if getpid() == Pid::INIT {
         return Ok(Side::Undivided);
