@@ -42,7 +42,8 @@ impl BoundaryWall {
         if self.surely_holds(state) { None } else { self.push_outside(state) }
     }
 
-    /// Returns true only for a pose inside; possibly false for a pose inside but close to the edge. Real-time: bounded, no allocation.
+    /// Returns true only for a pose inside, but not for all of these: the test overestimates a rotation by a factor of up to π/2,
+    /// and is false close to the edge. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn surely_holds(&self, state: &DeviceState) -> bool {
         // A rotation vector is the axis times the angle, and an angle is at most pi times the sine of half the angle.
@@ -161,7 +162,8 @@ impl Ellipsoid {
 /// Maximum number of Newton steps: four reach rounding accuracy within a tenth of a semi-axis, twelve at a hundred semi-axes.
 const MAX_STEPS: usize = 20;
 
-/// Finds the nearest point of the ellipsoid with the given squared semi-axes; `scaled` is the point `at` times the semi-axes.
+/// Returns distance and direction of the point `at` outside an ellipsoid; `squares`: squared semi-axes, `scaled`: `at` times the
+/// semi-axes.
 ///
 /// The nearest point is `a² p / (a² + t)` on each axis, where t makes `|a p / (a² + t)|` one (Eberly). The reciprocal of that
 /// length is concave in t, so Newton's method from t = 0 approaches from below, and takes one step on a sphere.

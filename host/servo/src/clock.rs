@@ -22,8 +22,9 @@ impl SpinWindow {
     /// Narrowest and widest window, ns: a narrower one absorbs no lateness, a wider one occupies the core.
     const BOUNDS_NS: [u64; 2] = [20_000, 250_000];
 
-    /// Measures the wake-up latency of the calling thread and returns a window of its 95th percentile plus a quarter, between 20
-    /// and 250 µs and at most half the period. Not real-time: some 30 ms. To be called on the loop thread, with its priority.
+    /// Measures the wake-up latency of the calling thread, and returns a spin window of 1.25 times the 95th percentile, clamped to
+    /// 20 to 250 µs and to at most half the period. Not real-time: takes about 30 ms. Call this function on the loop thread, at the
+    /// priority of the loop.
     #[must_use]
     pub fn measure(period_ns: u64) -> Self {
         let mut lateness_ns = [0; Self::SAMPLES];
@@ -96,9 +97,10 @@ const AHEAD_SHARE: u64 = 50;
 /// Result of a wait on the machine's clock.
 #[derive(Clone, Copy)]
 struct Woken {
-    /// Delay after the deadline of the first period that has not passed, ns.
+    /// Delay of the wake-up after the deadline of the tick to run, or after the expected arrival of the sample, ns; missed ticks do
+    /// not count.
     late_ns: u64,
-    /// Number of whole periods that had passed, or of unread samples.
+    /// Number of missed ticks: whole periods passed since the deadline, or samples not read before the newest sample.
     missed: u64,
 }
 

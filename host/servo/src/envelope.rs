@@ -1,6 +1,6 @@
 //! Safety envelope: the stages between models and device that every command passes.
 //!
-//! Order: guard (a number that is not finite becomes zero) -> gate (the start-up ramp and the other [states of the
+//! Order: guard (a wrench with a non-finite number becomes zero) -> gate (the start-up ramp and the other [states of the
 //! run](super::state)) -> velocity limit -> [boundary wall](super::boundary) -> force and torque limits -> [damping of an
 //! oscillation](flotor_core::oscillation) -> [passivity](super::passivity), and the limits once more if the controller has changed
 //! the wrench -> slew limit.
@@ -28,7 +28,7 @@ use slew::SlewLimit;
 pub struct StageEffect {
     /// Total time of the ticks in which the stage changed the wrench, ns.
     pub active_ns: u64,
-    /// Work of the change on the hand, J; negative: the stage removed energy.
+    /// Work done on the hand by the stage's change of the wrench, J; negative: the stage removed energy.
     pub work_j: f64,
 }
 
@@ -44,11 +44,13 @@ pub struct EnvelopeEffects {
 /// Safety envelope of one device: limits of force, torque, velocity and slew rate, boundary wall, damping of oscillations, and
 /// passivity controller.
 pub struct Envelope {
-    /// Limits of force and torque, N and N·m.
+    /// Limit of the force, N.
     force: Region,
+    /// Limit of the torque, N·m.
     torque: Region,
-    /// Velocity (m/s, rad/s) above which force components along it are scaled down.
+    /// Velocity above which the force component along the velocity is scaled down, m/s.
     velocity: Region,
+    /// Angular velocity above which the torque component along the angular velocity is scaled down, rad/s.
     spin: Region,
     slew: SlewLimit,
     wall: BoundaryWall,
@@ -92,13 +94,13 @@ impl Envelope {
         }
     }
 
-    /// Returns the largest force (N) and torque (N·m) that may reach the hand.
+    /// Returns the limits of force (N) and torque (N·m) at the hand: the tighter limits of scene and device.
     pub fn most(&self) -> [Bound; 2] {
         [self.force.bound(), self.torque.bound()]
     }
 
     /// Passes the requested wrench through all stages; returns the wrench to command, device frame, and adds the events of the
-    /// stages that acted. Also records the energy since the last sample: to be called once per tick. Real-time: bounded, no
+    /// stages that acted. Also records the energy since the last sample: call this function once per tick. Real-time: bounded, no
     /// allocation.
     #[inline]
     pub fn apply(

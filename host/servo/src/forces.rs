@@ -266,7 +266,7 @@ impl Forces {
     }
 
     /// Changes a live parameter of the current layer of the model numbered `model`; unsupported if there is no such model.
-    /// Real-time: bounded by its objects, no allocation.
+    /// Real-time: bounded by the model's objects, no allocation.
     pub fn set_parameter(&mut self, model: usize, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
         match self.stack_of(model) {
             Some((stack, place)) => stack.set_parameter(place, tick, parameter, value),
@@ -274,8 +274,8 @@ impl Forces {
         }
     }
 
-    /// Sets the target weight of the model numbered `model`, 0 to 1; the weight moves there at the model's fade rate. Real-time:
-    /// bounded, no allocation.
+    /// Sets the target weight of the model numbered `model`, 0 to 1, to which the weight moves at the model's fade rate;
+    /// unsupported if there is no such model. Real-time: bounded, no allocation.
     pub fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
         let Some(slot) = self.slot_of(model) else { return CallStatus::Unsupported };
         slot.set_weight(tick, weight);

@@ -1,4 +1,4 @@
-//! Guest mode: the loop runs in a library inside another program, which has its own signal handlers, memory and executable.
+//! Guest mode: the loop runs in a library inside a surrounding program, which has its own signal handlers, memory and executable.
 
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -8,9 +8,9 @@ use std::sync::atomic::{AtomicU8, Ordering};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Signals {
-    /// The other program handles all signals: the host installs no handler and restores none.
+    /// The surrounding program handles all signals: the host installs no handler and restores none.
     Program = 1,
-    /// Fatal signals stop the devices first; then the other program's handler runs, or the default action.
+    /// Fatal signals stop the devices first; then the surrounding program's handler runs, or the default action.
     StopFirst = 2,
 }
 
@@ -19,8 +19,8 @@ static GUEST: AtomicU8 = AtomicU8::new(0);
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
 /// Enters guest mode: the memory of this process is not locked, and its signals are handled as in `signals`. `program` is the
-/// `flotor` executable for the processes that a run starts, if one was found. To be called before the first session; later calls
-/// have no effect. Not real-time.
+/// `flotor` executable for the processes that a run starts, if one was found. Call this function before the first session; later
+/// calls have no effect. Not real-time.
 pub fn be_guest(signals: Signals, program: Option<PathBuf>) {
     if let Some(program) = program {
         let _ = PROGRAM.set(program);

@@ -6,8 +6,9 @@ use flotor_core::{MAX_DEVICES, PluginIndex};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering, fence};
 
-/// Time limit for a command in progress to complete, and poll interval meanwhile, ns.
+/// Time limit for a command in progress to complete, ns.
 const LONGEST_COMMAND_NS: u64 = 1_000_000;
+/// Poll interval while a command is in progress, ns.
 const COMMAND_LOOK_NS: u64 = 20_000;
 
 /// Code that the loop is running: host code, or a call of a plugin.
@@ -122,8 +123,8 @@ impl Heartbeat {
         self.shared.beat.store(tick << PLACE_BITS | place.code() & PLACE_MASK, Ordering::Release);
     }
 
-    /// Returns tick and code of the loop at the moment when the watchdog stopped the devices; `None` if it has not stopped them.
-    /// Real-time: bounded, no allocation.
+    /// Returns tick and running code of the loop when the watchdog stopped the devices; `None` if the watchdog has not stopped
+    /// them. Real-time: bounded, no allocation.
     #[inline]
     pub fn fired_at(&self) -> Option<Stuck> {
         match self.shared.fired.load(Ordering::Acquire) {
@@ -158,7 +159,7 @@ impl Heartbeat {
         self.shared.silenced.load(Ordering::Relaxed)
     }
 
-    /// Returns the current tick and code of the loop. Real-time: bounded, no allocation.
+    /// Returns the current tick and running code of the loop. Real-time: bounded, no allocation.
     #[must_use]
     pub fn now(&self) -> Stuck {
         Stuck::at(self.beat())
@@ -189,7 +190,7 @@ impl Heartbeat {
     }
 }
 
-/// Tick and code of a loop at one moment, for example when the watchdog found the loop stuck.
+/// Snapshot of a loop: current tick and running code, for example when the watchdog found the loop stuck.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stuck {
     /// Index of the tick.

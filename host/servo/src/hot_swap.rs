@@ -73,7 +73,7 @@ impl LoopSwaps {
         }
     }
 
-    /// Returns the replacements that were not applied, each with its model number. Not real-time.
+    /// Returns the layers of the replacements that were not applied, each with its model number. Not real-time.
     pub fn into_layers(mut self) -> Vec<(usize, Box<Layer>)> {
         let scheduled = self.schedule.into_iter().filter_map(|(_, replacement)| replacement);
         let arriving = std::iter::from_fn(|| self.arriving.pop().ok());

@@ -60,7 +60,7 @@ pub struct ParameterQueue {
 impl ParameterQueue {
     /// Creates a queue with a schedule; returns it with the sender of changes and the receiver of reports. Not real-time.
     ///
-    /// `replacements`: number of model replacements for which to reserve reports, beside those of the schedule.
+    /// `replacements`: number of model replacements for which to reserve reports, in addition to one report for each scheduled change.
     pub fn new(
         mut schedule: Vec<ScheduledChange>,
         replacements: usize,
@@ -93,8 +93,8 @@ impl ParameterQueue {
         let _ = self.reports.push(ChangeReport::at(tick, change, ChangeOutcome::Applied));
     }
 
-    /// Applies the scheduled changes that are due, oldest first, and at most `waiting` of the sent ones, and advances gradual
-    /// changes. Reports each of them; returns true if there was any.
+    /// Applies the scheduled changes that are due, oldest first, then at most `waiting` sent changes, and advances gradual changes.
+    /// Reports each change that was applied or rejected; returns true if `apply` was called for a reported change.
     ///
     /// Real-time: bounded by the schedule, `waiting`, the gradual changes, and `apply`; no allocation.
     #[inline]

@@ -84,7 +84,7 @@ impl RealTimeReport {
 }
 
 /// Requests real-time priority for the calling thread, pins the thread to `core` if given, and locks the memory of the process
-/// except in a guest. Not real-time.
+/// except in a guest; returns the outcomes. Not real-time.
 pub fn enter_real_time(core: Option<Core>) -> RealTimeReport {
     let memory_lock = lock_own_memory();
     let core = core.map_or(Privilege::NotRequested, |core| Privilege::of(pin(core)));
@@ -122,8 +122,8 @@ fn enter_priority(duty: Duty) -> Privilege {
     Privilege::of(scheduling::enter_priority(duty))
 }
 
-/// Requests the privileges in a new thread, so that the caller's priority does not change, and unlocks the memory afterwards. Not
-/// real-time.
+/// Requests the privileges of [`enter_real_time`] in a new thread, so that the caller's priority does not change; unlocks the
+/// memory of the process and returns the outcomes. Not real-time.
 pub fn probe_real_time() -> RealTimeReport {
     let asked = std::thread::Builder::new().spawn(|| {
         let report = enter_real_time(None);

@@ -18,7 +18,8 @@ pub enum RunEnd {
     TooFast(u32),
     /// The scene requires the device to set the pace, but the device sets none with its settings.
     NotPaced,
-    /// A tick took so long that the watchdog stopped the device; the tick returned later.
+    /// A tick took so long that the watchdog stopped the device, and returned later; or the gap between two ticks was too long, as
+    /// for a suspended process.
     Watchdog(Stuck),
     /// The force of a device oscillated between its limits, even after damping.
     Oscillation,

@@ -48,7 +48,7 @@ pub struct Servo {
     /// Dropped first: if a plugin unwinds the loop, the devices stop before anything else is dropped.
     _unwound: Option<Unwound>,
     stations: Box<[Station]>,
-    /// Ports of the devices, in the same order.
+    /// Ports of the devices, in the order of `stations`.
     ports: Box<[Port]>,
     parts: Parts,
     run: RunState,

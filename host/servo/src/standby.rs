@@ -74,9 +74,9 @@ impl Standby {
         self.devices.iter().map(|guarded| guarded.device.stopper()).collect()
     }
 
-    /// Energises the devices, in order, and returns the servo with its last stop; to be called on the loop thread. `names`: names
-    /// of the devices, then of the models, for the message if the process dies; `enters` is called with each device's number before
-    /// that device is energised. Not real-time; may block.
+    /// Arms the last stop, energises the devices, in order, and returns the servo. Call this function on the loop thread. `names`:
+    /// names of the devices, then of the models, for the message if the process dies; `enters` is called with each device's number
+    /// before that device is energised. Not real-time; may block.
     ///
     /// # Errors
     /// Number and [`Refusal`] of the device that refused; all devices are then stopped.

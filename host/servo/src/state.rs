@@ -68,7 +68,7 @@ impl EmergencySource {
 pub enum Cause {
     /// Fault of the device.
     Device(Fault),
-    /// The loop did not finish a tick in time, and the watchdog stopped the device.
+    /// The loop did not finish a tick in time and the watchdog stopped the device, or the gap between two ticks was too long.
     Watchdog,
     /// The force of a device oscillated between its limits, even after damping.
     Oscillation,
@@ -84,7 +84,7 @@ pub enum RunState {
     },
     /// The models' force reaches the hand.
     Active,
-    /// No usable sample for a while: no force until one arrives.
+    /// No usable sample for a while: no force until a usable sample arrives.
     Holding,
     /// Stop requested: all force fades out.
     Releasing {

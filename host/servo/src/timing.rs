@@ -89,7 +89,7 @@ pub struct Timing {
     pub lateness: Durations,
     /// Compute times of whole ticks, without the wait before.
     pub compute: Durations,
-    /// Durations of the stages, in the order of [`Stage`].
+    /// Durations of the stages in every 16th tick, in the order of [`Stage`].
     pub stages: [Durations; 4],
     /// Number of ticks.
     pub ticks: u64,

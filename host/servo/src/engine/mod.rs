@@ -89,7 +89,7 @@ impl Engine {
         }
     }
 
-    /// Returns true if the model has a linear field. Not real-time.
+    /// Returns true if the model has a linear field; false for an asynchronous model. Not real-time.
     pub fn has_linear_field(&self) -> bool {
         match self {
             Self::Here(model) => model.has_linear_field(),
@@ -98,7 +98,8 @@ impl Engine {
         }
     }
 
-    /// Computes the linear field at an input; `field` is only valid for [`Stepped::Answered`]. Not real-time.
+    /// Computes the linear field at an input; `field` is only valid for [`Stepped::Answered`]. Returns [`Stepped::Broken`] for an
+    /// asynchronous model. Not real-time.
     pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
         match self {
             Self::Here(model) => model.linear_field(input, field).into(),
@@ -107,8 +108,8 @@ impl Engine {
         }
     }
 
-    /// Prepares the model for the loop: after this call the model may not allocate. Does nothing for a worker or asynchronous
-    /// model, which is prepared when it starts. Not real-time.
+    /// Prepares the model for the loop: after this call the model must not allocate. Does nothing for a model in a worker or an
+    /// asynchronous model, which is prepared when it starts. Not real-time.
     ///
     /// # Errors
     /// The model's [`Refusal`].

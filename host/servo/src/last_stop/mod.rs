@@ -110,8 +110,8 @@ fn glance(run: &Mutex<Option<Arc<Armed>>>) -> Option<MutexGuard<'_, Option<Arc<A
     }
 }
 
-/// Emergency stop on process death: until this guard is dropped, after devices are closed and models freed, the devices of a run
-/// are stopped before the process ends.
+/// Guard of a run's emergency stop on process death: until the guard is dropped, the devices of the run are stopped before the
+/// process ends. Drop the guard after the devices are closed and the models freed.
 pub struct LastStop {
     place: usize,
 }

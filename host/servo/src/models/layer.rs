@@ -27,11 +27,12 @@ pub struct ModelHealth {
     pub late_ticks: u64,
     /// First late tick.
     pub first_late: Option<u64>,
-    /// Number of ticks without a reply in time from a worker process. Not a fault by themselves: the time budget limits them.
+    /// Number of steps without a reply in time from a worker process. Late replies alone are no fault: the time budget limits their
+    /// number.
     pub late_answers: u64,
     /// Overrun for which the model was disabled; `None` if it was not.
     pub overrun: Option<Overrun>,
-    /// Number of ticks in which the model changed the floating-point environment; the host restored it each time.
+    /// Number of steps that changed the floating-point environment, which the host restored each time.
     pub float_changes: u64,
     /// First tick with a changed floating-point environment.
     pub first_float_change: Option<u64>,

@@ -125,8 +125,8 @@ impl ModelStack {
         (sum.wrench, sum.energy_j)
     }
 
-    /// Changes a live parameter of the model at index `model` of the stack; unsupported if there is none. Real-time: bounded by its
-    /// objects, no allocation.
+    /// Changes a live parameter of the model at index `model` of the stack; unsupported if there is no such model. Real-time:
+    /// bounded by the model's objects, no allocation.
     pub(crate) fn set_parameter(
         &mut self,
         model: usize,

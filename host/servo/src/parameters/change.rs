@@ -13,7 +13,8 @@ pub const PLUGIN: u32 = u32::MAX - 1;
 pub struct ParameterChange {
     /// Number of the plugin in the run.
     pub plugin: PluginIndex,
-    /// Generation of the plugin that the change was checked against; the loop rejects a change for another generation.
+    /// Generation of the plugin that the change was checked against; the loop rejects a change of a model's parameter for another
+    /// generation.
     pub generation: u16,
     /// Index into the plugin's schema, [`WEIGHT`], or in a report [`PLUGIN`].
     pub parameter: u32,
@@ -30,7 +31,7 @@ pub enum Pace {
     AtOnce,
     /// At a rate, from the current value.
     Gradual {
-        /// Value when the plugin was created, in the parameter's unit: start of a number that has not changed since.
+        /// Initial value of the parameter, in its unit: start of the movement if the parameter has not changed since.
         from: f64,
         /// Rate in the parameter's unit per second.
         per_s: f64,
@@ -40,7 +41,7 @@ pub enum Pace {
 /// Report on a change of a parameter, or on the replacement of a plugin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChangeReport {
-    /// Tick before which the change was applied.
+    /// Tick before which the change was applied or rejected.
     pub tick: u64,
     /// Time of the tick, ns.
     pub time_ns: u64,

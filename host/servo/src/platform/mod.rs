@@ -6,7 +6,7 @@
 //! - `process_group`: process of plugin code, which ends with its parent, and all processes that it has started;
 //! - `watchdog_process`: process that stops devices whose host has ended.
 //!
-//! Signals exist on Linux only, and so does the code in another crate that receives them.
+//! Signals exist on Linux only, where the crate `flotor-command` receives them.
 
 #[cfg(not(windows))]
 mod linux;

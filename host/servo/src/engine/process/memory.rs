@@ -27,8 +27,9 @@ pub(crate) struct SharedPage {
     pub(super) operation: AtomicU32,
     /// Status of the reply.
     pub(super) status: AtomicU32,
-    /// Index of the parameter to change, and bits of its new value.
+    /// Index of the parameter to change.
     pub(super) parameter: AtomicU64,
+    /// Bits of the new value of the parameter.
     pub(super) value: AtomicU64,
     pub(super) input: [AtomicU64; INPUT_WORDS],
     pub(super) output: [AtomicU64; OUTPUT_WORDS],

@@ -56,7 +56,7 @@ impl Worker {
     /// Starts a worker and waits until its model is ready, at most [`WorkerConfig::create_timeout`]. Not real-time.
     ///
     /// # Errors
-    /// The plugin's [`Refusal`], or a refusal with the system's error if no worker could start, or if it ended or timed out.
+    /// The plugin's [`Refusal`], or a refusal with the cause if the worker process cannot be started, ends, or exceeds the timeout.
     pub fn start(config: &WorkerConfig<'_>) -> Result<Self, Refusal> {
         let no_worker =
             |error: io::Error| Refusal::resource(format!("cannot start a worker process: {error}"));
@@ -187,7 +187,8 @@ impl Worker {
             .unwrap_or(CallStatus::Unsupported)
     }
 
-    /// Clears the history of the model. Real-time: bounded by the reply timeout, no allocation.
+    /// Clears the history of the model; [`CallStatus::Ok`] also without a reply. Real-time: bounded by the reply timeout, no
+    /// allocation.
     pub fn reset(&mut self) -> CallStatus {
         // The next step reports a late or ended worker.
         self.request(Operation::Reset, |_| (), |memory| memory.status()).unwrap_or(CallStatus::Ok)
@@ -198,7 +199,7 @@ impl Worker {
         self.remembers
     }
 
-    /// Sends a request and waits for the reply; returns its status, or the result of a step without a reply.
+    /// Sends a request and waits for the reply; returns the status of the reply, or late or gone if there is no reply.
     fn request(
         &mut self,
         operation: Operation,
@@ -258,7 +259,7 @@ impl Drop for Worker {
 const LOOK_NS: u64 = 20_000_000;
 
 /// Receives the greeting of a worker piece by piece, and confirms each piece with a request under its number. Returns the last
-/// number and the whole text; `None` if the worker ended before.
+/// number and the whole text; `None` if `has_ended` returns true before.
 pub(super) fn receive_text(
     memory: &SharedMemory,
     mut has_ended: impl FnMut() -> bool,

@@ -74,7 +74,7 @@ fn tightest(folders: &[PathBuf], read: Reader) -> Option<GroupLimit> {
 }
 
 impl LimitValue {
-    /// Returns the unused part of the limit.
+    /// Returns the unused part of a limit with a current use, else the limit itself; only for comparing limits of one kind.
     #[allow(clippy::cast_precision_loss)] // only compared
     fn room(&self) -> f64 {
         match *self {

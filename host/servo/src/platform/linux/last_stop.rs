@@ -50,8 +50,9 @@ fn is_own_process() -> bool {
 /// Actions of the signals before our handler.
 static BEFORE: [OnceLock<sigaction>; SIGNALS] = [const { OnceLock::new() }; SIGNALS];
 
-/// Installs handlers for every fatal signal, on an alternate stack of this thread, and for `exit`. Repeated for each run, because a
-/// plugin may have installed other handlers. Not real-time.
+/// Installs handlers for `exit`, for crash signals and for every other fatal signal without a handler, on an alternate stack of
+/// this thread, and unblocks the signals of [`block_sent_signals`]. If the program of a guest handles all signals, only the handler
+/// for `exit` is installed. Repeated for each run, because a plugin may have installed other handlers. Not real-time.
 pub(crate) fn install() {
     install_for(|signal| !HARMLESS.contains(&signal));
     take_sent();
@@ -103,7 +104,8 @@ pub fn block_sent_signals() -> io::Result<()> {
     block_signals(&SENT)
 }
 
-/// Unblocks the signals of [`block_sent_signals`] in this thread, unless another program handles all signals. Not real-time.
+/// Unblocks the signals of [`block_sent_signals`] in this thread, unless the host is a guest of a program that handles all signals
+/// ([`Signals::Program`](crate::guest::Signals::Program)). Not real-time.
 pub(crate) fn take_sent() {
     if program_handles_signals() {
         return;

@@ -19,7 +19,7 @@ pub enum WatchdogProcess {}
 pub enum HeartbeatSender {}
 
 impl HeartbeatSender {
-    /// Sends a heartbeat and announces the next one within this time, ns.
+    /// Sends a heartbeat and announces the next heartbeat within this time, ns.
     pub(crate) fn give(&self, _: u64) {
         match *self {}
     }
@@ -29,7 +29,7 @@ impl WatchdogProcess {
     /// Returns `None` without a device that is stopped by a message. Not real-time.
     ///
     /// # Errors
-    /// If there is such a device.
+    /// If a device is stopped by a message.
     pub fn start<'a>(
         devices: impl IntoIterator<Item = (&'a str, &'a Independence)>,
     ) -> io::Result<Option<Self>> {

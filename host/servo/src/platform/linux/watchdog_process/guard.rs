@@ -163,7 +163,8 @@ fn thread_of(number: &[u8]) -> Option<OwnedFd> {
 /// Writes the message of every device [`TIMES`] times, in rounds over all devices.
 fn stop(devices: &[Guarded]) {
     for Guarded { handle, .. } in devices {
-        // The host shares the handle with its flags, but does not run any more.
+        // The file status flags are shared with the host's handle: the host, which has ended, hangs or is suspended, gets
+        // `O_NONBLOCK` too.
         if let Ok(mode) = fcntl_getfl(handle) {
             let _ = fcntl_setfl(handle, mode | OFlags::NONBLOCK);
         }

@@ -29,10 +29,11 @@ enum Packet {
     Name = b'n',
     /// To the process: the list of devices is complete.
     Begin = b'b',
-    /// To the process: id of the thread that runs the loop, empty once none does. A killed process ends with its last thread, which
-    /// on a busy machine may wait for a processor; the loop's thread has priority.
+    /// To the process: id of the loop's thread, empty once the loop has ended. The guard also watches this thread, because a killed
+    /// process exists until its last thread has ended, which on a busy machine may wait for a processor; the loop's thread, with
+    /// real-time priority, ends first.
     Thread = b't',
-    /// To the process: heartbeat of the host, with the time until the next one, ns. A stopped process sends none.
+    /// To the process: heartbeat of the host, with the time limit for the next heartbeat, ns. A suspended host sends no heartbeat.
     Alive = b'a',
     /// To the process: no more heartbeats follow.
     Quiet = b'q',
