@@ -3,14 +3,20 @@
 //! ```toml
 //! format = 1
 //!
-//! [device] plugin = "simulated" serial = "simulated"
+//! [device]
+//! plugin = "simulated"
+//! serial = "simulated"
 //!
-//! [vertical]                        # delivered over commanded force: c0 + c1 z + c2 z² ..., z in mm range_mm = [-7.0, 7.0]
+//! [vertical] # delivered over commanded force: c0 + c1 z + c2 z² ..., z in mm
+//! range_mm = [-7.0, 7.0]
 //! coefficients_per_mm = [1.05, -0.006, -0.0011]
 //!
-//! [quality] error_after_percent = 0.1
+//! [quality]
+//! error_after_percent = 0.1
 //!
-//! [provenance] source = "measured" program = "flotor 0.1.0"
+//! [provenance]
+//! source = "measured"
+//! program = "flotor 0.1.0"
 //! ```
 
 use crate::scene::Location;
@@ -31,7 +37,7 @@ pub struct CalibrationFile {
     pub format: u32,
     /// Calibrated device.
     pub device: CalibratedDevice,
-    /// Curve of the vertical force.
+    /// Ratio of delivered to commanded vertical force, over the height.
     pub vertical: VerticalCurve,
     /// Quality of the fit.
     #[serde(default)]

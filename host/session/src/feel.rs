@@ -54,8 +54,8 @@ impl Feel {
         }
     }
 
-    /// Returns the largest stiffness felt, N/m: increase of the force against the handle per displacement, over displacements of 0.1
-    /// mm; 0 if the force never increased.
+    /// Returns the largest stiffness felt, N/m: increase of the force against the handle per displacement, over displacements of at
+    /// least 0.1 mm; 0 if the force never increased.
     pub(crate) fn peak_stiffness_n_per_m(&self) -> f64 {
         self.peak_stiffness_n_per_m
     }

@@ -83,7 +83,7 @@ impl<P: PartialEq> LongCall<P> {
     }
 
     /// Polls the thread of `clock`, which is at `place` now, and returns the limit that the call has exceeded; at a new place the
-    /// timing starts again. To be called every few tens of milliseconds. Not real-time.
+    /// timing starts again. Call this function every few tens of milliseconds. Not real-time.
     pub fn check(
         &mut self,
         place: P,

@@ -27,7 +27,7 @@ impl Measurements {
         Self { tally, recording: RunRecording::new(recorder), digest, requested }
     }
 
-    /// Returns the inputs of the summary, without the counts of messages between hosts; to be called before the recording is
+    /// Returns the inputs of the summary, without the counts of messages between hosts. Call this function before the recording is
     /// finished, because the demand changes then.
     #[must_use]
     pub fn facts<'a>(

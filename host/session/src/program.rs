@@ -90,7 +90,7 @@ struct ModelEnd {
 static FREE: Mutex<Vec<(u32, ModelEnd)>> = Mutex::new(Vec::new());
 static NEXT: AtomicU32 = AtomicU32::new(1);
 
-/// Error: a component of the wrench is NaN or infinite.
+/// Error of a wrench with a NaN or infinite component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a wrench has a number that is not finite; the previous wrench stays until it expires")]
 pub struct NotFinite;

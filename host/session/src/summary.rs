@@ -168,8 +168,8 @@ pub struct RunSummary {
     pub peak_force_n: f64,
     /// Largest magnitude of the commanded torque at any device, N·m.
     pub peak_torque_nm: f64,
-    /// Largest stiffness felt at a handle, N/m: increase of the force against the handle per displacement, over displacements of 0.1
-    /// mm in ticks without an event (limit, ramp, change).
+    /// Largest stiffness felt at a handle, N/m: increase of the force against the handle per displacement, over displacements of at
+    /// least 0.1 mm in ticks without an event (limit, ramp, change).
     pub peak_stiffness_n_per_m: f64,
     /// Time after which every handle stayed within 0.1 mm and 1 mrad of one pose, s; `None` if a handle moved within the last half
     /// second.
@@ -205,7 +205,7 @@ pub struct RunSummary {
 /// Compute times of the stages of a tick, ns.
 #[derive(Clone, Debug, Serialize)]
 pub struct StageSummary {
-    /// Reading the devices.
+    /// Applying parameter changes, and reading the devices.
     pub read: Percentiles,
     /// Mapping the poses and stepping the models.
     pub models: Percentiles,
@@ -340,8 +340,8 @@ pub struct LinkSummary {
 /// Energy balance of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct EnergySummary {
-    /// Unexplained part of a device's own energy balance, relative to its peak energy; of several devices the largest in magnitude.
-    /// Absent if no device keeps a balance.
+    /// Unexplained part of a device's own energy balance, relative to its peak energy (in J if the peak is 0); of several devices
+    /// the largest in magnitude. Absent if no device keeps a balance.
     pub device_residual_relative: Option<f64>,
     /// Largest mechanical energy of a device, J; absent if no device keeps a balance.
     pub device_peak_j: Option<f64>,

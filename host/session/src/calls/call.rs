@@ -59,7 +59,7 @@ impl fmt::Display for Call {
     }
 }
 
-/// Error: a plugin call did not return in time. Its thread is abandoned, and the process should end soon.
+/// Error of a plugin call that did not return in time: the thread of the call is abandoned, and the process should end soon.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{who}` did not return from {call} within {} s, the time limit; check the plugin, or raise the limit with `{LIMIT_VARIABLE}`",

@@ -198,7 +198,7 @@ impl Registry {
     /// Loads the plugin with an id (or the file at a path), which must be of this kind. Not real-time; runs the plugin's code.
     ///
     /// # Errors
-    /// [`LookupError`]: unknown, with the closest known id, or rejected, with the reason.
+    /// [`LookupError`] if the id is unknown or ambiguous, the plugin is rejected, or its initialisers do not return in time.
     pub fn load(&self, id: &str, kind: PluginKind) -> Result<Plugin, LookupError> {
         self.find(id, Some(kind))
     }
@@ -206,7 +206,7 @@ impl Registry {
     /// Loads the plugin with an id (or the file at a path), of any kind. Not real-time; runs the plugin's code.
     ///
     /// # Errors
-    /// [`LookupError`]: unknown, with the closest known id, or rejected, with the reason.
+    /// [`LookupError`] if the id is unknown or ambiguous, the plugin is rejected, or its initialisers do not return in time.
     pub fn load_any(&self, id: &str) -> Result<Plugin, LookupError> {
         self.find(id, None)
     }
@@ -214,7 +214,7 @@ impl Registry {
     /// Checks that an id (or a path to a file) resolves to a plugin, without running its code. Not real-time.
     ///
     /// # Errors
-    /// [`LookupError`]: unknown, with the closest known id, or no plugin of this kind.
+    /// [`LookupError`] if the id is unknown or ambiguous, the file at the path is no plugin, or the plugin is not of this kind.
     pub fn check(&self, id: &str, kind: PluginKind) -> Result<(), LookupError> {
         match self.locate(id, Some(kind))? {
             Located::Linked(_) | Located::Found(_) => Ok(()),

@@ -45,7 +45,7 @@ pub enum ChangeWhat {
 pub struct Alternative {
     /// Id or file of the plugin; `None`: as named in the scene.
     pub plugin: Option<String>,
-    /// Parameters of the replacement; without `plugin` they are added to those of the scene.
+    /// Parameters of the replacement; without `plugin`, in addition to the model's parameters in the scene.
     pub parameters: Vec<ParameterText>,
 }
 

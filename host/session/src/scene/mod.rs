@@ -169,7 +169,7 @@ impl Scene {
     /// Reads the built-in demo.
     ///
     /// # Errors
-    /// None in practice: a test reads it.
+    /// Never in practice: a test parses the scene.
     pub fn demo() -> Result<Self, SceneError> {
         Self::parse(Path::new("built-in demo"), DEMO)
     }
@@ -177,7 +177,7 @@ impl Scene {
     /// Reads the built-in scene of experiments. A plugin other than the spring replaces the spring, with the default mapping.
     ///
     /// # Errors
-    /// None in practice: a test reads it.
+    /// Never in practice: a test parses the scene.
     pub fn study(model: &str) -> Result<Self, SceneError> {
         let mut scene = Self::parse(Path::new("built-in study"), STUDY)?;
         if let Some(object) = scene.models.iter_mut().find(|object| object.name != model) {
@@ -188,7 +188,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Reads a scene file, or one of Flotor's own scenes by its name. Not real-time.
+    /// Reads a scene file, or, if no file has this path, one of Flotor's own scenes by its name. Not real-time.
     ///
     /// # Errors
     /// [`SceneError`] with file, line, key and remedy.

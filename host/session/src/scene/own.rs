@@ -38,7 +38,7 @@ pub const OWN_SCENES: &[OwnScene] = own![
 ];
 
 impl OwnScene {
-    /// Returns the built-in scene with this name; `None` if there is none, or if a file exists at this path. Not real-time.
+    /// Returns the built-in scene with this name; `None` if no scene has the name, or if a file exists at this path. Not real-time.
     #[must_use]
     pub fn named(path: &Path) -> Option<Self> {
         if path.exists() && !path.is_dir() {
@@ -50,7 +50,7 @@ impl OwnScene {
     /// Parses the scene. Not real-time.
     ///
     /// # Errors
-    /// None in practice: a test reads all of them.
+    /// Never in practice: a test parses every built-in scene.
     pub fn read(&self) -> Result<Scene, SceneError> {
         Scene::parse(Path::new(self.name), self.text)
     }

@@ -55,7 +55,7 @@ pub struct KeyReference {
 /// Returns all tables of a scene, sorted by name, with all keys. Not real-time.
 ///
 /// # Errors
-/// None in practice: a test reads it.
+/// Never in practice: a test parses the scene with every table.
 pub fn reference() -> Result<Vec<SectionReference>, SceneError> {
     let source = Source::new(Path::new("every table"), EVERY_TABLE);
     Scene::read(&source)?;

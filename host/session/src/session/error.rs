@@ -34,7 +34,7 @@ pub enum RunError {
     /// A call before the run did not return, was stopped, or had no thread.
     #[error(transparent)]
     Calls(#[from] CallError),
-    /// The servo thread failed; the text says how.
+    /// The servo thread failed, with a verb phrase for the message.
     #[error("internal error: the servo thread {0}; please report this error with the scene")]
     Thread(&'static str),
     /// The system cannot start the thread for this part of the run.

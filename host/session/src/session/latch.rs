@@ -1,4 +1,4 @@
-//! Latch of the machine during a run: nothing is energised while the latch is pressed, a press ends the run, and an emergency stop
+//! Emergency-stop latch during a run: nothing is energised while the latch is pressed, a press ends the run, and an emergency stop
 //! of the run presses the latch.
 
 use super::error::RunError;
@@ -19,7 +19,7 @@ const POLL: Duration = Duration::from_millis(5);
 /// Timeout for the confirmation of an emergency stop by the other runs.
 const CONFIRM_WAIT: Duration = Duration::from_secs(2);
 
-/// Emergency stop latch of the machine, with its state when the preparation of a run began.
+/// Emergency-stop latch, with its state when the preparation of a run began.
 #[derive(Clone, Debug)]
 pub struct LatchGuard {
     latch: Latch,
@@ -55,8 +55,8 @@ impl LatchGuard {
         Self::of(&Directory::of_this_user())
     }
 
-    /// Returns a warning if an emergency stop of this run will not be stored or may not reach other runs; `None` otherwise. To be
-    /// called before anything is energised. Not real-time.
+    /// Returns a warning if an emergency stop of this run will not be stored or may not reach other runs; `None` otherwise. Call
+    /// this function before anything is energised. Not real-time.
     #[must_use]
     pub fn warning(&self) -> Option<String> {
         let problem = self.latch.problem()?;

@@ -93,7 +93,8 @@ impl Session {
     /// clock also starts the watchdog process. Not real-time; runs plugin code.
     ///
     /// # Errors
-    /// [`RunError`].
+    /// [`RunError`] if a plugin is unknown or refuses, a call does not return, the scene does not fit a device or a plugin, or the
+    /// required watchdog process cannot be started.
     pub fn prepare(scene: &Scene, registry: &Registry, options: &RunOptions) -> Result<Self, RunError> {
         let RunOptions { clock, seed } = *options;
         let config = LoopConfig { period_ns: period_ns(scene.rate_hz), seed };
@@ -218,8 +219,8 @@ impl Session {
         self
     }
 
-    /// Returns the latch of the machine: a press stops this run, and an emergency stop of this run presses it. `None` on the virtual
-    /// clock, where no hand is on a device.
+    /// Returns the emergency-stop latch of this run: a press of the latch stops this run, and an emergency stop of this run presses
+    /// the latch. `None` on the virtual clock, where no hand is on a device.
     #[must_use]
     pub fn latch(&self) -> Option<&LatchGuard> {
         self.real_clock.latch.as_ref()
@@ -272,7 +273,7 @@ impl Session {
         std::mem::take(&mut self.lines)
     }
 
-    /// Creates a tap: a concurrent program reads the newest record of the device from it, without waiting. The loop publishes a
+    /// Creates a tap, through which another thread reads the newest record of the device without waiting. The loop publishes a
     /// record as soon as its tick is over. Not real-time.
     #[must_use]
     pub fn tap(&mut self, device: u16) -> Tap {

@@ -114,7 +114,8 @@ fn open_device(registry: &Registry, device: &DeviceUse) -> Result<(Opened, Plugi
 /// Loads the plugin of a model and creates an instance at each of the model's positions. Not real-time; runs the plugin's code.
 ///
 /// # Errors
-/// [`RunError`]: the plugin is unknown or was rejected, refused its settings, or did not return.
+/// [`RunError`]: the plugin is unknown or was rejected, refused its settings, did not return, or does not fit the model's table in
+/// the scene.
 pub fn prepare_model(
     registry: &Registry,
     model: &ModelUse,

@@ -43,7 +43,7 @@ pub(super) struct RealClock {
     pub(super) watchdog_process: Option<Arc<WatchdogProcess>>,
     /// True if the run must stop when the watchdog process has ended.
     pub(super) requires_independent_stop: bool,
-    /// Latch of the machine; `None` on the virtual clock, where no hand is on a device.
+    /// Emergency-stop latch; `None` on the virtual clock, where no hand is on a device.
     pub(super) latch: Option<LatchGuard>,
 }
 

@@ -54,7 +54,8 @@ impl Steps {
     /// before each tick and the tick's records to the observer. Not real-time: calls the observer.
     ///
     /// # Errors
-    /// [`RunError::Hung`] if a plugin call does not return; the devices are stopped, and later calls fail.
+    /// [`RunError::Hung`] if a plugin call does not return; the devices are stopped, and later calls fail with
+    /// [`RunError::Thread`].
     pub fn advance(&mut self, ticks: u64, observer: &mut dyn Observer) -> Result<Option<RunEnd>, RunError> {
         let mut left = ticks;
         while left > 0 && self.ticks.end().is_none() {

@@ -18,8 +18,8 @@ pub struct StopWithoutHost {
 }
 
 impl StopWithoutHost {
-    /// Queries the plugin how its device is stopped after the end of the host's process; `name` is the device's name in messages. Not
-    /// real-time.
+    /// Queries the plugin for the means that stop its device after the end of the host's process, and returns these means; `name`
+    /// is the device's name in messages. Not real-time.
     ///
     /// # Errors
     /// [`Refusal`] if the plugin declares a stop that cannot be used.

@@ -118,7 +118,7 @@ impl<O: Observer> Observer for ObservedRun<O> {
 struct Host {
     controls: Controls,
     stop: StopSwitch,
-    /// Latch of the machine, which an emergency stop presses before the reply; `None` on the virtual clock.
+    /// Emergency-stop latch, which an emergency stop presses before the reply; `None` on the virtual clock.
     latch: Option<LatchGuard>,
     /// Plugin folders of the scene.
     folders: Vec<PathBuf>,
@@ -168,7 +168,7 @@ fn refused(error: &ControlError) -> (RefusalCause, String) {
     (cause, error.to_string())
 }
 
-/// Performs a client's emergency stop: stops this run, then presses the latch of the machine, if there is one, and waits up to 2 s
+/// Performs a client's emergency stop: stops this run, then presses the emergency-stop latch, if there is one, and waits up to 2 s
 /// until the other runs confirm the stop. Not real-time.
 ///
 /// # Errors
@@ -179,7 +179,7 @@ pub fn emergency_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) -> Result<(
     problem.map_or(Ok(()), |problem| Err((RefusalCause::Other, format!("this run stops; {problem}"))))
 }
 
-/// Stops this run for an emergency stop of another run, if this run has the machine's latch (real clock).
+/// Stops this run for an emergency stop of another run, if this run has an emergency-stop latch (real clock).
 pub fn machine_stop(stop: &StopSwitch, latch: Option<&LatchGuard>) {
     if latch.is_some() {
         stop.press(EmergencySource::Latch);
