@@ -58,7 +58,7 @@ struct Magnitude {
 pub(crate) struct BoundedPeaks(Vec<Magnitude>);
 
 impl BoundedPeaks {
-    /// Creates a magnitude for each quantity with a bound.
+    /// Creates an empty trace of the magnitude of each quantity (force, torque) that has a bound.
     pub(crate) fn new(bounds: &[PeakBound]) -> Self {
         let magnitude = |peak: Peak| {
             let bounds_si: Vec<f64> =

@@ -22,7 +22,7 @@ use std::ffi::OsString;
     disable_help_flag = true
 )]
 pub(crate) struct EmulateArguments {
-    /// Id of the device's plugin
+    /// Name of the emulator: falcon, haply-service, maglev, or NAME for another program flotor-NAME-emulator
     #[arg(allow_hyphen_values = true, value_name = "NAME")]
     device: String,
     /// Arguments of the emulator; `flotor emulate NAME --help` lists them
@@ -41,7 +41,7 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
         && device.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
     if !is_id {
         return Err(CommandError::Usage(format!(
-            "`{device}` is not the id of a device plugin: an id starts with a letter; `flotor emulate NAME --help` \
+            "`{device}` is not the name of an emulator: a name starts with a letter; `flotor emulate NAME --help` \
              lists the options"
         )));
     }

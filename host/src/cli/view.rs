@@ -41,7 +41,8 @@ pub(crate) struct ViewArguments {
     /// Write the traces of the recording as a table (.csv) or a plot (.svg, .png), which is light without --look dark
     #[arg(long, value_name = "OUT", requires = "file", conflicts_with = "screenshot")]
     export: Option<PathBuf>,
-    /// Traces shown, by name, such as force,stiffness (default: force,position; in a window: the traces of the last window)
+    /// Traces shown: force, torque, position, rotation, velocity, angular-velocity, energy, stiffness, lateness (default:
+    /// force,position; in a window: the traces of the last window)
     #[arg(long, value_name = "LIST")]
     traces: Option<String>,
     /// Plot force over position along this axis, beside the traces

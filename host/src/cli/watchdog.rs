@@ -7,7 +7,7 @@ use flotor_servo::watchdog_process;
 /// Arguments of the watchdog process. Its standard input is a socket to its host.
 #[derive(Args, Clone, Copy, Debug)]
 pub(super) struct WatchdogArguments {
-    /// Number of the host's process
+    /// Process id of the host
     #[arg(long)]
     host: i32,
 }

@@ -6,12 +6,12 @@ use flotor_servo::engine::process;
 use flotor_session::registry::load_file;
 use std::path::PathBuf;
 
-/// Arguments of a worker. Its standard input is the memory it shares with its host.
+/// Arguments of a worker. The standard input of a worker is the memory that it shares with its host.
 #[derive(Args, Clone, Debug)]
 pub(super) struct WorkerArguments {
     /// The plugin's shared library
     plugin: PathBuf,
-    /// Number of the host's process
+    /// Process id of the host
     #[arg(long)]
     host: i32,
     /// Nominal time between ticks, ns

@@ -45,8 +45,8 @@ pub struct Scaffold {
 /// Creates the plugin `parent/NAME` from the templates for its kind and language. Not real-time.
 ///
 /// # Errors
-/// If the name clashes with a type of the template, the folder exists (it is not changed) or belongs to Flotor's workspace, or a file
-/// cannot be read or written.
+/// If the name clashes with a type of the template, the folder exists (it is not changed) or belongs to Flotor's workspace, path or
+/// manifest of the contract cannot be used, or a file cannot be read or written.
 pub fn scaffold(
     parent: &Path,
     name: &PluginName,

@@ -20,7 +20,8 @@ pub struct PluginName(String);
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NameError {
-    /// The name is too long, or has characters that are not allowed there.
+    /// The name is empty or too long, does not start with a letter, or has other characters than lower-case letters, digits and
+    /// single hyphens between them.
     #[error("invalid plugin name `{name}`: use lower-case letters, digits and single hyphens between \
         them, a letter first, at most {LONGEST} characters{}",
         nearest.as_ref().map_or(String::new(), |nearest| format!("; use `{nearest}`")))]

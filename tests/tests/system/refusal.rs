@@ -804,7 +804,7 @@ fn emulate_helps_with_itself_until_a_name_is_given() {
     assert!(ran.error().contains("no emulator `flotor-nothing-emulator`"), "{ran:#?}");
     let ran = Flotor::with(["emulate", "--port", "9999"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
-    assert!(ran.error().starts_with("`--port` is not the id of a device plugin"), "{ran:#?}");
+    assert!(ran.error().starts_with("`--port` is not the name of an emulator"), "{ran:#?}");
     let ran = Flotor::with(["emulate", "maglev", "--set", "preset=xx"]).run();
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
     assert!(ran.error().starts_with("--set preset=xx: `preset` = `xx`: must be "), "{ran:#?}");

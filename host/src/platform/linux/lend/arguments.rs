@@ -24,7 +24,7 @@ pub(crate) struct LendArguments {
     /// The interface that the program calls (default: the program finds the three libraries)
     #[arg(long, value_name = "dhd|openhaptics|chai3d|haply|ml-api")]
     pub(super) api: Option<String>,
-    /// Haply, ml-api: where the service listens (default: the address that programs expect, port 10001 or 5678)
+    /// With --api haply or ml-api: address of the service (default: the address that programs expect, port 10001 or 5678)
     #[arg(long, value_name = "HOST:PORT")]
     pub(super) listen: Option<String>,
     /// Source of the time of the run

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 
-/// Exit code for a run that a device fault, the watchdog or an oscillation has ended; the same as of `flotor run`.
+/// Exit code if the program ended with 0, but a run ended abnormally, for example by a device fault or the watchdog.
 const RUN_FAILED: i32 = 4;
 /// Extension of a file of a run that has not ended.
 const SO_FAR: &str = "so-far";
@@ -114,8 +114,8 @@ impl<'a> Runs<'a> {
         Ok(())
     }
 
-    /// Returns the exit code of the command: the exit code of the program, 128 plus the signal that ended it, or 4 if it ended with 0
-    /// after a failed run.
+    /// Returns the exit code of the command: the exit code of the program, 128 plus the signal that ended the program, or 4 if the
+    /// program ended with 0 after a failed run.
     pub(super) fn exit_code(&self) -> i32 {
         let in_order = [RunEnd::Finished, RunEnd::Stopped].map(RunEnd::word);
         let ended_early = |run: &Run| {
