@@ -89,8 +89,8 @@ fn report_text(text: std::fmt::Arguments<'_>) -> Result<(), CommandError> {
     }
 }
 
-/// Prints a human-readable line on standard error. Unlike `eprintln!` it does not panic on a closed pipe, after which the exit code
-/// would be wrong.
+/// Prints a human-readable line on standard error, with control characters escaped. Unlike `eprintln!`, this function does not
+/// panic on a closed pipe: after a panic the exit code would be wrong.
 pub fn print_error_line(line: std::fmt::Arguments<'_>) {
     let _ = writeln!(std::io::stderr(), "{}", for_terminal(line));
 }

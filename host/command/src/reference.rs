@@ -4,7 +4,7 @@ use clap::{Arg, Command};
 use std::fmt::Write;
 
 /// Returns the parser `program` completed with the arguments of the commands that separate programs execute, from the parsers
-/// `separate` of these programs. The one-line descriptions remain those of `program`. Not real-time.
+/// `separate` of these programs. The one-line descriptions are taken from `program`. Not real-time.
 #[must_use]
 pub fn whole_program(program: Command, separate: &[Command]) -> Command {
     let described = |command: Command| match separate

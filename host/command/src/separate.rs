@@ -23,7 +23,7 @@ pub struct SeparateProgram<'a> {
     pub program: &'a str,
     /// Workspace, which determines the folder of the executable.
     pub built: Built,
-    /// Command line that builds the program, for the error if it is missing.
+    /// Command line that builds the program, for the error about a missing program.
     pub build: &'a str,
 }
 
@@ -104,8 +104,8 @@ fn profile_of(program: &Path) -> Option<&'static str> {
     ["debug", "release"].into_iter().find(|profile| folder.ends_with(profile))
 }
 
-/// Running separate program. Dropping it sends SIGTERM (on Windows, kills the program), so that the program removes its socket, and
-/// waits for its end.
+/// Running separate program. Dropping the value sends SIGTERM, so that the program removes its socket (on Windows kills the
+/// program), and waits for the end of the program.
 pub struct Running(pub Child);
 
 impl Drop for Running {

@@ -40,7 +40,7 @@ enum First {
     InOrderOnceEnergised,
 }
 
-/// Starts the thread that handles signals, and returns the stop switch that it operates: the first signal that requests an end
+/// Starts the thread that handles signals, and returns the stop switch of that thread: the first signal that requests an end
 /// (such as Ctrl-C) leads to an orderly end, the second to an emergency stop, the third ends the process; `SIGUSR1` leads to an
 /// emergency stop. Call this function before other threads start.
 ///
