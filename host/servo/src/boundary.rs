@@ -1,9 +1,9 @@
 //! Boundary wall at the edge of a device's range: a spring and a damper that push the handle back and never pull.
 //!
-//! The range is an ellipsoid of positions and one of rotation vectors; equal semi-axes make it the sphere of the thesis's boundary
-//! (section 3.2). The spring force is proportional to the distance from the ellipsoid, along the normal at the nearest point: the
-//! force has a potential, so no closed path gains energy. In most ticks the handle is inside; a cheap test without square root or
-//! arc tangent comes first.
+//! The range is an ellipsoid of positions and an ellipsoid of rotation vectors; with equal semi-axes, the boundary of the thesis
+//! (section 3.2), a sphere. The spring force is proportional to the distance from the ellipsoid, along the normal at the nearest
+//! point: the force has a potential, so no closed path gains energy. In most ticks the handle is inside; a cheap test without
+//! square root or arc tangent comes first.
 //!
 //! Stiffness and position of the wall come from a [`RenderedBoundary`].
 

@@ -314,8 +314,8 @@ impl Forces {
         self.stacks.iter().any(|stack| stack.slots.iter().any(Slot::is_fading))
     }
 
-    /// Returns a report on every current layer and every layer that is fading out; calls `on_query` with the model number before it
-    /// queries a model's last message. Not real-time.
+    /// Returns a report on every current layer and every layer that is fading out; calls `on_query` with the model number before
+    /// each query of a model's last message. Not real-time.
     pub fn reports(&mut self, on_query: impl Fn(usize)) -> Vec<LayerReport> {
         self.slots().flat_map(|slot| slot.reports(&on_query)).collect()
     }

@@ -106,7 +106,7 @@ struct Shared {
     done: AtomicBool,
     /// Beat at which the watchdog stopped the device, plus one; 0: not stopped.
     fired: AtomicU64,
-    /// Signals of the host whose action a plugin replaced, or which it blocked, while the loop ran; one bit each.
+    /// Signals of the host that a plugin blocked, or whose action a plugin replaced, while the loop ran; one bit each.
     taken: AtomicU64,
     /// True once another thread is about to stop the devices: the loop sends no more commands.
     silenced: AtomicBool,
@@ -165,8 +165,8 @@ impl Heartbeat {
         Stuck::at(self.beat())
     }
 
-    /// Returns the signals of the host whose action a plugin replaced, or which it blocked, while the loop ran; the watchdog has
-    /// restored them.
+    /// Returns the signals of the host that a plugin blocked, or whose action a plugin replaced, while the loop ran; the watchdog
+    /// has restored these signals.
     #[must_use]
     pub fn signals_taken(&self) -> TakenSignals {
         TakenSignals::from_bits(self.shared.taken.load(Ordering::Relaxed))

@@ -1,11 +1,11 @@
 //! Parameter changes between two ticks, sent by other threads or scheduled by the scene.
 //!
 //! A change is applied at a tick boundary, before the device is read, so that every model of the tick uses it. Changes sent
-//! together are applied together. Each one is reported before the record of its tick; a change that could not be reported is not
-//! applied, so a recording holds every change.
+//! together are applied together. Each change is reported before the record of its tick; a change that could not be reported is not
+//! applied, so a recording contains every change.
 //!
-//! A number may be sent with a rate: it then moves to its new value over many ticks, because a hand would feel a jump. Each step is
-//! a change with its own report, so a replay needs no rate.
+//! A number may be sent with a rate: the parameter then moves to the new value over many ticks, because a hand would feel a jump.
+//! Each step is a change with its own report, so a replay needs no rate.
 
 mod change;
 mod gradual;
@@ -60,7 +60,7 @@ pub struct ParameterQueue {
 impl ParameterQueue {
     /// Creates a queue with a schedule; returns it with the sender of changes and the receiver of reports. Not real-time.
     ///
-    /// `replacements`: number of model replacements for which to reserve reports, in addition to one report for each scheduled change.
+    /// `replacements`: number of model replacements for which to reserve reports, in addition to one for each scheduled change.
     pub fn new(
         mut schedule: Vec<ScheduledChange>,
         replacements: usize,

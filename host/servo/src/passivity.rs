@@ -25,7 +25,7 @@ pub(super) struct Passivity {
     mode: PassivityMode,
     controller: Controller,
     reserve_j: f64,
-    /// 1 for each driven axis of force and torque, 0 for the others.
+    /// Driven axes of force and torque: 1 for a driven axis, 0 for an axis without force or torque.
     driven: [DVec3; 2],
     energy_j: f64,
     /// Change of the last wrench by the controller.
@@ -57,7 +57,7 @@ impl Passivity {
     }
 
     /// Returns a wrench with which the port delivers no more energy than it has, the reserve included; `None` if the wrench may
-    /// pass unchanged. Only motion along driven axes counts: along the other axes no force can damp.
+    /// pass unchanged. Only motion along driven axes counts: along an axis without drive no force can damp.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]

@@ -27,8 +27,8 @@ impl Loop {
         Self { release_ns: self.duration_ns.saturating_sub(self.servo.ramp_ns()), ..self }
     }
 
-    /// Waits for the next tick and runs it, passing its records to `on_record`; or ends the run ([`Self::end`]). Real-time after
-    /// the wait: bounded, no allocation.
+    /// Waits for the next tick, runs the tick and passes its records to `on_record`; or ends the run ([`Self::end`]). Real-time
+    /// after the wait: bounded, no allocation.
     #[inline]
     pub fn advance(&mut self, stop: &StopSwitch, on_record: impl FnMut(&TickRecord)) {
         if self.schedule.next_time_ns() >= self.duration_ns {

@@ -317,7 +317,7 @@ impl Servo {
     }
 }
 
-/// Parts of a stopped servo. Dropping them runs plugin code.
+/// Parts of a stopped servo. Dropping the parts runs plugin code.
 pub struct Dismantled {
     /// Devices in the scene's order, still energised, each with its report.
     pub devices: Vec<(ActiveDevice, Reported)>,

@@ -25,8 +25,8 @@ impl StopSwitch {
         self.in_order.store(true, Ordering::Relaxed);
     }
 
-    /// Triggers the emergency stop and wakes the threads that wait for it. The first source is kept. Real-time: one system call,
-    /// after the last tick.
+    /// Triggers the emergency stop and wakes the threads that wait for the stop. Only the first source is stored. Real-time: one
+    /// system call, after the last tick.
     pub fn press(&self, source: EmergencySource) {
         let place = EmergencySource::ALL.iter().position(|other| *other == source);
         let code = place.and_then(|place| u32::try_from(place + 1).ok()).unwrap_or(1);

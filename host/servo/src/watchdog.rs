@@ -1,7 +1,7 @@
 //! Watchdog: a thread that stops all devices when the loop no longer ticks, and records the tick and the code in which the loop is stuck.
 //!
-//! It polls the [heartbeat](Heartbeat) several times per limit. A beat unchanged for longer than the limit means that a call does not
-//! return; the watchdog then stops the devices without the loop's help.
+//! The watchdog polls the [heartbeat](Heartbeat) several times per limit. A beat unchanged for longer than the limit means that a
+//! call does not return; the watchdog then stops the devices without the loop's help.
 
 use super::clock::{monotonic_ns, sleep_until};
 use super::heartbeat::Heartbeat;
@@ -25,8 +25,8 @@ const SIGNAL_LOOKS: u64 = 100;
 
 /// Starts the watchdog thread: it stops all devices with `stoppers` when `heartbeat` has not changed for `limit_ns`, or when the
 /// emergency stop `stop` is triggered. The thread also sends heartbeats (`signs`) to the watchdog process, if there is one, and
-/// restores signal actions that a plugin has replaced. It ends after [`Heartbeat::finish`], or after it has stopped a stuck loop's
-/// devices. Not real-time.
+/// restores signal actions that a plugin has replaced. The thread ends after [`Heartbeat::finish`], or after a stop of the devices
+/// of a stuck loop. Not real-time.
 ///
 /// # Errors
 /// If the system cannot start a thread.

@@ -1,4 +1,4 @@
-//! Plugin call of a thread outside the loop: if the process ends there, the message names plugin and call.
+//! Plugin call of a thread outside the loop: if the process ends in the call, the message names plugin and call.
 
 use super::line::Line;
 use crate::platform::last_stop::install_for_crashes;

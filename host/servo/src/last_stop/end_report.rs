@@ -22,7 +22,7 @@ pub enum ReportedEnd {
 }
 
 impl ReportedEnd {
-    /// Decodes the end report in a word; `None` if there is none.
+    /// Decodes the end report in an atomic word; `None` if the process has not reported its end.
     #[must_use]
     pub fn read(word: &AtomicU32) -> Option<Self> {
         match word.load(Ordering::Acquire) {

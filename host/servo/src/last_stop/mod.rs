@@ -58,7 +58,7 @@ static NEXT: AtomicUsize = AtomicUsize::new(0);
 /// Cause of the end of a process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Death {
-    /// Signal, with its sender if another process sent it.
+    /// Signal, with the process id of its sender if another process sent the signal.
     Signal { signal: i32, sender: Option<i32> },
     /// Call of `exit`.
     Exit,
@@ -116,7 +116,7 @@ pub struct LastStop {
     place: usize,
 }
 
-/// Guard that stops the devices when a plugin or a panic ends the loop thread. A loop drops it before devices and models: if
+/// Guard that stops the devices when a plugin or a panic ends the loop thread. A loop drops the guard before devices and models: if
 /// neither the end of the loop nor a panic is the reason, a plugin has called a function like `pthread_exit`, and the process ends.
 pub struct Unwound(Arc<Armed>);
 

@@ -1,9 +1,9 @@
 //! Broad phase: finds the models that can act at the handle, with a uniform grid over their active regions.
 //!
-//! A model declares its active region ([`flotor_hal::ActiveRegion`]); elsewhere its wrench is zero and it is not stepped. The grid
-//! is built before the loop starts, over the bounding box of all regions, with cells about twice the median size of a region, so
-//! that a region lies in a few cells and a cell holds a few regions. A tick looks up one cell and compares the handle with the
-//! boxes of the objects in it; objects elsewhere cost nothing.
+//! A model declares its active region ([`flotor_hal::ActiveRegion`]); elsewhere the wrench of the model is zero, and the model is
+//! not stepped. The grid is built before the loop starts, over the bounding box of all regions, with cells about twice the median
+//! size of a region, so that a region lies in a few cells and a cell holds a few regions. A tick looks up one cell and compares the
+//! handle with the boxes of the objects in it; objects elsewhere cost nothing.
 //!
 //! Objects do not move (their mapping is fixed); an object whose region is changed by a live parameter is checked in every tick
 //! from then on ([`BroadPhase::watch_always`]).

@@ -1,7 +1,7 @@
 //! Wall at the workspace bounds of a model: a spring and a damper that push the handle back and never pull.
 //!
-//! The wall is part of the model's contribution: it fades with the model, yields with it to a higher priority, and is removed with
-//! it. The [boundary](crate) of the device acts as well; the nearer of the two is felt first.
+//! The wall is part of the model's contribution: wall and model fade together, yield together to a higher priority, and are removed
+//! together. The [boundary](crate) of the device acts as well; the handle meets the nearer of the two walls first.
 
 use flotor_core::mapping::Mapping;
 use flotor_hal::{DVec3, Damper, Pose, SampledLoop, Twist, WorkspaceBounds, Wrench};

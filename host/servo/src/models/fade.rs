@@ -1,6 +1,6 @@
 //! Weight that moves to its target at a constant rate.
 
-/// Weight from 0 to 1. A function of time alone: it needs no updates, and rare queries return the same as frequent ones.
+/// Weight from 0 to 1, a function of time alone: the weight needs no updates, and does not depend on the number of queries.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fade {
     from: f64,
@@ -18,7 +18,7 @@ impl Fade {
         Self { from: at, target: at, since_ns: 0, rate_per_ns: 1.0e-9 / fade_s }
     }
 
-    /// Sets the target of the weight, 0 to 1 (clamped); the weight moves there from its present value. Real-time: bounded, no allocation.
+    /// Sets the target, 0 to 1 (clamped), to which the weight moves from its present value. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn set_target(&mut self, target: f64, now_ns: u64) {
         let target = target.clamp(0.0, 1.0);

@@ -30,7 +30,7 @@ pub struct ModelHealth {
     /// Number of steps without a reply in time from a worker process. Late replies alone are no fault: the time budget limits their
     /// number.
     pub late_answers: u64,
-    /// Overrun for which the model was disabled; `None` if it was not.
+    /// Overrun for which the model was disabled; `None` for a model that is not disabled.
     pub overrun: Option<Overrun>,
     /// Number of steps that changed the floating-point environment, which the host restored each time.
     pub float_changes: u64,
@@ -159,7 +159,7 @@ pub struct LayerReport {
 impl Layer {
     /// Creates a layer from a model's instances, each with its mapping, and their common time budget. Not real-time.
     ///
-    /// A model with workspace bounds gets a wall there, with the largest stable stiffness of the loop up to 7500 N/m.
+    /// A model with workspace bounds gets a wall at the bounds, with the largest stable stiffness of the loop up to 7500 N/m.
     pub fn new(
         instances: Vec<(Engine, Mapping)>,
         blend: &Blend,

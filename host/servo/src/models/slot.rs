@@ -119,7 +119,7 @@ impl Slot {
         share.times(presence).plus(before.times(1.0 - presence))
     }
 
-    /// Sets the target weight, 0 to 1; the weight moves there at the fade rate. Real-time: bounded, no allocation.
+    /// Sets the target, 0 to 1, to which the weight moves at the fade rate. Real-time: bounded, no allocation.
     pub(crate) fn set_weight(&mut self, tick: &Tick, weight: f64) {
         self.weight.set_target(weight, tick.time_ns);
     }

@@ -1,4 +1,4 @@
-//! Changes of parameters, and reports on them.
+//! Changes of parameters, and reports on changes.
 
 use flotor_core::{ChangeOutcome, PluginIndex};
 use flotor_hal::Tick;

@@ -37,7 +37,7 @@ impl Known {
     }
 }
 
-/// Numbers that were changed, moving ones included.
+/// Changed parameters with their values, including the parameters in a gradual change.
 pub(super) struct Movements {
     known: Vec<Known>,
     moving: usize,

@@ -2,7 +2,7 @@
 
 use flotor_hal::{LinearField, Pose, Wrench};
 
-/// Newest field, the field that it replaces, and the fade between them.
+/// Newest field, the field before the newest, and the fade between both.
 pub(super) struct CrossFade {
     old: LinearField,
     new: LinearField,
@@ -46,7 +46,7 @@ impl CrossFade {
         (self.new, self.since_ns) = (field, now_ns);
     }
 
-    /// Returns the wrench at a pose, and true if the fields in use are valid there. Real-time: bounded, no allocation.
+    /// Returns the wrench at a pose, and true if the fields in use are valid at the pose. Real-time: bounded, no allocation.
     pub(super) fn at(&self, pose: &Pose, now_ns: u64) -> (Wrench, bool) {
         let share = self.share(now_ns);
         let (new, is_new_valid) = self.new.at(pose);

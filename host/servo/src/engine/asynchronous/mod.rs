@@ -58,7 +58,7 @@ impl AsynchronousModel {
     /// Prepares the model for its own rate ([`Self::config`]) and starts it, inline or on a thread. Not real-time.
     ///
     /// # Errors
-    /// The model's [`Refusal`], or the error of starting a thread.
+    /// The model's [`Refusal`], or a refusal with the cause if the system cannot start a thread.
     pub fn start(
         mut model: Engine,
         parameters: usize,

@@ -19,9 +19,9 @@ pub(super) const MESSAGE_BYTES: usize = 508;
 /// Layout of the shared page, with one request and one reply at a time.
 #[repr(C)]
 pub(crate) struct SharedPage {
-    /// Number of the newest request; the worker sleeps on it.
+    /// Number of the newest request; the worker sleeps until the number changes.
     pub(crate) request: AtomicU32,
-    /// Number of the newest request with a reply; the host sleeps on it.
+    /// Number of the newest request with a reply; the host sleeps until the number changes.
     pub(super) reply: AtomicU32,
     /// Code of the requested operation.
     pub(super) operation: AtomicU32,

@@ -1,10 +1,10 @@
-//! Force model in a worker process: the loop continues without the model when it hangs or crashes.
+//! Force model in a worker process: if the model hangs or crashes, the loop continues without the model.
 //!
 //! The host starts a second process of its own program, `flotor worker`, which loads the plugin and creates the model. Both
 //! processes share one page of memory, through which the loop requests each step. The worker sleeps until a request arrives; the
 //! loop sleeps until the reply, but no longer than the model's timeout. In the first tick without a reply the last force is
-//! applied, then none until the worker has caught up. A worker with five more late ticks than ticks in time is disabled, as a model
-//! with such overruns in the loop is; so is a worker whose process has ended.
+//! applied, then no force until the worker replies again. A worker with five more late ticks than ticks in time is disabled, like a
+//! model with such overruns in the loop. A worker whose process has ended is also disabled.
 //!
 //! The host loads the library as well, for its parameter schema, but creates no model.
 

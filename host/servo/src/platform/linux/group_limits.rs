@@ -54,7 +54,7 @@ pub fn group_limits(root: &Path) -> Vec<GroupLimit> {
     readers.into_iter().filter_map(|read| tightest(&folders, read)).collect()
 }
 
-/// Returns the file of a control group that leaves real-time threads of this process no processor time, so that the system refuses
+/// Returns the file of a control group whose budget for real-time threads of this process is zero, so that the system refuses
 /// real-time priority; `None` if there is no such group. Not real-time.
 pub(crate) fn file_without_real_time() -> Option<PathBuf> {
     let is_none = |limit: &GroupLimit| limit.value == LimitValue::RealTimeShare(0.0);

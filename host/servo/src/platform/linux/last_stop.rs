@@ -300,8 +300,8 @@ impl Drop for AlternateStack {
 
 // ---------------------------------------------------------------- signals that stay the host's
 
-/// Blocks signals in the calling thread and in all threads that it starts from now on, to be received by [`wait_for_signal`]. Not
-/// real-time.
+/// Blocks signals in the calling thread and in all threads that it starts from now on, so that [`wait_for_signal`] receives the
+/// signals. Not real-time.
 ///
 /// # Errors
 /// If the system call fails.
@@ -355,7 +355,7 @@ pub struct SignalGuard {
     blocked: sigset_t,
 }
 
-/// Signals of the host whose action a plugin has replaced, or which it has blocked.
+/// Signals of the host that a plugin has blocked, or whose action a plugin has replaced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TakenSignals {
     bits: u64,

@@ -26,7 +26,7 @@ impl HostProcess {
     }
 }
 
-/// Returns the signal that ended a process; `None` if it exited.
+/// Returns the signal that ended a process; `None` if the process exited.
 pub(crate) fn ending_signal(status: ExitStatus) -> Option<i32> {
     status.signal()
 }

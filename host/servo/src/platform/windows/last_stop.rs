@@ -4,8 +4,8 @@
 //! handles console events, which no plugin can replace.
 //!
 //! Not caught: `abort` and other immediate terminations (`__fastfail`), heap corruption that the system finds, which bypass all
-//! filters; and `TerminateProcess`. Only the device's own watchdog can stop it then. The end of the process by `exit` is reported
-//! by a callback of the loader, which Wine 8 does not call for a program: it is not tested.
+//! filters; and `TerminateProcess`. Then only the watchdog of a device itself can stop the device. The end of the process by `exit`
+//! is reported by a callback of the loader. Wine 8 does not call this callback for a program, so it is not tested.
 #![allow(unsafe_code)] // neither filter nor callback can be made without; tests/tests/system/architecture.rs lists it
 
 use crate::guest::program_handles_signals;

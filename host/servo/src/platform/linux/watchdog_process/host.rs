@@ -17,7 +17,8 @@ use std::process::{Child, Command, Stdio};
 /// Timeout for the watchdog process to be ready.
 const PATIENCE: Timespec = Timespec { tv_sec: 5, tv_nsec: 0 };
 
-/// Watchdog process of this host. Dropping it reports to the process that the devices are stopped, and waits for the process to end.
+/// Watchdog process of this host. Dropping the value reports to the process that the devices are stopped, and waits for the end of
+/// the process.
 pub struct WatchdogProcess {
     child: Child,
     link: OwnedFd,
@@ -25,8 +26,8 @@ pub struct WatchdogProcess {
 }
 
 impl WatchdogProcess {
-    /// Starts the watchdog process for those of `devices` (each with its name) that are stopped by a message, and waits until it is
-    /// ready; `None` without such devices. Not real-time.
+    /// Starts the watchdog process for the `devices` (each with its name) that are stopped by a message, and waits until the
+    /// process is ready; `None` if no device is stopped by a message. Not real-time.
     ///
     /// # Errors
     /// If a system call fails, or the process is not ready within 5 s.
@@ -62,8 +63,8 @@ impl WatchdogProcess {
         Ok(process)
     }
 
-    /// Returns the control group that the process shares with the host because it could not leave: killing the group ends both.
-    /// `None` if it shares none.
+    /// Returns the control group that the process could not leave and therefore shares with the host: a kill of the group ends both
+    /// processes. `None` if the processes share no group.
     #[must_use]
     pub fn shared_group(&self) -> Option<&str> {
         self.shared_group.as_deref()
@@ -156,8 +157,8 @@ impl Drop for HeartbeatSender {
     }
 }
 
-/// Starts a watchdog process without devices and ends it; returns the control group that the process shared with this process,
-/// `None` if it shared none. Not real-time.
+/// Starts a watchdog process without devices and ends the process; returns the control group that both processes shared, `None` if
+/// they shared no group. Not real-time.
 ///
 /// # Errors
 /// As for [`WatchdogProcess::start`].

@@ -37,7 +37,7 @@ enum Packet {
     Alive = b'a',
     /// To the process: no more heartbeats follow.
     Quiet = b'q',
-    /// From the process: ready; with the control group shared with the host, if it could not leave one.
+    /// From the process: ready; with the path of a control group shared with the host, empty if there is none.
     Ready = b'r',
     /// To the process: the devices are stopped and need not be guarded any more.
     End = b'e',
