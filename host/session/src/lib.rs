@@ -1,4 +1,4 @@
-//! Embeds Flotor in a program: reads scenes, finds and loads plugins, runs sessions, records and reports them.
+//! Embeds Flotor in a program: reads scenes, finds and loads plugins, runs sessions, and records and summarises runs.
 //!
 //! ```text
 //! file -> Scene -> Session (plugins loaded, settings checked, devices paired) -> run

@@ -19,8 +19,8 @@ pub struct Measurements {
 }
 
 impl Measurements {
-    /// Creates the measurements before a run; `requested` are the model outputs to compute in addition to the recorded ones. Without
-    /// `recorder` the run is not recorded.
+    /// Creates the measurements before a run; `requested` are the model outputs to compute in addition to the recorded outputs.
+    /// Without `recorder` the run is not recorded.
     #[must_use]
     pub fn new(recorder: Option<Recorder>, requested: Demand) -> Self {
         let (tally, digest) = (Tally::default(), TraceDigest::new());

@@ -1,8 +1,8 @@
 //! Process for plugin code, in a process group of its own. The whole group is killed when its handle is dropped, and when the thread
 //! that started it ends, for any reason.
 //!
-//! A plugin may hang, ignore signals or start processes. On Windows only the process itself is killed, and it outlives a killed host:
-//! a remedy is a job object, which Flotor does not use yet.
+//! A plugin may hang, ignore signals or start processes. On Windows only the process itself is killed, and the process outlives a
+//! killed host: a remedy is a job object, which Flotor does not use yet.
 
 use flotor_servo::platform::process_group;
 use std::io;

@@ -111,8 +111,8 @@ impl Default for Port {
 }
 
 impl Port {
-    /// Creates a port with disabled force; the next model that is created with its [number](Self::number) as `port` is connected to
-    /// it. Not real-time.
+    /// Creates a port with disabled force, and connects the next model that is created with the [number](Self::number) of the port
+    /// as `port`. Not real-time.
     #[must_use]
     pub fn new() -> Self {
         let (publisher, command) = latest(NO_COMMAND);
@@ -127,8 +127,8 @@ impl Port {
         self.number
     }
 
-    /// Commands the wrench on the hand, N and N·m, model frame, from the next tick on until it expires. Bounded, but may wait for
-    /// another thread that uses the same port.
+    /// Commands the wrench on the hand, N and N·m, model frame, from the next tick on until the wrench expires. Bounded, but may
+    /// wait for another thread that uses the same port.
     ///
     /// # Errors
     /// [`NotFinite`]; the previous wrench stays until it expires.
@@ -201,8 +201,8 @@ pub struct Connected {
     pub ramp_ns: u64,
 }
 
-/// Creates a port for each device of a scene, in the scene's order, and assigns it to the first model `program` on the device; adds
-/// such a model to a device that has none. Not real-time.
+/// Creates a port for each device of a scene, in the scene's order, and assigns the port to the first model `program` on the
+/// device; adds such a model to a device without one. Not real-time.
 #[must_use]
 pub fn connect(scene: &mut Scene) -> Vec<Connected> {
     let connect = |device: u16| {

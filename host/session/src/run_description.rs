@@ -7,7 +7,7 @@ use flotor_hal::ParameterKind;
 use flotor_record::{NamedFile, PluginDescription, Role, RunDescription};
 use std::path::PathBuf;
 
-/// Creates the description of a run before it begins. Not real-time.
+/// Creates the description of a run before its start. Not real-time.
 ///
 /// `plugins` are the plugins of the prepared session ([`crate::Session::plugins`]): devices, then models, both in the scene's order.
 #[must_use]

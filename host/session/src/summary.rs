@@ -186,7 +186,7 @@ pub struct RunSummary {
     pub events: std::collections::BTreeMap<&'static str, u64>,
     /// Digest of all records without measured times: equal for equal runs.
     pub trace_digest: String,
-    /// Model outputs that were not computed in every tick, because they were not requested or a model has none: "torque", "energy".
+    /// Model outputs that were not computed in every tick ("torque", "energy"): not requested, or not available from every model.
     pub not_computed: Vec<&'static str>,
     /// Number of records dropped because an observer was too slow.
     pub dropped_records: u64,
@@ -291,8 +291,8 @@ pub struct CouplingSummary {
     /// Largest ratio of the energy delivered to one hand to the energy that the other hand puts in; depends on the scales of the ends
     /// alone.
     pub energy_gain: f64,
-    /// Lowest energy of the tank of each end, J; below zero: more came out at this end than it had and received. The value of a
-    /// remote end is reported by its host and cannot be verified here.
+    /// Lowest energy of the tank of each end, J; below zero: more energy came out at this end than its tank had and received. The
+    /// value of a remote end is reported by its host and cannot be verified here.
     pub lowest_j: [f64; 2],
     /// Net energy that the hand at each end put in, J; negative: more came out.
     pub gone_in_j: [f64; 2],
@@ -324,7 +324,7 @@ pub struct LinkSummary {
     /// local hand put in.
     #[serde(rename = "believed_j")]
     pub accepted_j: f64,
-    /// Energy claimed by the partner beyond the part that can be verified here, J; it was rejected.
+    /// Rejected energy, J: claimed by the partner beyond the part that can be verified here.
     pub cut_j: f64,
     /// Travel claimed by the partner beyond the plausible limit, m.
     pub cut_path_m: f64,

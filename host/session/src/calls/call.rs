@@ -32,7 +32,7 @@ pub enum Call {
     Activate,
     /// Stopping a device at the end of a run.
     SafeStop,
-    /// Ending the energy balance of a device and de-energising it.
+    /// Ending the energy balance of a device and de-energising the device.
     Deactivate,
     /// Reading the message about a failed call.
     LastMessage,
@@ -93,7 +93,7 @@ pub(crate) fn limit() -> Duration {
     limit_of(LIMIT_VARIABLE).unwrap_or(DEFAULT_LIMIT)
 }
 
-/// Reads a time limit, s, from an environment variable; `None` if it is unset or not a positive number.
+/// Reads a time limit, s, from an environment variable; `None` if the variable is unset or not a positive number.
 pub(crate) fn limit_of(variable: &str) -> Option<Duration> {
     let seconds = std::env::var(variable).ok()?.parse::<f64>().ok().filter(|seconds| *seconds > 0.0)?;
     Duration::try_from_secs_f64(seconds).ok()

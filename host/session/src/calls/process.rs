@@ -29,7 +29,8 @@ pub enum Notice {
         who: String,
         /// Names of the changed parts, which the host has restored.
         restored: Vec<&'static str>,
-        /// Names of changed environment variables, which the host does not restore: other threads may read them at any time.
+        /// Names of changed environment variables, which the host does not restore: other threads may read the variables at any
+        /// time.
         variables: Vec<String>,
     },
     /// The watchdog process has ended and the run continues without it.

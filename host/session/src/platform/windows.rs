@@ -41,8 +41,8 @@ pub(crate) fn identity(file: &Metadata) -> [u64; 2] {
     [file.creation_time(), u64::from(file.file_attributes())]
 }
 
-/// Returns the time of the last write, s and ns since 1970. A program can set it back, so length and creation time of the file have
-/// to match as well.
+/// Returns the time of the last write, s and ns since 1970. A program can set this time back, so length and creation time of the
+/// file have to match as well.
 pub(crate) fn changed(file: &Metadata) -> (i64, i64) {
     let since = file.modified().ok().and_then(|at| at.duration_since(UNIX_EPOCH).ok()).unwrap_or_default();
     (i64::try_from(since.as_secs()).unwrap_or(i64::MAX), since.subsec_nanos().into())

@@ -90,7 +90,7 @@ pub enum LookupError {
         kind: Option<PluginKind>,
         /// The most similar id of that kind.
         nearest: Option<String>,
-        /// Hint about a file with this name and the reason why it is not used, or about a folder of the scene without a plugin.
+        /// Hint: cause for which a file with this name is not used, or a folder of the scene without a plugin.
         hint: Option<String>,
     },
     /// Two files of one folder have the id.

@@ -31,7 +31,7 @@ pub enum ChangeWhat {
         /// Alternatives for the model, at least one; of several, the seed of the run chooses one.
         by: Vec<Alternative>,
     },
-    /// New weight of a model; the loop approaches it at the rate of the model's fade.
+    /// New weight of a model, which the loop approaches at the rate of the model's fade.
     Weight {
         /// Name of a model in the scene, or id of a plugin.
         model: String,

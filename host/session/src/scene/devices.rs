@@ -78,7 +78,7 @@ fn find(devices: &[DeviceUse], name: &str, location: &Location) -> Result<u16, S
     })
 }
 
-/// Returns the numbers of the devices of a model: the named ones, or the only device of the scene.
+/// Returns the numbers of the devices of a model: the named devices, or the only device of the scene.
 pub(super) fn of_model(
     devices: &[DeviceUse],
     named: Option<Value<'_>>,
@@ -118,7 +118,7 @@ pub fn without_device(name: &str) -> &str {
     name.split_once(ON).map_or(name, |(model, _)| model)
 }
 
-/// Returns an error if two models, or a model and a device, have the same name: `--set` and changes would reach only one of them.
+/// Returns an error if two models, or a model and a device, have the same name: `--set` and changes would reach only one of both.
 pub(super) fn tell_apart(models: &[ModelUse], devices: &[DeviceUse]) -> Result<(), SceneError> {
     let mut names = BTreeSet::new();
     for model in models {

@@ -32,7 +32,7 @@ pub const DEMO: &str = include_str!("../../scenes/demo.toml");
 /// Scene of perception experiments: a spring for the subject to judge, on the simulated flotor.
 pub const STUDY: &str = include_str!("../../scenes/study.toml");
 
-/// Scene as read from text: complete and consistent, but not yet checked against the plugins that it names.
+/// Scene as read from text: complete and consistent, but not yet checked against the named plugins.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// Title of the run in reports; may be empty.
@@ -45,7 +45,8 @@ pub struct Scene {
     pub pacing: Pacing,
     /// Duration of the run, s.
     pub duration_s: f64,
-    /// Plugin folders, searched before all others; [`Scene::load`] resolves them against the folder of the scene file.
+    /// Plugin folders, searched before all other folders; [`Scene::load`] resolves relative paths against the folder of the scene
+    /// file.
     pub plugin_folders: Vec<PathBuf>,
     /// Devices, at least one.
     pub devices: Vec<DeviceUse>,
@@ -75,7 +76,7 @@ pub struct PluginUse {
 /// Calibration file named in a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CalibrationUse {
-    /// Path as written; [`Self::path`] resolves it.
+    /// Path as written in the scene; [`Self::path`] resolves a relative path.
     pub file: PathBuf,
     /// Location of the path in the scene.
     pub location: Location,

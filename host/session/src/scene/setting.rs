@@ -89,8 +89,8 @@ impl PluginKeyValue {
         (self.plugin, self.setting.key, self.setting.value)
     }
 
-    /// Adds the setting to the plugins of a scene that it names: a device, a model (`MODEL` on all its devices, `MODEL@DEVICE` on
-    /// one), or a plugin id; `device` names every device. Not real-time.
+    /// Adds the setting to the named plugins of a scene: a device, a model (`MODEL` on all its devices, `MODEL@DEVICE` on one
+    /// device), or a plugin id; `device` names every device. Not real-time.
     ///
     /// # Errors
     /// Message with the closest name, if the scene has no such plugin.
@@ -109,7 +109,7 @@ impl PluginKeyValue {
         self.apply_among(models, &names.collect::<Vec<_>>())
     }
 
-    /// Adds the setting to the models that it names, by name in the scene or by plugin id. Not real-time.
+    /// Adds the setting to the named models, by name in the scene or by plugin id. Not real-time.
     ///
     /// # Errors
     /// Message with the closest name, if no model has the name or id.

@@ -14,7 +14,7 @@ pub enum Strength {
     /// At most the host's [ceiling](CEILING), except for simulated devices.
     #[default]
     UnderCeiling,
-    /// Up to the limits of scene and device: permitted by the user; a scene cannot permit it.
+    /// Up to the limits of scene and device, if the user permits this; a scene cannot give the permission.
     Strong,
 }
 

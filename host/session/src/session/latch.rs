@@ -40,8 +40,8 @@ pub struct StopReach {
 }
 
 impl LatchGuard {
-    /// Creates a guard of the latch in `directory`. Every press from now on counts, even if it is released before the next check. Not
-    /// real-time.
+    /// Creates a guard of the latch in `directory`. Every press from now on counts, even if the latch is released before the next
+    /// check. Not real-time.
     #[must_use]
     pub fn of(directory: &Directory) -> Self {
         let latch = directory.latch();
@@ -122,8 +122,8 @@ impl LatchGuard {
         self.latch.state().pressed.map(|pressed| pressed.at)
     }
 
-    /// Starts to watch the latch, as [`Self::watch`] does, and checks it, as [`Self::check`] does: for devices that are energised
-    /// without [`Session::run`](super::Session::run). Not real-time.
+    /// Starts to watch the latch, as [`Self::watch`] does, and checks the latch, as [`Self::check`] does: for devices that are
+    /// energised without [`Session::run`](super::Session::run). Not real-time.
     ///
     /// # Errors
     /// [`RunError::Latched`] as for [`Self::check`]; [`RunError::NoThread`] if the system cannot start a thread.

@@ -89,8 +89,8 @@ pub struct Session {
 }
 
 impl Session {
-    /// Loads the plugins of a scene, opens its devices, creates its models and checks that they fit; energises no device. On the real
-    /// clock also starts the watchdog process. Not real-time; runs plugin code.
+    /// Loads the plugins of a scene, opens its devices, creates its models and checks that scene and devices fit; energises no
+    /// device. On the real clock also starts the watchdog process. Not real-time; runs plugin code.
     ///
     /// # Errors
     /// [`RunError`] if a plugin is unknown or refuses, a call does not return, the scene does not fit a device or a plugin, or the

@@ -37,7 +37,7 @@ pub struct Outcome {
     pub models: Vec<(String, ModelHealth, String)>,
     /// Replacements of models that had faults.
     pub faulty_plugins: Vec<FaultyPlugin>,
-    /// Replacements in place at the end, after a hot swap; not those that the seed chose among several.
+    /// Replacements in place at the end, after a hot swap, without the replacements that the seed chose among several.
     pub replacements: Vec<PluginReport>,
     /// Warnings for users, a sentence each; the warnings known before the run come first.
     pub warnings: Vec<String>,
@@ -45,7 +45,7 @@ pub struct Outcome {
     known_before: usize,
     /// First plugin that did not return from a call after the run; `None` if all returned.
     pub unresponsive: Option<Unresponsive>,
-    /// Plugin instances left to free. Free or drop them last: plugin code may hang.
+    /// Plugin instances that are not freed yet. Free or drop this value last: plugin code may hang.
     pub unfreed_plugins: UnfreedPlugins,
 }
 
@@ -98,7 +98,7 @@ pub struct DeviceOutcome {
     pub effects: EnvelopeEffects,
     /// Problem with samples or commands of the device that the host detected; `None` without a problem.
     pub problem: Option<String>,
-    /// Energy balance kept by the device itself; `None` if it keeps none.
+    /// Energy balance computed by the device itself; `None` for a device without an energy balance.
     pub ledger: Option<EnergyLedger>,
     /// Problem that the host found, or else the last message of the device; may be empty.
     pub words: String,

@@ -32,7 +32,8 @@ pub struct PluginReport {
     pub at_hand: Demand,
     /// Isolation of a model, with `ByOrigin` resolved; `None` for a device.
     pub isolation: Option<Isolation>,
-    /// Signals of the host whose actions the plugin replaced, or which it blocked, while it was created; the host has restored them.
+    /// Signals of the host that the plugin blocked, or whose actions the plugin replaced, during its creation; the host has
+    /// restored these signals.
     pub signals_taken: TakenSignals,
     /// Error estimates of a model ([`crate::estimates`]): id and value of each.
     pub estimates: Vec<(String, f64)>,

@@ -77,8 +77,8 @@ pub struct WatchdogStart {
 /// Starts the watchdog process of open devices, before the first of them is energised. Not real-time.
 ///
 /// # Errors
-/// [`RunError::WatchdogProcess`] if `limits` require the process and it cannot be started; [`RunError::SharedControlGroup`] if a kill
-/// of one control group leaves the force of a device on and `limits` do not accept this.
+/// [`RunError::WatchdogProcess`] if the process cannot be started but `limits` require it; [`RunError::SharedControlGroup`] if a
+/// kill of one control group leaves the force of a device on and `limits` do not accept this.
 pub fn start_watchdog_process(
     stops: &[&StopWithoutHost],
     limits: &Limits,

@@ -6,7 +6,8 @@ use crate::calls::{Call, CallError, CallThread, Unresponsive, end_limit};
 use flotor_hal::abi::loader::OpenedDevice;
 use flotor_servo::{LastStop, Layer};
 
-/// Models and devices of a finished run. Dropping the value frees them; [`Self::free`] also reports a plugin that hangs.
+/// Models and devices of a finished run. Dropping the value frees models and devices; [`Self::free`] also reports a plugin that
+/// hangs.
 #[derive(Default)]
 pub struct UnfreedPlugins {
     pub(super) devices: Vec<(String, OpenedDevice)>,

@@ -13,7 +13,7 @@ pub struct Guardian {
 }
 
 impl Guardian {
-    /// Creates a monitor of this process, if there is one; with `is_required` the end of the process stops the run.
+    /// Creates a monitor of a watchdog process, without effect for `None`; with `is_required` the end of the process stops the run.
     #[must_use]
     pub fn of(process: Option<&Arc<WatchdogProcess>>, is_required: bool) -> Self {
         Self { process: process.map(Arc::downgrade).unwrap_or_default(), is_required, is_gone: false }

@@ -31,7 +31,7 @@ use flotor_servo::{EmergencySource, StopSwitch, THREAD_ADVICE};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 
-/// Publishes a prepared run in `directory`, so that clients can find, observe and change it. Not real-time.
+/// Publishes a prepared run in `directory`, so that clients can find, observe and change the run. Not real-time.
 ///
 /// # Errors
 /// [`PublishError`]; the session can still run, without clients.
@@ -48,7 +48,8 @@ pub fn publish(
     announce(directory, scene, run, session, Arc::new(host))
 }
 
-/// Publishes a prepared run in `directory`, so that clients can find and observe it; `host` handles all other requests. Not real-time.
+/// Publishes a prepared run in `directory`, so that clients can find and observe the run; `host` handles all other requests. Not
+/// real-time.
 ///
 /// # Errors
 /// [`PublishError`]; the session can still run, without clients.
@@ -80,7 +81,7 @@ fn panel(report: &PluginReport) -> PanelPlugin {
 pub struct ObservedRun<O> {
     /// Observer of the run, called before the clients.
     pub observer: O,
-    /// Telemetry server; `None` if it has not started.
+    /// Telemetry server; `None` if the server has not started.
     pub publication: Option<Publication>,
 }
 

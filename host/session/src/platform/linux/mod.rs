@@ -20,7 +20,7 @@ pub(crate) fn identity(file: &Metadata) -> [u64; 2] {
     [file.dev(), file.ino()]
 }
 
-/// Returns the time of the last change of contents or attributes (ctime), s and ns since 1970; programs cannot set it back.
+/// Returns the time of the last change of contents or attributes (ctime), s and ns since 1970; programs cannot set this time back.
 pub(crate) fn changed(file: &Metadata) -> (i64, i64) {
     (file.ctime(), file.ctime_nsec())
 }

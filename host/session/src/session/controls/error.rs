@@ -21,7 +21,7 @@ pub enum ControlError {
         /// Names of all plugins of the run.
         names: Vec<String>,
     },
-    /// The plugin has no such parameter, or the value is not legal for it.
+    /// The plugin has no such parameter, or the value is not legal for the parameter.
     #[error("[{plugin}] {error}")]
     Setting {
         /// Name of the plugin.

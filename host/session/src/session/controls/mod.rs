@@ -98,8 +98,8 @@ impl Controls {
         self.send(&checked.collect::<Result<Vec<_>, _>>()?.concat())
     }
 
-    /// Sets the weight of a model, limited to 0 to 1; the loop approaches it at the rate of the model's fade from the next tick on. A
-    /// model with weight 0 is not stepped. Not real-time.
+    /// Sets the target weight of a model, clamped to 0 to 1, which the loop approaches at the rate of the model's fade from the
+    /// next tick on. A model with weight 0 is not stepped. Not real-time.
     ///
     /// # Errors
     /// [`ControlError`]: unknown model, queue to the loop full, or run over.

@@ -1,5 +1,5 @@
-//! Table of the plugins of a run with their replacements: checks new values before they enter the loop, and describes the changes
-//! that the loop reports.
+//! Table of the plugins of a run with their replacements: checks new values before the loop receives them, and describes the
+//! changes that the loop reports.
 
 use super::super::plugin_report::PluginReport;
 use super::error::ControlError;
@@ -16,8 +16,8 @@ use std::sync::{Arc, Mutex, MutexGuard};
 /// New value for a parameter of a plugin of the run, as text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NewValue<'a> {
-    /// Name of a device or model in the scene (a model on several devices: `NAME@DEVICE` for one of them, `NAME` for all), or id of
-    /// a plugin.
+    /// Name of a device or model in the scene (a model on several devices: `NAME@DEVICE` for one device, `NAME` for all devices),
+    /// or id of a plugin.
     pub plugin: &'a str,
     /// Id of the parameter.
     pub parameter: &'a str,
@@ -74,12 +74,12 @@ impl PluginTable {
         self.lock().get_mut(PluginIndex::of_model(self.devices, model).position()).map(on_model)
     }
 
-    /// Adds the replacement of a model and returns its generation; new values are checked against it from now on.
+    /// Adds the replacement of a model and returns its generation; new values are checked against the replacement from now on.
     pub(in super::super) fn add(&self, model: usize, report: PluginReport, chosen_by: ChosenBy) -> u16 {
         self.model(model, |versions| versions.add(report, chosen_by)).unwrap_or(0)
     }
 
-    /// Records that the loop has put a generation in place; new values are checked against it from now on.
+    /// Records that the loop has put a generation in place; new values are checked against this generation from now on.
     pub(super) fn set_current(&self, plugin: PluginIndex, generation: u16) {
         if let Some(versions) = self.lock().get_mut(plugin.position()) {
             (versions.current, versions.in_place) = (generation, generation);
@@ -113,7 +113,7 @@ impl PluginTable {
         self.model(model, |versions| versions.retire(generation));
     }
 
-    /// Selects the plugins that a run begins with as the ones that new values are checked against.
+    /// Makes new values be checked against the plugins that the run begins with.
     pub(in super::super) fn start_with_the_first(&self) {
         self.lock().iter_mut().for_each(|versions| versions.current = 0);
     }
