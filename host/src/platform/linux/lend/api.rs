@@ -1,4 +1,4 @@
-//! Library interfaces of other makers, and the drop-in libraries for them.
+//! Library interfaces of other makers, and the drop-in libraries with these interfaces.
 
 use flotor_command::CommandError;
 use std::path::{Path, PathBuf};

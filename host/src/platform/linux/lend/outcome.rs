@@ -92,7 +92,8 @@ impl<'a> Runs<'a> {
         }
     }
 
-    /// Writes the summary of each run as JSON: the first to `file`, each further one to a file beside it, with the suffix of the run.
+    /// Writes the summary of each run as JSON: the first summary to `file`, each further summary to a file in the same folder with
+    /// the suffix of the run in its name.
     pub(super) fn write(&self, file: &Path) -> Result<(), CommandError> {
         if self.runs.is_empty() {
             return write_json(

@@ -82,7 +82,8 @@ impl StopRequest {
         if is_emergency { stage.max(Stage::ProgramKilled) } else { stage }
     }
 
-    /// Calls `poll` with the current stage until it returns a value; returns `None` at [`Stage::Over`].
+    /// Calls `poll` with the current stage until `poll` returns a value, and returns this value; `None` after the poll at
+    /// [`Stage::Over`].
     pub(super) fn poll<T>(&self, mut poll: impl FnMut(Stage) -> Option<T>) -> Option<T> {
         loop {
             let stage = self.stage();
@@ -97,7 +98,7 @@ impl StopRequest {
     }
 }
 
-/// Returns the exit status of a process that has ended; `None` while it runs.
+/// Returns the exit status of a process that has ended; `None` while the process runs.
 pub(super) fn has_ended(child: &mut Child) -> Option<ExitStatus> {
     child.try_wait().unwrap_or_else(|_| Some(ExitStatus::default()))
 }
