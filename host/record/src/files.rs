@@ -71,3 +71,17 @@ fn path_key(parameter: &str) -> String {
 fn hash_key(parameter: &str) -> String {
     format!("{parameter}.xxh3")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hash_is_that_of_all_bytes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("file");
+        let bytes: Vec<u8> = (0..300_000_u32).map(|k| k.to_le_bytes()[0]).collect();
+        std::fs::write(&file, &bytes).expect("a file");
+        assert_eq!(NamedFile::read(&file).expect("it is there").hash, xxhash_rust::xxh3::xxh3_64(&bytes));
+    }
+}

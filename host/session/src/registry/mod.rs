@@ -5,7 +5,7 @@
 
 mod stamp;
 
-use self::stamp::{FileStamp, hash_of};
+use self::stamp::FileStamp;
 use crate::calls::{self, Call, CallError, CallThread};
 pub use crate::platform::is_same_file;
 use crate::platform::{UNKNOWN_PROGRAM, distrust, user_folder};
@@ -13,6 +13,7 @@ use crate::scene::nearest;
 use flotor_core::lock;
 use flotor_hal::abi::loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_hal::abi::{Entry, PluginKind};
+use flotor_record::NamedFile;
 use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 use std::sync::Mutex;
 
@@ -286,7 +287,7 @@ impl Registry {
         {
             return Ok(known.plugin.clone());
         }
-        let Ok(hash) = hash_of(path) else { return load_in_time(path) };
+        let Ok(NamedFile { hash, .. }) = NamedFile::read(path) else { return load_in_time(path) };
         if let Some(known) = loaded.iter_mut().find(|known| known.path == path && known.hash == hash) {
             known.stamp = stamp;
             return Ok(known.plugin.clone());

@@ -1,10 +1,8 @@
 //! File stamps, which show whether a file has changed since it was read.
 
 use crate::platform;
-use std::fs::File;
 use std::path::Path;
 use std::time::{Duration, SystemTime};
-use xxhash_rust::xxh3::Xxh3Default;
 
 /// Coarsest resolution of file times: a second change within this time may leave the file time unchanged. File systems count in
 /// kernel ticks (10 ms at most), some in seconds (FAT in two).
@@ -49,16 +47,6 @@ fn is_settled((seconds, nanoseconds): (i64, i64), now: SystemTime) -> bool {
     now.duration_since(changed).is_ok_and(|age| age > COARSEST_FILE_TIME)
 }
 
-/// Returns the xxh3-64 hash of the bytes of a regular file. Not real-time.
-pub(super) fn hash_of(path: &Path) -> std::io::Result<u64> {
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(std::io::Error::new(std::io::ErrorKind::InvalidInput, "not a regular file"));
-    }
-    let mut hash = Xxh3Default::new();
-    std::io::copy(&mut File::open(path)?, &mut hash)?;
-    Ok(hash.digest())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -85,14 +73,5 @@ mod tests {
         assert!(!is_settled((100, 0), at(101)));
         assert!(!is_settled((100, 0), at(50)), "a clock was set back");
         assert!(!is_settled((-1, 0), at(50)));
-    }
-
-    #[test]
-    fn the_hash_is_that_of_all_bytes() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let file = folder.path().join("file");
-        let bytes: Vec<u8> = (0..300_000_u32).map(|k| k.to_le_bytes()[0]).collect();
-        std::fs::write(&file, &bytes).expect("a file");
-        assert_eq!(hash_of(&file).expect("it is there"), xxhash_rust::xxh3::xxh3_64(&bytes));
     }
 }
