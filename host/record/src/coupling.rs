@@ -2,16 +2,12 @@
 
 use crate::schema::{Coupling as CouplingMessage, CouplingEnd as EndMessage, Mapping, Missing, Passivity};
 use flotor_core::coupling::{
-    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MAX_DELAY_TICKS, PassivityMode,
+    CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, MAX_DELAY_TICKS,
 };
 
 impl From<&CouplingDescription> for CouplingMessage {
     fn from(description: &CouplingDescription) -> Self {
         let config = &description.config;
-        let passivity = match config.passivity {
-            PassivityMode::Observe => Passivity::Observe,
-            PassivityMode::Control => Passivity::Control,
-        };
         let end = |end: &CouplingEnd| EndMessage {
             device: end.device.into(),
             mapping: Some(Mapping::new(&end.mapping)),
@@ -24,7 +20,7 @@ impl From<&CouplingDescription> for CouplingMessage {
             damping_nms_per_rad: Some(config.damping_nms_per_rad),
             delay_ticks: config.delay_ticks,
             reserve_j: Some(config.reserve_j),
-            passivity: passivity.into(),
+            passivity: Passivity::from(config.passivity).into(),
             ends: description.ends.here().iter().map(end).collect(),
         }
     }
@@ -34,11 +30,6 @@ impl TryFrom<CouplingMessage> for CouplingDescription {
     type Error = Missing;
 
     fn try_from(message: CouplingMessage) -> Result<Self, Missing> {
-        let passivity = match message.passivity() {
-            Passivity::Observe => PassivityMode::Observe,
-            Passivity::Control => PassivityMode::Control,
-            Passivity::Unspecified => return Err(Missing("coupling.passivity")),
-        };
         let config = CouplingConfig {
             stiffness_n_per_m: message.stiffness_n_per_m(),
             damping_ns_per_m: message.damping_ns_per_m(),
@@ -46,7 +37,7 @@ impl TryFrom<CouplingMessage> for CouplingDescription {
             damping_nms_per_rad: message.damping_nms_per_rad(),
             delay_ticks: message.delay_ticks.min(MAX_DELAY_TICKS),
             reserve_j: message.reserve_j(),
-            passivity,
+            passivity: message.passivity().value().ok_or(Missing("coupling.passivity"))?,
         };
         let end = |end: &EndMessage| {
             let device = u16::try_from(end.device).map_err(|_| Missing("coupling.ends.device"))?;

@@ -98,17 +98,13 @@ impl RunDescription {
     }
 
     pub(crate) fn to_message(&self) -> Run {
-        let clock = match self.clock {
-            Clock::Real => schema::Clock::Real,
-            Clock::Virtual => schema::Clock::Virtual,
-        };
         Run {
             format: FORMAT,
             flotor_version: self.flotor_version.clone(),
             rate_hz: Some(self.rate_hz),
             duration_s: Some(self.duration_s),
             seed: self.seed,
-            clock: clock.into(),
+            clock: schema::Clock::from(self.clock).into(),
             scene_toml: self.scene_toml.clone(),
             plugins: self.plugins.iter().map(PluginDescription::to_message).collect(),
             couplings: self.couplings.iter().map(Into::into).collect(),
@@ -116,28 +112,19 @@ impl RunDescription {
     }
 
     pub(crate) fn from_message(run: Run) -> Result<Self, Missing> {
-        let clock = match run.clock() {
-            schema::Clock::Real => Clock::Real,
-            schema::Clock::Virtual => Clock::Virtual,
-            schema::Clock::Unspecified => return Err(Missing("clock")),
-        };
+        let clock = run.clock().value().ok_or(Missing("clock"))?;
+        let (rate_hz, duration_s) = (run.rate_hz(), run.duration_s());
+        let plugins = run.plugins.into_iter().map(PluginDescription::from_message);
+        let couplings = run.couplings.into_iter().map(CouplingDescription::try_from);
         Ok(Self {
-            rate_hz: run.rate_hz(),
-            duration_s: run.duration_s(),
+            rate_hz,
+            duration_s,
             seed: run.seed,
             clock,
             flotor_version: run.flotor_version,
             scene_toml: run.scene_toml,
-            plugins: run
-                .plugins
-                .into_iter()
-                .map(PluginDescription::from_message)
-                .collect::<Result<_, _>>()?,
-            couplings: run
-                .couplings
-                .into_iter()
-                .map(CouplingDescription::try_from)
-                .collect::<Result<_, _>>()?,
+            plugins: plugins.collect::<Result<_, _>>()?,
+            couplings: couplings.collect::<Result<_, _>>()?,
         })
     }
 
@@ -148,17 +135,13 @@ impl RunDescription {
 
     /// Returns the description as keys and values, for tools that show the metadata of an MCAP file.
     pub(crate) fn to_metadata(&self) -> BTreeMap<String, String> {
-        let clock = match self.clock {
-            Clock::Real => "real",
-            Clock::Virtual => "virtual",
-        };
         let mut texts = BTreeMap::from([
             ("format".to_owned(), FORMAT.to_string()),
             ("flotor_version".to_owned(), self.flotor_version.clone()),
             ("rate_hz".to_owned(), self.rate_hz.to_string()),
             ("duration_s".to_owned(), self.duration_s.to_string()),
             ("seed".to_owned(), self.seed.to_string()),
-            ("clock".to_owned(), clock.to_owned()),
+            ("clock".to_owned(), self.clock.word().to_owned()),
             ("scene_toml".to_owned(), self.scene_toml.clone()),
         ]);
         for plugin in &self.plugins {

@@ -5,9 +5,12 @@
 //! default, -0.0 equals 0.0, and a recording is bit-exact. On the wire it is the plain field of the schema.
 
 use crate::{Note, Severity};
+use flotor_core::coupling::PassivityMode;
 use flotor_core::mapping::MappingConfig;
 use flotor_core::trace::{Events, TickRecord};
-use flotor_core::{Change as ParameterChange, ChangeOutcome, ChangeSubject, ModelOutputs};
+use flotor_core::{
+    Change as ParameterChange, ChangeOutcome, ChangeSubject, Clock as ClockValue, ModelOutputs,
+};
 use flotor_hal::{Demand, Pose, Twist as TwistValue, Wrench as WrenchValue};
 use prost::{Enumeration, Message};
 use prost_types::Timestamp;
@@ -229,21 +232,41 @@ enum Level {
     Fatal = 5,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-enum Outcome {
-    Unspecified = 0,
-    Applied = 1,
-    Refused = 2,
-    Broke = 3,
+/// Defines enumerations of the schema, with the name of 0 if 0 is no value, and their conversion from and to the value of a field.
+macro_rules! enumerations {
+    ($($wire:ident $(($none:ident))? of $value:ident { $($name:ident = $number:tt),+ })+) => {
+        $(#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
+        #[repr(i32)]
+        pub(crate) enum $wire {
+            $($none = 0,)?
+            $($name = $number,)+
+        }
+
+        impl From<$value> for $wire {
+            fn from(value: $value) -> Self {
+                match value {
+                    $($value::$name => Self::$name,)+
+                }
+            }
+        }
+
+        impl $wire {
+            /// Returns the value; `None` if the field is not set.
+            pub(crate) fn value(self) -> Option<$value> {
+                match self {
+                    $(Self::$none => None,)?
+                    $(Self::$name => Some($value::$name),)+
+                }
+            }
+        })+
+    };
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-enum Subject {
-    Parameter = 0,
-    Weight = 1,
-    Plugin = 2,
+enumerations! {
+    Outcome(Unspecified) of ChangeOutcome { Applied = 1, Refused = 2, Broke = 3 }
+    Subject of ChangeSubject { Parameter = 0, Weight = 1, Plugin = 2 }
+    Passivity(Unspecified) of PassivityMode { Observe = 1, Control = 2 }
+    Clock(Unspecified) of ClockValue { Real = 1, Virtual = 2 }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
@@ -252,22 +275,6 @@ pub(crate) enum Felt {
     Unspecified = 0,
     Force = 1,
     Wrench = 2,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-pub(crate) enum Passivity {
-    Unspecified = 0,
-    Observe = 1,
-    Control = 2,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-pub(crate) enum Clock {
-    Unspecified = 0,
-    Real = 1,
-    Virtual = 2,
 }
 
 impl Mapping {
@@ -466,42 +473,22 @@ impl Log {
 
 impl Change {
     pub(crate) fn new(change: &ParameterChange) -> Self {
-        let outcome = match change.outcome {
-            ChangeOutcome::Applied => Outcome::Applied,
-            ChangeOutcome::Refused => Outcome::Refused,
-            ChangeOutcome::Broke => Outcome::Broke,
-        };
         Self {
             tick: change.tick,
             plugin: change.plugin.clone(),
             key: change.parameter.clone(),
             value: change.value.clone(),
             number: Some(change.number),
-            outcome: outcome.into(),
-            subject: match change.subject {
-                ChangeSubject::Parameter => Subject::Parameter,
-                ChangeSubject::Weight => Subject::Weight,
-                ChangeSubject::Plugin => Subject::Plugin,
-            }
-            .into(),
+            outcome: Outcome::from(change.outcome).into(),
+            subject: Subject::from(change.subject).into(),
             settings: crate::run::to_settings(&change.settings),
         }
     }
 
     pub(crate) fn change(self, time_ns: u64) -> Result<ParameterChange, Missing> {
-        let outcome = match self.outcome() {
-            Outcome::Applied => ChangeOutcome::Applied,
-            Outcome::Refused => ChangeOutcome::Refused,
-            Outcome::Broke => ChangeOutcome::Broke,
-            Outcome::Unspecified => return Err(Missing("outcome")),
-        };
-        let subject = match self.subject() {
-            Subject::Parameter => ChangeSubject::Parameter,
-            Subject::Weight => ChangeSubject::Weight,
-            Subject::Plugin => ChangeSubject::Plugin,
-        };
         Ok(ParameterChange {
-            subject,
+            outcome: self.outcome().value().ok_or(Missing("outcome"))?,
+            subject: self.subject().value().ok_or(Missing("subject"))?,
             settings: crate::run::from_settings(self.settings.clone()),
             tick: self.tick,
             time_ns,
@@ -509,7 +496,6 @@ impl Change {
             plugin: self.plugin,
             parameter: self.key,
             value: self.value,
-            outcome,
         })
     }
 }
