@@ -78,11 +78,8 @@ impl ChunkedFile {
 
     /// Writes a schema, and repeats it in the summary.
     pub(crate) fn add_schema(&mut self, header: &SchemaHeader, data: &[u8]) -> io::Result<()> {
-        let mut body = little_endian(header)?;
         let length = u32::try_from(data.len()).map_err(io::Error::other)?;
-        body.extend_from_slice(&length.to_le_bytes());
-        body.extend_from_slice(data);
-        let record = [&framed_head(op::SCHEMA, body.len()), body.as_slice()].concat();
+        let record = framed(op::SCHEMA, &[&little_endian(header)?, &length.to_le_bytes(), data]);
         self.statistics.schema_count += 1;
         self.repeat(op::SCHEMA, &record);
         self.emit(&record)
@@ -282,10 +279,8 @@ impl Chunk {
         self.first_ns = self.first_ns.min(time_ns);
         self.last_ns = self.last_ns.max(time_ns);
         let offset = self.messages.len() as u64;
-        self.places
-            .entry(header.channel_id)
-            .or_default()
-            .push(MessageIndexEntry { log_time: time_ns, offset });
+        let place = MessageIndexEntry { log_time: time_ns, offset };
+        self.places.entry(header.channel_id).or_default().push(place);
         let head = little_endian(header)?;
         self.messages.extend_from_slice(&framed_head(op::MESSAGE, head.len() + data.len()));
         self.messages.extend_from_slice(&head);
@@ -344,10 +339,13 @@ fn little_endian<T: for<'a> BinWrite<Args<'a> = ()>>(value: &T) -> io::Result<Ve
 
 /// Encodes a record: opcode, length, body.
 fn encoded<T: for<'a> BinWrite<Args<'a> = ()>>(opcode: u8, body: &T) -> io::Result<Vec<u8>> {
-    let body = little_endian(body)?;
-    let mut record = framed_head(opcode, body.len()).to_vec();
-    record.extend_from_slice(&body);
-    Ok(record)
+    Ok(framed(opcode, &[&little_endian(body)?]))
+}
+
+/// Returns a record from the parts of its body.
+fn framed(opcode: u8, body: &[&[u8]]) -> Vec<u8> {
+    let length = body.iter().map(|part| part.len()).sum();
+    [&framed_head(opcode, length)[..], &body.concat()].concat()
 }
 
 /// Encodes opcode and length of a record.
