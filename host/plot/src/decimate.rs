@@ -72,14 +72,9 @@ impl Bucket {
     }
 
     fn append_to(self, run: &mut Vec<Point>) {
-        let mut kept = [self.first, self.lowest, self.highest, self.last];
+        let mut kept = vec![self.first, self.lowest, self.highest, self.last];
         kept.sort_by_key(|&(place, _)| place);
-        let mut previous = None;
-        for (place, point) in kept {
-            if previous != Some(place) {
-                run.push(point);
-            }
-            previous = Some(place);
-        }
+        kept.dedup_by_key(|&mut (place, _)| place);
+        run.extend(kept.into_iter().map(|(_, point)| point));
     }
 }

@@ -54,11 +54,12 @@ pub(super) fn draw(series: &Series, slot: Slot, projection: &Projection) -> Opti
 }
 
 fn line(samples: impl Iterator<Item = Option<Point>>, slot: Slot, projection: &Projection) -> Drawing {
-    let runs: Vec<Vec<Point>> = decimate(samples, projection.column())
-        .into_iter()
-        .map(|run| run.into_iter().map(|point| projection.point_px(point)).collect())
-        .flat_map(|run: Vec<Point>| clipped(&run, &projection.frame.grown(EDGE_PX)))
-        .collect();
+    let visible = |run: Vec<Point>| {
+        let run_px: Vec<Point> = run.into_iter().map(|point| projection.point_px(point)).collect();
+        clipped(&run_px, &projection.frame.grown(EDGE_PX))
+    };
+    let runs: Vec<Vec<Point>> =
+        decimate(samples, projection.column()).into_iter().flat_map(visible).collect();
     let (mut path, mut dots) = (Path::default(), Path::default());
     if let [only_run] = runs.as_slice()
         && let [(x, y)] = only_run.as_slice()

@@ -5,7 +5,7 @@
 //! where they would overlap.
 
 use super::Panel;
-use super::axis::Domain;
+use super::axis::{Domain, Extent};
 use super::mark::{Direction, Mark};
 use super::projection::Projection;
 use super::series::{Series, Shape};
@@ -107,15 +107,11 @@ impl<'a> Legend<'a> {
     /// Places the entries between `left` and `right`, with `heading` at the start of the row.
     /// Series without a label have no entry.
     pub(super) fn new(panel: &'a Panel, x: &Domain, heading: &Heading, left: f64, right: f64) -> Self {
-        let mut entries: Vec<LegendEntry<'a>> = panel
-            .series
-            .iter()
-            .enumerate()
-            .filter(|(_, series)| !series.label.is_empty())
-            .map(|(index, series)| {
-                LegendEntry::new(series, index, series.extent_y(x, panel.y.scale).is_empty())
-            })
-            .collect();
+        let labelled = panel.series.iter().enumerate().filter(|(_, series)| !series.label.is_empty());
+        let entry = |(index, series): (usize, &'a Series)| {
+            LegendEntry::new(series, index, &series.extent_y(x, panel.y.scale))
+        };
+        let mut entries: Vec<LegendEntry<'a>> = labelled.map(entry).collect();
         let all_px: f64 =
             entries.iter().map(|entry| entry.width_px + LEGEND_GAP_PX).sum::<f64>() - LEGEND_GAP_PX;
         if entries.is_empty() || left + heading.width_px() + LEGEND_GAP_PX + all_px <= right {
@@ -128,9 +124,9 @@ impl<'a> Legend<'a> {
 }
 
 impl<'a> LegendEntry<'a> {
-    fn new(series: &'a Series, index: usize, is_empty: bool) -> Self {
+    fn new(series: &'a Series, index: usize, extent_y: &Extent) -> Self {
         let mut text = text::shorten(&series.label, LEGEND_TEXT_LIMIT_PX, font_px::LABEL);
-        if is_empty {
+        if extent_y.is_empty() {
             text.push_str(" (no data)");
         }
         let mut entry = Self { series, index, text, x: 0.0, row: 0, width_px: 0.0 };

@@ -89,20 +89,16 @@ pub(super) struct Draft<'a> {
     pub(super) has_data: bool,
 }
 
-fn drafts(figure: &Figure) -> Vec<Draft<'_>> {
+fn drafts<'a>(figure: &'a Figure) -> Vec<Draft<'a>> {
     let shared_x = x_domain(&figure.shared_x, figure.panels.iter().filter(|panel| panel.own_x.is_none()));
-    figure
-        .panels
-        .iter()
-        .enumerate()
-        .map(|(index, panel)| {
-            let (x_axis, x) = match &panel.own_x {
-                Some(own) => (own, x_domain(own, [panel])),
-                None => (&figure.shared_x, shared_x),
-            };
-            Draft::new(panel, x_axis, x, figure.panel_height_px, has_x_labels(figure, index))
-        })
-        .collect()
+    let draft = |(index, panel): (usize, &'a Panel)| {
+        let (x_axis, x) = match &panel.own_x {
+            Some(own) => (own, x_domain(own, [panel])),
+            None => (&figure.shared_x, shared_x),
+        };
+        Draft::new(panel, x_axis, x, figure.panel_height_px, has_x_labels(figure, index))
+    };
+    figure.panels.iter().enumerate().map(draft).collect()
 }
 
 /// Returns true if panel `index` has x labels: it has its own axis, or is the last of its column that
@@ -166,17 +162,15 @@ fn columns(figure: &Figure, drafts: &[Draft<'_>]) -> Vec<Column> {
     let count = figure.columns.min(drafts.len());
     let all_px = figure.width_px - 2.0 * MARGIN_PX + COLUMN_GAP_PX;
     let pitch_px = all_px / count.max(1) as f64;
-    (0..count)
-        .map(|index| {
-            let mine = || drafts.iter().skip(index).step_by(count);
-            let left_px = mine().map(Draft::y_label_width_px).fold(0.0, f64::max) + FRAME_TO_Y_LABEL_PX;
-            let right_px =
-                mine().map(|draft| side_gutter_px(&draft.panel.marks, &draft.y)).fold(0.0, f64::max);
-            let left = MARGIN_PX + pitch_px * index as f64;
-            let frame_width = (pitch_px - COLUMN_GAP_PX - left_px - right_px).max(LEAST_FRAME_WIDTH_PX);
-            Column { left, frame_left: left + left_px, frame_width }
-        })
-        .collect()
+    let column = |index: usize| {
+        let mine = || drafts.iter().skip(index).step_by(count);
+        let left_px = mine().map(Draft::y_label_width_px).fold(0.0, f64::max) + FRAME_TO_Y_LABEL_PX;
+        let right_px = mine().map(|draft| side_gutter_px(&draft.panel.marks, &draft.y)).fold(0.0, f64::max);
+        let left = MARGIN_PX + pitch_px * index as f64;
+        let frame_width = (pitch_px - COLUMN_GAP_PX - left_px - right_px).max(LEAST_FRAME_WIDTH_PX);
+        Column { left, frame_left: left + left_px, frame_width }
+    };
+    (0..count).map(column).collect()
 }
 
 /// Labels above a panel, and its x ticks: the parts that depend on the panel's column and not on its row.

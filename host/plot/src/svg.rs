@@ -17,7 +17,7 @@ use super::layout::{
 use super::mark::{Direction, MarkLook};
 use super::path::Path;
 use super::projection::Projection;
-use super::series::Shape;
+use super::series::{Series, Shape};
 use super::spans::Spans;
 use super::text::{self, escape, px};
 use super::theme::{Slot, font_px, style_sheet};
@@ -78,24 +78,18 @@ fn description(figure: &Figure, layout: &Layout<'_>) -> String {
             cell.draft.x_axis.name(0),
         );
         description.push_str(&sentence);
-        let clauses: Vec<String> = panel
-            .series
-            .iter()
-            .map(|series| {
-                let extent = series.extent_y(&cell.projection.x, panel.y.scale);
-                let label =
-                    if series.label.is_empty() { String::new() } else { format!("{}, ", series.label) };
-                let kind = if matches!(series.shape, Shape::Histogram(_)) { "bins" } else { "samples" };
-                let range = match extent.is_empty() {
-                    true => "none to show".to_owned(),
-                    false => {
-                        let value = |coordinate| text::significant(panel.y.scale.backward(coordinate));
-                        format!("{} to {}", value(extent.low), value(extent.high))
-                    }
-                };
-                format!(" {label}{} {kind}, {range}", series.given)
-            })
-            .collect();
+        let value = |coordinate| text::significant(panel.y.scale.backward(coordinate));
+        let clause = |series: &Series| {
+            let extent = series.extent_y(&cell.projection.x, panel.y.scale);
+            let label = if series.label.is_empty() { String::new() } else { format!("{}, ", series.label) };
+            let kind = if matches!(series.shape, Shape::Histogram(_)) { "bins" } else { "samples" };
+            let range = match extent.is_empty() {
+                true => "none to show".to_owned(),
+                false => format!("{} to {}", value(extent.low), value(extent.high)),
+            };
+            format!(" {label}{} {kind}, {range}", series.given)
+        };
+        let clauses: Vec<String> = panel.series.iter().map(clause).collect();
         description.push_str(if clauses.is_empty() { " no data" } else { "" });
         description.push_str(&clauses.join(";"));
         description.push('.');

@@ -137,19 +137,20 @@ pub(super) mod font_px {
 /// CairoSVG, svglib, Inkscape, librsvg and browsers support all rules: plain colours for `fill` and `stroke`, no inherited font
 /// size, and no size of the picture, which is in the attributes of the root.
 pub(super) fn style_sheet(paper: Paper) -> String {
+    use font_px::{HEADING, LABEL, SUBTITLE, TICK, TITLE};
     let light = Page { paper: "#ffffff", ink: "#1f2328", muted: "#59636e", axis: "#8c959f", grid: "#e7eaee" };
     let dark = Page { paper: "#0d1117", ink: "#e6edf3", muted: "#9198a1", axis: "#656c76", grid: "#232a33" };
     let (light, dark) = (light.rules(|(light, _)| light), dark.rules(|(_, dark)| dark));
     format!(
         ".plot{{font-family:system-ui,-apple-system,'Segoe UI',Roboto,\
          'Helvetica Neue','Noto Sans','DejaVu Sans',sans-serif;font-variant-numeric:tabular-nums}}\n\
-         .plot text{{font-size:{tick}px}}\n\
-         .plot .title{{font-size:{title}px;font-weight:600}}\n\
-         .plot .subtitle{{font-size:{subtitle}px}}\n\
-         .plot .heading{{font-size:{heading}px;font-weight:600}}\n\
+         .plot text{{font-size:{TICK}px}}\n\
+         .plot .title{{font-size:{TITLE}px;font-weight:600}}\n\
+         .plot .subtitle{{font-size:{SUBTITLE}px}}\n\
+         .plot .heading{{font-size:{HEADING}px;font-weight:600}}\n\
          .plot .watermark{{font-weight:600;fill-opacity:.13}}\n\
          .plot .unit{{font-weight:400}}\n\
-         .plot .label{{font-size:{label}px}}\n\
+         .plot .label{{font-size:{LABEL}px}}\n\
          .plot .middle{{text-anchor:middle}}\n\
          .plot .end{{text-anchor:end}}\n\
          .plot .hair{{fill:none;stroke-width:1}}\n\
@@ -172,11 +173,6 @@ pub(super) fn style_sheet(paper: Paper) -> String {
             Paper::Dark => dark,
             Paper::OfReader => format!("{light}@media (prefers-color-scheme:dark){{\n{dark}}}\n"),
         },
-        title = font_px::TITLE,
-        subtitle = font_px::SUBTITLE,
-        heading = font_px::HEADING,
-        label = font_px::LABEL,
-        tick = font_px::TICK,
     )
 }
 

@@ -126,11 +126,8 @@ fn multiples(low: f64, high: f64, step: f64) -> impl Iterator<Item = f64> {
 
 /// Returns the exponent of ten, a multiple of three, that labels of values up to `magnitude` leave out.
 fn left_out_exponent(magnitude: f64) -> i32 {
-    if (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&magnitude) {
-        0
-    } else {
-        exponent_of(magnitude).div_euclid(3) * 3
-    }
+    let is_plain = (SMALLEST_PLAIN..LARGEST_PLAIN).contains(&magnitude);
+    if is_plain { 0 } else { exponent_of(magnitude).div_euclid(3) * 3 }
 }
 
 /// Places ticks of a log axis: at decades, at 1-2-5 in each decade, or in linear steps, whichever gives enough labels.

@@ -69,7 +69,7 @@ fn kept(bucket: &[Point]) -> impl Iterator<Item = Point> + '_ {
     let finite = || bucket.iter().enumerate().filter(|(_, (_, y))| y.is_finite());
     let place = |found: Option<(usize, &Point)>| found.map(|(place, _)| place);
     let by_y = |one: &(usize, &Point), other: &(usize, &Point)| one.1.1.total_cmp(&other.1.1);
-    let mut places = [
+    let places = [
         place(finite().next()),
         place(finite().min_by(by_y)),
         place(finite().max_by(by_y)),
@@ -77,13 +77,10 @@ fn kept(bucket: &[Point]) -> impl Iterator<Item = Point> + '_ {
         bucket.iter().position(|(_, y)| !y.is_finite()),
         bucket.last().filter(|(_, y)| !y.is_finite()).map(|_| bucket.len() - 1),
     ];
+    let mut places: Vec<usize> = places.into_iter().flatten().collect();
     places.sort_unstable();
-    let mut previous = None;
-    places.into_iter().flatten().filter_map(move |place| {
-        let is_new = previous != Some(place);
-        previous = Some(place);
-        bucket.get(place).filter(|_| is_new).copied()
-    })
+    places.dedup();
+    places.into_iter().filter_map(|place| bucket.get(place).copied())
 }
 
 #[cfg(test)]
