@@ -40,10 +40,8 @@ impl Loop {
         let next = schedule.next_index();
         let wait_for_sample = |timeout_ns| {
             servo.heartbeat().enter(next, Place::DeviceWait(0));
-            servo
-                .devices()
-                .next()
-                .map_or(SampleWait::NotPaced, |(device, _)| device.wait_for_sample(timeout_ns))
+            let first = servo.devices().next();
+            first.map_or(SampleWait::NotPaced, |(device, _)| device.wait_for_sample(timeout_ns))
         };
         let due = match schedule.wait(wait_for_sample) {
             Ok(due) => due,

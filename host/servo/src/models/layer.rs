@@ -345,17 +345,11 @@ impl Object {
         match stepped {
             Stepped::Answered => {
                 let usable = usable(demand, output);
-                match usable {
-                    Some(_) if self.model.may_be_late() => self.last = usable,
-                    Some(_) => {}
-                    None => {
-                        self.last = None;
-                        ModelHealth::count(
-                            &mut health.rejected_ticks,
-                            &mut health.first_rejected,
-                            input.tick,
-                        );
-                    }
+                if usable.is_none() {
+                    self.last = None;
+                    ModelHealth::count(&mut health.rejected_ticks, &mut health.first_rejected, input.tick);
+                } else if self.model.may_be_late() {
+                    self.last = usable;
                 }
                 usable
             }

@@ -11,6 +11,7 @@ use std::io;
 use std::os::fd::{AsFd, OwnedFd};
 use std::ptr::NonNull;
 use std::sync::atomic::AtomicU32;
+use std::time::Duration;
 
 /// Mapping of a [`SharedPage`] that another process may have mapped too.
 pub(crate) struct SharedMemory {
@@ -81,14 +82,10 @@ impl Drop for SharedMemory {
 }
 
 /// Sleeps until [`wake`], or for `timeout_ns`, if `word` is still `value`; may return earlier. Real-time: one system call.
-#[allow(clippy::cast_possible_wrap)] // seconds of a timeout
 pub(crate) fn wait_for_change(word: &AtomicU32, value: u32, timeout_ns: u64) {
-    let timeout = Timespec {
-        tv_sec: (timeout_ns / 1_000_000_000) as i64,
-        tv_nsec: (timeout_ns % 1_000_000_000) as i64,
-    };
+    let timeout = Timespec::try_from(Duration::from_nanos(timeout_ns)).ok();
     // The caller reads the word again after any wake-up.
-    let _ = futex::wait(word, futex::Flags::empty(), value, Some(&timeout));
+    let _ = futex::wait(word, futex::Flags::empty(), value, timeout.as_ref());
 }
 
 /// Wakes the other process if it sleeps on `word`. Real-time: one system call.

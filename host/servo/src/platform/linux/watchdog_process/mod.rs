@@ -45,17 +45,9 @@ enum Packet {
 
 impl Packet {
     fn of(byte: u8) -> Option<Self> {
-        const ALL: [Packet; 8] = [
-            Packet::Device,
-            Packet::Name,
-            Packet::Begin,
-            Packet::Thread,
-            Packet::Alive,
-            Packet::Quiet,
-            Packet::Ready,
-            Packet::End,
-        ];
-        ALL.into_iter().find(|packet| *packet as u8 == byte)
+        use Packet::{Alive, Begin, Device, End, Name, Quiet, Ready, Thread};
+        let all = [Device, Name, Begin, Thread, Alive, Quiet, Ready, End];
+        all.into_iter().find(|packet| *packet as u8 == byte)
     }
 }
 
