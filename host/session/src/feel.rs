@@ -18,7 +18,9 @@ pub(crate) struct Feel {
     before: Option<(DVec3, DVec3)>,
     /// Pose at the start of the current rest.
     rest: Option<Pose>,
-    peak_stiffness_n_per_m: f64,
+    /// Largest stiffness felt, N/m: increase of the force against the handle per displacement, over displacements of 0.1 mm; 0 if the
+    /// force never increased.
+    pub(crate) peak_stiffness_n_per_m: f64,
     settled_ns: u64,
     newest_ns: u64,
 }
@@ -52,12 +54,6 @@ impl Feel {
             self.peak_stiffness_n_per_m = self.peak_stiffness_n_per_m.max(stiffness_n_per_m);
             self.before = Some((here_m, force_n));
         }
-    }
-
-    /// Returns the largest stiffness felt, N/m: increase of the force against the handle per displacement, over displacements of at
-    /// least 0.1 mm; 0 if the force never increased.
-    pub(crate) fn peak_stiffness_n_per_m(&self) -> f64 {
-        self.peak_stiffness_n_per_m
     }
 
     /// Returns the time from which on the handle stayed within 0.1 mm and 1 mrad of one pose, s; `None` for a handle that moved
@@ -106,14 +102,14 @@ mod tests {
         for (stiffness_n_per_m, way_m, ticks) in
             [(500.0, 4.0e-3, 400), (2000.0, 4.0e-3, 10), (0.0, 4.0e-3, 400)]
         {
-            let felt_n_per_m = felt(stiffness_n_per_m, way_m, ticks, Events::NONE).peak_stiffness_n_per_m();
+            let felt_n_per_m = felt(stiffness_n_per_m, way_m, ticks, Events::NONE).peak_stiffness_n_per_m;
             // Digits of differences of forces.
             assert!((felt_n_per_m - stiffness_n_per_m).abs() <= 1.0e-9 * stiffness_n_per_m, "{felt_n_per_m}");
         }
         let pumped = felt(-500.0, 4.0e-3, 400, Events::NONE);
-        assert_eq!(pumped.peak_stiffness_n_per_m(), 0.0, "a force along the way is no stiffness");
+        assert_eq!(pumped.peak_stiffness_n_per_m, 0.0, "a force along the way is no stiffness");
         let ramped = felt(500.0, 4.0e-3, 400, Events::RAMPING);
-        assert_eq!(ramped.peak_stiffness_n_per_m(), 0.0, "the force of a ramp is not the model's");
+        assert_eq!(ramped.peak_stiffness_n_per_m, 0.0, "the force of a ramp is not the model's");
     }
 
     #[test]

@@ -473,7 +473,7 @@ impl RunSummary {
             },
             peak_force_n: tally.largest(|device| device.peak_force_n),
             peak_torque_nm: tally.largest(|device| device.peak_torque_nm),
-            peak_stiffness_n_per_m: tally.largest(|device| device.feel.peak_stiffness_n_per_m()),
+            peak_stiffness_n_per_m: tally.largest(|device| device.feel.peak_stiffness_n_per_m),
             settled_after_s: (tally.devices.iter())
                 .map(|device| device.feel.settled_after_s())
                 .try_fold(0.0, |latest_s: f64, settled_s| Some(latest_s.max(settled_s?))),
@@ -728,11 +728,8 @@ fn replacement(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
     let same = |known: &&FaultyPlugin| {
         known.plugin.name == plugin.name && known.plugin.metadata.path == plugin.metadata.path
     };
-    outcome
-        .faulty_plugins
-        .iter()
-        .find(same)
-        .map_or_else(|| summary_of(plugin, "ok".to_owned()), faulty_plugin_summary)
+    let faulty = outcome.faulty_plugins.iter().find(same);
+    faulty.map_or_else(|| summary_of(plugin, "ok".to_owned()), faulty_plugin_summary)
 }
 
 fn summary_of(plugin: &PluginReport, health: String) -> PluginSummary {

@@ -65,26 +65,20 @@ impl fmt::Display for Notice {
     }
 }
 
-/// Shared state of the plugin calls of this process.
-struct ProcessCalls {
-    on_notice: OnceLock<fn(&Notice)>,
-    /// Switch whose stop request ends the wait for a call before a run.
-    stop: OnceLock<StopSwitch>,
-    /// True once a thread with plugin code was abandoned.
-    has_abandoned: AtomicBool,
-}
-
-static CALLS: ProcessCalls =
-    ProcessCalls { on_notice: OnceLock::new(), stop: OnceLock::new(), has_abandoned: AtomicBool::new(false) };
+static ON_NOTICE: OnceLock<fn(&Notice)> = OnceLock::new();
+/// Switch whose stop request ends the wait for a call before a run.
+static STOP: OnceLock<StopSwitch> = OnceLock::new();
+/// True once a thread with plugin code was abandoned.
+static HAS_ABANDONED: AtomicBool = AtomicBool::new(false);
 
 /// Sets the callback for notices: slow calls, changes of the process by plugins, and the end of the watchdog process. Only the first
 /// call has an effect.
 pub fn on_notice(notify: fn(&Notice)) {
-    let _ = CALLS.on_notice.set(notify);
+    let _ = ON_NOTICE.set(notify);
 }
 
 pub(crate) fn notify(notice: &Notice) {
-    if let Some(notify) = CALLS.on_notice.get() {
+    if let Some(notify) = ON_NOTICE.get() {
         notify(notice);
     }
 }
@@ -92,23 +86,23 @@ pub(crate) fn notify(notice: &Notice) {
 /// Sets the switch whose stop request ends the wait for a plugin call before a run, when nothing is energised. Only the first call
 /// has an effect.
 pub fn stop_waits_with(stop: &StopSwitch) {
-    let _ = CALLS.stop.set(stop.clone());
+    let _ = STOP.set(stop.clone());
 }
 
 /// Returns true unless a stop or an emergency stop was requested.
 pub(crate) fn is_to_begin() -> bool {
-    CALLS.stop.get().is_none_or(|stop| !stop.is_stop_requested() && stop.emergency().is_none())
+    STOP.get().is_none_or(|stop| !stop.is_stop_requested() && stop.emergency().is_none())
 }
 
 /// Returns true if a thread was abandoned in plugin code: exit handlers of the process may wait for that thread for ever.
 #[must_use]
 pub fn is_abandoned() -> bool {
-    CALLS.has_abandoned.load(Ordering::Relaxed)
+    HAS_ABANDONED.load(Ordering::Relaxed)
 }
 
 /// Records that a thread with plugin code is abandoned.
 pub(crate) fn abandon() {
-    CALLS.has_abandoned.store(true, Ordering::Relaxed);
+    HAS_ABANDONED.store(true, Ordering::Relaxed);
 }
 
 /// Runs `make`, which calls plugin code, then restores the changed state of the process and notifies the user of the changes.

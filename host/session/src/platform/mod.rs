@@ -11,12 +11,11 @@ mod linux;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use linux::{MachineState, NOT_CAUGHT, UNKNOWN_PROGRAM, changed, distrust, identity, user_folder};
-#[cfg(not(windows))]
-pub use linux::{ThreadClock, is_same_file};
+use linux as system;
 #[cfg(windows)]
-pub(crate) use windows::{
+use windows as system;
+
+pub(crate) use system::{
     MachineState, NOT_CAUGHT, UNKNOWN_PROGRAM, changed, distrust, identity, user_folder,
 };
-#[cfg(windows)]
-pub use windows::{ThreadClock, is_same_file};
+pub use system::{ThreadClock, is_same_file};

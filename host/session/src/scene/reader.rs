@@ -13,6 +13,11 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+/// Key of a table.
+type Key = &'static str;
+/// Range of the legal values of a number.
+pub(super) type Legal = RangeInclusive<f64>;
+
 /// Location of a value, for error messages: a line of a file, or a command line option.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Location {
@@ -74,13 +79,13 @@ pub(super) struct Source<'t> {
     /// Name and looked-up keys of each table that was read to its end.
     seen: RefCell<Vec<(String, Vec<Known>)>>,
     /// Keys looked up at the top level, above all tables.
-    above: RefCell<Vec<&'static str>>,
+    above: RefCell<Vec<Key>>,
 }
 
 /// Key that is looked up, with the type of its value.
 #[derive(Clone, Debug)]
 pub(super) struct Known {
-    pub(super) key: &'static str,
+    pub(super) key: Key,
     pub(super) takes: Takes,
 }
 
@@ -90,11 +95,11 @@ pub(super) enum Takes {
     /// Value described in the book only.
     Value,
     /// A number in a range.
-    Number(RangeInclusive<f64>),
+    Number(Legal),
     /// Three numbers, or one for all.
-    Three(RangeInclusive<f64>),
+    Three(Legal),
     /// Bound of a vector: one number (the norm), three numbers (one for each axis), or a table with both.
-    Bound(RangeInclusive<f64>),
+    Bound(Legal),
     /// A table.
     Table,
     /// A list of tables.
@@ -165,11 +170,11 @@ pub(super) struct Value<'t> {
 
 impl<'t> Section<'t> {
     /// Removes a key and returns its value; `None` if the key is absent.
-    pub(super) fn take(&mut self, key: &'static str) -> Option<Value<'t>> {
+    pub(super) fn take(&mut self, key: Key) -> Option<Value<'t>> {
         self.take_as(key, Takes::Value)
     }
 
-    fn take_as(&mut self, key: &'static str, takes: Takes) -> Option<Value<'t>> {
+    fn take_as(&mut self, key: Key, takes: Takes) -> Option<Value<'t>> {
         self.known.push(Known { key, takes });
         if self.name.is_empty() {
             self.source.above.borrow_mut().push(key);
@@ -185,7 +190,7 @@ impl<'t> Section<'t> {
     }
 
     /// Removes a required key and returns its value.
-    pub(super) fn require(&mut self, key: &'static str) -> Result<Value<'t>, SceneError> {
+    pub(super) fn require(&mut self, key: Key) -> Result<Value<'t>, SceneError> {
         let missing = self.missing(key);
         self.take(key).ok_or(missing)
     }
@@ -202,36 +207,27 @@ impl<'t> Section<'t> {
     /// Removes a key and reads its value; `None` if the key is absent.
     pub(super) fn read<T>(
         &mut self,
-        key: &'static str,
+        key: Key,
         read: impl FnOnce(Value<'t>) -> Result<T, SceneError>,
     ) -> Result<Option<T>, SceneError> {
         self.take(key).map(read).transpose()
     }
 
     /// Reads a number and checks that it lies in `range`; returns `default` if the key is absent.
-    pub(super) fn number_or(
-        &mut self,
-        key: &'static str,
-        range: RangeInclusive<f64>,
-        default: f64,
-    ) -> Result<f64, SceneError> {
+    pub(super) fn number_or(&mut self, key: Key, range: Legal, default: f64) -> Result<f64, SceneError> {
         Ok(self.number(key, range)?.unwrap_or(default))
     }
 
     /// Reads a number and checks that it lies in `range`; `None` if the key is absent.
-    pub(super) fn number(
-        &mut self,
-        key: &'static str,
-        range: RangeInclusive<f64>,
-    ) -> Result<Option<f64>, SceneError> {
+    pub(super) fn number(&mut self, key: Key, range: Legal) -> Result<Option<f64>, SceneError> {
         Ok(self.number_and_place(key, range)?.map(|(number, _)| number))
     }
 
     /// Reads a number as [`Self::number`] does, with its location for errors that depend on other keys.
     pub(super) fn number_and_place(
         &mut self,
-        key: &'static str,
-        range: RangeInclusive<f64>,
+        key: Key,
+        range: Legal,
     ) -> Result<Option<(f64, Location)>, SceneError> {
         let Some(value) = self.take_as(key, Takes::Number(range.clone())) else { return Ok(None) };
         let place = value.location.clone();
@@ -239,22 +235,13 @@ impl<'t> Section<'t> {
     }
 
     /// Reads three numbers (or one for all three) and checks that they lie in `range`; `None` if the key is absent.
-    pub(super) fn three(
-        &mut self,
-        key: &'static str,
-        range: RangeInclusive<f64>,
-    ) -> Result<Option<[f64; 3]>, SceneError> {
+    pub(super) fn three(&mut self, key: Key, range: Legal) -> Result<Option<[f64; 3]>, SceneError> {
         self.take_as(key, Takes::Three(range.clone())).map(|value| value.three(range)).transpose()
     }
 
     /// Reads the bound of a vector, a norm, a number for each axis, or a table with both, and checks that its numbers lie in `range`;
     /// returns `default` if the key is absent.
-    pub(super) fn bound_or(
-        &mut self,
-        key: &'static str,
-        range: RangeInclusive<f64>,
-        default: Bound,
-    ) -> Result<Bound, SceneError> {
+    pub(super) fn bound_or(&mut self, key: Key, range: Legal, default: Bound) -> Result<Bound, SceneError> {
         if matches!(self.table.get(key).map(Spanned::get_ref), Some(DeValue::Table(_)))
             && let Some(mut both) = self.section(key)?
         {
@@ -272,7 +259,7 @@ impl<'t> Section<'t> {
     }
 
     /// Removes a sub-table and returns it; `None` if absent.
-    pub(super) fn section(&mut self, key: &'static str) -> Result<Option<Section<'t>>, SceneError> {
+    pub(super) fn section(&mut self, key: Key) -> Result<Option<Section<'t>>, SceneError> {
         let source = self.source;
         self.known.push(Known { key, takes: Takes::Table });
         let Some((_, value)) = self.table.remove_entry(key) else { return Ok(None) };
@@ -280,7 +267,7 @@ impl<'t> Section<'t> {
     }
 
     /// Removes a list of tables (`[[key]]`), or a single table, and returns it; empty if absent.
-    pub(super) fn sections(&mut self, key: &'static str) -> Result<Vec<Section<'t>>, SceneError> {
+    pub(super) fn sections(&mut self, key: Key) -> Result<Vec<Section<'t>>, SceneError> {
         let source = self.source;
         self.known.push(Known { key, takes: Takes::Tables });
         let Some((_, value)) = self.table.remove_entry(key) else { return Ok(Vec::new()) };
@@ -422,12 +409,12 @@ impl Value<'_> {
         }
     }
 
-    pub(super) fn number(self, range: RangeInclusive<f64>) -> Result<f64, SceneError> {
+    pub(super) fn number(self, range: Legal) -> Result<f64, SceneError> {
         let number = parse_number(&self.value).ok_or_else(|| self.wrong_type("a number"))?;
         self.in_range(number, &range)
     }
 
-    pub(super) fn three(self, range: RangeInclusive<f64>) -> Result<[f64; 3], SceneError> {
+    pub(super) fn three(self, range: Legal) -> Result<[f64; 3], SceneError> {
         if let Some(number) = parse_number(&self.value) {
             return self.in_range(number, &range).map(|number| [number; 3]);
         }
@@ -438,7 +425,7 @@ impl Value<'_> {
     }
 
     /// Returns three numbers in `range`, one for each axis.
-    fn axes(self, range: RangeInclusive<f64>) -> Result<[f64; 3], SceneError> {
+    fn axes(self, range: Legal) -> Result<[f64; 3], SceneError> {
         self.each_in_range(self.numbers().map_err(|_| self.no_bound())?, &range)
     }
 
@@ -458,7 +445,7 @@ impl Value<'_> {
     /// Returns a list of points, each three numbers in `range`; `counts` is the legal number of points.
     pub(super) fn points(
         self,
-        range: RangeInclusive<f64>,
+        range: Legal,
         counts: RangeInclusive<usize>,
     ) -> Result<Vec<[f64; 3]>, SceneError> {
         let ([least, most], [from, to]) = ([counts.start(), counts.end()], [range.start(), range.end()]);
@@ -476,12 +463,12 @@ impl Value<'_> {
         parse_numbers(&self.value).ok_or_else(|| self.must_be(format_args!("a list of {N} numbers")))
     }
 
-    fn each_in_range(&self, numbers: [f64; 3], range: &RangeInclusive<f64>) -> Result<[f64; 3], SceneError> {
+    fn each_in_range(&self, numbers: [f64; 3], range: &Legal) -> Result<[f64; 3], SceneError> {
         numbers.iter().try_for_each(|number| self.in_range(*number, range).map(drop))?;
         Ok(numbers)
     }
 
-    fn in_range(&self, number: f64, range: &RangeInclusive<f64>) -> Result<f64, SceneError> {
+    fn in_range(&self, number: f64, range: &Legal) -> Result<f64, SceneError> {
         if range.contains(&number) {
             return Ok(number);
         }
@@ -490,7 +477,7 @@ impl Value<'_> {
 }
 
 /// Formats a range of legal values for an error or the reference.
-pub(super) fn legal(range: &RangeInclusive<f64>) -> String {
+pub(super) fn legal(range: &Legal) -> String {
     let (least, most) = (range.start(), range.end());
     if most.is_finite() { format!("{least} to {most}") } else { format!("{least} or more") }
 }

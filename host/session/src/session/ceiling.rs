@@ -25,10 +25,7 @@ impl Strength {
     /// Reads the permission from the environment variable: `FLOTOR_ALLOW_STRONG=1` permits strong devices. Not real-time.
     #[must_use]
     pub fn of_the_environment() -> Self {
-        match std::env::var(VARIABLE).as_deref() {
-            Ok("1") => Self::Strong,
-            _ => Self::UnderCeiling,
-        }
+        if std::env::var(VARIABLE).as_deref() == Ok("1") { Self::Strong } else { Self::UnderCeiling }
     }
 }
 

@@ -111,13 +111,8 @@ fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
     if unfelt.is_empty() {
         return None;
     }
-    let accepted: Vec<String> = device
-        .max_force_n
-        .iter()
-        .zip(is_driven)
-        .map(|(most_n, is_driven)| if is_driven { most_n.to_string() } else { "0".to_owned() })
-        .collect();
-    let accepted = accepted.join(", ");
+    let accepted_n = |(most_n, is_driven): (&f64, bool)| if is_driven { *most_n } else { 0.0 }.to_string();
+    let accepted = device.max_force_n.iter().zip(is_driven).map(accepted_n).collect::<Vec<_>>().join(", ");
     Some(if is_driven == [false; 3] {
         format!(
             "the device exerts no force, so the hand cannot feel a model; set `[limits] force_n = [{accepted}]` to \

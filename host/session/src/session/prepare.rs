@@ -318,12 +318,7 @@ const PATIENCE_NS: u64 = 2_000_000_000;
 /// Returns the time limit of a step of a model, ns; `None` on the virtual clock unless the scene sets a limit: a limit on wall-clock
 /// time would make two runs differ.
 fn budget_ns(model: &ModelUse, clock: Clock, period_ns: u64) -> Option<u64> {
-    let set_ns = model.budget_s.map(to_ns);
-    let usual_ns = match clock {
-        Clock::Real => Some(period_ns / 2),
-        Clock::Virtual => None,
-    };
-    set_ns.or(usual_ns)
+    model.budget_s.map(to_ns).or((clock == Clock::Real).then_some(period_ns / 2))
 }
 
 /// Parses settings and checks them against the plugin's schema; errors name file and line.

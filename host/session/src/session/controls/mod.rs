@@ -156,7 +156,7 @@ impl Controls {
         let mut swaps = self.swaps();
         let made = made.inspect_err(|_| swaps.release(&numbers))?;
         for (number, (layer, report)) in numbers.into_iter().zip(made) {
-            swaps.warn(report.warning());
+            swaps.warnings.extend(report.warning());
             let generation = plugins.add(number, report, ChosenBy::Name);
             swaps.send(Replacement { model: number, generation, layer: Box::new(layer) })?;
         }
@@ -165,7 +165,7 @@ impl Controls {
 
     /// Removes and returns the warnings about replacements, a sentence each. Not real-time.
     pub(super) fn warnings(&self) -> Vec<String> {
-        self.swaps().take_warnings()
+        std::mem::take(&mut self.swaps().warnings)
     }
 
     fn swaps(&self) -> MutexGuard<'_, Swaps> {

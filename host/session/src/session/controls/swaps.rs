@@ -26,7 +26,7 @@ pub(super) struct Swaps {
     /// bounds the list.
     faulty_plugins: Vec<(usize, u16, FaultyPlugin)>,
     /// Warnings about replacements, a sentence each.
-    warnings: Vec<String>,
+    pub(super) warnings: Vec<String>,
     /// Plugins being freed on helper threads: `sweep` does not wait for plugin code.
     freeing: Vec<PendingCall<LayerReport>>,
     /// First plugin that was not freed in time.
@@ -99,20 +99,15 @@ impl Swaps {
 
     /// Records the faults of freed plugins; waits up to `time` for each plugin that is being freed.
     pub(super) fn collect(&mut self, plugins: &PluginTable, time: Duration) {
-        let mut at = 0;
-        while let Some(calls) = self.freeing.get(at) {
-            let Some(freed) = calls.poll(time) else {
-                at += 1;
-                continue;
-            };
-            self.freeing.swap_remove(at);
-            match freed {
-                Ok(report) => {
+        for call in std::mem::take(&mut self.freeing) {
+            match call.poll(time) {
+                None => self.freeing.push(call),
+                Some(Ok(report)) => {
                     let (model, generation) = (report.model, report.generation);
                     self.note(plugins, report);
                     plugins.retire(model, generation);
                 }
-                Err(hung) => {
+                Some(Err(hung)) => {
                     self.hung.get_or_insert(hung);
                 }
             }
@@ -150,14 +145,6 @@ impl Swaps {
     /// Removes and returns the models that a finished loop has returned, each with its number.
     pub(super) fn take_retired(&mut self) -> Vec<(usize, Box<Layer>)> {
         std::iter::from_fn(|| self.queues.retired.pop().ok()).collect()
-    }
-
-    pub(super) fn warn(&mut self, warning: Option<String>) {
-        self.warnings.extend(warning);
-    }
-
-    pub(super) fn take_warnings(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.warnings)
     }
 
     /// Returns health and faults of all models of a finished run; `in_loop` has a report on each model still in the loop. Not
