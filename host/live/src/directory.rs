@@ -226,11 +226,8 @@ impl Drop for Listener {
 pub(crate) fn private(path: &Path) -> Result<(), DirectoryError> {
     make_folder(path).map_err(unusable(path))?;
     let attributes = std::fs::symlink_metadata(path).map_err(unusable(path))?;
-    if is_ours_alone(&attributes) {
-        Ok(())
-    } else {
-        Err(DirectoryError::NotPrivate { path: path.to_path_buf() })
-    }
+    let is_private = is_ours_alone(&attributes);
+    if is_private { Ok(()) } else { Err(DirectoryError::NotPrivate { path: path.to_path_buf() }) }
 }
 
 pub(crate) fn unusable(path: &Path) -> impl FnOnce(io::Error) -> DirectoryError {

@@ -190,12 +190,12 @@ impl Shared {
     }
 
     /// Starts sending ticks to a client, or changes the interval; an error if too many clients watch.
-    fn admit(&self, outbox: &Outbox, every: u32) -> Result<(), String> {
+    fn admit(&self, outbox: &Outbox, every: u32) -> Result<(), (RefusalCause, String)> {
         let watchers = self.watchers();
         if !outbox.wants_ticks() && self.watching.load(Ordering::Relaxed) >= MAX_WATCHERS {
-            return Err(format!(
-                "{MAX_WATCHERS} clients watch the run already, the maximum; close one of them"
-            ));
+            let words =
+                format!("{MAX_WATCHERS} clients watch the run already, the maximum; close one of them");
+            return Err((RefusalCause::Other, words));
         }
         outbox.want_ticks(every.max(1), self.demand.request(Demand::ALL));
         self.count(&watchers);
@@ -204,9 +204,7 @@ impl Shared {
 
     fn carry_out(&self, ask: Ask, outbox: &Outbox) -> Result<(), (RefusalCause, String)> {
         match ask {
-            Ask::Watch { every } => {
-                self.admit(outbox, every).map_err(|refused| (RefusalCause::Other, refused))?;
-            }
+            Ask::Watch { every } => self.admit(outbox, every)?,
             Ask::Unwatch => {
                 outbox.want_no_ticks();
                 self.count(&self.watchers());
@@ -227,13 +225,11 @@ impl Handler for Shared {
     fn answer(&self, payload: &[u8], outbox: &Outbox) -> Answer {
         let (number, done) = match Request::read(payload) {
             Ok(Request { number, ask }) => (number, self.carry_out(ask, outbox)),
-            Err((number, error)) => (
-                number,
-                Err((
-                    RefusalCause::Request,
-                    format!("unknown or malformed request: {error}; use both programs from one build"),
-                )),
-            ),
+            Err((number, error)) => {
+                let words =
+                    format!("unknown or malformed request: {error}; use both programs from one build");
+                (number, Err((RefusalCause::Request, words)))
+            }
         };
         let (cause, refused) = done.err().map(|(cause, words)| (cause, Some(words))).unwrap_or_default();
         Answer { number, refused, cause }

@@ -62,13 +62,8 @@ impl Watcher {
             for_reader.close();
             handler.on_end();
         });
-        match reader {
-            Ok(reader) => Some(Self { outbox, stream, writer, reader, last_request_ms }),
-            Err(_) => {
-                outbox.close();
-                None
-            }
-        }
+        let reader = reader.inspect_err(|_| outbox.close()).ok()?;
+        Some(Self { outbox, stream, writer, reader, last_request_ms })
     }
 
     /// Returns true if the client has closed its end, or the run is over.
