@@ -8,6 +8,7 @@
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between the two ends of a coupling.
 //! - [`guidance`]: the parameters that guide a simulated hand.
 //! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: number of a plugin in the run.
+//! - [`fade()`]: smooth step of a force; [`civil_date()`]: date of a day.
 //! - [`words`]: encoding of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
 //!
 //! The crate reads no files, starts no threads and, apart from [`lock()`], makes no system calls.
@@ -16,7 +17,9 @@
 mod change;
 mod clock;
 pub mod coupling;
+mod date;
 pub mod demand;
+mod fade;
 pub mod guidance;
 pub mod limits;
 mod lock;
@@ -35,6 +38,8 @@ pub mod words;
 
 pub use change::{Change, ChangeOutcome, ChangeSubject};
 pub use clock::{Clock, period_ns, to_ns};
+pub use date::civil_date;
+pub use fade::fade;
 pub use lock::lock;
 pub use outputs::ModelOutputs;
 pub use plugin_index::PluginIndex;

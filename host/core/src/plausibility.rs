@@ -71,37 +71,16 @@ pub enum Implausible {
 }
 
 impl Implausible {
-    /// All reasons.
-    pub const ALL: [Implausible; 7] = [
-        Self::NotFinite,
-        Self::Quaternion,
-        Self::Range,
-        Self::Speed,
-        Self::Acceleration,
-        Self::Time,
-        Self::Stuck,
-    ];
-
-    /// Returns the name of the reason, for reports.
-    #[must_use]
-    pub const fn word(self) -> &'static str {
-        match self {
-            Self::NotFinite => "not finite",
-            Self::Quaternion => "quaternion",
-            Self::Range => "range",
-            Self::Speed => "speed",
-            Self::Acceleration => "acceleration",
-            Self::Time => "time",
-            Self::Stuck => "stuck",
-        }
-    }
+    /// Names of the reasons, for reports.
+    const NAMES: [&'static str; 7] =
+        ["not finite", "quaternion", "range", "speed", "acceleration", "time", "stuck"];
 }
 
 /// Counts of the implausible samples of a device in a run, by reason.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImplausibleSamples {
-    /// Counts in the order of [`Implausible::ALL`].
-    counts: [u64; Implausible::ALL.len()],
+    /// Counts in the order of [`Implausible::NAMES`].
+    counts: [u64; Implausible::NAMES.len()],
     /// Tick of the first implausible sample.
     first_tick: Option<u64>,
 }
@@ -130,12 +109,12 @@ impl ImplausibleSamples {
 impl std::fmt::Display for ImplausibleSamples {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let total: u64 = self.counts.iter().sum();
-        let found = Implausible::ALL.into_iter().zip(self.counts).filter(|(_, count)| *count > 0);
+        let found = Implausible::NAMES.into_iter().zip(self.counts).filter(|(_, count)| *count > 0);
         let plural = if total == 1 { "" } else { "s" };
         write!(f, "{total} implausible sample{plural} (")?;
-        for (place, (why, count)) in found.enumerate() {
+        for (place, (name, count)) in found.enumerate() {
             let comma = if place == 0 { "" } else { ", " };
-            write!(f, "{comma}{} {count}", why.word())?;
+            write!(f, "{comma}{name} {count}")?;
         }
         write!(f, "), the first at tick {}", self.first_tick.unwrap_or(0))
     }

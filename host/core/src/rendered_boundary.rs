@@ -101,10 +101,7 @@ impl RenderedBoundary {
                 self.holds_n, self.wanted_n
             ));
         }
-        if parts.is_empty() {
-            return None;
-        }
-        Some(format!("the boundary wall {}; {self}", parts.join(" and ")))
+        (!parts.is_empty()).then(|| format!("the boundary wall {}; {self}", parts.join(" and ")))
     }
 }
 

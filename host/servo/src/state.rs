@@ -24,6 +24,7 @@
 //! A run ends in the last three states, and an emergency stop latches: force returns only with a new run, which opens and activates
 //! the device anew. A fault may still become an emergency stop, never the other way round.
 
+use flotor_core::fade;
 use flotor_core::trace::Events;
 use flotor_hal::Fault;
 
@@ -207,15 +208,6 @@ impl RunState {
 
 fn elapsed(since_ns: u64, now_ns: u64) -> u64 {
     now_ns.saturating_sub(since_ns)
-}
-
-/// Returns a smooth step from 0 to 1 over `length_ns`, with zero slope at both ends.
-fn fade(elapsed_ns: u64, length_ns: u64) -> f64 {
-    if elapsed_ns >= length_ns {
-        return 1.0;
-    }
-    let part = elapsed_ns as f64 / length_ns as f64;
-    part * part * (3.0 - 2.0 * part)
 }
 
 #[cfg(test)]

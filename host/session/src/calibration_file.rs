@@ -21,6 +21,7 @@
 
 use crate::scene::Location;
 pub use crate::scene::SceneError as CalibrationFileError;
+use flotor_core::civil_date;
 use flotor_hal::{InvalidCalibration, TextProblem, VerticalCalibration, read_text};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -117,16 +118,17 @@ fn error(file: &str, line: usize, problem: impl Into<String>) -> CalibrationFile
 
 const MM: f64 = 1.0e-3;
 
+/// Returns the powers of a millimetre, in m, from the power 0.
+fn powers_of_mm() -> impl Iterator<Item = f64> {
+    std::iter::successors(Some(1.0), |power| Some(power * MM))
+}
+
 impl VerticalCurve {
     /// Converts a calibration, in metres, to a curve in millimetres, without trailing zero coefficients.
     #[must_use]
     pub fn of(calibration: &VerticalCalibration) -> Self {
-        let mut coefficients: Vec<f64> = Vec::new();
-        let mut scale = 1.0;
-        for coefficient in calibration.coefficients() {
-            coefficients.push(coefficient * scale);
-            scale *= MM;
-        }
+        let scaled = calibration.coefficients().iter().zip(powers_of_mm());
+        let mut coefficients: Vec<f64> = scaled.map(|(coefficient, scale)| coefficient * scale).collect();
         while coefficients.len() > 1 && coefficients.last() == Some(&0.0) {
             coefficients.pop();
         }
@@ -138,13 +140,9 @@ impl VerticalCurve {
     /// # Errors
     /// [`flotor_hal::InvalidCalibration`] if range or coefficients are not valid.
     pub fn calibration(&self) -> Result<VerticalCalibration, flotor_hal::InvalidCalibration> {
-        let mut scale = 1.0;
-        let powers = self.coefficients_per_mm.iter().map(|coefficient| {
-            let power = coefficient / scale;
-            scale *= MM;
-            power
-        });
-        VerticalCalibration::new(self.range_mm.map(|height| height * MM), &powers.collect::<Vec<_>>())
+        let scaled = self.coefficients_per_mm.iter().zip(powers_of_mm());
+        let coefficients: Vec<f64> = scaled.map(|(coefficient, scale)| coefficient / scale).collect();
+        VerticalCalibration::new(self.range_mm.map(|height| height * MM), &coefficients)
     }
 }
 
@@ -189,13 +187,11 @@ impl CalibrationFile {
         })?;
         let wrong = |keys: &[&str], problem: String| error(file, line_of(text, keys), problem);
         if read.format != FORMAT {
-            let found = read.format;
-            return Err(wrong(
-                &["format"],
-                format!(
-                    "the file has format {found}, but this program reads format {FORMAT}; calibrate again"
-                ),
-            ));
+            let problem = format!(
+                "the file has format {}, but this program reads format {FORMAT}; calibrate again",
+                read.format
+            );
+            return Err(wrong(&["format"], problem));
         }
         let calibration = read.vertical.calibration().map_err(|invalid| match invalid {
             // In mm, the unit of the file.
@@ -242,25 +238,6 @@ pub fn today() -> toml::value::Datetime {
     let now = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
     let (year, month, day) = civil_date(now.as_secs() / 86_400);
     toml::value::Datetime { date: Some(toml::value::Date { year, month, day }), time: None, offset: None }
-}
-
-/// Converts a number of days since 1970 to year, month and day, by counting whole years and months.
-fn civil_date(mut days: u64) -> (u16, u8, u8) {
-    let is_leap =
-        |year: u16| (year.is_multiple_of(4) && !year.is_multiple_of(100)) || year.is_multiple_of(400);
-    let mut year = 1970;
-    while days >= 365 + u64::from(is_leap(year)) && year < u16::MAX {
-        days -= 365 + u64::from(is_leap(year));
-        year += 1;
-    }
-    let february = 28 + u64::from(is_leap(year));
-    for (month, length) in (1..).zip([31, february, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31]) {
-        if days < length {
-            return (year, month, u8::try_from(days + 1).unwrap_or(1));
-        }
-        days -= length;
-    }
-    (year, 12, 31)
 }
 
 #[cfg(test)]
@@ -311,15 +288,6 @@ mod tests {
         assert!(file.check_device("c.toml", "simulated", "s2").is_err());
         let refused = file.check_device("c.toml", "maglev", "s1").unwrap_err().to_string();
         assert!(refused.contains("`simulated` s1") && refused.contains("`maglev` s1"), "{refused}");
-    }
-
-    #[test]
-    fn dates_are_those_of_the_calendar() {
-        assert_eq!(civil_date(0), (1970, 1, 1));
-        assert_eq!(civil_date(11_016), (2000, 2, 29));
-        assert_eq!(civil_date(20_513), (2026, 3, 1));
-        assert_eq!(civil_date(47_540), (2100, 2, 28) /* 2100 is no leap year */);
-        assert_eq!(civil_date(47_541), (2100, 3, 1));
     }
 
     /// Mutated files: never a panic, and whatever is accepted is a curve that multiplies no force beyond two.

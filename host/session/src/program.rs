@@ -13,7 +13,7 @@
 use crate::scene::{ModelUse, Scene};
 use flotor_core::mapping::Mapping;
 use flotor_core::words::{Decoder, Encoder};
-use flotor_core::{lock, to_ns};
+use flotor_core::{fade, lock, to_ns};
 use flotor_hal::abi::{Entry, model_entry};
 use flotor_hal::{
     Demand, ForceModel, Input, Memory, ModelInfo, Output, Parameter, Refusal, Settings, StepStatus, Wrench,
@@ -329,7 +329,7 @@ impl ForceModel for ProgramModel {
         }
         let valid_ns = if valid_ns == 0 { self.valid_ns } else { valid_ns };
         let over_ns = now_ns.saturating_sub(self.commanded_ns).saturating_sub(valid_ns);
-        let risen = smooth(now_ns.saturating_sub(self.since_ns), self.rise_ns);
+        let risen = fade(now_ns.saturating_sub(self.since_ns), self.rise_ns);
         if over_ns == 0 {
             return (wrench * risen).into();
         }
@@ -338,16 +338,14 @@ impl ForceModel for ProgramModel {
             self.end.lapses.count.fetch_add(1, Ordering::Relaxed);
         }
         self.end.lapses.ticks.fetch_add(1, Ordering::Relaxed);
-        let left = risen * (1.0 - smooth(over_ns, self.fade_ns));
+        let left = risen * (1.0 - fade(over_ns, self.fade_ns));
         Output::new(wrench * left, f64::NAN, StepStatus::OutOfDomain)
     }
 
     fn parameter(&self, index: usize) -> f64 {
         let ms = |ns: u64| ns as f64 * 1.0e-6;
-        [f64::NAN, ms(self.valid_ns), ms(self.fade_ns), ms(self.ramp_ns)]
-            .get(index)
-            .copied()
-            .unwrap_or(f64::NAN)
+        let values = [f64::NAN, ms(self.valid_ns), ms(self.fade_ns), ms(self.ramp_ns)];
+        values.get(index).copied().unwrap_or(f64::NAN)
     }
 }
 
@@ -367,15 +365,6 @@ impl ProgramModel {
         }
         self.command = command;
     }
-}
-
-/// Returns a smooth step (cubic) from 0 to 1 over `length_ns`, with zero slope at both ends.
-fn smooth(elapsed_ns: u64, length_ns: u64) -> f64 {
-    if elapsed_ns >= length_ns {
-        return 1.0;
-    }
-    let part = elapsed_ns as f64 / length_ns as f64;
-    part * part * (3.0 - 2.0 * part)
 }
 
 #[cfg(test)]

@@ -101,7 +101,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("interop/compat/chai3d", DropIn, &[Contract, Compat]),
     ("interop/compat/openhaptics", DropIn, &[Contract, Compat]),
     ("interop/compat/dhd", DropIn, &[Contract, Compat]),
-    ("interop/compat/haply", Service, &[Contract, Compat, Command, OfEmulators]),
+    ("interop/compat/haply", Service, &[Contract, Core, Compat, Command, OfEmulators]),
     ("study/statistics", Statistics, &[]),
     ("host/plot", Plot, &[]),
     ("host/command", Command, &[Contract, Sync, Core, Servo, Record, Live, Session]),

@@ -6,6 +6,7 @@ use crate::events::{Events, Level, device_data};
 use crate::force::{Domain, Forces, SessionCommand};
 use crate::view::View;
 use flotor_compat::{Host, Pace, State, Station};
+use flotor_core::civil_date;
 use flotor_hal::Wrench;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -199,13 +200,6 @@ impl Shared {
 fn now_text() -> String {
     let seconds = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
     let (days, second) = (seconds / 86_400, seconds % 86_400);
-    // Years begin in March, in eras of 400 years, so that leap days come last.
-    let shifted = days + 719_468;
-    let (era, day) = (shifted / 146_097, shifted % 146_097);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let (day, month) = (day - (153 * month + 2) / 5 + 1, if month < 10 { month + 3 } else { month - 9 });
-    let year = year + era * 400 + u64::from(month <= 2);
+    let (year, month, day) = civil_date(days);
     format!("{year:04}-{month:02}-{day:02} {:02}:{:02}:{:02}", second / 3600, second / 60 % 60, second % 60)
 }
