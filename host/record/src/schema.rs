@@ -48,22 +48,21 @@ impl Topic {
     }
 
     pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Topic::Run => "/flotor/run",
-            Topic::Pose => "/tf",
-            Topic::Tick => "/flotor/tick",
-            Topic::Log => "/flotor/log",
-            Topic::Change => "/flotor/change",
-        }
+        self.names().0
     }
 
     pub(crate) const fn schema(self) -> &'static str {
+        self.names().1
+    }
+
+    /// Returns the names of topic and schema.
+    const fn names(self) -> (&'static str, &'static str) {
         match self {
-            Topic::Run => "flotor.Run",
-            Topic::Pose => "foxglove.FrameTransform",
-            Topic::Tick => "flotor.Tick",
-            Topic::Log => "foxglove.Log",
-            Topic::Change => "flotor.Change",
+            Topic::Run => ("/flotor/run", "flotor.Run"),
+            Topic::Pose => ("/tf", "foxglove.FrameTransform"),
+            Topic::Tick => ("/flotor/tick", "flotor.Tick"),
+            Topic::Log => ("/flotor/log", "foxglove.Log"),
+            Topic::Change => ("/flotor/change", "flotor.Change"),
         }
     }
 }
