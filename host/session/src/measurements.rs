@@ -60,8 +60,8 @@ impl Observer for Measurements {
 /// Recording of a run, if one is requested. A write error ends the recording, not the run. Not real-time.
 #[derive(Default)]
 pub struct RunRecording {
-    recorder: Option<Recorder>,
-    failure: Option<RecordError>,
+    /// Recorder, or the write error that ended the recording; `None` if no recording was requested, or it is finished.
+    recorder: Option<Result<Recorder, RecordError>>,
     has_ticks: bool,
 }
 
@@ -69,7 +69,7 @@ impl RunRecording {
     /// Creates the recording of a run; `None`: the run is not recorded.
     #[must_use]
     pub fn new(recorder: Option<Recorder>) -> Self {
-        Self { recorder, failure: None, has_ticks: false }
+        Self { recorder: recorder.map(Ok), has_ticks: false }
     }
 
     /// Returns true if a recording was requested and is not finished; also after a write error.
@@ -84,8 +84,7 @@ impl RunRecording {
     /// # Errors
     /// The write error that ended the recording, during the run or now.
     pub fn finish(&mut self, notes: &[Note]) -> Result<(), RecordError> {
-        let Some(mut recorder) = self.recorder.take() else { return Ok(()) };
-        self.failure.take().map_or(Ok(()), Err)?;
+        let Some(mut recorder) = self.recorder.take().transpose()? else { return Ok(()) };
         if !self.has_ticks {
             recorder.discard();
             return Ok(());
@@ -95,10 +94,10 @@ impl RunRecording {
     }
 
     fn write(&mut self, write: impl FnOnce(&mut Recorder) -> Result<(), RecordError>) {
-        if self.failure.is_none()
-            && let Some(recorder) = &mut self.recorder
+        if let Some(Ok(recorder)) = &mut self.recorder
+            && let Err(failure) = write(recorder)
         {
-            self.failure = write(recorder).err();
+            self.recorder = Some(Err(failure));
         }
     }
 }
@@ -110,7 +109,7 @@ impl Observer for RunRecording {
 
     /// Returns all outputs while the recording writes, the force alone otherwise.
     fn demand(&self) -> Demand {
-        if self.is_on() && self.failure.is_none() { Demand::ALL } else { Demand::FORCE }
+        if let Some(Ok(_)) = self.recorder { Demand::ALL } else { Demand::FORCE }
     }
 
     fn observe(&mut self, record: &TickRecord) {
