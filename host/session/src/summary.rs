@@ -11,7 +11,8 @@ use flotor_coupling::LinkStatistics;
 use flotor_hal::{DVec3, Demand, EnergyLedger};
 use flotor_servo::RunEnd;
 use flotor_servo::{
-    CouplingOutcome, EnvelopeEffects, ModelHealth, Overrun, Percentiles, Stage, StageEffect, Timing,
+    CouplingOutcome, Durations, EnvelopeEffects, ModelHealth, Overrun, Percentiles, Stage, StageEffect,
+    Timing,
 };
 use serde::{Serialize, Serializer};
 
@@ -440,9 +441,9 @@ impl RunSummary {
     /// Creates the summary of a run.
     #[must_use]
     pub fn new(facts: RunFacts<'_>, outcome: &Outcome, tally: &Tally) -> Self {
-        let Timing { ticks, late, missed, lateness, compute, stages: [read, models, envelope, write] } =
-            &outcome.timing;
-        let _ = Stage::Read; // the array above is in the order of `Stage`
+        let Timing { ticks, late, missed, lateness, compute, stages } = &outcome.timing;
+        let _ = Stage::Read; // the array below is in the order of `Stage`
+        let [read, models, envelope, write] = stages.each_ref().map(Durations::percentiles);
         let events = Events::NAMES.iter().copied().zip(tally.event_ticks());
         let ledgers = || outcome.devices.iter().filter_map(|device| device.ledger);
         let elapsed_s = outcome.elapsed_ns as f64 * 1.0e-9;
@@ -465,12 +466,7 @@ impl RunSummary {
             elapsed_s,
             lateness_ns: lateness.percentiles(),
             compute_ns: compute.percentiles(),
-            stages_ns: StageSummary {
-                read: read.percentiles(),
-                models: models.percentiles(),
-                envelope: envelope.percentiles(),
-                write: write.percentiles(),
-            },
+            stages_ns: StageSummary { read, models, envelope, write },
             peak_force_n: tally.largest(|device| device.peak_force_n),
             peak_torque_nm: tally.largest(|device| device.peak_torque_nm),
             peak_stiffness_n_per_m: tally.largest(|device| device.feel.peak_stiffness_n_per_m),
@@ -691,16 +687,14 @@ fn health_words(health: &ModelHealth, words: &str) -> String {
             "{count} results were not finite, the first at tick {tick}; the host replaced each by zero force"
         );
     }
-    health.first_float_change.map_or_else(
-        || "ok".to_owned(),
-        |tick| {
-            let ticks = health.float_changes;
-            format!(
-                "changed the floating-point environment in {ticks} ticks, the first at tick {tick}; the host \
-            restored it each time"
-            )
-        },
-    )
+    if let Some(tick) = health.first_float_change {
+        let ticks = health.float_changes;
+        return format!(
+            "changed the floating-point environment in {ticks} ticks, the first at tick {tick}; the host restored it \
+             each time"
+        );
+    }
+    "ok".to_owned()
 }
 
 /// Returns the summary of the plugin with this number; devices have the first numbers.
