@@ -1,5 +1,6 @@
 //! Reference of all commands with their arguments and options, generated from the parser, for the book.
 
+use clap::builder::ValueRange;
 use clap::{Arg, Command};
 use std::fmt::Write;
 
@@ -63,13 +64,10 @@ fn usage(argument: &Arg) -> String {
     let names: Vec<&str> =
         argument.get_value_names().unwrap_or_default().iter().map(clap::builder::Str::as_str).collect();
     let values = names.join(" ");
+    let is_optional = |values: ValueRange| values.min_values() == 0 && values.takes_values();
     match argument.get_long() {
         None => cell(&values),
-        Some(long)
-            if argument
-                .get_num_args()
-                .is_some_and(|values| values.min_values() == 0 && values.takes_values()) =>
-        {
+        Some(long) if argument.get_num_args().is_some_and(is_optional) => {
             cell(&format!("--{long} [{values}]"))
         }
         Some(long) if argument.get_action().takes_values() => cell(&format!("--{long} {values}")),

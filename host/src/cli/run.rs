@@ -151,18 +151,13 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
 /// Returns the options of the run, checked against each other and the machine.
 fn run_options(arguments: &RunArguments) -> Result<RunOptions, CommandError> {
     let clock = match arguments.clock {
-        ClockOption::Real => Clock::Real,
+        ClockOption::Real => enough_files().map(|()| Clock::Real)?,
+        ClockOption::Virtual if arguments.core.is_some() => {
+            let usage = "--core needs the real clock: omit `--clock virtual`".to_owned();
+            return Err(CommandError::Usage(usage));
+        }
         ClockOption::Virtual => Clock::Virtual,
     };
-    match clock {
-        Clock::Real => enough_files()?,
-        Clock::Virtual if arguments.core.is_some() => {
-            return Err(CommandError::Usage(
-                "--core needs the real clock: omit `--clock virtual`".to_owned(),
-            ));
-        }
-        Clock::Virtual => {}
-    }
     Ok(RunOptions { clock, seed: arguments.seed })
 }
 
@@ -391,9 +386,7 @@ impl Watchers {
 impl Observer for Watchers {
     fn change(&mut self, change: &Change) {
         self.measured.change(change);
-        if let Some(plot) = &mut self.plot {
-            plot.change(change);
-        }
+        self.plot.iter_mut().for_each(|plot| plot.change(change));
     }
 
     fn demand(&self) -> Demand {
@@ -403,9 +396,7 @@ impl Observer for Watchers {
 
     fn observe(&mut self, record: &TickRecord) {
         self.measured.observe(record);
-        if let Some(plot) = &mut self.plot {
-            plot.observe(record);
-        }
+        self.plot.iter_mut().for_each(|plot| plot.observe(record));
         if record.tick.is_multiple_of(PROGRESS_TICKS) && record.device == 0 {
             self.progress.set_position(record.time_ns / 1_000_000);
             if !self.progress.is_hidden() {

@@ -112,9 +112,8 @@ fn tidied(name: &str) -> String {
 
 fn capitalised(word: &str) -> String {
     let mut characters = word.chars();
-    characters
-        .next()
-        .map_or(String::new(), |first| first.to_ascii_uppercase().to_string() + characters.as_str())
+    let first = characters.next().map(|first| first.to_ascii_uppercase());
+    first.into_iter().chain(characters).collect()
 }
 
 #[cfg(test)]

@@ -19,10 +19,8 @@ pub(super) fn write_copy(from: &Path, to: &Path) -> Result<(), ScaffoldError> {
     let manifest = standalone(&manifest, &workspace)
         .map_err(|reason| ScaffoldError::Manifest { path: from.join("Cargo.toml"), reason })?;
     write_file(&to.join("Cargo.toml"), &manifest)?;
-    COPIED
-        .iter()
-        .filter(|name| from.join(name).exists())
-        .try_for_each(|name| copy(&from.join(name), &to.join(name)))
+    let mut present = COPIED.iter().filter(|name| from.join(name).exists());
+    present.try_for_each(|name| copy(&from.join(name), &to.join(name)))
 }
 
 /// Writes a new file and creates its parent folders; an existing file is an error.

@@ -48,11 +48,8 @@ impl Requests {
     /// Errors of the system.
     pub(crate) fn listen(stop: &StopSwitch) -> io::Result<Self> {
         // A run that was started with `nohup` has to continue after its terminal closes.
-        let signals: Vec<i32> = ENDING
-            .into_iter()
-            .filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP))
-            .chain([SIGUSR1])
-            .collect();
+        let ending = ENDING.into_iter().filter(|signal| *signal != SIGHUP || !is_ignored(SIGHUP));
+        let signals: Vec<i32> = ending.chain([SIGUSR1]).collect();
         block_signals(&[&signals[..], &SUSPENDING].concat())?;
         // This thread may not get a processor while a plugin in the loop occupies it.
         block_sent_signals()?;

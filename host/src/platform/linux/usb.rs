@@ -115,10 +115,8 @@ impl Seen {
             UsbAccess::Serial => ("SUBSYSTEM==\"tty\"", "ATTRS", format!(" ENV{{{IGNORED}}}=\"1\",")),
             UsbAccess::Hid => ("KERNEL==\"hidraw*\"", "ATTRS", String::new()),
         };
-        let product = self
-            .kind
-            .product()
-            .map_or_else(String::new, |product| format!(" {attribute}{{idProduct}}==\"{product:04x}\","));
+        let product = self.kind.product().map(|id| format!(" {attribute}{{idProduct}}==\"{id:04x}\","));
+        let product = product.unwrap_or_default();
         format!("{begins}, {attribute}{{idVendor}}==\"{:04x}\",{product}{then} TAG+=\"uaccess\"", self.vendor)
     }
 
@@ -131,10 +129,8 @@ impl Seen {
     }
 
     fn diagnose(&self, machine: &Machine, is_open: bool) -> Vec<Diagnosis> {
-        let mut diagnoses = vec![Diagnosis::good(
-            "on USB",
-            format!("{:04x}:{:04x} at {}", self.vendor, self.product, self.place),
-        )];
+        let found = format!("{:04x}:{:04x} at {}", self.vendor, self.product, self.place);
+        let mut diagnoses = vec![Diagnosis::good("on USB", found)];
         if self.place.contains('.') {
             diagnoses.push(Diagnosis::note(
                 "hub",
@@ -182,11 +178,8 @@ impl Seen {
                 UsbAccess::Hid => ("raw HID", "usbhid"),
             };
             let remedy = format!("as root: `modprobe {module}`, and reconnect the device");
-            return Some(Diagnosis::bad(
-                "driver",
-                format!("the kernel has no {what} for the device"),
-                remedy,
-            ));
+            let found = format!("the kernel has no {what} for the device");
+            return Some(Diagnosis::bad("driver", found, remedy));
         };
         let shown = Path::new("/").join(node.strip_prefix(&machine.root).unwrap_or(&node));
         let shown = shown.display();

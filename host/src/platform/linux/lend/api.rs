@@ -15,13 +15,15 @@ pub(super) enum Api {
 }
 
 /// Drop-in library for an interface.
-struct Library {
+pub(super) struct Library {
     word: &'static str,
     /// Name of the library file that cargo builds.
     built: &'static str,
     package: &'static str,
-    names: &'static [&'static str],
-    marks: &'static [&'static str],
+    /// File names under which programs load the library; an installation has the file under the last name.
+    pub(super) names: &'static [&'static str],
+    /// Strings that the file of a program contains if the program is linked with the library or loads it.
+    pub(super) marks: &'static [&'static str],
 }
 
 impl Api {
@@ -32,7 +34,7 @@ impl Api {
         self.library().word
     }
 
-    fn library(self) -> Library {
+    pub(super) fn library(self) -> Library {
         match self {
             Self::Dhd => Library {
                 word: "dhd",
@@ -73,22 +75,12 @@ impl Api {
         }
     }
 
-    /// Returns the file names under which programs load the library; an installation has the file under the last name.
-    pub(super) fn names(self) -> &'static [&'static str] {
-        self.library().names
-    }
-
-    /// Returns the strings that the file of a program contains if the program is linked with the library or loads it.
-    pub(super) fn marks(self) -> &'static [&'static str] {
-        self.library().marks
-    }
-
     /// Finds the drop-in library, in the installation or in the build folder of the program `own`.
     pub(super) fn find(self, own: &Path) -> Result<PathBuf, CommandError> {
         let folder = own.parent().unwrap_or(Path::new("."));
-        let Library { built, package, .. } = self.library();
+        let Library { built, package, names, .. } = self.library();
         let compat = folder.join("../lib/flotor/compat").join(self.word());
-        let installed = self.names().iter().rev().map(|name| compat.join(name));
+        let installed = names.iter().rev().map(|name| compat.join(name));
         let beside = [folder.join(built), folder.join("deps").join(built)];
         installed.chain(beside).find(|file| file.is_file()).ok_or_else(|| {
             let release = if folder.ends_with("debug") { "" } else { " --release" };

@@ -28,8 +28,9 @@ impl Folder {
             Api::Openhaptics | Api::Chai3d => vec![self.0.clone()],
         };
         for folder in folders {
-            let linked = std::fs::create_dir_all(&folder)
-                .and_then(|()| api.names().iter().try_for_each(|name| symlink(&library, folder.join(name))));
+            let linked = std::fs::create_dir_all(&folder).and_then(|()| {
+                api.library().names.iter().try_for_each(|name| symlink(&library, folder.join(name)))
+            });
             linked.map_err(|cause| CommandError::file(&folder, "cannot link the libraries", cause))?;
         }
         Ok(())

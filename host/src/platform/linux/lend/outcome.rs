@@ -67,11 +67,8 @@ impl<'a> Runs<'a> {
         for (suffix, run) in &self.runs {
             let Some(text) = &run.text else { continue };
             say!("{}", text.trim_end());
-            match record {
-                Some(record) if !suffix.is_empty() => {
-                    note(format_args!("the recording of this run is `{}`", named(record, suffix).display()));
-                }
-                _ => {}
+            if let Some(record) = record.filter(|_| !suffix.is_empty()) {
+                note(format_args!("the recording of this run is `{}`", named(record, suffix).display()));
             }
             if !run.is_whole {
                 let end = self.end();
@@ -96,10 +93,8 @@ impl<'a> Runs<'a> {
     /// the suffix of the run in its name.
     pub(super) fn write(&self, file: &Path) -> Result<(), CommandError> {
         if self.runs.is_empty() {
-            return write_json(
-                file,
-                &json!({ "end": format!("the program opened no device: {}", self.end()) }),
-            );
+            let end = format!("the program opened no device: {}", self.end());
+            return write_json(file, &json!({ "end": end }));
         }
         for (suffix, run) in &self.runs {
             let mut summary = run.summary.clone().unwrap_or_else(|| json!({}));

@@ -89,7 +89,7 @@ impl Program {
         match others.into_iter().find(|other| native.calls(*other)) {
             Some(other) => Err(CommandError::Usage(format!(
                 "`{name}` calls {}, not `--api {}`: write `--api {}`, or omit the option",
-                other.marks().join(" and "),
+                other.library().marks.join(" and "),
                 api.word(),
                 other.word()
             ))),
@@ -115,7 +115,7 @@ fn read_native(path: &Path) -> Option<Native> {
     let bits = bits(&bytes)?;
     let is_dynamic = bits == Bits::ThirtyTwo || has_interpreter(&bytes)?;
     let holds = |mark: &&str| bytes.windows(mark.len()).any(|window| window == mark.as_bytes());
-    Some(Native { bits, is_dynamic, names: Api::ALL.map(|api| api.marks().iter().any(holds)) })
+    Some(Native { bits, is_dynamic, names: Api::ALL.map(|api| api.library().marks.iter().any(holds)) })
 }
 
 /// Returns the address size of an ELF program; `None` for another file.

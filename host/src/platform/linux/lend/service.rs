@@ -16,6 +16,8 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 /// Scene with a simulated flotor, for a program of the ML API if no scene is given.
 const SCENE: &str = include_str!("ml-api.toml");
+/// Default address of the ML API, at which programs expect it.
+const ML_API: &str = "127.0.0.1:5678";
 /// Duration of the run, a year: longer than any program runs.
 const LONGEST: &str = "8760h";
 
@@ -45,14 +47,6 @@ impl Service {
         self == Self::Haply
     }
 
-    /// Returns the default address, at which programs expect the service.
-    fn usual(self) -> &'static str {
-        match self {
-            Self::Haply => "127.0.0.1:10001",
-            Self::MlApi => "127.0.0.1:5678",
-        }
-    }
-
     /// Starts the service and waits until it listens.
     pub(super) fn start<'a>(
         self,
@@ -76,7 +70,7 @@ impl Service {
                 }
                 command
             }
-            Self::MlApi => self.run(arguments, folder, own)?,
+            Self::MlApi => run_with_ml_api(arguments, folder, own)?,
         };
         // In a process group of its own: Ctrl-C reaches only the program, and the service ends after the program.
         command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
@@ -86,37 +80,36 @@ impl Service {
             .map_err(|cause| CommandError::file(file.as_ref(), "cannot be started", cause))?;
         Served::wait(child, self, stop)
     }
+}
 
-    /// Returns a `flotor run` command that adds the controller to the scene as a model.
-    fn run(self, arguments: &LendArguments, folder: &Folder, own: &Path) -> Result<Command, CommandError> {
-        if arguments.pace == PaceOption::Lockstep {
-            return Err(CommandError::Usage(
-                "`--pace lockstep` does not work with `--api ml-api`; use `flotor emulate maglev --protocol ml-api --pace lockstep`"
-                    .to_owned(),
-            ));
-        }
-        let built_in = folder.0.join("ml-api.toml");
-        let scene = match &arguments.scene {
-            Some(scene) => scene,
-            None => {
-                std::fs::write(&built_in, SCENE)
-                    .map_err(|cause| CommandError::file(&built_in, "cannot be written", cause))?;
-                &built_in
-            }
-        };
-        let mut command = Command::new(own);
-        command.arg("run").arg(scene).args(["--duration", LONGEST, "--seed", &arguments.seed.to_string()]);
-        command.args(["--ml-api", arguments.listen.as_deref().unwrap_or(self.usual())]);
-        command
-            .args(arguments.options.plugin_path.arguments())
-            .args(arguments.options.control_group.arguments());
-        for (option, file) in [("--record", &arguments.options.record), ("--json", &arguments.options.json)] {
-            if let Some(file) = file {
-                command.arg(option).arg(file);
-            }
-        }
-        Ok(command)
+/// Returns a `flotor run` command that adds the controller to the scene as a model.
+fn run_with_ml_api(arguments: &LendArguments, folder: &Folder, own: &Path) -> Result<Command, CommandError> {
+    if arguments.pace == PaceOption::Lockstep {
+        return Err(CommandError::Usage(
+            "`--pace lockstep` does not work with `--api ml-api`; use `flotor emulate maglev --protocol ml-api --pace lockstep`"
+                .to_owned(),
+        ));
     }
+    let built_in = folder.0.join("ml-api.toml");
+    let scene = match &arguments.scene {
+        Some(scene) => scene,
+        None => {
+            std::fs::write(&built_in, SCENE)
+                .map_err(|cause| CommandError::file(&built_in, "cannot be written", cause))?;
+            &built_in
+        }
+    };
+    let mut command = Command::new(own);
+    command.arg("run").arg(scene).args(["--duration", LONGEST, "--seed", &arguments.seed.to_string()]);
+    command.args(["--ml-api", arguments.listen.as_deref().unwrap_or(ML_API)]);
+    command.args(arguments.options.plugin_path.arguments());
+    command.args(arguments.options.control_group.arguments());
+    for (option, file) in [("--record", &arguments.options.record), ("--json", &arguments.options.json)] {
+        if let Some(file) = file {
+            command.arg(option).arg(file);
+        }
+    }
+    Ok(command)
 }
 
 /// End of a service.
