@@ -201,6 +201,15 @@ impl JsonOption {
     pub fn is_on_standard_output(&self) -> bool {
         self.file().is_some_and(|file| file.as_os_str() == "-")
     }
+
+    /// Writes a result as JSON, if requested; returns true if standard output is free for text. Not real-time.
+    ///
+    /// # Errors
+    /// As [`write_json`](crate::write_json).
+    pub fn write(&self, value: &impl serde::Serialize) -> Result<bool, CommandError> {
+        self.file().map_or(Ok(()), |file| crate::write_json(file, value))?;
+        Ok(!self.is_on_standard_output())
+    }
 }
 
 /// Options of each command that searches for plugins and has a result for programs.

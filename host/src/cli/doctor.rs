@@ -8,7 +8,7 @@ use crate::platform::usb;
 use clap::Args;
 use flotor_command::options::{KeyValue, PluginResultOptions};
 use flotor_command::say;
-use flotor_command::{CommandError, style, write_json};
+use flotor_command::{CommandError, style};
 use flotor_servo::{PRIORITY_NAME, Privilege, RealTimeReport, probe_real_time};
 use flotor_session::registry::Registry;
 use std::path::{Path, PathBuf};
@@ -40,9 +40,7 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
         Some(id) => device::diagnose(&registry, id, &arguments.sets, &usb::Machine::at(&arguments.root))?,
         None => machine(&registry, &arguments.root),
     };
-    if let Some(file) = arguments.options.json.file() {
-        write_json(file, &diagnoses)?;
-    }
+    let is_text_wanted = arguments.options.json.write(&diagnoses)?;
     let bad = diagnoses.iter().filter(|diagnosis| diagnosis.grade == Grade::Bad).count();
     let verdict = match (&arguments.device, bad) {
         (Some(id), 1..) => {
@@ -50,7 +48,7 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
         }
         _ => Ok(()),
     };
-    if arguments.options.json.is_on_standard_output() {
+    if !is_text_wanted {
         return verdict;
     }
     for diagnosis in &diagnoses {
@@ -77,23 +75,22 @@ pub(crate) fn run(arguments: &DoctorArguments) -> Result<(), CommandError> {
 
 /// Diagnoses the real-time configuration of this machine, with the plugins found.
 fn machine(registry: &Registry, root: &Path) -> Vec<Diagnosis> {
-    let mut diagnoses = vec![cores(root)];
-    diagnoses.extend(of_the_system(root));
-    diagnoses.extend(privileges(&probe_real_time(), root));
-    diagnoses.push(plugins(registry));
-    diagnoses
+    let privileges = privileges(&probe_real_time(), root);
+    [cores(root)]
+        .into_iter()
+        .chain(of_the_system(root))
+        .chain(privileges)
+        .chain([plugins(registry)])
+        .collect()
 }
 
 fn cores(root: &Path) -> Diagnosis {
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    match cores {
-        1 => Diagnosis::note(
-            "cores",
-            "1",
-            format!("the loop shares its core with all other programs; {}", core_remedy(root)),
-        ),
-        _ => Diagnosis::good("cores", cores.to_string()),
+    if cores > 1 {
+        return Diagnosis::good("cores", cores.to_string());
     }
+    let remedy = format!("the loop shares its core with all other programs; {}", core_remedy(root));
+    Diagnosis::note("cores", "1", remedy)
 }
 
 fn privileges(report: &RealTimeReport, root: &Path) -> [Diagnosis; 2] {

@@ -3,7 +3,7 @@
 use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, PluginResultOptions, settings};
 use flotor_command::say;
-use flotor_command::{CommandError, style, while_preparing, write_json};
+use flotor_command::{CommandError, style, while_preparing};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::{Metadata, Plugin};
 use flotor_hal::{Input, Mutability, Output, Parameter, ParameterKind, Pose, Wrench};
@@ -59,10 +59,7 @@ fn list(registry: &Registry, json: &JsonOption) -> Result<(), CommandError> {
         file: plugin.path.display().to_string(),
     });
     let listed: Vec<_> = listed.collect();
-    if let Some(file) = json.file() {
-        write_json(file, &listed)?;
-    }
-    if json.is_on_standard_output() {
+    if !json.write(&listed)? {
         return Ok(());
     }
     for kind in [PluginKind::Device, PluginKind::Model] {
@@ -117,10 +114,7 @@ struct Described<'a> {
 fn describe(registry: &Registry, id: &str, sets: &[KeyValue], json: &JsonOption) -> Result<(), CommandError> {
     let plugin = registry.load_any(id)?;
     let parameters: Vec<Described<'_>> = plugin.parameters().iter().map(described).collect();
-    if let Some(file) = json.file() {
-        write_json(file, &parameters)?;
-    }
-    if json.is_on_standard_output() {
+    if !json.write(&parameters)? {
         return Ok(());
     }
     print_description(&plugin, &parameters);

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use flotor_command::options::JsonOption;
-use flotor_command::{CommandError, say, style, write_json};
+use flotor_command::{CommandError, say, style};
 use flotor_session::RunError;
 use flotor_session::scene::{OWN_SCENES, OwnScene, did_you_mean};
 use serde::Serialize;
@@ -48,10 +48,7 @@ fn print(name: &str) -> Result<(), CommandError> {
 
 fn list(json: &JsonOption) -> Result<(), CommandError> {
     let listed = OWN_SCENES.iter().map(Listed::of).collect::<Result<Vec<_>, _>>()?;
-    if let Some(file) = json.file() {
-        write_json(file, &listed)?;
-    }
-    if json.is_on_standard_output() {
+    if !json.write(&listed)? {
         return Ok(());
     }
     say!("{}", style::title(&format!("{:<20} {:<22} {:<10} {}", "scene", "devices", "models", "title")));

@@ -3,7 +3,7 @@
 use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, duration_s};
 use flotor_command::say;
-use flotor_command::{CommandError, style, write_json};
+use flotor_command::{CommandError, style};
 use flotor_judge::validate::{Check, Figures, Finding, Verdict, check, deliver, validate};
 use flotor_servo::last_stop::ignore_no_signal;
 use flotor_session::step_limit;
@@ -76,17 +76,11 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     let findings =
         validate(&arguments.plugin, &arguments.only, Duration::from_secs_f64(arguments.timeout), one_rule);
     let violated = findings.iter().filter(|finding| finding.violation.is_some()).count();
-    if let Some(file) = arguments.json.file() {
-        write_json(file, &findings)?;
-    }
-    if !arguments.json.is_on_standard_output() {
+    if arguments.json.write(&findings)? {
         say!("{}", style::title(&arguments.plugin.display().to_string()));
         findings.iter().for_each(print);
-        let unchecked: Vec<&str> = findings
-            .iter()
-            .filter(|finding| !finding.has_nothing_to_judge())
-            .filter_map(|finding| finding.unchecked.as_deref())
-            .collect();
+        let judged = findings.iter().filter(|finding| !finding.has_nothing_to_judge());
+        let unchecked: Vec<&str> = judged.filter_map(|finding| finding.unchecked.as_deref()).collect();
         if !unchecked.is_empty() {
             let reasons: BTreeSet<&str> = unchecked.iter().copied().collect();
             let reasons = reasons.into_iter().collect::<Vec<_>>().join("; ");
