@@ -8,7 +8,7 @@ use flotor_live::Directory;
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
-use flotor_session::{Observer, Outcome, RunOptions, Session};
+use flotor_session::{Observer, Outcome, RunOptions, Session, Strength};
 use std::path::Path;
 
 /// Ticks, parameter changes and outcome of a run.
@@ -79,7 +79,7 @@ pub fn watch(scene: &str) -> Watched {
 /// As [`watch`].
 #[must_use]
 pub fn watch_strong(scene: &str) -> Watched {
-    keep(prepared(Clock::Virtual, scene).allow_strong())
+    keep(prepared(Clock::Virtual, scene).with_strength(Strength::Strong))
 }
 
 /// Runs the text of a scene on the virtual clock as [`watch`], with another seed, and without the plugins built with the tests.

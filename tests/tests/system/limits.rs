@@ -102,7 +102,7 @@ fn a_device_that_may_push_a_hand_gets_no_more_than_the_ceiling() {
     let read = Scene::parse(Path::new("scene.toml"), &scene).expect("the scene is right");
     let session = Session::prepare(&read, &Registry::search(&[]), &options).expect("it starts");
     assert_eq!(session.held_back().len(), 1);
-    let session = session.allow_strong();
+    let session = session.with_strength(Strength::Strong);
     assert!(
         session.held_back().is_empty() && session.notices()[0].contains("lifted"),
         "{:?}",

@@ -167,24 +167,18 @@ impl Session {
         Ok(session.with_strength(Strength::of_the_environment()))
     }
 
-    /// Lifts the host's ceiling on force and torque: only the limits of scene and device apply. Only a user who knows the device
-    /// should decide this; a scene cannot. Not real-time.
-    pub fn allow_strong(mut self) -> Self {
-        self.prepared.standby.guard_with(std::mem::take(&mut self.strong_envelopes));
-        self.strength = Strength::Strong;
+    /// Lifts the host's ceiling on force and torque if the strength is [`Strength::Strong`]: only the limits of scene and device
+    /// apply. Only a user who knows the device should decide this; a scene cannot. Not real-time.
+    pub fn with_strength(mut self, strength: Strength) -> Self {
+        if strength == Strength::Strong && self.strength == Strength::UnderCeiling {
+            self.prepared.standby.guard_with(std::mem::take(&mut self.strong_envelopes));
+            self.strength = Strength::Strong;
+        }
         self
     }
 
-    /// Applies [`Session::allow_strong`] if the strength is [`Strength::Strong`]. Not real-time.
-    pub fn with_strength(self, strength: Strength) -> Self {
-        match (strength, self.strength) {
-            (Strength::Strong, Strength::UnderCeiling) => self.allow_strong(),
-            _ => self,
-        }
-    }
-
     /// Returns the devices whose force or torque the host's ceiling limits, in the scene's order; empty once the ceiling is
-    /// [lifted](Self::allow_strong).
+    /// [lifted](Self::with_strength).
     #[must_use]
     pub fn held_back(&self) -> &[StrongDevice] {
         match self.strength {
