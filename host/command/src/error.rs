@@ -110,7 +110,7 @@ impl CommandError {
     #[must_use]
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Usage(_) | Self::Read(_) | Self::Record(RecordError::Exists { .. }) => 2,
+            Self::Usage(_) | Self::Read(_) | Self::Record(RecordError::Exists(_)) => 2,
             Self::Run(error) => match error {
                 wrong if wrong.is_configuration() => 2,
                 // The device may still exert a force.

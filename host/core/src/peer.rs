@@ -58,14 +58,9 @@ const UNIT_TOLERANCE: f64 = 1.0e-6;
 /// Reason why bytes are not a valid dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum InvalidDispatch {
-    /// Wrong length.
-    #[error(
-        "the peer message has {length} bytes instead of {DISPATCH_BYTES}; run the same release on both hosts"
-    )]
-    Length {
-        /// Bytes received.
-        length: usize,
-    },
+    /// Wrong length, bytes.
+    #[error("the peer message has {0} bytes instead of {DISPATCH_BYTES}; run the same release on both hosts")]
+    Length(usize),
     /// Wrong mark, or another version.
     #[error("the version of the peer message is not supported; run the same release on both hosts")]
     Mark,
@@ -95,7 +90,7 @@ impl Dispatch {
     /// If the length, the mark or a number is invalid.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, InvalidDispatch> {
         if bytes.len() != DISPATCH_BYTES {
-            return Err(InvalidDispatch::Length { length: bytes.len() });
+            return Err(InvalidDispatch::Length(bytes.len()));
         }
         let mut words =
             bytes.chunks_exact(8).map(|word| u64::from_le_bytes(word.try_into().unwrap_or_default()));
@@ -174,10 +169,10 @@ mod tests {
     fn what_is_none_is_not_taken_for_one() {
         let bytes = dispatch().to_bytes();
         for length in [0, 1, DISPATCH_BYTES - 1] {
-            assert_eq!(Dispatch::from_bytes(&bytes[..length]), Err(InvalidDispatch::Length { length }));
+            assert_eq!(Dispatch::from_bytes(&bytes[..length]), Err(InvalidDispatch::Length(length)));
         }
         let long = [bytes.as_slice(), &[0]].concat();
-        assert_eq!(Dispatch::from_bytes(&long), Err(InvalidDispatch::Length { length: DISPATCH_BYTES + 1 }));
+        assert_eq!(Dispatch::from_bytes(&long), Err(InvalidDispatch::Length(DISPATCH_BYTES + 1)));
         let mut other = bytes;
         other[7] += 1;
         assert_eq!(Dispatch::from_bytes(&other), Err(InvalidDispatch::Mark));

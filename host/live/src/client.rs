@@ -22,12 +22,9 @@ const ASK_WAIT: Duration = Duration::from_secs(1);
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LiveError {
-    /// No session is running in the folder.
-    #[error("no running session: start one with `flotor run` (searched in {})", path.display())]
-    NoRun {
-        /// Folder that was searched.
-        path: PathBuf,
-    },
+    /// No session is running in the folder searched.
+    #[error("no running session: start one with `flotor run` (searched in {})", .0.display())]
+    NoRun(PathBuf),
     /// Sessions are running, but none in the given process.
     #[error("process {process} runs no session; running: {}", running.join(", "))]
     OtherRuns {
@@ -40,13 +37,8 @@ pub enum LiveError {
     #[error("the host does not reply: {0}; check whether the run has ended")]
     Connection(#[from] io::Error),
     /// The host uses another protocol version.
-    #[error(
-        "the host uses protocol version {host}, this program version {PROTOCOL}; use both from one build"
-    )]
-    Protocol {
-        /// Version of the host's protocol; this program has [`PROTOCOL`].
-        host: u32,
-    },
+    #[error("the host uses protocol version {0}, this program version {PROTOCOL}; use both from one build")]
+    Protocol(u32),
     /// A message of the host is malformed.
     #[error("malformed message from the host: {0}; use both from one build")]
     Malformed(String),
@@ -127,7 +119,7 @@ impl Client {
                 Err(error) => first = first.or(Some(error)),
             }
         }
-        Err(first.unwrap_or_else(|| LiveError::NoRun { path: directory.path().to_path_buf() }))
+        Err(first.unwrap_or_else(|| LiveError::NoRun(directory.path().to_path_buf())))
     }
 
     /// Connects to the run of a socket file, and waits up to 2 s for greeting and description. Ticks arrive only after
@@ -144,7 +136,7 @@ impl Client {
         })?;
         let greeting = greeting.ok_or_else(silent)??;
         if greeting.protocol != PROTOCOL {
-            return Err(LiveError::Protocol { host: greeting.protocol });
+            return Err(LiveError::Protocol(greeting.protocol));
         }
         let run = read_frame(&mut stream, &mut frames, until, |kind, payload| {
             (kind == Kind::Run).then(|| RunDescription::from_bytes(payload))

@@ -48,11 +48,8 @@ pub enum DirectoryError {
     /// Other users may enter the folder, or another user owns it: they could change a run.
     #[error(
         "{}: unsafe permissions: other users may enter the folder and change a run; run `chmod 700` on the \
-         folder, and make yourself its owner", path.display())]
-    NotPrivate {
-        /// Path of the folder.
-        path: PathBuf,
-    },
+         folder, and make yourself its owner", .0.display())]
+    NotPrivate(PathBuf),
 }
 
 /// Id set by [`set_process_number`]; 0: none.
@@ -227,7 +224,7 @@ pub(crate) fn private(path: &Path) -> Result<(), DirectoryError> {
     make_folder(path).map_err(unusable(path))?;
     let attributes = std::fs::symlink_metadata(path).map_err(unusable(path))?;
     let is_private = is_ours_alone(&attributes);
-    if is_private { Ok(()) } else { Err(DirectoryError::NotPrivate { path: path.to_path_buf() }) }
+    if is_private { Ok(()) } else { Err(DirectoryError::NotPrivate(path.to_path_buf())) }
 }
 
 pub(crate) fn unusable(path: &Path) -> impl FnOnce(io::Error) -> DirectoryError {

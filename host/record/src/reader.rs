@@ -42,12 +42,9 @@ pub enum Damage {
     /// A tick has no pose.
     #[error("a tick has no pose of the same time on `/tf`")]
     NoPose,
-    /// Ticks are missing.
-    #[error("{missing} ticks are missing")]
-    Gap {
-        /// Number of missing ticks.
-        missing: u32,
-    },
+    /// A number of ticks are missing.
+    #[error("{0} ticks are missing")]
+    Gap(u32),
 }
 
 /// Error of opening or reading a recording.
@@ -64,27 +61,18 @@ pub enum ReadError {
         cause: io::Error,
     },
     /// The file has another format.
-    #[error("`{}` is not an MCAP file; make a recording with `flotor run --record FILE.mcap`", path.display())]
-    NotMcap {
-        /// Path of the file.
-        path: PathBuf,
-    },
+    #[error("`{}` is not an MCAP file; make a recording with `flotor run --record FILE.mcap`", .0.display())]
+    NotMcap(PathBuf),
     /// The file is MCAP, but no recording of a run.
     #[error(
         "`{}` is an MCAP file, but not a recording of a run: its first message is not on `/flotor/run`; make a \
          recording with `flotor run --record FILE.mcap`",
-        path.display()
+        .0.display()
     )]
-    NotARecording {
-        /// Path of the file.
-        path: PathBuf,
-    },
+    NotARecording(PathBuf),
     /// The file is truncated before the end of the run description.
-    #[error("`{}` is truncated before the run description and cannot be used; record again", path.display())]
-    CutOffAtStart {
-        /// Path of the file.
-        path: PathBuf,
-    },
+    #[error("`{}` is truncated before the run description and cannot be used; record again", .0.display())]
+    CutOffAtStart(PathBuf),
     /// A later version wrote the file.
     #[error(
         "`{}` has format {format}, written by flotor {flotor_version}; this version reads formats up to {FORMAT}: update flotor",
@@ -148,20 +136,20 @@ impl Recording {
     /// before the end of the run description.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
         let unreadable = |cause: io::Error| match cause.kind() {
-            io::ErrorKind::InvalidInput => ReadError::NotMcap { path: path.into() },
+            io::ErrorKind::InvalidInput => ReadError::NotMcap(path.into()),
             _ => ReadError::Open { path: path.into(), cause },
         };
         let file = flotor_hal::open_file(path).map_err(unreadable)?;
         let mut messages = MessageReader::open(file, known_topic).map_err(|error| match error {
             OpenError::Io(cause) => unreadable(cause),
-            _ => ReadError::NotMcap { path: path.into() },
+            _ => ReadError::NotMcap(path.into()),
         })?;
         let ending = messages.ending();
         let first = messages.next_message().map_err(|cause| damaged(path, None, cause.into()))?;
         let run = match first {
             Some(first) if first.topic == Topic::Run => read_run(path, &first)?,
-            None if ending == Ending::CutOff => return Err(ReadError::CutOffAtStart { path: path.into() }),
-            _ => return Err(ReadError::NotARecording { path: path.into() }),
+            None if ending == Ending::CutOff => return Err(ReadError::CutOffAtStart(path.into())),
+            _ => return Err(ReadError::NotARecording(path.into())),
         };
         Ok(Self {
             path: path.into(),
@@ -243,7 +231,7 @@ impl Recording {
     fn tick(&mut self, message: &Message<Topic>) -> Result<TickRecord, Damage> {
         match message.sequence.wrapping_sub(self.sequence) {
             0 => self.sequence = self.sequence.wrapping_add(1),
-            missing => return Err(Damage::Gap { missing }),
+            missing => return Err(Damage::Gap(missing)),
         }
         let pose = self.pose.take().filter(|(time_ns, _)| *time_ns == message.time_ns);
         let (_, pose) = pose.ok_or(Damage::NoPose)?;

@@ -16,11 +16,8 @@ pub enum RepairError {
     #[error(transparent)]
     Write(#[from] RecordError),
     /// The recording is complete: there is nothing to repair.
-    #[error("`{}` is complete: there is nothing to repair", path.display())]
-    Complete {
-        /// Path of the file.
-        path: PathBuf,
-    },
+    #[error("`{}` is complete: there is nothing to repair", .0.display())]
+    Complete(PathBuf),
 }
 
 /// Result of a repair: extent of the new file, and damage of the old.
@@ -65,7 +62,7 @@ pub fn repair(from: &Path, to: &Path) -> Result<Repaired, RepairError> {
     }
     if !is_truncated && repaired.damage.is_none() {
         recorder.discard();
-        return Err(RepairError::Complete { path: from.into() });
+        return Err(RepairError::Complete(from.into()));
     }
     recorder.finish()?;
     Ok(repaired)

@@ -30,12 +30,9 @@ pub enum RecordError {
     /// A file of that name exists: recordings are never overwritten.
     #[error(
         "the recording `{}` exists already, and recordings are not overwritten; name another file, or remove the recording",
-        path.display()
+        .0.display()
     )]
-    Exists {
-        /// Path of the file.
-        path: PathBuf,
-    },
+    Exists(PathBuf),
     /// The file could not be created.
     #[error("cannot make the recording `{}`: {cause}; name a file in a folder you may write to", path.display())]
     Create {
@@ -226,7 +223,7 @@ impl Recorder {
 
 fn new_file(path: &Path) -> Result<NewFile, RecordError> {
     NewFile::create(path).map_err(|cause| match cause.kind() {
-        io::ErrorKind::AlreadyExists => RecordError::Exists { path: path.into() },
+        io::ErrorKind::AlreadyExists => RecordError::Exists(path.into()),
         _ => RecordError::Create { path: path.into(), cause },
     })
 }

@@ -29,6 +29,7 @@ pub mod run_description;
 pub mod scene;
 mod session;
 pub mod summary;
+mod tally;
 pub mod telemetry;
 
 pub use calls::{

@@ -74,12 +74,9 @@ pub enum EvaluateError {
     /// The model could not be created.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// The model panicked and cannot be called any more.
-    #[error("the model failed: {message}")]
-    Panicked {
-        /// Message of the model.
-        message: String,
-    },
+    /// The model panicked, with its message, and cannot be called any more.
+    #[error("the model failed: {0}")]
+    Panicked(String),
 }
 
 /// Maximum number of steps of a walk; a pose farther away is approached in larger steps.
@@ -212,7 +209,7 @@ impl Walker<'_> {
     }
 
     fn panicked(&mut self) -> EvaluateError {
-        EvaluateError::Panicked { message: self.subject.model().last_message() }
+        EvaluateError::Panicked(self.subject.model().last_message())
     }
 
     fn answer(&mut self, handle: Handle, output: &Output) -> Result<Answer, EvaluateError> {

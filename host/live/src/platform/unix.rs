@@ -242,7 +242,7 @@ mod tests {
         let scratch = tempfile::tempdir().unwrap();
         std::fs::set_permissions(scratch.path(), std::fs::Permissions::from_mode(0o755)).unwrap();
         let refused = Directory::at(scratch.path()).listen();
-        assert!(matches!(refused, Err(DirectoryError::NotPrivate { .. })), "{refused:?}");
+        assert!(matches!(refused, Err(DirectoryError::NotPrivate(_))), "{refused:?}");
     }
 
     /// Who made the folder first wrote what this user's runs obeyed, and showed runs of its own.

@@ -88,7 +88,7 @@ pub fn serve(
                 relay.carry(client, report_line)?;
                 report_line("the run is over; waiting for the next run");
             }
-            Err(LiveError::NoRun { .. }) => {}
+            Err(LiveError::NoRun(_)) => {}
             Err(error) => {
                 // Report once, as this is retried many times a second.
                 let words = error.to_string();

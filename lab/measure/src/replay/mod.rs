@@ -42,13 +42,10 @@ pub enum ReplayError {
     Run(#[from] RunError),
     /// The coupling's messages from another host are not in the recording.
     #[error(
-        "the coupling `{coupling}` has its other end on another host, whose messages are not in the recording: \
+        "the coupling `{0}` has its other end on another host, whose messages are not in the recording: \
          only runs whose couplings have both ends on one host can be replayed"
     )]
-    RemoteCoupling {
-        /// Name of the coupling.
-        coupling: String,
-    },
+    RemoteCoupling(String),
     /// The forces of a model came from a program, which is not in the recording.
     #[error(
         "the forces of `{model}` came from an external program, which a replay cannot repeat; replace \
@@ -159,7 +156,7 @@ impl<'r> Replay<'r> {
         let devices = recording.run().devices().count();
         let period_s = period_ns as f64 * 1.0e-9;
         if let Some(coupling) = recording.run().couplings.iter().find(|coupling| is_remote(coupling)) {
-            return Err(ReplayError::RemoteCoupling { coupling: coupling.name.clone() });
+            return Err(ReplayError::RemoteCoupling(coupling.name.clone()));
         }
         let couplings = recording.run().couplings.iter();
         let couplings =
