@@ -42,10 +42,8 @@ impl Durations {
     /// Returns the non-empty bins, each as its largest duration, ns, and its count. Not real-time.
     #[must_use]
     pub fn bins(&self) -> Vec<(u64, u64)> {
-        self.0
-            .iter_recorded()
-            .map(|bin| (bin.value_iterated_to(), bin.count_since_last_iteration()))
-            .collect()
+        let bins = self.0.iter_recorded();
+        bins.map(|bin| (bin.value_iterated_to(), bin.count_since_last_iteration())).collect()
     }
 
     /// Returns the percentiles so far. Not real-time.

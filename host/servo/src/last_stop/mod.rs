@@ -23,6 +23,7 @@ use crate::{Heartbeat, Place, Stuck};
 use flotor_core::lock;
 use flotor_hal::abi::loader::Stopper;
 use line::Line;
+use std::fmt::Write;
 use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
@@ -221,15 +222,13 @@ pub(crate) fn end_dying() -> ! {
 /// Stops all devices, prints the message, and ends the process.
 fn die(death: Death) -> ! {
     let own = system::thread_number();
-    match DYING.compare_exchange(0, own, Ordering::AcqRel, Ordering::Acquire) {
-        Ok(_) => {}
-        // A stop that crashed: continue with the next device.
-        Err(first) if first == own => {}
-        Err(_) => {
-            // The first thread stops the devices and ends the process, unless a device's stop does not return.
-            for _ in 0..LOOKS {
-                crate::sleep_until(crate::monotonic_ns() + LOOK_NS);
-            }
+    // On the first thread again: a stop that crashed; continue with the next device.
+    if let Err(first) = DYING.compare_exchange(0, own, Ordering::AcqRel, Ordering::Acquire)
+        && first != own
+    {
+        // The first thread stops the devices and ends the process, unless a device's stop does not return.
+        for _ in 0..LOOKS {
+            crate::sleep_until(crate::monotonic_ns() + LOOK_NS);
         }
     }
     stop_the_rest();
@@ -260,7 +259,6 @@ fn stop_the_rest() {
 
 /// Describes the end in one line: cause, tick and running code.
 fn describe(line: &mut Line, death: Death, own: i32) {
-    use std::fmt::Write;
     if let Some(call) = call::current() {
         let _ = write!(line, "error: {}: ", call.text());
         describe_death(line, death);
@@ -300,7 +298,6 @@ fn describe(line: &mut Line, death: Death, own: i32) {
 }
 
 fn describe_death(line: &mut Line, death: Death) {
-    use std::fmt::Write;
     let _ = match death {
         Death::Signal { signal, sender } => {
             let told = write!(line, "{}", system::SignalName(signal));

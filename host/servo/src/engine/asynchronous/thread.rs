@@ -103,10 +103,7 @@ impl ModelThread {
     }
 
     fn enqueue(&mut self, operation: Operation) -> CallStatus {
-        match self.operations.push(operation) {
-            Ok(()) => CallStatus::Ok,
-            Err(_) => CallStatus::Unsupported,
-        }
+        self.operations.push(operation).map_or(CallStatus::Unsupported, |()| CallStatus::Ok)
     }
 
     /// Returns the last message of a failed model. Not real-time.

@@ -142,10 +142,7 @@ impl Worker {
     #[inline]
     pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
         let put = |memory: &SharedMemory| memory.put_input(input);
-        let reply = self.request(Operation::Step, put, |memory| {
-            *output = memory.output();
-            memory.status()
-        });
+        let reply = self.request(Operation::Step, put, |memory| *output = memory.output());
         reply.map_or_else(|missing| missing, Stepped::from)
     }
 
@@ -158,10 +155,7 @@ impl Worker {
     /// timeout.
     pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
         let put = |memory: &SharedMemory| memory.put_input(input);
-        let reply = self.request(Operation::Field, put, |memory| {
-            *field = memory.field();
-            memory.status()
-        });
+        let reply = self.request(Operation::Field, put, |memory| *field = memory.field());
         reply.map_or_else(|missing| missing, Stepped::from)
     }
 
@@ -183,15 +177,14 @@ impl Worker {
             memory.value.store(value.to_bits(), Ordering::Relaxed);
         };
         // The next step reports a late or ended worker.
-        self.request(Operation::SetParameter, put, |memory| memory.status())
-            .unwrap_or(CallStatus::Unsupported)
+        self.request(Operation::SetParameter, put, |_| ()).unwrap_or(CallStatus::Unsupported)
     }
 
     /// Clears the history of the model; [`CallStatus::Ok`] also without a reply. Real-time: bounded by the reply timeout, no
     /// allocation.
     pub fn reset(&mut self) -> CallStatus {
         // The next step reports a late or ended worker.
-        self.request(Operation::Reset, |_| (), |memory| memory.status()).unwrap_or(CallStatus::Ok)
+        self.request(Operation::Reset, |_| (), |_| ()).unwrap_or(CallStatus::Ok)
     }
 
     /// Returns the model's dependence on the path of the handle.
@@ -204,7 +197,7 @@ impl Worker {
         &mut self,
         operation: Operation,
         put: impl FnOnce(&SharedMemory),
-        take: impl FnOnce(&SharedMemory) -> CallStatus,
+        take: impl FnOnce(&SharedMemory),
     ) -> Result<CallStatus, Stepped> {
         if self.is_gone {
             return Err(Stepped::Gone);
@@ -226,7 +219,8 @@ impl Worker {
             }
             wait_for_change(&self.memory.reply, self.number.wrapping_sub(1), left_ns);
         }
-        Ok(take(&self.memory))
+        take(&self.memory);
+        Ok(self.memory.status())
     }
 
     /// Returns late or gone, after one system call that checks whether the worker has ended.
@@ -319,10 +313,9 @@ fn start_starter() -> io::Result<Sender<Start>> {
 
 /// Adds advice to the error if a limit of processes or threads is reached (`EAGAIN`).
 fn with_advice(error: io::Error) -> io::Error {
-    if error.kind() == io::ErrorKind::WouldBlock {
-        io::Error::other(format!("{error}; {THREAD_ADVICE}"))
-    } else {
-        error
+    match error.kind() {
+        io::ErrorKind::WouldBlock => io::Error::other(format!("{error}; {THREAD_ADVICE}")),
+        _ => error,
     }
 }
 

@@ -104,10 +104,8 @@ impl SharedPage {
             RegionShape::Box => 2,
         };
         let (center_m, half_sides_m) = (region.center().to_array(), region.half_sides().to_array());
-        store(
-            &self.region,
-            Encoder::of_zeros().words([shape]).numbers(center_m).numbers(half_sides_m).finish(),
-        );
+        let words = Encoder::of_zeros().words([shape]).numbers(center_m).numbers(half_sides_m).finish();
+        store(&self.region, words);
     }
 
     pub(super) fn region(&self) -> ActiveRegion {

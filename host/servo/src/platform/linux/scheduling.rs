@@ -99,12 +99,12 @@ pub(crate) fn enter_priority(duty: Duty) -> Result<(), String> {
     };
     let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
     let value = ThreadPriorityValue::try_from(priority)?;
-    set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy).map_err(
-        |error| match error {
-            Error::OS(code) => std::io::Error::from_raw_os_error(code).to_string(),
-            other => other.to_string(),
-        },
-    )
+    let entered =
+        set_thread_priority_and_policy(thread_native_id(), ThreadPriority::Crossplatform(value), policy);
+    entered.map_err(|error| match error {
+        Error::OS(code) => std::io::Error::from_raw_os_error(code).to_string(),
+        other => other.to_string(),
+    })
 }
 
 #[cfg(test)]
