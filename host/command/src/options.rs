@@ -241,11 +241,8 @@ pub fn duration_s(text: &str) -> Result<f64, String> {
     let number: f64 =
         number.trim().parse().map_err(|_| format!("invalid duration `{text}`; write 10s or 500ms"))?;
     let seconds = number * scale;
-    if (0.0..=31_536_000.0).contains(&seconds) {
-        Ok(seconds)
-    } else {
-        Err("the range is 0 to 1 year".to_owned())
-    }
+    let is_legal = (0.0..=31_536_000.0).contains(&seconds);
+    if is_legal { Ok(seconds) } else { Err("the range is 0 to 1 year".to_owned()) }
 }
 
 /// Parses a loop rate in Hz, with or without the unit.

@@ -85,12 +85,8 @@ fn default(argument: &Arg) -> String {
 
 fn help(argument: &Arg) -> String {
     let help = argument.get_help().map(ToString::to_string).unwrap_or_default();
-    let words: Vec<String> = match argument.get_action().takes_values() {
-        true => {
-            argument.get_possible_values().iter().map(|value| format!("`{}`", value.get_name())).collect()
-        }
-        false => Vec::new(),
-    };
+    let values = argument.get_possible_values().into_iter().filter(|_| argument.get_action().takes_values());
+    let words: Vec<String> = values.map(|value| format!("`{}`", value.get_name())).collect();
     let help = cell(&help);
     if words.is_empty() { help } else { format!("{help}: {}", words.join(", ")) }
 }

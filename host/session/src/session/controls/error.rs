@@ -62,9 +62,8 @@ pub enum ControlError {
 }
 
 fn live_words(live: &[String]) -> String {
-    if live.is_empty() {
-        "no parameter of this plugin can change then".to_owned()
-    } else {
-        format!("parameters that can change then: {}", live.join(", "))
+    match live {
+        [] => "no parameter of this plugin can change then".to_owned(),
+        live => format!("parameters that can change then: {}", live.join(", ")),
     }
 }
