@@ -33,6 +33,10 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Kinds of this version of the protocol.
+    const KNOWN: [Self; 7] =
+        [Self::Greeting, Self::Run, Self::Ticks, Self::Change, Self::Answer, Self::End, Self::Request];
+
     const fn byte(self) -> u8 {
         match self {
             Self::Greeting => 1,
@@ -46,17 +50,8 @@ impl Kind {
         }
     }
 
-    const fn of(byte: u8) -> Self {
-        match byte {
-            1 => Self::Greeting,
-            2 => Self::Run,
-            3 => Self::Ticks,
-            4 => Self::Change,
-            5 => Self::Answer,
-            6 => Self::End,
-            16 => Self::Request,
-            other => Self::Unknown(other),
-        }
+    fn of(byte: u8) -> Self {
+        Self::KNOWN.into_iter().find(|kind| kind.byte() == byte).unwrap_or(Self::Unknown(byte))
     }
 }
 

@@ -18,8 +18,8 @@ pub(crate) struct Feel {
     before: Option<(DVec3, DVec3)>,
     /// Pose at the start of the current rest.
     rest: Option<Pose>,
-    /// Largest stiffness felt, N/m: increase of the force against the handle per displacement, over displacements of 0.1 mm; 0 if the
-    /// force never increased.
+    /// Largest stiffness felt, N/m: increase of the force against the handle per displacement, over displacements of at least
+    /// 0.1 mm; 0 if the force never increased.
     pub(crate) peak_stiffness_n_per_m: f64,
     settled_ns: u64,
     newest_ns: u64,

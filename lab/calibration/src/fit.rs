@@ -94,10 +94,8 @@ pub fn fit(readings: &[Reading]) -> Result<Fit, CalibrationError> {
     let mut weight_direction = vec![0.0; degree + 1];
     weight_direction.push(1.0);
     let weight_95_n = QUANTILE_95 * residual_n * solution.unit_variance(&weight_direction).sqrt();
-    let residuals_n = readings
-        .iter()
-        .map(|reading| reading.force_n - predict(reading, &solution, &scale, degree))
-        .collect();
+    let residual = |reading: &Reading| reading.force_n - predict(reading, &solution, &scale, degree);
+    let residuals_n = readings.iter().map(residual).collect();
     Ok(Fit {
         calibration,
         degree,

@@ -69,12 +69,8 @@ fn reflect(table: &mut [Vec<f64>], column: usize) -> Option<()> {
     let squares: f64 = mirror.iter().map(|value| value * value).sum();
     let width = table.first()?.len();
     for k in column..width {
-        let dot: f64 = table
-            .iter()
-            .skip(column)
-            .zip(&mirror)
-            .map(|(row, v)| row.get(k).copied().unwrap_or(0.0) * v)
-            .sum();
+        let below = table.iter().skip(column).map(|row| row.get(k).copied().unwrap_or(0.0));
+        let dot: f64 = below.zip(&mirror).map(|(value, v)| value * v).sum();
         for (row, v) in table.iter_mut().skip(column).zip(&mirror) {
             if let Some(cell) = row.get_mut(k) {
                 *cell -= 2.0 * dot / squares * v;

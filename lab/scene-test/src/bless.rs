@@ -37,10 +37,8 @@ pub(crate) fn bless(
         near.sort_by_key(|expected| std::cmp::Reverse(expected.at));
         for expected in near {
             let Bound::Near { value, within } = expected.bound else { continue };
-            let got: Vec<f64> = own
-                .iter()
-                .filter_map(|index| outcomes[*index].values.get(&expected.path).and_then(Value::as_f64))
-                .collect();
+            let of_run = |index: &usize| outcomes[*index].values.get(&expected.path).and_then(Value::as_f64);
+            let got: Vec<f64> = own.iter().filter_map(of_run).collect();
             if got.iter().all(|got| (got - value).abs() <= within) {
                 continue;
             }

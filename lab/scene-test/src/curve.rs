@@ -60,10 +60,9 @@ impl Points {
             rows.push((pose, wrench));
         }
         if rows.is_empty() {
-            Err(table.header_problem("the table has no row; write at least one"))
-        } else {
-            Ok(Self { compared, rows })
+            return Err(table.header_problem("the table has no row; write at least one"));
         }
+        Ok(Self { compared, rows })
     }
 
     /// Formats the poses for `flotor eval`.

@@ -292,10 +292,9 @@ impl TestFile {
         let checks_a_plugin = curve.is_some() || golden.is_some() || validate.is_some() || stress.is_some();
         let nothing = expect.is_empty() && reference.is_none() && digests.is_empty() && !checks_a_plugin;
         if nothing {
-            Err((0, "the file has no expectation; write at least [expect]".to_owned()))
-        } else {
-            Ok(self)
+            return Err((0, "the file has no expectation; write at least [expect]".to_owned()));
         }
+        Ok(self)
     }
 
     /// Formats a position in the text as `FILE:LINE`.

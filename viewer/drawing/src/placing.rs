@@ -41,11 +41,8 @@ pub fn round_below(number: f64) -> f64 {
     }
     let power = 10.0_f64.powf(number.log10().floor());
     // Slightly above the number, to allow for the rounding of the power.
-    [5.0, 2.0, 1.0]
-        .map(|k| k * power)
-        .into_iter()
-        .find(|round| *round <= number * (1.0 + 1.0e-9))
-        .unwrap_or(power)
+    let mut all = [5.0, 2.0, 1.0].into_iter().map(|k| k * power);
+    all.find(|round| *round <= number * (1.0 + 1.0e-9)).unwrap_or(power)
 }
 
 #[cfg(test)]

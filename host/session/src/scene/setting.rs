@@ -16,12 +16,9 @@ impl FromStr for KeyValue {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text.split_once('=') {
-            Some((key, value)) if !key.trim().is_empty() => {
-                Ok(Self { key: key.trim().to_owned(), value: value.trim().to_owned() })
-            }
-            _ => Err(format!("`{text}` is not KEY=VALUE")),
-        }
+        let parts = text.split_once('=').map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()));
+        let setting = parts.filter(|(key, _)| !key.is_empty()).map(|(key, value)| Self { key, value });
+        setting.ok_or_else(|| format!("`{text}` is not KEY=VALUE"))
     }
 }
 

@@ -75,10 +75,8 @@ pub(super) fn work(bound: f64, mut powers: impl FnMut(&[f64]) -> Option<Vec<f64>
             return Some(whole);
         }
         let allowed_j = ALLOWED * bound * whole.gross_j / works.len() as f64;
-        let split = ends
-            .windows(2)
-            .zip(&works)
-            .flat_map(|(pair, work)| between(pair, if work.uncertain_j > allowed_j { PARTS } else { 1 }));
+        let parts = |work: &Work| if work.uncertain_j > allowed_j { PARTS } else { 1 };
+        let split = ends.windows(2).zip(&works).flat_map(|(pair, work)| between(pair, parts(work)));
         ends = split.chain([1.0]).collect();
     }
     None

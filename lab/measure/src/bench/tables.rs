@@ -73,12 +73,8 @@ impl BenchReport {
     pub fn to_text(&self) -> String {
         let tables =
             [self.times(), self.errors(), self.at_the_hand(), self.pareto_front(), self.split_calls()];
-        tables
-            .into_iter()
-            .filter(|lines| !lines.is_empty())
-            .map(|lines| lines.join("\n"))
-            .collect::<Vec<_>>()
-            .join("\n\n")
+        let tables = tables.into_iter().filter(|lines| !lines.is_empty()).map(|lines| lines.join("\n"));
+        tables.collect::<Vec<_>>().join("\n\n")
     }
 
     fn times(&self) -> Vec<String> {
@@ -258,12 +254,8 @@ impl BenchReport {
         .panel_height_px(220.0)
         .panel(drawn(force, true, |distance| distance.force_rms_n));
         // A sphere has no torque about its centre.
-        let figure = if has_torque {
-            figure.panel(drawn(torque, false, |distance| distance.torque_rms_nm))
-        } else {
-            figure
-        };
-        figure.to_svg()
+        let torque = has_torque.then(|| drawn(torque, false, |distance| distance.torque_rms_nm));
+        torque.into_iter().fold(figure, Figure::panel).to_svg()
     }
 
     /// Draws the times of each case as bars, in the order of the table.

@@ -194,10 +194,8 @@ fn stiffness_panel(first: &Case, plant: Plant, within: &[(&Case, &Row)]) -> Pane
                 (damping, limit(&plant, &rendering(damping)))
             })
         };
-        let measured = within
-            .iter()
-            .filter(|(case, _)| case.delay_ticks == delay_ticks)
-            .map(|(case, row)| (case.virtual_damping_ns_per_m, row.k_max_n_per_m));
+        let of_delay = within.iter().filter(|(case, _)| case.delay_ticks == delay_ticks);
+        let measured = of_delay.map(|(case, row)| (case.virtual_damping_ns_per_m, row.k_max_n_per_m));
         panel = panel
             .series(
                 Series::line(format!("exact, {delay_ticks} ticks"), theory(exact_limit_n_per_m)).slot(slot),

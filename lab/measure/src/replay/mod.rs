@@ -398,6 +398,11 @@ fn use_recorded_files(
 /// Returns the models of a recorded run as in a scene.
 fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
     let location = Location { file: PathBuf::from(path), line: 0 };
+    let parameter = |(key, value): &(String, String)| ParameterText {
+        key: key.clone(),
+        value: value.clone(),
+        location: location.clone(),
+    };
     let model = |plugin: &flotor_record::PluginDescription| match plugin.role {
         Role::Device => None,
         Role::Model(mapping) => Some(ModelUse {
@@ -405,15 +410,7 @@ fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
             plugin: PluginUse {
                 plugin: plugin.id.clone(),
                 location: location.clone(),
-                parameters: plugin
-                    .settings
-                    .iter()
-                    .map(|(key, value)| ParameterText {
-                        key: key.clone(),
-                        value: value.clone(),
-                        location: location.clone(),
-                    })
-                    .collect(),
+                parameters: plugin.settings.iter().map(parameter).collect(),
             },
             device: plugin.device,
             mapping,

@@ -82,14 +82,12 @@ pub fn default_cases() -> Vec<Case> {
 /// # Errors
 /// The first [`LoopError`] of a case.
 pub fn measure(plugin: &Plugin, cases: &[Case], done: impl Fn() + Sync) -> Result<Vec<Row>, LoopError> {
-    let rows: Vec<Result<Row, LoopError>> = cases
-        .par_iter()
-        .map(|case| {
-            let row = row(plugin, case);
-            done();
-            row
-        })
-        .collect();
+    let measured = |case: &Case| {
+        let row = row(plugin, case);
+        done();
+        row
+    };
+    let rows: Vec<Result<Row, LoopError>> = cases.par_iter().map(measured).collect();
     rows.into_iter().collect()
 }
 
