@@ -55,17 +55,12 @@ impl Event {
     /// Encodes the event as a frame.
     pub fn encode(&self) -> Frame {
         let mut frame = Frame::new(self.kind().map_or(END, |kind| kind as i32));
-        match self {
-            Self::Button(buttons) => frame.int(buttons.left.into()).int(buttons.right.into()),
-            Self::Boundary(sides) => {
-                for side in sides {
-                    frame.int(*side);
-                }
-                &mut frame
-            }
-            Self::Overtemp(temperatures) => frame.floats(temperatures),
-            Self::Fault(bits) => frame.put(&bits.0.to_le_bytes()),
-            Self::Tick(pose) => frame.int(pose.out_of_range.into()).floats(&pose.at),
+        match *self {
+            Self::Button(buttons) => frame.add(buttons),
+            Self::Boundary(sides) => frame.add(sides),
+            Self::Overtemp(temperatures) => frame.add(temperatures),
+            Self::Fault(bits) => frame.add(bits),
+            Self::Tick(pose) => frame.add(pose),
             Self::End => &mut frame,
         };
         frame
@@ -82,17 +77,11 @@ impl Event {
         const TICK: i32 = EventKind::Tick as i32;
         Some(match id {
             END => Self::End,
-            BUTTON => Self::Button(Buttons { left: fields.int()? != 0, right: fields.int()? != 0 }),
-            BOUNDARY => {
-                let mut sides = [0; 7];
-                for side in &mut sides {
-                    *side = fields.int()?;
-                }
-                Self::Boundary(sides)
-            }
-            OVERTEMP => Self::Overtemp(fields.floats()?),
-            FAULT => Self::Fault(FaultBits(u32::from_le_bytes(fields.array()?))),
-            TICK => Self::Tick(WirePose { out_of_range: fields.int()? != 0, at: fields.floats()? }),
+            BUTTON => Self::Button(fields.next()?),
+            BOUNDARY => Self::Boundary(fields.next()?),
+            OVERTEMP => Self::Overtemp(fields.next()?),
+            FAULT => Self::Fault(fields.next()?),
+            TICK => Self::Tick(fields.next()?),
             _ => return None,
         })
     }

@@ -7,6 +7,15 @@ pub const LONGEST_BYTES: usize = 512;
 /// Length of the longest frame sent by this code, bytes: a request with all gains of a set.
 const LONGEST_SENT_BYTES: usize = 108;
 
+/// Type of a field, or of several fields in a row.
+pub(super) trait Field: Copy {
+    /// Appends the field to a frame.
+    fn write(self, frame: &mut Frame);
+
+    /// Reads the field; `None` if bytes are missing or are no value of the type.
+    fn read(fields: &mut Fields<'_>) -> Option<Self>;
+}
+
 /// Encoded frame to send.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
@@ -19,7 +28,7 @@ impl Frame {
     /// Creates a frame with this code (function, status or event) and no fields.
     pub fn new(code: i32) -> Self {
         let mut frame = Self { bytes: [0; LONGEST_SENT_BYTES], length: 4 };
-        frame.int(code);
+        frame.add(code);
         frame
     }
 
@@ -42,18 +51,9 @@ impl Frame {
         self
     }
 
-    pub(super) fn int(&mut self, value: i32) -> &mut Self {
-        self.put(&value.to_le_bytes())
-    }
-
-    pub(super) fn float(&mut self, value: f32) -> &mut Self {
-        self.put(&value.to_le_bytes())
-    }
-
-    pub(super) fn floats(&mut self, values: &[f32]) -> &mut Self {
-        for value in values {
-            self.float(*value);
-        }
+    /// Appends a field.
+    pub(super) fn add(&mut self, field: impl Field) -> &mut Self {
+        field.write(self);
         self
     }
 }
@@ -73,21 +73,9 @@ impl<'a> Fields<'a> {
         (declared == frame.len()).then_some((i32::from_le_bytes(*code), Self { bytes }))
     }
 
-    /// Reads the next four bytes as an integer.
-    pub(super) fn int(&mut self) -> Option<i32> {
-        self.array().map(i32::from_le_bytes)
-    }
-
-    pub(super) fn float(&mut self) -> Option<f32> {
-        self.array().map(f32::from_le_bytes)
-    }
-
-    pub(super) fn floats<const N: usize>(&mut self) -> Option<[f32; N]> {
-        let mut values = [0.0; N];
-        for value in &mut values {
-            *value = self.float()?;
-        }
-        Some(values)
+    /// Reads the next field.
+    pub(super) fn next<T: Field>(&mut self) -> Option<T> {
+        T::read(self)
     }
 
     pub(super) fn array<const N: usize>(&mut self) -> Option<[u8; N]> {

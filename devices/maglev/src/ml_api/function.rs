@@ -2,8 +2,18 @@
 
 use super::event::EventKind;
 
+macro_rules! is_marked {
+    () => {
+        false
+    };
+    (commands) => {
+        true
+    };
+}
+
+/// Declares the functions with their numbers; `commands` marks those that only the commanding client may call.
 macro_rules! functions {
-    ($($(#[$doc:meta])* $name:ident = $id:literal,)+) => {
+    ($($(#[$doc:meta])* $name:ident = $id:literal $($mark:ident)?,)+) => {
         /// Function of the controller, with its number on the wire; units of [`super`].
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub enum Function {
@@ -20,19 +30,27 @@ macro_rules! functions {
                     $(Self::$name => stringify!($name),)+
                 }
             }
+
+            /// Returns true if only the commanding client may call the function. All clients may read and land.
+            #[must_use]
+            pub const fn commands(self) -> bool {
+                match self {
+                    $(Self::$name => is_marked!($($mark)?),)+
+                }
+            }
         }
     };
 }
 
 functions! {
     /// Keeps an axis inside a range.
-    ConstrainAxis = 1,
+    ConstrainAxis = 1 commands,
     /// Sets the feed-forward of the normal gains to the stored gravity wrench.
-    DefyGravity = 2,
+    DefyGravity = 2 commands,
     /// Ends the session of the client.
     Disconnect = 3,
     /// Measures the gravity wrench, which balances the weight of the flotor; takes seconds.
-    FindGravity = 4,
+    FindGravity = 4 commands,
     /// Returns the pose of the flotor.
     GetActualPosition = 5,
     /// Returns the control mode of each axis.
@@ -90,7 +108,7 @@ functions! {
     /// Sets the flotor down; takes seconds.
     Land = 33,
     /// Locks an axis at its present position.
-    LockAxis = 34,
+    LockAxis = 34 commands,
     /// Registers for changes of the buttons.
     RegisterButton = 36,
     /// Registers for changes of the fault bits.
@@ -102,53 +120,53 @@ functions! {
     /// Registers for servo intervals.
     RegisterTick = 40,
     /// Clears the faults whose cause has ended.
-    ResetFault = 41,
+    ResetFault = 41 commands,
     /// Restores the default gains of a set; takes seconds.
-    ResetGainVecAxes = 42,
+    ResetGainVecAxes = 42 commands,
     /// Sets the voltage of the spare output.
-    SetAuxDac = 43,
+    SetAuxDac = 43 commands,
     /// Sets the radius of the boundary sphere.
-    SetBoundaryRadius = 44,
+    SetBoundaryRadius = 44 commands,
     /// Sets the current limit of each coil.
-    SetCurrentLimits = 45,
+    SetCurrentLimits = 45 commands,
     /// Commands the current of each coil.
-    SetCurrents = 46,
+    SetCurrents = 46 commands,
     /// Sets the desired pose of the flotor.
-    SetDesiredPosition = 47,
+    SetDesiredPosition = 47 commands,
     /// Commands the force of one axis.
-    SetForceAxis = 48,
+    SetForceAxis = 48 commands,
     /// Commands a wrench.
-    SetForces = 49,
+    SetForces = 49 commands,
     /// Sets the frame in which poses and velocities are reported to clients.
-    SetFrame = 50,
+    SetFrame = 50 commands,
     /// Sets the gains of all axes.
-    SetGainVecAxes = 51,
+    SetGainVecAxes = 51 commands,
     /// Sets the gains of one axis.
-    SetGainVecAxis = 52,
+    SetGainVecAxis = 52 commands,
     /// Sets the gains of the grasp.
-    SetGainVecGrasp = 53,
+    SetGainVecGrasp = 53 commands,
     /// Sets one gain.
-    SetGainVecSingle = 54,
+    SetGainVecSingle = 54 commands,
     /// Sets the current of the grasp.
-    SetGraspCurrent = 55,
+    SetGraspCurrent = 55 commands,
     /// Sets the current limit of the grasp.
-    SetGraspCurrentLimit = 56,
+    SetGraspCurrentLimit = 56 commands,
     /// Stores the gravity wrench, which balances the weight of the flotor.
-    SetGravity = 57,
+    SetGravity = 57 commands,
     /// Sets the placement of the position sensors.
-    SetLatCellOffset = 58,
+    SetLatCellOffset = 58 commands,
     /// Sets the servo rate.
-    SetServoFrequency = 59,
+    SetServoFrequency = 59 commands,
     /// Sets the speed limits.
-    SetSpeedLimits = 60,
+    SetSpeedLimits = 60 commands,
     /// Sets the velocity of the desired pose.
-    SetVelocity = 61,
+    SetVelocity = 61 commands,
     /// Restarts the controller.
-    Shutdown = 62,
+    Shutdown = 62 commands,
     /// Lifts the flotor home; takes seconds.
-    Takeoff = 63,
+    Takeoff = 63 commands,
     /// Ends the lock or the constraint of an axis.
-    UnlockAxis = 64,
+    UnlockAxis = 64 commands,
     /// Unregisters from button events.
     UnregisterButton = 65,
     /// Unregisters from fault events.
@@ -199,41 +217,5 @@ impl Function {
     #[must_use]
     pub fn unregisters(self) -> Option<EventKind> {
         REGISTRATIONS.iter().find(|(.., off)| *off == self).map(|(kind, ..)| *kind)
-    }
-
-    /// Returns true if only the commanding client may call the function. All clients may read and land.
-    #[must_use]
-    pub const fn commands(self) -> bool {
-        matches!(
-            self,
-            Self::ConstrainAxis
-                | Self::DefyGravity
-                | Self::FindGravity
-                | Self::LockAxis
-                | Self::ResetFault
-                | Self::ResetGainVecAxes
-                | Self::SetAuxDac
-                | Self::SetBoundaryRadius
-                | Self::SetCurrentLimits
-                | Self::SetCurrents
-                | Self::SetDesiredPosition
-                | Self::SetForceAxis
-                | Self::SetForces
-                | Self::SetFrame
-                | Self::SetGainVecAxes
-                | Self::SetGainVecAxis
-                | Self::SetGainVecGrasp
-                | Self::SetGainVecSingle
-                | Self::SetGraspCurrent
-                | Self::SetGraspCurrentLimit
-                | Self::SetGravity
-                | Self::SetLatCellOffset
-                | Self::SetServoFrequency
-                | Self::SetSpeedLimits
-                | Self::SetVelocity
-                | Self::Shutdown
-                | Self::Takeoff
-                | Self::UnlockAxis
-        )
     }
 }

@@ -10,7 +10,7 @@
 //! Little endian, every number 4 bytes, no checksum and no sequence number: one call is outstanding on a connection at a time.
 //! Metres, radians, seconds, newtons, amperes, degrees Celsius; axes x, y, z and the rotations about them, the device frame.
 //!
-//! - [`frame`]: encoding and decoding of one frame; [`intake`]: frames from a stream.
+//! - [`frame`]: encoding and decoding of one frame, of its fields in `field.rs`; [`intake`]: frames from a stream.
 //! - [`values`]: types of the fields; [`angles`]: three angles as an orientation.
 //! - [`request`], [`reply`], [`event`]: the messages and their encoding.
 //!
@@ -18,6 +18,7 @@
 
 pub mod angles;
 pub mod event;
+mod field;
 pub mod frame;
 pub mod function;
 pub mod intake;

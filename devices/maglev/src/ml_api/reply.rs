@@ -4,7 +4,7 @@
 use super::frame::{Fields, Frame};
 use super::function::Function;
 use super::values::{
-    AxisMode, AxisValues, Buttons, Cell, CellOffset, FaultBits, Pid, Status, Version, WirePose, of_code,
+    AxisMode, AxisValues, Buttons, Cell, CellOffset, FaultBits, Pid, Status, Version, WirePose,
 };
 
 /// Results of a function. Units of [`super`].
@@ -88,85 +88,41 @@ impl Results {
     }
 
     fn write<'f>(&self, frame: &'f mut Frame) -> &'f mut Frame {
-        match self {
-            Self::None => {}
-            Self::Number(value) => return frame.float(*value),
-            Self::AxisValues(values) => return frame.floats(values),
-            Self::Pose(pose) => return frame.int(pose.out_of_range.into()).floats(&pose.at),
-            Self::Modes(modes) => {
-                // The first two are sent a second time: the vendor's decoder reads two further numbers.
-                for mode in modes.iter().chain(modes.iter().take(2)) {
-                    frame.int(*mode as i32);
-                }
-            }
-            Self::Buttons(buttons) => return frame.int(buttons.left.into()).int(buttons.right.into()),
-            Self::Cells(cells) => {
-                for cell in cells {
-                    frame.float(cell.x).float(cell.y).put(if cell.is_valid { b"1" } else { b"0" });
-                }
-            }
-            Self::Fault(bits) => return frame.put(&bits.0.to_le_bytes()),
-            Self::Gains(gains) => {
-                for pid in gains {
-                    frame.pid(*pid);
-                }
-            }
-            Self::Pid(pid) => return frame.pid(*pid),
-            Self::CellOffsets(cells) => {
-                for cell in cells {
-                    frame.floats(&[cell.x, cell.y, cell.t]);
-                }
-            }
-            Self::Voltages(values) => return frame.floats(values),
-            Self::Version(version) => return frame.put(version.text().as_bytes()).put(&[0]),
-            Self::Token(token) => return frame.int(*token),
+        match *self {
+            Self::None => frame,
+            Self::Number(value) => frame.add(value),
+            Self::AxisValues(values) => frame.add(values),
+            Self::Pose(pose) => frame.add(pose),
+            // The first two are sent a second time: the vendor's decoder reads two further numbers.
+            Self::Modes(modes @ [first, second, ..]) => frame.add(modes).add([first, second]),
+            Self::Buttons(buttons) => frame.add(buttons),
+            Self::Cells(cells) => frame.add(cells),
+            Self::Fault(bits) => frame.add(bits),
+            Self::Gains(gains) => frame.add(gains),
+            Self::Pid(pid) => frame.add(pid),
+            Self::CellOffsets(cells) => frame.add(cells),
+            Self::Voltages(values) => frame.add(values),
+            Self::Version(version) => frame.add(version),
+            Self::Token(token) => frame.add(token),
         }
-        frame
     }
 
     fn read(function: Function, fields: &mut Fields<'_>) -> Option<Self> {
         Some(match Self::zero(function) {
             Self::None => Self::None,
-            Self::Number(_) => Self::Number(fields.float()?),
-            Self::AxisValues(_) => Self::AxisValues(fields.floats()?),
-            Self::Pose(_) => Self::Pose(WirePose { out_of_range: fields.int()? != 0, at: fields.floats()? }),
-            Self::Modes(mut modes) => {
-                for mode in &mut modes {
-                    *mode = of_code(&AxisMode::ALL, fields.int()?)?;
-                }
-                Self::Modes(modes)
-            }
-            Self::Buttons(_) => {
-                Self::Buttons(Buttons { left: fields.int()? != 0, right: fields.int()? != 0 })
-            }
-            Self::Cells(mut cells) => {
-                for cell in &mut cells {
-                    let (x, y, [flag]) = (fields.float()?, fields.float()?, fields.array()?);
-                    *cell = Cell { x, y, is_valid: flag != b'0' };
-                }
-                Self::Cells(cells)
-            }
-            Self::Fault(_) => Self::Fault(FaultBits(u32::from_le_bytes(fields.array()?))),
-            Self::Gains(mut gains) => {
-                for pid in &mut gains {
-                    *pid = fields.pid()?;
-                }
-                Self::Gains(gains)
-            }
-            Self::Pid(_) => Self::Pid(fields.pid()?),
-            Self::CellOffsets(mut cells) => {
-                for cell in &mut cells {
-                    let [x, y, t] = fields.floats()?;
-                    *cell = CellOffset { x, y, t };
-                }
-                Self::CellOffsets(cells)
-            }
-            Self::Voltages(_) => Self::Voltages(fields.floats()?),
-            Self::Version(_) => {
-                let end = fields.rest().iter().position(|byte| *byte == 0)?;
-                Self::Version(Version::new(fields.rest().get(..end)?))
-            }
-            Self::Token(_) => Self::Token(fields.int()?),
+            Self::Number(_) => Self::Number(fields.next()?),
+            Self::AxisValues(_) => Self::AxisValues(fields.next()?),
+            Self::Pose(_) => Self::Pose(fields.next()?),
+            Self::Modes(_) => Self::Modes(fields.next()?),
+            Self::Buttons(_) => Self::Buttons(fields.next()?),
+            Self::Cells(_) => Self::Cells(fields.next()?),
+            Self::Fault(_) => Self::Fault(fields.next()?),
+            Self::Gains(_) => Self::Gains(fields.next()?),
+            Self::Pid(_) => Self::Pid(fields.next()?),
+            Self::CellOffsets(_) => Self::CellOffsets(fields.next()?),
+            Self::Voltages(_) => Self::Voltages(fields.next()?),
+            Self::Version(_) => Self::Version(fields.next()?),
+            Self::Token(_) => Self::Token(fields.next()?),
         })
     }
 }

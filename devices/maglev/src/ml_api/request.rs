@@ -1,7 +1,7 @@
 //! Requests: a function and its arguments.
 
 use super::event::EventKind;
-use super::frame::{Fields, Frame};
+use super::frame::{Field, Fields, Frame};
 use super::function::Function;
 use super::values::{Axis, AxisValues, CellOffset, Gain, GainSet, Pid, Status, WirePose, of_code};
 
@@ -101,37 +101,24 @@ impl Request {
         let mut frame = Frame::new(self.function().id());
         match *self {
             Self::Plain(_) => &mut frame,
-            Self::ConstrainAxis { axis, range } => frame.int(axis as i32).floats(&range),
-            Self::OfAxis(_, axis) => frame.int(axis as i32),
-            Self::OfSet(_, set) => frame.int(set as i32),
-            Self::GetGainVecAxis(set, axis) => frame.int(set as i32).int(axis as i32),
-            Self::GetGainVecSingle(set, axis, gain) => {
-                frame.int(set as i32).int(axis as i32).int(gain as i32)
-            }
-            Self::Register(_, process) => frame.int(process),
-            Self::Number(_, value) => frame.float(value),
-            Self::AxisValues(_, values) => frame.floats(&values),
-            Self::Pose(_, pose) => frame.int(pose.out_of_range.into()).floats(&pose.at),
-            Self::SetForceAxis(axis, force) => frame.int(axis as i32).float(force),
-            Self::SetGainVecAxes(set, gains) => {
-                frame.int(set as i32);
-                for pid in gains {
-                    frame.pid(pid);
-                }
-                &mut frame
-            }
-            Self::SetGainVecAxis(set, axis, pid) => frame.int(set as i32).int(axis as i32).pid(pid),
-            Self::SetGainVecGrasp(pid) => frame.pid(pid),
+            Self::ConstrainAxis { axis, range } => frame.add(axis as i32).add(range),
+            Self::OfAxis(_, axis) => frame.add(axis as i32),
+            Self::OfSet(_, set) => frame.add(set as i32),
+            Self::GetGainVecAxis(set, axis) => frame.add([set as i32, axis as i32]),
+            Self::GetGainVecSingle(set, axis, gain) => frame.add([set as i32, axis as i32, gain as i32]),
+            Self::Register(_, process) => frame.add(process),
+            Self::Number(_, value) => frame.add(value),
+            Self::AxisValues(_, values) => frame.add(values),
+            Self::Pose(_, pose) => frame.add(pose),
+            Self::SetForceAxis(axis, force) => frame.add(axis as i32).add(force),
+            Self::SetGainVecAxes(set, gains) => frame.add(set as i32).add(gains),
+            Self::SetGainVecAxis(set, axis, pid) => frame.add([set as i32, axis as i32]).add(pid),
+            Self::SetGainVecGrasp(pid) => frame.add(pid),
             Self::SetGainVecSingle(set, axis, gain, value) => {
-                frame.int(set as i32).int(axis as i32).int(gain as i32).float(value)
+                frame.add([set as i32, axis as i32, gain as i32]).add(value)
             }
-            Self::SetLatCellOffset(cells) => {
-                for cell in cells {
-                    frame.floats(&[cell.x, cell.y, cell.t]);
-                }
-                &mut frame
-            }
-            Self::MapToken(token) => frame.int(token),
+            Self::SetLatCellOffset(cells) => frame.add(cells),
+            Self::MapToken(token) => frame.add(token),
         };
         frame
     }
@@ -158,9 +145,7 @@ impl Arguments<'_> {
     fn read(mut self) -> Result<Request, InvalidRequest> {
         let function = self.function;
         Ok(match function {
-            Function::ConstrainAxis => {
-                Request::ConstrainAxis { axis: self.axis()?, range: [self.float()?, self.float()?] }
-            }
+            Function::ConstrainAxis => Request::ConstrainAxis { axis: self.axis()?, range: self.next()? },
             Function::GetForceAxis | Function::LockAxis | Function::UnlockAxis => {
                 Request::OfAxis(function, self.axis()?)
             }
@@ -171,42 +156,28 @@ impl Arguments<'_> {
             | Function::SetBoundaryRadius
             | Function::SetGraspCurrent
             | Function::SetGraspCurrentLimit
-            | Function::SetServoFrequency => Request::Number(function, self.float()?),
+            | Function::SetServoFrequency => Request::Number(function, self.next()?),
             Function::SetCurrentLimits
             | Function::SetCurrents
             | Function::SetForces
             | Function::SetGravity
             | Function::SetSpeedLimits
-            | Function::SetVelocity => Request::AxisValues(function, self.six()?),
+            | Function::SetVelocity => Request::AxisValues(function, self.next()?),
             Function::SetDesiredPosition | Function::SetFrame => {
                 // The flag is ignored: clients send uninitialised memory.
-                self.int()?;
-                Request::Pose(function, WirePose { out_of_range: false, at: self.six()? })
+                Request::Pose(function, WirePose { out_of_range: false, ..self.next()? })
             }
-            Function::SetForceAxis => Request::SetForceAxis(self.axis()?, self.float()?),
-            Function::SetGainVecAxes => {
-                let set = self.set()?;
-                let mut gains = [Pid::ZERO; 6];
-                for pid in &mut gains {
-                    *pid = self.pid()?;
-                }
-                Request::SetGainVecAxes(set, gains)
-            }
-            Function::SetGainVecAxis => Request::SetGainVecAxis(self.set()?, self.axis()?, self.pid()?),
-            Function::SetGainVecGrasp => Request::SetGainVecGrasp(self.pid()?),
+            Function::SetForceAxis => Request::SetForceAxis(self.axis()?, self.next()?),
+            Function::SetGainVecAxes => Request::SetGainVecAxes(self.set()?, self.next()?),
+            Function::SetGainVecAxis => Request::SetGainVecAxis(self.set()?, self.axis()?, self.next()?),
+            Function::SetGainVecGrasp => Request::SetGainVecGrasp(self.next()?),
             Function::SetGainVecSingle => {
-                Request::SetGainVecSingle(self.set()?, self.axis()?, self.gain()?, self.float()?)
+                Request::SetGainVecSingle(self.set()?, self.axis()?, self.gain()?, self.next()?)
             }
-            Function::SetLatCellOffset => {
-                let mut cells = [CellOffset::default(); 3];
-                for cell in &mut cells {
-                    *cell = CellOffset { x: self.float()?, y: self.float()?, t: self.float()? };
-                }
-                Request::SetLatCellOffset(cells)
-            }
-            Function::MapToken => Request::MapToken(self.int()?),
+            Function::SetLatCellOffset => Request::SetLatCellOffset(self.next()?),
+            Function::MapToken => Request::MapToken(self.next()?),
             _ if function.registers().is_some() || function.unregisters().is_some() => {
-                Request::Register(function, self.int()?)
+                Request::Register(function, self.next()?)
             }
             _ => Request::Plain(function),
         })
@@ -216,44 +187,19 @@ impl Arguments<'_> {
         InvalidRequest { function: Some(self.function), status }
     }
 
-    fn int(&mut self) -> Result<i32, InvalidRequest> {
-        self.fields.int().ok_or(self.invalid(Status::COMMUNICATION))
-    }
-
-    fn float(&mut self) -> Result<f32, InvalidRequest> {
-        self.fields.float().ok_or(self.invalid(Status::COMMUNICATION))
-    }
-
-    fn six(&mut self) -> Result<AxisValues, InvalidRequest> {
-        self.fields.floats().ok_or(self.invalid(Status::COMMUNICATION))
-    }
-
-    fn pid(&mut self) -> Result<Pid, InvalidRequest> {
-        self.fields.pid().ok_or(self.invalid(Status::COMMUNICATION))
+    fn next<T: Field>(&mut self) -> Result<T, InvalidRequest> {
+        self.fields.next().ok_or(self.invalid(Status::COMMUNICATION))
     }
 
     fn axis(&mut self) -> Result<Axis, InvalidRequest> {
-        of_code(&Axis::ALL, self.int()?).ok_or(self.invalid(Status::AXIS))
+        of_code(&Axis::ALL, self.next()?).ok_or(self.invalid(Status::AXIS))
     }
 
     fn set(&mut self) -> Result<GainSet, InvalidRequest> {
-        of_code(&GainSet::ALL, self.int()?).ok_or(self.invalid(Status::GAIN_TYPE))
+        of_code(&GainSet::ALL, self.next()?).ok_or(self.invalid(Status::GAIN_TYPE))
     }
 
     fn gain(&mut self) -> Result<Gain, InvalidRequest> {
-        of_code(&Gain::ALL, self.int()?).ok_or(self.invalid(Status::GAIN_TYPE))
-    }
-}
-
-impl Frame {
-    pub(super) fn pid(&mut self, pid: Pid) -> &mut Self {
-        self.floats(&[pid.p, pid.i, pid.d, pid.ff])
-    }
-}
-
-impl Fields<'_> {
-    pub(super) fn pid(&mut self) -> Option<Pid> {
-        let [p, i, d, ff] = self.floats()?;
-        Some(Pid { p, i, d, ff })
+        of_code(&Gain::ALL, self.next()?).ok_or(self.invalid(Status::GAIN_TYPE))
     }
 }
