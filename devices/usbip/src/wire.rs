@@ -1,6 +1,7 @@
 //! USB/IP messages between a virtual host controller and a device (Linux kernel documentation,
 //! `usb/usbip_protocol`): headers of 48 bytes, big endian, some followed by data.
 
+use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 
 const HEADER_BYTES: usize = 48;
@@ -88,6 +89,16 @@ pub fn complete(stream: &mut impl Write, transfer: &Transfer, data: &[u8]) -> io
     end(stream, SUBMITTED, transfer.number, 0, u32::try_from(actual).unwrap_or(0), data)
 }
 
+/// Completes a control transfer with data, cut to the requested length; without data the transfer stalls.
+///
+/// # Errors
+/// Errors of the stream.
+pub fn answer(stream: &mut impl Write, transfer: &Transfer, data: Option<Vec<u8>>) -> io::Result<()> {
+    let Some(mut data) = data else { return stall(stream, transfer) };
+    data.truncate(transfer.length);
+    complete(stream, transfer, &data)
+}
+
 /// Reports a transfer as stalled: the device does not support the request.
 ///
 /// # Errors
@@ -96,12 +107,19 @@ pub fn stall(stream: &mut impl Write, transfer: &Transfer) -> io::Result<()> {
     end(stream, SUBMITTED, transfer.number, STALLED, 0, &[])
 }
 
-/// Replies to the unlink request `number`: the transfer was cancelled (`in_time`), or was complete before.
+/// Executes the unlink request `number`: removes the transfer from the pending ones, unless it was complete before.
 ///
 /// # Errors
 /// Errors of the stream.
-pub fn unlinked(stream: &mut impl Write, number: u32, in_time: bool) -> io::Result<()> {
-    end(stream, UNLINKED, number, if in_time { TAKEN_BACK } else { 0 }, 0, &[])
+pub fn unlink(
+    stream: &mut impl Write,
+    pending: &mut VecDeque<Transfer>,
+    number: u32,
+    transfer: u32,
+) -> io::Result<()> {
+    let place = pending.iter().position(|waiting| waiting.number == transfer);
+    let removed = place.and_then(|place| pending.remove(place));
+    end(stream, UNLINKED, number, if removed.is_some() { TAKEN_BACK } else { 0 }, 0, &[])
 }
 
 /// Writes header and data with one call, so that the kernel's reader wakes up once.

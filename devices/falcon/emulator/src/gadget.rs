@@ -7,6 +7,9 @@
 use crate::in_process::InProcess;
 use crate::machine::STATUS;
 use flotor_falcon::chip::{PACKET_BYTES, PRODUCT, VENDOR};
+use flotor_usbip::descriptor::{
+    BULK, CONFIGURATION, DEVICE, Device, STRING, Supply, configuration, endpoint, interface, string,
+};
 use flotor_usbip::vhci::{Speed, attach};
 use flotor_usbip::wire::{self, INPUT, Message, Transfer};
 use std::collections::VecDeque;
@@ -24,10 +27,8 @@ const IN: u8 = 0x81;
 /// Poll interval for due packets: a quarter of the shortest latency timer.
 const LOOK: Duration = Duration::from_micros(250);
 
-/// Types of descriptors (USB 2.0, chapter 9).
-const DEVICE: u8 = 1;
-const CONFIGURATION: u8 = 2;
-const STRING: u8 = 3;
+/// Maker, product and serial number.
+const STRINGS: [&str; 3] = ["Flotor", "Falcon, emulated", "FLOTOR01"];
 /// Request types of the vendor, to and from the device.
 const VENDOR_OUT: u8 = 0x40;
 const VENDOR_IN: u8 = 0xc0;
@@ -134,9 +135,8 @@ impl Shared {
         let mut bus = self.lock();
         match message {
             Message::Unlink { number, transfer } => {
-                let waiting = bus.fetches.iter().position(|waiting| waiting.number == transfer);
-                let in_time = waiting.and_then(|place| bus.fetches.remove(place)).is_some();
-                wire::unlinked(&mut bus.socket, number, in_time)
+                let Bus { socket, fetches } = &mut *bus;
+                wire::unlink(socket, fetches, number, transfer)
             }
             Message::Submit(transfer) => match transfer.endpoint {
                 IN => {
@@ -147,13 +147,9 @@ impl Shared {
                     self.device.machine().output(&transfer.data, self.device.now());
                     wire::complete(&mut bus.socket, &transfer, &[])
                 }
-                endpoint if endpoint & !INPUT == 0 => match self.control(&transfer) {
-                    Some(mut data) => {
-                        data.truncate(transfer.length);
-                        wire::complete(&mut bus.socket, &transfer, &data)
-                    }
-                    None => wire::stall(&mut bus.socket, &transfer),
-                },
+                endpoint if endpoint & !INPUT == 0 => {
+                    wire::answer(&mut bus.socket, &transfer, self.control(&transfer))
+                }
                 _ => wire::stall(&mut bus.socket, &transfer),
             },
         }
@@ -169,7 +165,7 @@ impl Shared {
             (0x80, 6) => match value_high {
                 DEVICE => Some(device_descriptor()),
                 CONFIGURATION => Some(configuration_descriptor()),
-                STRING => string_descriptor(value_low),
+                STRING => string(value_low, STRINGS),
                 _ => None,
             },
             // Get and set configuration, get and set interface, get status, clear feature: the device has one of each, and no
@@ -185,46 +181,16 @@ impl Shared {
 
 /// Returns the descriptor of an FT232BM with the vendor and product of a Falcon.
 fn device_descriptor() -> Vec<u8> {
-    let (usb_1_1, class, packet, release, strings, configurations) =
-        ([0x10, 0x01], [0, 0, 0], 8, [0x00, 0x04], [1, 2, 3], 1);
-    let mut bytes = vec![18, DEVICE];
-    bytes.extend(usb_1_1);
-    bytes.extend(class);
-    bytes.push(packet);
-    bytes.extend(VENDOR.to_le_bytes());
-    bytes.extend(PRODUCT.to_le_bytes());
-    bytes.extend(release);
-    bytes.extend(strings);
-    bytes.push(configurations);
-    bytes
+    let (usb, release) = (0x0110, 0x0400);
+    Device { usb, class: 0, packet_bytes: 8, vendor: VENDOR, product: PRODUCT, release }.bytes()
 }
 
 fn configuration_descriptor() -> Vec<u8> {
-    let [packet_low, packet_high] = u16::try_from(PACKET_BYTES).unwrap_or(0).to_le_bytes();
-    let (own_class, bulk) = (0xff, 2);
-    let mut body = vec![9, 4, 0, 0, 2, own_class, own_class, own_class, 2];
-    for address in [IN, OUT] {
-        body.extend([7, 5, address, bulk, packet_low, packet_high, 0]);
-    }
-    let (self_powered, twice_milliampere) = (0xc0, 45);
-    let total = u8::try_from(9 + body.len()).unwrap_or(0);
-    let mut bytes = vec![9, CONFIGURATION, total, 0, 1, 1, 0, self_powered, twice_milliampere];
-    bytes.extend(body);
-    bytes
-}
-
-/// Returns a string descriptor; number 0 lists the languages.
-fn string_descriptor(number: u8) -> Option<Vec<u8>> {
-    let text = match number {
-        0 => return Some(vec![4, STRING, 0x09, 0x04]), // American English
-        1 => "Flotor",
-        2 => "Falcon, emulated",
-        3 => "FLOTOR01",
-        _ => return None,
-    };
-    let mut bytes: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
-    bytes.splice(0..0, [u8::try_from(bytes.len() + 2).unwrap_or(u8::MAX), STRING]);
-    Some(bytes)
+    let own_class = [0xff; 3];
+    let packet_bytes = u16::try_from(PACKET_BYTES).unwrap_or(0);
+    let bulk = |address| endpoint(address, BULK, packet_bytes, 0);
+    let body = [&interface(0, 0, 2, own_class, 2)[..], &bulk(IN), &bulk(OUT)].concat();
+    configuration(1, Supply::Own, 45, &body)
 }
 
 #[cfg(test)]
@@ -238,9 +204,9 @@ mod tests {
         assert_eq!(&device[8..12], [0x03, 0x04, 0x48, 0xcb], "0403:cb48");
         assert_eq!((configuration.len(), usize::from(configuration[2])), (32, 32));
         for number in 0..4 {
-            let string = string_descriptor(number).expect("there is one");
+            let string = string(number, STRINGS).expect("there is one");
             assert_eq!(usize::from(string[0]), string.len());
         }
-        assert!(string_descriptor(4).is_none());
+        assert!(string(4, STRINGS).is_none());
     }
 }

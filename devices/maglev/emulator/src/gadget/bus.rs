@@ -11,7 +11,8 @@
 //!
 //! Unplugging ends every use.
 
-use super::personality::{CONFIGURATION, DEVICE, IN, OUT, Personality, REPORT, REPORT_DESCRIPTOR, STRING};
+use super::personality::{IN, OUT, Personality, REPORT, REPORT_DESCRIPTOR};
+use flotor_usbip::descriptor::{CONFIGURATION, DEVICE, STRING};
 use flotor_usbip::wire::{self, INPUT, Message, Transfer};
 use std::collections::VecDeque;
 use std::io::{self, Read};
@@ -52,12 +53,6 @@ struct State {
     fetched_since: Instant,
     to_host: VecDeque<Vec<u8>>,
     to_controller: VecDeque<Vec<u8>>,
-}
-
-/// Result of a control transfer.
-enum Answer {
-    Data(Vec<u8>),
-    Stall,
 }
 
 impl Bus {
@@ -120,13 +115,10 @@ impl Bus {
                 state.keep_for_controller(&transfer.data);
                 wire::complete(&mut state.socket, &transfer, &[])
             }
-            endpoint if endpoint & !INPUT == 0 => match self.control(state, &transfer) {
-                Answer::Data(mut data) => {
-                    data.truncate(transfer.length);
-                    wire::complete(&mut state.socket, &transfer, &data)
-                }
-                Answer::Stall => wire::stall(&mut state.socket, &transfer),
-            },
+            endpoint if endpoint & !INPUT == 0 => {
+                let data = self.control(state, &transfer);
+                wire::answer(&mut state.socket, &transfer, data)
+            }
             // A notification, which never arrives: the transfer waits until unplugged or unlinked.
             _ => {
                 state.fetches.push_back(transfer);
@@ -135,21 +127,19 @@ impl Bus {
         }
     }
 
-    fn control(&self, state: &mut State, transfer: &Transfer) -> Answer {
+    /// Answers a control transfer; `None` stalls the endpoint.
+    fn control(&self, state: &mut State, transfer: &Transfer) -> Option<Vec<u8>> {
         let [kind, request, value_low, value_high, index_low, ..] = transfer.setup;
-        let (done, status) = (|| Answer::Data(Vec::new()), || Answer::Data(vec![0, 0]));
+        let done = || Some(Vec::new());
         match (kind, request, self.personality) {
             // Get descriptor, of the device and of the interface.
             (0x80, 6, _) => match value_high {
-                DEVICE => Answer::Data(self.personality.device()),
-                CONFIGURATION => Answer::Data(self.personality.configuration()),
-                STRING => match self.personality.string(value_low, &self.serial) {
-                    Some(string) => Answer::Data(string),
-                    None => Answer::Stall,
-                },
-                _ => Answer::Stall,
+                DEVICE => Some(self.personality.device()),
+                CONFIGURATION => Some(self.personality.configuration()),
+                STRING => self.personality.string(value_low, &self.serial),
+                _ => None,
             },
-            (0x81, 6, Personality::Hid) if value_high == REPORT => Answer::Data(REPORT_DESCRIPTOR.to_vec()),
+            (0x81, 6, Personality::Hid) if value_high == REPORT => Some(REPORT_DESCRIPTOR.to_vec()),
             // Set configuration: resets the interface.
             (0x00, 9, _) => {
                 state.select(0);
@@ -161,7 +151,7 @@ impl Bus {
                 done()
             }
             // Get status, of device, interface and endpoint; clear feature: no endpoint is ever halted.
-            (0x80..=0x82, 0, _) => status(),
+            (0x80..=0x82, 0, _) => Some(vec![0, 0]),
             (0x02, 1, _) => done(),
             // Set idle: ignored, reports are sent only when available.
             (0x21, 0x0a, Personality::Hid) => done(),
@@ -170,7 +160,7 @@ impl Bus {
                 state.line_coding.iter_mut().zip(&transfer.data).for_each(|(slot, byte)| *slot = *byte);
                 done()
             }
-            (0xa1, 0x21, Personality::Serial) => Answer::Data(state.line_coding.to_vec()),
+            (0xa1, 0x21, Personality::Serial) => Some(state.line_coding.to_vec()),
             (0x21, 0x22, Personality::Serial) => {
                 let ready = value_low & 1 == 1;
                 if ready {
@@ -180,7 +170,7 @@ impl Bus {
                 }
                 done()
             }
-            _ => Answer::Stall,
+            _ => None,
         }
     }
 
@@ -294,9 +284,7 @@ impl State {
     }
 
     fn take_back(&mut self, number: u32, transfer: u32) -> io::Result<()> {
-        let index = self.fetches.iter().position(|waiting| waiting.number == transfer);
-        let in_time = index.and_then(|index| self.fetches.remove(index)).is_some();
         self.fetched_since = Instant::now();
-        wire::unlinked(&mut self.socket, number, in_time)
+        wire::unlink(&mut self.socket, &mut self.fetches, number, transfer)
     }
 }

@@ -1,6 +1,7 @@
 //! USB descriptors of the device by kind (USB 2.0, chapter 9; HID 1.11; CDC PSTN 1.2).
 
 use flotor_maglev::protocol::FRAME_BYTES;
+use flotor_usbip::descriptor::{BULK, Device, INTERRUPT, Supply, configuration, endpoint, interface, string};
 
 /// Vendor id of all kinds: pid.codes, with its first sixteen products reserved for tests.
 pub const VENDOR: u16 = 0x1209;
@@ -24,19 +25,11 @@ pub(super) const IN: u8 = 0x81;
 /// Address of the serial port's notification endpoint, which never sends.
 pub(super) const NOTIFY: u8 = 0x82;
 
-/// Types of descriptors.
-pub(super) const DEVICE: u8 = 1;
-pub(super) const CONFIGURATION: u8 = 2;
-pub(super) const STRING: u8 = 3;
-const INTERFACE: u8 = 4;
-const ENDPOINT: u8 = 5;
+/// Types of descriptors of classes.
 const HID: u8 = 0x21;
 pub(super) const REPORT: u8 = 0x22;
 const CLASS_SPECIFIC: u8 = 0x24;
 
-/// Types of endpoints.
-const TYPE_BULK: u8 = 2;
-const TYPE_INTERRUPT: u8 = 3;
 /// Largest packet of a bulk endpoint at high speed, the only size that USB 2.0 allows.
 const BULK_BYTES: u16 = 512;
 const INTERRUPT_BYTES: u16 = 64;
@@ -73,17 +66,10 @@ impl Personality {
     }
 
     pub(super) fn device(self) -> Vec<u8> {
-        let [vendor_low, vendor_high] = VENDOR.to_le_bytes();
-        let [product_low, product_high] = self.product().to_le_bytes();
         // A serial port has its class in the device descriptor, the others in the interface descriptor.
         let class = if self == Self::Serial { 2 } else { 0 };
-        let (usb_2, packet, strings, one_configuration) = ([0x00, 0x02], 64, [1, 2, 3], 1);
-        let mut bytes = vec![18, DEVICE];
-        bytes.extend(usb_2);
-        bytes.extend([class, 0, 0, packet, vendor_low, vendor_high, product_low, product_high, 0x00, 0x01]);
-        bytes.extend(strings);
-        bytes.push(one_configuration);
-        bytes
+        let (usb, release) = (0x0200, 0x0100);
+        Device { usb, class, packet_bytes: 64, vendor: VENDOR, product: self.product(), release }.bytes()
     }
 
     pub(super) fn configuration(self) -> Vec<u8> {
@@ -93,67 +79,41 @@ impl Personality {
         };
         match self {
             Self::Interrupt => {
-                body.extend(interface(0, 0, 0, [0xff, 0, 0]));
-                body.extend(interface(0, 1, 2, [0xff, 0, 0]));
-                body.extend(pair(TYPE_INTERRUPT, INTERRUPT_BYTES, EVERY_MICROFRAME));
+                body.extend(interface(0, 0, 0, [0xff, 0, 0], 0));
+                body.extend(interface(0, 1, 2, [0xff, 0, 0], 0));
+                body.extend(pair(INTERRUPT, INTERRUPT_BYTES, EVERY_MICROFRAME));
             }
             Self::Bulk => {
-                body.extend(interface(0, 0, 0, [0xff, 0, 0]));
-                body.extend(interface(0, 1, 2, [0xff, 0, 0]));
-                body.extend(pair(TYPE_BULK, BULK_BYTES, 0));
+                body.extend(interface(0, 0, 0, [0xff, 0, 0], 0));
+                body.extend(interface(0, 1, 2, [0xff, 0, 0], 0));
+                body.extend(pair(BULK, BULK_BYTES, 0));
             }
             Self::Hid => {
-                body.extend(interface(0, 0, 2, [3, 0, 0]));
+                body.extend(interface(0, 0, 2, [3, 0, 0], 0));
                 #[allow(clippy::cast_possible_truncation)] // 27
                 let report_bytes = REPORT_DESCRIPTOR.len() as u8;
                 body.extend([9, HID, 0x11, 0x01, 0, 1, REPORT, report_bytes, 0]);
-                body.extend(pair(TYPE_INTERRUPT, INTERRUPT_BYTES, EVERY_MICROFRAME));
+                body.extend(pair(INTERRUPT, INTERRUPT_BYTES, EVERY_MICROFRAME));
             }
             Self::Serial => {
-                body.extend(interface(0, 0, 1, [2, 2, 1]));
+                body.extend(interface(0, 0, 1, [2, 2, 1], 0));
                 // Header 1.10; calls as data on interface 1; line coding and state are supported; union of 0 and 1.
                 body.extend([5, CLASS_SPECIFIC, 0, 0x10, 0x01, 5, CLASS_SPECIFIC, 1, 0, 1]);
                 body.extend([4, CLASS_SPECIFIC, 2, 2, 5, CLASS_SPECIFIC, 6, 0, 1]);
-                body.extend(endpoint(NOTIFY, TYPE_INTERRUPT, 8, EVERY_16_MILLISECONDS));
-                body.extend(interface(1, 0, 2, [10, 0, 0]));
-                body.extend(pair(TYPE_BULK, BULK_BYTES, 0));
+                body.extend(endpoint(NOTIFY, INTERRUPT, 8, EVERY_16_MILLISECONDS));
+                body.extend(interface(1, 0, 2, [10, 0, 0], 0));
+                body.extend(pair(BULK, BULK_BYTES, 0));
             }
         }
-        let interfaces = if self == Self::Serial { 2 } else { 1 };
-        let total = u16::try_from(9 + body.len()).unwrap_or(0).to_le_bytes();
-        let (number, name, bus_powered, twice_milliampere) = (1, 0, 0x80, 50);
-        let mut bytes = vec![9, CONFIGURATION, total[0], total[1], interfaces, number, name, bus_powered];
-        bytes.push(twice_milliampere);
-        bytes.extend(body);
-        bytes
+        configuration(if self == Self::Serial { 2 } else { 1 }, Supply::Bus, 50, &body)
     }
 
     /// Returns the string descriptor `number`; 0 lists the languages, `None` for an unknown number.
     pub(super) fn string(self, number: u8, serial: &str) -> Option<Vec<u8>> {
-        let text = match number {
-            0 => return Some(vec![4, STRING, 0x09, 0x04]), // American English
-            1 => "Flotor",
-            2 => "Maglev controller, emulated",
-            3 => serial,
-            _ => return None,
-        };
-        // The length field of a descriptor has one byte.
-        let mut bytes: Vec<u8> = text.encode_utf16().take(126).flat_map(u16::to_le_bytes).collect();
-        bytes.splice(0..0, [u8::try_from(bytes.len() + 2).unwrap_or(u8::MAX), STRING]);
-        Some(bytes)
+        string(number, ["Flotor", "Maglev controller, emulated", serial])
     }
 }
 
 /// Values of `bInterval` at high speed: 2^(n-1) microframes of 125 µs.
 const EVERY_MICROFRAME: u8 = 1;
 const EVERY_16_MILLISECONDS: u8 = 8;
-
-fn interface(number: u8, alternate: u8, endpoints: u8, class: [u8; 3]) -> [u8; 9] {
-    let [class, subclass, protocol] = class;
-    [9, INTERFACE, number, alternate, endpoints, class, subclass, protocol, 0]
-}
-
-fn endpoint(address: u8, kind: u8, packet_bytes: u16, interval: u8) -> [u8; 7] {
-    let [low, high] = packet_bytes.to_le_bytes();
-    [7, ENDPOINT, address, kind, low, high, interval]
-}
