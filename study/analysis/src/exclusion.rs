@@ -5,7 +5,7 @@ use crate::{Estimator, SubjectChecks, SubjectRecord, conditions};
 use flotor_study::exclusion::{EMPTY_CONDITION, Exclusion, ExclusionRules, Scope};
 use flotor_study::log::TrialEvent;
 use flotor_study::protocol::{Protocol, SubjectNumber};
-use flotor_study::trial::{Modality, Presented, Response, Trial};
+use flotor_study::trial::{Modality, Response, Trial};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -234,10 +234,6 @@ fn without(record: &SubjectRecord, excluded: &[Exclusion]) -> SubjectRecord {
 /// Returns a text about the first condition without a result, because rules have excluded all of its data or no track reached a
 /// threshold; `None` if every condition has a result.
 fn emptied(protocol: &Protocol, estimator: Estimator, kept: &SubjectRecord) -> Option<String> {
-    let level = |event: &TrialEvent| match event.trial.presented {
-        Presented::Pair(pair) => pair.base,
-        Presented::One { value } => value,
-    };
     // A track without a threshold has answers, but no result.
     let by_tracks = matches!((protocol, estimator), (Protocol::Jnd(_), Estimator::Procedure));
     let has_result = |(modality, at): (Modality, f64)| {
@@ -245,7 +241,8 @@ fn emptied(protocol: &Protocol, estimator: Estimator, kept: &SubjectRecord) -> O
             let mut tracks = kept.tracks.iter().filter(|track| track.threshold.is_some());
             tracks.any(|track| track.modality == modality && track.base == at)
         } else {
-            kept.counted().any(|event| event.trial.modality == modality && level(event) == at)
+            let mut trials = kept.counted().map(|event| &event.trial);
+            trials.any(|trial| trial.modality == modality && trial.presented.level() == at)
         }
     };
     let (modality, at) = conditions(protocol.levels()).find(|condition| !has_result(*condition))?;

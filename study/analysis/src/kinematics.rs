@@ -103,10 +103,11 @@ fn cells(levels: &[f64], record: &SubjectRecord, value: fn(&StimulusKinematics) 
 /// Returns the movements with the rated stimulus or the base of a pair, if it is `level`; repeated presentations within the
 /// trial included.
 fn with_level(event: &TrialEvent, level: f64) -> impl Iterator<Item = &StimulusKinematics> {
-    let (of_trial, place, stimuli) = match event.trial.presented {
-        Presented::One { value } => (value, 0, 1),
-        Presented::Pair(pair) => (pair.base, usize::from(pair.comparison_at == Position::First), 2),
+    let presented = event.trial.presented;
+    let (place, stimuli) = match presented {
+        Presented::One { .. } => (0, 1),
+        Presented::Pair(pair) => (usize::from(pair.comparison_at == Position::First), 2),
     };
     let felt = event.exploration.kinematics.iter().skip(place).step_by(stimuli);
-    felt.filter(move |_| of_trial == level)
+    felt.filter(move |_| presented.level() == level)
 }

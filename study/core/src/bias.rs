@@ -5,6 +5,7 @@ use crate::observer::TernaryObserver;
 use crate::procedure::{Procedure, QuestPlusRule, Track, WeightedUpDownRule};
 use crate::random::{Purpose, Stream};
 use crate::trial::{Judgement, Response};
+use crate::word::words;
 use flotor_statistics::describe::{deviation, mean};
 use serde::Serialize;
 
@@ -23,17 +24,9 @@ pub enum Method {
 impl Method {
     /// All methods in the order of the tables.
     pub const ALL: [Self; 3] = [Self::Thesis, Self::Map, Self::QuestPlus];
-
-    /// Returns the label used in tables.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Thesis => "thesis",
-            Self::Map => "map",
-            Self::QuestPlus => "questplus",
-        }
-    }
 }
+
+words! { Method { Thesis = "thesis", Map = "map", QuestPlus = "questplus" } }
 
 /// Accuracy of one method for one observer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

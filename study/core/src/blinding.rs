@@ -41,11 +41,7 @@ impl Codes {
     /// Returns the code of a condition, such as `A2`.
     #[must_use]
     pub fn condition(&self, modality: Modality, presented: &Presented) -> String {
-        let level = match presented {
-            Presented::One { value } => *value,
-            Presented::Pair(pair) => pair.base,
-        };
-        format!("{}{}", self.modality(modality), self.level(level))
+        format!("{}{}", self.modality(modality), self.level(presented.level()))
     }
 }
 

@@ -44,3 +44,4 @@ pub mod screen;
 pub mod sitting;
 pub mod time_of_day;
 pub mod trial;
+mod word;

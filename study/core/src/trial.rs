@@ -2,6 +2,7 @@
 
 use crate::kinematics::StimulusKinematics;
 use crate::time_of_day::TimeOfDay;
+use crate::word::words;
 use serde::{Deserialize, Serialize};
 
 /// Sensory modalities of a trial.
@@ -26,16 +27,9 @@ impl Modality {
             Self::H => Self::Vh,
         }
     }
-
-    /// Returns the label used in tables.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Vh => "vh",
-            Self::H => "h",
-        }
-    }
 }
+
+words! { Modality { Vh = "vh", H = "h" } }
 
 /// Role of a trial in the analysis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,22 +49,16 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// Returns the label used in tables.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Practice => "practice",
-            Self::Main => "main",
-            Self::Catch => "catch",
-            Self::Obvious => "obvious",
-            Self::RepeatCheck => "repeat_check",
-        }
-    }
-
     /// Returns the phase as shown to the subject: a check appears as a counted trial.
     #[must_use]
     pub fn shown(self) -> Self {
         if self == Self::Practice { Self::Practice } else { Self::Main }
+    }
+}
+
+words! {
+    Phase {
+        Practice = "practice", Main = "main", Catch = "catch", Obvious = "obvious", RepeatCheck = "repeat_check",
     }
 }
 
@@ -93,16 +81,9 @@ impl Position {
             Self::Second => Self::First,
         }
     }
-
-    /// Returns the label used in tables.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::First => "first",
-            Self::Second => "second",
-        }
-    }
 }
+
+words! { Position { First = "first", Second = "second" } }
 
 /// Two stimuli to compare: a base and a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -144,6 +125,15 @@ pub enum Presented {
 }
 
 impl Presented {
+    /// Returns the rated stimulus, or the base of a pair, in the stimulus's unit.
+    #[must_use]
+    pub fn level(&self) -> f64 {
+        match self {
+            Self::One { value } => *value,
+            Self::Pair(pair) => pair.base,
+        }
+    }
+
     /// Returns the values in the order of presentation.
     #[must_use]
     pub fn values(&self) -> Vec<f64> {
@@ -229,17 +219,9 @@ pub enum Judgement {
 impl Judgement {
     /// All judgements.
     pub const ALL: [Self; 3] = [Self::Correct, Self::Wrong, Self::Unsure];
-
-    /// Returns the label used in tables.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Correct => "correct",
-            Self::Wrong => "wrong",
-            Self::Unsure => "unsure",
-        }
-    }
 }
+
+words! { Judgement { Correct = "correct", Wrong = "wrong", Unsure = "unsure" } }
 
 /// Measurements during a presentation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

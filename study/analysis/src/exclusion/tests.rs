@@ -3,7 +3,7 @@ use flotor_study::kinematics::StimulusKinematics;
 use flotor_study::procedure::{Procedure, QuestPlusRule};
 use flotor_study::protocol::{Checks, JndProtocol, MagnitudeProtocol, ObviousPairs};
 use flotor_study::sitting::Sitting;
-use flotor_study::trial::{Exploration, Phase, Position};
+use flotor_study::trial::{Exploration, Phase, Position, Presented};
 
 fn number(number: u16) -> SubjectNumber {
     SubjectNumber::new(number).unwrap()

@@ -25,6 +25,7 @@ use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::Verdict;
 use crate::time_of_day::TimeOfDay;
 use crate::trial::{Exploration, Response, Trial};
+use crate::word::words;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -106,15 +107,6 @@ pub enum ObserverKind {
 }
 
 impl ObserverKind {
-    /// Returns the label used in tables.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Human => "human",
-            Self::Simulated => "simulated",
-        }
-    }
-
     /// Returns the restriction to attach to every result; `None` for people.
     #[must_use]
     pub fn restriction(self) -> Option<&'static str> {
@@ -124,6 +116,8 @@ impl ObserverKind {
         }
     }
 }
+
+words! { ObserverKind { Human = "human", Simulated = "simulated" } }
 
 /// File that determines the stimuli of a sitting.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

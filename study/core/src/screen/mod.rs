@@ -20,6 +20,7 @@ pub use line::{Warning, WindowMessage, WindowReply, WindowState};
 
 use crate::protocol::Quality;
 use crate::trial::{Phase, Position, Response};
+use crate::word::words;
 use serde::{Deserialize, Serialize};
 
 /// Key of the emergency stop in a window; by default not the space bar, which a person tends to press to continue.
@@ -34,17 +35,7 @@ pub enum StopKey {
     F12,
 }
 
-impl StopKey {
-    /// Returns the name on a command line.
-    #[must_use]
-    pub fn word(self) -> &'static str {
-        match self {
-            Self::Escape => "escape",
-            Self::Space => "space",
-            Self::F12 => "f12",
-        }
-    }
-}
+words! { StopKey { Escape = "escape", Space = "space", F12 = "f12" } }
 
 /// Current screen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
