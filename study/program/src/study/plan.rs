@@ -154,10 +154,9 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     })?;
     let (words, exclusion) = words(&file, &text, further)?;
     let command = clap::Command::new("study").no_binary_name(true);
-    let matches = StudyArguments::augment_args(command)
+    let mut study = StudyArguments::augment_args(command)
         .try_get_matches_from(words)
-        .map_err(|error| CommandError::Usage(of_file(&file, &error.to_string())))?;
-    let mut study = StudyArguments::from_arg_matches(&matches)
+        .and_then(|matches| StudyArguments::from_arg_matches(&matches))
         .map_err(|error| CommandError::Usage(of_file(&file, &error.to_string())))?;
     let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let plan = Plan { file: name, sha256: digest(&text), text, exclusion };

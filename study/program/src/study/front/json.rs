@@ -1,6 +1,6 @@
 //! Front end for a separate window program: screens and inputs as lines of JSON.
 
-use super::next_line;
+use super::next_input;
 use flotor_study::apparatus::attend::{FrontEnd, PollResult};
 use flotor_study::conduct::ApparatusOrFrontEndError;
 use flotor_study::screen::{Screen, Warning, WindowMessage, WindowReply};
@@ -35,18 +35,13 @@ impl<W: Write> FrontEnd for JsonLines<W> {
     }
 
     fn poll(&mut self, _screen: &Screen) -> Result<PollResult, ApparatusOrFrontEndError> {
-        let line = match next_line(&self.lines) {
-            Ok(line) => line,
-            Err(noticed) => return Ok(noticed),
-        };
-        match WindowReply::read(&line) {
-            Ok(WindowReply::Input(input)) => Ok(PollResult::Input(input)),
-            Ok(WindowReply::Window { .. }) => Ok(PollResult::Nothing),
-            Err(error) => {
-                self.refuse(&error)?;
-                Ok(PollResult::Nothing)
-            }
-        }
+        let polled = next_input(&self.lines, |line| {
+            WindowReply::read(line).map(|reply| match reply {
+                WindowReply::Input(input) => PollResult::Input(input),
+                WindowReply::Window { .. } => PollResult::Nothing,
+            })
+        });
+        polled.or_else(|why| self.refuse(&why).map(|()| PollResult::Nothing))
     }
 
     fn warn_out_of_range(&mut self) -> Result<(), ApparatusOrFrontEndError> {

@@ -29,14 +29,18 @@ pub(super) enum ScreenOption {
     Json,
 }
 
-/// Waits up to [`MOMENT`] for a line of input. If there is none, the error is the poll result: [`PollResult::Nothing`], or
-/// [`PollResult::Closed`] at the end of the input.
-fn next_line(lines: &Receiver<String>) -> Result<String, PollResult> {
-    lines.recv_timeout(MOMENT).map_err(|none| match none {
-        RecvTimeoutError::Timeout => PollResult::Nothing,
+/// Waits up to [`MOMENT`] for a line of input, and reads the line with `read`. Without a line the result is
+/// [`PollResult::Nothing`], or [`PollResult::Closed`] at the end of the input.
+fn next_input(
+    lines: &Receiver<String>,
+    read: impl FnOnce(&str) -> Result<PollResult, String>,
+) -> Result<PollResult, String> {
+    match lines.recv_timeout(MOMENT) {
+        Ok(line) => read(&line),
+        Err(RecvTimeoutError::Timeout) => Ok(PollResult::Nothing),
         // The input has ended: the window, or standard input, is closed.
-        RecvTimeoutError::Disconnected => PollResult::Closed,
-    })
+        Err(RecvTimeoutError::Disconnected) => Ok(PollResult::Closed),
+    }
 }
 
 /// Starts a background thread that reads lines, and returns the channel of the lines.

@@ -1,6 +1,6 @@
 //! Front end on a terminal, with answers by keyboard.
 
-use super::{lines_of, next_line};
+use super::{lines_of, next_input};
 use flotor_command::say;
 use flotor_command::style;
 use flotor_study::apparatus::attend::{FrontEnd, PollResult};
@@ -34,17 +34,8 @@ impl FrontEnd for Terminal {
     }
 
     fn poll(&mut self, screen: &Screen) -> Result<PollResult, ApparatusOrFrontEndError> {
-        let line = match next_line(&self.lines) {
-            Ok(line) => line,
-            Err(noticed) => return Ok(noticed),
-        };
-        match typed(&line, screen) {
-            Ok(input) => Ok(PollResult::Input(input)),
-            Err(why) => {
-                self.refuse(&why)?;
-                Ok(PollResult::Nothing)
-            }
-        }
+        let polled = next_input(&self.lines, |line| typed(line, screen).map(PollResult::Input));
+        polled.or_else(|why| self.refuse(&why).map(|()| PollResult::Nothing))
     }
 
     fn warn_out_of_range(&mut self) -> Result<(), ApparatusOrFrontEndError> {
