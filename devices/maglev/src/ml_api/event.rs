@@ -21,6 +21,11 @@ pub enum EventKind {
     Tick = 78,
 }
 
+impl EventKind {
+    /// All kinds, by number.
+    pub const ALL: [Self; 5] = [Self::Button, Self::Boundary, Self::Overtemp, Self::Fault, Self::Tick];
+}
+
 /// Event with its payload.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
@@ -70,19 +75,15 @@ impl Event {
     #[must_use]
     pub fn decode(frame: &[u8]) -> Option<Self> {
         let (id, mut fields) = Fields::of(frame)?;
-        const BUTTON: i32 = EventKind::Button as i32;
-        const BOUNDARY: i32 = EventKind::Boundary as i32;
-        const OVERTEMP: i32 = EventKind::Overtemp as i32;
-        const FAULT: i32 = EventKind::Fault as i32;
-        const TICK: i32 = EventKind::Tick as i32;
-        Some(match id {
-            END => Self::End,
-            BUTTON => Self::Button(fields.next()?),
-            BOUNDARY => Self::Boundary(fields.next()?),
-            OVERTEMP => Self::Overtemp(fields.next()?),
-            FAULT => Self::Fault(fields.next()?),
-            TICK => Self::Tick(fields.next()?),
-            _ => return None,
+        if id == END {
+            return Some(Self::End);
+        }
+        Some(match EventKind::ALL.into_iter().find(|kind| *kind as i32 == id)? {
+            EventKind::Button => Self::Button(fields.next()?),
+            EventKind::Boundary => Self::Boundary(fields.next()?),
+            EventKind::Overtemp => Self::Overtemp(fields.next()?),
+            EventKind::Fault => Self::Fault(fields.next()?),
+            EventKind::Tick => Self::Tick(fields.next()?),
         })
     }
 }

@@ -11,7 +11,7 @@ macro_rules! is_marked {
     };
 }
 
-/// Declares the functions with their numbers; `commands` marks those that only the commanding client may call.
+/// Declares the functions with their numbers; `commands` marks the functions of the commanding client.
 macro_rules! functions {
     ($($(#[$doc:meta])* $name:ident = $id:literal $($mark:ident)?,)+) => {
         /// Function of the controller, with its number on the wire; units of [`super`].
@@ -185,14 +185,19 @@ functions! {
     MapToken = 73,
 }
 
-/// Events, with the functions that register for them and unregister from them.
-const REGISTRATIONS: [(EventKind, Function, Function); 5] = [
-    (EventKind::Button, Function::RegisterButton, Function::UnregisterButton),
-    (EventKind::Boundary, Function::RegisterBoundary, Function::UnregisterBoundary),
-    (EventKind::Overtemp, Function::RegisterOvertemp, Function::UnregisterOvertemp),
-    (EventKind::Fault, Function::RegisterFault, Function::UnregisterFault),
-    (EventKind::Tick, Function::RegisterTick, Function::UnregisterTick),
-];
+impl EventKind {
+    /// Returns the functions that register a client for the events and unregister the client.
+    #[must_use]
+    pub const fn functions(self) -> (Function, Function) {
+        match self {
+            Self::Button => (Function::RegisterButton, Function::UnregisterButton),
+            Self::Boundary => (Function::RegisterBoundary, Function::UnregisterBoundary),
+            Self::Overtemp => (Function::RegisterOvertemp, Function::UnregisterOvertemp),
+            Self::Fault => (Function::RegisterFault, Function::UnregisterFault),
+            Self::Tick => (Function::RegisterTick, Function::UnregisterTick),
+        }
+    }
+}
 
 impl Function {
     /// Returns the number of the function on the wire.
@@ -210,12 +215,12 @@ impl Function {
     /// Returns the kind of event for which the function registers a client; `None` for other functions.
     #[must_use]
     pub fn registers(self) -> Option<EventKind> {
-        REGISTRATIONS.iter().find(|(_, on, _)| *on == self).map(|(kind, ..)| *kind)
+        EventKind::ALL.into_iter().find(|kind| kind.functions().0 == self)
     }
 
     /// Returns the kind of event from which the function unregisters a client; `None` for other functions.
     #[must_use]
     pub fn unregisters(self) -> Option<EventKind> {
-        REGISTRATIONS.iter().find(|(.., off)| *off == self).map(|(kind, ..)| *kind)
+        EventKind::ALL.into_iter().find(|kind| kind.functions().1 == self)
     }
 }

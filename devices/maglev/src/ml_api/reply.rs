@@ -7,11 +7,36 @@ use super::values::{
     AxisMode, AxisValues, Buttons, Cell, CellOffset, FaultBits, Pid, Status, Version, WirePose,
 };
 
-/// Results of a function. Units of [`super`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Results {
-    /// No results.
-    None,
+/// Declares the results with their types.
+macro_rules! results {
+    ($($(#[$doc:meta])* $name:ident($type:ty),)+) => {
+        /// Results of a function. Units of [`super`].
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub enum Results {
+            /// No results.
+            None,
+            $($(#[$doc])* $name($type),)+
+        }
+
+        impl Results {
+            fn write(&self, frame: &mut Frame) {
+                match *self {
+                    Self::None => frame,
+                    $(Self::$name(value) => frame.add(value),)+
+                };
+            }
+
+            fn read(function: Function, fields: &mut Fields<'_>) -> Option<Self> {
+                Some(match Self::zero(function) {
+                    Self::None => Self::None,
+                    $(Self::$name(_) => Self::$name(fields.next()?),)+
+                })
+            }
+        }
+    };
+}
+
+results! {
     /// One number.
     Number(f32),
     /// One number per axis or per coil.
@@ -86,45 +111,6 @@ impl Results {
             _ => Self::None,
         }
     }
-
-    fn write<'f>(&self, frame: &'f mut Frame) -> &'f mut Frame {
-        match *self {
-            Self::None => frame,
-            Self::Number(value) => frame.add(value),
-            Self::AxisValues(values) => frame.add(values),
-            Self::Pose(pose) => frame.add(pose),
-            // The first two are sent a second time: the vendor's decoder reads two further numbers.
-            Self::Modes(modes @ [first, second, ..]) => frame.add(modes).add([first, second]),
-            Self::Buttons(buttons) => frame.add(buttons),
-            Self::Cells(cells) => frame.add(cells),
-            Self::Fault(bits) => frame.add(bits),
-            Self::Gains(gains) => frame.add(gains),
-            Self::Pid(pid) => frame.add(pid),
-            Self::CellOffsets(cells) => frame.add(cells),
-            Self::Voltages(values) => frame.add(values),
-            Self::Version(version) => frame.add(version),
-            Self::Token(token) => frame.add(token),
-        }
-    }
-
-    fn read(function: Function, fields: &mut Fields<'_>) -> Option<Self> {
-        Some(match Self::zero(function) {
-            Self::None => Self::None,
-            Self::Number(_) => Self::Number(fields.next()?),
-            Self::AxisValues(_) => Self::AxisValues(fields.next()?),
-            Self::Pose(_) => Self::Pose(fields.next()?),
-            Self::Modes(_) => Self::Modes(fields.next()?),
-            Self::Buttons(_) => Self::Buttons(fields.next()?),
-            Self::Cells(_) => Self::Cells(fields.next()?),
-            Self::Fault(_) => Self::Fault(fields.next()?),
-            Self::Gains(_) => Self::Gains(fields.next()?),
-            Self::Pid(_) => Self::Pid(fields.next()?),
-            Self::CellOffsets(_) => Self::CellOffsets(fields.next()?),
-            Self::Voltages(_) => Self::Voltages(fields.next()?),
-            Self::Version(_) => Self::Version(fields.next()?),
-            Self::Token(_) => Self::Token(fields.next()?),
-        })
-    }
 }
 
 impl Reply {
@@ -148,6 +134,10 @@ impl Reply {
     pub fn encode(&self) -> Frame {
         let mut frame = Frame::new(self.status.0);
         self.results.write(&mut frame);
+        // The first two modes are sent a second time: the vendor's decoder reads two further numbers.
+        if let Results::Modes([first, second, ..]) = self.results {
+            frame.add([first, second]);
+        }
         frame
     }
 

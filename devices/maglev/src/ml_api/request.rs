@@ -86,14 +86,7 @@ impl Request {
     /// Creates the request that registers for events.
     #[must_use]
     pub const fn register(kind: EventKind, process: i32) -> Self {
-        let function = match kind {
-            EventKind::Button => Function::RegisterButton,
-            EventKind::Boundary => Function::RegisterBoundary,
-            EventKind::Overtemp => Function::RegisterOvertemp,
-            EventKind::Fault => Function::RegisterFault,
-            EventKind::Tick => Function::RegisterTick,
-        };
-        Self::Register(function, process)
+        Self::Register(kind.functions().0, process)
     }
 
     /// Encodes the request as a frame.

@@ -252,14 +252,8 @@ impl Session {
     /// Unregisters from events, restores the gains to hold the pose `at`, and lands. Continues after an error.
     pub(crate) fn land(&mut self, at: Option<WirePose>) {
         for kind in KINDS.into_iter().rev() {
-            let function = match kind {
-                EventKind::Tick => Function::UnregisterTick,
-                EventKind::Button => Function::UnregisterButton,
-                EventKind::Boundary => Function::UnregisterBoundary,
-                EventKind::Overtemp => Function::UnregisterOvertemp,
-                EventKind::Fault => Function::UnregisterFault,
-            };
-            let _ = self.call(&Request::Register(function, PROCESS));
+            let (_, unregister) = kind.functions();
+            let _ = self.call(&Request::Register(unregister, PROCESS));
         }
         if let Some(pose) = at {
             for (place, set) in FORCED.into_iter().enumerate() {

@@ -79,17 +79,9 @@ pub enum Mode {
 }
 
 impl Mode {
-    fn from_code(code: u16) -> Option<Self> {
-        Some(match code {
-            0 => Self::Disarmed,
-            1 => Self::Armed,
-            2 => Self::Levitating,
-            3 => Self::Holding,
-            4 => Self::Landing,
-            5 => Self::Fault,
-            _ => return None,
-        })
-    }
+    /// All modes, by code.
+    const ALL: [Self; 6] =
+        [Self::Disarmed, Self::Armed, Self::Levitating, Self::Holding, Self::Landing, Self::Fault];
 }
 
 /// Faults and active limits of the controller, one bit each.
@@ -223,24 +215,16 @@ impl RequestFrame {
             Writer::new(REQUEST_MAGIC, self.sequence, self.acknowledged, self.time_us, self.session);
         match self.request {
             Request::Command { wrench, valid_us } => {
-                bytes.kind(1).word(18, valid_us).floats(PAYLOAD, &wrench);
+                bytes.kind(1).word(18, valid_us).floats(PAYLOAD, &wrench)
             }
-            Request::Describe { page } => {
-                bytes.kind(2).word(16, page);
-            }
+            Request::Describe { page } => bytes.kind(2).word(16, page),
             Request::Arm { period_us, watchdog_us } => {
-                bytes.kind(3).double(PAYLOAD, period_us).double(PAYLOAD + 4, watchdog_us);
+                bytes.kind(3).double(PAYLOAD, period_us).double(PAYLOAD + 4, watchdog_us)
             }
-            Request::TakeOff => {
-                bytes.kind(4);
-            }
-            Request::Land => {
-                bytes.kind(5);
-            }
-            Request::Disarm => {
-                bytes.kind(6);
-            }
-        }
+            Request::TakeOff => bytes.kind(4),
+            Request::Land => bytes.kind(5),
+            Request::Disarm => bytes.kind(6),
+        };
         bytes.finish()
     }
 
@@ -297,7 +281,7 @@ impl AnswerFrame {
                     return Err(Rejection::Kind);
                 }
                 Answer::Status(Status {
-                    mode: Mode::from_code(bytes.word(16)).ok_or(Rejection::Kind)?,
+                    mode: *Mode::ALL.get(usize::from(bytes.word(16))).ok_or(Rejection::Kind)?,
                     condition: Condition(condition),
                     position_m: bytes.floats(PAYLOAD)?,
                     rotation_xyz: bytes.floats(32)?,

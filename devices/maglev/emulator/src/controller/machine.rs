@@ -296,17 +296,12 @@ impl Controller {
                 if self.config.limits.is_leaving(pose.position(), twist.linear()) =>
             {
                 self.condition = self.condition.with(Condition::EDGE);
-                self.session = 0;
-                self.command = None;
-                self.enter(Mode::Landing, now_us);
+                self.end_session(Mode::Landing, now_us);
             }
             Mode::Armed | Mode::Levitating if now_us.saturating_sub(self.heard_us) >= self.watchdog_us => {
                 let flying = self.mode == Mode::Levitating;
                 self.condition = self.condition.with(Condition::WATCHDOG);
-                // The session ends now: requests of a host that resumes are rejected.
-                self.session = 0;
-                self.command = None;
-                self.enter(if flying { Mode::Holding } else { Mode::Fault }, now_us);
+                self.end_session(if flying { Mode::Holding } else { Mode::Fault }, now_us);
             }
             Mode::Holding if in_mode_us >= self.config.hold_us => self.enter(Mode::Landing, now_us),
             Mode::Landing if in_mode_us >= self.config.landing_us => {
@@ -328,19 +323,22 @@ impl Controller {
 
     fn fault(&mut self, condition: Condition, now_us: u64) -> Wrench {
         self.condition = self.condition.with(condition);
-        self.session = 0;
-        self.command = None;
         self.driven = Wrench::ZERO;
-        self.enter(Mode::Fault, now_us);
+        self.end_session(Mode::Fault, now_us);
         Wrench::ZERO
     }
 
     fn disarm(&mut self, now_us: u64) {
-        self.session = 0;
-        self.command = None;
         self.driven = Wrench::ZERO;
         self.condition = Condition::NONE;
-        self.enter(Mode::Disarmed, now_us);
+        self.end_session(Mode::Disarmed, now_us);
+    }
+
+    /// Enters a mode without a session: requests of a host that resumes are rejected.
+    fn end_session(&mut self, mode: Mode, now_us: u64) {
+        self.session = 0;
+        self.command = None;
+        self.enter(mode, now_us);
     }
 
     fn enter(&mut self, mode: Mode, now_us: u64) {

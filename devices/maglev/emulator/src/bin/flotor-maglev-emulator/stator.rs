@@ -26,13 +26,18 @@ pub(crate) struct OnStator<P> {
 }
 
 impl<P: Plant> OnStator<P> {
-    pub(crate) fn new(mut plant: P) -> Self {
-        let sample = plant.advance(0, &Wrench::ZERO);
-        let mut settled = Self { plant, sample };
-        for _ in 0..SETTLING_MS {
-            settled.advance(1000, &Wrench::ZERO);
-        }
+    pub(crate) fn new(plant: P) -> Self {
+        let mut settled = Self { plant, sample: Sample::HOME };
+        settled.settle();
         settled
+    }
+
+    /// Lets the flotor come to rest on the stator.
+    fn settle(&mut self) {
+        self.sample = self.plant.advance(0, &Wrench::ZERO);
+        for _ in 0..SETTLING_MS {
+            self.advance(1000, &Wrench::ZERO);
+        }
     }
 
     /// Returns the contact wrench of the stator on the flotor.
@@ -59,10 +64,7 @@ impl<P: Plant> Plant for OnStator<P> {
 
     fn restart(&mut self) {
         self.plant.restart();
-        self.sample = self.plant.advance(0, &Wrench::ZERO);
-        for _ in 0..SETTLING_MS {
-            self.advance(1000, &Wrench::ZERO);
-        }
+        self.settle();
     }
 }
 
