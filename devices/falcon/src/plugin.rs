@@ -184,18 +184,13 @@ impl Device for FalconDevice {
 
     fn capabilities(&self) -> Capabilities {
         Capabilities {
-            sensed: Axes::TRANSLATION,
-            actuated: Axes::TRANSLATION,
-            range_m: [RANGE_M; 3],
-            range_rad: [0.0; 3],
             resolution_m: resolution_m(),
-            max_force_n: [self.options.max_force_n; 3],
-            max_torque_nm: [0.0; 3],
-            max_force_slew_n_per_s: SLEW_N_PER_S,
-            max_torque_slew_nm_per_s: f64::INFINITY, // of nothing
-            max_stiffness_n_per_m: 0.0,
             rate_hz: [100.0, 1000.0],
-            latency_s: LATENCY_S,
+            ..Capabilities::driving(Axes::TRANSLATION)
+                .with_range(RANGE_M, 0.0)
+                .with_limits(self.options.max_force_n, 0.0)
+                .with_slew(SLEW_N_PER_S, f64::INFINITY) // no torque to limit
+                .with_latency(LATENCY_S)
         }
     }
 

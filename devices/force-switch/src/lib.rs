@@ -1,8 +1,7 @@
 //! Stop switch for devices whose I/O runs on a thread of the plugin: any thread can remove the force. The switch wakes
 //! the I/O thread, which then commands zero force.
 
-use flotor_hal::SafeStop;
-use std::sync::atomic::{AtomicBool, Ordering};
+use flotor_hal::{SafeStop, StopFlag};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::Thread;
 
@@ -10,7 +9,7 @@ use std::thread::Thread;
 /// the force.
 #[derive(Clone, Debug, Default)]
 pub struct ForceSwitch {
-    is_stopped: Arc<AtomicBool>,
+    stop: StopFlag,
     thread: Arc<Mutex<Option<Thread>>>,
 }
 
@@ -19,12 +18,12 @@ impl ForceSwitch {
     /// no allocation.
     #[must_use]
     pub fn is_stopped(&self) -> bool {
-        self.is_stopped.load(Ordering::Acquire)
+        self.stop.is_set()
     }
 
     /// Ends a stop: force is permitted again. Real-time: bounded, no allocation.
     pub fn rearm(&self) {
-        self.is_stopped.store(false, Ordering::Release);
+        self.stop.arm();
     }
 
     /// Sets the I/O thread that a stop wakes, replacing an earlier one. Not real-time.
@@ -35,7 +34,7 @@ impl ForceSwitch {
 
 impl SafeStop for ForceSwitch {
     fn safe_stop(&self) {
-        self.is_stopped.store(true, Ordering::Release);
+        self.stop.safe_stop();
         // Never waits: on contention the I/O thread sees the flag at its next poll.
         if let Ok(thread) = self.thread.try_lock()
             && let Some(thread) = &*thread

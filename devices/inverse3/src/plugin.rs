@@ -163,21 +163,15 @@ impl Device for Inverse3Device {
 
     fn capabilities(&self) -> Capabilities {
         let Options { max_force_n, range_m, .. } = self.options;
-        let (sensed, range_rad) =
-            if self.has_grip { (Axes::ALL, [PI; 3]) } else { (Axes::TRANSLATION, [0.0; 3]) };
         Capabilities {
-            sensed,
-            actuated: Axes::TRANSLATION,
-            range_m: [range_m; 3],
-            range_rad,
             resolution_m: RESOLUTION_M,
-            max_force_n: [max_force_n; 3],
-            max_torque_nm: [0.0; 3],
-            max_force_slew_n_per_s: SLEW_N_PER_S,
-            max_torque_slew_nm_per_s: f64::INFINITY, // of nothing
-            max_stiffness_n_per_m: 0.0,
             rate_hz: [100.0, 4000.0],
-            latency_s: LATENCY_S,
+            ..Capabilities::driving(Axes::TRANSLATION)
+                .sensing(if self.has_grip { Axes::ALL } else { Axes::TRANSLATION })
+                .with_range(range_m, PI)
+                .with_limits(max_force_n, 0.0)
+                .with_slew(SLEW_N_PER_S, f64::INFINITY) // no torque to limit
+                .with_latency(LATENCY_S)
         }
     }
 

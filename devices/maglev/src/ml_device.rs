@@ -95,18 +95,15 @@ impl MlDevice {
         let [side_n, up_n] = facts::MAX_FORCE_N;
         let [tilt_nm, yaw_nm] = facts::MAX_TORQUE_NM;
         Capabilities {
-            sensed: Axes::ALL,
-            actuated: Axes::ALL,
-            range_m: [facts::RANGE_M; 3],
-            range_rad: [facts::RANGE_RAD; 3],
             resolution_m: facts::RESOLUTION_M[0],
             max_force_n: [side_n, side_n, up_n].map(|limit| limit * share),
             max_torque_nm: [tilt_nm, tilt_nm, yaw_nm].map(|limit| limit * share),
-            max_force_slew_n_per_s: SLEW[0],
-            max_torque_slew_nm_per_s: SLEW[1],
-            max_stiffness_n_per_m: facts::MAX_STIFFNESS_N_PER_M,
             rate_hz: facts::SERVO_RATE_HZ,
-            latency_s: Self::latency_s(lockstep),
+            ..Capabilities::driving(Axes::ALL)
+                .with_range(facts::RANGE_M, facts::RANGE_RAD)
+                .with_slew(SLEW[0], SLEW[1])
+                .with_stiffness(facts::MAX_STIFFNESS_N_PER_M)
+                .with_latency(Self::latency_s(lockstep))
         }
     }
 

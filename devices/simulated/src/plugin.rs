@@ -80,18 +80,13 @@ impl Device for SimulatedFlotor {
 
     fn capabilities(&self) -> Capabilities {
         let plain = Capabilities {
-            sensed: Axes::ALL,
-            actuated: Axes::ALL,
-            range_m: [TRANSLATION_RANGE_M; 3],
-            range_rad: [ROTATION_RANGE_RAD; 3],
-            resolution_m: 0.0,
             max_force_n: FORCE_LIMIT_N.to_array(),
             max_torque_nm: TORQUE_LIMIT_NM.to_array(),
-            max_force_slew_n_per_s: FORCE_SLEW_N_PER_S,
-            max_torque_slew_nm_per_s: TORQUE_SLEW_NM_PER_S,
-            max_stiffness_n_per_m: self.largest_stiffness_n_per_m(0.0),
             rate_hz: RATE_HZ,
-            latency_s: 0.0,
+            ..Capabilities::driving(Axes::ALL)
+                .with_range(TRANSLATION_RANGE_M, ROTATION_RANGE_RAD)
+                .with_slew(FORCE_SLEW_N_PER_S, TORQUE_SLEW_NM_PER_S)
+                .with_stiffness(self.largest_stiffness_n_per_m(0.0))
         };
         let Some((machine, Ok(limits))) = self.machine.as_ref().map(|machine| (machine, machine.limits()))
         else {
