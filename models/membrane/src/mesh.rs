@@ -52,6 +52,7 @@ impl Mesh {
         let spacing_m = sheet.side_m / (n - 1) as f64;
         let node_kg = sheet.mass_kg / ((n - 1) * (n - 1)) as f64;
         let rest_m = spacing_m / sheet.stretch;
+        let link = |ends| Link { ends, rest_m, stiffness_n_per_m: sheet.stiffness_n_per_m };
         let mut mesh = Self::default();
         for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
             let place = |index: usize| index as f64 * spacing_m - 0.5 * sheet.side_m;
@@ -64,18 +65,10 @@ impl Mesh {
             }
             // Omit springs along the border: they would join two fixed masses.
             if column + 1 < n && ![0, n - 1].contains(&row) {
-                mesh.links.push(Link {
-                    ends: [node, node + 1],
-                    rest_m,
-                    stiffness_n_per_m: sheet.stiffness_n_per_m,
-                });
+                mesh.links.push(link([node, node + 1]));
             }
             if row + 1 < n && ![0, n - 1].contains(&column) {
-                mesh.links.push(Link {
-                    ends: [node, node + n],
-                    rest_m,
-                    stiffness_n_per_m: sheet.stiffness_n_per_m,
-                });
+                mesh.links.push(link([node, node + n]));
             }
         }
         mesh

@@ -158,10 +158,7 @@ impl ForceModel for Membrane {
             network.come_to_rest(MOST_SETTLING_STEPS);
             network.activate();
         }
-        let mut parameters = [0.0; SCHEMA.len()];
-        for (value, parameter) in parameters.iter_mut().zip(Self::PARAMETERS) {
-            *value = settings.number_or_default(parameter.id());
-        }
+        let parameters = std::array::from_fn(|index| number(SCHEMA[index].id()));
         let coarseness_m = mesh.coarseness_m();
         let pictured = network.state().clone();
         let surface = Surface {

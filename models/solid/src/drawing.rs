@@ -14,7 +14,7 @@ use crate::half_space::HalfSpace;
 use crate::jet::Jet;
 use crate::mesh::Mesh;
 use crate::plate::plate;
-use crate::punch::{Bond, Loads, Outline, punch_loads};
+use crate::punch::{Bond, Loads, Outline, punch};
 use crate::rigid::{MODES, RigidPatch};
 use crate::several::{self, Spheres};
 use crate::skin::{Face, Focus, Skin};
@@ -370,7 +370,7 @@ fn punch_modes(
     bond: Bond,
 ) -> Option<Modal> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio: description.poisson_ratio };
-    let (_, loads) = punch_loads(&solid, None, outline, bond, FINENESS).ok()?;
+    let (_, loads) = punch(&solid, None, outline, bond, FINENESS).ok()?;
     let extent_m = outline.extent_m();
     let focus = Focus { at_m: DVec3::ZERO, width_m: 0.7 * extent_m };
     let skin = match (description.body, mesh) {

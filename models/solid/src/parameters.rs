@@ -16,7 +16,7 @@ macro_rules! choice {
 
             /// Returns the value of a parameter.
             pub(crate) fn of(settings: &Settings<'_>, id: &str) -> Self {
-                [$(Self::$value),+][settings.choice_or_default(id)]
+                settings.one_of(id, [$(Self::$value),+])
             }
         }
     };

@@ -31,7 +31,6 @@ const DETAILS: &[Detail] = &[
 pub struct Solid {
     law: Law,
     mesh_error: f64,
-    youngs_modulus_pa: f64,
     /// Friction of each sphere.
     friction: [Friction; MAX_SPHERES],
     depth_m: f64,
@@ -126,11 +125,9 @@ impl ForceModel for Solid {
         };
         let friction =
             Friction::new(settings.number_or_default("friction"), description.poisson_ratio, reach_m);
-        let youngs_modulus_pa = parameters[YOUNGS_MODULUS];
         Ok(Self {
             law,
             mesh_error,
-            youngs_modulus_pa,
             friction: [friction; MAX_SPHERES],
             depth_m: f64::NAN,
             contacts: f64::NAN,
@@ -152,7 +149,7 @@ impl ForceModel for Solid {
         let position_m = input.pose.position();
         let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
         let mut status = if reached_m == position_m { StepStatus::Ok } else { StepStatus::Clamped };
-        let modulus = self.youngs_modulus_pa;
+        let modulus = self.parameters[YOUNGS_MODULUS];
         let (wrench, energy_j) = match &self.law {
             Law::Bonded(patch) => {
                 let (wrench, energy_j) = patch.answer(reached_m, input.pose.orientation(), input.demand);
@@ -201,7 +198,6 @@ impl ForceModel for Solid {
             return Err(SetParameterError::Fixed);
         }
         self.parameters[index] = value;
-        self.youngs_modulus_pa = value;
         Ok(())
     }
 
@@ -226,18 +222,17 @@ impl ShapeModel for Solid {
         }
         let Some(drawing) = &mut self.drawing else { return &self.nothing };
         let reached_m = pose.position().clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
+        let modulus = self.parameters[YOUNGS_MODULUS];
         match &self.law {
-            Law::Bonded(_) => {
-                drawing.bonded(&Pose::new(reached_m, pose.orientation()), self.youngs_modulus_pa)
-            }
+            Law::Bonded(_) => drawing.bonded(&Pose::new(reached_m, pose.orientation()), modulus),
             Law::Sphere(atlas) => {
                 let centre_m = reached_m + DVec3::Z * atlas.radius_m;
                 let answer = atlas.answer(centre_m.to_array());
-                drawing.sphere(atlas, centre_m, &answer, self.youngs_modulus_pa)
+                drawing.sphere(atlas, centre_m, &answer, modulus)
             }
             Law::Spheres(spheres) => {
                 let answer = spheres.answer(reached_m, pose.orientation());
-                drawing.spheres(spheres, &answer, self.youngs_modulus_pa)
+                drawing.spheres(spheres, &answer, modulus)
             }
         }
     }

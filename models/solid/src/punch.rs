@@ -151,8 +151,8 @@ pub fn extrapolated(
     outline: Outline,
     bond: Bond,
 ) -> Result<(RigidPatch, f64), NotPositive> {
-    let coarse = punch(solid, remainder, outline, bond, FINENESS[0])?.stiffness;
-    let fine = punch(solid, remainder, outline, bond, FINENESS[1])?.stiffness;
+    let coarse = punch(solid, remainder, outline, bond, FINENESS[0])?.0.stiffness;
+    let fine = punch(solid, remainder, outline, bond, FINENESS[1])?.0.stiffness;
     let share = FINENESS[1] as f64 / FINENESS[0] as f64;
     let step = 1.0 / (share * share - 1.0);
     let mut stiffness = fine;
@@ -176,26 +176,12 @@ pub struct Loads {
     pub forces: Vec<[[f64; MODES]; 3]>,
 }
 
-/// Solves for the stiffness of a punch at the origin of the surface `z = 0`. `remainder`: that of a body, `None` for a half-space;
-/// `fineness`: number of cells from the middle to the rim. Not real-time.
+/// Solves for the stiffness of a punch at the origin of the surface `z = 0`, and for the loads of the punch. `remainder`: that of a
+/// body, `None` for a half-space; `fineness`: number of cells from the middle to the rim. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.
 pub fn punch(
-    solid: &HalfSpace,
-    remainder: Option<&Table>,
-    outline: Outline,
-    bond: Bond,
-    fineness: usize,
-) -> Result<RigidPatch, NotPositive> {
-    Ok(punch_loads(solid, remainder, outline, bond, fineness)?.0)
-}
-
-/// Solves for the stiffness of a punch, as [`punch`] does, and returns the loads of the punch as well. Not real-time.
-///
-/// # Errors
-/// [`NotPositive`] if the parameters do not describe an elastic solid.
-pub fn punch_loads(
     solid: &HalfSpace,
     remainder: Option<&Table>,
     outline: Outline,

@@ -209,10 +209,8 @@ pub(crate) struct Choice {
 impl Choice {
     /// Resolves preset, mode and explicit values, and checks their combination.
     pub(crate) fn resolve(settings: &Settings<'_>) -> Result<Self, Refusal> {
-        let preset =
-            Preset::ALL.get(settings.choice_or_default("preset")).copied().unwrap_or(Preset::Thesis1);
-        let variant =
-            Variant::ALL.get(settings.choice_or_default("variant")).copied().unwrap_or(Variant::Energy);
+        let preset = settings.one_of("preset", Preset::ALL);
+        let variant = settings.one_of("variant", Variant::ALL);
         let set = (settings, variant);
         let precision = second_only_for(
             &[Variant::Thesis, Variant::ClosedForm],
@@ -441,8 +439,7 @@ fn rod_blend(settings: &Settings<'_>, variant: Variant) -> Result<Switch, Refusa
 
 /// Returns the explicit mode, without one the mode of the preset.
 fn mode(settings: &Settings<'_>, preset: Stiffness) -> Mode {
-    let set = settings.number("mode").and_then(|_| Mode::ALL.get(settings.choice_or_default("mode")));
-    set.copied().unwrap_or_else(|| Mode::of(preset))
+    settings.number("mode").map_or(Mode::of(preset), |_| settings.one_of("mode", Mode::ALL))
 }
 
 /// Refuses an explicit value of a parameter that the mode derives from other parameters.
