@@ -207,28 +207,27 @@ export! {
     fn dhdDisableExpertMode() -> c_int [-1] { crate::device::set_expert(false); DONE }
 }
 
-/// Runs `body` on an open device.
-pub(crate) fn read(id: i8, body: impl FnOnce(&Open)) -> c_int {
-    result(open(id).map(|open| {
+/// Runs `body` on a device; returns [`DONE`], or reports the error.
+pub(crate) fn with(device: Result<Open, Code>, body: impl FnOnce(&Open)) -> c_int {
+    result(device.map(|open| {
         body(&open);
         DONE
     }))
+}
+
+/// Runs `body` on an open device.
+pub(crate) fn read(id: i8, body: impl FnOnce(&Open)) -> c_int {
+    with(open(id), body)
 }
 
 /// Runs `body` on an open device that is not lost, and counts a read of its sample.
 pub(crate) fn read_live(id: i8, body: impl FnOnce(&Open)) -> c_int {
-    result(sampled(id).map(|open| {
-        body(&open);
-        DONE
-    }))
+    with(sampled(id), body)
 }
 
 /// Runs `body` on an open device that is not lost, in expert mode.
 pub(crate) fn read_expert(id: i8, body: impl FnOnce(&Open)) -> c_int {
-    result(expert(id).map(|open| {
-        body(&open);
-        DONE
-    }))
+    with(expert(id), body)
 }
 
 pub(crate) fn put3(places: [Out<f64>; 3], values: DVec3) {

@@ -30,10 +30,7 @@ fn applied(open: &Open) -> [DVec3; 2] {
 }
 
 fn switched(id: i8, on: bool) -> c_int {
-    result(open(id).map(|open| {
-        open.set_switch(&mut open.device(), if on { Switch::On } else { Switch::Off });
-        DONE
-    }))
+    read(id, |open| open.set_switch(&mut open.device(), if on { Switch::On } else { Switch::Off }))
 }
 
 /// Changes the stored settings of an open device.

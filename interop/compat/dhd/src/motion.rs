@@ -1,6 +1,6 @@
 //! Entry points of regulation and motion: hold the handle, move it, follow the program.
 
-use crate::basic::{angles, put6, read, read_live, turning};
+use crate::basic::{angles, put6, read, read_live, turning, with};
 use crate::device::{FRAME, Open, Switch, live, open};
 use crate::error::{Code, DONE, failed, result};
 use crate::kept::{POSITION_MOVE, ROTATION_MOVE};
@@ -13,10 +13,7 @@ use std::ffi::c_int;
 use std::time::Duration;
 
 fn begin(id: i8) -> c_int {
-    result(live(id).map(|open| {
-        start(&open);
-        DONE
-    }))
+    with(live(id), start)
 }
 
 /// Converts angles about x, then y, then z, to a rotation vector in Flotor's axes.
