@@ -34,10 +34,7 @@ mod step;
 mod tableau;
 mod translation;
 
-pub use flotor::{
-    Drag, FeedForward, FlotorParameters, STANDARD_GRAVITY_M_PER_S2, THESIS_FEED_FORWARD_N,
-    THESIS_MEASURED_WEIGHT_N,
-};
+pub use flotor::{Drag, FeedForward, FlotorParameters, STANDARD_GRAVITY_M_PER_S2};
 pub use scheme::MAX_PIECE_NS;
 pub use state::{State, Wrench};
 

@@ -22,9 +22,6 @@ pub const TORQUE_LIMIT_NM: DVec3 = DVec3::new(6.3, 6.3, 12.2);
 /// Largest stiffness of a rendered contact in translation, N/m (thesis section 2: about 25 N/mm).
 pub const STIFFNESS_LIMIT_N_PER_M: f64 = 25.0e3;
 
-/// Largest stiffness of a rendered contact in rotation, N·m/rad (thesis section 2).
-pub const ROTATIONAL_STIFFNESS_LIMIT_NM_PER_RAD: f64 = 50.0;
-
 /// Pose of the flotor relative to the range of the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorRange {

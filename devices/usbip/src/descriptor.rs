@@ -53,7 +53,7 @@ impl Device {
 pub enum Supply {
     /// By the bus.
     Bus = 0x80,
-    /// Of its own.
+    /// Supply of the device itself.
     Own = 0xc0,
 }
 

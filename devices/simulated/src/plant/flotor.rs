@@ -6,13 +6,6 @@ use flotor_hal::glam::DVec3;
 /// Standard gravity, m/s² (ISO 80000-3).
 pub const STANDARD_GRAVITY_M_PER_S2: f64 = 9.806_65;
 
-/// Weight of the flotor as the thesis measured it, N (Varadharajan 2007, section 3.4; its 580 g would weigh
-/// 5.69 N).
-pub const THESIS_MEASURED_WEIGHT_N: f64 = 6.9;
-
-/// Feed-forward of the thesis's program, N (Varadharajan 2007, section 3.2 and appendix A).
-pub const THESIS_FEED_FORWARD_N: f64 = 7.7;
-
 /// Upward force that compensates gravity, acting at the centre of mass.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FeedForward {
