@@ -261,7 +261,7 @@ real() {
 
 # Programs of other makers' interfaces, as they are published: each drives the simulated flotor for a minute at its own pace.
 programs() {
-    cargo build --release -p flotor -p flotor-simulated -p flotor-dhd -p flotor-openhaptics -p flotor-chai3d \
+    cargo build --release -p flotor -p flotor-lend -p flotor-simulated -p flotor-dhd -p flotor-openhaptics -p flotor-chai3d \
         -p flotor-haply-service
     python3 -m venv target/programs
     target/programs/bin/pip install --quiet forcedimension-core==1.0.0 pyopenhaptics==1.0.1

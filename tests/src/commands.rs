@@ -10,6 +10,7 @@ pub fn whole_program() -> Command {
         flotor_study_program::PARSER(),
         flotor_calibration::cli::PARSER(),
         flotor_test::cli::PARSER(),
+        flotor_lend::PARSER(),
     ];
     flotor_command::whole_program(flotor::cli::command(), &separate)
 }

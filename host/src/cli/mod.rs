@@ -17,7 +17,7 @@ mod view;
 mod watchdog;
 mod worker;
 
-use crate::platform::{end_with_parent, lend};
+use crate::platform::{check_lend, end_with_parent};
 use bridge::BRIDGE;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use flotor_command::separate::{Built, SeparateProgram};
@@ -57,6 +57,8 @@ const STUDY: SeparateProgram<'static> = built_with_this("flotor-study");
 const CALIBRATION: SeparateProgram<'static> = built_with_this("flotor-calibration");
 /// Program that tests scenes with expectations.
 const TEST: SeparateProgram<'static> = built_with_this("flotor-test");
+/// Program that lends a device to programs of other makers.
+const LEND: SeparateProgram<'static> = built_with_this("flotor-lend");
 
 const fn built_with_this(program: &'static str) -> SeparateProgram<'static> {
     SeparateProgram { program, built: Built::WithThis, build: "cargo build --release" }
@@ -127,7 +129,7 @@ enum Command {
     /// Emulate the controller of a device, to use its plugin without hardware
     Emulate(emulate::EmulateArguments),
     /// Run an unmodified program, written for another maker's device, on the device of a scene, within the scene's limits
-    Lend(lend::LendArguments),
+    Lend(Separate),
     /// Check this machine's real-time configuration and suggest fixes
     Doctor(doctor::DoctorArguments),
     /// Process with one force model, started by `run` for `isolation = "process"`
@@ -136,9 +138,6 @@ enum Command {
     /// Process that stops devices when the host has ended, started by `run`
     #[command(hide = true)]
     Watchdog(watchdog::WatchdogArguments),
-    /// Process that starts the program of `lend`, and kills its remaining processes
-    #[command(hide = true)]
-    ProgramGuard(lend::guard::GuardArguments),
     /// Print a completion script for a shell
     Completions {
         /// Shell of the completion script
@@ -178,6 +177,12 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Returns the arguments after the command as they were given. The parser removes a leading `--`, which separates scene and program
+/// for `lend`.
+fn after_the_command() -> Vec<OsString> {
+    std::env::args_os().skip(2).collect()
+}
+
 fn carry_out(command: Command) -> Result<(), CommandError> {
     match command {
         Command::Run(arguments) => run::run(arguments),
@@ -203,8 +208,7 @@ fn carry_out(command: Command) -> Result<(), CommandError> {
         Command::Analyse(separate) => STUDY.carry_out("analyse", &separate.arguments),
         Command::Calibrate(separate) => CALIBRATION.carry_out("calibrate", &separate.arguments),
         Command::Emulate(arguments) => emulate::run(&arguments),
-        Command::Lend(arguments) => lend::run(arguments),
-        Command::ProgramGuard(arguments) => lend::guard::run(&arguments),
+        Command::Lend(_) => check_lend().and_then(|()| LEND.carry_out("lend", &after_the_command())),
         Command::Doctor(arguments) => doctor::run(&arguments),
         Command::Worker(arguments) => worker::run(arguments),
         Command::Watchdog(arguments) => watchdog::run(arguments),

@@ -1,5 +1,6 @@
 //! Windows: `flotor lend` and the diagnosis of USB devices are not supported yet.
 
+use flotor_command::CommandError;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -25,6 +26,16 @@ pub(crate) fn canonical(path: &Path) -> io::Result<PathBuf> {
 /// Returns the limit on the number of open files of this process: `None`, unlimited.
 pub(crate) fn most_open_files() -> Option<u64> {
     None
+}
+
+/// Checks that `flotor lend` is supported on this system.
+///
+/// # Errors
+/// Always: not yet.
+pub(crate) fn check_lend() -> Result<(), CommandError> {
+    Err(CommandError::Usage(
+        "`flotor lend` is not supported on Windows yet: its libraries are for Linux".to_owned(),
+    ))
 }
 
 /// Does nothing: only `flotor lend`, which is not supported on Windows, needs it.
@@ -87,43 +98,6 @@ pub(crate) mod usb {
             "not checked on Windows yet",
             "the Device Manager lists the connected devices",
         )]
-    }
-}
-
-pub(crate) mod lend {
-    //! `flotor lend`.
-
-    use clap::Args;
-    use flotor_command::CommandError;
-    use std::ffi::OsString;
-
-    /// Run an unmodified program, written for another maker's device (on Linux only)
-    #[derive(Args)]
-    pub(crate) struct LendArguments {
-        /// Arguments of the command on Linux
-        #[arg(trailing_var_arg = true, allow_hyphen_values = true, value_name = "ARGUMENTS")]
-        _arguments: Vec<OsString>,
-    }
-
-    #[allow(clippy::needless_pass_by_value)] // as elsewhere
-    pub(crate) fn run(_: LendArguments) -> Result<(), CommandError> {
-        Err(CommandError::Usage(
-            "`flotor lend` is not supported on Windows yet: its libraries are for Linux".to_owned(),
-        ))
-    }
-
-    pub(crate) mod guard {
-        //! Guard process of `flotor lend`, which does nothing on Windows.
-
-        use flotor_command::CommandError;
-
-        /// Arguments of the guard
-        #[derive(clap::Args)]
-        pub(crate) struct GuardArguments {}
-
-        pub(crate) fn run(_: &GuardArguments) -> Result<(), CommandError> {
-            Ok(())
-        }
     }
 }
 

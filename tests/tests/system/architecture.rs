@@ -45,6 +45,8 @@ enum Role {
     DropIn,
     /// A program that answers where a program calls another maker's service.
     Service,
+    /// Runs programs of other makers.
+    Lend,
     /// Knows numbers only.
     Statistics,
     /// Draws, and knows nothing of what.
@@ -76,8 +78,8 @@ enum Role {
 
 use Role::{
     Analysis, Calibration, Command, Compat, Container, Contract, Core, Coupling, Drawing, DropIn, Emulator,
-    Fixture, Guard, History, Host, Judge, Lab, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin, Record,
-    SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
+    Fixture, Guard, History, Host, Judge, Lab, Lend, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin,
+    Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -102,6 +104,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("interop/compat/openhaptics", DropIn, &[Contract, Compat]),
     ("interop/compat/dhd", DropIn, &[Contract, Compat]),
     ("interop/compat/haply", Service, &[Contract, Core, Compat, Command, OfEmulators]),
+    ("interop/lend", Lend, &[Servo, Session, Command]),
     ("study/statistics", Statistics, &[]),
     ("host/plot", Plot, &[]),
     ("host/command", Command, &[Contract, Sync, Core, Servo, Record, Live, Session]),
@@ -514,8 +517,9 @@ const PORTED: &[&str] = &[
 ];
 
 /// Where files of Linux's kernel are named outside a module `platform`, in crates that run on no other system yet: libraries that
-/// stand in for those of other makers.
-const KERNEL_FILES_ELSEWHERE: &[&str] = &["interop/compat/common/src/process.rs"];
+/// stand in for those of other makers, and what starts a program with them.
+const KERNEL_FILES_ELSEWHERE: &[&str] =
+    &["interop/compat/common/src/process.rs", "interop/lend/src/guard.rs"];
 
 /// Crates with what only one system has.
 const SYSTEM_CRATES: &[&str] = &["libc", "rustix", "signal_hook", "thread_priority", "windows_sys"];

@@ -505,13 +505,14 @@ fn what_cannot_be_lent_is_said_in_one_line_with_what_helps() {
         assert!(ran.error().contains(said), "{arguments:?}: {ran:?}");
         assert_eq!(ran.stderr.trim_end().lines().count(), 1, "{arguments:?}: {ran:?}");
     }
-    // Without a library: a program in a folder of its own.
-    let alone = scratch.folder("alone").join("flotor");
+    // Without a library: the programs in a folder of their own.
+    let alone = scratch.folder("alone");
+    let programs = ["flotor", "flotor-lend"].map(|name| build_folder().join(name));
     // By a process of its own: a file that this one has open for writing cannot be started while another test forks.
-    let copied = Command::new("cp").arg(build_folder().join("flotor")).arg(&alone).status();
-    assert!(copied.is_ok_and(|copied| copied.success()), "it can be copied");
-    let output =
-        Command::new(&alone).args(["lend", "--api", "chai3d", "--", &program]).output().expect("it starts");
+    let copied = Command::new("cp").args(programs).arg(&alone).status();
+    assert!(copied.is_ok_and(|copied| copied.success()), "they can be copied");
+    let lend = ["lend", "--api", "chai3d", "--", &program];
+    let output = Command::new(alone.join("flotor")).args(lend).output().expect("it starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(
         said.contains("build it with `cargo build --release -p flotor-chai3d`")

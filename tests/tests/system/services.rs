@@ -432,12 +432,13 @@ fn a_service_is_lent_beside_a_program_and_what_cannot_be_is_said_in_one_line() {
         assert_eq!(ran.code, Some(code), "{arguments:?}: {ran:?}");
         assert!(ran.error().contains(said), "{arguments:?}: {ran:?}");
     }
-    // Without the service: a program in a folder of its own.
+    // Without the service: the programs in a folder of their own.
     let scratch = Scratch::default();
-    let alone = scratch.folder("alone").join("flotor");
-    let copied = Command::new("cp").arg(build_folder().join("flotor")).arg(&alone).status();
-    assert!(copied.is_ok_and(|copied| copied.success()), "it can be copied");
-    let output = Command::new(Path::new(&alone))
+    let alone = scratch.folder("alone");
+    let programs = ["flotor", "flotor-lend"].map(|name| build_folder().join(name));
+    let copied = Command::new("cp").args(programs).arg(&alone).status();
+    assert!(copied.is_ok_and(|copied| copied.success()), "they can be copied");
+    let output = Command::new(alone.join("flotor"))
         .args(["lend", "--api", "haply", "--", "true"])
         .output()
         .expect("it starts");

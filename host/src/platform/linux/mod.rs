@@ -1,9 +1,9 @@
-//! Linux: diagnosis from files of the kernel, `flotor lend`, limits of the process.
+//! Linux: diagnosis from files of the kernel, limits of the process.
 
 pub(crate) mod doctor;
-pub(crate) mod lend;
 pub(crate) mod usb;
 
+use flotor_command::CommandError;
 use rustix::process::{Resource, Signal, getrlimit, set_parent_process_death_signal};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -22,6 +22,14 @@ pub(crate) fn canonical(path: &Path) -> io::Result<PathBuf> {
 /// Returns the limit on the number of open files of this process; `None` if unlimited.
 pub(crate) fn most_open_files() -> Option<u64> {
     getrlimit(Resource::Nofile).current
+}
+
+/// Checks that `flotor lend` is supported on this system.
+///
+/// # Errors
+/// None on Linux.
+pub(crate) fn check_lend() -> Result<(), CommandError> {
+    Ok(())
 }
 
 /// Requests that the system sends SIGTERM to this process when its parent ends.

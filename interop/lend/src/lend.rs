@@ -1,36 +1,26 @@
 //! `flotor lend`: runs an unmodified program, written for another maker's device, on a device of a scene; a drop-in library or a
 //! service replaces the maker's.
 
-mod api;
-mod arguments;
-mod folder;
-pub(crate) mod guard;
-mod outcome;
-mod program;
-mod service;
-mod stop_request;
-
-pub(crate) use arguments::LendArguments;
-
-use api::Api;
+use crate::api::Api;
+use crate::arguments::LendArguments;
+use crate::folder::Folder;
+use crate::guard::{KILL_GROUP, ProgramEnd};
+use crate::outcome::Runs;
+use crate::program::Program;
+use crate::service::{Service, ServiceEnd};
+use crate::stop_request::{Early, Stage, StopRequest, has_ended};
 use flotor_command::{CommandError, INTERRUPTED, note, write_json};
 use flotor_servo::last_stop::spawn_unblocked;
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;
 use flotor_session::{RunError, check_plugins};
-use folder::Folder;
-use guard::{KILL_GROUP, ProgramEnd};
-use outcome::Runs;
-use program::Program;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::json;
-use service::{Service, ServiceEnd};
 use std::ffi::OsString;
 use std::os::unix::fs::symlink;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus};
-use stop_request::{Early, Stage, StopRequest, has_ended};
 
 /// Interface between a program and its device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +68,8 @@ fn lend(arguments: &LendArguments) -> Result<i32, Early> {
     check_scene(arguments)?;
     let program = Program::find(name)?;
     let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
-    let lending = Lending { arguments, program, rest, own, stop };
+    let flotor = own.with_file_name("flotor");
+    let lending = Lending { arguments, program, rest, own, flotor, stop };
     match interface {
         Some(Interface::Service(service)) => lending.with_service(service),
         Some(Interface::Library(api)) => lending.with_library(Some(api)),
@@ -92,8 +83,10 @@ struct Lending<'a> {
     program: Program,
     /// Arguments of the program.
     rest: &'a [OsString],
-    /// Path of the running `flotor`.
+    /// Path of this program.
     own: PathBuf,
+    /// Path of `flotor`, in the folder of this program.
+    flotor: PathBuf,
     stop: StopRequest,
 }
 
@@ -131,9 +124,9 @@ impl Lending<'_> {
     /// Starts the service, then runs the program, which connects to the service. Returns the exit code of the program and its runs;
     /// if this is 0, the exit code of the service, whose run may have failed.
     fn with_service(&self, service: Service) -> Result<i32, Early> {
-        let Self { arguments, program, own, stop, .. } = self;
+        let Self { arguments, program, flotor, stop, .. } = self;
         let folder = Folder::new()?;
-        let served = service.start(arguments, &folder, own, stop)?;
+        let served = service.start(arguments, &folder, flotor, stop)?;
         let end = self.carry_out(&mut self.guarded(&folder), &folder)?;
         let served = served.finish();
         let runs = Runs::read(&folder.0, &end);
@@ -187,7 +180,7 @@ impl Lending<'_> {
         if folder.join("lib").is_dir() {
             command.env("FDSDK", folder).env("FORCEDIM_SDK", folder);
         }
-        self.arguments.set_environment(command, folder, &self.own)
+        self.arguments.set_environment(command, folder, &self.flotor)
     }
 }
 

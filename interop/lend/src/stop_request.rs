@@ -13,7 +13,7 @@ const POLL: Duration = Duration::from_millis(10);
 
 /// Stage of the schedule, in order of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Stage {
+pub(crate) enum Stage {
     /// No stop was requested.
     Running,
     /// A stop was requested: the program may end by the signal that a terminal has sent to it.
@@ -43,7 +43,7 @@ impl Stage {
 }
 
 /// Reason why `flotor lend` ends without a result of its program.
-pub(super) enum Early {
+pub(crate) enum Early {
     Failed(CommandError),
     /// Exit code, after a request to stop or an error that another process has printed.
     Exit(i32),
@@ -56,7 +56,7 @@ impl From<CommandError> for Early {
 }
 
 /// Request to stop `flotor lend`, by a signal.
-pub(super) struct StopRequest {
+pub(crate) struct StopRequest {
     switch: StopSwitch,
     /// Time of the poll that found the request.
     found: OnceCell<Instant>,
@@ -64,12 +64,12 @@ pub(super) struct StopRequest {
 
 impl StopRequest {
     /// Installs the handlers of the signals that request the stop; must be called before other threads start.
-    pub(super) fn by_signals() -> Result<Self, CommandError> {
+    pub(crate) fn by_signals() -> Result<Self, CommandError> {
         Ok(Self { switch: stop_on_signals()?, found: OnceCell::new() })
     }
 
     /// Returns the current stage; after an emergency stop at least [`Stage::ProgramKilled`].
-    pub(super) fn stage(&self) -> Stage {
+    pub(crate) fn stage(&self) -> Stage {
         self.stage_at(Instant::now())
     }
 
@@ -84,7 +84,7 @@ impl StopRequest {
 
     /// Calls `poll` with the current stage until `poll` returns a value, and returns this value; `None` after the poll at
     /// [`Stage::Over`].
-    pub(super) fn poll<T>(&self, mut poll: impl FnMut(Stage) -> Option<T>) -> Option<T> {
+    pub(crate) fn poll<T>(&self, mut poll: impl FnMut(Stage) -> Option<T>) -> Option<T> {
         loop {
             let stage = self.stage();
             if let Some(value) = poll(stage) {
@@ -99,7 +99,7 @@ impl StopRequest {
 }
 
 /// Returns the exit status of a process that has ended; `None` while the process runs.
-pub(super) fn has_ended(child: &mut Child) -> Option<ExitStatus> {
+pub(crate) fn has_ended(child: &mut Child) -> Option<ExitStatus> {
     child.try_wait().unwrap_or_else(|_| Some(ExitStatus::default()))
 }
 

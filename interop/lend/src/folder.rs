@@ -1,15 +1,15 @@
 //! Private folder of `flotor lend`: links to the drop-in libraries, and the files that the runs of a program write.
 
-use super::api::Api;
+use crate::api::Api;
 use flotor_command::CommandError;
 use std::os::unix::fs::{DirBuilderExt, symlink};
 use std::path::{Path, PathBuf};
 
 /// Private folder with links to the libraries, removed when dropped.
-pub(super) struct Folder(pub(super) PathBuf);
+pub(crate) struct Folder(pub(crate) PathBuf);
 
 impl Folder {
-    pub(super) fn new() -> Result<Self, CommandError> {
+    pub(crate) fn new() -> Result<Self, CommandError> {
         let path = std::env::temp_dir().join(format!("flotor-lend-{}", std::process::id()));
         // Left by a killed process with the same id.
         let _ = std::fs::remove_dir_all(&path);
@@ -19,7 +19,7 @@ impl Folder {
     }
 
     /// Links a library under the file names of its interface, in the folders that the loader and the clients of an SDK search.
-    pub(super) fn put(&self, api: Api, library: &Path) -> Result<(), CommandError> {
+    pub(crate) fn put(&self, api: Api, library: &Path) -> Result<(), CommandError> {
         let library = library.canonicalize().unwrap_or_else(|_| library.to_path_buf());
         let sdk = self.0.join(format!("lib/release/lin-{}-gcc", std::env::consts::ARCH));
         // An old client searches the folder `lib` inside the folder of the libraries.
@@ -37,7 +37,7 @@ impl Folder {
     }
 
     /// Returns the path of the file to which the guard writes the end of the program.
-    pub(super) fn program_end(&self) -> PathBuf {
+    pub(crate) fn program_end(&self) -> PathBuf {
         self.0.join("program-end.json")
     }
 }

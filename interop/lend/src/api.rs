@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 /// Library interface of another maker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Api {
+pub(crate) enum Api {
     /// Force Dimension's DHD and DRD
     Dhd,
     /// 3D Systems' OpenHaptics (HDAPI)
@@ -15,26 +15,26 @@ pub(super) enum Api {
 }
 
 /// Drop-in library for an interface.
-pub(super) struct Library {
+pub(crate) struct Library {
     word: &'static str,
     /// Name of the library file that cargo builds.
     built: &'static str,
     package: &'static str,
     /// File names under which programs load the library; an installation has the file under the last name.
-    pub(super) names: &'static [&'static str],
+    pub(crate) names: &'static [&'static str],
     /// Strings that the file of a program contains if the program is linked with the library or loads it.
-    pub(super) marks: &'static [&'static str],
+    pub(crate) marks: &'static [&'static str],
 }
 
 impl Api {
-    pub(super) const ALL: [Self; 3] = [Self::Dhd, Self::Openhaptics, Self::Chai3d];
+    pub(crate) const ALL: [Self; 3] = [Self::Dhd, Self::Openhaptics, Self::Chai3d];
 
     /// Returns the name for `--api`.
-    pub(super) fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         self.library().word
     }
 
-    pub(super) fn library(self) -> Library {
+    pub(crate) fn library(self) -> Library {
         match self {
             Self::Dhd => Library {
                 word: "dhd",
@@ -76,7 +76,7 @@ impl Api {
     }
 
     /// Finds the drop-in library, in the installation or in the build folder of the program `own`.
-    pub(super) fn find(self, own: &Path) -> Result<PathBuf, CommandError> {
+    pub(crate) fn find(self, own: &Path) -> Result<PathBuf, CommandError> {
         let folder = own.parent().unwrap_or(Path::new("."));
         let Library { built, package, names, .. } = self.library();
         let compat = folder.join("../lib/flotor/compat").join(self.word());

@@ -1,6 +1,6 @@
 //! Program of `flotor lend`: its path, and a check that a drop-in library can replace the library of the other maker.
 
-use super::api::Api;
+use crate::api::Api;
 use flotor_command::CommandError;
 use std::ffi::OsStr;
 use std::os::unix::fs::PermissionsExt;
@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 const MAX_BYTES: u64 = 512 << 20;
 
 /// Program to be run on a device.
-pub(super) struct Program {
-    pub(super) path: PathBuf,
+pub(crate) struct Program {
+    pub(crate) path: PathBuf,
     /// Properties of its file; `None` for a script or a very large file.
     native: Option<Native>,
 }
@@ -34,7 +34,7 @@ enum Bits {
 
 impl Program {
     /// Finds an executable file by path or, for a name without a folder, in `PATH`.
-    pub(super) fn find(name: &OsStr) -> Result<Self, CommandError> {
+    pub(crate) fn find(name: &OsStr) -> Result<Self, CommandError> {
         let is_program = |path: &PathBuf| {
             std::fs::metadata(path).is_ok_and(|file| file.is_file() && file.permissions().mode() & 0o111 != 0)
         };
@@ -61,12 +61,12 @@ impl Program {
     }
 
     /// Returns true if the program's file contains the name of the interface's library.
-    pub(super) fn calls(&self, api: Api) -> bool {
+    pub(crate) fn calls(&self, api: Api) -> bool {
         self.native.is_some_and(|native| native.calls(api))
     }
 
     /// Checks that a drop-in library can replace the library that the program uses; accepts a program that cannot be judged.
-    pub(super) fn check(&self, api: Option<Api>) -> Result<(), CommandError> {
+    pub(crate) fn check(&self, api: Option<Api>) -> Result<(), CommandError> {
         let Some(native) = self.native else { return Ok(()) };
         let name = self.path.display();
         if native.bits == Bits::ThirtyTwo {

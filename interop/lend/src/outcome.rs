@@ -1,6 +1,6 @@
 //! Summaries that the runs of a program write to the folder of `flotor lend`: one for each process that has opened a device.
 
-use super::guard::ProgramEnd;
+use crate::guard::ProgramEnd;
 use flotor_command::{CommandError, note, say, write_json};
 use flotor_servo::RunEnd;
 use flotor_servo::last_stop::SignalName;
@@ -24,19 +24,19 @@ struct Run {
 }
 
 /// Runs of a program, by the suffix in the names of their files.
-pub(super) struct Runs<'a> {
+pub(crate) struct Runs<'a> {
     runs: BTreeMap<String, Run>,
     program: &'a ProgramEnd,
 }
 
 impl<'a> Runs<'a> {
     /// Returns the paths of the files that a run writes to this folder: summary as text, and as JSON.
-    pub(super) fn files(folder: &Path) -> [PathBuf; 2] {
+    pub(crate) fn files(folder: &Path) -> [PathBuf; 2] {
         ["report.txt", "report.json"].map(|name| folder.join(name))
     }
 
     /// Reads the files of all runs at the end of the program.
-    pub(super) fn read(folder: &Path, program: &'a ProgramEnd) -> Self {
+    pub(crate) fn read(folder: &Path, program: &'a ProgramEnd) -> Self {
         let mut runs = BTreeMap::<String, Run>::new();
         for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
             let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
@@ -62,7 +62,7 @@ impl<'a> Runs<'a> {
     }
 
     /// Prints the summary of each run; returns true if there is a summary.
-    pub(super) fn tell(&self, program: &Path, record: Option<&Path>) -> bool {
+    pub(crate) fn tell(&self, program: &Path, record: Option<&Path>) -> bool {
         let name = program.display();
         for (suffix, run) in &self.runs {
             let Some(text) = &run.text else { continue };
@@ -91,7 +91,7 @@ impl<'a> Runs<'a> {
 
     /// Writes the summary of each run as JSON: the first summary to `file`, each further summary to a file in the same folder with
     /// the suffix of the run in its name.
-    pub(super) fn write(&self, file: &Path) -> Result<(), CommandError> {
+    pub(crate) fn write(&self, file: &Path) -> Result<(), CommandError> {
         if self.runs.is_empty() {
             let end = format!("the program opened no device: {}", self.end());
             return write_json(file, &json!({ "end": end }));
@@ -112,7 +112,7 @@ impl<'a> Runs<'a> {
 
     /// Returns the exit code of the command: the exit code of the program, 128 plus the signal that ended the program, or 4 if the
     /// program ended with 0 after a failed run.
-    pub(super) fn exit_code(&self) -> i32 {
+    pub(crate) fn exit_code(&self) -> i32 {
         let in_order = [RunEnd::Finished, RunEnd::Stopped].map(RunEnd::word);
         let ended_early = |run: &Run| {
             let end = run.summary.as_ref().and_then(|summary| summary.get("end")).and_then(Value::as_str);

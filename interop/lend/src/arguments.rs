@@ -1,6 +1,6 @@
 //! Arguments of `flotor lend`, and the environment variables that pass the arguments to the run in a drop-in library or service.
 
-use super::outcome::Runs;
+use crate::outcome::Runs;
 use clap::{Args, ValueEnum};
 use flotor_command::CommandError;
 use flotor_command::options::{LendOptions, seed};
@@ -11,40 +11,43 @@ use std::process::Command;
 
 /// Run an unmodified program, written for another maker's device, on the device of a scene, within the scene's limits.
 #[derive(Args)]
-#[command(after_help = "Examples:\n  \
+#[command(
+    version,
+    after_help = "Examples:\n  \
     flotor lend -- python3 my_openhaptics_script.py      on the simulated flotor, held by a hand\n  \
     flotor lend --api dhd maglev.toml -- ./surgery       on a scene's device, within the scene's limits\n  \
     flotor lend --api haply -- python3 my_haply_script.py       over the network: a service beside the program\n  \
     flotor lend --pace lockstep --record run.mcap -- ./my_test   one call, one tick: repeatable, fast\n\n\
     Environment variables: FLOTOR_SIGNALS=stop stops the devices before a signal ends the program. FLOTOR_DHD_TYPE,\n\
     FLOTOR_HD_MODEL and FLOTOR_PHANTOM_TYPE set the type of device that the program sees.\n\n\
-    The exit code is that of the program; 4 if the program ended with 0 after its run had failed.")]
+    The exit code is that of the program; 4 if the program ended with 0 after its run had failed."
+)]
 #[command(mut_arg("json", |json| json.help("Write the summary as JSON; standard output is for the program")))]
 pub(crate) struct LendArguments {
     /// The interface that the program calls (default: the program finds the three libraries)
     #[arg(long, value_name = "dhd|openhaptics|chai3d|haply|ml-api")]
-    pub(super) api: Option<String>,
+    pub(crate) api: Option<String>,
     /// With --api haply or ml-api: address of the service (default: the address that programs expect, port 10001 or 5678)
     #[arg(long, value_name = "HOST:PORT")]
-    pub(super) listen: Option<String>,
+    pub(crate) listen: Option<String>,
     /// Source of the time of the run
     #[arg(long, value_enum, default_value_t = PaceOption::Real)]
-    pub(super) pace: PaceOption,
+    pub(crate) pace: PaceOption,
     /// Seed of all random numbers
     #[arg(long, value_parser = seed, default_value_t = 0, value_name = "N")]
-    pub(super) seed: u64,
+    pub(crate) seed: u64,
     #[command(flatten)]
-    pub(super) options: LendOptions,
+    pub(crate) options: LendOptions,
     /// Scene file in TOML (default: a simulated flotor held by a hand)
-    pub(super) scene: Option<PathBuf>,
+    pub(crate) scene: Option<PathBuf>,
     /// The program and its arguments
     #[arg(last = true, required = true, value_name = "PROGRAM")]
-    pub(super) program: Vec<OsString>,
+    pub(crate) program: Vec<OsString>,
 }
 
 /// Source of the time of the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum PaceOption {
+pub(crate) enum PaceOption {
     /// The machine's clock: the program runs at its own rate
     Real,
     /// The program: each call that sets a force, or each callback of a scheduler, is one tick
@@ -53,11 +56,11 @@ pub(super) enum PaceOption {
 
 impl LendArguments {
     /// Sets the environment variables for the run in a drop-in library or service.
-    pub(super) fn set_environment(
+    pub(crate) fn set_environment(
         &self,
         command: &mut Command,
         folder: &Path,
-        own: &Path,
+        flotor: &Path,
     ) -> Result<(), CommandError> {
         let absolute = |path: &Path| {
             std::path::absolute(path).map_err(|cause| CommandError::file(path, "cannot be found", cause))
@@ -85,7 +88,7 @@ impl LendArguments {
         }
         let [report, summary] = Runs::files(folder);
         command.env("FLOTOR_REPORT", report).env("FLOTOR_JSON", summary);
-        command.env("FLOTOR_PROCESSES", folder).env("FLOTOR_PROGRAM", own);
+        command.env("FLOTOR_PROCESSES", folder).env("FLOTOR_PROGRAM", flotor);
         Ok(())
     }
 }

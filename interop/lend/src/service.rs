@@ -1,8 +1,8 @@
 //! Services of other makers, to which a program connects over the network: the service is a separate process.
 
-use super::arguments::{LendArguments, PaceOption};
-use super::folder::Folder;
-use super::stop_request::{Early, Stage, StopRequest, has_ended};
+use crate::arguments::{LendArguments, PaceOption};
+use crate::folder::Folder;
+use crate::stop_request::{Early, Stage, StopRequest, has_ended};
 use flotor_command::separate::{Built, SeparateProgram};
 use flotor_command::{CommandError, INTERRUPTED, note, say};
 use flotor_servo::last_stop::spawn_unblocked;
@@ -23,7 +23,7 @@ const LONGEST: &str = "8760h";
 
 /// Service of another maker, emulated by Flotor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Service {
+pub(crate) enum Service {
     /// Haply's Inverse Service.
     Haply,
     /// Controller of the Maglev 200.
@@ -31,10 +31,10 @@ pub(super) enum Service {
 }
 
 impl Service {
-    pub(super) const ALL: [Self; 2] = [Self::Haply, Self::MlApi];
+    pub(crate) const ALL: [Self; 2] = [Self::Haply, Self::MlApi];
 
     /// Returns the name for `--api`.
-    pub(super) fn word(self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Haply => "haply",
             Self::MlApi => "ml-api",
@@ -43,16 +43,16 @@ impl Service {
 
     /// Returns true if the service writes its summary to the folder of `flotor lend`; false for the ML API, a `flotor run` that
     /// writes the file itself.
-    pub(super) fn writes_summary(self) -> bool {
+    pub(crate) fn writes_summary(self) -> bool {
         self == Self::Haply
     }
 
     /// Starts the service and waits until it listens.
-    pub(super) fn start<'a>(
+    pub(crate) fn start<'a>(
         self,
         arguments: &LendArguments,
         folder: &Folder,
-        own: &Path,
+        flotor: &Path,
         stop: &'a StopRequest,
     ) -> Result<Served<'a>, Early> {
         let mut command = match self {
@@ -63,14 +63,14 @@ impl Service {
                     build: "cargo build --release -p flotor-haply-service",
                 };
                 let mut command = program.command()?;
-                arguments.set_environment(&mut command, &folder.0, own)?;
+                arguments.set_environment(&mut command, &folder.0, flotor)?;
                 command.arg("--lent");
                 if let Some(listen) = &arguments.listen {
                     command.args(["--listen", listen, "--events", "127.0.0.1:0"]);
                 }
                 command
             }
-            Self::MlApi => run_with_ml_api(arguments, folder, own)?,
+            Self::MlApi => run_with_ml_api(arguments, folder, flotor)?,
         };
         // In a process group of its own: Ctrl-C reaches only the program, and the service ends after the program.
         command.stdin(Stdio::null()).stdout(Stdio::piped()).process_group(0);
@@ -83,7 +83,7 @@ impl Service {
 }
 
 /// Returns a `flotor run` command that adds the controller to the scene as a model.
-fn run_with_ml_api(arguments: &LendArguments, folder: &Folder, own: &Path) -> Result<Command, CommandError> {
+fn run_with_ml_api(arguments: &LendArguments, folder: &Folder, flotor: &Path) -> Result<Command, CommandError> {
     if arguments.pace == PaceOption::Lockstep {
         return Err(CommandError::Usage(
             "`--pace lockstep` does not work with `--api ml-api`; use `flotor emulate maglev --protocol ml-api --pace lockstep`"
@@ -99,7 +99,7 @@ fn run_with_ml_api(arguments: &LendArguments, folder: &Folder, own: &Path) -> Re
             &built_in
         }
     };
-    let mut command = Command::new(own);
+    let mut command = Command::new(flotor);
     command.arg("run").arg(scene).args(["--duration", LONGEST, "--seed", &arguments.seed.to_string()]);
     command.args(["--ml-api", arguments.listen.as_deref().unwrap_or(ML_API)]);
     command.args(arguments.options.plugin_path.arguments());
@@ -114,7 +114,7 @@ fn run_with_ml_api(arguments: &LendArguments, folder: &Folder, own: &Path) -> Re
 
 /// End of a service.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum ServiceEnd {
+pub(crate) enum ServiceEnd {
     /// The service ended with this exit code; nonzero after a failed run.
     Exited(i32),
     /// `flotor lend` killed the service at the end of the schedule.
@@ -123,11 +123,11 @@ pub(super) enum ServiceEnd {
 
 impl ServiceEnd {
     /// Explanation of [`ServiceEnd::Killed`].
-    pub(super) const KILLED: &str =
+    pub(crate) const KILLED: &str =
         "the service did not end in time after the request to stop, and was killed without a summary";
 
     /// Returns the exit code of the command for this end.
-    pub(super) fn exit_code(self) -> i32 {
+    pub(crate) fn exit_code(self) -> i32 {
         match self {
             Self::Exited(code) => code,
             Self::Killed => 1,
@@ -136,7 +136,7 @@ impl ServiceEnd {
 }
 
 /// Running service. Dropping it requests the end of the service and waits for the end.
-pub(super) struct Served<'a> {
+pub(crate) struct Served<'a> {
     child: Child,
     stop: &'a StopRequest,
     /// Output of the service: first its address, then the rest, sent when the output has ended.
@@ -182,7 +182,7 @@ impl<'a> Served<'a> {
     }
 
     /// Ends the service, prints its remaining output, and returns its end.
-    pub(super) fn finish(mut self) -> ServiceEnd {
+    pub(crate) fn finish(mut self) -> ServiceEnd {
         let end = self.end();
         if end == ServiceEnd::Killed {
             note(ServiceEnd::KILLED);

@@ -21,7 +21,7 @@ use std::process::{Command, ExitStatus};
 use std::time::{Duration, Instant};
 
 /// Signal that requests the guard to kill the process group; the system sends it when `flotor lend` ends.
-pub(super) const KILL_GROUP: Signal = Signal::USR1;
+pub(crate) const KILL_GROUP: Signal = Signal::USR1;
 /// Poll interval; signals and the end of a child wake the guard at once.
 const POLL: Duration = Duration::from_secs(1);
 /// Pause between two attempts to kill the group.
@@ -47,31 +47,31 @@ pub(crate) struct GuardArguments {
 
 /// End of a program, as reported by its guard in a file.
 #[derive(Debug, Default, Serialize, Deserialize)]
-pub(super) struct ProgramEnd {
+pub(crate) struct ProgramEnd {
     /// Wait status of the program.
     status: i32,
     /// Descendants of the program that have left its process group.
-    pub(super) left_running: Vec<Descendant>,
+    pub(crate) left_running: Vec<Descendant>,
 }
 
 impl ProgramEnd {
     /// Reads the file of a guard that has ended; `None` if the guard has written none.
-    pub(super) fn read(file: &Path) -> Option<Self> {
+    pub(crate) fn read(file: &Path) -> Option<Self> {
         serde_json::from_slice(&std::fs::read(file).ok()?).ok()
     }
 
     /// Creates the end of a program that was killed together with its guard; `status` is the exit status of the guard.
-    pub(super) fn of(status: ExitStatus) -> Self {
+    pub(crate) fn of(status: ExitStatus) -> Self {
         Self { status: status.into_raw(), left_running: Vec::new() }
     }
 
     /// Returns the exit status of the program.
-    pub(super) fn status(&self) -> ExitStatus {
+    pub(crate) fn status(&self) -> ExitStatus {
         ExitStatus::from_raw(self.status)
     }
 
     /// Prints a note on each process that keeps running.
-    pub(super) fn tell(&self) {
+    pub(crate) fn tell(&self) {
         for process in &self.left_running {
             note(format_args!("{process} has left the process group of the program, and still runs"));
         }
@@ -80,7 +80,7 @@ impl ProgramEnd {
 
 /// Process that is a descendant of the guard.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Descendant {
+pub(crate) struct Descendant {
     process: i32,
     name: String,
     #[serde(skip)]
