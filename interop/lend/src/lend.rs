@@ -145,7 +145,7 @@ impl Lending<'_> {
         })
     }
 
-    /// Returns the command that starts the program under its [`guard`].
+    /// Returns the command that starts the program under its [`guard`](crate::guard).
     fn guarded(&self, folder: &Folder) -> Command {
         let mut command = Command::new(&self.own);
         command.args(["program-guard", "--parent", &std::process::id().to_string(), "--end"]);
