@@ -17,8 +17,6 @@ pub const MAX_STIFFNESS_N_PER_M: f64 = 25_000.0;
 pub const MAX_STIFFNESS_NM_PER_RAD: f64 = 50.0;
 /// Best and worst position resolution of the prototype, m (thesis, IJRR).
 pub const RESOLUTION_M: [f64; 2] = [5.0e-6, 10.0e-6];
-/// Closed-loop position bandwidth at ±3 dB, Hz (thesis).
-pub const POSITION_BANDWIDTH_HZ: f64 = 125.0;
 /// Lowest and highest servo rate of the controller, Hz (client).
 pub const SERVO_RATE_HZ: [f64; 2] = [100.0, 10_000.0];
 /// Largest current per coil, A (client).

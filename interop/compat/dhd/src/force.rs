@@ -29,10 +29,6 @@ fn applied(open: &Open) -> [DVec3; 2] {
     [applied.force(), applied.torque()].map(|part| FRAME.of_flotor(part))
 }
 
-fn switched(id: i8, on: bool) -> c_int {
-    read(id, |open| open.set_switch(&mut open.device(), if on { Switch::On } else { Switch::Off }))
-}
-
 /// Changes the stored settings of an open device.
 pub(crate) fn keep(id: i8, change: impl FnOnce(&mut Device)) -> c_int {
     read(id, |open| change(&mut open.device()))
@@ -93,7 +89,9 @@ export! {
         })
     }
     /// Enables or disables force.
-    fn dhdEnableForce(on: c_uchar, id: i8) -> c_int [-1] { switched(id, on != 0) }
+    fn dhdEnableForce(on: c_uchar, id: i8) -> c_int [-1] {
+        read(id, |open| open.set_switch(&mut open.device(), if on == 0 { Switch::Off } else { Switch::On }))
+    }
     /// Does nothing: there is no gripper.
     fn dhdEnableGripperForce(_on: c_uchar, id: i8) -> c_int [-1] { read(id, |_| ()) }
     /// Disables force. Returns 0 even without an open device: programs call it until it succeeds.

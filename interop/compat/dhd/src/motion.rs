@@ -30,6 +30,10 @@ struct Goal {
     angles_rad: Option<DVec3>,
 }
 
+impl Goal {
+    const NONE: Self = Self { position_m: None, angles_rad: None };
+}
+
 /// Kind of motion to a goal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Way {
@@ -125,11 +129,11 @@ fn eight(place: In<f64>) -> Option<Goal> {
 }
 
 fn position(x: f64, y: f64, z: f64) -> Goal {
-    Goal { position_m: Some(DVec3::new(x, y, z)), angles_rad: None }
+    Goal { position_m: Some(DVec3::new(x, y, z)), ..Goal::NONE }
 }
 
 fn rotation(a: f64, b: f64, g: f64) -> Goal {
-    Goal { position_m: None, angles_rad: Some(DVec3::new(a, b, g)) }
+    Goal { angles_rad: Some(DVec3::new(a, b, g)), ..Goal::NONE }
 }
 
 export! {
@@ -156,8 +160,7 @@ export! {
         read(id, |open| {
             let mut device = open.device();
             device.regulation = Regulation::OFF;
-            let (force_n, torque_nm) = (DVec3::ZERO, DVec3::ZERO);
-            (device.force_n, device.torque_nm) = (force_n, torque_nm);
+            (device.force_n, device.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
             if keeps_force {
                 open.send_again(&mut device);
             } else {
@@ -188,9 +191,7 @@ export! {
     /// Turns the handle to angles, rad; with `block`, waits for the arrival.
     fn drdMoveToRot(a: f64, b: f64, g: f64, block: bool, id: i8) -> c_int [-1] { go(id, rotation(a, b, g), way(block)) }
     /// Checks the regulation and moves nothing: there is no gripper.
-    fn drdMoveToGrip(_gap: f64, _block: bool, id: i8) -> c_int [-1] {
-        go(id, Goal { position_m: None, angles_rad: None }, Way::Follow)
-    }
+    fn drdMoveToGrip(_gap: f64, _block: bool, id: i8) -> c_int [-1] { go(id, Goal::NONE, Way::Follow) }
     /// Moves the handle to a position, m, and turns it to angles, rad; with `block`, waits for the arrival.
     fn drdMoveTo(place: In<f64>, block: bool, id: i8) -> c_int [-1] {
         eight(place).map_or_else(|| failed(Code::NullArgument), |goal| go(id, goal, way(block)))
@@ -200,9 +201,7 @@ export! {
     /// Sets the target angles, rad, without a planned motion.
     fn drdTrackRot(a: f64, b: f64, g: f64, id: i8) -> c_int [-1] { go(id, rotation(a, b, g), Way::Follow) }
     /// Checks the regulation and moves nothing: there is no gripper.
-    fn drdTrackGrip(_gap: f64, id: i8) -> c_int [-1] {
-        go(id, Goal { position_m: None, angles_rad: None }, Way::Follow)
-    }
+    fn drdTrackGrip(_gap: f64, id: i8) -> c_int [-1] { go(id, Goal::NONE, Way::Follow) }
     /// Reads position, m, angles, rad, 0 for a gripper, and rotation matrix, row-major.
     fn drdGetPositionAndOrientation(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
