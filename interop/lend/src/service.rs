@@ -83,7 +83,11 @@ impl Service {
 }
 
 /// Returns a `flotor run` command that adds the controller to the scene as a model.
-fn run_with_ml_api(arguments: &LendArguments, folder: &Folder, flotor: &Path) -> Result<Command, CommandError> {
+fn run_with_ml_api(
+    arguments: &LendArguments,
+    folder: &Folder,
+    flotor: &Path,
+) -> Result<Command, CommandError> {
     if arguments.pace == PaceOption::Lockstep {
         return Err(CommandError::Usage(
             "`--pace lockstep` does not work with `--api ml-api`; use `flotor emulate maglev --protocol ml-api --pace lockstep`"
