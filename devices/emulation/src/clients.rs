@@ -6,7 +6,7 @@ use std::io;
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Timeout for the first message of a client.
+/// Timeout for the first bytes of a client.
 pub const FIRST_MESSAGE: Duration = Duration::from_secs(5);
 /// Timeout from the first bytes of a message to its last: a host writes a message at once, and a slower client delays the others.
 const REST_OF_MESSAGE: Duration = Duration::from_millis(200);

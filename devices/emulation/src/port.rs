@@ -42,7 +42,7 @@ pub enum Reach {
     AnyMachine,
 }
 
-/// Listening TCP port that checks the user of each connection.
+/// Listening TCP port that admits the connections within its [`Reach`].
 #[derive(Debug)]
 pub struct Port {
     listener: TcpListener,

@@ -46,7 +46,7 @@ fn stop_s(text: &str) -> Result<f64, String> {
 }
 
 impl RigArguments {
-    /// Returns the path of the force sensor and the stand; `None` without a rig.
+    /// Returns the path for the link to the terminal of the force sensor, and the stand; `None` without a rig.
     #[must_use]
     pub fn rig(&self) -> Option<(&Path, Stand)> {
         let stand = Stand { step_mm: self.rig_step_mm, stop_s: self.rig_stop_s };
@@ -94,7 +94,7 @@ impl Stand {
         from_mm * 1.0e-3
     }
 
-    /// Returns the motion as a TOML script for the simulated hand.
+    /// Returns the motion as a TOML script for the simulated hand, with as many rounds as a script may have.
     #[must_use]
     pub fn script(&self) -> String {
         let (stop_s, repeat) = (self.stop_s, MOVEMENTS / (2 * (self.steps() + 1)));
