@@ -76,7 +76,7 @@ pub enum BootFailure {
     },
     /// The firmware was loaded but sends no report.
     NoReport,
-    /// The device sends reports without commands.
+    /// The device sends reports without a command, or more than one report for a command.
     StaleReports,
 }
 
@@ -176,7 +176,7 @@ impl<'c> Line<'c> {
 /// Starts a device and waits for its first report; loads the firmware unless it runs already. Not real-time.
 ///
 /// # Errors
-/// The [`BootFailure`] of the last attempt.
+/// [`BootFailure::NoFirmware`] if no firmware runs and `firmware` is `None`; else the [`BootFailure`] of the last attempt.
 pub fn start(chip: &dyn Chip, firmware: Option<&[u8]>) -> Result<Report, BootFailure> {
     match run(chip) {
         Err(BootFailure::NoReport) => {}

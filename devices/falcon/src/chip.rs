@@ -60,8 +60,8 @@ pub trait Chip: Send + Sync + 'static {
     /// If the chip is gone.
     fn read(&self, packets: &mut [u8], patience: Duration) -> Result<usize, ChipLost>;
 
-    /// Returns a stop that works without this plugin: a message that sends `_rest` on the serial line. A chip on USB
-    /// has no such stop, as it is reached only by system calls of this process.
+    /// Returns the independent stop of the chip: a message that sends the bytes `_rest` on the serial line. The default is no
+    /// independent stop, as for a chip on USB, which only system calls of this process can reach.
     fn independent_stop(&self, _rest: &[u8]) -> IndependentStop {
         IndependentStop::none()
     }

@@ -11,7 +11,7 @@ pub enum DeviceError {
     Gone,
     /// Timeout: no report to any command, the chip sends its status bytes alone.
     Silent,
-    /// A packet without status bytes.
+    /// A packet shorter than its two status bytes.
     ShortPacket,
     /// A surplus report: all later reports would be delayed.
     StaleReport,

@@ -11,8 +11,8 @@
 //! ```
 //!
 //! The angles for a position follow in closed form; the position for three angles is the root of the three `g`, by Newton's
-//! method, to 1e-12 rad. With `G = ∂g/∂P` and `h = ∂g/∂θ`, `G dP + h dθ = 0`, and by virtual work the torques for a force
-//! `F` on the hand are `τ = -h G⁻ᵀ F`.
+//! method, to 1e-12 rad (1e-9 rad where rounding prevents more). With `G = ∂g/∂P` and `h = ∂g/∂θ`, `G dP + h dθ = 0`,
+//! and by virtual work the torques for a force `F` on the hand are `τ = -h G⁻ᵀ F`.
 //!
 //! The frame is the maker's: x to the right, y up, z from the device towards the user.
 

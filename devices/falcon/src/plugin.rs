@@ -104,7 +104,7 @@ pub struct FalconDevice {
     switch: ForceSwitch,
 }
 
-/// Active Falcon whose motors follow the host.
+/// Active Falcon: its motors exert the commanded force.
 pub struct DrivenDevice {
     opened: FalconDevice,
     exchange: Exchange,

@@ -34,7 +34,7 @@ pub enum Lamp {
     Red = 8,
 }
 
-/// Homing bit: the firmware searches for the ends of the arms' ranges, the zero of its counts.
+/// Homing bit of a command; if set, the firmware searches for the ends of the arms' ranges, from which its encoder counts start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Homing {
     /// No homing requested.

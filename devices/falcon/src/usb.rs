@@ -22,7 +22,8 @@ pub(crate) struct UsbChip {
     output: u8,
 }
 
-/// Opens and claims the device with a serial number, or the first one. Not real-time.
+/// Opens the device with the serial number `serial`, or the first device that can be opened, and claims its interface. Not
+/// real-time.
 ///
 /// # Errors
 /// One sentence with the cause and the remedy.

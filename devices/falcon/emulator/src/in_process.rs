@@ -22,7 +22,7 @@ impl InProcess {
         Self { machine: Arc::new(Mutex::new(machine)), started: Instant::now() }
     }
 
-    /// Locks the device.
+    /// Locks the device and returns its state machine; every other use of the device waits until the guard is dropped.
     pub fn machine(&self) -> MutexGuard<'_, Machine> {
         self.machine.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -30,12 +30,12 @@ pub enum Power {
     On,
 }
 
-/// Injected fault.
+/// Fault that a test injects into the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// The loader never replies to the prompt.
     NoPrompt,
-    /// The loader replies with this byte instead of the agreement.
+    /// The loader replies with this byte instead of the agreement byte.
     NotAgreed(u8),
     /// The echo of this byte of the firmware has its lowest bit changed.
     WrongEcho(usize),
@@ -43,13 +43,13 @@ pub enum Fault {
     NoEcho(usize),
     /// The firmware does not start.
     NoReport,
-    /// From this command on: a packet without its status bytes.
+    /// From this command on: packets of one byte, shorter than their two status bytes.
     ShortPacket(u64),
     /// From this command on: one surplus report per command.
     StaleReport(u64),
     /// From this command on: packets with their status bytes alone.
     IdlePackets(u64),
-    /// From this command on: bytes that are no reports.
+    /// From this command on: malformed bytes instead of reports.
     Noise(u64),
     /// From this command on: the arms are not homed and count zero.
     Unhomed(u64),
@@ -179,7 +179,7 @@ impl Machine {
         self.share = share;
     }
 
-    /// Returns the newest command.
+    /// Returns the newest command; [`Command::REST`] before the first.
     #[must_use]
     pub fn command(&self) -> Command {
         self.command
@@ -258,7 +258,8 @@ impl Machine {
         }
     }
 
-    /// Processes bytes from the host on the serial line: prompt, firmware or commands, whose replies become due packets.
+    /// Processes bytes from the host on the serial line (prompt, firmware or commands), and queues the replies for
+    /// [`Self::packet`]; bytes at a wrong baud rate are lost.
     pub fn output(&mut self, bytes: &[u8], at: Duration) {
         for byte in bytes {
             match (self.stage, self.divisor) {

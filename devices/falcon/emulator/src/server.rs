@@ -14,10 +14,10 @@ const LOOK: Timespec = Timespec { tv_sec: 0, tv_nsec: 250_000 };
 /// Timeout of the write of a packet to the host.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(200);
 
-/// Serves a host until the host disconnects, the device leaves its bus, or the tenure is over.
+/// Serves a host until the host disconnects, the device leaves its bus, or a time limit of `tenure` is exceeded.
 ///
 /// # Errors
-/// Errors of the connection; `TimedOut` if the tenure is over, `InvalidData` for an unknown message.
+/// Errors of the connection; `TimedOut` if a time limit is exceeded, `InvalidData` for an unknown message.
 pub fn serve(mut stream: TcpStream, device: &InProcess, mut tenure: Tenure<'_>) -> io::Result<()> {
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;

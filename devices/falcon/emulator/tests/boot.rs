@@ -1,4 +1,4 @@
-//! The handshake: it succeeds with any bytes as a firmware, and each failure has its own name.
+//! Handshake of the boot loader: succeeds with any bytes as firmware; each failure has its own error.
 
 use flotor_falcon::boot::{BootFailure, start};
 use flotor_falcon::kinematics::CENTRE_M;

@@ -1,4 +1,4 @@
-//! Commands and reports in the two threads: one in flight, and each fault is its own, with the motors at rest.
+//! Commands and reports in the two threads: one command in flight; each fault has its own error and sets the motors to zero torque.
 
 use flotor_falcon::DeviceError;
 use flotor_falcon::boot::start;

@@ -1,5 +1,5 @@
-//! What `flotor doctor --device falcon` finds, but for what the machine's files say of the bus (`host/src/platform/linux/usb.rs`): one
-//! test for each finding, as the plugin tells it when it is opened.
+//! Errors of opening the plugin, as `flotor doctor --device falcon` reports them: one test for each. The checks of the bus are
+//! tested in `host/src/platform/linux/usb.rs`.
 
 use super::contract::{CONFIG, open, serve};
 use flotor_falcon::kinematics::CENTRE_M;

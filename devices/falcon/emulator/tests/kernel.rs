@@ -1,6 +1,7 @@
 //! The emulated device on the USB of a real kernel, found by the plugin through libusb.
 //!
-//! Plugging in needs root and the module `vhci_hcd`: ignored unless asked for; `.ci/vm` asks in a small virtual machine.
+//! Attaching the device needs root and the module `vhci_hcd`: the tests are ignored by default; `.ci/vm` runs them in a virtual
+//! machine.
 
 use flotor_falcon::firmware::digest;
 use flotor_falcon::kinematics::CENTRE_M;

@@ -1,4 +1,4 @@
-//! The plugin against the emulated device: boot loader, exchange and the contract, and on a kernel's own USB.
+//! Plugin with the emulated device: boot loader, exchange, device contract, and the USB of a kernel.
 
 mod attacks;
 mod boot;
