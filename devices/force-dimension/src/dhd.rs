@@ -178,7 +178,7 @@ impl Dhd {
     }
 
     /// Sets gravity compensation, limits, velocity windows and watchdog, releases the brakes, enables force and sends
-    /// zero.
+    /// a zero wrench.
     pub(crate) fn energize(&self, setup: &Setup) -> Result<(), Failed> {
         let Self { functions, id, wrist } = self;
         let [most_n, most_nm] = setup.most;
@@ -250,8 +250,8 @@ impl Dhd {
         Ok(if code == SATURATED { Given::Saturated } else { Given::All })
     }
 
-    /// Reads an error of the device or the cause of disabled force from the status; `None` while force is enabled, and for other
-    /// causes.
+    /// Reads the status and returns the fault for an error of the device, or for the cause of disabled force; `None` while force is
+    /// enabled, and for causes without a corresponding fault.
     pub(crate) fn force_off(&self) -> Result<Option<Fault>, Failed> {
         let (code, status) = self.functions.status(self.id);
         self.check(code, "reading the status")?;
@@ -279,7 +279,7 @@ impl Drop for Dhd {
 /// Device selection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Which {
-    /// First device of the list.
+    /// First device in the SDK's list.
     First,
     /// Device with this serial number.
     Serial(u16),
@@ -297,9 +297,9 @@ pub(crate) enum Given {
 pub(crate) struct Setup {
     /// Largest force, N, and torque, N·m.
     pub(crate) most: [f64; 2],
-    /// Window of the velocity, ms.
+    /// Window of the SDK's velocity estimate, ms.
     pub(crate) window_ms: c_int,
-    /// Watchdog, in units of 125 µs.
+    /// Timeout of the device's watchdog, in units of 125 µs.
     pub(crate) watchdog_units: u8,
 }
 

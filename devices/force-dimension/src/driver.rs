@@ -21,6 +21,9 @@ pub(crate) struct Driver {
 
 impl Driver {
     /// Energises the device and starts the thread. Not real-time.
+    ///
+    /// # Errors
+    /// The cause, with the device; without the device, which is then closed, if the thread could not be created.
     pub(crate) fn start(
         dhd: Dhd,
         setup: &Setup,

@@ -126,7 +126,7 @@ impl Functions {
         self.drdAutoInit.map(|auto_init| unsafe { auto_init(id) })
     }
 
-    /// Ends the regulation of the arm; force may stay enabled.
+    /// Ends the regulation of the arm; force may stay enabled. Returns 0 if the library has no such function.
     pub(crate) fn stop_regulation(&self, id: i8) -> c_int {
         // SAFETY: any id is legal.
         self.drdStop.map_or(0, |stop| unsafe { stop(1, id) })
@@ -147,13 +147,13 @@ impl Functions {
         unsafe { (self.dhdSetGravityCompensation)(c_int::from(on), id) }
     }
 
-    /// Sets the window of the velocity, ms.
+    /// Sets the window of the estimate of the linear velocity, ms.
     pub(crate) fn config_velocity(&self, window_ms: c_int, id: i8) -> c_int {
         // SAFETY: any id is legal.
         unsafe { (self.dhdConfigLinearVelocity)(window_ms, WINDOWING, id) }
     }
 
-    /// Sets the window of the angular velocity, ms.
+    /// Sets the window of the estimate of the angular velocity, ms.
     pub(crate) fn config_angular_velocity(&self, window_ms: c_int, id: i8) -> c_int {
         // SAFETY: any id is legal.
         unsafe { (self.dhdConfigAngularVelocity)(window_ms, WINDOWING, id) }

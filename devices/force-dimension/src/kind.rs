@@ -16,7 +16,7 @@ pub(crate) struct Kind {
     pub(crate) range_rad: f64,
     /// Largest force in any direction, N.
     pub(crate) force_n: f64,
-    /// Largest torque about any axis, N·m; 0: none.
+    /// Largest torque about any axis, N·m; 0: no driven wrist, or unknown.
     pub(crate) torque_nm: f64,
 }
 
