@@ -86,7 +86,7 @@ impl Hardware {
     }
 }
 
-/// Pantograph whose motors follow the host while it is active.
+/// Pantograph with its board; while the device is active, its motors exert the commanded force.
 pub struct HaplyDevice {
     board: Board,
     hardware: Hardware,
@@ -104,7 +104,7 @@ pub struct HaplyDevice {
     force_n: DVec2,
 }
 
-/// Stop that sends zero torque through a second handle of the port, from any thread: the board holds the last torque
+/// Stop handle: sends zero torque through a duplicate of the port, from any thread: the board holds the last torque
 /// indefinitely, so that zero must be sent even if the loop has stopped.
 pub struct TorqueStop(Mutex<Port>);
 

@@ -1,4 +1,4 @@
-//! The plugin on an emulated board at a pseudo terminal, through the contract as a host meets it.
+//! Plugin with an emulated board at a pseudo terminal, called through the device contract as by a host.
 
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
 use flotor_hal::glam::DVec2;
