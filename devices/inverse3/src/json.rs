@@ -4,7 +4,7 @@
 //! value is [skipped](Cursor::skip) if it is valid JSON, and [`Malformed`] otherwise. Real-time: bounded by the length of the
 //! text, no allocation.
 
-/// Error: the text is not JSON, or contains another kind of value than expected.
+/// Error: the text is not JSON, is nested too deeply, or contains another kind of value than expected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Malformed;
 

@@ -8,7 +8,7 @@ use crate::session_error::SessionError;
 use flotor_hal::{DQuat, DVec3};
 use std::io::Write;
 
-/// Names of the lists of arms and grips.
+/// Names of the service's lists of arms and grips.
 const ARMS: &str = "inverse3";
 const GRIPS: [&str; 3] = ["verse_grip", "wireless_verse_grip", "custom_verse_grip"];
 /// Buttons of a grip, from bit 0.
@@ -20,10 +20,10 @@ pub const LOOK: &[u8] = b"{}";
 /// Smallest norm of a quaternion that is accepted and normalised.
 const SHORTEST: f64 = 1.0e-3;
 
-/// Grip, identified by its list and its id.
+/// Grip, identified by its list in the service's messages and its id.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grip {
-    /// Name of the list.
+    /// Name of the service's list that contains the grip, such as `verse_grip`.
     pub kind: &'static str,
     /// Id, as sent by the service.
     pub id: String,

@@ -134,7 +134,7 @@ pub struct Inverse3Device {
     switch: ForceSwitch,
 }
 
-/// Active Inverse3 that follows the host.
+/// Active Inverse3: exerts the commanded force.
 pub struct DrivenDevice {
     opened: Inverse3Device,
     exchange: Exchange,

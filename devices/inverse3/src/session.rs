@@ -17,7 +17,7 @@ const MESSAGE_BYTES: usize = 512;
 pub struct Request {
     /// `host:port` of the service.
     pub address: String,
-    /// Id of the arm; `None` for the only one.
+    /// Id of the arm, in upper or lower case; `None` for the only arm of the service.
     pub arm: Option<String>,
     /// Selection of the grip.
     pub grip: GripRequest,
@@ -25,7 +25,8 @@ pub struct Request {
     pub force_gate: f64,
     /// Timeout of a reply from the service; a missing reply is a fault.
     pub timeout: Duration,
-    /// Largest deviation of the exerted force from recent commands of this session, N; a larger deviation is a fault.
+    /// Largest deviation of a component of the exerted force from the range of this session's recent commands, N; a larger
+    /// deviation is a fault.
     pub foreign_force_n: f64,
 }
 
@@ -36,7 +37,7 @@ pub enum GripRequest {
     OnlyOne,
     /// No grip.
     None,
-    /// The grip with this id.
+    /// The grip with this id, in upper or lower case.
     Named(String),
 }
 

@@ -7,8 +7,8 @@ use std::fmt;
 /// Remedy for messages outside the documented interface.
 const UPDATE: &str = "update the service to 3.5 or newer";
 
-/// Fault of a session. After a fault, [`Session::end`](crate::session::Session::end) ends the session, and the service removes its
-/// force.
+/// Fault of a session. After a fault, [`Session::end`](crate::session::Session::end) ends the session, and the service removes the
+/// force of the session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SessionError {
     /// The service closed the connection, or is gone.
@@ -17,7 +17,7 @@ pub enum SessionError {
     Silent,
     /// Timeout with an incomplete state.
     Unfinished,
-    /// A message is longer than any state, bytes.
+    /// A message above the limit of the plugin; its length, bytes.
     TooLong(u64),
     /// A malformed, fragmented or masked WebSocket frame.
     NoFrame,
@@ -29,7 +29,7 @@ pub enum SessionError {
     Infinite(&'static str),
     /// The device or its grip is no longer connected to the service.
     Unplugged,
-    /// The service reports that the device is not ready: no power, or not calibrated.
+    /// The service reports that the device or its grip is not ready: no power, or not calibrated.
     NotReady,
     /// The device exerts a force that this session did not command: another program also commands it.
     ForeignForce,

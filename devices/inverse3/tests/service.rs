@@ -1,4 +1,4 @@
-//! The plugin against a service that breaks its promises, through the contract as a host meets it.
+//! Plugin with a faulty service, called through the device contract as by a host.
 
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Axes, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, UsbAccess, Wrench};

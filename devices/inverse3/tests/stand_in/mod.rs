@@ -1,6 +1,6 @@
 //! Scripted service for tests: a callback returns each reply, and all messages are recorded. Not real-time.
 //!
-//! `flotor emulate haply-service` is a correct service; this one simulates faulty ones.
+//! `flotor emulate haply-service` is a correct service; this service simulates faulty services.
 
 use std::io::{self, Read, Write};
 use std::net::{TcpListener, TcpStream};
