@@ -226,8 +226,8 @@ impl<P: Plant> Emulator<P> {
     }
 }
 
-/// Returns the configuration of a controller for a plant with these capabilities; the limits are the smaller of the
-/// plant's and the published limits.
+/// Returns the configuration of a controller for a plant with these capabilities. The largest force and torque are the
+/// smaller of the plant's and the published limits; all other limits are those of [`LimitConfig::MAGLEV`].
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the wire format is f32, latencies are small
 pub fn controller_config(capabilities: &Capabilities, pace: Pace, serial: &str) -> ControllerConfig {

@@ -1,4 +1,4 @@
-//! Strangers at the ports of the emulator: they cost little, and a host is served all the same.
+//! Hostile clients of the emulator: they use few resources, and a host is still served.
 
 #[path = "../../../../tests/src/attacks.rs"]
 mod strangers;

@@ -1,6 +1,6 @@
-//! Pushes out of the range against the host's walls and the controller behind them, sampled and late as they are: a
-//! handle at rest sits where the spring of the wall says, gets no deeper on the way than the printed bound, and where
-//! that bound is beyond the range the controller lands before the sensors lose it.
+//! Constant pushes out of the range, against the walls of host and controller with sampling and delay: the handle at rest has
+//! the penetration given by the stiffness, the penetration on the way stays below the printed bound, and if this bound is
+//! beyond the range, the controller lands before the flotor leaves the sensors' range.
 #![allow(clippy::cast_possible_truncation)] // f32 is what the wire has
 
 use flotor_hal::{Axes, Capabilities, DQuat, DVec3, DeviceState, Pose, SampledLoop, Twist, Wrench};

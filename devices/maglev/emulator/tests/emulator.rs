@@ -1,4 +1,4 @@
-//! The emulator as a program: what it says to wrong arguments. (With a host at the other end: `tests/tests/system/maglev.rs` of the
+//! Emulator as a program: error messages for wrong arguments. (Tests with a host: `tests/tests/system/maglev.rs` of the
 //! workspace.)
 
 use std::process::{Command, Output};

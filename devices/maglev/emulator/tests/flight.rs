@@ -1,5 +1,5 @@
-//! Taking off and landing through the plugin: the handle comes home from where it lies and its weight is found; a
-//! flight that goes wrong says so.
+//! Take-off and landing through the plugin: the handle moves home from its start position and is weighed; failures are
+//! reported.
 #![allow(clippy::unwrap_used)] // helpers of tests
 
 use crate::machine::CAPABILITIES;

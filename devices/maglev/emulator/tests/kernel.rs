@@ -1,8 +1,8 @@
-//! The plugin against the drivers of a real kernel: the emulated controller is plugged into it as a USB device, and the
-//! plugin finds it through libusb, hidraw and the tty layer.
+//! Plugin with the drivers of a real kernel: the emulated controller is attached to the kernel as a USB device, and the
+//! plugin opens the device through libusb, hidraw and the tty layer.
 //!
-//! Plugging in needs root and the module `vhci_hcd`, so these tests are ignored unless asked for. `.ci/vm` runs them in
-//! a small virtual machine whose clock counts instructions: there, times are the program's and not the machine's.
+//! Attaching a device needs root and the module `vhci_hcd`, so these tests are ignored by default. `.ci/vm` runs them in
+//! a virtual machine whose clock counts instructions: the measured times do not depend on the load of the machine.
 #![allow(clippy::unwrap_used)] // helpers of tests
 
 mod machine;

@@ -1,4 +1,4 @@
-//! The emulated controller: as a program, as a plant, and at the edge of its range.
+//! Emulated controller: as a program, with the plugin, and at the edge of its range.
 
 mod attacks;
 mod boundary;

@@ -2,7 +2,7 @@
 
 use flotor_hal::{DVec3, Wrench, math};
 
-/// Limits of the wrench, wall and edge of the range of the controller.
+/// Limits of the controller: largest wrench and slew rates, wall, edge of the range, and load of the coils.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitConfig {
     /// Largest force along each axis, N.

@@ -129,7 +129,7 @@ impl Controller {
         self.condition
     }
 
-    /// Returns the replay protection with the numbers of rejected requests.
+    /// Returns the replay protection, with the counts of rejected requests.
     #[must_use]
     pub fn intake(&self) -> &Intake {
         &self.intake
@@ -141,7 +141,7 @@ impl Controller {
         self.period_us
     }
 
-    /// Returns the time since the last accepted request of the session, µs.
+    /// Returns the time since the last accepted request, µs; before the first, the time since the start of the clock.
     #[must_use]
     pub fn silence_us(&self, now_us: u64) -> u64 {
         now_us.saturating_sub(self.heard_us)
@@ -215,8 +215,8 @@ impl Controller {
         Some(Reply::Status(frame.sequence))
     }
 
-    /// Switches the coils off at once after the loss of the link, ends the session, and sets the condition `LINK_LOST` unless the
-    /// controller was disarmed.
+    /// Switches the coils off at once after the loss of the link, ends the session, and sets the condition `LINK_LOST`; no effect
+    /// while the controller is disarmed.
     pub fn link_lost(&mut self, now_us: u64) {
         if self.mode != Mode::Disarmed {
             self.disarm(now_us);
@@ -347,7 +347,7 @@ impl Controller {
     }
 
     /// Creates the next status frame, with mode, condition and the newest sample; `acknowledged` is the sequence number of the
-    /// newest accepted request.
+    /// answered request.
     pub fn status(&mut self, acknowledged: u32) -> AnswerFrame {
         let Sample { pose, twist, .. } = self.sample;
         let orientation = pose.orientation();

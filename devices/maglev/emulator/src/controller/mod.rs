@@ -1,9 +1,9 @@
 //! The controller's firmware as a state machine: the device's side between link and coils.
 //!
 //! The controller trusts no host. It accepts one session at a time, each command once and only while valid; limits force,
-//! torque and their slew; keeps the flotor inside its own boundary, and lands before a flotor beyond that leaves the
-//! sensors' range. If no request arrives within the watchdog timeout, the controller holds, lands and stays faulted until
-//! disarmed.
+//! torque and their slew rates; keeps the flotor inside its own wall, and lands before the flotor leaves the sensors'
+//! range. If no request arrives within the watchdog timeout while the flotor levitates, the controller holds, lands and
+//! stays faulted until disarmed.
 //!
 //! ```text
 //!            arm            take off              silence               held            down

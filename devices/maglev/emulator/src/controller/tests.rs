@@ -1,4 +1,4 @@
-//! The state machine in simulated time: who is obeyed, for how long, and what happens in silence.
+//! State machine in simulated time: accepted hosts, validity of commands, and behaviour without requests.
 #![allow(clippy::cast_possible_truncation)] // random bytes
 
 #[path = "../../tests/machine/mod.rs"]

@@ -25,7 +25,7 @@ const KEPT_PACKETS: usize = 32;
 /// Pause after which a HID host counts as detached: a reading host requests the next report within microseconds.
 const FETCHES_NO_MORE: Duration = Duration::from_millis(5);
 
-/// Use of the device by a host, numbered.
+/// Id of an attachment of a host to the device; each attachment has a new id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Attachment(u64);
 
@@ -187,7 +187,7 @@ impl Bus {
         state.used
     }
 
-    /// Queues a packet for the host.
+    /// Queues a packet for the host; a full queue drops the oldest packet.
     pub(super) fn send(&self, attachment: Attachment, packet: &[u8]) -> Result<(), Detached> {
         let mut state = self.lock();
         state.check(attachment)?;
@@ -198,7 +198,7 @@ impl Bus {
         state.deliver().map_err(|_| Detached)
     }
 
-    /// Waits until a packet from the host arrives, or the host detaches.
+    /// Waits until a packet from the host arrives or the host detaches, at most for `patience`.
     pub(super) fn wait_for_packet(&self, attachment: Attachment, patience: Duration) {
         drop(self.wait(self.lock(), attachment, patience));
     }
@@ -215,7 +215,8 @@ impl Bus {
         waited.unwrap_or_else(PoisonError::into_inner).0
     }
 
-    /// Waits for the oldest packet from the host; `None` after the timeout `patience`.
+    /// Removes and returns the oldest packet from the host; waits for a packet if there is none, and returns `None` after the
+    /// timeout `patience`.
     pub(super) fn take(
         &self,
         attachment: Attachment,

@@ -1,4 +1,4 @@
-//! The device on its bus without a kernel: what a host controller would send, by hand.
+//! Device on its bus without a kernel: the test sends the messages of a host controller.
 
 use super::{Gadget, Personality};
 use flotor_maglev::transport::{Incoming, LinkLost};

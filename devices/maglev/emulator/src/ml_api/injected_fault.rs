@@ -35,7 +35,7 @@ pub enum Deed {
 pub enum InjectedFaultKind {
     /// Treatment of one call in place of the normal reply.
     Call(Deed),
-    /// Status in every Nth reply.
+    /// Reply with this status, without any effect, to every Nth call.
     Status(Status, u32),
     /// A tick delayed by 50 ms.
     LateTick,
@@ -184,7 +184,7 @@ impl Plan {
         self.silenced == Some(client)
     }
 
-    /// Returns the treatment of a client's next call.
+    /// Returns the treatment of a client's next call; a fault of a single call is used up.
     pub(super) fn deed(&mut self, client: u64) -> Deed {
         if self.has_silenced(client) {
             return Deed::Silence;

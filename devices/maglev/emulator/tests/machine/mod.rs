@@ -1,4 +1,4 @@
-//! The machine of the thesis.
+//! Capabilities of the device of the thesis.
 
 use flotor_hal::{Axes, Capabilities};
 

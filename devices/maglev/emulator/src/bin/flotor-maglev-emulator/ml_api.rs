@@ -79,7 +79,7 @@ fn watchdog_ms(text: &str) -> Result<f64, String> {
 }
 
 impl MlApiArguments {
-    /// Returns the default settings of the plant.
+    /// Returns the settings of a flotor at rest on its stator; none with the simulated hand.
     pub(crate) fn plant_defaults(&self) -> &'static [(&'static str, &'static str)] {
         match self.hand {
             HandOption::None => ON_STATOR,

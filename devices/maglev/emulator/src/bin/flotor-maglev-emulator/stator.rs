@@ -19,7 +19,7 @@ const TURN_NMS_PER_RAD: f64 = 0.03;
 /// Settling time of the flotor on its stator before the emulation starts, in steps of 1 ms.
 const SETTLING_MS: u64 = 500;
 
-/// A plant with a stator below.
+/// Plant with a stator below the flotor.
 pub(crate) struct OnStator<P> {
     plant: P,
     sample: Sample,

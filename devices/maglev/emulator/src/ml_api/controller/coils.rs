@@ -18,7 +18,7 @@ pub(super) struct CoilSet {
     coils: Option<Coils>,
     optics: Option<Optics>,
     thermal: Thermal,
-    /// Current limit of each coil set by a client, A.
+    /// Current limit of each coil, A: the limit of the device until a client sets another.
     pub(super) limits_a: AxisValues,
     currents_a: Currents,
 }

@@ -98,7 +98,7 @@ pub(super) struct AxisError {
     pub(super) speed_off: f64,
 }
 
-/// Returns force or torque of the PIDF law without its integral, N or N·m.
+/// Returns force or torque of the PIDF law without the integral term, N or N·m.
 pub(super) fn force(pid: Pid, error: AxisError) -> f64 {
     f64::from(pid.p) * error.off + f64::from(pid.d) * error.speed_off + f64::from(pid.ff)
 }

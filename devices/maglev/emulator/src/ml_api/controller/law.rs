@@ -83,8 +83,8 @@ impl Controller {
         [mode, beyond]
     }
 
-    /// Advances the integrals by a cycle, s. The sum is a force: a changed gain acts from then on, and a gain of zero
-    /// resets the sum.
+    /// Advances the integral terms by a cycle of `dt_s`. The stored sum is a force or torque, so that a changed gain acts from then
+    /// on. The sum is reset while all integral gains of the axis are zero, and unless the flotor levitates under its gains.
     pub(super) fn integrate(&mut self, dt_s: f64) {
         let are_held = self.flight == Flight::Flying
             && (matches!(self.command, Command::Position | Command::Velocity(_))

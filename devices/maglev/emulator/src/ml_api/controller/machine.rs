@@ -131,7 +131,7 @@ pub struct Controller {
     pub(super) ranges: [[f32; 2]; 6],
     pub(super) desired: [f64; 6],
     pub(super) desired_told: AxisValues,
-    /// Force and torque of the integrals, N and N·m.
+    /// Integral terms of the control law by axis, N and N·m.
     pub(super) integral_n: [f64; 6],
     /// Offset added by the search for gravity, N and N·m.
     pub(super) trim: [f64; 6],
@@ -140,7 +140,7 @@ pub struct Controller {
     pub(super) faults: FaultBits,
     pub(super) injected: Injected,
     pub(super) sample: Sample,
-    /// Position and angles, default frame.
+    /// Position, m, and angles, rad, in the default frame.
     pub(super) at: [f64; 6],
     pub(super) speed: [f64; 6],
     pub(super) frame: AxisValues,
@@ -157,7 +157,7 @@ pub struct Controller {
     pub(super) events: Vec<Event>,
 }
 
-/// Stored settings of a grasp; the machine has none.
+/// Stored settings for grasping; the emulated device has no gripper.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Grasp {
     pub(super) gains: Pid,
@@ -193,7 +193,8 @@ impl Controller {
         self.flight
     }
 
-    /// Returns the fault bits; a fault stays set until a client resets the faults.
+    /// Returns the fault bits; a fault stays set until a client resets the faults after the end of its cause, or restarts the
+    /// controller.
     pub fn faults(&self) -> FaultBits {
         self.faults
     }
@@ -250,7 +251,7 @@ impl Controller {
     }
 
     /// Returns the wrench over a servo interval of `dt_s`, for the newest command within the limits of the coils; heats
-    /// the coils and advances the integrals.
+    /// the coils and advances the integral terms.
     pub fn drive(&mut self, dt_s: f64) -> Wrench {
         let wanted = self.wanted();
         self.integrate(dt_s);

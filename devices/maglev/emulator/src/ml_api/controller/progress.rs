@@ -111,7 +111,7 @@ impl Controller {
         self.finished.push((procedure_id, reply));
     }
 
-    /// Advances the procedure and the target of a velocity command by a cycle of `dt_s`.
+    /// Advances the procedure, the gain resets and the target of a velocity command by a cycle of `dt_s`.
     pub(super) fn advance(&mut self, dt_s: f64) {
         if let (Command::Velocity(speeds), Flight::Flying) = (self.command, self.flight) {
             for (desired, speed) in self.desired.iter_mut().zip(speeds) {

@@ -1,4 +1,4 @@
-//! The controller over a free body: what its procedures find has a closed form, and what it is told it says again.
+//! Controller over a free body: results of procedures against closed forms, and settings read back.
 
 use super::{Answer, Controller, ControllerConfig, Flight, ForceCommand, ProcedureId};
 use crate::controller::Sample;

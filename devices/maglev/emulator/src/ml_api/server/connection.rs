@@ -13,7 +13,7 @@ pub(super) fn is_gone(stream: &TcpStream) -> bool {
     gone || stream.set_nonblocking(false).is_err()
 }
 
-/// Sends a frame in one write: a second one would wait for an acknowledgement (Nagle).
+/// Sends a frame in a single write; returns false if the connection is lost or the write times out.
 pub(super) fn send(stream: &mut TcpStream, bytes: &[u8]) -> bool {
     stream.write_all(bytes).is_ok()
 }

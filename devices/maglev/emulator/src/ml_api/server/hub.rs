@@ -77,7 +77,8 @@ impl Hub {
         Some(wrench)
     }
 
-    /// Advances the coil temperatures and the integrals by a servo interval of `dt_s`, and returns the wrench over the interval.
+    /// Advances the coil temperatures and the integral terms by a servo interval of `dt_s`, and returns the wrench over the
+    /// interval.
     #[must_use]
     pub fn drive(&self, dt_s: f64) -> Wrench {
         self.state().controller.drive(dt_s)
@@ -135,7 +136,7 @@ impl Hub {
         id
     }
 
-    /// Removes a client; lands the flotor if this client commanded it.
+    /// Removes a client; lands the flotor if this client commanded it, unless the loss of a client is ignored ([`Silence`]).
     pub(super) fn disconnect(&self, id: Id) {
         let mut state = self.state();
         let Some(place) = state.clients.iter().position(|client| client.id == id) else { return };

@@ -11,12 +11,12 @@ use std::collections::VecDeque;
 /// Callback that receives each log line.
 pub type Log = Box<dyn Fn(std::fmt::Arguments<'_>) + Send + Sync>;
 
-/// Number of a connection; for a callback connection, also the token.
+/// Id of a connection; for a callback connection, also the token.
 pub(super) type Id = u64;
 
 /// Maximum number of queued events; a client that reads no events loses the oldest.
 pub(super) const EVENTS: usize = 256;
-/// Number of the first connection.
+/// Id of the first connection.
 const FIRST: Id = 101;
 
 pub(super) struct State {
