@@ -2,8 +2,8 @@
 //!
 //! A spring and a damper about a target hold the handle (the gains of the device's client program, made stable for period
 //! and delay). During take-off the target moves home along a minimum-jerk curve (Flash and Hogan 1985), so that the force
-//! starts at zero; during landing the gains fade. The spring force at rest is the weight (D5: the literature gives three
-//! masses for one flotor); the device applies it as a feedforward from then on.
+//! starts at zero; during landing stiffness and feedforward fade. The spring force at rest is the weight (D5: the literature gives
+//! three masses for one flotor); the device applies it as a feedforward from then on.
 //!
 //! Not real-time: runs before and after the loop.
 

@@ -22,7 +22,7 @@ pub(crate) enum Unanswered {
     Silent,
 }
 
-/// The newest status, with the sequence number of the request that it answers.
+/// Status with the sequence number of the answered request.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AcknowledgedStatus {
     pub(crate) status: Status,
@@ -171,7 +171,8 @@ impl HostLink {
         pages.ok_or(Unanswered::Silent)
     }
 
-    /// Begins a session and takes off. Not real-time.
+    /// Disarms the controller, begins a session and starts the levitation; returns the first status in the mode Levitating. Not
+    /// real-time.
     pub(crate) fn take_off(
         &mut self,
         period_us: u32,

@@ -27,7 +27,7 @@ const EVENTS_PER_LOOK: usize = 32;
 /// Slew rate of force and torque, N/s and N·m/s: full scale in a millisecond.
 const SLEW: [f64; 2] = [55.0e3, 6.3e3];
 
-/// The opened device: the controller has identified itself; the flotor lies on its stator.
+/// The opened device: the controller has identified itself and is not commanded yet.
 pub(crate) struct MlDevice {
     session: Session,
     facts: Facts,

@@ -22,7 +22,7 @@ const VALID_PERIODS: u64 = 3;
 /// Rounding tolerance of the squared length of a quaternion's vector part in `f32`.
 const LENGTH_TOLERANCE: f64 = 1.0e-5;
 
-/// The opened device: the controller has described itself; the coils are off.
+/// The opened device: the controller has described itself; no session has begun.
 pub(crate) struct OwnDevice {
     options: Options,
     link: HostLink,

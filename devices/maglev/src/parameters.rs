@@ -206,7 +206,7 @@ pub(crate) enum Gravity {
     Defy,
 }
 
-/// Options fixed while the loop runs: all parameters but the walls.
+/// Options fixed while the loop runs, parsed from the parameters of connection, timing, feed-forward, take-off and landing.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Options {
     pub(crate) protocol: Protocol,

@@ -1,5 +1,5 @@
-//! Any bytes give frames or reasons, never a panic: frames that were right, wounded in every way a link and a bad host
-//! know, as packets and on a stream. `FLOTOR_TEST_SIZE=full` makes it 1e8 of them; `tests/fuzz` has the same for libFuzzer.
+//! Fuzzing of the decoders: any bytes give a frame or a rejection, never a panic. The inputs are valid frames, damaged at random,
+//! as packets and on a stream; 1e8 with `FLOTOR_TEST_SIZE=full`. `tests/fuzz` has the same targets for libFuzzer.
 #![allow(clippy::cast_possible_truncation)] // random bytes
 
 #[path = "../../../tests/src/random.rs"]

@@ -1,6 +1,6 @@
-//! Any bytes give requests, replies and events of the ML API or nothing, never a panic: frames that were right, wounded in every
-//! way a link and a bad program know, whole and on a stream. `FLOTOR_TEST_SIZE=full` makes it 1e8 of each; `tests/fuzz` has the same
-//! for libFuzzer.
+//! Fuzzing of the decoders of the ML API: any bytes give a request, a reply, an event or an error, never a panic. The inputs are
+//! valid frames, damaged at random, whole and on a stream; 1e8 of each with `FLOTOR_TEST_SIZE=full`. `tests/fuzz` has the same
+//! targets for libFuzzer.
 #![allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)] // random bytes
 
 #[path = "../../../tests/src/random.rs"]

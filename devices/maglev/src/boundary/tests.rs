@@ -1,4 +1,4 @@
-//! Walls: where they begin, which way they push, and that damping acts once.
+//! Walls: start, direction of the force, and damping that acts once.
 
 use super::{THESIS_ANGLE_LIMIT_RAD, Wall, Walls};
 use flotor_hal::{DQuat, DVec3, DeviceState, Pose, SampledLoop, Twist};

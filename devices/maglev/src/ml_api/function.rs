@@ -69,9 +69,9 @@ functions! {
     GetDesiredPosition = 12,
     /// Returns the fault bits.
     GetFault = 14,
-    /// Returns the force of one axis.
+    /// Returns the applied force or torque of one axis.
     GetForceAxis = 15,
-    /// Returns the commanded wrench.
+    /// Returns the applied wrench.
     GetForces = 16,
     /// Returns the frame set by a client.
     GetFrame = 17,
@@ -117,7 +117,7 @@ functions! {
     RegisterBoundary = 38,
     /// Registers for overheated coils.
     RegisterOvertemp = 39,
-    /// Registers for servo intervals.
+    /// Registers for ticks, one per servo interval.
     RegisterTick = 40,
     /// Clears the faults whose cause has ended.
     ResetFault = 41 commands,

@@ -66,7 +66,7 @@ impl Intake {
         }
     }
 
-    /// Returns true if a frame has arrived in part.
+    /// Returns true if bytes after the last returned frame have arrived.
     #[must_use]
     pub fn has_partial_frame(&self) -> bool {
         self.filled > self.returned

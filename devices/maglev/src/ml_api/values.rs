@@ -82,7 +82,7 @@ pub struct Pid {
 }
 
 impl Pid {
-    /// Gains without any force.
+    /// All gains and the feed-forward zero.
     pub const ZERO: Self = Self { p: 0.0, i: 0.0, d: 0.0, ff: 0.0 };
 
     /// Returns a mutable reference to the gain of this kind.

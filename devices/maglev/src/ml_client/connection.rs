@@ -89,7 +89,7 @@ impl Control {
         Self { line, outstanding: None, is_lost: false }
     }
 
-    /// Returns true after a timeout or an error; no further call is sent.
+    /// Returns true after an error of the connection or a timeout of [`Self::call`]; no further call is then sent.
     pub(crate) fn is_lost(&self) -> bool {
         self.is_lost
     }
@@ -109,7 +109,8 @@ impl Control {
         self.keep(sent)
     }
 
-    /// Receives the reply to the outstanding call; `None` if it misses the budget. Real-time: bounded, no allocation.
+    /// Receives the reply to the outstanding call within `budget`; `None` without an outstanding call, or if the reply does not
+    /// arrive in time: the call then stays outstanding. Real-time: bounded, no allocation.
     pub(crate) fn finish(&mut self, budget: Duration) -> Result<Option<Reply>, NoResults> {
         let Some((function, _)) = self.outstanding else { return Ok(None) };
         let taken = self.line.take(budget);

@@ -46,7 +46,7 @@ pub(crate) struct Plan {
 pub(crate) struct TakenOff {
     /// Pose of the first tick.
     pub(crate) pose: WirePose,
-    /// Wrench that balances the weight of the flotor, N and N·m.
+    /// Wrench that balances the weight of the flotor, N and N·m; zero if not measured.
     pub(crate) gravity: AxisValues,
 }
 
@@ -249,7 +249,8 @@ impl Session {
         Ok(())
     }
 
-    /// Unregisters from events, restores the gains to hold the pose `at`, and lands. Continues after an error.
+    /// Unregisters from events, restores the gains to hold the pose `at` (`None`: leaves the gains unchanged), and lands. Continues
+    /// after an error.
     pub(crate) fn land(&mut self, at: Option<WirePose>) {
         for kind in KINDS.into_iter().rev() {
             let (_, unregister) = kind.functions();

@@ -62,7 +62,7 @@ impl Writer {
     }
 }
 
-/// A frame with valid length, checksum, magic and version.
+/// Decoder of a frame with valid length, checksum, magic and version, field by field.
 pub(super) struct Reader<'b> {
     bytes: &'b [u8; FRAME_BYTES],
 }

@@ -95,7 +95,7 @@ impl Description {
         Some(Self { axes, ranges, limits })
     }
 
-    /// Returns the serial number as text; drops bytes that are not printable ASCII. Not real-time.
+    /// Returns the serial number as text; drops spaces and all bytes that are not printable ASCII. Not real-time.
     #[must_use]
     pub fn serial_text(&self) -> String {
         self.axes.serial.iter().filter(|byte| byte.is_ascii_graphic()).map(|byte| char::from(*byte)).collect()

@@ -49,13 +49,13 @@ pub enum Request {
 /// Request from the host, with its envelope.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RequestFrame {
-    /// Sequence number, incremented with every frame of a session.
+    /// Sequence number, incremented with every frame.
     pub sequence: u32,
     /// Sequence number of the newest reply received by the host; 0 before the first.
     pub acknowledged: u32,
     /// The host's clock, µs, wrapping.
     pub time_us: u32,
-    /// Session number chosen by the host when arming; frames of another session are rejected.
+    /// Session number chosen by the host when arming; requests of another session are rejected, except `Describe`.
     pub session: u32,
     /// Request, the payload of the frame.
     pub request: Request,
@@ -197,7 +197,7 @@ pub enum Answer {
 pub struct AnswerFrame {
     /// Sequence number, incremented with every reply.
     pub sequence: u32,
-    /// Sequence number of the newest accepted request.
+    /// Sequence number of the answered request.
     pub acknowledged: u32,
     /// The controller's clock when the sample was taken, µs, wrapping.
     pub time_us: u32,

@@ -19,7 +19,7 @@ pub enum Rejection {
     NotFinite,
     /// Sequence number repeated from the last accepted frame.
     Duplicate,
-    /// Sequence number older than that of the last accepted frame.
+    /// Sequence number older than the last accepted number.
     Old,
     /// Frame of another session, for example of a host that has been replaced.
     Session,

@@ -1,4 +1,4 @@
-//! The codec: every frame comes back, nothing else comes through. (Wounded frames by the million: `tests/fuzz.rs`.)
+//! Codec: every frame is decoded as encoded, and all other bytes are rejected. (Fuzzing: `tests/fuzz.rs`.)
 
 use super::codec::FRAME_BYTES;
 use super::description::{AxesPage, Description, LimitsPage, PAGES, RangesPage, serial_bytes};
