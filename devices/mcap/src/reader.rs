@@ -132,7 +132,7 @@ impl<R: Read + Seek, T: Copy> MessageReader<R, T> {
         })
     }
 
-    /// Returns the name of the library that wrote the file; empty before the first message.
+    /// Returns the name of the library that wrote the file; empty before the first call of [`Self::next_message`].
     #[must_use]
     pub fn library(&self) -> &str {
         &self.library
@@ -144,7 +144,7 @@ impl<R: Read + Seek, T: Copy> MessageReader<R, T> {
         self.ending
     }
 
-    /// Returns the next message; `None` at the end, and after an error. Not real-time.
+    /// Returns the next message; `None` at the end of the data. Do not call again after an error. Not real-time.
     ///
     /// # Errors
     /// [`Damage`] at the current position.
