@@ -125,7 +125,7 @@ impl Functions {
     }
 }
 
-/// Number of a parameter with `N` values.
+/// Id of a parameter with `N` values.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Numbers<const N: usize>(c_uint);
 
@@ -145,7 +145,7 @@ pub(crate) const MAX_TORQUE: Numbers<1> = Numbers(0x2622);
 /// Proof that the scheduler has ended and calls no client any more.
 pub(crate) struct Stopped(());
 
-/// Scheduled client.
+/// Client in the SDK's scheduler: handle and callback data.
 pub(crate) struct Scheduled<C> {
     handle: c_ulong,
     data: *mut C,
