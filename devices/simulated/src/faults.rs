@@ -40,7 +40,8 @@ pub struct FaultPlan {
     pub start_ns: u64,
     /// Length of every episode, ns.
     pub duration_ns: u64,
-    /// Mean number of random episodes per second; if not zero, there is no planned episode.
+    /// Mean rate of random episodes, 1/s; an episode that begins during another prolongs it. If not zero, there is no planned
+    /// episode.
     pub rate_per_s: f64,
 }
 

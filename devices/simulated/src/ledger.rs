@@ -107,7 +107,7 @@ impl Ledger {
         self.now
     }
 
-    /// Returns the works since the start of the balance. Real-time: bounded, no allocation.
+    /// Returns the work by source since the start of the balance. Real-time: bounded, no allocation.
     #[must_use]
     pub fn work(&self) -> Work {
         self.work

@@ -96,7 +96,7 @@ pub struct Sensing {
 }
 
 impl Sensing {
-    /// Creates the sensors; `start` is the initial guess of the pose solver, and at rest the value of all samples
+    /// Creates the sensors; `start` is the initial guess of the pose solver and, with zero velocity, the value of all samples
     /// before the first. Real-time: bounded, no allocation.
     ///
     /// # Errors

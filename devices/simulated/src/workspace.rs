@@ -25,7 +25,7 @@ pub const STIFFNESS_LIMIT_N_PER_M: f64 = 25.0e3;
 /// Pose of the flotor relative to the range of the sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SensorRange {
-    /// Translation and rotation are within range: all three light spots are on their cells.
+    /// Translation and rotation are within the range of the sensors.
     Inside,
     /// The flotor is out of range, or the pose is not finite: the pose is invalid.
     Outside,

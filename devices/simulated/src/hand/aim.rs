@@ -62,7 +62,7 @@ impl Aim {
     }
 }
 
-/// Intention of the hand during a piece of time, device frame: the aim interpolated linearly.
+/// Intention of the hand during a piece of time, device frame: position interpolated linearly, orientation and force constant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intention {
     /// Intended position of the handle at the start, m.

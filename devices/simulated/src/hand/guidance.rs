@@ -132,8 +132,9 @@ impl Guidance {
         self.is_guide_speaking = false;
     }
 
-    /// Advances by `dt_s` (s) to the time `now_ns`. Returns the aim of the hand, and the contribution of the guide to its
-    /// velocity, m/s. `scripted` is the aim of the trajectory at `now_ns`, `handle` the motion of the handle before the step.
+    /// Advances by `dt_s` (s) to the time `now_ns`. Returns the aim of the hand, and the contribution of the guide to the
+    /// intended velocity, m/s. `scripted` is the aim of the trajectory at `now_ns`, `handle` the motion of the handle before
+    /// the step.
     ///
     /// Real-time: bounded, no allocation.
     pub(crate) fn advance(

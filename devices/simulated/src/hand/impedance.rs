@@ -45,7 +45,7 @@ impl Impedance {
     /// and Kappers 2015, Sci. Rep. 5:18004).
     ///
     /// Rotation is an estimate: a passive wrist has 1 to 2 N·m/rad (Formica et al. 2012, J. Neurophysiol.
-    /// 108:1158); the damping gives the flotor, 4e-3 kg m² about the handle, a damping ratio of about 0.4.
+    /// 108:1158); the damping, with the drag of the flotor (4e-3 kg m² about the handle), gives a damping ratio of about 0.4.
     pub const RELAXED: Self = Self {
         stiffness_n_per_m: DVec3::splat(135.0),
         damping_ns_per_m: DVec3::splat(6.45),
@@ -57,8 +57,8 @@ impl Impedance {
     /// A firm grip: 0.5 kg, 70 N s/m, 2000 N/m, the operator usually quoted from Hashtrudi-Zaad and Salcudean's studies of
     /// teleoperation. Stiff enough to compress a spring of 1 N/mm with an intended depth of only 1.5 times the compression.
     ///
-    /// Rotation is an estimate: a tensed wrist, twice the passive one (see [`Self::RELAXED`]), damping ratio
-    /// about 0.45.
+    /// Rotation is an estimate: the upper end of the range of a passive wrist (see [`Self::RELAXED`]), damping ratio with the drag
+    /// of the flotor about 0.45.
     pub const FIRM: Self = Self {
         stiffness_n_per_m: DVec3::splat(2000.0),
         damping_ns_per_m: DVec3::splat(70.0),

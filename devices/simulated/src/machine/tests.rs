@@ -1,4 +1,4 @@
-//! The machine around the simulation: what it changes when nothing is wrong, and what each fault does.
+//! Actuators and sensors around the simulation: their effect without a fault, and the effect of each fault.
 
 use super::*;
 use crate::actuation::field::FieldError;

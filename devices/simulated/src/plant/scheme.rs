@@ -63,7 +63,8 @@ impl Scheme {
         &self.body
     }
 
-    /// Advances by `piece_ns` in one straight step; returns the new motion and the work done, or `None` if not exact.
+    /// Advances by `piece_ns` in one straight step; returns the new motion and the work done, or `None` if one straight step is not
+    /// exact.
     ///
     /// Real-time: bounded, no allocation.
     #[inline]

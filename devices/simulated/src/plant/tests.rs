@@ -1,4 +1,4 @@
-//! The plant against closed forms: oscillator, free fall, ramps, tops, pendulum; order of the integrator.
+//! Plant against closed forms (oscillator, free fall, ramps, spinning tops, pendulum), and order of the integrator.
 
 mod tumbling;
 

@@ -96,8 +96,8 @@ impl Optics {
     /// Computes positions and directions of diodes and lenses. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a length or the gap between diodes and lenses is not positive, an azimuth is not finite, or the diodes stand in a line:
-    /// the rotation about that line would be unobservable.
+    /// If a length is not positive, the gap between diodes and lenses is not above 24 mm, an azimuth is not finite, or the diodes
+    /// stand in a line: the rotation about that line would be unobservable.
     pub fn new(geometry: &OpticsGeometry) -> Result<Self, InvalidParameter> {
         number("led_radius_mm", geometry.diode_radius_m, Domain::Positive)?;
         let gap_m = geometry.lens_radius_m - geometry.diode_radius_m - REGION_M;

@@ -1,4 +1,4 @@
-//! Poses from light spots, their errors, delay, and the trade of the velocity estimates.
+//! Poses from light spots, their errors and delay, and the trade-off of noise and lag in the velocity estimates.
 
 use super::*;
 use crate::validation::InvalidParameter;

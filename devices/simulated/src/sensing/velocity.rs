@@ -93,8 +93,8 @@ impl Estimator {
         self.velocity
     }
 
-    /// Updates the estimate with a pose measured `dt_s` (s) after the previous pose; returns the velocity, zero after
-    /// the first pose. Real-time: bounded, no allocation.
+    /// Updates the estimate with a pose measured `dt_s` (s) after the previous pose; returns the velocity: zero after
+    /// the first pose, unchanged if `dt_s` is 0. Real-time: bounded, no allocation.
     pub fn update(&mut self, pose: &Pose, dt_s: f64) -> Velocity {
         let Some(last) = self.last.filter(|_| dt_s > 0.0) else {
             self.last = Some(*pose);

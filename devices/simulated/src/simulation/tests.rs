@@ -1,4 +1,4 @@
-//! Whole runs: energy, splitting of ticks, release, totality.
+//! Whole runs: energy balance, splitting of ticks, release of the handle, and finite results for any input.
 
 mod guided;
 

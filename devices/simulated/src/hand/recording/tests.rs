@@ -1,4 +1,4 @@
-//! Recorded trajectories: the way between samples, and files that hold none.
+//! Recorded trajectories: interpolation between samples, and files without a trajectory.
 
 use super::*;
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! Scripts: what they mean, and what becomes of those that mean nothing.
+//! Scripts: their movements, and errors of invalid scripts.
 
 use super::*;
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! The response functions against closed forms, and the Gramian against a finer one.
+//! Response functions against closed forms, and the Gramian against a finer quadrature.
 
 use super::*;
 

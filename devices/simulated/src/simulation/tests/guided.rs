@@ -1,4 +1,4 @@
-//! A hand that a client guides: the force at a wall, taking and releasing without a jump, clock and energy.
+//! Guidance of the hand by a client: force at a wall, start and release without a jump of the force, clock and energy balance.
 
 use super::*;
 
