@@ -36,7 +36,7 @@ pub enum Report {
 }
 
 impl Report {
-    /// Parses a report, whose first byte is its number. Real-time: bounded, no allocation.
+    /// Parses a report; the first byte is its HID report id. Real-time: bounded, no allocation.
     #[must_use]
     pub fn parse(bytes: &[u8]) -> Self {
         match bytes {

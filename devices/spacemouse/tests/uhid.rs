@@ -1,6 +1,6 @@
-//! The plugin on a puck that the kernel believes in: an emulated HID device at /dev/uhid, found and read through hidraw.
+//! Plugin with an emulated puck: a HID device created through /dev/uhid, found and read through hidraw.
 //!
-//! Needs a /dev/uhid that this user may write: `.ci/vm` runs it in a machine that has one.
+//! Needs write permission for /dev/uhid: `.ci/vm` runs the test in a virtual machine with this permission.
 
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Plugin;
