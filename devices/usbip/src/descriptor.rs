@@ -57,7 +57,8 @@ pub enum Supply {
     Own = 0xc0,
 }
 
-/// Encodes the only configuration, with the descriptors of `interfaces` interfaces in `body`.
+/// Encodes the only configuration, with the descriptors of `interfaces` interfaces in `body`; `twice_milliampere`: largest current
+/// from the bus, in units of 2 mA.
 #[must_use]
 pub fn configuration(interfaces: u8, supply: Supply, twice_milliampere: u8, body: &[u8]) -> Vec<u8> {
     let [low, high] = u16::try_from(9 + body.len()).unwrap_or(0).to_le_bytes();
@@ -65,14 +66,15 @@ pub fn configuration(interfaces: u8, supply: Supply, twice_milliampere: u8, body
     [&head, body].concat()
 }
 
-/// Encodes an interface descriptor; `class`: class, subclass and protocol, `name`: its string descriptor or 0.
+/// Encodes an interface descriptor; `class`: class, subclass and protocol; `name`: index of the string descriptor of the
+/// interface, 0 for none.
 #[must_use]
 pub fn interface(number: u8, alternate: u8, endpoints: u8, class: [u8; 3], name: u8) -> [u8; 9] {
     let [class, subclass, protocol] = class;
     [9, INTERFACE, number, alternate, endpoints, class, subclass, protocol, name]
 }
 
-/// Encodes an endpoint descriptor with a transfer type and a polling interval.
+/// Encodes an endpoint descriptor; `packet_bytes`: largest packet, `interval`: polling interval, coded as `bInterval`.
 #[must_use]
 pub fn endpoint(address: u8, transfer_type: u8, packet_bytes: u16, interval: u8) -> [u8; 7] {
     let [low, high] = packet_bytes.to_le_bytes();

@@ -107,7 +107,7 @@ pub fn stall(stream: &mut impl Write, transfer: &Transfer) -> io::Result<()> {
     end(stream, SUBMITTED, transfer.number, STALLED, 0, &[])
 }
 
-/// Executes the unlink request `number`: removes the transfer from the pending ones, unless it was complete before.
+/// Executes and answers the unlink request `number`: removes the transfer from the pending ones, unless it was complete before.
 ///
 /// # Errors
 /// Errors of the stream.
