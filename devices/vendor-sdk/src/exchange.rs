@@ -46,7 +46,7 @@ pub struct Sample {
     pub conditions: Conditions,
 }
 
-/// Lock-free exchange of samples and wrenches, with stop and fault.
+/// Exchange of samples and wrenches, with stop and fault. In real pace the loop reads and writes without a lock.
 #[derive(Debug)]
 pub struct Exchange {
     pace: Pace,
@@ -248,7 +248,7 @@ impl Exchange {
         self.wait(patience, || self.samples() > seen || self.fault().is_some());
     }
 
-    /// Returns true if the thread does not wait for the loop, and must limit its own rate.
+    /// Returns true if the thread of the SDK does not wait for the loop, and must limit its own rate.
     #[must_use]
     pub fn runs_free(&self) -> bool {
         self.pace == Pace::Real || self.is_stopped()

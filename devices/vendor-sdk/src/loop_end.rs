@@ -5,7 +5,7 @@ use flotor_hal::{Cycle, DVec3, DeviceState, Fault, SafeStop, SampleWait, Tick, W
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Stop that removes the force of an exchange, from any thread.
+/// Stop handle that removes the force of an exchange, usable from any thread.
 #[derive(Clone, Debug)]
 pub struct StopSwitch(pub Arc<Exchange>);
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// Error of loading the library of an SDK.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LibraryProblem {
-    /// No folder contains the library.
+    /// No folder contains the library, or the chosen file does not exist.
     NotFound {
         /// Name of the SDK.
         sdk: &'static str,
@@ -43,7 +43,7 @@ pub enum LibraryProblem {
         /// Error of the loader.
         reason: String,
     },
-    /// The file is a drop-in library of Flotor, which would load Flotor once more.
+    /// The file is Flotor's own drop-in library, which simulates a device, and the policy rejects drop-in libraries.
     StandIn {
         /// Path of the file.
         path: PathBuf,

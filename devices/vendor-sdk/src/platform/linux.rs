@@ -21,7 +21,7 @@ pub(crate) fn missing_remedy(path: &Path) -> String {
     format!("`ldd {}` lists the required libraries and the missing ones", path.display())
 }
 
-/// Returns the file names of a library on Linux, `files`.
+/// Returns `files`, the file names of a library on Linux.
 pub(crate) fn files(
     files: &'static [&'static str],
     _on_windows: &'static [&'static str],

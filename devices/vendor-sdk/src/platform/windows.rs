@@ -18,7 +18,7 @@ pub(crate) fn missing_remedy(path: &Path) -> String {
     format!("a library that {} needs is missing; install the whole SDK", path.display())
 }
 
-/// Returns the file names of a library on Windows, `on_windows`.
+/// Returns `on_windows`, the file names of a library on Windows.
 pub(crate) fn files(
     _files: &'static [&'static str],
     on_windows: &'static [&'static str],
