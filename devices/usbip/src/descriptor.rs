@@ -57,12 +57,12 @@ pub enum Supply {
     Own = 0xc0,
 }
 
-/// Encodes the only configuration, with the descriptors of `interfaces` interfaces in `body`; `twice_milliampere`: largest current
+/// Encodes the only configuration, with the descriptors of `interfaces` interfaces in `body`; `current_2ma`: largest current
 /// from the bus, in units of 2 mA.
 #[must_use]
-pub fn configuration(interfaces: u8, supply: Supply, twice_milliampere: u8, body: &[u8]) -> Vec<u8> {
+pub fn configuration(interfaces: u8, supply: Supply, current_2ma: u8, body: &[u8]) -> Vec<u8> {
     let [low, high] = u16::try_from(9 + body.len()).unwrap_or(0).to_le_bytes();
-    let head = [9, CONFIGURATION, low, high, interfaces, 1, 0, supply as u8, twice_milliampere];
+    let head = [9, CONFIGURATION, low, high, interfaces, 1, 0, supply as u8, current_2ma];
     [&head, body].concat()
 }
 
