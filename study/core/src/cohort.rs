@@ -92,8 +92,8 @@ impl Cohort {
         }
     }
 
-    /// Runs the study with `jobs` subjects at a time and writes the tables. `watch` is called after each trial is on disk;
-    /// `stop` ends the study after the trials in progress. Not real-time.
+    /// Runs the study with `jobs` subjects at a time and writes the tables. `watch` is called after each trial is on disk; `stop`
+    /// ends the study; a trial in progress then counts as not presented. Not real-time.
     ///
     /// Checks the logs of all subjects before the first presentation.
     ///

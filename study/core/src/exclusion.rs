@@ -121,7 +121,7 @@ impl ExclusionRules {
         )
     }
 
-    /// Formats a rule as in the study file: `most_false_alarms = 0.5`; a rule that is not set as its name.
+    /// Formats a rule as in the study file: `most_false_alarms = 0.5`; for a rule that is not set, returns its name.
     #[must_use]
     pub fn text_of(&self, rule: &str) -> String {
         let said = serde_json::to_value(self).unwrap_or_default();

@@ -127,8 +127,8 @@ pub(crate) fn with_repeat_checks(
     all
 }
 
-/// Returns the demonstration before a modality of a magnitude experiment: the smallest, the largest and random other stimuli,
-/// in random order.
+/// Returns the demonstration before a modality of a magnitude experiment: at most `protocol.demo` stimuli (the smallest, the
+/// largest, and random others) in random order.
 pub(crate) fn magnitude_demo(protocol: &MagnitudeProtocol, draws: Draws, modality: Modality) -> Vec<f64> {
     let mut sorted = protocol.values.clone();
     sorted.sort_by(f64::total_cmp);

@@ -20,7 +20,7 @@ use std::time::Duration;
 /// Settling time, longer than the loop takes to apply a change and the observers take to report the change.
 const SETTLE: Duration = Duration::from_millis(20);
 
-/// Real-time apparatus of one person. Dropping it stops the run.
+/// Real-time apparatus of one person. Dropping the apparatus stops the run.
 pub struct RealTimeRig<'a> {
     apparatus: &'a Apparatus,
     kinematics: Kinematics,
@@ -95,7 +95,7 @@ impl<'a> RealTimeRig<'a> {
         })
     }
 
-    /// Records every tick of every trial from now on, one file per trial.
+    /// Records every tick of all later trials, one file per trial; practice before a resumed sitting is not recorded.
     pub fn record_into(&mut self, files: TrialFiles) {
         self.shared.expect_recordings();
         self.files = Some(files);

@@ -105,7 +105,7 @@ pub struct Estimate {
     pub sigma: f64,
     /// Criterion for "I don't know", in standard deviations of the noise.
     pub criterion: f64,
-    /// Difference at which the target is reached, as a fraction of the base.
+    /// Threshold: difference at which `P(correct) + P(don't know) / 2`, lapses aside, equals the target, as a fraction of the base.
     pub threshold: f64,
 }
 

@@ -74,7 +74,7 @@ pub struct Posterior {
 }
 
 impl Posterior {
-    /// Returns the normalised prior.
+    /// Creates the posterior before the first answer, the normalised prior.
     #[must_use]
     pub fn new(grid: &PosteriorGrid) -> Self {
         let mut posterior = Self { weights: grid.observers.iter().map(|member| member.prior).collect() };

@@ -24,7 +24,8 @@ pub struct Psychometric {
     pub named: usize,
     /// Number of wrong answers.
     pub wrong: usize,
-    /// p-value of worse than chance: probability of at least this many wrong answers by guessing (binomial, 0.5).
+    /// p-value of the test for performance below chance: probability of at least [`Self::wrong`] wrong answers among the
+    /// [`Self::named`] ones by guessing (binomial, 0.5).
     pub p_chance: f64,
     /// Posterior median of the threshold, as a fraction of the base.
     pub threshold: f64,

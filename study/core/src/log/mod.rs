@@ -6,8 +6,8 @@
 //! {"chain":"...","event":{"trial":{...}},"time":"2026-11-25T18:34:09.123Z"}    with a person
 //! ```
 //!
-//! `chain` is the SHA-256 of the previous line's `chain` and of event and time of its own line, so a changed, missing or
-//! exchanged line breaks the chain from that line on. The chain protects against accidents, not against forgery, because anyone
+//! `chain` is the SHA-256 of the previous line's `chain` followed by the event and the time of the same line, so a changed, missing
+//! or exchanged line breaks the chain from that line on. The chain protects against accidents, not against forgery, because anyone
 //! can recompute it. An incomplete last line, which a killed process leaves, is ignored.
 
 mod error;

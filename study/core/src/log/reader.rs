@@ -1,4 +1,5 @@
-//! Reader of a log, which verifies chain, syntax, order of events, and by a replay of the experiment the trials and verdicts.
+//! Reader of a log: verifies the hash chain, the syntax and the order of the events, and, by a replay of the experiment, the trials
+//! and verdicts.
 
 use super::error::{LogError, LogProblem};
 use super::{Begin, CHAIN_START, Event, FORMAT, Incident, LogWriter, TrialEvent, chain, parts, unstamped};

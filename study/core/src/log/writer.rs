@@ -92,8 +92,8 @@ impl LogWriter {
         }
     }
 
-    /// Writes an event; first an incident if the system's time of day was set. Returns once the event is on disk. Not
-    /// real-time.
+    /// Writes an event. With time stamps, first writes an incident if the system's time of day was set. Returns once the event is
+    /// on disk. Not real-time.
     ///
     /// # Errors
     /// If the file cannot be written.

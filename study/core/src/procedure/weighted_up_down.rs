@@ -266,8 +266,8 @@ impl WeightedUpDown {
         self.reversals >= self.rule.stop_after || self.trials >= self.rule.trials_most
     }
 
-    /// Returns the threshold, the mean of the counted differences, as a fraction of the base; `None` before the last reversal,
-    /// or if the track ended without that reversal.
+    /// Returns the threshold, the mean of the counted differences, as a fraction of the base; `None` before the last reversal, if
+    /// the track ended without the last reversal, or if no trial counts in the mean.
     #[must_use]
     pub fn threshold(&self) -> Option<f64> {
         let complete = self.reversals >= self.rule.stop_after && self.counted > 0;

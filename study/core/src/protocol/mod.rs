@@ -111,7 +111,7 @@ pub enum AtBoundary {
         /// Maximum number of repeats of one trial.
         most: u32,
     },
-    /// Counts the answer and records the hit.
+    /// Counts the answer and logs that the handle left its range.
     Keep,
 }
 

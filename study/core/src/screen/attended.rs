@@ -24,7 +24,7 @@ pub enum Step {
     Read(String),
     /// Note to be logged; the screen does not change.
     Note(String),
-    /// The person stopped the sitting.
+    /// The person stopped the sitting, or gave any input but a note after the last trial.
     Stopped,
 }
 

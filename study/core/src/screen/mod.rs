@@ -114,7 +114,7 @@ pub enum Question {
 /// Data on a trial for a front end, without the stimulus values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrialView {
-    /// Count of presentations in the sitting, from 1.
+    /// Number of this presentation in the sitting, from 1.
     pub number: u32,
     /// Estimated number of presentations in the sitting.
     pub of_about: u64,
@@ -126,7 +126,7 @@ pub struct TrialView {
     pub repeat: u32,
     /// Number of stimuli: one to rate, or two to compare.
     pub stimuli: usize,
-    /// Judged quality.
+    /// Quality of the stimulus that the subject judges: stiffness or force.
     pub quality: Quality,
     /// Optional inputs that the screen accepts.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
