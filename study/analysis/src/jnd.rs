@@ -42,7 +42,7 @@ impl<T> WeberFractions<T> {
     }
 }
 
-/// Mean threshold in one condition: a bar of figure 18.
+/// Mean threshold in one condition: a bar of figure 18 in CMU-RI-TR-07-21.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ThresholdCell {
     /// Modality of the condition.
@@ -72,8 +72,8 @@ pub struct JndAnalysis {
     pub anova: Vec<Effect>,
     /// Effect of the base on the Weber fraction, within each modality; `None` for a single base.
     pub constancy: WeberFractions<Option<Effect>>,
-    /// R² of the linear trend of thresholds over bases (mean of both modalities); NaN (`null` in JSON) without three bases, or
-    /// with equal means.
+    /// R² of the linear trend of thresholds over bases (mean of both modalities); NaN (`null` in JSON) with fewer than three bases,
+    /// or with equal means.
     pub linear_r2: f64,
     /// Thresholds by condition.
     pub thresholds: Vec<ThresholdCell>,

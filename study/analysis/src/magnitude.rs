@@ -14,7 +14,7 @@ use flotor_study::protocol::{MagnitudeProtocol, RatingScale};
 use flotor_study::trial::{Modality, Presented, Response};
 use serde::Serialize;
 
-/// Mean rating of a stimulus: a point of figure 17.
+/// Mean rating of a stimulus: a point of figure 17 in CMU-RI-TR-07-21.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RatingCell {
     /// Modality of the condition.

@@ -105,8 +105,8 @@ pub enum Direction {
     Falls,
 }
 
-/// Returns the direction of change published in section 5; `None` for a measure without one. The text: "velocity and
-/// acceleration are directly proportional and force is inversely proportional to the rendered gamma".
+/// Returns the direction of change published in section 5; `None` for a measure without a published direction. Section 5 states:
+/// "velocity and acceleration are directly proportional and force is inversely proportional to the rendered gamma".
 #[must_use]
 pub fn direction(measure: &str) -> Option<Direction> {
     match measure {

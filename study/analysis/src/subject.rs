@@ -41,7 +41,7 @@ pub struct SubjectQuality {
     pub tracks: Vec<TrackResult>,
     /// Psychometric functions of a difference experiment; empty for ratings.
     pub conditions: Vec<SubjectCondition>,
-    /// Quartiles of the time from the end of a presentation to the answer, s; `None` if unknown.
+    /// Quartiles of the time from the end of a presentation to the answer, s; `None` if not measured.
     pub response_time_s: Option<[f64; 3]>,
     /// Fraction of "I don't know" among the answers; `None` for ratings or without answers.
     pub dont_know: Option<f64>,
