@@ -17,7 +17,7 @@ enum Command {
     Analyse(analyse::AnalyseArguments),
 }
 
-/// Function that returns the command-line parser of all commands. Not real-time.
+/// Function that returns the command-line parser of `study` and `analyse`. Not real-time.
 pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
 /// Runs the command given on the command line and returns its exit code. Not real-time.

@@ -1,5 +1,5 @@
-//! HTML page of a study, a single self-contained file: figure 17 or 18 of CMU-RI-TR-07-21 with the study's data, and all
-//! results beside the results of the thesis.
+//! HTML page of a study, a single self-contained file: figure 17 or 18 of CMU-RI-TR-07-21 with the study's data, and all results; a
+//! comparable study also has the results of the thesis.
 
 mod figures;
 

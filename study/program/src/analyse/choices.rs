@@ -76,7 +76,7 @@ impl Choices {
         [own, ("type", word(&self.sums))]
     }
 
-    /// Describes each option of this task that differs from `from`, the plan.
+    /// Describes each option of this task whose value differs from the planned options `from`.
     pub(crate) fn deviations(self, from: Self, protocol: &Protocol) -> Vec<String> {
         let both = self.of_task(protocol).into_iter().zip(from.of_task(protocol));
         let different = both.filter(|(used, planned)| used != planned);

@@ -90,7 +90,7 @@ pub(super) enum ForceWay {
 }
 
 impl ForceWay {
-    /// Returns the settings of the load for this kind of force.
+    /// Returns the settings of the model `load` for this kind of force.
     pub(super) fn load(self) -> &'static [&'static str] {
         match self {
             Self::Felt => &["load.kind=felt"],
@@ -110,7 +110,7 @@ impl ForceWay {
     }
 }
 
-/// Returns the population of simulated subjects for pairs of a stimulus; `way` is the kind of force in a force experiment.
+/// Returns the population of simulated subjects who compare pairs of a stimulus; `way` is the kind of force in a force experiment.
 ///
 /// # Errors
 /// If no Weber fraction of the stimulus is published.
