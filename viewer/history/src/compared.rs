@@ -1,11 +1,11 @@
-//! Second recording, shown over another run for comparison.
+//! Second recording, shown over the displayed run for comparison.
 
 use crate::History;
 use flotor_hal::Pose;
 use flotor_record::ReadError;
 use std::path::Path;
 
-/// Recording with traces and handles that are shown over another run. Times count from the start of each run, and devices are
+/// Recording whose traces and handles are shown over the displayed run. Times count from the start of each run, and devices are
 /// matched by their order in the scenes.
 #[derive(Clone, Debug)]
 pub struct Compared {
@@ -29,14 +29,15 @@ impl Compared {
         self.histories.get(device)
     }
 
-    /// Returns the pose of each handle in its device frame at a time, s; `None` if the recording has no sample at this time.
+    /// Returns the pose of each handle in its device frame at a time, s; `None` before the first sample and in a gap. After the end
+    /// of the recording, the last pose is valid.
     #[must_use]
     pub fn handles(&self, now_s: f64) -> Vec<Option<Pose>> {
         let pose = |history: &History| history.seen_at(now_s).map(|sample| sample.pose);
         self.histories.iter().map(pose).collect()
     }
 
-    /// Returns name, rate and length of the recording as one line of text.
+    /// Returns file name, tick rate and end time of the recording as one line of text.
     #[must_use]
     pub fn text(&self) -> String {
         let (rate_hz, [_, last_s]) =

@@ -1,14 +1,15 @@
 //! Decimation of traces without a visible change: smallest and largest value of each bucket of time.
 //!
-//! Buckets lie at whole multiples of their width from time zero, not from the edge of the picture: while a trace
-//! scrolls, a sample stays in its bucket and the trace does not shimmer.
+//! Buckets lie at whole multiples of their width from time zero, not from the edge of the plot: while a trace scrolls, a sample
+//! stays in its bucket and the trace does not shimmer.
 
 use std::collections::VecDeque;
 
 /// Point of a trace: time, s, and value.
 pub type Point = [f64; 2];
 
-/// Returns the width of a bucket, s: the next power of two from `span_s / buckets`, so that a small zoom moves no edge of a bucket.
+/// Returns the width of a bucket, s: the smallest power of two not below `span_s / buckets`, so that a small zoom moves no edge of
+/// a bucket.
 #[must_use]
 pub fn bucket_width_s(span_s: f64, buckets: usize) -> f64 {
     let wanted_s = (span_s / buckets.max(1) as f64).max(f64::MIN_POSITIVE);

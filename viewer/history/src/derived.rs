@@ -9,8 +9,9 @@ const LEAST_WAY_M: f64 = 50.0e-6;
 /// Threshold of a point with force, as a fraction of the largest force: above the rounding of a recording.
 const LEAST_FORCE: f64 = 0.01;
 
-/// Returns the stiffness felt along the motion, N/m: the secant `-dF/dx` from the newest earlier sample that is far enough away
-/// (`earlier` has the newest first). Positive where the force grows against the motion; NaN where the handle rests.
+/// Returns the stiffness felt along the motion, N/m: the secant `-dF/dx` from the newest earlier sample at a distance of at least
+/// 50 µm (`earlier` has the newest first). Positive where the force grows against the motion; NaN without such a sample, as while
+/// the handle rests.
 #[must_use]
 pub fn felt_stiffness_n_per_m<'a>(earlier: impl Iterator<Item = &'a Sample>, now: &Sample) -> f64 {
     for before in earlier {
@@ -28,9 +29,10 @@ pub fn felt_stiffness_n_per_m<'a>(earlier: impl Iterator<Item = &'a Sample>, now
 pub struct ForcePosition {
     /// Position, m, and force on the hand, N, in order of time.
     pub points: Vec<[f64; 2]>,
-    /// Stiffness fitted to the points with force (contact without free motion), N/m; `None` if the handle rests.
+    /// Stiffness fitted to the points with more than 1 % of the largest force (contact without free motion), N/m; `None` if the
+    /// standard deviation of their positions is at most 50 µm.
     pub stiffness_n_per_m: Option<f64>,
-    /// Stiffness fitted to all points, with force and without, N/m; `None` if the handle rests.
+    /// Stiffness fitted to all points, N/m; `None` if the standard deviation of the positions is at most 50 µm.
     pub stiffness_of_all_n_per_m: Option<f64>,
     /// Number of whole cycles, and mean energy that a cycle takes from the hand, J: the area of the loop. `None` without a whole
     /// cycle.

@@ -140,7 +140,8 @@ impl History {
         self.run.devices().nth(usize::from(self.device)).map_or("", |device| device.name.as_str())
     }
 
-    /// Adds a tick of this device, and ignores ticks of other devices; at the limit of retained samples, removes the oldest sample.
+    /// Adds a tick of this device with its felt stiffness, and ignores ticks of other devices; at the limit of retained samples,
+    /// removes the oldest sample.
     pub fn push(&mut self, record: &TickRecord) {
         if record.device != self.device {
             return;
@@ -161,8 +162,8 @@ impl History {
         self.samples.push_back(sample);
     }
 
-    /// Adds a change of a parameter, not earlier than the last change, and removes the changes before the first retained sample.
-    /// Ignores a change that guides a hand, because each motion of a pointer sends such a change.
+    /// Adds the time of a parameter change, not earlier than the last change, and removes the changes before the first retained
+    /// sample. Ignores a change that guides a hand, because each motion of a pointer sends such a change.
     pub fn push_change(&mut self, time_ns: u64, parameter: &str) {
         let [first_s, _] = self.span_s();
         while self.retention != Retention::All
@@ -237,8 +238,8 @@ impl History {
         (age_s >= 0.0 && (is_last || age_s <= self.gap_s())).then_some(sample)
     }
 
-    /// Returns the tick rate of the loop in the second up to a time, Hz: a missed tick does not count, a tick without a sample does.
-    /// `None` before the second tick.
+    /// Returns the tick rate of the loop in the second up to a time, Hz: a missed tick does not count, a tick without a sample
+    /// does. `None` with fewer than two samples in this second.
     #[must_use]
     pub fn tick_rate_hz(&self, now_s: f64) -> Option<f64> {
         const OVER_S: f64 = 1.0;

@@ -66,7 +66,7 @@ impl Quantity {
         }
     }
 
-    /// Returns the smallest range of an axis, in these units.
+    /// Returns the smallest range of an axis, in the unit of [`Self::unit`].
     #[must_use]
     pub fn least_range(self, units: Units) -> f64 {
         self.entry().2.least_range_si() * self.unit(units).1
