@@ -1,4 +1,4 @@
-//! Places of the devices of a run in the picture: side by side, each in its own frame, because the positions of their bases are
+//! Places of the devices of a run in the scene: side by side, each in its own frame, because the positions of their bases are
 //! unknown.
 
 use flotor_hal::DVec3;
@@ -19,7 +19,7 @@ impl Placing {
         Self { count, spacing_m: (1.1 * height_m).max(2.6 * radius_m) }
     }
 
-    /// Returns the home position of a device in the picture, m.
+    /// Returns the home position of a device in the scene, m.
     #[must_use]
     pub fn place_m(&self, device: usize) -> DVec3 {
         let middle = 0.5 * (self.count.max(1) - 1) as f64;

@@ -35,7 +35,7 @@ pub struct View<'a> {
     pub size: [usize; 2],
 }
 
-/// Rasteriser; its buffers are reused from picture to picture.
+/// Rasteriser; its buffers are reused from frame to frame.
 #[derive(Debug, Default)]
 pub struct Rasterizer {
     color: Vec<[u8; 3]>,
@@ -56,7 +56,7 @@ struct Corner {
 impl Rasterizer {
     /// Draws a mesh with `samples` × `samples` samples per pixel (supersampling).
     ///
-    /// Skips triangles with a vertex nearer than the near plane.
+    /// Skips triangles that face away from the eye, or have a vertex nearer than the near plane.
     pub fn draw(&mut self, mesh: &Mesh, view: &View<'_>, samples: usize) -> Image {
         let [width, height] = view.size.map(|length| length.max(1) * samples);
         self.begin(view.backdrop, [width, height]);

@@ -1,6 +1,6 @@
 //! Ground of the scene: a grid that fades out, and soft shadows, as visual cues for height and depth.
 //!
-//! Grid and surface are static; only the shadows change from picture to picture.
+//! Grid and surface are static; only the shadows change from frame to frame.
 
 use super::{Color, MM_PER_M, Mesh, Vertex};
 use flotor_hal::DVec3;
@@ -42,13 +42,15 @@ const LINE_HALF_WIDTH: f64 = 0.012;
 const LINE_LIFT: f64 = 0.002;
 
 impl Ground {
-    /// Adds surface and lines, without shadows. Call it first: bodies on the ground cover the ground.
+    /// Adds surface and grid lines, without shadows. The ground must be the first part of the mesh: bodies cover it, and
+    /// [`Ground::shade`] darkens the first vertices.
     pub fn append(&self, mesh: &mut Mesh) {
         self.surface(mesh);
         self.lines(mesh);
     }
 
-    /// Darkens the surface's vertices added by [`Ground::append`] by the shadows; replaces earlier shadows.
+    /// Darkens the vertices of the surface, which [`Ground::append`] has added at the start of `corners`, by the shadows; replaces
+    /// earlier shadows.
     pub fn shade(&self, corners: &mut [Vertex], shadows: &[Shadow]) {
         for corner in corners.iter_mut().take((RINGS + 1) * (SECTORS + 1)) {
             let [x_mm, y_mm, _] = corner.position_mm.map(f64::from);

@@ -9,7 +9,7 @@ pub const MM_PER_M: f64 = 1.0e3;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Vertex {
-    /// Position, mm, in the frame of the picture (z up).
+    /// Position, mm, in the frame of the scene (z up).
     pub position_mm: [f32; 3],
     /// Unit normal; zero for an unlit surface.
     pub normal: [f32; 3],

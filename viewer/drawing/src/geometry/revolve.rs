@@ -56,8 +56,8 @@ pub fn revolve(mesh: &mut Mesh, frame: &Frame, profile: &[(f64, f64)], sides: us
     }
 }
 
-/// Adds an end plate: a disc with chamfered rims that touches the plane of a section and lies outside of it.
-/// `outward` is +1 for the end at the handle and -1 for the fixed end.
+/// Adds an end plate: a disc with chamfered rims, with one face in the plane of a section and the other beyond the body. `outward`
+/// is +1 for the end at the handle and -1 for the fixed end.
 pub fn plate(
     mesh: &mut Mesh,
     section: &Section,

@@ -3,14 +3,14 @@
 use super::Frame;
 use flotor_hal::{DVec3, Form, Primitive};
 
-/// Point of a surface that is closest to another point.
+/// Closest point of a surface to a query point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
     /// Position, m.
     pub position_m: DVec3,
     /// Unit vector out of the body.
     pub normal: DVec3,
-    /// Depth of the other point inside the body, m; negative outside.
+    /// Depth of the query point inside the body, m; negative outside.
     pub depth_m: f64,
 }
 

@@ -13,7 +13,7 @@ use pipeline::{Pipelines, ViewUniform, pipelines};
 use target::Target;
 use wgpu::{BufferDescriptor, BufferUsages, Device, Queue, TextureView};
 
-/// Renderer of scenes; buffers and textures are reused from picture to picture.
+/// Renderer of scenes; buffers and textures are reused from frame to frame.
 pub struct GpuScene {
     device: Device,
     queue: Queue,
