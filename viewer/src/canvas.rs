@@ -16,7 +16,7 @@ pub enum Canvas {
         scene: Box<GpuScene>,
         /// Device of the interface.
         state: RenderState,
-        /// Texture of the last picture and its size, pixels.
+        /// Texture of the last frame and its size, pixels.
         shown: Option<(TextureId, [usize; 2])>,
     },
     /// Rendering by the processor.
@@ -25,7 +25,7 @@ pub enum Canvas {
         rasterizer: Rasterizer,
         /// Samples per pixel and direction.
         samples: usize,
-        /// Texture of the last picture.
+        /// Texture of the last frame.
         texture: Option<TextureHandle>,
     },
 }

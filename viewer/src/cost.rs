@@ -1,4 +1,4 @@
-//! Cost of an open window: pictures, and processor time and memory of the whole process, the driver's threads included.
+//! Cost of an open window: frames, and processor time and memory of the whole process, the driver's threads included.
 
 use crate::platform::{processor, resident_mib};
 use egui::{Context, ViewportCommand, ViewportId};
@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 pub struct Cost {
     /// Duration of the measurement.
     pub elapsed: Duration,
-    /// Number of pictures.
+    /// Number of frames.
     pub pictures: u64,
     /// Processor time of all threads.
     pub processor: Duration,
@@ -32,7 +32,8 @@ impl fmt::Display for Cost {
     }
 }
 
-/// Measures the cost of a window on a separate thread, sends the result, and closes the window. Sends nothing if no thread starts.
+/// Measures the cost of a window over `duration` on a separate thread, after a start-up of at most 30 s; then sends the result, and
+/// closes the window. Sends nothing if no thread starts.
 pub fn watch(context: &Context, duration: Duration, tells: Sender<Cost>) {
     let context = context.clone();
     // The window is in its first picture, possibly drawn by this thread.

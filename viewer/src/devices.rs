@@ -105,7 +105,7 @@ impl Devices {
         })
     }
 
-    /// Adds a tick to its device.
+    /// Adds a tick to the history and the event counts of its device; ignores a tick of an unknown device.
     pub fn push(&mut self, record: &TickRecord) {
         if let Some(seen) = self.seen.get_mut(usize::from(record.device)) {
             seen.history.push(record);

@@ -46,7 +46,7 @@ impl EventCounts {
         &self.counts
     }
 
-    /// Returns the time of the first sample, s: a window that opens during a run has no earlier samples.
+    /// Returns the time of the first sample, s: a window that opens during a run has no earlier samples. 0 without samples.
     #[must_use]
     pub fn since_s(&self) -> f64 {
         self.since_s.unwrap_or(0.0)

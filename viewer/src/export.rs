@@ -89,7 +89,7 @@ pub fn least_height_px(plots: &PlotStack) -> f64 {
     f64::from((SCALE * (plots.least_height_pt() + TITLE_PT)).ceil())
 }
 
-/// Returns every sample of the displayed time as CSV, with a column and its unit for each component.
+/// Returns every sample of the displayed time span as CSV, with a column and its unit for each component.
 #[must_use]
 pub fn csv(history: &History, plots: &PlotStack) -> String {
     let [from_s, to_s] = plots.span_s(history);

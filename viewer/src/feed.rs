@@ -1,4 +1,4 @@
-//! Data feed of a running host: a reading thread, and the data since the last picture.
+//! Data feed of a running host: a reading thread, and the data received since the last frame.
 
 use flotor_core::trace::TickRecord;
 use flotor_live::{
@@ -35,7 +35,7 @@ pub enum FeedState {
     Lost(String),
 }
 
-/// Data received since the last picture.
+/// Data received since the last call of [`Feed::arrivals`].
 #[derive(Debug, Default)]
 pub struct Arrivals {
     /// Tick records of all devices, in order.
@@ -127,7 +127,7 @@ impl Feed {
         waiting.dropped_by_host + waiting.dropped_here
     }
 
-    /// Sends a request to the host and returns its number.
+    /// Sends a request to the host and returns the number of the request.
     ///
     /// # Errors
     /// [`LiveError::Connection`] if the host is gone.

@@ -3,15 +3,15 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Time over which pictures are counted.
+/// Time over which frames are counted.
 const OVER: Duration = Duration::from_secs(1);
 
-/// Counter of the pictures in the last second.
+/// Counter of the frames drawn in the last second, for the frame rate.
 #[derive(Clone, Debug, Default)]
 pub struct FrameRate(VecDeque<Instant>);
 
 impl FrameRate {
-    /// Counts a picture.
+    /// Counts a frame drawn at `now`.
     pub fn count(&mut self, now: Instant) {
         self.0.push_back(now);
         while self.0.front().is_some_and(|first| now.duration_since(*first) > OVER) {
@@ -19,7 +19,7 @@ impl FrameRate {
         }
     }
 
-    /// Returns the frame rate, Hz; `None` before the second picture.
+    /// Returns the frame rate over the second before the last frame, Hz; `None` with fewer than two frames in this second.
     #[must_use]
     pub fn hz(&self) -> Option<f64> {
         let span = self.0.back()?.duration_since(*self.0.front()?).as_secs_f64();

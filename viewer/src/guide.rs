@@ -31,7 +31,8 @@ struct Held {
 }
 
 impl Guide {
-    /// Finds the hands among the plugins of a running host, devices first; a recording has none.
+    /// Finds the hands among the plugins of a running host, which must have the devices first, in the scene's order. For a
+    /// recording, `plugins` is empty.
     #[must_use]
     pub fn new(plugins: &[PanelPlugin]) -> Self {
         let hand = |plugin: &PanelPlugin| has_hand(plugin).then(|| plugin.name.clone());
@@ -73,8 +74,8 @@ impl Guide {
         Some(Ask::Set { values: vec![self.value(device, GUIDE, "0".to_owned())] })
     }
 
-    /// Returns the request that is due at a time: the client's number with the changed coordinates, or alone to keep an unchanged
-    /// target; `None` if no request is due.
+    /// Returns the request that is due at a time: the client's number with the changed coordinates of the target, or only the
+    /// client's number to keep an unchanged target; `None` if no request is due.
     pub fn due(&mut self, now: Instant) -> Option<Ask> {
         let held = self.held.as_mut()?;
         let (device, target_mm, sent) = (held.device, held.target_mm, held.sent);

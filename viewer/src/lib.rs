@@ -5,12 +5,13 @@
 //!
 //! - [`feed`]: data of a running host, for a history (`flotor-history`); [`event_counts`]: counts of events; [`panel`]: parameters.
 //! - [`devices`]: devices of a run, one of them chosen.
-//! - [`trace`]: points of a plot from picture to picture; [`export`]: traces as files; [`display_options`]: options of a command line.
+//! - [`trace`]: points of a plot, updated with each frame; [`export`]: traces as files; [`display_options`]: options of a command
+//!   line.
 //! - [`shape`]: bodies of the models; [`scene`]: triangles of the bodies, made with `flotor-drawing`.
 //! - [`canvas`]: 3D view in the interface, drawn on a GPU or the processor; [`picture`]: a whole picture without a window, drawn
 //!   by [`flat`].
 //! - [`ui`], [`palette`]: parts of the interface; [`app`]: window with all parts; [`sound`]: acoustic warning.
-//! - [`window`]: opening of the window; [`cost`]: processor time and memory; [`frame_rate`]: pictures per second.
+//! - [`window`]: opening of the window; [`cost`]: processor time and memory; [`frame_rate`]: frames per second.
 //! - [`saved_settings`]: settings of the window, saved for the next window.
 //! - [`experiment`]: a sitting of a perception experiment, and its screens.
 //!

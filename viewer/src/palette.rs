@@ -1,8 +1,8 @@
 //! Colours, light and dark, distinguishable with any kind of colour vision.
 //!
-//! Lines and plates: after Okabe and Ito, "Color Universal Design" (2008), with a darker green and a lighter blue (on white: darker);
-//! the originals, equal in lightness, look alike without blue cones (tritanopia). Strain: viridis (van der Walt and Smith,
-//! 2015), whose lightness increases monotonically, so that it is readable in greyscale as well.
+//! Lines and plates: after Okabe and Ito, "Color Universal Design" (2008), with a darker green and a lighter blue (on white:
+//! darker); the original green and blue, equal in lightness, are indistinguishable without blue cones (tritanopia). Strain: viridis
+//! (van der Walt and Smith, 2015), whose lightness increases monotonically, so that it is readable in greyscale as well.
 
 use clap::builder::Resettable;
 use egui::Color32;
@@ -23,7 +23,7 @@ pub enum Look {
     Light,
 }
 
-/// All colours of a look.
+/// All colours of a colour scheme.
 #[derive(Clone, Copy, Debug)]
 pub struct Palette {
     /// Background of the 3D view.
@@ -63,7 +63,7 @@ pub struct Palette {
 }
 
 impl Look {
-    /// Returns the other look.
+    /// Returns the other colour scheme.
     #[must_use]
     pub const fn other(self) -> Self {
         match self {
@@ -74,7 +74,7 @@ impl Look {
 }
 
 impl Palette {
-    /// Returns the colours of a look.
+    /// Returns the colours of a colour scheme.
     #[must_use]
     pub const fn of(look: Look) -> Self {
         const fn rgb(r: u8, g: u8, b: u8) -> Color32 {

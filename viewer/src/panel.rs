@@ -26,7 +26,7 @@ pub enum Editability {
     Free,
     /// Not editable: follows from other parameters, or has no effect with them; with the plugin's message.
     Follows(String),
-    /// Not editable: set only when the plugin is created, or part of a recording.
+    /// Not editable: set only when the plugin is created, or part of a recording or of a run that is over.
     Fixed,
 }
 
@@ -72,7 +72,8 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// Creates a panel from the description of a plugin, by a running host or for a recording.
+    /// Creates a panel from the description of a plugin, by a running host or for a recording; leaves out parameters that guide a
+    /// hand.
     #[must_use]
     pub fn new(plugin: &PanelPlugin, purpose: PanelPurpose) -> Self {
         // Guidance parameters are left out: a hand is guided in the 3D view.
@@ -152,7 +153,7 @@ impl Panel {
         self.entries.iter_mut().for_each(|entry| entry.editability = Editability::Fixed);
     }
 
-    /// Discards changes that the host has not passed on, and displays the values in force.
+    /// Discards all requested values that are not in force yet, and displays the values in force.
     pub fn take_back(&mut self) {
         self.entries.iter_mut().filter(|entry| entry.wanted.is_some()).for_each(PanelEntry::give_up);
     }
@@ -181,7 +182,7 @@ impl Panel {
         Some(index)
     }
 
-    /// Displays the initial value of a parameter; returns true if that is a change, to be sent.
+    /// Displays the initial value of a parameter; returns true if the displayed value has changed and must be sent.
     pub fn reset(&mut self, index: usize) -> bool {
         let Some(entry) = self.entries.get(index).filter(|entry| entry.is_moved()) else { return false };
         let (before, first) = (entry.value.clone(), Value::read(&entry.parameter, &entry.parameter.first));

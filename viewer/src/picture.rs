@@ -24,7 +24,7 @@ pub struct PictureOptions {
     pub size_px: [usize; 2],
     /// Pixels per point: 2 draws everything twice as large as 1.
     pub scale: f32,
-    /// Look of the picture.
+    /// Colour scheme of the picture, light or dark.
     pub look: Look,
     /// Direction and zoom; `None`: the default view.
     pub view: Option<View>,
@@ -91,7 +91,8 @@ pub fn number_of(histories: &[History], name: &str) -> Result<usize, PictureErro
     })
 }
 
-/// Checks that a time, s, is inside a recording; a recording without ticks passes.
+/// Checks that a time, s, is inside a recording, from one period before its first tick to 1.5 periods after its last tick; a
+/// recording without ticks passes.
 ///
 /// # Errors
 /// [`PictureError::Moment`] if the time is outside.

@@ -1,9 +1,9 @@
-//! Ordering of clicks and keys for late pictures.
+//! Ordering of clicks and keys for late frames.
 //!
-//! A window that was busy gets all events since the last picture at once, and a widget then sees only the last position of the
-//! pointer: if the pointer moves on after the release of a slider, the slider would follow the pointer.
-//! This module passes each picture the events up to the next press or release, and the rest to later pictures: text typed after a
-//! click goes to the clicked field. Only the keys of an emergency stop are passed at once.
+//! A window that was busy gets all events since the last frame at once, and a widget then sees only the last position of the
+//! pointer: if the pointer moves on after the release of a slider, the slider would follow the pointer. This module passes each
+//! frame the events up to the next press or release, and the rest to later frames: text typed after a click goes to the clicked
+//! field. Only the keys of an emergency stop are passed at once.
 
 use crate::experiment::key_of;
 use egui::{Event, Key, RawInput};
@@ -13,16 +13,16 @@ use std::collections::VecDeque;
 /// Keys that may be the emergency stop.
 const STOP_KEYS: [Key; 3] = [key_of(StopKey::Escape), key_of(StopKey::Space), key_of(StopKey::F12)];
 
-/// Queue that splits the input of a late picture at presses and releases.
+/// Queue that splits the input of a late frame at presses and releases.
 #[derive(Debug, Default)]
 pub struct PointerOrder {
-    /// Events for later pictures, in order.
+    /// Events for later frames, in order.
     waiting: VecDeque<Event>,
 }
 
 impl PointerOrder {
-    /// Limits the input of a picture to the events up to the next press or release of a button; returns true if more events are
-    /// pending, so that another picture should be drawn at once.
+    /// Limits the input of a frame to the events up to the next press or release of a button, and the keys that may be the
+    /// emergency stop; returns true if more events are pending, so that another frame should be drawn at once.
     pub fn split(&mut self, input: &mut RawInput) -> bool {
         let arrived = std::mem::take(&mut input.events);
         let (ordered, others): (Vec<_>, Vec<_>) = arrived.into_iter().partition(is_in_order);

@@ -27,7 +27,7 @@ pub struct SavedSettings {
     pub side_pt: f32,
     /// Fraction of the height for the 3D view; `None`: depends on the height of the window.
     pub view_part: Option<f32>,
-    /// Width and height of the window, points without the zoom.
+    /// Width and height of the window without its frame, points at zoom 1.
     pub size_pt: [f32; 2],
     /// Size of text and lines, as a factor on the pixels per point of the display.
     pub zoom: f32,
@@ -58,7 +58,7 @@ impl SavedSettings {
         settings_folder().map(|folder| folder.join("flotor").join("viewer.toml"))
     }
 
-    /// Reads the settings; returns the defaults if the file is missing or invalid.
+    /// Reads the settings and limits size and zoom to usable values; returns the defaults if the file is missing or invalid.
     #[must_use]
     pub fn load(file: &Path) -> Self {
         let text = std::fs::read_to_string(file).unwrap_or_default();

@@ -24,8 +24,8 @@ pub struct ArrowScale {
 }
 
 impl ArrowScale {
-    /// Returns the scale at which the largest force and torque of the samples have arrows of full length; a smallest scale for small
-    /// or no samples.
+    /// Returns the scale at which the largest force and torque of the samples have arrows of full length, with a lower limit for
+    /// samples with small forces and torques, or without samples.
     pub fn fitting<'a>(samples: impl Iterator<Item = &'a Sample>) -> Self {
         /// Smallest scale: smaller forces and torques have short arrows.
         const LEAST: ArrowScale = ArrowScale { force_n: FULL_FORCE * 1.0e-3, torque_nm: 1.0e-5 };
@@ -45,7 +45,7 @@ impl ArrowScale {
         Self { force_n: force_n.map_or(self.force_n, |force_n| FULL_FORCE * force_n), ..self }
     }
 
-    /// Returns the larger of both scales.
+    /// Returns the larger force and the larger torque of both scales.
     pub fn larger(self, other: Self) -> Self {
         Self { force_n: self.force_n.max(other.force_n), torque_nm: self.torque_nm.max(other.torque_nm) }
     }
@@ -103,7 +103,7 @@ pub struct SceneFacts {
     pub grid_m: f64,
     /// Height of the lower end of the bodies, m.
     pub foot_m: f64,
-    /// Axes of the device frame in the frame of the picture.
+    /// Axes of the device frame in the frame of the scene.
     pub axes: [DVec3; 3],
     /// Scale of the arrows; `None` without arrows.
     pub arrows: Option<ArrowKey>,
@@ -143,7 +143,7 @@ const BARE_DEPTH: f64 = 0.3;
 const EMPTY_HEIGHT_M: f64 = 0.025;
 
 impl SceneBuilder {
-    /// Returns the height of the scene, mm: of the tallest body, or a default.
+    /// Returns the height of the scene, mm: of the tallest body, or 25 mm without bodies.
     #[must_use]
     pub fn height_mm(shapes: &[Shape]) -> f64 {
         let tallest = shapes.iter().map(Shape::height_m).fold(0.0, f64::max);

@@ -1,5 +1,5 @@
-//! Trace of a quantity over time, decimated to visible points and kept from picture to picture: for a running host, each
-//! picture processes only the new samples.
+//! Trace of a quantity over time, decimated to visible points and kept from frame to frame: for a running host, each frame
+//! processes only the new samples.
 
 use egui_plot::PlotPoint;
 use flotor_history::History;

@@ -23,7 +23,7 @@ const EXCESS: Events = Events::from_bits(
 );
 
 impl Viewer {
-    /// Processes all data received since the last picture, and searches for a run while there is none.
+    /// Processes all data received since the last frame, and searches for a run while there is none.
     pub(super) fn poll(&mut self, context: &Context) {
         let due = self.last_look.is_none_or(|last| last.elapsed() >= LOOK_PERIOD);
         let wanted = match &self.source {

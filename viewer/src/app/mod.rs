@@ -1,7 +1,7 @@
 //! Window of the viewer: state, and handling of a running host or a recording.
 //!
-//! A picture is drawn only after a change: new ticks, user input, or playback. This module owns all displayed state; the
-//! parts in [`crate::ui`] only show the state.
+//! A frame is drawn only after a change: new ticks, user input, or playback. This module owns all displayed state; the parts in
+//! [`crate::ui`] only show the state.
 
 mod hand;
 mod intake;
@@ -151,7 +151,7 @@ enum Audience {
 }
 
 impl Viewer {
-    /// Creates a window; without a render device, the 3D view is drawn by the processor.
+    /// Creates the viewer of a window with its initial content; without a render device, the 3D view is drawn by the processor.
     #[must_use]
     pub fn new(context: &Context, device: Option<&RenderState>, start: Start, look: Look) -> Self {
         style::apply(context, look);
@@ -221,7 +221,7 @@ impl Viewer {
         self.plots.choose(chosen);
     }
 
-    /// Returns the second recording over the run.
+    /// Returns the second recording shown over the run; `None` without one.
     #[must_use]
     pub fn compared(&self) -> Option<&Compared> {
         self.compared.as_ref()
@@ -261,13 +261,13 @@ impl Viewer {
         matches!(self.source, Source::Recording) && self.audience == Audience::Subject
     }
 
-    /// Returns the look, light or dark.
+    /// Returns the colour scheme, light or dark.
     #[must_use]
     pub fn look(&self) -> Look {
         self.look
     }
 
-    /// Returns the user's settings of the window, to be saved.
+    /// Returns the user's settings for saving; the size and the zoom of the window have their defaults here.
     #[must_use]
     pub fn settings(&self) -> SavedSettings {
         SavedSettings {
@@ -282,7 +282,7 @@ impl Viewer {
         }
     }
 
-    /// Restores the saved settings of the window.
+    /// Restores the saved settings, except size and zoom of the window.
     pub fn restore(&mut self, context: &Context, saved: &SavedSettings) {
         let SavedSettings { look, units, traces, shows_panel, side_pt, view_part, latest, .. } = saved;
         self.opening.restore(latest);

@@ -224,7 +224,7 @@ fn ask<'a>(trial: &TrialView, question: Question, texts: &'a Texts) -> Words<'a>
     Words { headline, text, keys: keys.to_owned() + &others(trial, texts) }
 }
 
-/// Returns the keys of a sitting pressed in this picture.
+/// Returns the keys of a sitting pressed in this frame.
 #[must_use]
 pub fn keys(ui: &Ui) -> Vec<StudyKey> {
     ui.input(|input| {

@@ -42,7 +42,7 @@ impl ExportFormat {
 /// Options for pictures of traces.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExportOptions {
-    /// Look of the picture.
+    /// Colour scheme of the picture, light or dark.
     pub look: Look,
     /// Width and height, pixels.
     pub size_px: [f64; 2],
@@ -58,7 +58,7 @@ impl Default for ExportOptions {
 }
 
 impl ExportOptions {
-    /// Shows controls for the options.
+    /// Shows controls by which the user changes the options.
     pub fn choose(&mut self, ui: &mut egui::Ui) {
         ui.horizontal(|ui| {
             ui.selectable_value(&mut self.look, Look::Light, "Light");

@@ -16,7 +16,7 @@ const LEAST_PLOT_PT: f32 = 90.0;
 /// Largest number of points drawn.
 const MOST_POINTS: usize = 2000;
 
-/// Curve of force over position along an axis, cached from picture to picture.
+/// Curve of force over position along an axis, cached from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub struct ForcePositionPlot {
     /// Axis, 0 to 2 (x, y, z); `None`: not shown.
@@ -26,7 +26,7 @@ pub struct ForcePositionPlot {
 }
 
 impl ForcePositionPlot {
-    /// Shows the plot, along z, or hides it.
+    /// Hides the shown plot, or shows the plot for the axis z.
     pub fn toggle(&mut self) {
         self.axis = if self.axis.is_some() { None } else { Some(2) };
     }

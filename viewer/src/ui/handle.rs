@@ -41,8 +41,8 @@ pub struct Drag {
     pointer: Pos2,
 }
 
-/// Shows a draggable handle, and moves the guide's target with the pointer. `to_device` converts a displacement in the scene, m, to
-/// the device frame.
+/// Shows a draggable handle. A drag starts to guide the hand, and moves the guide's target with the pointer. `to_device` converts a
+/// displacement in the scene, m, to the device frame.
 pub fn handle(
     ui: &Ui,
     (area, camera): (Rect, &Camera),

@@ -20,7 +20,7 @@ const CHANGE: &str = "parameter changed";
 const CROSS_PT: f32 = 4.5;
 const CROSS_DEPTH_PT: f32 = 8.0;
 
-/// Events of the displayed time, kept from picture to picture like the traces.
+/// Events of the displayed time span, kept from frame to frame like the traces.
 #[derive(Clone, Debug, Default)]
 pub struct Marks {
     width_s: f64,

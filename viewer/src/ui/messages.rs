@@ -59,7 +59,7 @@ impl Messages<'_> {
         }
     }
 
-    /// Shows the row, with warnings that do not fit as a count.
+    /// Shows the row of messages; replaces the warnings that do not fit with their count.
     pub fn show(&self, ui: &mut Ui, palette: &Palette) {
         match (self.extent, self.warnings) {
             (_, []) => {

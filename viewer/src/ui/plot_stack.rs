@@ -206,7 +206,7 @@ impl PlotStack {
         self.values_of(quantity).map(|values| values.map(|value| value * per_si))
     }
 
-    /// Clears traces and zoom, for another run.
+    /// Clears traces and zoom, for a new run.
     pub fn start_over(&mut self) {
         self.look_at_another();
         self.end_s = f64::INFINITY;
@@ -214,7 +214,7 @@ impl PlotStack {
         self.values.clear();
     }
 
-    /// Clears all traces, for another device of the same run.
+    /// Clears all traces, the marks and the curve of force over position, for a newly chosen device of the same run.
     pub fn look_at_another(&mut self) {
         self.traces.clear();
         self.forget_compared();
@@ -277,7 +277,7 @@ impl PlotStack {
         }
     }
 
-    /// Returns the number of samples processed so far: once for each quantity, not once for each picture.
+    /// Returns the number of samples processed so far: once for each quantity, not once for each frame.
     #[must_use]
     pub fn visited(&self) -> u64 {
         self.traces.values().map(Trace::visited).sum()
@@ -465,7 +465,7 @@ impl PlotStack {
         }
     }
 
-    /// Shows or hides a quantity; the last quantity cannot be hidden.
+    /// Shows or hides a quantity, and restores all traces if one is maximised; the last quantity cannot be hidden.
     pub fn toggle(&mut self, quantity: Quantity) {
         self.alone = None;
         match self.shown.iter().position(|shown| *shown == quantity) {

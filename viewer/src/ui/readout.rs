@@ -1,4 +1,4 @@
-//! Texts over the picture: title, numbers, warnings.
+//! Texts over the 3D view: title, numbers, warnings.
 
 use crate::palette::Palette;
 use crate::scene::SceneFacts;
@@ -113,7 +113,7 @@ pub fn rows(sample: &Sample, units: Units, palette: &Palette) -> Vec<NumberRow> 
     shown.into_iter().map(row).collect()
 }
 
-/// Returns the rows of the haptic and the graphic rate of a running session, Hz.
+/// Returns the rows of the haptic rate (ticks) and the graphic rate (frames) of a running session, Hz.
 #[must_use]
 pub fn rates(haptic_hz: Option<f64>, graphic_hz: Option<f64>, palette: &Palette) -> [NumberRow; 2] {
     let row = |name: &'static str, rate_hz: Option<f64>| {

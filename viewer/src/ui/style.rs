@@ -10,7 +10,7 @@ pub const BODY_PT: f32 = 13.5;
 /// Size of axes and remarks, points.
 pub const SMALL_PT: f32 = 11.5;
 
-/// Applies the colours and text sizes of a look to the interface.
+/// Applies the colours and text sizes of a colour scheme to the interface.
 pub fn apply(context: &Context, look: Look) {
     let palette = Palette::of(look);
     let theme = match look {

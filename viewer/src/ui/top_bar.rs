@@ -33,7 +33,7 @@ pub struct TopBar<'a> {
     pub scale: f32,
     /// Effect of the button for the panel.
     pub panel: PanelSwitch,
-    /// Current look, if a button can switch it.
+    /// Current colour scheme; `None` without a button that switches it.
     pub look: Option<Look>,
 }
 
@@ -86,7 +86,7 @@ impl RunStatus {
 pub enum TopBarRequest {
     /// Emergency stop.
     EmergencyStop,
-    /// Switch to the other look.
+    /// Switch to the other colour scheme.
     SwitchLook,
     /// Show or hide the panel.
     SwitchPanel,

@@ -32,7 +32,7 @@ pub struct Subject<'a> {
     pub scale: ArrowScale,
 }
 
-/// 3D view: camera, buffers, and the last picture.
+/// 3D view: camera, buffers, and the last frame.
 pub struct View3d {
     /// Camera of the view.
     pub camera: Camera,
@@ -47,7 +47,7 @@ pub struct View3d {
     drawn: Option<(Look3d, TextureId, SceneFacts)>,
 }
 
-/// All inputs of a picture, compared to reuse the last picture.
+/// All inputs of a frame, compared to reuse the last frame.
 #[derive(Clone, Debug, PartialEq)]
 struct Look3d {
     handles: Vec<(Pose, [f32; 6])>,
@@ -102,7 +102,7 @@ impl View3d {
         }
     }
 
-    /// Returns the total number of vertices built; constant while the picture is unchanged.
+    /// Returns the total number of vertices built; constant while the view is unchanged.
     #[must_use]
     pub fn corners_made(&self) -> u64 {
         self.builder.corners_made()
