@@ -38,7 +38,7 @@ impl Board {
         (Self { force_mn, is_ending, thread: Some(thread) }, theirs)
     }
 
-    /// Waits until the last received force equals `force_mn`.
+    /// Waits until the last received force equals `force_mn`; panics after ten seconds.
     pub fn wait_for_force_mn(&self, force_mn: i64) {
         let started = Instant::now();
         while self.force_mn.load(Ordering::Acquire) != force_mn {

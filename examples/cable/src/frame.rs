@@ -26,7 +26,7 @@ impl Decoder {
         Self { kind, last: [0; BYTES] }
     }
 
-    /// Adds a byte and returns the number of the frame that it completes.
+    /// Adds a byte; returns the number of the completed frame, `None` if the byte completes no frame.
     pub fn push(&mut self, byte: u8) -> Option<i16> {
         let [_, kind, low, high] = self.last;
         self.last = [kind, low, high, byte];
