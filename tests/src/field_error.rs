@@ -22,17 +22,17 @@ pub struct FieldError {
     pub direct_step_n: f64,
     /// Largest change of the membrane's own force over one period of the field, N: the step of a zero-order hold.
     pub held_step_n: f64,
-    /// Difference between a zero-order hold of the membrane's force, a period late, and the membrane, root mean square, N.
+    /// Root mean square difference between the membrane and a zero-order hold of the membrane's force that is one period late, N.
     pub held_rms_n: f64,
     /// Number of ticks in which the slew limit acted.
     pub slewed_ticks: usize,
-    /// Difference between field and membrane, root mean square, N.
+    /// Root mean square difference between field and membrane, N.
     pub rms_n: f64,
     /// Largest difference between field and membrane, N.
     pub worst_n: f64,
     /// Delay of the field against the membrane, s: the delay with the smallest difference.
     pub delay_s: f64,
-    /// Difference between field and membrane after compensation of the delay, in whole ticks, root mean square, N.
+    /// Root mean square difference between field and membrane after compensation of the delay in whole ticks, N.
     pub rms_delayed_n: f64,
 }
 

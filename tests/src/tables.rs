@@ -11,7 +11,7 @@ pub const WRENCH_HEADER: &str = "id,fx_n,fy_n,fz_n,tx_nm,ty_nm,tz_nm,energy_j,st
 /// Millimetre in metres, and newton millimetre in newton metres.
 pub const MM: f64 = 1.0e-3;
 
-/// Row of a table: cell by column name.
+/// Row of a table: cells by column name.
 pub type Row = BTreeMap<String, String>;
 
 /// Returns the number in a cell.

@@ -82,7 +82,7 @@ pub fn watch_strong(scene: &str) -> Watched {
     keep(prepared(Clock::Virtual, scene).with_strength(Strength::Strong))
 }
 
-/// Runs the text of a scene on the virtual clock as [`watch`], with another seed, and without the plugins built with the tests.
+/// Runs the text of a scene on the virtual clock as [`watch`], with the seed `seed`, and without the plugins built with the tests.
 ///
 /// # Panics
 /// As [`watch`].
