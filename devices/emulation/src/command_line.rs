@@ -21,7 +21,10 @@ pub fn arguments<T: Parser>() -> T {
 /// # Errors
 /// A message: the text is no number, or the number is outside the limits.
 pub fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
-    let number: f64 = text.trim().parse().map_err(|_| format!("`{text}` is not a number"))?;
+    let number: f64 = text
+        .trim()
+        .parse()
+        .map_err(|_| format!("`{text}` is not a number; write {least} to {most}, without the unit {unit}"))?;
     if (least..=most).contains(&number) {
         Ok(number)
     } else {
@@ -62,6 +65,9 @@ mod tests {
         for text in ["7.01", "0", "-1", "inf", "NaN"] {
             assert_eq!(within(text, 0.1, 7.0, "mm"), Err("must be 0.1 to 7 mm".to_owned()), "{text}");
         }
-        assert_eq!(within("1 mm", 0.1, 7.0, "mm"), Err("`1 mm` is not a number".to_owned()));
+        assert_eq!(
+            within("1 mm", 0.1, 7.0, "mm"),
+            Err("`1 mm` is not a number; write 0.1 to 7, without the unit mm".to_owned())
+        );
     }
 }
