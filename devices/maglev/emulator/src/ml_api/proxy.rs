@@ -102,8 +102,8 @@ impl ForceModel for MlApiModel {
         let (Some(listen), None) = (&self.listen, &self.server) else { return Ok(()) };
         let refused = |error| {
             Refusal::resource(format!(
-                "cannot listen at {listen}: {error}; choose another address \
-        with `listen`"
+                "cannot start the server at {listen}: {error}; end other programs of this user, or raise the limit of \
+                 its threads"
             ))
         };
         let port = Port::bind(listen, self.reach).map_err(|error| match error.kind() {
