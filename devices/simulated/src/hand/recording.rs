@@ -108,7 +108,9 @@ impl Sample {
         let pose = Pose { position_m, orientation };
         // Written so that NaN is rejected.
         if !(0.0..=1.0e6).contains(&time_s) {
-            return Err(format!("time {time_s} s is outside 0 to 1000000 s after the first pose"));
+            return Err(format!(
+                "time {time_s} s is outside 0 to 1000000 s after the first pose; give ascending times in seconds"
+            ));
         }
         pose.check().map_err(|error| error.to_string())?;
         let inside = position_m.abs().max_element() <= FARTHEST_M;
