@@ -122,7 +122,7 @@ fn describe(registry: &Registry, id: &str, sets: &[KeyValue], json: &JsonOption)
         print_certificate(&plugin, sets)?;
     } else if !sets.is_empty() {
         return Err(CommandError::Usage(format!(
-            "--set: `{id}` is a device; only models have an error estimate"
+            "--set: `{id}` is a device, and only models have an error estimate; omit --set"
         )));
     }
     Ok(())
