@@ -25,7 +25,10 @@ pub(super) fn untouched(subject: &Subject, before: &Host) -> Result<(), Outcome>
     before.compare("loading")?;
     live(subject, &mut |call, float_changes| match float_changes {
         0 => before.compare(call),
-        _ => Err(format!("{call} changed the floating-point mode: rounding, flush-to-zero or traps")),
+        _ => Err(format!(
+            "{call} changed the floating-point mode (rounding, flush-to-zero or traps); restore the mode before the call \
+             returns"
+        )),
     })?;
     std::thread::sleep(REST);
     before.compare("the plugin, after its last call,")?;
