@@ -25,7 +25,10 @@ const SCHEMA: &[Parameter] = &[
         "Library of OpenHaptics, libHD.so (default: searched in the library folders of the SDK and the system)",
     ),
     STAND_IN,
-    Parameter::text("name", "Name of the device in the maker's setup program (default: its default device)"),
+    Parameter::text(
+        "name",
+        "Name of the device in the maker's setup program (default: the default device of that program)",
+    ),
     max_force(40.0),
     max_torque(1.0),
     TIMEOUT,

@@ -79,7 +79,7 @@ impl ForceModel for Measured {
             1.0,
             200.0,
             6.0,
-            "Diameter of the coil (only for the drawing)",
+            "Diameter of the coil between wire centres (only for the drawing)",
         ),
     ];
 

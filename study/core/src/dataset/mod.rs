@@ -344,9 +344,9 @@ fn replace(path: &Path, text: &str) -> Result<(), DatasetError> {
     }
     let aside = path.with_extension("part");
     std::fs::write(&aside, text)
-        .map_err(|cause| DatasetError::file(&aside, "cannot write the table", cause))?;
+        .map_err(|cause| DatasetError::file(&aside, "cannot write the file", cause))?;
     std::fs::rename(&aside, path)
-        .map_err(|cause| DatasetError::file(path, "cannot replace the old table", cause))
+        .map_err(|cause| DatasetError::file(path, "cannot replace the earlier file", cause))
 }
 
 fn make_folder(folder: &Path) -> Result<(), DatasetError> {
