@@ -27,7 +27,7 @@
 // 1 for a release candidate of this contract version, 0 for the release.
 #define FLOTOR_ABI_CANDIDATE 1
 
-// [`Host::flags`] bit: the plugin has its own Rust runtime and may replace its panic hook by a silent one.
+// [`Host::flags`] bit: the plugin has its own Rust runtime and may replace its panic hook with a silent hook.
 #define FLOTOR_HOST_QUIET_PANICS 1
 
 // Maximum number of coefficients of a calibration: a polynomial of degree seven.
@@ -623,7 +623,7 @@ typedef struct FlotorCapabilities {
     double latency_s;
 } FlotorCapabilities;
 
-// Result of `read` and `write` at the boundary, 4 bytes. A separate type, so that no other code of the contract can be
+// Result of `read` and `write` at the plugin boundary, 4 bytes. A separate type, so that no other code of the contract can be
 // mistaken for a result.
 typedef struct FlotorCycleCode {
     // 0: fresh; 1: stale; 256 plus the code of a [`crate::Fault`]: fault.
@@ -699,8 +699,8 @@ typedef struct FlotorDeviceTable {
     // Sets the actuators to zero (or starts a controlled landing) at once, until the next activation. May be called from
     // any thread at any time, also during `read` and `write`.
     void (*safe_stop)(FlotorInstance instance);
-    // Changes the live parameter at `index` at a tick boundary (for a choice, `value` is its index). Real-time. May be
-    // null.
+    // Changes the live parameter at `index` of an active device at a tick boundary (for a choice, `value` is its index).
+    // Real-time. May be null.
     uint32_t (*set_parameter)(FlotorInstance instance, uint32_t index, double value);
     // Returns the current value of the parameter at `index` of an opened device; NaN if unknown. May be null.
     double (*parameter)(FlotorInstance instance, uint32_t index);
@@ -770,7 +770,7 @@ typedef struct FlotorScalarField {
 
 // View of a [`Shape`] at the plugin boundary: the plugin's own memory, valid until the next call of the instance. 88 bytes.
 typedef struct FlotorShapeView {
-    // Bodies of simple form, and the tool; like the two lists below, may be null if empty.
+    // Bodies of simple form, and the tool; like `vertices` and `triangles`, may be null if empty.
     const struct FlotorPrimitive *primitives;
     // Vertices of the surface.
     const struct FlotorSurfaceVertex *vertices;

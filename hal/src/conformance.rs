@@ -136,7 +136,7 @@ impl Rule {
         }
     }
 
-    /// Returns the rule with a short name; `None` if unknown.
+    /// Returns the rule with the short name `id`; `None` if unknown.
     #[must_use]
     pub fn from_id(id: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|rule| rule.id() == id)

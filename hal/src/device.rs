@@ -57,7 +57,7 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Converts a code from the boundary: 0 is `None`, an unknown code [`Self::Broken`].
+    /// Converts a fault code of the ABI: 0 is `None`, an unknown code is [`Self::Broken`].
     #[inline]
     #[must_use]
     pub const fn from_code(code: u32) -> Option<Self> {
@@ -359,7 +359,7 @@ pub enum Embodiment {
 }
 
 impl Embodiment {
-    /// Converts a code from the boundary; an unknown code counts as [`Self::Physical`], because the device may push a hand.
+    /// Converts an embodiment code of the ABI; an unknown code counts as [`Self::Physical`], because the device may push a hand.
     #[must_use]
     pub const fn from_code(code: u32) -> Self {
         match code {
@@ -439,7 +439,7 @@ pub trait SafeStop: Send + Sync + 'static {
     fn arm(&self) {}
 }
 
-/// Stop of a device without actuators: there is no force to remove.
+/// Stop handle of a device without actuators: there is no force to remove.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NothingToStop;
 

@@ -1,9 +1,9 @@
 //! Elementary functions with the same bits on every machine. Real-time: bounded, no allocation.
 //!
-//! The functions of `f64` come from the system's C library, whose last bit depends on its version and on the processor. The
-//! functions here are those of the crate `libm`, plain sums and products in source order; [`crate::glam`] uses `libm` too. Angles
-//! are in radians. Functions that IEEE 754 rounds exactly (`sqrt`, `abs`, `floor`, `%`) are the same everywhere. A product and a
-//! sum are two roundings everywhere: `f64::mul_add` is a slow call where the processor has no instruction for it.
+//! The functions of `f64` come from the system's C library; the last bit of their results depends on its version and on the
+//! processor. The functions here are those of the crate `libm`, plain sums and products in source order; [`crate::glam`] uses
+//! `libm` too. Angles are in radians. Functions that IEEE 754 rounds exactly (`sqrt`, `abs`, `floor`, `%`) are the same everywhere.
+//! A product and a sum are two roundings everywhere: `f64::mul_add` is a slow call where the processor has no instruction for it.
 
 pub use libm::{
     acos, asin, atan, atan2, cbrt, cos, cosh, exp, expm1 as exp_m1, hypot, log as ln, log1p as ln_1p, log2,

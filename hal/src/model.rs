@@ -108,7 +108,7 @@ pub enum StepStatus {
 }
 
 impl StepStatus {
-    /// Converts a code from the boundary; `None` for an unknown code.
+    /// Converts a step status code of the ABI; `None` for an unknown code.
     #[inline]
     #[must_use]
     pub const fn from_code(code: u32) -> Option<Self> {
@@ -183,7 +183,7 @@ pub enum Memory {
 }
 
 impl Memory {
-    /// Converts a code from the boundary; an unknown code counts as path-dependent, the safe choice.
+    /// Converts a path dependence code of the ABI; an unknown code counts as path-dependent, the safe choice.
     pub(crate) const fn from_code(code: u32) -> Self {
         if code == Self::Stateless as u32 { Self::Stateless } else { Self::PathDependent }
     }

@@ -105,7 +105,7 @@ impl Parameter {
         parameter
     }
 
-    /// Declares a file, or one of `built_in` by its name; none by default.
+    /// Declares a file, or one of `built_in` by its name; empty by default.
     pub const fn file(id: &'static str, built_in: Choices, doc: &'static str) -> Self {
         let mut parameter = Self::text(id, doc);
         parameter.kind = ParameterKind::File as u32;
@@ -187,7 +187,7 @@ impl Parameter {
     /// Checks a number against kind and range. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// [`OutOfRange`] with the range, if the number is not finite, outside the range, or no index of a choice.
+    /// [`OutOfRange`] with the range, if the number is not finite, outside the range, or, for a choice, not an integer.
     pub fn check(&self, value: f64) -> Result<(), OutOfRange> {
         let in_range = value >= self.min && value <= self.max; // false for NaN
         let is_index = !matches!(self.kind(), ParameterKind::Choice) || value.fract() == 0.0;
@@ -201,7 +201,8 @@ impl fmt::Debug for Parameter {
     }
 }
 
-/// Error of a number outside the range of its schema. `Copy`: nothing to allocate in a tick.
+/// Error of an illegal number: outside the range of its parameter, or, for a choice, not an integer. `Copy`: nothing to allocate in
+/// a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutOfRange {
     /// Smallest legal number.

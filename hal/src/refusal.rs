@@ -17,7 +17,7 @@ pub enum RefusalKind {
 }
 
 impl RefusalKind {
-    /// Converts a code from the boundary; an unknown code counts as [`Self::Broken`].
+    /// Converts a refusal code of the ABI; an unknown code counts as [`Self::Broken`].
     #[must_use]
     pub const fn from_code(code: u32) -> Self {
         match code {

@@ -88,8 +88,8 @@ impl SafeStop for StopFlag {
     }
 }
 
-/// Stop of a [`Simple`] device: triggers the stop of the [`SimpleDevice`] and replaces later commands by zero until the
-/// next activation.
+/// Stop handle of a [`Simple`] device: triggers the stop handle of the [`SimpleDevice`] and replaces later commands with zero until
+/// the next activation.
 pub struct SimpleStop<S>(Arc<(StopFlag, S)>);
 
 impl<S> Clone for SimpleStop<S> {

@@ -114,8 +114,8 @@ impl<'a> Table<'a> {
         TextProblem::at(self.header_line, problem)
     }
 
-    /// Parses the rows one after the other. A row with another number of cells than columns, or with a malformed cell, is
-    /// an error. Not real-time.
+    /// Parses the rows one after the other. A row whose number of cells differs from the number of columns, or with a malformed
+    /// cell, is an error. Not real-time.
     pub fn rows(&self) -> impl Iterator<Item = Result<Row<'_>, TextProblem>> {
         self.lines.clone().map(|(line, text)| {
             let cells = cells(text).map_err(|problem| TextProblem::at(line, problem))?;

@@ -12,7 +12,7 @@ use crate::{
 };
 use std::marker::PhantomData;
 
-/// Result of `read` and `write` at the boundary, 4 bytes. A separate type, so that no other code of the contract can be
+/// Result of `read` and `write` at the plugin boundary, 4 bytes. A separate type, so that no other code of the contract can be
 /// mistaken for a result.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,8 +98,8 @@ pub struct DeviceTable {
     /// Sets the actuators to zero (or starts a controlled landing) at once, until the next activation. May be called from
     /// any thread at any time, also during `read` and `write`.
     pub safe_stop: Option<unsafe extern "C" fn(instance: Instance)>,
-    /// Changes the live parameter at `index` at a tick boundary (for a choice, `value` is its index). Real-time. May be
-    /// null.
+    /// Changes the live parameter at `index` of an active device at a tick boundary (for a choice, `value` is its index).
+    /// Real-time. May be null.
     pub set_parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32, value: f64) -> u32>,
     /// Returns the current value of the parameter at `index` of an opened device; NaN if unknown. May be null.
     pub parameter: Option<unsafe extern "C" fn(instance: Instance, index: u32) -> f64>,

@@ -27,7 +27,7 @@ pub enum PluginKind {
 }
 
 impl PluginKind {
-    /// Converts a code from the boundary; `None` for an unknown code.
+    /// Converts a plugin kind code of the ABI; `None` for an unknown code.
     #[must_use]
     pub const fn from_code(code: u32) -> Option<Self> {
         match code {
@@ -67,7 +67,7 @@ pub enum CallStatus {
 }
 
 impl CallStatus {
-    /// Converts a code from the boundary; an unknown code counts as [`Self::Panicked`].
+    /// Converts a call status code of the ABI; an unknown code counts as [`Self::Panicked`].
     #[inline]
     #[must_use]
     pub const fn from_code(code: u32) -> Self {
@@ -81,7 +81,7 @@ impl CallStatus {
     }
 }
 
-/// [`Host::flags`] bit: the plugin has its own Rust runtime and may replace its panic hook by a silent one.
+/// [`Host::flags`] bit: the plugin has its own Rust runtime and may replace its panic hook with a silent hook.
 pub const HOST_QUIET_PANICS: u32 = 1;
 
 /// Host information that a plugin receives once, before any other call.

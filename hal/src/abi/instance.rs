@@ -75,7 +75,7 @@ unsafe fn shared<'a, P: PluginAdapter>(instance: Instance) -> &'a P::Shared {
     unsafe { &(*instance.cast::<Slot<P>>()).shared }
 }
 
-/// Runs `body` on the shared half, on any thread.
+/// Runs `body` on the shared half, on any thread; discards a panic.
 ///
 /// # Safety
 /// As for [`shared`].

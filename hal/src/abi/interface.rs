@@ -43,8 +43,8 @@ macro_rules! table {
 }
 pub(crate) use table;
 
-/// Function table for instances of `P`, with its interface id. Only the `offer` function of an extension constructs an
-/// `Interface`:
+/// Function table for instances of `P`, with its interface id. Only the `offer` functions, one for each function table of the
+/// contract, construct an `Interface`:
 ///
 /// ```compile_fail,E0624
 /// use flotor_hal::abi::{Interface, MAGIC};

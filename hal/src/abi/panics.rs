@@ -22,11 +22,10 @@ struct Place {
     line: u32,
 }
 
-/// Replaces the panic hook of a separately linked library, which has its own Rust runtime, by a hook that only stores
-/// the source location of the panic: the default hook would print from inside the servo and walk the stack for tens of
-/// milliseconds. Called by the host after loading. The hook of a plugin linked into the host is unchanged. A plugin
-/// built with `-C prefer-dynamic` may share the host's runtime, which is not detectable here: the host's panics are
-/// then silenced too.
+/// Replaces the panic hook of a separately linked library, which has its own Rust runtime, with a hook that only stores the source
+/// location of the panic: the default hook would print from inside the servo and walk the stack for tens of milliseconds. Called by
+/// the host after loading. The hook of a plugin linked into the host is unchanged. A plugin built with `-C prefer-dynamic` may
+/// share the host's runtime, which is not detectable here: the host's panics are then silenced too.
 pub(super) unsafe extern "C" fn init(host: *const Host) {
     // SAFETY: the contract of `init`: null or a valid host struct for the call.
     let flags = unsafe { host.as_ref() }.map_or(0, |host| host.flags);

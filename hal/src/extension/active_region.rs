@@ -71,7 +71,7 @@ impl ActiveRegion {
         DVec3::from_array(self.center_m)
     }
 
-    /// Returns the half extents of the bounding box, m (for a ball, each is the radius).
+    /// Returns the half extents of the bounding box, m (for a ball, each is the radius); infinite for [`Self::EVERYWHERE`].
     #[must_use]
     pub fn half_sides(&self) -> DVec3 {
         DVec3::from_array(self.half_sides_m)

@@ -1,8 +1,8 @@
 //! Calibration of the vertical force: ratio of delivered to commanded force as a function of height.
 //!
-//! Extension `flotor.calibration/1`. The host measures, fits and stores the calibration; the device receives the
-//! numbers and divides its **total** vertical command by the ratio, gravity compensation included, because the uneven
-//! field acts on the sum (Varadharajan 2007, section 3.4, corrected only the part of the spring).
+//! Extension `flotor.calibration/1`. The host measures, fits and stores the calibration; the device receives the numbers and
+//! divides its **total** vertical command by the ratio, gravity compensation included, because the uneven field acts on the sum
+//! (Varadharajan 2007, section 3.4, corrected only the spring force).
 
 use crate::abi::instance::{fill, refusable};
 use crate::abi::interface::table;
@@ -82,8 +82,8 @@ impl VerticalCalibration {
     /// Builds a polynomial `c0 + c1 z + c2 z² ...` with z in m (so `ck` in 1/mᵏ), measured over `range_m`.
     ///
     /// # Errors
-    /// [`InvalidCalibration`] for an invalid range, an invalid number of coefficients, or a ratio that is not between
-    /// 0.5 and 2 over the whole range.
+    /// [`InvalidCalibration`] for an invalid range, an invalid number of coefficients, or a ratio that is not between 0.5 and 2 at
+    /// one of 257 heights over the range.
     pub fn new(range_m: [f64; 2], coefficients: &[f64]) -> Result<Self, InvalidCalibration> {
         let mut calibration = Self { range_m, coefficients: [0.0; CALIBRATION_COEFFICIENTS] };
         match calibration.coefficients.get_mut(..coefficients.len()) {
@@ -97,7 +97,7 @@ impl VerticalCalibration {
     /// Checks the numbers of a calibration from another source.
     ///
     /// # Errors
-    /// [`InvalidCalibration`] for an invalid range, or a ratio that is not between 0.5 and 2 over the whole range.
+    /// [`InvalidCalibration`] for an invalid range, or a ratio that is not between 0.5 and 2 at one of 257 heights over the range.
     pub fn check(&self) -> Result<(), InvalidCalibration> {
         let [from, to] = self.range_m;
         if !(from.abs() <= MOST_RANGE_M && to.abs() <= MOST_RANGE_M && from < to) {

@@ -20,7 +20,7 @@ pub enum UsbAccess {
 }
 
 impl UsbAccess {
-    /// Converts a code from the boundary; `None` for an unknown code.
+    /// Converts an access path code of the ABI; `None` for an unknown code.
     #[must_use]
     pub const fn from_code(code: u32) -> Option<Self> {
         match code {

@@ -178,7 +178,8 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Computes the vertex normals as means of the adjacent triangles' normals, weighted by area. Not real-time.
+    /// Computes the vertex normals as means of the adjacent triangles' normals, weighted by area; zero for a vertex without a
+    /// triangle. Not real-time.
     ///
     /// # Panics
     /// If a triangle has a vertex index out of range.
@@ -246,7 +247,7 @@ pub trait ShapeModel: ForceModel {
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct ShapeView {
-    /// Bodies of simple form, and the tool; like the two lists below, may be null if empty.
+    /// Bodies of simple form, and the tool; like `vertices` and `triangles`, may be null if empty.
     pub primitives: *const Primitive,
     /// Vertices of the surface.
     pub vertices: *const SurfaceVertex,
@@ -334,7 +335,7 @@ table!(ShapeTable: "flotor.shape/1", M: [ShapeModel] {
 /// Reason why a model's shape is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InvalidShape {
-    /// The model failed.
+    /// The model has no shape, or failed.
     Failed,
     /// 2^20 or more vertices, triangles or primitives.
     TooLarge,
@@ -414,7 +415,7 @@ impl Model {
     /// Returns the model's shape at an input, copied and checked. Not real-time: for observers with their own instance.
     ///
     /// # Errors
-    /// [`InvalidShape`]; also for a model without a shape.
+    /// [`InvalidShape`]; for a model without a shape, [`InvalidShape::Failed`].
     pub fn shape(&mut self, input: &Input) -> Result<Shape, InvalidShape> {
         let ask = self.extensions.shape.and_then(|table| table.shape).ok_or(InvalidShape::Failed)?;
         let mut view = ShapeView::EMPTY;

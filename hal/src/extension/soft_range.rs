@@ -39,10 +39,10 @@ impl SoftRange {
         Self { id: Str::new(id), min, max, step }
     }
 
-    /// Returns a soft range about `value`, within the legal range, for a parameter without a declared one. For a positive
-    /// value of a parameter that cannot be negative: from a third of the value to three times the value. Otherwise
-    /// the range extends to both sides of the value by twice its magnitude, at least by a twentieth of the legal range.
-    /// `None` for a parameter that is not a number with a finite range.
+    /// Returns a soft range about `value`, within the legal range, for a parameter without a declared soft range. For a positive
+    /// value of a parameter that cannot be negative: from a third of the value to three times the value. Otherwise the range
+    /// extends to both sides of the value by twice its magnitude, at least by a twentieth of the legal range. `None` for a
+    /// parameter that is not a number with a finite range.
     #[must_use]
     pub fn around(parameter: &'static Parameter, value: f64) -> Option<Self> {
         let value = if value.is_finite() { value } else { parameter.default() };

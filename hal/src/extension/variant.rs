@@ -1,7 +1,7 @@
 //! Extension `flotor.variant/1`: demands and memory of a model that depend on its settings.
 //!
-//! One plugin may contain several laws: a stateless closed form, and an exact solution that follows its equilibrium
-//! from tick to tick. [`crate::ModelInfo`] covers all of them, before creation; this extension covers one instance.
+//! One plugin may contain several laws: a stateless closed form, and an exact solution that tracks its equilibrium from tick to
+//! tick. [`crate::ModelInfo`] covers all of them, before creation; this extension covers one instance.
 
 use crate::abi::instance::fill;
 use crate::abi::interface::table;

@@ -1,7 +1,7 @@
 //! Extension `flotor.workspace-bounds/1`: workspace limits of a force model.
 //!
-//! A spring ends where its coils touch, a table of measured forces at the last measurement. Beyond, the model still
-//! returns a wrench, but not that of the real object. A host renders a wall at these limits if its own wall is farther
+//! The model of a spring is valid until its coils touch, a table of measured forces up to the last measurement. Beyond, the model
+//! still returns a wrench, but not the wrench of the real object. A host renders a wall at these limits if its own wall is farther
 //! out.
 
 use crate::abi::instance::fill;

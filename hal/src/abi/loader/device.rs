@@ -168,8 +168,8 @@ impl ActiveDevice {
         })
     }
 
-    /// Returns the number of calls so far that changed the rounding mode, flush-to-zero or traps of the thread; the
-    /// host restored them each time. Real-time: bounded, no allocation.
+    /// Returns the number of calls since activation that changed the rounding mode, flush-to-zero or traps of the thread; the host
+    /// restored them each time. Real-time: bounded, no allocation.
     #[must_use]
     pub fn float_changes(&self) -> u64 {
         self.calls.float_changes

@@ -109,7 +109,7 @@ pub enum LoadError {
     LayoutDiffers {
         /// Path of the plugin.
         path: PathBuf,
-        /// Struct and field that differ, with both layouts.
+        /// Description of the first difference: struct and field with both layouts, or the missing part.
         difference: String,
     },
     /// The plugin declares an invalid id or list.
@@ -120,7 +120,7 @@ pub enum LoadError {
         /// Invalid declaration and its problem.
         cause: String,
     },
-    /// The interface of the plugin's kind, or a required function of the interface, is missing.
+    /// The interface of the plugin's kind or a required function is missing, or a table is misaligned or too short.
     #[error(
         "{}: {} {missing}; use the export macros or the current header, and build the plugin again",
         path.display(), table_words(interface)
@@ -130,7 +130,7 @@ pub enum LoadError {
         path: PathBuf,
         /// Id of the table, or "the entry".
         interface: &'static str,
-        /// Missing function or property, as a verb with its object.
+        /// Predicate of the error text about the table, such as "has no `step`" or "is not aligned".
         missing: &'static str,
     },
     /// The parameter schema has invalid counts or texts.

@@ -9,7 +9,7 @@ use crate::extension::{DeviceExtensions, ModelExtensions};
 use std::ffi::c_void;
 use std::path::Path;
 
-/// The tables of a plugin, by its kind.
+/// Function tables of a plugin, by its kind.
 #[derive(Clone, Copy)]
 pub(super) enum Interface {
     Model(ModelTables),
@@ -24,9 +24,8 @@ impl Interface {
     /// extension, is shorter than the contract's.
     ///
     /// # Safety
-    /// `entry` is the entry of a plugin that keeps the contract: `get_interface` answers any id with null or
-    /// with the address of a static that starts with its size in bytes and is the table of that id as far as
-    /// it goes.
+    /// `entry` is the entry of a plugin that keeps the contract: for any id, `get_interface` returns null or the address of a
+    /// static table that starts with its size in bytes and, up to this size, has the layout of the table of that id.
     pub(super) unsafe fn find(
         path: &Path,
         entry: &'static Entry,

@@ -16,11 +16,11 @@ pub struct Metadata {
     pub kind: PluginKind,
     /// Id in scenes and commands.
     pub id: String,
-    /// Display name.
+    /// Display name; empty if the file has none.
     pub name: String,
     /// Description in one sentence.
     pub doc: String,
-    /// Version of the plugin.
+    /// Version of the plugin; for a plugin linked into this program, the version of this crate.
     pub version: String,
     /// Contract version of the plugin's build, in the form of [`CONTRACT`].
     pub abi: String,

@@ -1,10 +1,9 @@
 //! Host side of the contract: identifies a plugin file, opens it, compares the struct layouts of both sides, and wraps
 //! its tables in types that cannot be called in the wrong order.
 //!
-//! Order of a load, each step cheaper and safer than the next:
-//! file -> ELF section with metadata -> contract version -> private copy -> `dlopen` -> entry -> kind ->
-//! layouts -> interface table -> declarations. No code of the plugin runs before `dlopen`, and a file that fails an
-//! earlier check is never opened: a truncated library would otherwise raise SIGBUS inside `dlopen`.
+//! Order of a load: file -> private copy -> metadata section (ELF, on Windows PE) -> contract version -> `dlopen` (on Windows
+//! `LoadLibrary`) -> entry -> kind -> layouts -> function tables -> declarations. No code of the plugin runs before `dlopen`, and a
+//! file that fails an earlier check is never passed to `dlopen`: a truncated library would raise SIGBUS there.
 
 mod capabilities;
 mod check;

@@ -35,7 +35,7 @@ pub enum SettingError {
         /// Rejected value.
         value: String,
     },
-    /// The number is outside the range.
+    /// The number is outside the range or, for a choice, not an integer.
     #[error("`{id}` = {}: must be {} to {}{}", range.value, range.min, range.max, if unit.is_empty() { String::new() } else { format!(" {unit}") })]
     OutOfRange {
         /// Id of the parameter.

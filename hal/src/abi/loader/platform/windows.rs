@@ -42,8 +42,9 @@ pub(crate) unsafe fn writable_duplicate(_: i32) -> Result<Handle, String> {
     Ok(PhantomData)
 }
 
-/// Private copy in a separate file, which nobody can write or remove while this process lives, so that the plugin's own
-/// file can be rebuilt. A loaded library cannot be removed; a later start of any program removes the copy.
+/// Private copy in a separate file, which nobody can write or remove while this process lives, so that the plugin's own file can be
+/// rebuilt. A loaded library cannot be removed; a later load of any plugin, in any process, removes the copy when it is unused and
+/// older than a minute.
 pub(crate) struct PrivateCopy {
     path: PathBuf,
     file: File,
