@@ -80,7 +80,8 @@ impl SeparateProgram<'_> {
         (own.with_file_name(name), own_build)
     }
 
-    /// Replaces this process by the separate program, with a command and its arguments; returns only on an error.
+    /// Replaces this process with the separate program, with a command and its arguments, as [`Self::become_with`] does; returns
+    /// only on an error.
     ///
     /// # Errors
     /// If the program is missing or cannot be started.
@@ -88,7 +89,8 @@ impl SeparateProgram<'_> {
         self.become_with(&[&[command.into()], arguments].concat())
     }
 
-    /// Replaces this process by the separate program, which then determines output and exit code; returns only on an error.
+    /// Replaces this process with the separate program, which then determines output and exit code (on Windows, runs the program
+    /// and exits with its exit code); returns only on an error.
     ///
     /// # Errors
     /// If the program is missing or cannot be started.

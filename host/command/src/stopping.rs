@@ -40,9 +40,9 @@ enum First {
     InOrderOnceEnergised,
 }
 
-/// Starts the thread that handles signals, and returns the stop switch of that thread: the first signal that requests an end
-/// (such as Ctrl-C) leads to an orderly end, the second to an emergency stop, the third ends the process; `SIGUSR1` leads to an
-/// emergency stop. Call this function before other threads start.
+/// Starts the thread that handles signals, and returns the stop switch of that thread: the first signal that requests an end (such
+/// as Ctrl-C) leads to an orderly end, the second to an emergency stop, the third ends the process; `SIGUSR1` (on Windows,
+/// Ctrl-Break) leads to an emergency stop. Call this function before other threads start.
 ///
 /// # Errors
 /// If the system cannot block the signals or start a thread.

@@ -22,7 +22,7 @@ use std::time::Duration;
 
 pub(crate) use supervision::{accept_interrupts, die_by, divide, is_orphaned};
 
-/// Exit code after a third signal, when nothing else has ended the process: 128 + SIGINT, as in shells.
+/// Exit code of a forced end, for example after a third signal: 128 + SIGINT, as in shells.
 pub const INTERRUPTED: i32 = 130;
 
 /// Signals that stop a run: sent by the keys of a terminal (Ctrl-C, `Ctrl-\`, Ctrl-Z), by a closing terminal, and by process managers.

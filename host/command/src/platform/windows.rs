@@ -45,8 +45,7 @@ pub(crate) fn die_by(_: i32) -> ! {
     std::process::exit(INTERRUPTED)
 }
 
-/// Exit code after a third request, when nothing else has ended the process: the code of a program ended by Ctrl-C
-/// (`STATUS_CONTROL_C_EXIT`).
+/// Exit code of a forced end, for example after a third request: the code of a program ended by Ctrl-C (`STATUS_CONTROL_C_EXIT`).
 pub const INTERRUPTED: i32 = 0xc000_013a_u32.cast_signed();
 
 /// Wait in the handler of a closing console: the system ends the process 5 s after the event.
