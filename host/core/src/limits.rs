@@ -86,7 +86,7 @@ pub struct Limits {
     pub watchdog_s: f64,
     /// Buttons of the device that are emergency stops, one bit each.
     pub emergency_buttons: u32,
-    /// Treatment of energy that the port generates.
+    /// Treatment of energy that the device's port generates.
     pub passivity: PassivityMode,
     /// True to reject a device without an independent stop, which nothing would stop after the end of the host's
     /// process.
@@ -143,7 +143,7 @@ pub struct Boundary {
     pub damping_ns_per_m: f64,
     /// Rotational stiffness, N·m/rad.
     pub stiffness_nm_per_rad: f64,
-    /// Rotational damping, N·m·s/rad.
+    /// Damping of outward rotation in the wall, N·m·s/rad.
     pub damping_nms_per_rad: f64,
 }
 

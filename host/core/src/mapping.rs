@@ -1,8 +1,8 @@
 //! Mapping between the device frame and a model's frame: the only place that scales motion, force and torque.
 //!
-//! With `x_model = m R x_device`, `m` the motion scale and `f` the force scale, scaling the energy by `f / m` gives the
-//! device the force `f R^T F` and the torque `(f / m) R^T M`: gradients of one energy, so a conservative model stays
-//! conservative at the hand (PHYSICS D6). The stiffness at the hand is `f m k`.
+//! With `x_model = m R x_device` (rotation `R`, motion scale `m`, force scale `f`), a model's force `F` and torque `M` become the
+//! force `f R^T F` and the torque `(f / m) R^T M` at the device: gradients of the model's energy times `f / m`, so a conservative
+//! model stays conservative at the hand (PHYSICS D6). A model stiffness `k` becomes `f m k` at the hand.
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
@@ -150,8 +150,8 @@ impl Mapping {
         self.energy_scale
     }
 
-    /// Returns true if the mapping conserves energy: forces and torques at the hand are gradients of one energy if
-    /// those of the model are.
+    /// Returns true if the mapping conserves energy: forces and torques at the hand are gradients of one energy if the forces and
+    /// torques of the model are.
     #[must_use]
     pub fn is_conservative(&self) -> bool {
         let conservative = self.energy_scale();

@@ -40,7 +40,7 @@ pub struct Dispatch {
     pub since: u64,
     /// Tick of the sender; of two dispatches of a run, the dispatch with the higher tick is newer.
     pub tick: u64,
-    /// The peer state.
+    /// Pose and velocity of the sender's handle, and energy passed on, shared frame.
     pub state: PeerState,
     /// The energy tank of the sending end.
     pub tank: TankState,

@@ -92,7 +92,7 @@ impl ImplausibleSamples {
         self.counts.get(why as usize).copied().unwrap_or(0)
     }
 
-    /// Returns the tick of the first implausible sample. Real-time: bounded, no allocation.
+    /// Returns the tick of the first implausible sample; `None` if all were plausible. Real-time: bounded, no allocation.
     #[must_use]
     pub fn first_tick(&self) -> Option<u64> {
         self.first_tick

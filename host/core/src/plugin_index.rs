@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Number of a plugin in a run: the devices come first, then the models, both in the scene's order.
+/// Number of a plugin in a run, from 0: the devices come first, then the models, both in the scene's order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[must_use]
 pub struct PluginIndex(usize);

@@ -44,7 +44,8 @@ pub struct RenderedBoundary {
 impl RenderedBoundary {
     /// Computes the wall on a device whose force is limited to `most_n`. Not real-time.
     ///
-    /// The damping of the device is not known and counts as zero. A wall without a damper has the scene's stiffness.
+    /// The damping of the device is not known and counts as zero. A wall without a damper has the scene's stiffness, limited to the
+    /// stiffness that the device declares.
     #[must_use]
     pub fn new(boundary: &Boundary, device: &Capabilities, most_n: &Bound, period_ns: u64) -> Self {
         let sampled = SampledLoop { period_s: period_ns as f64 * 1.0e-9, latency_s: device.latency_s };
