@@ -122,8 +122,9 @@ impl Claims {
             && !is_too_fast(&unscaled)
     }
 
-    /// Starts the check of a partner at this state: energy that the partner passed on before belongs to another run.
-    /// The excess of earlier claims still counts unless `is_another`. Real-time: bounded, no allocation.
+    /// Starts the check of a partner with its first state: energy that the partner passed on earlier was for another run and is not
+    /// accepted here. `is_another`: the partner's run differs from the previous partner's; the recent excess is then reset,
+    /// otherwise it still counts. Real-time: bounded, no allocation.
     pub(super) fn meet(&mut self, peer: &PeerState, is_another: bool) {
         self.last = None;
         if is_another {

@@ -182,7 +182,7 @@ impl End {
         self.bounce.stored_j / self.mapping.energy_scale()
     }
 
-    /// Returns the energy tank.
+    /// Returns the energy tank of this end, shared frame.
     #[must_use]
     pub fn tank(&self) -> &Tank {
         &self.tank

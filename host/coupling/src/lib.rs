@@ -1,12 +1,11 @@
 //! Virtual coupling of two devices by a spring and a damper: bilateral teleoperation.
 //!
-//! Each device has an [`End`]. An end receives the state of its partner: pose, velocity and the energy that the partner
-//! has passed on ([`PeerState`], some ticks old), and pulls its own handle to that pose. It has an energy tank
-//! ([`Tank`]): the energy that its hand puts in, less the energy that comes out, plus the energy that the partner has
-//! passed on. As long as no tank is below zero, the pair generates no energy, *whatever the delay*, constant or not,
-//! and even if messages get lost: the energy passed on is sent as a running total. This holds for ends with true
-//! claims; the claims of a partner on another host are accepted only as far as they can be checked here (`claims`), so
-//! that false claims yield no energy beyond the accepted energy.
+//! Each device has an [`End`]. An end receives the state of its partner: pose, velocity and the energy that the partner has passed
+//! on ([`PeerState`], some ticks old), and pulls its own handle to that pose. It has an energy tank ([`Tank`]): the energy that its
+//! hand puts in, less the energy that comes out, plus the energy that the partner has passed on. As long as no tank is below zero,
+//! the pair generates no energy, *whatever the delay*, constant or not, and even if messages get lost: the energy passed on is sent
+//! as a running total. This holds for ends with true claims; the claims of a partner on another host are accepted up to the motion
+//! and energy that can be checked here (`claims`), so that false claims yield no energy beyond the accepted energy.
 //!
 //! ```text
 //!  hand  <-- wrench --  End   -- PeerState: pose, twist, energy passed on -->  End  -- wrench -->  hand
@@ -52,7 +51,8 @@ use flotor_hal::{DeviceState, Wrench};
 pub struct PortSample<'a> {
     /// State of the handle, device frame.
     pub state: &'a DeviceState,
-    /// Coupling's part of the wrench applied since the last tick, device frame.
+    /// Wrench applied since the last tick less the models' request, device frame: the coupling's wrench with the changes by the
+    /// envelope.
     pub held: Wrench,
 }
 
