@@ -79,7 +79,8 @@ fn remedy(cause: &io::Error) -> &'static str {
 }
 
 impl Directory {
-    /// Returns the folder of this user: `$XDG_RUNTIME_DIR/flotor`, else `/tmp/flotor-UID`; on Windows `%LOCALAPPDATA%\\flotor\\run`.
+    /// Returns the folder of this user: `$XDG_RUNTIME_DIR/flotor` if the variable names a folder, else `flotor-UID` in the folder
+    /// for temporary files (on Windows, `flotor/run` in `%LOCALAPPDATA%`).
     #[must_use]
     pub fn of_this_user() -> Self {
         let runtime = std::env::var_os("XDG_RUNTIME_DIR").filter(|path| Path::new(path).is_dir());

@@ -52,7 +52,7 @@ pub struct Pressed {
     pub at: SystemTime,
 }
 
-/// State of the latch.
+/// Presses of the emergency stop latch, as read from its file: numbers of the last presses, and the press that is not released.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LatchState {
     /// Numbers of the last presses, released or not, in the file that was opened and in a file that has replaced it.
@@ -141,7 +141,7 @@ impl Latch {
     }
 
     /// Reads the present state. A file that cannot be read counts as pressed; a folder of another user has no latch, because only
-    /// others could press it.
+    /// other users could press the latch.
     #[must_use]
     pub fn state(&self) -> LatchState {
         let mut state = LatchState::default();

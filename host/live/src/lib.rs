@@ -1,8 +1,8 @@
 //! Observation and control of a running host by other programs on the same machine: viewer, bridges, scripts.
 //!
-//! A running host listens on a Unix socket in a folder that only its user may enter ([`Directory`]); every program that
-//! may open the socket may observe and change the run. [`Publication`] is the host's end, [`Client`] the end of the
-//! other program:
+//! A running host listens on a Unix socket in a folder that only its user may enter ([`Directory`]); on Windows, on a local port
+//! announced with a secret in a file in the user's profile. Every program that may open the socket, or read the file, may observe
+//! and change the run. [`Publication`] is the host's end, [`Client`] the end of the other program:
 //!
 //! ```no_run
 //! use flotor_live::{Ask, Client, Directory, Event};
@@ -34,10 +34,11 @@
 //! | 6 end | host | JSON [`End`]: outcome of the run. Last |
 //! | 16 request | client | JSON [`Request`] |
 //!
-//! A record has the same words as in the digest of a run ([`flotor_core::trace::TickRecord`]): tick, time (ns), time since the last
-//! tick (ns) as integers; position (3), quaternion xyzw (4), velocity (3), angular velocity (3), model's force and torque (6),
-//! commanded (6), delivered (6), stored energy, energy of the port as IEEE doubles; events (low half) and buttons (high half);
-//! lateness and compute time (ns). SI units, device frame, little endian.
+//! A record has the words of [`flotor_core::trace::TickRecord`], as in the digest of a run, which excludes the last two: tick (low
+//! 46 bits), absence flags of torque and energy (1 bit each) and device (high 16 bits); time (ns), time since the last tick (ns) as
+//! integers; position (3), quaternion xyzw (4), velocity (3), angular velocity (3), model's force and torque (6), commanded (6),
+//! delivered (6), stored energy, energy of the port as IEEE doubles; events (low half) and buttons (high half); lateness and
+//! compute time (ns). SI units, device frame, little endian.
 //!
 //! **No client can delay the loop.** A host sends only the first two frames until a client requests more, and does nothing per tick
 //! without a client. Each client has a queue of fixed length between loop and socket; ticks that find the queue full are dropped

@@ -41,7 +41,7 @@ pub struct WrenchLimits {
 /// Plugin of the run with its parameters, as shown in a client's panel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PanelPlugin {
-    /// Name in the scene; `device` for the device.
+    /// Name in the scene; `device` for a single device without a name.
     pub name: String,
     /// Id of the plugin.
     pub id: String,
@@ -116,7 +116,7 @@ pub enum ParameterShape {
     },
     /// Text; can be set only when the plugin is created.
     Text,
-    /// Path of a file; can be set only when the plugin is created.
+    /// Path of a file, or name of a built-in file; can be set only when the plugin is created.
     File,
 }
 
@@ -257,8 +257,8 @@ pub enum Ask {
         /// New weight, 0 to 1.
         weight: f64,
     },
-    /// Replace a model by another plugin, or by the same plugin after a rebuild (hot swap): the new model fades in while the old
-    /// model fades out. The answer is sent after the new model has been created.
+    /// Replace a model with another plugin, or with the same plugin after a rebuild (hot swap): the new model fades in while the
+    /// old model fades out. The answer is sent after the new model has been created.
     Swap {
         /// Name of the model in the scene.
         model: String,
@@ -280,7 +280,7 @@ pub enum Ask {
 /// New value of a parameter.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SetValue {
-    /// `device`, a model's name in the scene, or a plugin's id.
+    /// Name of a device or model in the scene (`device` for a single device without a name), or id of a plugin.
     pub plugin: String,
     /// Id of the parameter.
     pub parameter: String,
@@ -330,7 +330,7 @@ pub enum EndKind {
     /// The run reached its duration, or was stopped.
     #[default]
     InOrder,
-    /// A fault, or an emergency stop.
+    /// The run ended otherwise, such as by a fault, an emergency stop or the watchdog.
     Failed,
 }
 

@@ -52,8 +52,8 @@ pub(crate) fn private_file(options: &mut OpenOptions) -> &mut OpenOptions {
     options.mode(0o600)
 }
 
-/// Removes the socket file if no process has the socket open; returns true if so. The process id is not checked: containers that
-/// share the folder have separate process ids.
+/// Removes the socket file and returns true if no process has the socket open; else returns false. The process id is not checked:
+/// containers that share the folder have separate process ids.
 pub(crate) fn remove_if_dead(path: &Path) -> bool {
     // Probe with a datagram socket: if no process has the socket file open, the connection is refused, whatever the
     // type of the socket. A listening stream socket reports another error and accepts no connection.

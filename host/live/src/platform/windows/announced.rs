@@ -17,7 +17,7 @@ const LOOKS: u32 = 5;
 /// Pause between two attempts.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// Content of the file.
+/// Port and secret that the file announces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Announced {
     pub(super) port: u16,

@@ -52,7 +52,7 @@ const TOO_LONG: i32 = 10040;
 const MAX_DISCARDED: usize = 64;
 
 impl Datagrams {
-    /// Creates a non-blocking socket.
+    /// Binds a non-blocking socket to a port of this machine, and writes port and new secret to the file at `path`.
     pub(crate) fn bind(path: &Path) -> io::Result<Self> {
         let socket = UdpSocket::bind((Ipv4Addr::LOCALHOST, 0))?;
         socket.set_nonblocking(true)?;
