@@ -198,7 +198,7 @@ impl Figure {
     }
 }
 
-/// Background of a picture.
+/// Colour scheme of a picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Paper {
     /// Light, or dark if the reader's browser is in dark mode.

@@ -5,27 +5,27 @@
 /// Quantity that a run or an experiment measures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// A position or a length.
+    /// Position or length; axis in mm.
     Length,
-    /// An angle or a rotation.
+    /// Angle or rotation; axis in degrees.
     Angle,
-    /// A linear velocity.
+    /// Linear velocity; axis in mm/s.
     Velocity,
-    /// An angular velocity.
+    /// Angular velocity; axis in degrees per second.
     AngularVelocity,
-    /// A linear acceleration.
+    /// Linear acceleration; axis in m/s².
     Acceleration,
-    /// A force.
+    /// Force; axis in N.
     Force,
-    /// A torque.
+    /// Torque; axis in mN·m.
     Torque,
-    /// An energy.
+    /// Energy; axis in mJ.
     Energy,
-    /// A stiffness.
+    /// Stiffness; axis in N/mm.
     Stiffness,
-    /// The lateness or the duration of a tick.
+    /// Lateness or duration of a tick; axis in µs.
     Lateness,
-    /// A ratio, shown in per cent.
+    /// Ratio; axis in per cent.
     Percent,
 }
 
