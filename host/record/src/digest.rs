@@ -44,7 +44,7 @@ pub struct TraceDigest {
 }
 
 impl TraceDigest {
-    /// Creates a digest without ticks, with the default [`Coverage`].
+    /// Creates a digest without ticks, with the coverage [`Coverage::Hand`].
     pub fn new() -> Self {
         Self::default()
     }

@@ -10,7 +10,7 @@
 //! | `/flotor/run` | `flotor.Run` | once, first: all data needed to repeat the run |
 //! | `/tf` | `foxglove.FrameTransform` | each tick and device: pose of `handle` in `device`, with several devices `NAME/handle` in `NAME` |
 //! | `/flotor/tick` | `flotor.Tick` | every tick and device: twist, wrenches, energy, events, timing |
-//! | `/flotor/change` | `flotor.Change` | when a parameter changed: before the first tick with the new value |
+//! | `/flotor/change` | `flotor.Change` | at a change of a parameter, weight or plugin, applied or rejected: before its tick |
 //! | `/flotor/log` | `foxglove.Log` | on text events, such as faults |
 //!
 //! [`RunDescription`] is written first (and once more as the metadata record `flotor.run`, for tools that list

@@ -42,7 +42,7 @@ pub enum Damage {
     /// A tick has no pose.
     #[error("a tick has no pose of the same time on `/tf`")]
     NoPose,
-    /// A number of ticks are missing.
+    /// Number of tick records that are missing from the sequence.
     #[error("{0} ticks are missing")]
     Gap(u32),
 }

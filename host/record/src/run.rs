@@ -55,9 +55,9 @@ pub struct PluginDescription {
     pub blend: Blend,
     /// Timing of an asynchronous model; `None` for other plugins.
     pub field: Option<FieldTiming>,
-    /// Declared latency of a device, s; 0 in recordings of earlier versions.
+    /// Declared latency of a device, s; 0 for a model, and in recordings of earlier versions.
     pub latency_s: f64,
-    /// Outputs of models that reach the hand at a device; force and torque in recordings of earlier versions.
+    /// Outputs of models that reach the hand at a device; force and torque for a model, and in recordings of earlier versions.
     pub at_hand: Demand,
     /// Settings of scene and command line, as written, in order; sufficient to repeat the run.
     pub settings: Vec<(String, String)>,
