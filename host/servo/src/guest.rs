@@ -19,8 +19,8 @@ static GUEST: AtomicU8 = AtomicU8::new(0);
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
 /// Enters guest mode: the memory of this process is not locked, and its signals are handled as in `signals`. `program` is the
-/// `flotor` executable for the processes that a run starts, if one was found. Call this function before the first session; later
-/// calls have no effect. Not real-time.
+/// `flotor` executable for the processes that a run starts, if one was found. Call this function before the first session; a later
+/// call can only add a missing `program`. Not real-time.
 pub fn be_guest(signals: Signals, program: Option<PathBuf>) {
     if let Some(program) = program {
         let _ = PROGRAM.set(program);

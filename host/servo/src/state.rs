@@ -33,7 +33,7 @@ use flotor_hal::Fault;
 pub enum EmergencySource {
     /// A key of the terminal.
     Key,
-    /// Signal `SIGUSR1`, or a second termination signal.
+    /// Signal `SIGUSR1`, or a second termination signal (on Windows, a console event).
     Signal,
     /// The latch of the machine: the emergency stop of another run, or of the network.
     Latch,
@@ -78,7 +78,7 @@ pub enum Cause {
 /// State of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RunState {
-    /// Start: the models' force fades in.
+    /// Start of the run, or return of lost samples: the models' force fades in.
     Ramping {
         /// Start of the fade, ns.
         since_ns: u64,

@@ -39,7 +39,7 @@ pub struct Reported {
     pub fault: Option<Fault>,
     /// True if the device reported the fault; if the host found it, the counts below give the reason.
     pub is_own_fault: bool,
-    /// Implausible samples of the device.
+    /// Counts of the implausible samples of the device by reason, with the tick of the first.
     pub implausible: ImplausibleSamples,
     /// Number of consecutive commands that the device had not taken when the run ended.
     pub untaken: u32,

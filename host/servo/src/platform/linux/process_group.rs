@@ -15,7 +15,8 @@ use std::os::unix::process::CommandExt;
 use std::process::{Child, Command};
 
 /// Makes the process of a command the leader of a new process group, which terminal signals do not reach. The system kills the
-/// leader when the thread that starts it ends; at the end of the leader, a guard kills the rest of the group. Not real-time.
+/// leader when the thread that starts the leader ends; at the end of the leader, a guard (from Linux 5.3 on) kills the rest of the
+/// group. Not real-time.
 pub fn lead_until_parent_ends(command: &mut Command) {
     end_with_this_thread(command.process_group(0));
     // SAFETY: system calls alone, without a lock or an allocation.

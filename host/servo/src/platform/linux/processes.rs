@@ -11,7 +11,7 @@ pub(crate) struct HostProcess {
 }
 
 impl HostProcess {
-    /// Creates the host process with an id; it may already have ended. Not real-time.
+    /// Creates the handle of the host process with the id `number`; the process may already have ended. Not real-time.
     ///
     /// # Errors
     /// None on Linux.

@@ -9,7 +9,7 @@ use std::sync::atomic::AtomicU32;
 /// Page that another process may have mapped too: not available yet.
 pub(crate) enum SharedMemory {}
 
-/// Creates the shared file. Not real-time.
+/// Returns an error: worker processes are not available yet. Not real-time.
 ///
 /// # Errors
 /// Always.
@@ -18,7 +18,7 @@ pub(crate) fn create_file() -> io::Result<OwnedHandle> {
 }
 
 impl SharedMemory {
-    /// Maps the memory passed to this process as standard input. Not real-time.
+    /// Returns an error: worker processes are not available yet. Not real-time.
     ///
     /// # Errors
     /// Always.
@@ -26,7 +26,7 @@ impl SharedMemory {
         Err(no_workers())
     }
 
-    /// Maps a file of [`create_file`]. Not real-time.
+    /// Returns an error: worker processes are not available yet. Not real-time.
     ///
     /// # Errors
     /// Always.

@@ -77,7 +77,7 @@ impl WatchdogProcess {
     }
 }
 
-/// Returns the control group that a watchdog process would share with this process. Not real-time.
+/// Returns an error: this system has no watchdog process yet, and no control groups. Not real-time.
 ///
 /// # Errors
 /// Always.
@@ -85,7 +85,7 @@ pub fn probe_shared_group() -> io::Result<Option<String>> {
     is_offered().map(|()| None)
 }
 
-/// Guards the devices of a host.
+/// Returns an error: this system has no watchdog process yet. Not real-time.
 ///
 /// # Errors
 /// Always.
