@@ -32,7 +32,7 @@ pub enum Call {
     Activate,
     /// Stopping a device at the end of a run.
     SafeStop,
-    /// Ending the energy balance of a device and de-energising the device.
+    /// Reading the energy balance and the last message of a device, and de-energising the device.
     Deactivate,
     /// Reading the message about a failed call.
     LastMessage,

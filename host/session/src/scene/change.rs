@@ -19,12 +19,12 @@ pub struct ChangeUse {
 pub enum ChangeWhat {
     /// New value of a parameter.
     Set {
-        /// `device`, the name of a model in the scene, or a plugin's id.
+        /// Name of a device or model in the scene (`device` for a single device without a name), or id of a plugin.
         plugin: String,
         /// Parameter with its value.
         parameter: ParameterText,
     },
-    /// Replacement of a model by another plugin, or by a new instance of the same plugin.
+    /// Replacement of a model with another plugin, or with a new instance of the same plugin.
     Swap {
         /// Name of a model in the scene, or id of a plugin.
         model: String,

@@ -28,7 +28,7 @@ pub struct Location {
 }
 
 impl Location {
-    /// Returns true for a line of a file, false for a command line. Not real-time.
+    /// Returns true if the location is a line; false for a command line option, and for a file as a whole. Not real-time.
     #[must_use]
     pub fn is_in_a_file(&self) -> bool {
         self.line > 0

@@ -168,7 +168,8 @@ impl Session {
     }
 
     /// Lifts the host's ceiling on force and torque if the strength is [`Strength::Strong`]: only the limits of scene and device
-    /// apply. Only a user who knows the device should decide this; a scene cannot. Not real-time.
+    /// apply. [`Strength::UnderCeiling`] changes nothing. Only a user who knows the device should decide this; a scene cannot. Not
+    /// real-time.
     pub fn with_strength(mut self, strength: Strength) -> Self {
         if strength == Strength::Strong && self.strength == Strength::UnderCeiling {
             self.prepared.standby.guard_with(std::mem::take(&mut self.strong_envelopes));

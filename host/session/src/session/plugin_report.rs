@@ -73,7 +73,7 @@ impl PluginNames {
         self.names.get(self.devices..).unwrap_or_default()
     }
 
-    /// Returns the name of a plugin, or its number as text if the run has fewer plugins.
+    /// Returns the name of a plugin; `plugin N` with its index if the run has fewer plugins.
     pub(super) fn name(&self, plugin: PluginIndex) -> String {
         self.names.get(plugin.position()).cloned().unwrap_or_else(|| plugin.to_string())
     }

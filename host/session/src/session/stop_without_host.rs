@@ -33,7 +33,8 @@ impl StopWithoutHost {
         Ok(Self { device: name.to_owned(), embodiment, actuated: capabilities.actuated, means })
     }
 
-    /// Returns the reason to reject the device if an independent stop is required; `None` for a device that has one or exerts no force.
+    /// Returns the reason to reject the device if an independent stop is required; `None` for a device with an independent stop or
+    /// without actuated axes.
     pub(super) fn missing(&self) -> Option<String> {
         self.is_missing().then(|| {
             "no process stops the device if this program is killed: its plugin lacks the extension \

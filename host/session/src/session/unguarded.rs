@@ -41,7 +41,8 @@ impl Guardian {
         }
     }
 
-    /// Returns the warning that the watchdog process has ended, which the user has seen as a notice; `None` without it.
+    /// Returns the warning that the watchdog process has ended, which the user has seen as a notice; `None` if the process still
+    /// runs or is required.
     pub(super) fn warning(&self) -> Option<String> {
         (self.is_gone && !self.is_required).then(|| Notice::Unguarded.to_string())
     }

@@ -18,7 +18,7 @@ use flotor_servo::{
 };
 
 impl RunSummary {
-    /// Creates the summary of a run.
+    /// Creates the summary of a run from its inputs, its outcome and the counts over its ticks.
     #[must_use]
     pub fn new(facts: RunFacts<'_>, outcome: &Outcome, tally: &Tally) -> Self {
         let Timing { ticks, late, missed, lateness, compute, stages } = &outcome.timing;

@@ -61,7 +61,8 @@ pub struct RunSummary {
     pub couplings: Vec<CouplingSummary>,
     /// Number of ticks with each event, by name; events that did not happen are left out.
     pub events: BTreeMap<&'static str, u64>,
-    /// Digest of all records without measured times: equal for equal runs.
+    /// Digest of the time, motion, wrenches, events and buttons of all records, without model outputs and measured times: equal for
+    /// equal runs.
     pub trace_digest: String,
     /// Model outputs that were not computed in every tick ("torque", "energy"): not requested, or not available from every model.
     pub not_computed: Vec<&'static str>,
@@ -238,7 +239,7 @@ pub struct RunFacts<'a> {
     pub requested: Demand,
     /// Counts of messages between hosts, by the name of the coupling.
     pub carried: &'a [(String, LinkCounts)],
-    /// Digest of all records of the run.
+    /// Digest of all records of the run, as in [`RunSummary::trace_digest`].
     pub trace_digest: String,
 }
 

@@ -40,7 +40,7 @@ pub enum ControlError {
         /// Ids of the parameters that can change while the loop runs.
         live: Vec<String>,
     },
-    /// The name is that of a device, which has no weight and cannot be replaced.
+    /// The name belongs to a device, which has no weight and cannot be replaced.
     #[error("only models have a weight and can be swapped; name a model instead of a device")]
     NoWeight,
     /// The replacement of a model was rejected; the model stays in place.

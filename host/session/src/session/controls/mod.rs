@@ -116,11 +116,11 @@ impl Controls {
         changes.push_entire_slice(checked).map_err(|_| ControlError::Busy)
     }
 
-    /// Replaces a model by another plugin, or by a new instance of the same plugin (hot swap): loads and creates the new model, which
-    /// then fades in from the next tick on while the old model fades out. Not real-time: takes as long as creating the model.
+    /// Replaces a model with another plugin, or with a new instance of the same plugin (hot swap): loads and creates the new model,
+    /// which then fades in from the next tick on while the old model fades out. Not real-time: takes as long as creating the model.
     ///
-    /// Without `plugin`, plugin and parameters are those of the scene; a given plugin starts from its own defaults. `settings`, as
-    /// key and value, are added. Positions, mapping and weight stay.
+    /// Without `plugin`, the new model has the plugin and parameters of the scene; a given plugin starts from its own defaults.
+    /// `settings`, as key and value, are added. Positions, mapping and weight stay.
     ///
     /// # Errors
     /// [`ControlError`]: unknown model, rejected plugin, a previous replacement pending or still fading, or run over.

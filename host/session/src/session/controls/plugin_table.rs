@@ -92,7 +92,7 @@ impl PluginTable {
         self.model(model, |versions| versions.get(generation).clone())
     }
 
-    /// Returns the name of a model, or its number as text if the run has fewer models.
+    /// Returns the name of a model; if the run has fewer models, `plugin N` with the index among all plugins.
     pub(super) fn name(&self, model: usize) -> String {
         let name = self.model(model, |versions| versions.first.name.clone());
         name.unwrap_or_else(|| PluginIndex::of_model(self.devices, model).to_string())
