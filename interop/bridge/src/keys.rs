@@ -66,7 +66,7 @@ impl Name {
         format!("{ROOT}/{self}/{what}")
     }
 
-    /// Returns the name of the bridge in a key; `None` if the key is not one of this program.
+    /// Returns the name of the bridge in a key; `None` if the key does not begin with `flotor/NAME`.
     #[must_use]
     pub fn of_key(key: &str) -> Option<Self> {
         let name = key.strip_prefix(ROOT)?.strip_prefix('/')?.split('/').next()?;

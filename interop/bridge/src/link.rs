@@ -135,7 +135,8 @@ impl Link {
         &self.member
     }
 
-    /// Returns the remaining validity of the keys, days: 0 if expired, `None` without an expiry in the configuration.
+    /// Returns the remaining validity of the keys in whole days, rounded down: 0 on the last day and after the expiry; `None`
+    /// without an expiry in the configuration.
     #[must_use]
     pub fn days_left(&self) -> Option<u64> {
         Some(self.expires_s?.saturating_sub(since_1970().as_secs()) / 86_400)

@@ -97,7 +97,7 @@ impl Request {
         }
     }
 
-    /// Converts the request to one for the host; `None` for requests to the bridge itself.
+    /// Converts to a request for the host; `None` for requests to the bridge itself.
     #[must_use]
     pub fn ask(&self) -> Option<Ask> {
         match self {
@@ -109,7 +109,8 @@ impl Request {
         }
     }
 
-    /// Converts a request of a local client; `None` for a request that concerns the local machine only.
+    /// Converts a request of a local client; `None` for a request that no bridge accepts: for ticks, the swap of a plugin, or the
+    /// stop of all runs of a machine.
     #[must_use]
     pub fn of_ask(ask: Ask) -> Option<Self> {
         match ask {
@@ -136,7 +137,7 @@ pub struct Ticket {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct NumberedRequest {
-    /// Session of the member: any text that is unique among the member's sessions. The key names the member.
+    /// Session of the member: a text of 1 to 64 bytes that is unique among the member's sessions. The key names the member.
     pub session: String,
     /// Request number, higher than the numbers of the session's earlier requests.
     pub number: u64,
@@ -144,7 +145,7 @@ pub struct NumberedRequest {
     pub run: u32,
     /// Ticket from the bridge's status.
     pub ticket: Ticket,
-    /// The request.
+    /// Requested operation; its kind must match the key.
     pub request: Request,
 }
 
@@ -167,7 +168,7 @@ pub enum Refusal {
     /// Longer than [`MAX_REQUEST_BYTES`].
     #[error("the request is longer than {MAX_REQUEST_BYTES} bytes; use both programs from one build")]
     TooLong,
-    /// Number not higher than that of the session's last request.
+    /// Number not higher than the number of the session's last request.
     #[error(
         "the number of the request is not above the previous number, and each request is valid once; send a new request"
     )]
@@ -233,8 +234,8 @@ impl AdmissionControl {
         Ticket { began: self.began, at_ms }
     }
 
-    /// Decodes and admits a request that arrived on `key` (`flotor/NAME/ask/REQUEST/MEMBER`), and stores its number against replay;
-    /// `run` is the process id of the current run (0: no run).
+    /// Decodes and admits a request that arrived on `key` (`flotor/NAME/ask/REQUEST/MEMBER`), and stores its number to reject
+    /// replays (not for an emergency stop, which may be repeated); `run` is the process id of the current run (0: no run).
     ///
     /// # Errors
     /// [`Refusal`], which is counted.

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 pub struct Status {
     /// State of the bridge.
     pub state: State,
-    /// Process id of the run; 0 without one.
+    /// Process id of the run; 0 without a run.
     pub run: u32,
     /// Title of the run's scene; empty without a run.
     pub title: String,
