@@ -161,7 +161,7 @@ impl Host {
         self.stations.get(number)
     }
 
-    /// Returns the pace of the run.
+    /// Returns the clock of the run: the machine's clock, or lockstep with the program's calls.
     #[must_use]
     pub fn pace(&self) -> Pace {
         self.pace

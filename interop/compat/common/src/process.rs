@@ -52,8 +52,8 @@ pub(crate) fn is_first() -> bool {
     CLAIM.get_or_init(claim).is_some()
 }
 
-/// Runs `body` with the program's signals blocked in threads that `body` starts: signals belong to the program's own threads.
-/// Signals raised by an instruction stay unblocked. Not real-time.
+/// Runs `body` with signals blocked in this thread, and so in all threads that `body` starts: signals belong to the program's own
+/// threads. Signals raised by an instruction stay unblocked. Not real-time.
 pub fn quietly<T>(body: impl FnOnce() -> T) -> T {
     const RAISED: [i32; 7] =
         [libc::SIGSEGV, libc::SIGBUS, libc::SIGFPE, libc::SIGILL, libc::SIGABRT, libc::SIGSYS, libc::SIGTRAP];

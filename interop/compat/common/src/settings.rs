@@ -90,8 +90,8 @@ impl Settings {
         }
     }
 
-    /// Adds the number of this process among those of one `flotor lend` to the names of all files, from the second process on. Each
-    /// process reserves its number by a file in `folder`.
+    /// Adds the number of this process among the processes of one `flotor lend` to the names of all files, from the second process
+    /// on. Each process reserves its number by a file in `folder`.
     pub(crate) fn keep_processes_apart(&mut self, folder: &Path) {
         let stem = self.report.as_deref().and_then(Path::file_stem).unwrap_or_default().to_owned();
         let is_free = |number: &u32| {
