@@ -98,7 +98,7 @@ fn device(number: usize) -> MutexGuard<'static, Device> {
     device.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns the device of an id, open or not; -1 is the default one.
+/// Returns the device of an id, open or not; a negative id selects the default device.
 pub(crate) fn any(id: i8) -> Result<Open, Code> {
     let number = if id < 0 { DEFAULT.load(Ordering::Acquire) } else { i32::from(id) };
     let number = usize::try_from(number).ok().filter(|number| *number < MOST).ok_or(Code::NoDevice)?;
@@ -131,7 +131,7 @@ pub(crate) fn count() -> usize {
     host().map_or(0, |host| host.stations().len().min(MOST))
 }
 
-/// Opens a device and makes it the default one; returns its id.
+/// Opens a device and makes it the default device; returns its id.
 pub(crate) fn open_number(number: usize) -> Result<i32, Code> {
     let host = host().filter(|_| number < count()).ok_or(Code::NoDevice)?;
     let id = i32::try_from(number).map_err(|_| Code::NoDevice)?;
@@ -155,7 +155,7 @@ pub(crate) fn open_first(fits: impl Fn(&Open) -> bool) -> Result<i32, Code> {
     open_number(free.ok_or(Code::NoDevice)?)
 }
 
-/// Closes a device; if it was the default, another open one becomes the default.
+/// Ends the regulation of a device and closes the device; if it was the default device, another open device becomes the default.
 pub(crate) fn close(id: i8) -> Result<i32, Code> {
     let closing = open(id)?;
     closing.device().regulation = Regulation::OFF;
@@ -173,7 +173,7 @@ pub(crate) fn default() -> Result<i32, Code> {
     if id < 0 { Err(Code::NoDevice) } else { Ok(id) }
 }
 
-/// Makes an open device the default one.
+/// Makes an open device the default device.
 pub(crate) fn set_default(id: i8) -> Result<i32, Code> {
     let open = open(id)?;
     DEFAULT.store(i32::try_from(open.number).unwrap_or(-1), Ordering::Release);
@@ -231,8 +231,9 @@ impl Open {
         }
     }
 
-    /// Limits the program's force and torque, and sends both in addition to regulation and vibration. Returns true if force or
-    /// torque is scaled down, here or later by the envelope; [`Code::Invalid`] for a non-finite command.
+    /// Limits the program's force and torque, and sends both in addition to regulation and vibration. Enables force unless the
+    /// program has set the force switch. Returns true if force or torque is scaled down, here or later by the envelope;
+    /// [`Code::Invalid`] for a non-finite command.
     pub(crate) fn send(&self, device: &mut Device, force_n: DVec3, torque_nm: DVec3) -> Result<bool, Code> {
         if !(force_n.is_finite() && torque_nm.is_finite()) {
             // The port counts and rejects the command.

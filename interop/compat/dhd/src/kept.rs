@@ -72,35 +72,35 @@ pub(crate) const ROTATION_MOVE: usize = 4;
 export! {
     /// Stores the limits of acceleration, speed and jerk for encoder motions, without effect.
     fn drdSetEncMoveParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 0, [amax, vmax, jerk]) }
-    /// Stores the limits for following encoders, without effect.
+    /// Stores the limits for tracking encoders, without effect.
     fn drdSetEncTrackParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 1, [amax, vmax, jerk]) }
     /// Sets the limits for motions of the position, m and s; only the speed has an effect.
     fn drdSetPosMoveParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, POSITION_MOVE, [amax, vmax, jerk]) }
-    /// Stores the limits for following a position, m and s, without effect.
+    /// Stores the limits for tracking a position, m and s, without effect.
     fn drdSetPosTrackParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 3, [amax, vmax, jerk]) }
     /// Sets the limits for motions of the rotation, rad and s; only the speed has an effect.
     fn drdSetRotMoveParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, ROTATION_MOVE, [amax, vmax, jerk]) }
-    /// Stores the limits for following a rotation, rad and s, without effect.
+    /// Stores the limits for tracking a rotation, rad and s, without effect.
     fn drdSetRotTrackParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 5, [amax, vmax, jerk]) }
     /// Stores the limits for motions of a gripper, without effect.
     fn drdSetGripMoveParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 6, [amax, vmax, jerk]) }
-    /// Stores the limits for following a gripper, without effect.
+    /// Stores the limits for tracking a gripper, without effect.
     fn drdSetGripTrackParam(amax: f64, vmax: f64, jerk: f64, id: i8) -> c_int [-1] { set_parameters(id, 7, [amax, vmax, jerk]) }
     /// Reads the limits for encoder motions.
     fn drdGetEncMoveParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 0, [amax, vmax, jerk]) }
-    /// Reads the limits for following encoders.
+    /// Reads the limits for tracking encoders.
     fn drdGetEncTrackParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 1, [amax, vmax, jerk]) }
     /// Reads the limits for motions of the position.
     fn drdGetPosMoveParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, POSITION_MOVE, [amax, vmax, jerk]) }
-    /// Reads the limits for following a position.
+    /// Reads the limits for tracking a position.
     fn drdGetPosTrackParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 3, [amax, vmax, jerk]) }
     /// Reads the limits for motions of the rotation.
     fn drdGetRotMoveParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, ROTATION_MOVE, [amax, vmax, jerk]) }
-    /// Reads the limits for following a rotation.
+    /// Reads the limits for tracking a rotation.
     fn drdGetRotTrackParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 5, [amax, vmax, jerk]) }
     /// Reads the limits for motions of a gripper.
     fn drdGetGripMoveParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 6, [amax, vmax, jerk]) }
-    /// Reads the limits for following a gripper.
+    /// Reads the limits for tracking a gripper.
     fn drdGetGripTrackParam(amax: Out<f64>, vmax: Out<f64>, jerk: Out<f64>, id: i8) -> c_int [-1] { parameters(id, 7, [amax, vmax, jerk]) }
 }
 

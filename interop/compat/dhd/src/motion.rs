@@ -1,4 +1,4 @@
-//! Entry points of regulation and motion: hold the handle, move it, follow the program.
+//! Entry points of regulation and motion: hold the handle, move it along a line, track targets without a planned motion.
 
 use crate::basic::{angles, put6, read, read_live, turning, with};
 use crate::device::{FRAME, Open, Switch, live, open};

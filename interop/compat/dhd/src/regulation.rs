@@ -1,7 +1,7 @@
-//! Regulation: a virtual spring that holds the handle, moves it along a straight line, or follows the program.
+//! Regulation: a virtual spring that holds the handle, moves it along a straight line, or tracks targets without a planned motion.
 //!
-//! The original controls encoders with motors. Here a spring and a damper at the handle do this, inside the envelope: soft enough
-//! for any device, so that a resisting hand prevails.
+//! The original library regulates the encoder positions with the motors. Here a spring and a damper act on the handle instead,
+//! inside the envelope: soft enough for any device, so that a resisting hand prevails.
 
 use flotor_compat::{Axes, State};
 use flotor_hal::{DQuat, DVec3, orientation_from_rotation_vector, rotation_vector};
