@@ -28,7 +28,8 @@ pub(crate) fn answer_client(service: &Service, mut stream: TcpStream) -> io::Res
     Ok(())
 }
 
-/// Sends the devices and then all events to a client of the events channel, until the connection ends.
+/// Sends a `device-connected` event for each device, and then all events, to a client of the events channel until the connection
+/// ends.
 ///
 /// # Errors
 /// Error of the connection.

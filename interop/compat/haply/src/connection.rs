@@ -119,7 +119,7 @@ fn read_before(stream: &mut TcpStream, deadline: Instant, buffer: &mut [u8]) -> 
     stream.read(buffer)
 }
 
-/// Completes a WebSocket upgrade; returns true if the client requested one.
+/// Completes a WebSocket upgrade; returns false if the client requested no upgrade.
 pub(crate) fn upgraded(stream: &mut TcpStream, head: &Head) -> io::Result<bool> {
     let Some(key) = &head.key else { return Ok(false) };
     let accept = derive_accept_key(key.as_bytes());

@@ -4,7 +4,7 @@ use flotor_hal::DVec3;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// Returns the id of the arm of a device: four digits, as on the label of the original.
+/// Returns the id of the arm of a device: four hexadecimal digits, as on the label of an Inverse3.
 pub(crate) fn inverse_id(number: usize) -> String {
     format!("F{:03X}", number + 1)
 }

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 /// Emulated version of the service.
 const VERSION: &str = "3.5.0";
 
-/// Returns the reply to a request.
+/// Carries out a request and returns the reply.
 pub(crate) fn answer(service: &Service, request: &Request) -> Answer {
     let (path, query) = request.target.split_once('?').unwrap_or((&request.target, ""));
     let parts: Vec<&str> = path.split('/').filter(|part| !part.is_empty()).collect();

@@ -133,7 +133,7 @@ impl Service {
         station.enable();
     }
 
-    /// Starts a thread that updates sums that depend on the handle, and fades expired commands; it acts in real time only.
+    /// Starts a thread that updates sums that depend on the handle, and fades expired commands. The thread acts in real time only.
     ///
     /// # Errors
     /// If the thread cannot be created.

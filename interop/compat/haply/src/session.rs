@@ -57,7 +57,7 @@ pub(crate) fn socket(stream: TcpStream, read: Vec<u8>) -> WebSocket<Link> {
     WebSocket::from_partially_read(Link { stream, is_asking: false }, read, Role::Server, Some(config))
 }
 
-/// Serves a client until the connection ends.
+/// Serves a client until the connection ends or, in real time, the client is silent for 20 s.
 pub(crate) fn serve(service: &Service, mut socket: WebSocket<Link>) {
     let session = service.enter();
     if service.host.pace() == Pace::Real {

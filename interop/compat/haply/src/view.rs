@@ -200,7 +200,7 @@ impl View {
         true
     }
 
-    /// Replaces the mount by a custom one.
+    /// Sets the mount, and the preset to `custom`.
     pub(crate) fn set_mount(&mut self, mount: Transform) {
         (self.mount, self.preset) = (mount, "custom");
     }
