@@ -58,12 +58,12 @@ fn list() -> MutexGuard<'static, List> {
     LIST.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Returns true if the calling thread is the scheduler's.
+/// Returns true if the calling thread is the thread of the scheduler.
 pub(crate) fn is_here() -> bool {
     IS_SCHEDULER.try_with(Cell::get).unwrap_or(false)
 }
 
-/// Marks the calling thread as the scheduler's.
+/// Marks the calling thread as the thread of the scheduler.
 pub(crate) fn mark_here() {
     IS_SCHEDULER.with(|here| here.set(true));
 }

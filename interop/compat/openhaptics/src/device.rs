@@ -133,7 +133,7 @@ impl Devices {
     }
 }
 
-/// Opens the device with a name and makes it current; returns its handle.
+/// Opens the device with a name (the first device without a name or with a default name) and makes it current; returns its handle.
 pub(crate) fn init(name: Option<&str>) -> Result<c_uint, Code> {
     let host = host().ok_or(Code::DeviceFault)?;
     let name = name.unwrap_or_default();

@@ -56,7 +56,7 @@ pub(crate) fn raise(code: Code, device: c_uint) {
     });
 }
 
-/// Pops the newest error of the calling thread; [`NONE`] without one.
+/// Pops the newest error of the calling thread; [`NONE`] without an error.
 pub(crate) fn take() -> ErrorInfo {
     ERRORS.try_with(|errors| errors.borrow_mut().pop()).ok().flatten().unwrap_or(NONE)
 }
