@@ -155,7 +155,7 @@ impl Sweep {
         Ok(sweep)
     }
 
-    /// Returns the plan.
+    /// Returns the checked plan of the sweep.
     #[must_use]
     pub fn plan(&self) -> &Plan {
         &self.plan
