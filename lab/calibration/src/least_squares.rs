@@ -13,7 +13,8 @@ pub(super) struct Solution {
     triangle: Vec<Vec<f64>>,
 }
 
-/// Solves the least-squares problem by QR decomposition; `None` if the rows do not determine every unknown.
+/// Solves the least-squares problem by QR decomposition; `None` if the rows do not determine every unknown, or for more than
+/// [`MAX_UNKNOWNS`] unknowns.
 pub(super) fn solve(rows: &[Vec<f64>], values: &[f64]) -> Option<Solution> {
     /// Ratio of a diagonal entry of `R` to the largest one at or below which the rows count as rank-deficient; above rounding
     /// errors.

@@ -13,7 +13,7 @@ const APART_MM: f64 = 0.16;
 const FIT: usize = 2;
 const REPORT: usize = 3;
 
-/// Draws readings, fit and errors as SVG. `curves`: error curves with their names, first the one without correction.
+/// Draws readings, fit and errors as SVG. `curves`: error curves with their names, first the curve without correction.
 #[must_use]
 pub fn to_svg(
     readings: &[Reading],

@@ -33,7 +33,7 @@ impl Plan {
         (0..=self.steps).map(|step| self.top_m - f64::from(step) * self.step_m)
     }
 
-    /// Returns the number of stops of the sensor.
+    /// Returns the number of stops of the sensor over all forces, runs and heights.
     #[must_use]
     pub fn stops(&self) -> u64 {
         self.forces_n.len() as u64 * u64::from(self.runs) * (u64::from(self.steps) + 1)

@@ -12,7 +12,8 @@ const STEP_M: f64 = 0.25e-3;
 /// Number of steps to either side of the middle.
 const STEPS: u32 = 28;
 
-/// Commanded total vertical force, N: between the two forces of a calibration.
+/// Commanded total vertical force of an error curve, N: between the two forces of a calibration. The ratios of
+/// [`ErrorCurve::measure`] refer to this force.
 pub const PROBE_N: f64 = 11.0;
 
 /// Ratio of delivered to commanded force at heights from bottom to top.
