@@ -109,8 +109,8 @@ impl Hold {
 }
 
 impl Flotor {
-    /// Creates a flotor at rest at `pose`. The rotational damping is that of the translational damping at the lever arm
-    /// `lever_m`.
+    /// Creates a flotor at rest at `pose`. The rotational damping is the damping of the translation times the square of the lever
+    /// arm `lever_m`.
     #[must_use]
     pub fn at_rest(pose: Pose, damping_ns_per_m: f64, lever_m: f64, period_s: f64) -> Self {
         let angular_damping = damping_ns_per_m * lever_m * lever_m;

@@ -98,7 +98,7 @@ pub struct Trouble {
 pub enum TroubleKind {
     /// The model panicked, with this message.
     Panicked(String),
-    /// The answer contains NaN or infinity.
+    /// The wrench contains NaN or infinity, or the energy is infinite.
     NotFinite,
     /// The status is not one of the contract.
     UnknownStatus,
@@ -201,8 +201,8 @@ impl<'a> Subject<'a> {
         input
     }
 
-    /// Makes one call and checks the answer: finite, with a known status. Replaces a model that panicked by a new
-    /// instance.
+    /// Makes one call and checks the answer: finite apart from an energy of NaN, with a known status. Replaces a model that
+    /// panicked by a new instance.
     ///
     /// # Errors
     /// [`Trouble`] with the kind of the failure and its pose.

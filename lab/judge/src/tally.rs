@@ -64,7 +64,7 @@ macro_rules! tally {
 }
 pub(crate) use tally;
 
-/// Largest value so far, with its pose; the first of equal ones.
+/// Largest value so far, with its pose; of equal values, the first.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Worst {
     pub(crate) value: f64,
@@ -110,7 +110,7 @@ impl Decades {
         self.merge(later);
     }
 
-    /// Returns lower edge, upper edge and count of every bin from the first to the last non-empty one.
+    /// Returns lower edge, upper edge and count of every bin from the first to the last non-empty bin.
     #[must_use]
     pub fn bins(&self) -> Vec<(f64, f64, u64)> {
         let (Some((first, _)), Some((last, _))) = (self.0.first_key_value(), self.0.last_key_value()) else {

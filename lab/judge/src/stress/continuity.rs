@@ -22,7 +22,7 @@ use flotor_hal::{DVec3, Memory, Pose, Twist, Wrench};
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "continuity";
-/// Piece lengths from the first cut to the last, mm.
+/// Lengths of the pieces by refinement level, mm; the first is the length before any refinement.
 pub(super) const PIECES_MM: [f64; 7] = [1.0e-2, 1.0e-3, 1.0e-4, 1.0e-5, 1.0e-6, 1.0e-7, 1.0e-8];
 /// Pieces of a line: 10 mm.
 const PIECES_PER_LINE: usize = 1000;
@@ -36,7 +36,7 @@ const CUTS: usize = 10;
 pub(super) const FELT_N: f64 = 1.0e-3;
 /// Largest imperceptible step of torque, N·m.
 pub(super) const FELT_NM: f64 = 2.0e-5;
-/// Fraction of [`FELT_N`] and [`FELT_NM`] up to which a step passes; a larger but imperceptible one is noted.
+/// Fraction of [`FELT_N`] and [`FELT_NM`] up to which a step passes; a larger but imperceptible step is noted.
 pub(super) const HARMLESS: f64 = 1.0e-3;
 
 /// Largest changes of force and torque over all pieces of one length.

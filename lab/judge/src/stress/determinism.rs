@@ -38,7 +38,7 @@ tally! {
     }
 }
 
-/// Steps through the same poses in four ways.
+/// Compares the bits of the answers at the same poses: of two instances, of a reset instance, and of a batch.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let sobol = Sobol::new(setup.options.seed);
     let blocks = setup.share(1_000_000, 0).div_ceil(BLOCK);

@@ -116,7 +116,7 @@ impl Lap {
         Some(Self { net_j, gross_j, uncertain_j, mismatch: self.mismatch })
     }
 
-    /// Returns the generated energy beyond the uncertainty, J.
+    /// Returns the generated energy beyond the uncertainty, J; with [`Dissipation::None`] dissipated energy counts as generated.
     pub(super) fn made_j(&self, dissipation: Dissipation) -> f64 {
         (self.work_j(dissipation) - self.uncertain_j).max(0.0)
     }

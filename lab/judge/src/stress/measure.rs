@@ -55,7 +55,7 @@ impl Verdict {
 pub struct Quantity {
     /// Name of the quantity.
     pub name: String,
-    /// Value; NaN if there is none.
+    /// Value; NaN if the quantity has no value.
     #[serde(deserialize_with = "number_or_none")]
     pub value: f64,
     /// Unit; empty for a pure number.
@@ -123,7 +123,7 @@ pub struct Measure {
     pub bound: Option<f64>,
     /// Verdict on the value.
     pub verdict: Verdict,
-    /// Pose of the worst value; `None` if there is none.
+    /// Pose of the worst value; `None` if the value belongs to no pose.
     pub pose: Option<PoseRecord>,
     /// Comment on value and verdict.
     #[serde(rename = "remark")]

@@ -1,5 +1,4 @@
-//! Numerical stability score of a force model: ten measures of whether a law is safe for a hand at a thousand ticks a
-//! second.
+//! Numerical stability score of a force model: measures of whether a law is safe for a hand at a thousand ticks a second.
 //!
 //! | measure | question | source |
 //! |---|---|---|

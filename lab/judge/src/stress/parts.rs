@@ -1,8 +1,8 @@
 //! Measures in separate processes: a call that does not return, or a model that crashes its process, costs one measure,
 //! and the score continues.
 //!
-//! The process of a measure watches its own calls ([`crate::watch`]) and reports the pose of a stuck one. Its result
-//! returns through a file on its standard input, apart from the output of the plugin.
+//! The process of a measure watches its own calls ([`crate::watch`]) and reports the pose of a stuck call. Its result returns
+//! through a file on its standard input, apart from the output of the plugin.
 
 use super::measure::{Measure, PoseRecord};
 use super::score::{Distributions, StressReport};
@@ -97,7 +97,7 @@ impl Part {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Found {
     pub(super) measures: Vec<Measure>,
-    /// Distributions measured by the part; the others are empty.
+    /// Distributions measured by the part; all other distributions are empty.
     pub(super) spread: Distributions,
 }
 

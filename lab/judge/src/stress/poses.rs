@@ -1,8 +1,8 @@
 //! Poses of the tests: evenly through the workspace, and on the sets of measure zero where formulas break.
 //!
-//! Even coverage is [Sobol's sequence](crate::sampling): any first part of it covers the space evenly, so a short run
-//! takes the first poses of a full one. No sequence ever hits home exactly, or a coordinate plane, or a non-finite
-//! number: those are the named [`MANIFOLDS`].
+//! Even coverage is [Sobol's sequence](crate::sampling): any first part of it covers the space evenly, so a short run takes the
+//! first poses of a full run. No sequence ever hits home exactly, or a coordinate plane, or a non-finite number: those are the
+//! named [`MANIFOLDS`].
 
 use crate::sampling::{Random, Sobol};
 use crate::trajectory::at;

@@ -1,9 +1,9 @@
 //! Work of a lap by Romberg's rule, on intervals that are split adaptively.
 //!
 //! A sum of evenly spaced samples converges faster than any power of their distance where the power is smooth, but only
-//! quadratically where it has a kink, as on the surface of a wall. Here the splitting confines a kink to an interval of
-//! a two-millionth of the lap, so that 1e-9 of the work can be distinguished from zero. Every lap takes all samples in
-//! their order, because a model may have memory.
+//! quadratically where it has a kink, as on the surface of a wall. Here the splitting confines a kink to an interval of a millionth
+//! of the lap, so that 1e-9 of the work can be distinguished from zero. Every lap takes all samples in their order, because a model
+//! may have memory.
 
 /// Number of intervals of the first lap.
 const INTERVALS: usize = 256;

@@ -1,9 +1,9 @@
 //! M9, search: worst case found by optimisation.
 //!
-//! Even coverage finds faults that fill part of the workspace. A fault that grows towards a point (a pole, a transition
-//! between two formulas, a swirl around an axis) is found faster by ascent. No derivative is needed: the best of many
-//! points is varied at random, a better point replaces it, and the size of the variations follows the success rate (a
-//! (1+1) evolution strategy with the rule of one success in five; Rechenberg, *Evolutionsstrategie*, 1973).
+//! Even coverage finds faults that fill part of the workspace. A fault that grows towards a point (a pole, a transition between two
+//! formulas, a swirl around an axis) is found faster by ascent. No derivative is needed: the best of many points is varied at
+//! random, a better point replaces the best, and the size of the variations follows the success rate (a (1+1) evolution strategy
+//! with the rule of one success in five; Rechenberg, *Evolutionsstrategie*, 1973).
 //!
 //! Four goals, each from several starts with their own seeds:
 //! - *step*: irregularity along a short line, in pieces of 1, 0.1 and 0.01 mm; then refined as in M1, to 1e-8 mm;

@@ -66,7 +66,7 @@ impl Tally {
     }
 }
 
-/// Steps the model at poses everywhere.
+/// Steps the model at poses of the manifolds and of an even coverage, also beyond the workspace, and counts the failures.
 pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     let reach = setup.options.reach.scaled(WIDER);
     let sobol = Sobol::new(setup.options.seed);

@@ -17,7 +17,7 @@ const TICK: Duration = Duration::from_millis(1);
 /// Number of capability queries, before and after activation.
 const ASKED: usize = 10;
 
-/// Queries the capabilities; the loader rejects unenforceable and inconsistent ones.
+/// Queries the capabilities; the loader rejects unenforceable and inconsistent capabilities.
 pub(super) fn capabilities(mut device: OpenedDevice) -> Result<(), String> {
     let ask = |device: &mut OpenedDevice| {
         (0..ASKED).try_for_each(|_| device.capabilities().map(drop)).map_err(|refusal| refusal.to_string())

@@ -13,8 +13,8 @@ use std::time::Duration;
 /// Number of repetitions of a change, for its duration.
 const TIMES: usize = 33;
 
-/// Sets each live parameter to its value, to the ends of its range and to its default. Each has its own instance,
-/// because the value of one may change the range of another.
+/// Sets each live parameter to its value, to the ends of its range and to its default. Each parameter has its own instance, because
+/// the value of one parameter may change the range of another.
 pub(super) fn live_parameters(subject: &Subject) -> Result<(), Outcome> {
     let is_live = |(_, parameter): &(usize, &Parameter)| parameter.mutability() == Mutability::Live;
     let mut taken = Vec::new();

@@ -1,7 +1,8 @@
 //! Checks a plugin against the rules of the contract, from outside as a host: each rule in its own process, so that a
 //! plugin that crashes or hangs costs one rule.
 //!
-//! - `rule`: list of rules; `checks`: check of one, in this process; `outcome`: its result; `patience`: its timeout.
+//! - `rule`: list of rules; `checks`: check of one rule, in this process; `outcome`: result of a check; `patience`: timeout of a
+//!   check.
 //! - `subject`: checked plugin; `life`: all calls of an instance; `untouched` and `guarded` check their side effects.
 //! - `path`: poses of the checks; `model`, `live_parameters`, `passive`, `locked`: checks of a model.
 //! - `device`: checks of a device.

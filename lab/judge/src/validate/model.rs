@@ -191,8 +191,8 @@ pub(super) fn no_threads(mut model: Model, before: usize) -> Result<(), Outcome>
     more("destroy")
 }
 
-/// Compares force and torque with the energy's slope over a micrometre and a hundredth of a milliradian, at poses of a
-/// walk. A kink of the law may lie in between, so a few places may differ, but not one in ten.
+/// Compares force and torque with the energy's slope over a micrometre and a hundredth of a milliradian, at poses of a walk. A kink
+/// of the law may lie between the two poses, so a few places may differ, but not one in ten.
 pub(super) fn energy_gradient(model: &mut Model) -> Result<(), Outcome> {
     const STEP_M: f64 = 1.0e-6;
     const STEP_RAD: f64 = 1.0e-5;

@@ -13,11 +13,11 @@ pub struct Finding {
     pub rule: &'static str,
     /// Requirement of the rule.
     pub text: &'static str,
-    /// Violation that was found, or description of a step that did not return; `None` if there is neither.
+    /// Violation that was found, or description of a step that did not return; `None` if the check found neither.
     pub violation: Option<String>,
-    /// Reason why the rule could not be checked; `None` if it was checked.
+    /// Reason why the rule could not be checked; `None` if the rule was checked.
     pub unchecked: Option<String>,
-    /// Category of the reason in `unchecked`; `None` without one.
+    /// Category of the reason in `unchecked`; `None` if the rule was checked.
     pub obstacle: Option<Obstacle>,
     /// Figures measured by the check; `None` for a check that measures none.
     pub figures: Option<Figures>,
@@ -73,7 +73,7 @@ pub enum Outcome {
     Violation(String),
     /// A step did not return, so the outcome is unknown.
     Stuck(String),
-    /// The plugin needs something that is missing (a device, a permission): no violation, no proof.
+    /// The plugin or the check needs something that is missing (a device, a permission): neither a violation nor a proof.
     Missing(String),
     /// This system cannot check the rule for any plugin.
     #[serde(rename = "notonthissystem")]

@@ -65,7 +65,8 @@ pub(super) fn step(model: &mut Model, input: &Input) -> Result<Output, String> {
     })
 }
 
-/// Makes one step whose answer must be finite.
+/// Makes one step; returns a description of the failure also for a wrench that is not finite, an infinite energy or an unknown
+/// status.
 pub(super) fn finite(model: &mut Model, input: &Input) -> Result<Output, String> {
     let output = step(model, input)?;
     if output.wrench.is_finite() && !output.energy_j.is_infinite() && output.status().is_some() {

@@ -1,5 +1,5 @@
-//! Timeout of the process of one rule: a limit of its processor time, and one of the time in which it was idle by
-//! choice. Time in which other processes have the processor does not count.
+//! Timeout of the process of one rule: a limit of its processor time, and a limit of the time in which it was idle by choice. Time
+//! in which other processes have the processor does not count.
 
 use crate::platform::used;
 use flotor_session::PluginProcess;

@@ -10,7 +10,7 @@ pub enum Check {
     Contract(Rule),
     /// The wrench is finite in motion too.
     FiniteInMotion,
-    /// The force of a model does not depend on the rest of the demand.
+    /// Force and status do not depend on the demand for other outputs, and the torque not on the demand for energy.
     Demand,
     /// Live parameters can be set in time and report their value.
     LiveParameters,
