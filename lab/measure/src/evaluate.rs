@@ -48,7 +48,8 @@ pub struct Answer {
     pub details: Vec<Option<f64>>,
 }
 
-/// Path to each pose.
+/// Path of a model with memory to each pose. A stateless model needs no path; for such a model only [`Self::PerTick`] changes the
+/// result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Travel {
     /// Straight path from home, with the model reset.

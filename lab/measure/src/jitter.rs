@@ -54,8 +54,8 @@ pub struct JitterReport {
 
 /// Difference of the missed ticks between servo and bare loop.
 ///
-/// On a shared machine a second without disturbance is followed by one with twenty missed ticks, in either loop. The
-/// scatter of the pairs of slices estimates the part of the difference due to such disturbances.
+/// On a shared machine a second without disturbance is followed by a second with twenty missed ticks, in either loop. The scatter
+/// of the pairs of slices estimates the part of the difference due to such disturbances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MissedMore {
     /// Missed ticks of the servo less those of the bare loop.

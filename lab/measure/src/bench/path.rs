@@ -43,8 +43,8 @@ impl Hand {
     }
 }
 
-/// Motion through a whole workspace, a ball of positions and a ball of rotations about home. The time in each part is
-/// proportional to its volume, so a mean over many sweeps is one over uniformly distributed poses.
+/// Motion through a whole workspace, a ball of positions and a ball of rotations about home. The time in each part is proportional
+/// to its volume, so a mean over many sweeps is a mean over uniformly distributed poses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Workspace {
     /// Radius of the ball of positions, m.

@@ -13,9 +13,9 @@ use serde::Serialize;
 pub struct SplitTimes {
     /// Fraction of the ticks with the detail above zero, 0 to 1.
     pub share: f64,
-    /// Times of the ticks with the detail above zero; `None` if there are none.
+    /// Times of the ticks with the detail above zero; `None` if there are no such ticks.
     pub above: Option<Speed>,
-    /// Times of the other ticks; `None` if there are none.
+    /// Times of the other ticks; `None` if there are no other ticks.
     pub others: Option<Speed>,
 }
 

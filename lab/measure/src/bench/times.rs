@@ -1,8 +1,8 @@
 //! Duration of a call: continuously along the path, in a batch, call by call, and cold.
 //!
-//! A shared machine disturbs measurements. So the cases take turns: each runs a slice of the path, then the next case,
-//! and so on to its end, round after round. A disturbance of one slice affects its neighbours too, and quotients of
-//! neighbouring slices are those of a quiet machine.
+//! A shared machine disturbs measurements. So the cases take turns: in each round, all cases run the first slice of the path one
+//! after the other, then the next slice, to the end of the path. A disturbance of one slice affects its neighbours too, and
+//! quotients of neighbouring slices are those of a quiet machine.
 
 use flotor_core::quantile;
 use flotor_hal::abi::loader::Model;
@@ -18,7 +18,7 @@ use std::time::Instant;
 pub struct Times {
     /// Mean of a tick of the path, with nothing between the calls; fastest repetition of every slice.
     pub mean_ns: f64,
-    /// Ratio of `mean_ns` to that of the baseline: median of all turns.
+    /// Ratio of the time of a slice to the time of the baseline's slice in the same turn: median of all turns.
     pub of_yardstick: f64,
     /// Mean of a pose in a batch, from the fastest repetitions; `None` for a model with memory.
     pub batch_ns: Option<f64>,

@@ -13,7 +13,7 @@ pub struct Coverage {
     pub begins_at_tick: Option<u64>,
     /// Last comparable tick; `None` without a comparable tick.
     pub ends_at_tick: Option<u64>,
-    /// Number of missing ticks after the first comparable one.
+    /// Number of missing ticks after the first comparable tick.
     pub missing_ticks: u64,
     /// First missing tick; `None` if none is missing.
     pub first_missing_tick: Option<u64>,
@@ -29,7 +29,7 @@ impl Coverage {
         missing
     }
 
-    /// Ends the coverage in the middle of a tick.
+    /// Ends the coverage in the middle of `tick`, which counts as missing.
     pub(super) fn break_off(&mut self, tick: u64) {
         self.miss(self.ends_at_tick.map_or(1, |last| tick.saturating_sub(last)));
     }
@@ -42,7 +42,7 @@ impl Coverage {
         }
     }
 
-    /// Returns true if no tick is missing from the run's first to the last recorded one.
+    /// Returns true if no tick is missing from the first tick of the run to the last recorded tick.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         self.missing_ticks == 0 && !self.is_joined_late()
@@ -171,7 +171,7 @@ impl Evidence {
         self.cause.clone()
     }
 
-    /// Returns a cause besides the change, as far as the recording shows one.
+    /// Returns a cause of a difference besides the change; `None` if no tick differs or the recording shows no such cause.
     pub(super) fn other_cause(&self) -> Option<DivergenceCause> {
         let field =
             self.field.as_ref().map(|model| DivergenceCause::FieldOnRealClock { model: model.clone() });

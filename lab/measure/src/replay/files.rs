@@ -4,8 +4,8 @@ use flotor_record::NamedFile;
 use flotor_session::scene::{Location, ParameterText, SceneError};
 use std::path::{Path, PathBuf};
 
-/// Returns a setting of `model`, a file name replaced by that of a file of equal content: at its place in the run, or
-/// beside the recording, which may have been moved. `parameters`: parameters in the model's description.
+/// Returns a setting of `model`. A file name is replaced by the name of a file of equal content: at its place in the run, or beside
+/// the recording, which may have been moved. `parameters`: parameters in the model's description.
 ///
 /// # Errors
 /// [`SceneError`] if no file has that content.

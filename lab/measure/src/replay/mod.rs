@@ -129,8 +129,8 @@ impl<'r> Replay<'r> {
     /// Opens a recording and creates its models as in the run, with other models and settings on top. Not real-time.
     ///
     /// # Errors
-    /// [`ReplayError`] if the recording cannot be read, a model to be changed is not in the recording, a plugin is
-    /// missing or rejects the settings, or a file named by a setting differs from that of the run.
+    /// [`ReplayError`] if the recording cannot be read, a model to be changed is not in the recording, a plugin is missing or
+    /// rejects the settings, or a file named by a setting differs from the file in the run.
     pub fn open(
         path: &Path,
         registry: &'r Registry,
@@ -177,12 +177,12 @@ impl<'r> Replay<'r> {
         &self.plugins
     }
 
-    /// Evaluates the models at every recorded pose. `look` is called with each recorded tick and the outputs of the
-    /// models in this replay, limited to the recorded outputs. Not real-time.
+    /// Evaluates the models at every recorded pose and compares their outputs with the recorded outputs. Calls `look` with each
+    /// recorded tick and the outputs of the models in this replay, limited to the recorded outputs. Not real-time.
     ///
     /// # Errors
-    /// [`ReplayError`] at damaged data, or if a plugin swapped in during the run is rejected; the comparison up to
-    /// there is lost.
+    /// [`ReplayError`] if the data are damaged, or if a plugin swapped in during the run is rejected; the results of the earlier
+    /// ticks are then lost.
     pub fn compare(
         mut self,
         mut look: impl FnMut(&TickRecord, &ModelOutputs),

@@ -25,7 +25,7 @@ pub struct Row {
     pub quantum_m: f64,
     /// Grip of the hand on the device.
     pub hand: Grip,
-    /// Largest stable stiffness of the simulated loop, N/m; 0 if there is none.
+    /// Largest stable stiffness of the simulated loop, N/m; 0 if no stiffness is stable.
     pub k_max_n_per_m: f64,
     /// Limit of the exact sampled-data system with an ideal sensor, N/m.
     pub exact_n_per_m: f64,

@@ -12,8 +12,8 @@ pub fn is_search_end(limit_n_per_m: f64) -> bool {
     limit_n_per_m >= STIFFEST_N_PER_M
 }
 
-/// Searches for the stiffness, N/m, up to which `is_stable` is true, within a relative `tolerance`; returns 0 if it
-/// never is, and the [end of the search](is_search_end) if it always is.
+/// Searches for the stiffness, N/m, up to which `is_stable` is true, within a relative `tolerance`; returns 0 if the loop is
+/// unstable even at the start of the search, and the [end of the search](is_search_end) if it is stable up to there.
 ///
 /// Assumes that one interval of stiffness from the softest on is stable, as it is for a spring on a sampled
 /// mass. Not real-time.

@@ -1,8 +1,8 @@
 //! Closed loop of a virtual spring and a loaded device, with a test of stability.
 //!
-//! The device is the plugin `simulated`, opened as in any scene. Its centre of mass is at the origin, so that a push
-//! along z remains a translation and the plant is the linear one of [`theory`](super::theory). The spring is
-//! implemented here: it samples the height, computes its force, delays it in a delay line and writes it.
+//! The device is the plugin `simulated`, opened as in any scene. Its centre of mass is at the origin, so that a push along z
+//! remains a translation and the plant is the linear plant of [`theory`](super::theory). The spring is implemented here: it samples
+//! the height, computes its force, delays it in a delay line and writes it.
 //!
 //! **Stable** means that the envelope of the height shrinks. The measure is the mean square over two successive
 //! windows, weighted by a Hann window: for an oscillation `e^(s t) sin(w t)` their ratio is `e^(2 s W)` but for a
@@ -59,7 +59,7 @@ pub struct LoopSetup {
     pub plant_damping_ns_per_m: f64,
     /// Virtual damping by backward difference, N s/m.
     pub virtual_damping_ns_per_m: f64,
-    /// Step of the position sensor, m; 0 for an ideal one.
+    /// Step of the position sensor, m; 0 for an ideal sensor.
     pub quantum_m: f64,
     /// Grip of the hand on the device.
     pub grip: Grip,
@@ -84,8 +84,8 @@ const GROWN: f64 = 5.0;
 const VANISHED: f64 = 1.0e-12;
 
 impl LoopSetup {
-    /// Returns the largest stiffness at which the loop around `plugin` is stable, N/m; 0 if there is none. Not
-    /// real-time.
+    /// Returns the largest stiffness at which the loop around `plugin` is stable, N/m: 0 if no stiffness is stable, and the [end of
+    /// the search](super::is_search_end) if it is stable up to there. Not real-time.
     ///
     /// # Errors
     /// [`LoopError`] if the plugin is not a simulated flotor or rejects a call.

@@ -29,7 +29,8 @@ pub struct Rendering {
 /// Relative tolerance of the search for the exact limit.
 const EXACT_TOLERANCE: f64 = 1.0e-9;
 
-/// Returns the largest stiffness at which the sampled loop is stable, N/m; 0 if there is none. Not real-time.
+/// Returns the largest stiffness at which the sampled loop is stable, N/m: 0 if no stiffness is stable, and the [end of the
+/// search](super::is_search_end) if it is stable up to there. Not real-time.
 #[must_use]
 pub fn exact_limit_n_per_m(plant: &Plant, rendering: &Rendering) -> f64 {
     let held = HeldPlant::new(plant, rendering.period_s);
@@ -39,10 +40,11 @@ pub fn exact_limit_n_per_m(plant: &Plant, rendering: &Rendering) -> f64 {
     limit
 }
 
-/// Returns the largest stiffness that a device of `damping_ns_per_m` renders passively, N/m; 0 if there is none. Not real-time.
+/// Returns the largest stiffness that a device of `damping_ns_per_m` renders passively, N/m; 0 if the device renders no stiffness
+/// passively. Not real-time.
 ///
-/// Colgate and Schenkel's condition `b > T/2 / (1 - cos wT) Re[(1 - e^-jwT) H(e^jwT)]` at every frequency up to
-/// Nyquist's. Without delay it is `b > K T/2 + |B|`; with it, at low frequency, `b > K (T/2 + delay)`.
+/// Colgate and Schenkel's condition `b > T/2 / (1 - cos wT) Re[(1 - e^-jwT) H(e^jwT)]` at every frequency up to Nyquist's. Without
+/// delay it is `b > K T/2 + |B|`; with delay, at low frequency, `b > K (T/2 + delay)`.
 #[must_use]
 pub fn passive_limit_n_per_m(damping_ns_per_m: f64, rendering: &Rendering) -> f64 {
     /// Number of evaluated frequencies: the bounds vary smoothly, over a few periods for a few ticks of delay.
