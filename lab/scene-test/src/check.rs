@@ -44,7 +44,7 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Sets `passed`, and clears the commands of a failure if there is none.
+    /// Sets `passed`, and clears the commands of a failure if the case has passed.
     pub(crate) fn settle(&mut self) {
         self.passed = self.failures.is_empty();
         if self.passed {
@@ -52,7 +52,7 @@ impl Outcome {
         }
     }
 
-    /// Returns the commands for a failure, the one that repeats the case first.
+    /// Returns the commands for a failure, first the command that repeats the case.
     pub(crate) fn commands(&self) -> impl Iterator<Item = &String> {
         self.repeat.iter().chain(&self.detail)
     }

@@ -119,7 +119,7 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), CommandError> {
     written.map(drop).map_err(|cause| CommandError::file(path, "cannot write the result", cause))
 }
 
-/// Prints the results, and writes them to the requested files.
+/// Prints the results as text, unless the JSON goes to standard output, and writes them to the requested files.
 pub(crate) fn deliver(
     report: &Report,
     json: Option<&Path>,

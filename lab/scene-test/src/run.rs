@@ -45,7 +45,7 @@ pub(crate) fn run_arguments(
     arguments
 }
 
-/// Judged run.
+/// Failures of a run against the expectations of its case, with the summary of the run; `None` if the run gave no summary.
 pub(crate) struct JudgedRun {
     pub(crate) failures: Vec<Failure>,
     pub(crate) json: Option<Value>,
