@@ -70,13 +70,13 @@ impl<const N: usize> Factored<N> {
         1.0 / inverse
     }
 
-    /// Returns the number of negative eigenvalues, counted by the negative pivots. Real-time: bounded, no allocation.
+    /// Returns the number of negative eigenvalues of the shifted matrix, counted by the negative pivots. Real-time: bounded, no
+    /// allocation.
     pub fn negative(&self) -> usize {
         self.negative
     }
 
-    /// Returns the Newton step for the gradient `slope`: minus the solution of the system. Real-time: bounded, no
-    /// allocation.
+    /// Returns the Newton step for the gradient `slope`: minus the solution of [`Self::solve`]. Real-time: bounded, no allocation.
     #[inline]
     pub fn step_down(&self, slope: &[f64; N]) -> [f64; N] {
         let mut step = self.solve(slope);
@@ -86,7 +86,7 @@ impl<const N: usize> Factored<N> {
         step
     }
 
-    /// Solves the system for the right-hand side `right`. Real-time: bounded, no allocation.
+    /// Solves the linear system of the factorised matrix for the right-hand side `right`. Real-time: bounded, no allocation.
     #[inline]
     pub fn solve(&self, right: &[f64; N]) -> [f64; N] {
         let mut x = *right;

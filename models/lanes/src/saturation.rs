@@ -8,16 +8,16 @@ use crate::Real;
 /// Saturated quantity, with its derivative.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Saturated<R: Real = f64> {
-    /// Saturated quantity.
+    /// Quantity after saturation.
     pub value: R,
-    /// Derivative of `value` with respect to the original quantity.
+    /// Derivative of `value` with respect to the quantity before saturation.
     pub slope: R,
     /// True in the lanes in which the saturation changed the quantity.
     pub saturated: R::Mask,
 }
 
-/// Limits a quantity below `knee + reach`: unchanged up to `knee`, then `knee + d / sqrt(1 + (d / reach)²)` with the
-/// excess `d` beyond it. Real-time: bounded, no allocation.
+/// Limits a quantity below `knee + reach`: unchanged up to `knee`, then `knee + d / sqrt(1 + (d / reach)²)` with the excess `d` of
+/// the quantity over the knee. Real-time: bounded, no allocation.
 #[inline(always)]
 pub fn saturate_above<R: Real>(quantity: R, knee: f64, reach: f64) -> Saturated<R> {
     let saturated = quantity.above(knee);
