@@ -1,7 +1,7 @@
 //! Force over compression: a monotone cubic spline through knots.
 //!
-//! The slopes at the knots are Fritsch and Butland's weighted harmonic means (SIAM J. Sci. Stat. Comput. 5:300, 1984):
-//! between two knots the curve is monotone if they are, so the interpolation adds no bump that was not measured.
+//! The slopes at the knots are Fritsch and Butland's weighted harmonic means (SIAM J. Sci. Stat. Comput. 5:300, 1984): between two
+//! knots the curve is monotone if the knots are, so the interpolation adds no bump that was not measured.
 
 /// Error in a list of knots.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +50,7 @@ impl Curve {
     /// Builds a curve through knots of compression, m, and force, N, the first (0, 0). Not real-time.
     ///
     /// # Errors
-    /// A [`CurveError`] for a wrong count or order of knots.
+    /// A [`CurveError`] for a wrong number of knots, a first knot other than (0, 0), or a wrong order.
     pub fn new(knots: &[(f64, f64)]) -> Result<Self, CurveError> {
         if knots.len() < 3 || knots.len() > Self::MOST_KNOTS {
             return Err(CurveError::Count(knots.len()));
@@ -79,7 +79,7 @@ impl Curve {
         Ok(Self { pieces, deepest_m, end: (force_n, slopes[slopes.len() - 1], energy_j) })
     }
 
-    /// Returns the largest measured compression, that of the last knot, m.
+    /// Returns the compression of the last knot, the largest measured, m.
     #[must_use]
     pub fn deepest_m(&self) -> f64 {
         self.deepest_m

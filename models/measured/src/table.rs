@@ -19,7 +19,7 @@ pub const HEADER: &str = "compression_mm,force_n";
 /// Parses a table and builds the curve through its knots. Not real-time.
 ///
 /// # Errors
-/// A [`TextProblem`] with the line: wrong header, malformed row, number that is not finite, or knots without a [`Curve`].
+/// A [`TextProblem`] with the line: wrong header, malformed row, number that is not finite, or knots that [`Curve::new`] rejects.
 pub fn parse(text: &str) -> Result<Curve, TextProblem> {
     let table = Table::parse(text, HashLines::Comments)?;
     if table.columns().join(",") != HEADER {
