@@ -1,4 +1,4 @@
-//! Springs in runs: consecutive masses, each linked to another at the same index distance.
+//! Springs in runs: consecutive masses, each linked to another mass at the same index distance.
 //!
 //! A sheet numbered row by row has two such distances, one and a row; a run is then a row. A run is a plain loop over
 //! slices, which the compiler vectorises; an irregular mesh has short runs and is only slower. Products and sums have

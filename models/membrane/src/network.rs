@@ -185,8 +185,8 @@ impl Network {
         })
     }
 
-    /// Steps without drag until the masses rest against a ball, at most `most_steps` times. Resets all velocities after
-    /// each peak of the kinetic energy (kinetic damping, Cundall 1976). Returns true if the masses rest. Not real-time.
+    /// Steps without drag until the masses rest against a ball, at most `most_steps` times. Resets all velocities at the start and
+    /// after each peak of the kinetic energy (kinetic damping, Cundall 1976). Returns true if the masses rest. Not real-time.
     pub fn relax(&mut self, ball: &Ball, most_steps: usize) -> bool {
         /// Largest movement in a step, in radii of the ball, that counts as rest (root sum of squares of all masses): a
         /// sheet is then within some micrometres of its final position, a tenth of a pixel.

@@ -18,7 +18,7 @@ pub(crate) struct Obj {
     pub(crate) vertices_m: Vec<DVec3>,
     /// Corners of each face, as indices of vertices.
     pub(crate) faces: Vec<Vec<usize>>,
-    /// Ends of each segment of a line.
+    /// Ends of each segment of the lines, as indices of vertices.
     pub(crate) segments: Vec<[usize; 2]>,
 }
 

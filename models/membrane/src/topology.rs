@@ -89,7 +89,8 @@ impl Topology {
         self.edges.iter().filter(|(_, faces)| **faces == 1).map(|(ends, _)| *ends)
     }
 
-    /// Returns the position of a vertex of a connected part without a vertex of `held`, m; `None` without such a part.
+    /// Returns the position, m, of one vertex in a connected part without any vertex of `held`; `None` if every part has a vertex
+    /// of `held`.
     #[must_use]
     pub(crate) fn part_without(&self, held: &BTreeSet<usize>) -> Option<DVec3> {
         let mut neighbours = vec![Vec::new(); self.places_m.len()];
