@@ -130,10 +130,10 @@ impl Atlas {
         Answer { energy: self.unbounded(touch.depth_m) * touch.ratio, depth_m, is_extrapolated }
     }
 
-    /// Returns the contact with the top face of a block alone: its energy is zero beyond the edges of the face and
-    /// fades in over half a radius inside them. The force of this contact grows with the depth; that of
-    /// [`Self::answer`] does not where another face is nearer. For other bodies equal to [`Self::answer`]. Real-time:
-    /// bounded, no allocation.
+    /// Returns the contact with the top face of a block alone: its energy is zero beyond the edges of the face and fades in over
+    /// half a radius inside them. The force of this contact grows with the depth; the force of [`Self::answer`] does not where
+    /// another face is nearer. For a body other than a block the result is that of [`Self::answer`]. Real-time: bounded, no
+    /// allocation.
     pub fn top(&self, centre_m: [f64; 3]) -> Answer {
         let TouchedBody::Block { size, ratios, rounding_m } = &self.body else {
             return self.answer(centre_m);

@@ -48,8 +48,8 @@ pub fn unevenness_m(mesh: &Mesh) -> f64 {
     above.chain(beside).fold(0.0, f64::max)
 }
 
-/// Solves for the stiffness of a plate bonded to the touched face of a mesh; also returns its estimated relative error.
-/// Not real-time.
+/// Solves for the stiffness of a plate bonded to the touched face of a mesh; also returns the estimated relative error of the
+/// stiffness, the largest over the modes. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.

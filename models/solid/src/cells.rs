@@ -38,7 +38,7 @@ const BRICK_CORNERS: [[f64; 3]; 8] = [
 ];
 
 impl Kind {
-    /// Returns the number of corners.
+    /// Returns the number of corners: 4 of a tetrahedron, 8 of a brick.
     #[must_use]
     pub fn corners(self) -> usize {
         match self {
@@ -74,7 +74,7 @@ impl Kind {
         }
     }
 
-    /// Returns the number of nodes.
+    /// Returns the number of nodes: 10 of a tetrahedron, 20 of a brick.
     #[must_use]
     pub fn nodes(self) -> usize {
         self.corners() + self.edges().len()
@@ -134,7 +134,8 @@ impl Kind {
         }
     }
 
-    /// Returns quadrature points of the reference element, exact for the stiffness of an element with straight edges.
+    /// Returns quadrature points of the reference element, exact for the stiffness of a tetrahedron with straight edges and of a
+    /// brick with parallel edges.
     #[must_use]
     pub fn rule(self) -> Vec<Point<3>> {
         let line = gauss(3);

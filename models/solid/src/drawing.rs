@@ -108,14 +108,15 @@ impl Drawing {
         &self.shape
     }
 
-    /// Draws the solid under a sphere centred at `centre_m` (finite); `answer`: the law's result there.
+    /// Draws the solid under a sphere centred at `centre_m` (finite); `answer`: result of the law at this position.
     pub fn sphere(&mut self, atlas: &Atlas, centre_m: DVec3, answer: &Answer, modulus_pa: f64) -> &Shape {
         let contact = Contact::new(self.height_m, atlas, centre_m, answer, modulus_pa);
         let focus = Focus { at_m: contact.at_m, width_m: 0.6 * contact.radius_m.max(0.15 * atlas.radius_m) };
         self.under(&[contact], focus, atlas.radius_m)
     }
 
-    /// Draws the solid under several spheres; the displacement of the surface is the sum of those of all contacts.
+    /// Draws the solid under several spheres; the displacement of the surface is the sum of the displacements under each contact
+    /// alone.
     pub fn spheres(&mut self, spheres: &Spheres, answer: &several::Answer, modulus_pa: f64) -> &Shape {
         let atlas = &spheres.atlas;
         let contacts: Vec<Contact> = (0..spheres.count())

@@ -8,7 +8,7 @@ use crate::mesh::Facet;
 pub struct SurfacePoint {
     /// Position, m.
     pub position_m: [f64; 3],
-    /// Outward normal times area, m².
+    /// Outward normal times the area that the point represents, m².
     pub normal_m2: [f64; 3],
     /// Weights of the facet's nodes (shape functions).
     pub shares: Vec<f64>,

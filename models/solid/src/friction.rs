@@ -38,7 +38,7 @@ impl Friction {
         self.coefficient == 0.0
     }
 
-    /// Ends the contact: the slider starts anew at the next one. Real-time: bounded, no allocation.
+    /// Ends the contact: the slider starts anew at the next contact. Real-time: bounded, no allocation.
     pub fn release(&mut self) {
         self.contact = None;
     }

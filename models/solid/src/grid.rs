@@ -121,14 +121,14 @@ impl Grid {
         self.nodes_along().iter().product()
     }
 
-    /// Returns the number of the node at an index along each axis.
+    /// Returns the index of the node from its indices along x, y and z.
     #[must_use]
     pub fn node(&self, index: [usize; 3]) -> usize {
         let [nx, ny, _] = self.nodes_along();
         (index[2] * ny + index[1]) * nx + index[0]
     }
 
-    /// Returns the index of a node along each axis.
+    /// Returns the indices of a node along x, y and z.
     #[must_use]
     pub fn index(&self, node: usize) -> [usize; 3] {
         let [nx, ny, _] = self.nodes_along();

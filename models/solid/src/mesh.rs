@@ -9,7 +9,7 @@ use std::fmt;
 /// Element of a mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Element {
-    /// Kind of the element.
+    /// Shape of the element: tetrahedron or brick.
     pub kind: Kind,
     /// Indices of the nodes, in the order of [`Kind`].
     pub nodes: Vec<usize>,

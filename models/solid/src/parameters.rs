@@ -14,7 +14,7 @@ macro_rules! choice {
         impl $name {
             const WORDS: Choices = choices![$($word),+];
 
-            /// Returns the value of a parameter.
+            /// Returns the value of the choice parameter `id`, or its default.
             pub(crate) fn of(settings: &Settings<'_>, id: &str) -> Self {
                 settings.one_of(id, [$(Self::$value),+])
             }
@@ -121,7 +121,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::text("touched_face", "Name of the touched physical surface of the mesh (default: touched)"),
 ];
 
-/// Returns the current parameter values; a beam has its own default sizes.
+/// Returns the value of every parameter: from the settings, or the default. A beam has its own default sizes.
 pub(crate) fn resolve(settings: &Settings<'_>) -> [f64; SCHEMA.len()] {
     let mut values = [0.0; SCHEMA.len()];
     let beam = BodyChoice::of(settings, "body") == BodyChoice::Beam;

@@ -41,7 +41,8 @@ impl PlateBox {
     }
 }
 
-/// Returns the largest relative difference of the diagonal of a stiffness matrix from that of a finer solution.
+/// Returns the largest relative difference between the diagonal entries of a stiffness matrix and of the matrix of a finer
+/// solution.
 pub(crate) fn difference(coarse: &RigidPatch, fine: &RigidPatch) -> f64 {
     (0..MODES)
         .filter(|&i| fine.stiffness[i][i] > 0.0)

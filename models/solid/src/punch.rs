@@ -1,8 +1,9 @@
-//! Flat rigid punch on a half-space or a block: uniform tractions on cells of the contact, refined towards the rim.
+//! Flat rigid punch on a half-space, a block or the face of a mesh: uniform tractions on cells of the contact, refined towards the
+//! rim.
 //!
-//! The traction under a rigid punch is singular at its rim, as the inverse square root of the distance; the cells shrink
-//! with the square of the distance to resolve this. The displacement at the cells' centres is that of the half-space
-//! under uniform tractions, in closed form, plus that of the block's remainder, which is smooth.
+//! The traction under a rigid punch is singular at its rim, as the inverse square root of the distance; the cells shrink with the
+//! square of the distance to resolve this. The displacement at the cells' centres is that of the half-space under uniform
+//! tractions, in closed form, plus the remainder of the body, which is smooth.
 
 use crate::dense::{self, NotPositive};
 use crate::half_space::{Block, HalfSpace};
@@ -176,8 +177,9 @@ pub struct Loads {
     pub forces: Vec<[[f64; MODES]; 3]>,
 }
 
-/// Solves for the stiffness of a punch at the origin of the surface `z = 0`, and for the loads of the punch. `remainder`: that of a
-/// body, `None` for a half-space; `fineness`: number of cells from the middle to the rim. Not real-time.
+/// Solves for the contact stiffness of a rigid punch at the origin of the surface `z = 0`, and for the loads of its cells.
+/// `remainder`: difference between the body and a half-space, `None` for a half-space; `fineness`: number of cells from the middle
+/// to the rim. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.

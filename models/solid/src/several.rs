@@ -75,7 +75,8 @@ impl ExtraCompliance {
         Some(Self { shapes, ends_m, values })
     }
 
-    /// Restores the numbers of [`crate::prepare::beyond_half_space`]; `None` if they do not describe such a grid. Not real-time.
+    /// Builds the spline from the numbers of [`crate::prepare::beyond_half_space`]; `None` if the numbers do not describe a grid
+    /// for [`Self::new`]. Not real-time.
     #[must_use]
     pub fn from_numbers(mut numbers: &[f64]) -> Option<Self> {
         let counts = [whole(take(&mut numbers, 1)?[0])?, whole(take(&mut numbers, 1)?[0])?];

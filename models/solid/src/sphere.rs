@@ -1,10 +1,9 @@
 //! Contact solver of a frictionless rigid sphere on a deformed face, on a patch of cells that follows the sphere.
 //!
-//! Each cell carries a pressure along the normal of the sphere *at the displaced cell*, and no cell penetrates: `|X +
-//! u(X) - c| >= R`, `p >= 0`, one of them with equality. The displacement is that of a half-space under uniform loads
-//! on square cells, a table inversely proportional to the side of a cell, plus the remainder of the block. A solve
-//! alternates between the pressures for given normals (an active set and a Cholesky factorisation) and the normals for
-//! given pressures.
+//! Each cell carries a pressure along the normal of the sphere *at the displaced cell*, and no cell penetrates: `|X + u(X) - c| >=
+//! R`, `p >= 0`, one of the two with equality. The displacement is that of a half-space under uniform loads on square cells, a
+//! table inversely proportional to the side of a cell, plus the remainder of the block. A solve alternates between the pressures
+//! for given normals (an active set and a Cholesky factorisation) and the normals for given pressures.
 
 use crate::dense;
 use crate::half_space::{Block, HalfSpace};

@@ -7,7 +7,7 @@ use crate::jet::Jet;
 pub enum End {
     /// Zero slope, as on a mirror plane.
     Level,
-    /// Slope of the parabola through the last three nodes.
+    /// Slope of the parabola through the three nodes nearest to the end.
     Parabola,
 }
 
@@ -84,7 +84,8 @@ impl Curve {
         numbers.extend(&self.values);
     }
 
-    /// Removes count, nodes and values from the front and restores the spline; `None` if they are incomplete. Not real-time.
+    /// Removes count, nodes and values from the front and restores the spline; `None` if they are incomplete, or the count is not
+    /// from 3 to 1000. Not real-time.
     #[must_use]
     pub fn from_numbers(numbers: &mut &[f64], ends: [End; 2]) -> Option<Self> {
         let count = whole(take(numbers, 1)?[0])?;
@@ -127,7 +128,7 @@ pub(crate) fn whole(number: f64) -> Option<usize> {
     (number.fract() == 0.0 && (3.0..=1000.0).contains(&number)).then_some(number as usize)
 }
 
-/// Tricubic spline in three variables: value and seven mixed first derivatives at each node.
+/// Tricubic spline: at each node the value and seven partial derivatives, at most of first order along each axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Volume {
     nodes: [Vec<f64>; 3],
@@ -175,7 +176,8 @@ impl Volume {
         numbers.extend(self.data.iter().map(|data| data[0]));
     }
 
-    /// Removes counts, nodes and values from the front and restores the spline; `None` if they are incomplete. Not real-time.
+    /// Removes counts, nodes and values from the front and restores the spline; `None` if they are incomplete, or a count is not
+    /// from 3 to 1000. Not real-time.
     #[must_use]
     pub fn from_numbers(numbers: &mut &[f64], ends: [[End; 2]; 3]) -> Option<Self> {
         let mut counts = [0; 3];

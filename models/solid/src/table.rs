@@ -44,8 +44,8 @@ fn mirrored(half: &[f64]) -> Vec<f64> {
 }
 
 impl Table {
-    /// Solves for the remainder of all pairs of grid points. `half_m`: coordinates along `p` and `q`, ascending; those along `p`,
-    /// and on the top also those along `q`, begin at zero and are mirrored. Not real-time.
+    /// Solves for the remainder of all pairs of grid points. `half_m`: coordinates along `p` and `q`, ascending. The coordinates
+    /// along `p`, and on the top also along `q`, begin at zero and are mirrored. Not real-time.
     pub fn new(remainder: &Remainder, face: Face, half_m: [&[f64]; 2]) -> Self {
         let quarter: Vec<[f64; 2]> =
             half_m[1].iter().flat_map(|&q| half_m[0].iter().map(move |&p| [p, q])).collect();
