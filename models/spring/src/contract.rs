@@ -13,7 +13,7 @@ pub(crate) fn pose(input: &Input) -> Pose {
     Pose { position_m: input.pose.position(), orientation: input.pose.orientation() }
 }
 
-/// Returns the demand of a step's input.
+/// Converts the demand of a step's input: with energy to wrench and energy, else with torque to wrench, else to force.
 #[inline]
 pub(crate) fn demand(input: &Input) -> Demand {
     if input.demand.contains(flotor_hal::Demand::ENERGY) {

@@ -78,7 +78,7 @@ impl Load {
     }
 }
 
-/// Returns `m`.
+/// Returns the magnification `m` of a bow at an argument; constant above [`DEEP_ARGUMENT`].
 #[inline(always)]
 pub(crate) fn magnification(argument: f64) -> f64 {
     1.0 + BUCKLING_ARGUMENT / (BUCKLING_ARGUMENT - argument.min(DEEP_ARGUMENT))
@@ -179,7 +179,7 @@ impl Directions {
         [self.chord.z, self.upper.z, self.chord.dot(self.upper), self.twist[0]]
     }
 
-    /// Returns true if all angles are below those at which the rod's weight becomes zero.
+    /// Returns true if all angles and the twist are below 78 degrees, at which the factor of [`Self::upright`] becomes zero.
     pub(crate) fn is_upright(&self) -> bool {
         self.cosines().into_iter().all(|cosine| cosine > LYING)
     }

@@ -37,8 +37,8 @@ macro_rules! each {
 }
 
 impl Elastic {
-    /// Prepares the law `energy`. For touching coils it is the rod, which resolves the contact along the bulge. Not
-    /// real-time: the rod allocates.
+    /// Prepares the law `energy`. Blended into the rod and with coil contact, the law is the exact rod alone, which resolves the
+    /// contact along the bulge; without blending, the contact is along the chord. Not real-time: the rod allocates.
     pub(crate) fn energy(choice: &Choice) -> Self {
         let Choice { spring, tolerance_n, .. } = choice;
         match (choice.rod_blend, choice.coil_contact) {
@@ -51,7 +51,8 @@ impl Elastic {
         }
     }
 
-    /// Prepares the rod. The servo's rod is too coarse for a free base, which minimises its energy. Not real-time: allocates.
+    /// Prepares the rod. Under a free base, which minimises the rod's energy, equilibria are solved to rounding instead of the
+    /// servo's tolerance. Not real-time: allocates.
     pub(crate) fn rod(choice: &Choice) -> Self {
         Self::Rod(match (choice.seat, choice.accuracy) {
             (SeatChoice::Free, Accuracy::Servo) => exact_rod(choice),
@@ -100,8 +101,8 @@ impl Elastic {
         if let Self::RodBlend(held) = self { Some(held.law.share()) } else { None }
     }
 
-    /// Fills in the sections from plate to plate at a pose; returns `false` if there is no shape. A blend has the shape of
-    /// the rod where the rod acts alone, and that of `energy` elsewhere. Not real-time.
+    /// Fills in the sections from plate to plate at a pose; returns `false` if there is no shape. A blend has the shape of the rod
+    /// where the rod acts alone, and the shape of the law `energy` elsewhere. Not real-time.
     pub(crate) fn draw(&mut self, spring: &Spring, pose: &Pose, sections: &mut [Section]) -> bool {
         let rod = match self {
             Self::Energy(_) => None,
@@ -139,7 +140,8 @@ fn coils(choice: &Choice) -> Coils {
     }
 }
 
-/// Repeats a tick until the response has converged; returns `false` if the pose has no answer.
+/// Repeats a tick until the response has converged, at most [`MOST_TICKS_TO_DRAW`] times; returns `false` if the pose has no
+/// answer.
 pub(crate) fn arrive(mut tick: impl FnMut() -> Response) -> bool {
     let mut validity = tick().validity;
     for _ in 0..MOST_TICKS_TO_DRAW {

@@ -57,7 +57,7 @@ impl Pose {
     /// Returns the straight line from the lower to the upper plate.
     ///
     /// # Errors
-    /// [`Validity::InvalidInput`] or [`Validity::OutOfDomain`] if no law can be evaluated here.
+    /// [`Validity::InvalidInput`] or [`Validity::OutOfDomain`] if no law can be evaluated at this pose.
     #[inline]
     pub(crate) fn chord(&self, free_length_m: f64) -> Result<Chord, Validity> {
         let Span { vector_m: Vector { x, y, z }, length_m, shortening_m, usable } =

@@ -18,7 +18,7 @@ pub enum Precision {
 
 /// Storage format of numbers.
 pub(crate) trait Storage {
-    /// Returns the number after a round trip through memory. Real-time: bounded, no allocation.
+    /// Rounds a number to the storage format. Real-time: bounded, no allocation.
     fn store<R: Real>(number: R) -> R;
 }
 

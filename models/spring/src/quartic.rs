@@ -115,8 +115,8 @@ struct Limit {
 }
 
 impl Quartic {
-    /// Fits the coefficients. They are proportional to the rigidities, and are fitted for those of a spring with
-    /// `gamma` of one newton. Real-time: bounded (tens of microseconds), no allocation.
+    /// Fits the coefficients. The coefficients are proportional to the rigidities, and are fitted for a spring with `gamma` of one
+    /// newton. Real-time: bounded (tens of microseconds), no allocation.
     pub(crate) fn new(spring: &Spring) -> Self {
         let free_length_m = spring.geometry().free_length_m;
         let rigidities = &spring.rigidities_per_gamma();

@@ -182,9 +182,9 @@ impl Rod {
         Self::solved_by(Solver::Servo(Box::new(equilibrium)), spring, coils)
     }
 
-    /// Builds the rod at rest for a law that blends its energy with another ([`crate::rod_blend`]) and finds the
-    /// equilibrium anew at each pose. The equilibrium is solved to rounding while followed, to 1e-10 of the angles when
-    /// found from the pose. Not real-time: allocates.
+    /// Builds the rod at rest for a law that blends the rod's energy with another energy ([`crate::rod_blend`]) and finds the
+    /// equilibrium anew at each pose. The equilibrium is solved to rounding while followed, to 1e-10 of the angles when found from
+    /// the pose. Not real-time: allocates.
     pub(crate) fn for_a_blend(spring: &Spring) -> Self {
         // A base that lifts off needs two searches in a tick.
         let effort = Effort { most_matrices: 5, ..TO_ROUNDING };
@@ -274,8 +274,8 @@ impl Rod {
         )
     }
 
-    /// Returns the stored energy of the equilibrium found from the pose alone; `None` if the search does not converge,
-    /// or for a rod that is not for a blend. The rod is unchanged. Real-time: bounded, no allocation.
+    /// Returns the stored energy of the equilibrium found from the pose alone; `None` for a plate turned upside down, if the search
+    /// does not converge, or for a rod not built by [`Self::for_a_blend`]. The rod is unchanged. Real-time: bounded, no allocation.
     pub(crate) fn energy_at(&mut self, pose: &Pose) -> Option<f64> {
         let plate = Plate::new(pose, self.constants.free_length_m)?;
         let Solver::Blend(equilibrium, descent) = &mut self.solver else { return None };

@@ -11,11 +11,11 @@
 //! itself: it is as small as the difference of the energies, so `s` has to reach 1 before this difference is large.
 //! Past buckling, where `energy` saturates, the spring is the rod.
 //!
-//! **Path dependence.** Short of buckling there is one equilibrium, which is found anew at each pose, from the straight
-//! column. Past buckling there are several: a bulge may point anywhere, and its direction depends on the path of the
-//! hand. A choice by the pose alone would make the torque jump as a plate is rocked through the level, so past buckling
-//! the rod is followed from tick to tick, until the plates are far enough apart again. A spring too short to buckle
-//! (`RodWeight::has_buckling`) has no such poses and no history.
+//! **Path dependence.** Short of buckling there is one equilibrium, which is found anew at each pose, from the straight column.
+//! Past buckling there are several equilibria: a bulge may point anywhere, and its direction depends on the path of the hand. A
+//! choice by the pose alone would make the torque jump as a plate is rocked through the level, so past buckling the rod is followed
+//! from tick to tick, until the plates are far enough apart again. A spring too short to buckle (`RodWeight::has_buckling`) has no
+//! such poses and no history.
 
 use flotor_hal::glam::DVec3;
 use pulp::NullaryFnOnce;
@@ -139,8 +139,8 @@ impl RodBlend {
         &self.energy
     }
 
-    /// Returns the directions of a pose that may need remainder or rod; `None` where [`Self::energy`] is sufficient.
-    /// Real-time: bounded, no allocation.
+    /// Returns the directions of a pose that may need remainder or rod; `None` where [`Self::energy`] is sufficient, or no rod has
+    /// a shape. Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn examine(&self, pose: &Pose) -> Option<Directions> {
         self.shares.examine(pose)

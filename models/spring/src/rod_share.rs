@@ -60,7 +60,7 @@ pub(crate) struct Share {
     pub(crate) is_buckled: bool,
 }
 
-/// Law that is blended with the rod: the energy with its remainder, or alone.
+/// Law that is blended with the rod: [`crate::energy`] with its [`crate::remainder`] (`Corrected`) or without (`Plain`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Law {
     Corrected,

@@ -539,8 +539,8 @@ impl Seat {
         Slide { excess_n, along: Some((way, distance_m)) }
     }
 
-    /// Draws the sections of the spring on its present base; `draw` gives those of the clamped spring at a pose. Not
-    /// real-time.
+    /// Draws the sections of the spring on its present base; `draw` draws the sections of the clamped spring at a pose. Returns
+    /// false if `draw` does. Not real-time.
     pub(crate) fn draw(
         &self,
         pose: &Pose,

@@ -11,8 +11,8 @@
 //! in and wrenches go out in the model frame: X, Z, Y are x, y, z; `fwpos[3]` and `fwpos[4]` are `-rx` and `-ry`,
 //! `force[3]` and `force[4]` are minus the torques about x and y in N·mm (PHYSICS D9, D12).
 //!
-//! **Yaw.** The source sets `force[5] = -spring_limit[1] * yaw` with a gain from a control panel. The thesis prints
-//! no value of it, so it is zero here.
+//! **Yaw.** The source sets `force[5] = -spring_limit[1] * yaw` with a gain from a control panel. The thesis prints no value of the
+//! gain, so the gain is zero here.
 //!
 //! **Finite outputs.** The printed code may return NaN or infinity. Here every such output is zero with
 //! [`Validity::OutOfDomain`]:

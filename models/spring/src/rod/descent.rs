@@ -3,8 +3,8 @@
 //! Short of buckling the rod has one equilibrium, and the straight column along the chord is close to it ([`super::column`]). The
 //! second derivatives of the column are known. A quasi-Newton method (BFGS) starts from these and takes the effect of the angles
 //! from the slopes: each step adds a matrix of rank two to the inverse of the curvature. This matrix is stored as two vectors, so
-//! that all products with a slope can be formed at once, whereas the two loops of L-BFGS form one after the other. Each step
-//! needs one evaluation of the energy ([`super::search_energy`]); seven to ten steps reach the equilibrium.
+//! that all products with a slope can be formed at once, whereas the two loops of L-BFGS form one product after the other. Each
+//! step needs one evaluation of the energy ([`super::search_energy`]); seven to ten steps reach the equilibrium.
 //!
 //! Source: Nocedal and Wright, *Numerical Optimization*, 6.1 (BFGS).
 

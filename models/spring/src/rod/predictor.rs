@@ -1,8 +1,8 @@
 //! Prediction of the shape from the shapes of the last ticks.
 //!
-//! A hand moves smoothly, so the next shape is close to the polynomial through the last ones, sampled at the tick. But
-//! a hand also stops, starts and is read through a noisy sensor, where a polynomial overshoots. The poses decide: the
-//! order that would have predicted the *pose* best is used for the shape.
+//! A hand moves smoothly, so the next shape is close to the polynomial through the last shapes, sampled at the tick. But a hand
+//! also stops, starts and is read through a noisy sensor, where a polynomial overshoots. The poses decide: the order that would
+//! have predicted the *pose* best is used for the shape.
 
 use super::functional::Shape;
 use super::plate::Plate;
@@ -40,7 +40,7 @@ impl<const N: usize> History<N> {
         (self.plates[0], self.shapes[0], self.length) = (*plate, *shape, 1);
     }
 
-    /// Returns the last pose of the plates.
+    /// Returns the pose of the upper plate at the last equilibrium.
     pub(crate) fn plate(&self) -> &Plate {
         &self.plates[0]
     }

@@ -72,7 +72,7 @@ pub(super) fn dot<S: Simd>(a: &Fours<S>, b: &Fours<S>) -> f64 {
     sum(((a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])) + a[4] * b[4])
 }
 
-/// Tables of [`Basis`], arranged for the sums here.
+/// Tables of [`Basis`], arranged for sums over pairs of mirrored stations.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SearchEnergy {
     /// Weights of the stations in the lower half, and their scaled arc lengths from the middle.

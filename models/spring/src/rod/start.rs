@@ -1,4 +1,4 @@
-//! Initial shape without a last tick: that of the linear beam-column between the same plates.
+//! Initial shape where there is no shape of a last tick: the shape of the linear beam-column between the same plates.
 //!
 //! Short of buckling this shape is the equilibrium to first order in the angles of the ends from the chord, so Newton's
 //! method converges from it. The shape depends on the pose alone, so the equilibrium found is a function of the pose.
@@ -14,12 +14,12 @@ use flotor_lanes::basis::Basis;
 /// rod's amplitude does.
 const LARGEST_LEAN_RAD: f64 = 0.8;
 
-/// Returns the coefficients of the bubbles in both components, `[c][k]`, without and with the bow; `None` if the linear column has no
-/// shape.
+/// Returns the coefficients `[c][k]` of bubble `k` in component `c`, for the shape without and the shape with the bow; `None` if
+/// the linear column has no shape.
 ///
-/// Relative to the chord the ends lean by `theta_L` and `theta_U`, and the column by `theta(u)` between
-/// ([`crate::shape`]). The slopes of the bubbles are orthonormal and of mean zero, so a coefficient is the integral of
-/// a slope and that of `p`. Real-time: bounded, no allocation.
+/// Relative to the chord the ends lean by `theta_L` and `theta_U`, and the column by `theta(u)` between ([`crate::shape`]). The
+/// slopes of the bubbles are orthonormal and of mean zero, so a coefficient is the integral of the product of a bubble's slope and
+/// the derivative of `p` ([`rate`]). Real-time: bounded, no allocation.
 pub(crate) fn linear<const K: usize, const Q: usize>(
     basis: &Basis<K, Q>,
     spring: &Spring,

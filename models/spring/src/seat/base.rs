@@ -21,7 +21,7 @@ impl Lengths {
         Self { rim_radius_m: 0.5 * geometry.coil_diameter_m, free_length_m: geometry.free_length_m }
     }
 
-    /// Returns the vector from the centre of the base to that of the upper plate, without load.
+    /// Returns the vector from the centre of the base to the centre of the upper plate, without load.
     pub(super) fn rise_m(&self) -> DVec3 {
         DVec3::Z * self.free_length_m
     }
