@@ -297,10 +297,8 @@ fn config_of(options: &LinkOptions) -> Result<Config, LinkError> {
         config.insert_json5("connect/endpoints", &list(&options.connect)).map_err(wrong)?;
         return Ok(config);
     };
-    let mut config = Config::from_file(path).map_err(|error| LinkError::Config {
-        file: options.config.clone(),
-        reason: error.to_string(),
-    })?;
+    let mut config = Config::from_file(path)
+        .map_err(|error| LinkError::Config { file: options.config.clone(), reason: error.to_string() })?;
     for (key, given) in [("listen/endpoints", &options.listen), ("connect/endpoints", &options.connect)] {
         if !given.is_empty() {
             config.insert_json5(key, &list(given)).map_err(wrong)?;
