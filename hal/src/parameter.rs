@@ -215,7 +215,11 @@ pub struct OutOfRange {
 
 impl fmt::Display for OutOfRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} is outside {} to {}", self.value, self.min, self.max)
+        let Self { min, max, value } = self;
+        match (*min..=*max).contains(value) {
+            true => write!(f, "{value} is not a whole number from {min} to {max}"), // the index of a choice
+            false => write!(f, "{value} is outside {min} to {max}"),
+        }
     }
 }
 
@@ -235,7 +239,8 @@ impl fmt::Display for SetParameterError {
         match self {
             Self::Fixed => f.write_str(
                 "the parameter cannot change in this instance: it is not live, or has no effect with the \
-                 present values of the other parameters",
+                 present values of the other parameters; set the parameter in the scene, or change the other \
+                 parameters first",
             ),
             Self::OutOfRange(error) => error.fmt(f),
         }

@@ -126,7 +126,7 @@ impl<'a> Table<'a> {
             let hint = match found {
                 1 if text.contains(';') => "; separate them with commas, not with `;`",
                 _ if found == 2 * expected => "; write numbers with a decimal point, not with a comma",
-                _ => "",
+                _ => "; write one cell per column",
             };
             let cells = if found == 1 { "cell" } else { "cells" };
             Err(TextProblem::at(line, format!("the line has {found} {cells} for {expected} columns{hint}")))
@@ -179,7 +179,10 @@ impl Row<'_> {
 /// Splits a line of bounded length into cells. Quotation marks around a cell are removed, doubled marks inside become single.
 fn cells(line: &str) -> Result<Vec<Cow<'_, str>>, String> {
     if line.len() > LONGEST_LINE_BYTES {
-        return Err(format!("the line has more than {LONGEST_LINE_BYTES} bytes: the file is not a table"));
+        return Err(format!(
+            "the line has more than {LONGEST_LINE_BYTES} bytes: the file is not a table; name a file with one line per row \
+             and commas between cells"
+        ));
     }
     let mut cells = Vec::new();
     let mut rest = line;
@@ -199,7 +202,7 @@ fn cells(line: &str) -> Result<Vec<Cow<'_, str>>, String> {
         match after.strip_prefix(',') {
             Some(next) => rest = next,
             None if after.is_empty() => return Ok(cells),
-            None => return Err("a comma must follow a closing quotation mark".to_owned()),
+            None => return Err("a comma must follow a closing quotation mark; write a comma, or double a mark inside the text".to_owned()),
         }
     }
 }

@@ -65,7 +65,8 @@ pub fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     open_file(path)?.take(most_bytes.saturating_add(1)).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > most_bytes {
-        let problem = format!("the file has more than {} MiB", most_bytes >> 20);
+        let problem =
+            format!("the file has more than {} MiB, the limit; name a smaller file", most_bytes >> 20);
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, problem));
     }
     Ok(bytes)
@@ -100,7 +101,8 @@ pub fn text_from_bytes(mut bytes: Vec<u8>) -> Result<String, TextProblem> {
         let line = 1 + bytes.iter().take(at).filter(|byte| **byte == b'\n').count();
         return Err(TextProblem::at(
             line,
-            "the file contains a byte 0, so it is not a text, or a part of the file was not written",
+            "the file contains a byte 0, so it is not a text, or a part of the file was not written; name a text file, or \
+             write the file again",
         ));
     }
     String::from_utf8(bytes).map_err(|error| {

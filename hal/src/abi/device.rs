@@ -165,7 +165,10 @@ impl<D: Device> Phase<D> {
 
 /// Builds the refusal for a call outside the opened phase.
 pub(crate) fn not_opened() -> Refusal {
-    Refusal::broken("the device is not in the opened phase")
+    Refusal::broken(
+        "the device is active, or an earlier call failed; call the function on an opened device that is \
+         not active",
+    )
 }
 
 impl<D: Device> PluginAdapter for DeviceAdapter<D> {

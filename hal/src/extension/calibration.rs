@@ -63,7 +63,7 @@ impl std::fmt::Display for InvalidCalibration {
             Self::Share { height_m, share } => write!(
                 f,
                 "the ratio of delivered to commanded force is {share:?} at {:.3} mm, but must be between {} \
-                 and {}",
+                 and {}; calibrate again",
                 height_m * 1.0e3,
                 PLAUSIBLE_SHARE[0],
                 PLAUSIBLE_SHARE[1]

@@ -355,11 +355,13 @@ impl std::fmt::Display for InvalidShape {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Failed => "the model returned an error instead of a shape",
-            Self::TooLarge => "the shape has more than a million vertices, triangles or primitives",
-            Self::Empty => "the shape has neither a primitive nor a triangle",
+            Self::TooLarge => "the shape has 1048576 or more vertices, triangles or primitives; return fewer",
+            Self::Empty => "the shape has neither a primitive nor a triangle; return at least one",
             Self::Missing => "the shape has a list that is null or misaligned although its length is not 0",
             Self::Corner => "a triangle of the shape has an index beyond the list of vertices",
-            Self::Number => "a number of the shape is not finite, or a side is negative",
+            Self::Number => {
+                "a position, normal, value or side of the shape is not finite, or a side is negative"
+            }
             Self::Text => "the name or the unit of the field is longer than 64 bytes",
         })
     }

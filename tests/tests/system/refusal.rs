@@ -40,13 +40,13 @@ const WRONG_FILES: &[WrongFile] = &[
         name: "a text file",
         make: |scratch| scratch.file("text.so", "I am no library.\n"),
         cause: "not a shared library",
-        remedy: "build the plugin again",
+        remedy: "name the library of a plugin, or build this library again",
     },
     WrongFile {
         name: "an empty file",
         make: |scratch| scratch.file("empty.so", ""),
         cause: "not a shared library",
-        remedy: "build the plugin again",
+        remedy: "name the library of a plugin, or build this library again",
     },
     WrongFile {
         name: "half a plugin",
@@ -297,11 +297,11 @@ fn a_device_is_no_model_and_a_model_no_device() {
     let wrong = [
         (
             model_scene(&flotor),
-            "`simulated` is a device plugin, but a model is needed here; name another plugin",
+            "`simulated` is a device plugin, but a model is needed here; name a model plugin",
         ),
         (
             scene(&spring, &spring, ""),
-            "`spring` is a model plugin, but a device is needed here; name another plugin",
+            "`spring` is a model plugin, but a device is needed here; name a device plugin",
         ),
         (model_scene(Path::new("simulated")), "`simulated` is a device plugin, but a model is needed here"),
     ];

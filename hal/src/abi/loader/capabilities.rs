@@ -16,6 +16,10 @@ struct Number<T> {
 
 /// Capabilities of the three translations, or of the three rotations.
 struct Group {
+    /// Names of the axes in errors.
+    names: [&'static str; 3],
+    /// Quantity in errors that `limit` bounds.
+    load: &'static str,
     /// Axis masks of x, y and z.
     axes: [Axes; 3],
     range: Number<[f64; 3]>,
@@ -35,12 +39,16 @@ pub(super) fn check(declared: &Capabilities) -> Result<(), Refusal> {
         }
     }
     let translation = Group {
+        names: ["x", "y", "z"],
+        load: "force",
         axes: [Axes::X, Axes::Y, Axes::Z],
         range: number("range_m", declared.range_m, 100.0, "m"),
         limit: number("max_force_n", declared.max_force_n, 1.0e5, "N"),
         slew: number("max_force_slew_n_per_s", declared.max_force_slew_n_per_s, 1.0e10, "N/s"),
     };
     let rotation = Group {
+        names: ["the rotation about x", "the rotation about y", "the rotation about z"],
+        load: "torque",
         axes: [Axes { bits: 1 << 3 }, Axes { bits: 1 << 4 }, Axes { bits: 1 << 5 }],
         range: number("range_rad", declared.range_rad, 1.0e3, "rad"),
         limit: number("max_torque_nm", declared.max_torque_nm, 1.0e5, "N·m"),
@@ -83,7 +91,11 @@ pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Resu
         ]
     };
     let changed = numbers(before).into_iter().zip(numbers(now)).find(|(before, now)| before != now);
-    let changed = changed.map_or("`sensed` or `actuated`".to_owned(), |((field, before), (_, now))| {
+    let masks = || match before.sensed == now.sensed {
+        true => format!("`actuated` was {:#b}, then {:#b}", before.actuated.bits, now.actuated.bits),
+        false => format!("`sensed` was {:#b}, then {:#b}", before.sensed.bits, now.sensed.bits),
+    };
+    let changed = changed.map_or_else(masks, |((field, before), (_, now))| {
         format!("`{field}` was {}, then {}", list(&before), list(&now))
     });
     Err(Refusal::broken(format!(
@@ -93,27 +105,34 @@ pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Resu
 
 impl Group {
     fn check(&self, declared: &Capabilities) -> Result<(), Refusal> {
-        let Self { axes, range, limit, slew } = self;
+        let Self { names, load, axes, range, limit, slew } = self;
         range.has_an_end()?;
         limit.has_an_end()?;
         let driven = axes.map(|axis| declared.actuated.contains(axis));
         let held = axes.map(|axis| declared.actuated.contains(axis) && declared.sensed.contains(axis));
         limit.is_more_than_nothing_on(
+            names,
             driven,
-            "declare its largest value, or remove the axis from `actuated`",
+            &format!("declare its largest {load}, or remove the axis from `actuated`"),
         )?;
         // Without a range the boundary wall would stand at home.
         range.is_more_than_nothing_on(
+            names,
             held,
             "declare its range of motion, or remove the axis from `actuated`",
         )?;
         if driven == [false; 3] {
             // Without an actuated axis the slew has no effect: infinity and 0 are valid.
-            return if slew.value >= 0.0 { Ok(()) } else { Err(slew.wrong("must be 0 or more")) };
+            return if slew.value >= 0.0 {
+                Ok(())
+            } else {
+                Err(slew.wrong(&format!("must be 0 {} or more", slew.unit)))
+            };
         }
         slew.has_an_end()?;
         if slew.value == 0.0 {
-            return Err(slew.wrong("a force with this slew rate could never change; declare a rate above 0"));
+            let mend = format!("the {load} could never change; declare a rate above 0 {}", slew.unit);
+            return Err(slew.wrong(&mend));
         }
         Ok(())
     }
@@ -151,9 +170,9 @@ impl Number<[f64; 3]> {
         Err(wrong(field, &list(value), &format!("must be 0 to {most} {unit} on each axis")))
     }
 
-    fn is_more_than_nothing_on(&self, axes: [bool; 3], mend: &str) -> Result<(), Refusal> {
+    fn is_more_than_nothing_on(&self, names: &[&str; 3], axes: [bool; 3], mend: &str) -> Result<(), Refusal> {
         let Self { field, value, .. } = self;
-        let mut empty = ["x", "y", "z"].into_iter().zip(value.iter().zip(axes));
+        let mut empty = names.iter().zip(value.iter().zip(axes));
         match empty.find(|(_, (value, is_needed))| *is_needed && **value == 0.0) {
             None => Ok(()),
             Some((name, _)) => Err(wrong(field, &list(value), &format!("{name} is driven, so {mend}"))),
@@ -238,10 +257,13 @@ mod tests {
             (Capabilities { rate_hz: [1000.0, 100.0], ..HELD }, "declare the slowest rate first"),
             (Capabilities { sensed: Axes { bits: 0x7f }, ..HELD }, "`sensed` is 0b1111111: there are six"),
             (Capabilities { actuated: Axes { bits: u32::MAX }, ..HELD }, "clear the bits above the sixth"),
-            (Capabilities { max_torque_nm: [0.0; 3], ..HELD }, "x is driven, so declare its largest value"),
+            (
+                Capabilities { max_torque_nm: [0.0; 3], ..HELD },
+                "the rotation about x is driven, so declare its largest torque",
+            ),
             (
                 Capabilities { actuated: Axes::TRANSLATION, ..PLANAR },
-                "z is driven, so declare its largest value",
+                "z is driven, so declare its largest force",
             ),
             (Capabilities { range_m: [0.0; 3], ..HELD }, "x is driven, so declare its range of motion"),
         ];

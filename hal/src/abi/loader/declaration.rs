@@ -10,7 +10,7 @@ const MOST_ENTRIES: u32 = 4096;
 pub(super) fn check(interface: &Interface, id: &str) -> Result<(), String> {
     let ([own, ..], (parameters, count)) = (interface.texts(), interface.parameters());
     if own != id {
-        return Err(format!("the id `{own}`, but its metadata have `{id}`"));
+        return Err(format!("the id `{own}`, but its metadata have the id `{id}`; make both equal"));
     }
     list("parameters", !parameters.is_null(), count)?;
     match interface {
@@ -36,8 +36,10 @@ pub(crate) unsafe fn static_list<T>(first: *const T, count: u32) -> &'static [T]
 fn list(what: &str, is_there: bool, count: u32) -> Result<(), String> {
     match count {
         0 => Ok(()),
-        _ if count > MOST_ENTRIES => Err(format!("{count} {what}, above the limit of {MOST_ENTRIES}")),
-        _ if !is_there => Err(format!("{count} {what} at a null pointer")),
+        _ if count > MOST_ENTRIES => {
+            Err(format!("{count} {what}, above the limit of {MOST_ENTRIES}; declare fewer"))
+        }
+        _ if !is_there => Err(format!("{count} {what} at a null pointer; set the pointer to their list")),
         _ => Ok(()),
     }
 }

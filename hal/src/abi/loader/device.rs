@@ -104,7 +104,11 @@ impl OpenedDevice {
     pub fn capabilities(&mut self) -> Result<Capabilities, Refusal> {
         let table = self.handle.table;
         let Some(capabilities) = self.calls.query(table.capabilities, UNKNOWN) else {
-            return Err(Refusal::broken(self.calls.last_message(table.last_message).for_people()));
+            let reason = match self.calls.last_message(table.last_message).for_people() {
+                text if text.is_empty() => "`capabilities` failed without a message".to_owned(),
+                text => text,
+            };
+            return Err(Refusal::broken(reason));
         };
         check(&capabilities)?;
         check_unchanged(self.declared.get_or_insert_with(|| Box::new(capabilities)), &capabilities)?;

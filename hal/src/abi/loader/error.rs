@@ -1,6 +1,6 @@
 //! Errors of loading a plugin: one readable line with file, cause and remedy.
 
-use super::platform::link_remedy;
+use super::platform::{COPY_REMEDY, link_remedy};
 use crate::abi::{CONTRACT, PluginKind};
 use crate::{Refusal, RefusalKind};
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ pub enum LoadError {
         cause: std::io::Error,
     },
     /// The file is no shared library, or a damaged one.
-    #[error("{}: not a shared library ({cause}); build the plugin again", path.display())]
+    #[error("{}: not a shared library ({cause}); name the library of a plugin, or build this library again", path.display())]
     NotALibrary {
         /// Path of the plugin.
         path: PathBuf,
@@ -39,7 +39,7 @@ pub enum LoadError {
     /// The library carries no metadata section.
     #[error(
         "{}: a shared library, but not a Flotor plugin (no `.flotor` section); \
-         a plugin needs `export_model!`, `export_device!` or FLOTOR_METADATA", path.display()
+         name the library of a plugin, or build this library with `export_model!`, `export_device!` or FLOTOR_METADATA", path.display()
     )]
     NotAPlugin {
         /// Path of the plugin.
@@ -56,7 +56,7 @@ pub enum LoadError {
     /// The plugin was built for another contract.
     #[error(
         "{}: built for plugin contract {theirs}, but this host has contract {CONTRACT}; rebuild the plugin against this \
-         version", path.display()
+         version of Flotor", path.display()
     )]
     OtherContract {
         /// Path of the plugin.
@@ -74,8 +74,7 @@ pub enum LoadError {
     },
     /// The private copy could not be created.
     #[error(
-        "{}: cannot make a private copy of the plugin: {cause}; check memory limits (on Windows, the folder for \
-         temporary files)", path.display()
+        "{}: cannot make a private copy of the plugin: {cause}; {COPY_REMEDY}", path.display()
     )]
     Copy {
         /// Path of the plugin.
@@ -113,11 +112,11 @@ pub enum LoadError {
         difference: String,
     },
     /// The plugin declares an invalid id or list.
-    #[error("{}: the plugin declares {cause}; correct its tables and build the plugin again", path.display())]
+    #[error("{}: the plugin declares {cause}, and build the plugin again", path.display())]
     BadDeclaration {
         /// Path of the plugin.
         path: PathBuf,
-        /// Invalid declaration and its problem.
+        /// Invalid declaration, its problem and its correction.
         cause: String,
     },
     /// The interface of the plugin's kind or a required function is missing, or a table is misaligned or too short.
@@ -142,7 +141,7 @@ pub enum LoadError {
         problem: String,
     },
     /// The plugin is a device where a model is needed, or vice versa.
-    #[error("{}: `{id}` is a {found} plugin, but a {wanted} is needed here; name another plugin", path.display())]
+    #[error("{}: `{id}` is a {found} plugin, but a {wanted} is needed here; name a {wanted} plugin", path.display())]
     OtherKind {
         /// Path of the plugin.
         path: PathBuf,

@@ -78,7 +78,12 @@ impl GuardedInstance {
             return Ok(());
         }
         let reason = match message.for_people() {
-            text if text.is_empty() => format!("no reason given (code {code})"),
+            text if text.is_empty() && RefusalKind::from_code(code) == RefusalKind::Broken => {
+                format!("no reason given (code {code})")
+            }
+            text if text.is_empty() => {
+                format!("no reason given (code {code}); ask the author of the plugin for the reason")
+            }
             text => text,
         };
         Err(Refusal { kind: RefusalKind::from_code(code), reason })

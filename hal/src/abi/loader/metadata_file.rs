@@ -76,11 +76,12 @@ pub(super) fn parse<'d>(path: &Path, data: impl ReadRef<'d>, length: u64) -> Res
     let bad = |cause: String| LoadError::BadMetadata { path: path.into(), cause };
     let text = std::str::from_utf8(text).map_err(|cause| bad(cause.to_string()))?;
     let pairs = text.trim_end_matches('\0').lines().map(str::trim).filter(|line| !line.is_empty());
-    let pairs: Option<Vec<(&str, &str)>> = pairs.map(key_and_value).collect();
-    let pairs = pairs.ok_or_else(|| bad("a line does not have the form `key = \"value\"`".to_owned()))?;
+    let malformed = |line: &str| bad(format!("the line `{}` is not `key = \"value\"`", line.escape_debug()));
+    let pairs = pairs.map(|line| key_and_value(line).ok_or_else(|| malformed(line)));
+    let pairs: Vec<(&str, &str)> = pairs.collect::<Result<_, _>>()?;
     let value = |key: &str| {
         let found = pairs.iter().find(|(name, text)| *name == key && !text.is_empty());
-        found.map(|(_, text)| (*text).to_owned()).ok_or_else(|| bad(format!("`{key}` is missing")))
+        found.map(|(_, text)| (*text).to_owned()).ok_or_else(|| bad(format!("`{key}` is missing or empty")))
     };
     let kind = match value("kind")?.as_str() {
         "model" => PluginKind::Model,

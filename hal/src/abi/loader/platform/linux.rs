@@ -87,6 +87,10 @@ impl PrivateCopy {
     }
 }
 
+/// Remedy if the private copy, a file in memory, cannot be made.
+pub(crate) const COPY_REMEDY: &str =
+    "raise the limits of memory, file size and open files (`ulimit -v`, `-f` and `-n`, control group)";
+
 /// Returns the remedy for an error text of the dynamic linker.
 pub(crate) fn link_remedy(cause: &str) -> &'static str {
     // Error texts of the C library, each with its remedy.

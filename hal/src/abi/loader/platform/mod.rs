@@ -3,6 +3,7 @@
 //! Each system has one module with the same items:
 //! - `PrivateCopy`: a copy of a plugin's file that nobody can change, opened once and never unloaded;
 //! - `metadata_section`: the bytes of the section `.flotor` of a library, without running any of it;
+//! - `COPY_REMEDY`: the remedy if the system cannot make the copy;
 //! - `link_remedy`: the remedy if the system cannot link a library;
 //! - `Handle` and `writable_duplicate`: a duplicate of a plugin's descriptor.
 
@@ -12,9 +13,11 @@ mod linux;
 mod windows;
 
 #[cfg(not(windows))]
-pub(crate) use linux::{Handle, PrivateCopy, link_remedy, metadata_section, writable_duplicate};
+pub(crate) use linux::{COPY_REMEDY, Handle, PrivateCopy, link_remedy, metadata_section, writable_duplicate};
 #[cfg(windows)]
-pub(crate) use windows::{Handle, PrivateCopy, link_remedy, metadata_section, writable_duplicate};
+pub(crate) use windows::{
+    COPY_REMEDY, Handle, PrivateCopy, link_remedy, metadata_section, writable_duplicate,
+};
 
 /// Reason why a file has no metadata section that can be read.
 pub(crate) enum NoSection {

@@ -23,6 +23,10 @@ const FOLDER: &str = "flotor-plugins";
 /// Minimum age of a removable copy: another process may not have opened a younger copy yet.
 const OPENED_WITHIN: Duration = Duration::from_secs(60);
 
+/// Remedy if the private copy, a file in [`FOLDER`], cannot be made.
+pub(crate) const COPY_REMEDY: &str = "free space on the drive of the folder for temporary files (`%TEMP%`), and \
+                                      allow this user to write there";
+
 /// Returns the remedy if the system cannot link a library.
 pub(crate) fn link_remedy(_: &str) -> &'static str {
     "install the missing library or rebuild the plugin"
