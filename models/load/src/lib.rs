@@ -83,14 +83,19 @@ impl ForceModel for Load {
         ModelInfo::new("load", "Load", "A force to hold or to overcome").serving(Demand::ALL);
 
     const PARAMETERS: &'static [Parameter] = &[
-        Parameter::choice("kind", KINDS, 0, "A weight that pulls down, or a resistance to pushing down"),
+        Parameter::choice(
+            "kind",
+            KINDS,
+            0,
+            "felt: a weight that pulls down; exerted: a resistance to pushing down",
+        ),
         Parameter::real(
             "force_n",
             "N",
             0.0,
             100.0,
             3.0,
-            "Weight (felt), or resistance far below `onset_mm` (exerted)",
+            "Weight (kind felt), or resistance at depths far beyond `onset_mm` (kind exerted)",
         )
         .live(),
         Parameter::real(
@@ -99,7 +104,7 @@ impl ForceModel for Load {
             0.01,
             100.0,
             1.0,
-            "Depth at which a resistance has 76 % of its full force (exerted)",
+            "Depth below home at which a resistance has 76 % of its full force (kind exerted)",
         )
         .live(),
     ];

@@ -71,7 +71,7 @@ impl ForceModel for Measured {
             1.0,
             500.0,
             25.0,
-            "Free length: length without load (only for the drawing)",
+            "Free length: length without load, above the largest compression of the curve; for the drawing",
         ),
         Parameter::real(
             "coil_diameter_mm",
@@ -94,7 +94,8 @@ impl ForceModel for Measured {
         let (free_length_m, coil_diameter_m) = (metres("free_length_mm"), metres("coil_diameter_mm"));
         if curve.deepest_m() >= free_length_m {
             return Err(Refusal::parameter(format!(
-                "the curve ends at {:.3} mm, but the spring is only {:.3} mm long; set `free_length_mm`",
+                "the curve ends at a compression of {:.3} mm, but the spring is only {:.3} mm long; set `free_length_mm` \
+                 to a greater length",
                 curve.deepest_m() * 1.0e3,
                 free_length_m * 1.0e3
             )));

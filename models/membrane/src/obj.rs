@@ -74,7 +74,7 @@ impl Obj {
                 let corners = corners.collect::<Option<Vec<usize>>>();
                 let (least, word) = if kind == "f" { (3, "three") } else { (2, "two") };
                 let corners = corners.filter(|corners| corners.len() >= least).ok_or_else(|| {
-                    format!("`{kind}` needs the numbers of {word} or more vertices of earlier lines")
+                    format!("`{kind}` must have the numbers of {word} or more vertices of earlier lines; export the mesh again")
                 })?;
                 match kind {
                     "f" => self.faces.push(corners),
@@ -126,7 +126,7 @@ mod tests {
         }
         assert!(error("v 0 0 0\nf 1 2 3\n").starts_with("m:2: `f`"));
         assert!(error("").starts_with("m: the file has no face"));
-        assert!(error("v 0 0 0\nv 1 0 0\nf 1 2\n").starts_with("m:3: `f` needs the numbers of three"));
+        assert!(error("v 0 0 0\nv 1 0 0\nf 1 2\n").starts_with("m:3: `f` must have the numbers of three"));
         assert!(error("v 0 0 0\n0 0 0\n").starts_with("m:2: `0` is not a Wavefront OBJ statement"));
         let stl = "solid sheet\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n";
         assert_eq!(error(stl), "m:1: this is an STL file; export the mesh as Wavefront OBJ");

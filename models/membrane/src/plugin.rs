@@ -131,10 +131,12 @@ impl ForceModel for Membrane {
         let radius_m = number("ball_radius_mm") * 1.0e-3;
         if radius_m < 0.75 * mesh.coarseness_m() {
             return Err(Refusal::parameter(format!(
-                "a ball of radius {} mm would fall through between springs of length {:.3} mm; increase \
-                 `ball_radius_mm`, or make the mesh finer",
+                "a ball of radius {:.4} mm would fall through between springs of length {:.4} mm; set \
+                 `ball_radius_mm` to {:.3} or more, or make the mesh finer{}",
                 radius_m * 1.0e3,
-                mesh.coarseness_m() * 1.0e3
+                mesh.coarseness_m() * 1.0e3,
+                (0.75e6 * mesh.coarseness_m()).ceil() * 1.0e-3,
+                if settings.text("file").is_none() { " with `nodes_per_side`" } else { "" }
             )));
         }
         let mut network = Network::new(

@@ -11,7 +11,7 @@ use crate::mesh::Mesh;
 use crate::prepare::{
     BodyKind, Prepared, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
 };
-use crate::punch::extrapolated;
+use crate::punch::{Outline, extrapolated};
 use crate::remainder::{Face, Remainder};
 use crate::rigid::{MODES, RigidPatch};
 use crate::several::{ExtraCompliance, Spheres};
@@ -194,10 +194,15 @@ impl Description {
         let extent_m = outline.extent_m();
         let base = body::Body::new(mesh, solid)?;
         if !outline.rim().into_iter().all(|at| base.is_on_face(at)) {
-            return Err(Refusal::parameter(
-                "the punch at the middle of the touched face extends beyond the face: reduce \
-                 `tool_radius_mm` (round) or `tool_side_mm` (square)",
-            ));
+            let (what, size_m, parameter) = match outline {
+                Outline::Round { radius_m } => ("radius", radius_m, "tool_radius_mm"),
+                Outline::Square { half_m } => ("side", 2.0 * half_m, "tool_side_mm"),
+            };
+            return Err(Refusal::parameter(format!(
+                "a punch of {what} {:.4} mm at the middle of the touched face extends beyond the face: reduce \
+                 `{parameter}`",
+                size_m * 1.0e3
+            )));
         }
         let nodes: Vec<f64> = [-1.0, -0.5, 0.0, 0.5, 1.0].map(|share| share * extent_m).to_vec();
         let table = base.table([nodes.clone(), nodes], |at| at);
@@ -227,8 +232,8 @@ fn to_numbers(law: &Law, mesh_error: f64) -> Vec<f64> {
 impl From<NotPositive> for Refusal {
     fn from(NotPositive { pivot }: NotPositive) -> Self {
         Self::parameter(format!(
-            "the stiffness matrix is not positive definite (unknown {pivot}): use more similar sides, or a Poisson's \
-             ratio farther from 0.5"
+            "the stiffness matrix is not positive definite (degree of freedom {pivot}): lower `poisson_ratio`, or \
+             make the sides of the body (of a mesh: of each element) more similar"
         ))
     }
 }

@@ -128,7 +128,7 @@ impl fmt::Display for MeshError {
             }
             Self::Inverted { tag, jacobian_m3 } => write!(
                 f,
-                "element {tag} is inverted or folded (Jacobian determinant {jacobian_m3:.3e} m3): correct the order \
+                "element {tag} is inverted or folded (Jacobian determinant {jacobian_m3:.3e} m³): correct the order \
                  of its nodes, or bend its curved edges less"
             ),
             Self::Overlap { tag } => {

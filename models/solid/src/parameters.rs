@@ -65,7 +65,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         1.0,
         2000.0,
         80.0,
-        "Side along x of a block or a beam (200 by default), diameter of a cylinder",
+        "Side along x of a block or a beam (default for a beam: 200 mm), diameter of a cylinder",
     ),
     Parameter::real(
         "size_y_mm",
@@ -73,7 +73,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         1.0,
         2000.0,
         80.0,
-        "Side along y of a block or a beam (40 by default)",
+        "Side along y of a block or a beam (default for a beam: 40 mm)",
     ),
     Parameter::real(
         "size_z_mm",
@@ -81,7 +81,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         1.0,
         2000.0,
         80.0,
-        "Side along z of a block or a beam (40 by default), height of a cylinder",
+        "Side along z of a block or a beam (default for a beam: 40 mm), height of a cylinder",
     ),
     Parameter::real("youngs_modulus_pa", "Pa", 1.0, 1.0e9, 1.0e4, "Young's modulus").live(),
     Parameter::real("poisson_ratio", "1", 0.0, 0.49, 0.3, "Poisson's ratio"),

@@ -93,7 +93,12 @@ const N_MM2: f64 = 1.0e-6;
 /// Parameter schema. Defaults are those of preset `thesis-1`; other presets have their own. Choices are fixed, numbers are
 /// live.
 pub(crate) const SCHEMA: &[Parameter] = &[
-    Parameter::choice("preset", PRESETS, 0, "Spring of the thesis, or a slender spring that buckles"),
+    Parameter::choice(
+        "preset",
+        PRESETS,
+        0,
+        "Spring whose dimensions and constants are the defaults: 1, 2 or 3 of the thesis, or a slender one that buckles",
+    ),
     Parameter::choice(
         "variant",
         VARIANTS,
@@ -112,7 +117,12 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0,
         "Accuracy of the solution: for the servo, or tight as a reference (variant rod)",
     ),
-    Parameter::choice("seat", SEATS, 0, "Lower plate fixed, or free to roll up and lift off (energy, rod)"),
+    Parameter::choice(
+        "seat",
+        SEATS,
+        0,
+        "Lower plate fixed, or free to roll up and lift off (variants energy and rod)",
+    ),
     Parameter::real(
         "seat_friction",
         "1",
@@ -138,18 +148,19 @@ pub(crate) const SCHEMA: &[Parameter] = &[
          hand_over)",
     )
     .live(),
-    Parameter::choice("coil_contact", OFF_ON, 0, "Contact forces between coils (energy, rod)"),
+    Parameter::choice("coil_contact", OFF_ON, 0, "Contact forces between coils (variants energy and rod)"),
     Parameter::choice(
         "wire",
         OFF_ON,
         0,
-        "Effects of twist under compression and of the off-axis ends of the wire (energy, rod)",
+        "Effects of twist under compression and of the off-axis ends of the wire (variants energy and rod)",
     ),
     Parameter::choice(
         "mode",
         MODES,
         0,
-        "Constant given by the user, from which the stiffness and the other constants follow",
+        "Given quantity, from which the others follow: `gamma_n`, `alpha_n_mm2`, `beta_n`, or the wire \
+         (`wire_diameter_mm` and `active_coils`); default: the mode of the preset",
     ),
     Parameter::real(
         "free_length_mm",
@@ -217,14 +228,14 @@ impl Choice {
             set,
             "precision",
             [Precision::Double, Precision::Single],
-            "f32 is only for the variants `thesis` and `closed-form`; the other variants need f64",
+            "f32 is only for the variants `thesis` and `closed-form`; set `precision` to `f64`, or choose one of these variants",
         )?;
         let accuracy = second_only_for(
             &[Variant::Rod],
             set,
             "accuracy",
             [Accuracy::Servo, Accuracy::Tight],
-            "tight is only for variant `rod`; the other laws have closed forms",
+            "tight is only for variant `rod`; set `variant` to `rod`, or omit `accuracy`",
         )?;
         // A free plate minimises an energy, and a property of real coils adds one.
         let with_energy = [Variant::Energy, Variant::Rod];

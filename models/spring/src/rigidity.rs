@@ -266,22 +266,29 @@ impl fmt::Display for ParameterError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotFinite { quantity } => {
-                write!(f, "the {quantity} must be finite, but is NaN or infinite")
+                write!(
+                    f,
+                    "the {quantity} must be finite, but is NaN or infinite; choose values of a real spring"
+                )
             }
             Self::NotPositive { quantity, value } => {
-                write!(f, "the {quantity} must be positive, but is {value:e} in SI units")
+                write!(
+                    f,
+                    "the {quantity} must be positive, but is {value:e} in SI units; choose values of a real spring"
+                )
             }
             Self::CoilNotWiderThanWire { coil_diameter_m, wire_diameter_m } => write!(
                 f,
-                "the coil diameter ({:.4} mm) must be larger than the wire diameter ({:.4} mm)",
+                "the coil diameter ({:.4} mm) must be larger than the wire diameter ({:.4} mm); increase \
+                 `coil_diameter_mm`, or in mode `physical` reduce `wire_diameter_mm`",
                 coil_diameter_m * 1e3,
                 wire_diameter_m * 1e3
             ),
             Self::SolidAtRest { solid_length_m, free_length_m } => write!(
                 f,
                 "the coils would touch without load: active coils times wire diameter is {:.4} mm, but must be \
-                 below the free length of {:.4} mm; reduce the coils or the wire diameter, or increase the free \
-                 length",
+                 below the free length of {:.4} mm; increase `free_length_mm`, or in mode `physical` \
+                 reduce `active_coils` or `wire_diameter_mm`",
                 solid_length_m * 1e3,
                 free_length_m * 1e3
             ),
