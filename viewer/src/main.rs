@@ -37,7 +37,7 @@ struct Arguments {
     /// Recording to show, and a second recording over the first, dashed (default: the newest running host)
     #[arg(value_name = "FILE.mcap", num_args = 0..=2)]
     recording: Vec<PathBuf>,
-    /// File of a plugin whose shape may be drawn (repeatable)
+    /// File of a plugin, for drawing its model in a recording; without the file the model is not drawn (repeatable)
     #[arg(long = "plugin", value_name = "PLUGIN.so")]
     plugins: Vec<PathBuf>,
     /// Write a picture instead of opening a window; needs no display and no GPU
@@ -52,10 +52,11 @@ struct Arguments {
     /// Key of the emergency stop in a sitting
     #[arg(long, value_enum, default_value_t, requires = "sitting")]
     stop_key: StopKey,
-    /// Draw the whole window, with panels
+    /// Draw the whole window with its panels (default: only the 3D view and the traces)
     #[arg(long, requires = "screenshot")]
     window: bool,
-    /// Direction of the view, degrees: to the right of the front, above the horizon, and a zoom (default: 31.5,13.8)
+    /// Direction of the view, degrees: -360 to 360 to the right of the front, -2 to 88 above the horizon; and a zoom, 0.2 to 3
+    /// (default: 31.5,13.8,1)
     #[arg(long, value_name = "AZIMUTH,INCLINATION[,ZOOM]", allow_hyphen_values = true)]
     #[arg(requires = "screenshot", conflicts_with = "window")]
     view: Option<View>,
@@ -91,7 +92,7 @@ struct Arguments {
     /// Draw a screen of a sitting instead, from a line written by `flotor study --screen json`
     #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view", "traces", "force_position", "device", "arrow_force"], value_parser = screen)]
     screen: Option<Screen>,
-    /// File with the texts of the screens in the language of the person (default: English)
+    /// File with the texts of the screens in the language of the participant (default: English)
     #[arg(long, value_name = "FILE", value_parser = texts)]
     texts: Option<Texts>,
     #[command(flatten)]

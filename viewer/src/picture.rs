@@ -42,7 +42,7 @@ pub enum PictureError {
     #[error("the recording has no ticks to show; record a longer run")]
     Empty,
     /// The run has no device of this name.
-    #[error("the run has no device `{name}`; its devices: {}", known.join(", "))]
+    #[error("the run has no device `{name}`; name one of its devices: {}", known.join(", "))]
     Device {
         /// Requested name.
         name: String,

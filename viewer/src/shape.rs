@@ -217,7 +217,12 @@ impl Shape {
     /// # Errors
     /// The plugin's message if the parameter cannot be set, or a message about a value that is not a number.
     pub fn accepts_its_own(&mut self, index: usize) -> Result<(), String> {
-        let Some(number) = self.parameter(index) else { return Err("the value is not a number".to_owned()) };
+        let Some(number) = self.parameter(index) else {
+            return Err(
+                "the plugin returns no finite number as the value; report this to the author of the plugin"
+                    .to_owned(),
+            );
+        };
         match self.model.set_parameter(index, number) {
             CallStatus::Ok => Ok(()),
             _ => Err(self.model.last_message()),

@@ -45,10 +45,11 @@ pub enum WindowError {
 /// Options of a window; an option that is not given keeps its saved setting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, clap::Args)]
 pub struct WindowOptions {
-    /// Light or dark (default: dark; in a window: the look of the last window)
+    /// Light or dark (default: dark, with --export light; in a window: the look of the last window)
     #[arg(long, value_enum)]
     pub look: Option<Look>,
-    /// Width and height of picture or window (default: 1280x800; in a window: the size of the last window)
+    /// Width and height of picture or window, 64 to 8192 pixels each (default: 1280x800, with --export 1800x1000; in a window: the size of the last
+    /// window)
     #[arg(long, value_parser = size, value_name = "WxH")]
     pub size: Option<[usize; 2]>,
     /// Size of text and lines, 1 to 3 (default: 1; in a window: the scale of the last window)
@@ -62,7 +63,11 @@ pub struct WindowOptions {
 
 /// Parses a size in pixels, such as `1280x800`.
 fn size(text: &str) -> Result<[usize; 2], String> {
-    let wrong = || format!("`{text}` is not a size; write 1280x800, each side 64 to 8192 pixels");
+    let wrong = || {
+        format!(
+            "`{text}` is not a size; write width and height in pixels, as in 1280x800, each from 64 to 8192"
+        )
+    };
     let (width, height) = text.split_once('x').ok_or_else(wrong)?;
     let length =
         |text: &str| text.parse().ok().filter(|length| (64..=8192).contains(length)).ok_or_else(wrong);

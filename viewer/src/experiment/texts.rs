@@ -90,8 +90,8 @@ impl Texts {
     /// # Errors
     /// A message of one line if the file cannot be read, or a key is missing or unknown, or lacks the placeholder of its number.
     pub fn read(file: &Path) -> Result<Self, String> {
-        let text =
-            std::fs::read_to_string(file).map_err(|cause| format!("cannot read the texts: {cause}"))?;
+        let text = std::fs::read_to_string(file)
+            .map_err(|cause| format!("cannot read the texts: {cause}; check the path and its permissions"))?;
         Self::parse(&text)
     }
 
