@@ -52,7 +52,10 @@ pub fn link_to(target: &Path, link: &Path) -> Result<(), Box<dyn Error>> {
     if link.is_symlink() {
         std::fs::remove_file(link)?;
     }
-    std::os::unix::fs::symlink(target, link).map_err(|error| format!("{}: {error}", link.display()).into())
+    std::os::unix::fs::symlink(target, link).map_err(|error| {
+        let link = link.display();
+        format!("cannot create the link {link}: {error}; name a new file in a folder you may write to").into()
+    })
 }
 
 #[cfg(test)]

@@ -11,10 +11,11 @@ use std::sync::Once;
 /// Command line options that admit programs of other users or machines.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ReachArguments {
-    /// TCP: allow connections of every user of this machine
+    /// TCP: allow connections of every user of this machine (default: only of your own user)
     #[arg(long)]
     allow_users: bool,
-    /// TCP: listen beyond this machine: every program that reaches the port commands the device
+    /// TCP: permit an address that other machines reach; every program that reaches the port can then command the device
+    /// (default: only addresses of this machine)
     #[arg(long)]
     allow_remote: bool,
 }

@@ -29,10 +29,10 @@ pub struct RigArguments {
     /// at a serial port of this name
     #[arg(long, value_name = "PATH")]
     calibration_rig: Option<PathBuf>,
-    /// Calibration rig: step of the stand, in mm
+    /// Calibration rig: step of the stand, in mm, 0.1 to 7
     #[arg(long, default_value_t = 1.0, value_name = "MM", requires = "calibration_rig", value_parser = step_mm)]
     rig_step_mm: f64,
-    /// Calibration rig: time at each step, in s
+    /// Calibration rig: time at each step, in s, 0.1 to 600
     #[arg(long, default_value_t = 1.0, value_name = "S", requires = "calibration_rig", value_parser = stop_s)]
     rig_stop_s: f64,
 }
@@ -122,7 +122,11 @@ pub fn serve(
 ) -> Result<PathBuf, Box<dyn Error>> {
     let (mut ours, theirs) = TTYPort::pair()?;
     ours.set_timeout(Duration::from_secs(3600))?;
-    let name = PathBuf::from(theirs.name().ok_or("the pseudo terminal of the force sensor has no name")?);
+    let name = PathBuf::from(
+        theirs
+            .name()
+            .ok_or("the pseudo terminal of the force sensor has no name; start the emulator again")?,
+    );
     link_to(&name, link)?;
     std::thread::Builder::new().name("force-sensor".to_owned()).spawn(move || {
         // Hold the other end open: otherwise the terminal hangs up whenever no client has it open.

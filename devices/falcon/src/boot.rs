@@ -121,8 +121,8 @@ impl fmt::Display for BootFailure {
                  without a hub, and try again"
             ),
             Self::NoReport => f.write_str(
-                "the Falcon received the firmware but sends no reports; switch the Falcon off and on, and check the \
-                 file `firmware`",
+                "the Falcon received the firmware but sends no reports; switch the Falcon off and on, and check \
+                 that `firmware` names a firmware of the Falcon",
             ),
             Self::StaleReports => f.write_str(
                 "the Falcon sends reports without a command, so every report would be late; unplug the Falcon, plug \

@@ -27,7 +27,7 @@ pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
                 "firmware {path} has more than {MOST_BYTES} bytes, the limit of this plugin; set `firmware` to another file"
             )
         }
-        _ => format!("firmware {path}: {error}"),
+        _ => format!("cannot read the firmware {path}: {error}; set `firmware` to a file that you may read"),
     })?;
     let digest = digest(&bytes);
     let is_right = match expected {
@@ -42,9 +42,13 @@ pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
         return Ok(bytes);
     }
     Err(match expected {
+        Some(expected) if expected.len() < LEAST_DIGITS => format!(
+            "`firmware_sha256` is {expected}, but must have {LEAST_DIGITS} or more digits; firmware {path} has the SHA-256 \
+             {digest}"
+        ),
         Some(expected) => format!(
-            "firmware {path} has the SHA-256 {digest}, but `firmware_sha256` is {expected}; give the first \
-             {LEAST_DIGITS} or more digits of the SHA-256"
+            "firmware {path} has the SHA-256 {digest}, but `firmware_sha256` is {expected}; set `firmware` to the file with \
+             this SHA-256, or, if the file is right, give the first {LEAST_DIGITS} or more digits of its SHA-256"
         ),
         None => {
             let known =

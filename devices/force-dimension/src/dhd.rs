@@ -119,7 +119,7 @@ impl Dhd {
         let id = without_signals(|| functions.open(index));
         let id = checked(&functions, id, "opening the device").map_err(|failed| failed.refusal())?;
         let id = i8::try_from(id).map_err(|_| {
-            Refusal::broken(format!(
+            Refusal::resource(format!(
                 "the SDK returned the invalid device number {id}; install another version of the SDK"
             ))
         })?;

@@ -113,7 +113,7 @@ impl Device for ForceDimensionDevice {
         };
         if wrist == Wrist::Driven && kind.torque_nm == 0.0 {
             return Err(Refusal::parameter(format!(
-                "the {} has a driven wrist of unknown largest torque: set `max_torque_nm`",
+                "the {} has a driven wrist of unknown largest torque: set `max_torque_nm` to the torque in the maker's data sheet",
                 dhd.name()
             )));
         }
@@ -192,9 +192,10 @@ impl Device for ForceDimensionDevice {
                 self.dhd = dhd;
                 let refusal = match why {
                     Why::Failed(failed) => failed.refusal(),
-                    Why::NoThread(error) => {
-                        Refusal::resource(format!("cannot start a thread for the device: {error}"))
-                    }
+                    Why::NoThread(error) => Refusal::resource(format!(
+                        "cannot start a thread for the device: {error}; end other programs of this user, or raise \
+                             the limit of its threads"
+                    )),
                 };
                 Err((self, refusal))
             }

@@ -39,7 +39,8 @@ impl SensorLine {
     /// # Errors
     /// One sentence with port, cause and remedy.
     pub fn open(path: &str) -> Result<Self, String> {
-        let port = Port::open(path, BAUD).map_err(|reason| format!("no force sensor at {path}: {reason}"))?;
+        let port = Port::open(path, BAUD)
+            .map_err(|reason| format!("cannot open the force sensor at {path}: {reason}"))?;
         // Discard input from before the first request.
         let _ = port.discard_input();
         Ok(Self { port, lines: Lines::default(), requested_at: None })

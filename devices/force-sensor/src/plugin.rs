@@ -50,7 +50,8 @@ impl ForceSensor {
                 }
                 PollResult::Nothing if self.line.silence() > self.timeout => {
                     return Err(format!(
-                        "the force sensor at {port} does not answer within {} ms; use a sensor that answers `R` at 115200 baud",
+                        "the force sensor at {port} does not answer within {} ms; check its power and `port`, \
+                         and use a sensor that answers `R` at 115200 baud",
                         self.timeout.as_millis()
                     ));
                 }

@@ -54,8 +54,8 @@ impl Board {
     /// # Errors
     /// One sentence with the cause and the remedy.
     pub fn open(path: &str) -> Result<Self, String> {
-        let port =
-            Port::open(path, BAUD).map_err(|reason| format!("no board at {path}, the `port`: {reason}"))?;
+        let port = Port::open(path, BAUD)
+            .map_err(|reason| format!("cannot open the board at {path}, the `port`: {reason}"))?;
         Ok(Self::on(port))
     }
 

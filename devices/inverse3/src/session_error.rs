@@ -64,16 +64,16 @@ impl fmt::Display for SessionError {
             Self::Gone => f.write_str("the service closed the connection; restart the service"),
             Self::Silent => f.write_str("the service does not reply; restart the service"),
             Self::Unfinished => f.write_str("the service sent an incomplete state; restart the service"),
-            Self::TooLong(bytes) => write!(f, "a message of {bytes} bytes is too long for a device state; {UPDATE}"),
+            Self::TooLong(bytes) => write!(f, "the service sent a message of {bytes} bytes, too long for a device state; {UPDATE}"),
             Self::NoFrame => write!(f, "the service sent a malformed WebSocket frame; {UPDATE}"),
             Self::NoState => write!(f, "the service sent a malformed device state; {UPDATE}"),
             Self::Missing(field) => write!(f, "the device state has no `{field}`; {UPDATE}"),
             Self::Infinite(field) => write!(f, "`{field}` of the device state is not a finite number; {UPDATE}"),
-            Self::Unplugged => f.write_str("the device is no longer connected; connect the device, and switch it on"),
+            Self::Unplugged => f.write_str("the device or its grip is no longer connected to the service; connect both, and switch both on"),
             Self::NotReady => f.write_str(
-                "the device has no power, or is not calibrated; switch the device on, and wait for its calibration, up to 25 s",
+                "the device or its grip has no power, or is not calibrated; switch both on, and wait for the calibration, up to 25 s",
             ),
-            Self::ForeignForce => f.write_str("another program also commands a force; end that program first"),
+            Self::ForeignForce => f.write_str("another program also commands a force on this device; end that program first"),
         }
     }
 }

@@ -315,7 +315,7 @@ fn messages_of_another_version_are_told_with_the_version_that_is_needed() {
 #[test]
 fn a_device_without_power_is_not_opened() {
     let told = state(HELD_M, DVec3::ZERO).replace("\"power_supply\":true", "\"power_supply\":false");
-    refused_with(&answering(2, told), &[], &["no power, or is not calibrated; switch the device on"]);
+    refused_with(&answering(2, told), &[], &["no power, or is not calibrated; switch both on"]);
 }
 
 #[test]

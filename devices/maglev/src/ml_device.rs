@@ -59,10 +59,14 @@ pub(crate) struct MlActive {
 fn refused(address: &str, failed: Failed) -> Refusal {
     let hint = match failed {
         Failed::At(_, NoResults::Lost | NoResults::Silent) => {
-            "; without hardware start the emulator with `flotor emulate maglev --protocol ml-api`"
+            "; check its power and the network; without hardware start the emulator with `flotor emulate maglev --protocol ml-api`"
         }
         Failed::At(_, NoResults::Refused(Status::RECEIVE_ONLY)) => "; end the other program first",
-        _ => "",
+        Failed::At(_, NoResults::Malformed) => "; use a controller with the ML API 1.5b, and check `address`",
+        Failed::At(_, NoResults::Refused(_)) => {
+            "; correct the parameters of the device that this request transfers, or restart the controller"
+        }
+        Failed::Faulted(_) | Failed::NoTick => "",
     };
     Refusal::resource(format!("the controller at {address}: {failed}{hint}"))
 }

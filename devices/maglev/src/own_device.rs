@@ -175,7 +175,9 @@ fn refused(options: &Options, unanswered: Unanswered) -> Refusal {
                 "the controller at {address} closed the connection; end other programs that use the controller"
             )
         }
-        Unanswered::Silent => format!("no controller of this device replies at {address}{hint}"),
+        Unanswered::Silent => {
+            format!("no controller of this device replies at {address}; check its power and `address`{hint}")
+        }
     })
 }
 

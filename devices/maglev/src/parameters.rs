@@ -291,7 +291,14 @@ impl Values {
             Refusal::parameter(format!("first_contact = \"{}\": {why}", report.display()))
         };
         let text = read_text(report, "the file").map_err(|problem| wrong(&problem.problem))?;
-        let table: toml::Table = text.parse().map_err(|error: toml::de::Error| wrong(&error))?;
+        let table: toml::Table = text.parse().map_err(|error: toml::de::Error| {
+            let before = error.span().and_then(|span| text.get(..span.start)).unwrap_or_default();
+            let line = before.matches('\n').count() + 1;
+            wrong(&format_args!(
+                "line {line}: {}; run tests/hardware/first_contact.py again",
+                error.message()
+            ))
+        })?;
         let parameters = table.get("device").and_then(|device| device.get("parameters"));
         let Some(parameters) = parameters.and_then(toml::Value::as_table) else {
             return Err(wrong(

@@ -99,9 +99,9 @@ fn impedance(settings: &Settings<'_>, trajectory: &Trajectory) -> Impedance {
 
 fn trajectory(settings: &Settings<'_>) -> Result<Trajectory, Refusal> {
     match (settings.text("hand_script"), settings.text("hand_recording")) {
-        (Some(_), Some(_)) => {
-            Err(Refusal::parameter("set either `hand_script` or `hand_recording`, not both"))
-        }
+        (Some(_), Some(_)) => Err(Refusal::parameter(
+            "`hand_script` and `hand_recording` are both set, but the hand follows only one; omit one",
+        )),
         (Some(script), None) => Script::load(script).map(Trajectory::Scripted).map_err(Refusal::parameter),
         (None, Some(file)) => {
             Recording::load(Path::new(file)).map(Trajectory::Recorded).map_err(Refusal::parameter)

@@ -56,16 +56,20 @@ pub enum InvalidParameter {
 impl fmt::Display for InvalidParameter {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotFinite { name } => write!(f, "{name} is not a finite number"),
+            Self::NotFinite { name } => write!(f, "{name} must be finite, but is NaN or infinite"),
             Self::NotPositive { name, value } => write!(f, "{name} is {value}, but must be above zero"),
             Self::Negative { name, value } => write!(f, "{name} is {value}, but must not be negative"),
             Self::ImpossibleInertia { principal_kg_m2: i } => write!(
                 f,
-                "no body has the moments of inertia {}, {}, {} kg m^2: each may be at most the sum of the other two",
+                "no body has the moments of inertia {}, {}, {} kg m²: each may be at most the sum of the other two; change \
+                 inertia_x_kg_m2, inertia_y_kg_m2 or inertia_z_kg_m2",
                 i.x, i.y, i.z
             ),
             Self::NotARotation { name, length } => {
-                write!(f, "{name} has length {length}, but a rotation is a quaternion of length 1")
+                write!(
+                    f,
+                    "{name} has length {length}, but a rotation is a quaternion of length 1; divide the quaternion by its length"
+                )
             }
             Self::DependentCoils => f.write_str(
                 "the wrenches of the six coils are linearly dependent, so the coils cannot produce every \

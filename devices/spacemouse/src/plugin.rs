@@ -21,8 +21,17 @@ const DEAD_ZONE: usize = 2;
 const HOME_BUTTON: usize = 5;
 
 const SCHEMA: &[Parameter] = &[
-    Parameter::real("speed_mm_per_s", "mm/s", 0.1, 1000.0, 20.0, "Speed at full deflection").live(),
-    Parameter::real("spin_deg_per_s", "°/s", 0.0, 360.0, 20.0, "Angular speed at full deflection").live(),
+    Parameter::real("speed_mm_per_s", "mm/s", 0.1, 1000.0, 20.0, "Speed of the pose at full deflection")
+        .live(),
+    Parameter::real(
+        "spin_deg_per_s",
+        "°/s",
+        0.0,
+        360.0,
+        20.0,
+        "Angular speed of the pose at full deflection",
+    )
+    .live(),
     Parameter::real("dead_zone", "1", 0.0, 0.9, 0.08, "Dead zone, as a fraction of full deflection").live(),
     Parameter::real("range_mm", "mm", 0.1, 1000.0, 12.0, "Largest distance of the pose from home"),
     Parameter::real("range_deg", "°", 0.0, 170.0, 7.0, "Largest rotation of the pose from home"),

@@ -58,7 +58,9 @@ impl Reports for HidPuck {
             ours && (info.usage_page(), info.usage()) == (PAGE, MULTI_AXIS_CONTROLLER)
         };
         let path = match path {
-            Some(path) => std::ffi::CString::new(path).map_err(Refusal::parameter)?,
+            Some(path) => std::ffi::CString::new(path).map_err(|_| {
+                Refusal::parameter("`path` has a null character, which no path has; correct the path")
+            })?,
             None => api.device_list().find(puck).map(|info| info.path().to_owned()).ok_or_else(|| {
                 Refusal::resource(format!(
                     "no SpaceMouse found; connect a SpaceMouse, or set its `path`, such as {PATH_EXAMPLE}"

@@ -97,7 +97,7 @@ impl fmt::Display for LibraryProblem {
             }
             Self::NotALibrary { path } => write!(
                 f,
-                "{} is not a shared library; name the file that ends in {LIBRARY_ENDING}",
+                "{} is not a shared library; name the file that ends in {LIBRARY_ENDING} with the parameter `library`",
                 path.display()
             ),
             Self::Architecture { path, found, needed } => write!(
@@ -115,7 +115,11 @@ impl fmt::Display for LibraryProblem {
                 path.display()
             ),
             Self::MissingFunction { path, function, needed } => {
-                write!(f, "{} lacks the function `{function}`; install {needed} or later", path.display())
+                write!(
+                    f,
+                    "{} lacks the function `{function}`; install {needed} or later, or name another file with `library`",
+                    path.display()
+                )
             }
             Self::TooOld { path, found, needed } => write!(
                 f,

@@ -112,5 +112,5 @@ fn a_truncated_recording_is_refused_with_cause_and_remedy() {
     let bytes = std::fs::read(scratch.path().join("whole.mcap")).expect("it was recorded");
     let file = scratch.file("cut.mcap", &bytes[..bytes.len() / 2]);
     let error = Recording::load(&file).expect_err("half of the run is missing").to_string();
-    assert!(error.contains("cut.mcap: is truncated") && error.contains("record again"), "{error}");
+    assert!(error.contains("cut.mcap: the file is truncated") && error.contains("record again"), "{error}");
 }

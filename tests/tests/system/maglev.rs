@@ -248,10 +248,10 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     );
     let missing = scratch.path().join("nowhere");
     let ran = calibrate(&emulator, &missing, &["vertical"]);
-    assert!(ran.error().contains("no force sensor at"), "{}", ran.error());
+    assert!(ran.error().contains("cannot open the force sensor at"), "{}", ran.error());
     let ran = calibrate(&emulator, Path::new("/dev/null"), &["vertical"]);
     assert!(
-        ran.error().contains("no force sensor at /dev/null: the file is not a serial port"),
+        ran.error().contains("cannot open the force sensor at /dev/null: the file is not a serial port"),
         "{}",
         ran.error()
     );

@@ -62,7 +62,8 @@ impl Recording {
     /// [`RecordingError`] if the file is unreadable or contains no trajectory.
     pub fn load(path: &Path) -> Result<Self, RecordingError> {
         let wrong = |problem: String| RecordingError { file: path.display().to_string(), problem };
-        let unreadable = |error| wrong(format!("cannot be read: {error}"));
+        let unreadable =
+            |error| wrong(format!("the file cannot be read: {error}; check the path and its permissions"));
         let is_recording = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap"));
         let samples = if is_recording {
             mcap_file::read(flotor_hal::open_file(path).map_err(unreadable)?)
@@ -79,7 +80,7 @@ impl Recording {
     /// Creates a recording from samples in order of time; an error without any sample.
     fn new(samples: Vec<Sample>) -> Result<Self, String> {
         if samples.is_empty() {
-            return Err("has no pose; record again, or write at least one row".to_owned());
+            return Err("the file has no pose; record again, or write at least one row".to_owned());
         }
         Ok(Self(samples.into()))
     }
@@ -125,11 +126,14 @@ impl Sample {
     /// Appends the sample; an error unless it is later than the last.
     fn append_to(self, samples: &mut Vec<Self>) -> Result<(), String> {
         match samples.last() {
-            Some(last) if self.time_ns <= last.time_ns => {
-                Err(format!("time {} ns is not after {} ns", self.time_ns, last.time_ns))
-            }
+            Some(last) if self.time_ns <= last.time_ns => Err(format!(
+                "the time {} s after the first pose is not above {} s, the time of the pose before; give ascending \
+                     times",
+                self.time_ns as f64 * 1.0e-9,
+                last.time_ns as f64 * 1.0e-9
+            )),
             _ if samples.len() >= MAX_SAMPLES => {
-                Err(format!("has more than {MAX_SAMPLES} poses; use a shorter recording"))
+                Err(format!("the file has more than {MAX_SAMPLES} poses; use a shorter recording"))
             }
             _ => {
                 samples.push(self);

@@ -67,7 +67,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Extent of the simulation: plain has rigid body, gravity, drag and hand; full adds coils, sensors \
          and faults",
     ),
-    Parameter::choice("flotor", FLOTORS, 0, "Mass and centre of mass: as in the thesis, or as the Utah device"),
+    Parameter::choice("flotor", FLOTORS, 0, "Default mass and centre of mass: of the thesis, or of the Utah device"),
     Parameter::real("mass_kg", "kg", 0.01, 10.0, DEMO.mass_kg, "Mass of the flotor"),
     inertia("inertia_x_kg_m2", DEMO.inertia_kg_m2.x, "Moment of inertia about the centre of mass, x"),
     inertia("inertia_y_kg_m2", DEMO.inertia_kg_m2.y, "Moment of inertia about the centre of mass, y"),
@@ -101,7 +101,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         DEMO.drag.rotational_nms_per_rad,
         "Eddy-current drag on rotation",
     ),
-    Parameter::choice("hand", HANDS, 0, "Intended motion of the hand"),
+    Parameter::choice("hand", HANDS, 0, "Intended motion of the hand; open: the hand does not hold the handle"),
     Parameter::file(
         "hand_script",
         SCRIPTS,
@@ -110,7 +110,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "hand_recording",
         choices![],
-        "Intended motion of the hand: the path of a handle in a recording (.mcap) or a table (.csv)",
+        "Intended motion of the hand: the path of a handle in a recording (.mcap) or a table (.csv); overrides `hand`",
     ),
     Parameter::real(
         "hand_tremor_um",

@@ -32,7 +32,12 @@ const SCHEMA: &[Parameter] = &[
         "Programs that may connect: those of this user, of every user of this machine, or of every machine \
          that reaches the address",
     ),
-    Parameter::choice("force_command", FORCE_COMMANDS, 0, "Effect of a force command on the gains"),
+    Parameter::choice(
+        "force_command",
+        FORCE_COMMANDS,
+        0,
+        "Effect of a force command: its force replaces the force of the gains, or is added to it",
+    ),
     Parameter::choice(
         "commanders",
         COMMANDERS,

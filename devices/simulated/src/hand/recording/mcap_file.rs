@@ -2,7 +2,7 @@
 
 use super::Sample;
 use flotor_hal::glam::{DQuat, DVec3};
-use flotor_mcap::{ChannelInfo, Ending, MessageReader, OpenError};
+use flotor_mcap::{ChannelInfo, Damage, Ending, MessageReader, OpenError};
 use prost::Message;
 use std::io::{Read, Seek};
 
@@ -13,7 +13,7 @@ const POSE_SCHEMA: &str = "foxglove.FrameTransform";
 const HOW_TO_MAKE_ONE: &str = "make a recording with `flotor run --record FILE.mcap`";
 
 /// Problem and remedy of a recording without its end.
-const TRUNCATED: &str = "is truncated: the end of the run is missing; record again, or make a copy of the readable \
+const TRUNCATED: &str = "the file is truncated: the end of the run is missing; record again, or make a copy of the readable \
 part with `mcap recover` and name the copy";
 
 /// Decoded fields of `foxglove.FrameTransform` (<https://docs.foxglove.dev/docs/sdk/schemas/frame-transform>).
@@ -58,8 +58,8 @@ enum Topic {
 /// Reads the poses of a recording; an error if a single tick is missing.
 pub(super) fn read(file: impl Read + Seek) -> Result<Vec<Sample>, String> {
     let mut messages = MessageReader::open(file, topic_of).map_err(|error| match error {
-        OpenError::Io(cause) => format!("cannot be read: {cause}"),
-        _ => format!("is not an MCAP file; {HOW_TO_MAKE_ONE}"),
+        OpenError::Io(cause) => format!("the file cannot be read: {cause}"),
+        _ => format!("the file is not an MCAP file; {HOW_TO_MAKE_ONE}"),
     })?;
     if messages.ending() == Ending::CutOff {
         return Err(TRUNCATED.to_owned());
@@ -69,18 +69,24 @@ pub(super) fn read(file: impl Read + Seek) -> Result<Vec<Sample>, String> {
     let mut tick = 0_u32;
     let damaged = |cause: String, samples: &[Sample]| {
         let good_ns = samples.last().map_or(0, |sample| sample.time_ns);
-        format!("is damaged {good_ns} ns after the first pose: {cause}; record again")
+        format!(
+            "the file is damaged {:.3} s after the first pose: {cause}; record again",
+            good_ns as f64 * 1.0e-9
+        )
     };
-    while let Some(message) =
-        messages.next_message().map_err(|damage| damaged(damage.to_string(), &samples))?
-    {
+    while let Some(message) = messages.next_message().map_err(|damage| match damage {
+        Damage::Compressed(_) => damage.to_string(),
+        damage => damaged(damage.to_string(), &samples),
+    })? {
         match message.topic {
             Topic::Pose => {
                 let (position_m, orientation) =
                     pose(&message.data).map_err(|problem| damaged(problem, &samples))?;
                 let since_start_ns = message.time_ns.saturating_sub(*start_ns.get_or_insert(message.time_ns));
                 let sample = Sample::new(since_start_ns as f64 * 1.0e-9, position_m, orientation);
-                let place = |problem| format!("{since_start_ns} ns after the first pose: {problem}");
+                let place = |problem| {
+                    format!("{:.6} s after the first pose: {problem}", since_start_ns as f64 * 1.0e-9)
+                };
                 sample.and_then(|sample| sample.append_to(&mut samples)).map_err(place)?;
             }
             Topic::Tick => {

@@ -178,10 +178,16 @@ pub(super) fn read_file(path: &Path) -> Result<Script, ScriptError> {
     let wrong = |problem: String| ScriptError { file: file.clone(), line: 0, problem };
     let names = Script::NAMES.join(", ");
     let size = std::fs::metadata(path).map_err(|error| {
-        wrong(format!("cannot be read: {error}; a script is a TOML file or one of {names}"))
+        wrong(format!("the script cannot be read: {error}; a script is a TOML file or one of {names}"))
     })?;
-    if !size.is_file() || size.len() > MAX_BYTES {
-        return Err(wrong(format!("is not a script; write a TOML file of at most {MAX_BYTES} bytes")));
+    if !size.is_file() {
+        return Err(wrong("the path is a folder or a device, not a file; name a TOML file".to_owned()));
+    }
+    if size.len() > MAX_BYTES {
+        let bytes = size.len();
+        return Err(wrong(format!(
+            "the file has {bytes} bytes; name a TOML file of at most {MAX_BYTES} bytes"
+        )));
     }
     let text = read_text(path, "the script").map_err(|TextProblem { line, problem }| ScriptError {
         line,
@@ -200,7 +206,7 @@ pub(super) fn read(file: &str, text: &str) -> Result<Script, ScriptError> {
     let whole = |problem: String| ScriptError { file: file.to_owned(), line: 0, problem };
     let count = script.step.len().saturating_mul(script.repeat.0);
     if script.step.is_empty() {
-        return Err(whole("`step` is empty: a script needs at least one [[step]]".to_owned()));
+        return Err(whole("`step` is empty; write at least one [[step]]".to_owned()));
     }
     if count > MAX_LEGS {
         return Err(whole(format!(

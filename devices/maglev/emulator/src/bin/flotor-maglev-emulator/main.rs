@@ -176,7 +176,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
 /// Splits a value of `--set`.
 fn key_value(text: &str) -> Result<(&str, &str), Refusal> {
     let pair = text.split_once('=').map(|(key, value)| (key.trim(), value.trim()));
-    pair.ok_or_else(|| Refusal::parameter(format!("--set {text}: write KEY=VALUE")))
+    pair.ok_or_else(|| Refusal::parameter(format!("--set {text} has no `=`; write KEY=VALUE")))
 }
 
 /// Listens at the given address, or at this port of the loopback interface, and prints the address.
@@ -231,7 +231,7 @@ fn serve_pty(emulator: &mut Emulator<LoadedPlant>, arguments: &Arguments) -> Res
 
     let (mut ours, theirs) = TTYPort::pair()?;
     ours.set_timeout(Duration::ZERO)?;
-    let name = theirs.name().ok_or("the pseudo terminal has no name")?;
+    let name = theirs.name().ok_or("the pseudo terminal has no name; start the emulator again")?;
     drop(theirs);
     if let Some(link) = &arguments.link {
         link_to(Path::new(&name), link)?;

@@ -30,7 +30,7 @@ pub(crate) struct MlApiArguments {
     /// Recording file of the run with `--device`
     #[arg(long, default_value = "ml-api.mcap", value_name = "FILE")]
     pub(crate) record: std::path::PathBuf,
-    /// With --device: watchdog limit of a tick of the host, in ms (default: as in a scene without `watchdog_ms`)
+    /// With --device: watchdog limit of a tick of the host, in ms, 1 to 60000 (default: as in a scene without `watchdog_ms`)
     #[arg(long, requires = "device", value_name = "MS", value_parser = watchdog_ms)]
     pub(crate) host_watchdog_ms: Option<f64>,
     /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device
@@ -48,7 +48,8 @@ pub(crate) struct MlApiArguments {
     /// Reaction to the loss of a client, or of its tick acknowledgements, while the flotor is levitating
     #[arg(long, value_enum, default_value = "land", value_name = "WHAT")]
     on_silence: Silence,
-    /// Longest time without an acknowledged tick while a client commands forces and is registered for ticks, in ms
+    /// Longest time without an acknowledged tick while a client commands forces and is registered for ticks, in ms,
+    /// 1 to 60000
     #[arg(long, default_value_t = 500.0, value_name = "MS", value_parser = watchdog_ms)]
     watchdog_ms: f64,
     /// Fault to inject, as KIND[@STATE][+MS], like reset@flying+200 (repeatable): silence, half-frame, close, reset, stall,

@@ -91,13 +91,15 @@ impl LoadedPlant {
     /// weight; inertia is neglected.
     pub(crate) fn sense(&mut self, force: crate::rig::SensedForce) -> Result<(), Box<dyn Error>> {
         let mut opened = self.plugin.open_device(&self.settings)?;
-        let mut number =
-            |id: &str| {
-                let at = opened.parameters().iter().position(|parameter| parameter.id() == id);
-                at.map(|at| opened.parameter(at)).ok_or_else(|| format!(
-                "the plugin of --plant has no parameter `{id}`, which --calibration-rig needs; use the \
-                 simulated flotor"))
-            };
+        let mut number = |id: &str| {
+            let at = opened.parameters().iter().position(|parameter| parameter.id() == id);
+            at.map(|at| opened.parameter(at)).ok_or_else(|| {
+                format!(
+                    "the plugin of --plant has no parameter `{id}`, which --calibration-rig needs; omit \
+                 --plant to use the simulated flotor"
+                )
+            })
+        };
         let weight_n = number("mass_kg")? * number("gravity_m_per_s2")?;
         self.sensor = Some((number("feedforward_n")? - weight_n, force));
         Ok(())

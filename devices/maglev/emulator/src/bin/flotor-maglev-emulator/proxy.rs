@@ -32,7 +32,11 @@ pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box
     let host = std::env::current_exe()?.with_file_name(format!("flotor{}", std::env::consts::EXE_SUFFIX));
     let record = &arguments.ml_api.record;
     let error = Command::new(&host).arg("run").arg(&file).arg("--record").arg(record).exec();
-    Err(format!("{}: {error}; build the program with `cargo build --release`", host.display()).into())
+    Err(format!(
+        "cannot start the host {}: {error}; build the host with `cargo build --release`",
+        host.display()
+    )
+    .into())
 }
 
 /// Writes a text to an unnamed file: no other process can replace the file, and it is freed with its last descriptor.
