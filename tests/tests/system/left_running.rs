@@ -199,7 +199,7 @@ fn nothing_is_left_of_a_plugin_that_starts_processes() {
         soon(&format!("{command:?} hangs"), || hanging.path().join("hangs").exists());
         End::Kill.bring_about(&started);
         no_process_is_left_in(hanging.path(), &format!("{command:?}"));
-        started.wait();
+        assert_ne!(started.wait().code, Some(exit_code::CONFIGURATION), "{command:?}");
     }
 }
 

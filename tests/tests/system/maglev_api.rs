@@ -486,8 +486,13 @@ fn outcome(fault: &str) -> Outcome {
     let first_words = |text: String, of: &[&'static str]| {
         *of.iter().find(|words| text.contains(**words)).unwrap_or_else(|| panic!("{fault}: {text}"))
     };
-    let words =
-        ["closed the connection", "did not answer in time", "no reply", "rejected the request: ", "faulted"];
+    let words = [
+        "closed the connection",
+        "did not answer in time",
+        "a malformed reply",
+        "rejected the request: ",
+        "faulted",
+    ];
     let outcome = match plugin.open_device(&settings) {
         Err(refusal) => Outcome::Closed(first_words(refusal.to_string(), &words)),
         Ok(opened) => match opened.activate(&LoopConfig { period_ns: 1_000_000, seed: 1 }) {
@@ -520,13 +525,13 @@ fn what_goes_wrong_in_each_state_is_the_right_fault_and_others_are_served() {
         ("close@landed", Closed("closed the connection")),
         ("reset@landed", Closed("closed the connection")),
         ("stall@landed", Closed("did not answer in time")),
-        ("wrong-length@landed", Closed("no reply")),
+        ("wrong-length@landed", Closed("a malformed reply")),
         ("status=5/1@landed", Closed("rejected the request: ")),
         ("out-of-range@taking-off+100", Grounded("rejected the request: ")),
         ("over-temperature@taking-off+100", Grounded("rejected the request: ")),
         ("silence@flying", Grounded("did not answer in time")),
         ("half-frame@flying", Grounded("did not answer in time")),
-        ("wrong-length@flying", Grounded("no reply")),
+        ("wrong-length@flying", Grounded("a malformed reply")),
         ("status=5/1@flying", Grounded("rejected the request: ")),
         ("silence@ticking+200", Faulted(Fault::Timeout)),
         ("half-frame@ticking+200", Faulted(Fault::Timeout)),
