@@ -132,11 +132,11 @@ impl FromStr for InjectedFault {
     }
 }
 
-/// Injected faults: pending faults with their time in the required state, the active machine fault with its remaining time, and
+/// Injected faults: pending faults with their time in the required state (if in it), the active machine fault with its remaining time, and
 /// the client that receives no more replies.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Plan {
-    pending: Vec<(InjectedFault, f64)>,
+    pending: Vec<(InjectedFault, Option<f64>)>,
     calls: u32,
     silenced: Option<u64>,
     machine: Option<(FaultBits, f64)>,
@@ -145,13 +145,16 @@ pub(super) struct Plan {
 
 impl Plan {
     pub(super) fn new(injected_faults: Vec<InjectedFault>) -> Self {
-        Self { pending: injected_faults.into_iter().map(|one| (one, 0.0)).collect(), ..Self::default() }
+        // The controller starts landed, and a first call may come before its first servo interval is over.
+        let at_start = |one: &InjectedFault| is_now(one.when, Flight::Landed, false).then_some(0.0);
+        let pending = injected_faults.into_iter().map(|one| (one, at_start(&one)));
+        Self { pending: pending.collect(), ..Self::default() }
     }
 
     /// Advances by a servo interval, s, in this state; returns the injected faults of the machine.
     pub(super) fn advance(&mut self, flight: Flight, is_ticking: bool, dt_s: f64) -> FaultBits {
         for (one, in_state_s) in &mut self.pending {
-            *in_state_s = if is_now(one.when, flight, is_ticking) { *in_state_s + dt_s } else { 0.0 };
+            *in_state_s = is_now(one.when, flight, is_ticking).then(|| in_state_s.unwrap_or(0.0) + dt_s);
         }
         if let Some((_, left_s)) = &mut self.machine {
             *left_s -= dt_s;
@@ -168,9 +171,10 @@ impl Plan {
 
     /// Takes the first due fault of a kind.
     fn take(&mut self, is_wanted: impl Fn(InjectedFaultKind) -> bool) -> Option<InjectedFaultKind> {
-        let is_due =
-            |(one, in_state_s): &(InjectedFault, f64)| is_wanted(one.kind) && *in_state_s > one.after_s;
-        let place = self.pending.iter().position(is_due)?;
+        let is_taken = |(one, in_state_s): &(InjectedFault, Option<f64>)| {
+            is_wanted(one.kind) && is_due(one.after_s, *in_state_s)
+        };
+        let place = self.pending.iter().position(is_taken)?;
         Some(self.pending.remove(place).0.kind)
     }
 
@@ -190,7 +194,9 @@ impl Plan {
             return Deed::Silence;
         }
         let every = self.pending.iter().find_map(|(one, in_state_s)| match one.kind {
-            InjectedFaultKind::Status(status, every) if *in_state_s > one.after_s => Some((status, every)),
+            InjectedFaultKind::Status(status, every) if is_due(one.after_s, *in_state_s) => {
+                Some((status, every))
+            }
             _ => None,
         });
         if let Some((status, every)) = every {
@@ -206,6 +212,11 @@ impl Plan {
         }
         deed
     }
+}
+
+/// Returns true for a fault whose state has lasted for longer than its delay; without a delay, at once in the state.
+fn is_due(after_s: f64, in_state_s: Option<f64>) -> bool {
+    in_state_s.is_some_and(|in_state_s| after_s == 0.0 || in_state_s > after_s)
 }
 
 fn is_now(when: When, flight: Flight, is_ticking: bool) -> bool {
@@ -233,6 +244,16 @@ mod tests {
         for wrong in ["", "rest", "status=5/0", "reset@up", "reset+soon", "status=x/1"] {
             assert!(read(wrong).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn the_first_call_of_all_suffers_a_fault_without_delay() {
+        let deed = |fault: &str| Plan::new(vec![fault.parse().expect("as written")]).deed(1);
+        assert_eq!(
+            [deed("reset@landed"), deed("reset"), deed("status=5/1@landed")].map(|deed| deed == Deed::Answer),
+            [false; 3]
+        );
+        assert_eq!([deed("reset@flying"), deed("reset@landed+1")], [Deed::Answer; 2]);
     }
 
     #[test]
