@@ -26,7 +26,7 @@ pub enum LiveError {
     #[error("no running session: start one with `flotor run` (searched in {})", .0.display())]
     NoRun(PathBuf),
     /// Sessions are running, but none in the given process.
-    #[error("process {process} runs no session; running: {}", running.join(", "))]
+    #[error("process {process} runs no session; give the process of a running session: {}", running.join(", "))]
     OtherRuns {
         /// Process id that was given.
         process: u32,

@@ -347,8 +347,10 @@ fn a_model_of_a_run_of_the_program_is_replaced_from_another_terminal() {
         let arguments = ["swap"].iter().chain(arguments);
         Flotor::with(arguments).env("XDG_RUNTIME_DIR", &runtime).run()
     };
-    let running_here =
-        format!("process 1 runs no session; running: {} \"untitled\"", client.greeting().process);
+    let running_here = format!(
+        "process 1 runs no session; give the process of a running session: {} \"untitled\"",
+        client.greeting().process
+    );
     for (arguments, told) in [
         (&["sprng"][..], "did you mean `spring`?"),
         (
