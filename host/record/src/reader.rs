@@ -32,7 +32,7 @@ pub enum Damage {
         cause: prost::DecodeError,
     },
     /// A message lacks a field that every recording has.
-    #[error("a message on `{topic}` lacks `{field}`")]
+    #[error("a message on `{topic}` has no valid `{field}`")]
     Missing {
         /// Topic of the message.
         topic: &'static str,
@@ -98,9 +98,12 @@ pub enum ReadError {
         compression: String,
     },
     /// The file is damaged, and cannot be read any further.
-    #[error("`{}` is damaged {}: {cause}; the ticks before the damage are intact: `flotor repair` copies them to a new file",
+    #[error("`{}` is damaged {}: {cause}; {}",
         path.display(),
-        after_tick.map_or_else(|| "before its first tick".to_owned(), |tick| format!("after tick {tick}")))]
+        after_tick.map_or_else(|| "before its first tick".to_owned(), |tick| format!("after tick {tick}")),
+        after_tick.map_or("the recording contains no readable tick: record again", |_| {
+            "the ticks before the damage are intact: `flotor repair` copies them to a new file"
+        }))]
     Damaged {
         /// Path of the file.
         path: PathBuf,

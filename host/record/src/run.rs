@@ -94,7 +94,7 @@ impl RunDescription {
             )));
         }
         Self::from_message(run)
-            .map_err(|Missing(field)| InvalidRun(format!("the field `{field}` is missing")))
+            .map_err(|Missing(field)| InvalidRun(format!("the field `{field}` is missing or invalid")))
     }
 
     pub(crate) fn to_message(&self) -> Run {
