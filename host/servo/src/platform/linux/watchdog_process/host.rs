@@ -128,7 +128,11 @@ impl WatchdogProcess {
             Some((first, group)) if Packet::of(*first) == Some(Packet::Ready) => {
                 Ok(Some(String::from_utf8_lossy(group).into_owned()).filter(|group| !group.is_empty()))
             }
-            _ => Err(io::Error::other("the watchdog process does not answer")),
+            _ if is_there => Err(io::Error::other("the watchdog process ended before it was ready")),
+            _ => Err(io::Error::other(format!(
+                "the watchdog process did not answer within {} s",
+                PATIENCE.tv_sec
+            ))),
         }
     }
 }
