@@ -44,7 +44,11 @@ impl fmt::Display for Exceeded {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Watchdog(limit) => {
-                write!(f, "; the watchdog stopped the device after {} ms", limit.as_millis())
+                write!(
+                    f,
+                    "; the watchdog stopped the device after {} ms (`[limits] watchdog_ms` sets the limit)",
+                    limit.as_millis()
+                )
             }
             Self::Processor(limit) => {
                 write!(f, " within {} s of processor time ({REMEDY})", limit.as_secs_f64())

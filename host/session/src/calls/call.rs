@@ -62,7 +62,7 @@ impl fmt::Display for Call {
 /// Error of a plugin call that did not return in time: the thread of the call is abandoned, and the process should end soon.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{who}` did not return from {call} within {} s, the time limit; check the plugin, or raise the limit with `{LIMIT_VARIABLE}`",
+    "`{who}` did not return from {call} within {} s, the time limit; check the plugin, or raise the limit with the environment variable `{LIMIT_VARIABLE}`",
     limit.as_secs_f64()
 )]
 pub struct Unresponsive {

@@ -59,7 +59,8 @@ impl fmt::Display for Notice {
                 Ok(())
             }
             Self::Unguarded => f.write_str(
-                "the watchdog process has ended, so no process stops the devices if this program is killed",
+                "the watchdog process has ended, so no process stops the devices if this program is killed; end this \
+                 run and start the program again",
             ),
         }
     }

@@ -372,7 +372,7 @@ fn rotation(value: Value<'_>) -> Result<[f64; 4], SceneError> {
     }
     Err(value.problem(format!(
         "a rotation must be a unit quaternion [x, y, z, w], but this quaternion has length {}; divide its \
-         numbers by the length",
+         numbers by the length, or write [0, 0, 0, 1] for no rotation",
         rotation.length()
     )))
 }

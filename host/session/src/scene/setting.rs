@@ -18,7 +18,7 @@ impl FromStr for KeyValue {
     fn from_str(text: &str) -> Result<Self, String> {
         let parts = text.split_once('=').map(|(key, value)| (key.trim().to_owned(), value.trim().to_owned()));
         let setting = parts.filter(|(key, _)| !key.is_empty()).map(|(key, value)| Self { key, value });
-        setting.ok_or_else(|| format!("`{text}` is not KEY=VALUE"))
+        setting.ok_or_else(|| format!("`{text}` is not KEY=VALUE, like preset=full"))
     }
 }
 

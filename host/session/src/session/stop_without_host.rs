@@ -93,7 +93,8 @@ pub fn start_watchdog_process(
         Err(error) if limits.require_independent_stop => return Err(RunError::WatchdogProcess(error)),
         Err(error) => {
             warnings.push(format!(
-                "cannot start the watchdog process ({error}), so no process stops the devices if this program is killed"
+                "cannot start the watchdog process ({error}), so no process stops the devices if this program is \
+                 killed; keep a hand at the power switch of each device"
             ));
             None
         }

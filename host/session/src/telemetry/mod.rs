@@ -151,7 +151,7 @@ impl Host {
             })?;
             making.join().unwrap_or_else(|_| {
                 Err(refused(
-                    "the plugin panicked while it created the model; the previous model is still active"
+                    "the plugin panicked while it created the model; check the plugin with `flotor validate`"
                         .to_owned(),
                 ))
             })

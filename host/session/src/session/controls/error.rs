@@ -41,8 +41,8 @@ pub enum ControlError {
         live: Vec<String>,
     },
     /// The name belongs to a device, which has no weight and cannot be replaced.
-    #[error("only models have a weight and can be swapped; name a model instead of a device")]
-    NoWeight,
+    #[error("`{0}` is a device, and only models have a weight and can be swapped; name a model")]
+    NoWeight(String),
     /// The replacement of a model was rejected; the model stays in place.
     #[error("[{model}] model unchanged: {problem}")]
     Refused {

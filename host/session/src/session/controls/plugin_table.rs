@@ -140,7 +140,8 @@ impl PluginTable {
 
     /// Returns the numbers, counted among the models, of the models that a name names; an error for a device.
     pub(in super::super) fn models(&self, name: &str) -> Result<Vec<usize>, ControlError> {
-        let model = |plugin: PluginIndex| plugin.among_models(self.devices).ok_or(ControlError::NoWeight);
+        let no_model = || ControlError::NoWeight(name.to_owned());
+        let model = |plugin: PluginIndex| plugin.among_models(self.devices).ok_or_else(no_model);
         self.numbers(name)?.into_iter().map(model).collect()
     }
 
