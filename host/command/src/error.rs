@@ -15,6 +15,7 @@ use flotor_record::RecordError;
 use flotor_servo::{Place, RunEnd};
 use flotor_session::registry::LookupError;
 use flotor_session::{Call, CallError, RunError};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Error of a command, with its exit code.
@@ -58,7 +59,7 @@ pub enum CommandError {
     #[error("{0}")]
     PluginRefused(String),
     /// A file could not be written or read.
-    #[error("{}: {action}: {cause}", path.display())]
+    #[error("{}: {action}: {cause}{}", path.display(), remedy(cause))]
     File {
         /// Path of the file.
         path: PathBuf,
@@ -137,6 +138,18 @@ impl CommandError {
     }
 }
 
+/// Returns the remedy for an error of the system, after a semicolon; empty if the error implies none.
+fn remedy(cause: &std::io::Error) -> &'static str {
+    match cause.kind() {
+        ErrorKind::NotFound | ErrorKind::NotADirectory => "; check the path",
+        ErrorKind::PermissionDenied => "; check the permissions of the file and its folder",
+        ErrorKind::IsADirectory => "; name a file instead of a folder",
+        ErrorKind::ReadOnlyFilesystem => "; choose a folder where you may write",
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => "; free disk space",
+        _ => "",
+    }
+}
+
 /// Formats the message of a device for the place before the advice on its fault: with a trailing semicolon, or empty without a message.
 #[must_use]
 pub fn before_advice(words: &str) -> String {
@@ -163,7 +176,7 @@ fn ended(end: RunEnd) -> String {
             computes the largest stable stiffness)"
             .to_owned(),
         RunEnd::Unguarded => "the watchdog process has ended, so no process stops the devices if this program is \
-            killed; the run ended because the scene has `[limits] require_independent_stop`"
+            killed; the run ended because the scene has `[limits] require_independent_stop`. Start the run again"
             .to_owned(),
         RunEnd::NotPaced => "the device does not set the pace of the loop with its present settings; remove \
             `pacing = \"device\"` from the scene"

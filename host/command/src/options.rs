@@ -125,7 +125,8 @@ pub struct LendOptions {
 /// `--accept-shared-control-group`, of each command that drives a device.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct ControlGroupOption {
-    /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device
+    /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device;
+    /// without this option the command refuses such a device
     #[arg(long)]
     accept_shared_control_group: bool,
 }
@@ -238,11 +239,17 @@ pub fn duration_s(text: &str) -> Result<f64, String> {
         "h" => 3600.0,
         other => return Err(format!("unknown unit of time `{other}`; use ms, s, min or h")),
     };
-    let number: f64 =
-        number.trim().parse().map_err(|_| format!("invalid duration `{text}`; write 10s or 500ms"))?;
+    let number: f64 = number
+        .trim()
+        .parse()
+        .map_err(|_| format!("invalid duration `{text}`; write a number and a unit, such as 10s or 500ms"))?;
     let seconds = number * scale;
     let is_legal = (0.0..=31_536_000.0).contains(&seconds);
-    if is_legal { Ok(seconds) } else { Err("the range is 0 to 1 year".to_owned()) }
+    if is_legal {
+        Ok(seconds)
+    } else {
+        Err(format!("the duration `{text}` is outside the range of 0 to 1 year"))
+    }
 }
 
 /// Parses a loop rate in Hz, with or without the unit.
@@ -261,8 +268,9 @@ pub fn number(
 ) -> impl Fn(&str) -> Result<f64, String> + Clone {
     move |text| {
         let number = text.trim().trim_end_matches(unit).trim().parse();
-        let number = number.map_err(|_| format!("invalid {what} `{text}`; write a number in {unit}"))?;
         let (least, most) = (legal.start(), legal.end());
+        let number = number
+            .map_err(|_| format!("invalid {what} `{text}`; write a number from {least} to {most} {unit}"))?;
         let legal = legal.contains(&number).then_some(number);
         legal.ok_or_else(|| format!("the range is {least} to {most} {unit}"))
     }
@@ -334,7 +342,7 @@ fn json_output(text: &str) -> Result<PathBuf, String> {
 /// If the folder does not exist.
 pub fn folder(text: &str) -> Result<PathBuf, String> {
     let folder = PathBuf::from(text);
-    if folder.is_dir() { Ok(folder) } else { Err("no such folder".to_owned()) }
+    if folder.is_dir() { Ok(folder) } else { Err("no such folder; check the path".to_owned()) }
 }
 
 /// Parses the path of a file to write; `None` if it has an extension other than `kind`.
@@ -367,9 +375,13 @@ pub fn seed(text: &str) -> Result<u64, String> {
 /// # Errors
 /// If the text is not a number, or the system cannot address a core with this number.
 pub fn core(text: &str) -> Result<Core, String> {
-    let number =
-        text.trim().parse().map_err(|_| format!("invalid core number `{text}`; write a whole number"))?;
-    Core::new(number).ok_or_else(|| format!("no core {number} on this machine"))
+    let number = text
+        .trim()
+        .parse()
+        .map_err(|_| format!("invalid core number `{text}`; write a whole number, 0 or more"))?;
+    Core::new(number).ok_or_else(|| {
+        format!("no core {number} on this machine; write a smaller number: the first core is 0")
+    })
 }
 
 /// Parses the values `KEY=VALUE` of an option, such as `--set`, with the parameter schema of a plugin.
@@ -393,7 +405,7 @@ mod tests {
     fn a_number_may_have_its_unit_and_stays_in_its_range() {
         let force = number("N", "force", 1.0..=50.0);
         assert_eq!((force("10"), force(" 2.5 N ")), (Ok(10.0), Ok(2.5)));
-        assert_eq!(force("ten N"), Err("invalid force `ten N`; write a number in N".to_owned()));
+        assert_eq!(force("ten N"), Err("invalid force `ten N`; write a number from 1 to 50 N".to_owned()));
         for outside in ["0.5", "51N", "inf", "nan"] {
             assert_eq!(force(outside), Err("the range is 1 to 50 N".to_owned()), "{outside}");
         }

@@ -17,7 +17,7 @@ pub(crate) struct NewArguments {
     /// Kind of plugin
     #[arg(value_enum)]
     kind: Kind,
-    /// Id of the plugin: lower-case letters, digits and hyphens
+    /// Id of the plugin: at most 32 lower-case letters, digits and single hyphens, a letter first
     name: String,
     /// Programming language
     #[arg(long, value_enum, default_value = "rust")]

@@ -64,7 +64,7 @@ fn record_local(out: &Path) -> Result<(), CommandError> {
         RecordingEnd::Complete(_) => Ok(()),
         RecordingEnd::Cut(_) => Err(CommandError::Failed(
             "the connection was lost before the end of the run, so the recording is incomplete; the file \
-             contains the ticks received until then"
+             contains the ticks received until then. To record without a connection, use `flotor run --record`"
                 .to_owned(),
         )),
     };

@@ -54,7 +54,7 @@ pub(crate) struct RunArguments {
     /// Seed of all random numbers
     #[arg(long, value_parser = seed, default_value_t = 0, value_name = "N")]
     seed: u64,
-    /// Pin the loop to this core of the machine (real clock)
+    /// Pin the loop to this core of the machine, from 0 (real clock; default: not pinned)
     #[arg(long, value_parser = core, value_name = "N")]
     core: Option<Core>,
     /// Record every tick to an MCAP file (opens in Foxglove, Rerun, Python)
@@ -91,7 +91,7 @@ impl RunArguments {
 /// Model output for `--compute`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum OutputOption {
-    /// Torque, where the device gives none
+    /// Torque, even if the device exerts no torque
     Torque,
     /// Stored energy
     Energy,

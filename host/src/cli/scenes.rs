@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
     flotor run wall\n  \
     flotor scenes wall > mine.toml      a scene to edit and run with `flotor run mine.toml`")]
 pub(crate) struct ScenesArguments {
-    /// Name of a scene: print its text
+    /// Name of a scene: print its text (default: list all scenes)
     name: Option<String>,
     #[command(flatten)]
     json: JsonOption,

@@ -72,7 +72,7 @@ fn for_host(plugin: &str) -> Result<String, CommandError> {
         return Ok(plugin.to_owned());
     }
     let whole = std::path::absolute(plugin)
-        .map_err(|cause| CommandError::file(plugin.as_ref(), "cannot be found", cause))?;
+        .map_err(|cause| CommandError::file(plugin.as_ref(), "cannot determine the absolute path", cause))?;
     whole.into_os_string().into_string().map_err(|path| {
         CommandError::Usage(format!("`{}`: the path is not valid UTF-8; rename the file", path.display()))
     })
@@ -115,7 +115,8 @@ fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMe
         return Ok(change);
     }
     Err(CommandError::Failed(format!(
-        "no reply from the host in {} s; the host may still swap the model",
+        "no reply from the host in {} s; the host may still swap the model: look at the session with `flotor view` before \
+         you try again",
         CREATION_LIMIT.as_secs()
     )))
 }

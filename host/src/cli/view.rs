@@ -69,7 +69,7 @@ pub(crate) struct ViewArguments {
     /// Colours: dark or light (default: dark; with --export: light)
     #[arg(long, value_name = "dark|light")]
     look: Option<String>,
-    /// Width and height of picture or window (default: 1280x800)
+    /// Width and height of picture or window in pixels, each 64 to 8192 (default: 1280x800)
     #[arg(long, value_name = "WxH")]
     size: Option<String>,
     /// Size of text and lines, 1 to 3 (default: 1)
@@ -79,7 +79,7 @@ pub(crate) struct ViewArguments {
     #[arg(long, value_name = "AZIMUTH,INCLINATION[,ZOOM]", allow_hyphen_values = true)]
     #[arg(requires = "screenshot", conflicts_with = "window")]
     view: Option<String>,
-    /// Measure the processor time of the window for this duration, then close the window
+    /// Measure the processor time of the window for this duration, 1 to 3600 s, then close the window
     #[arg(long, value_name = "SECONDS", conflicts_with_all = ["screenshot", "export"])]
     measure: Option<String>,
     #[command(flatten)]

@@ -34,7 +34,7 @@ pub(crate) fn most_open_files() -> Option<u64> {
 /// Always: not yet.
 pub(crate) fn check_lend() -> Result<(), CommandError> {
     Err(CommandError::Usage(
-        "`flotor lend` is not supported on Windows yet: its libraries are for Linux".to_owned(),
+        "`flotor lend` is not supported on Windows yet: its libraries are for Linux; use `flotor lend` on Linux".to_owned(),
     ))
 }
 
