@@ -60,7 +60,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
             Rule::Independent => model::independent(&subject)?,
             Rule::NoThreads => model::no_threads(subject.prepared_model()?, before.threads()?)?,
             Rule::EnergyGradient => model::energy_gradient(&mut subject.prepared_model()?)?,
-            unknown => return Err(format!("this host cannot check `{}`", unknown.id()).into()),
+            unknown => return Err(format!("this host cannot check `{}`; update Flotor", unknown.id()).into()),
         },
     }
     Ok(None)
@@ -69,11 +69,14 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
 fn schema(parameters: &[Parameter]) -> Result<(), String> {
     for (index, parameter) in parameters.iter().enumerate() {
         let id = parameter.id();
-        if id.is_empty() || parameter.doc().is_empty() {
-            return Err(format!("parameter {index} (`{id}`) lacks an id or a doc"));
+        if id.is_empty() {
+            return Err(format!("parameter {index} (from 0) has no id; give each parameter an id"));
+        }
+        if parameter.doc().is_empty() {
+            return Err(format!("parameter `{id}` has no doc; describe the parameter in a sentence"));
         }
         if parameters.iter().take(index).any(|earlier| earlier.id() == id) {
-            return Err(format!("`{id}` occurs twice"));
+            return Err(format!("two parameters have the id `{id}`; rename one of them"));
         }
         if !matches!(parameter.kind(), ParameterKind::Text | ParameterKind::File)
             && let Err(range) = parameter.check(parameter.default())

@@ -53,7 +53,9 @@ pub(super) fn lifecycle(mut device: OpenedDevice) -> Result<(), String> {
         if let Sampled { count: 2.., first, last } = running.sampled
             && first == last
         {
-            return Err(format!("every sample has the same `sampled_ns`, {first} ns"));
+            return Err(format!(
+                "every sample has the same `sampled_ns`, {first} ns; set `sampled_ns` to the time of the sample"
+            ));
         }
         device = running.device.deactivate().ok_or("deactivate failed")?;
     }
@@ -257,12 +259,12 @@ impl Running {
         let now = state.sampled_ns;
         if now > tick.time_ns.saturating_add(AHEAD_NS) {
             return Err(format!(
-                "`sampled_ns` is {now}, more than a minute after the tick at {} ns",
+                "`sampled_ns` is {now} ns, more than a minute after the tick at {} ns",
                 tick.time_ns
             ));
         }
         if count > 0 && now < last {
-            return Err(format!("`sampled_ns` is {now}, before the previous {last}"));
+            return Err(format!("`sampled_ns` is {now} ns, before the {last} ns of the previous sample"));
         }
         self.sampled = Sampled { count: count + 1, first: if count == 0 { now } else { first }, last: now };
         Ok(())
@@ -283,7 +285,8 @@ impl Running {
         while !self.delivers() {
             if started.elapsed() > PATIENCE {
                 return Err(format!(
-                    "commanded {} N, the device reports no force for {}, so its stop cannot be checked",
+                    "at a commanded force of {} N the device reports no force for {}, so its stop cannot be checked; report the \
+                     force in `delivered`",
                     push.force(),
                     wording::time(PATIENCE)
                 ));
@@ -314,7 +317,7 @@ impl Running {
                 return Err(match self.delivers() {
                     true => format!("the device still delivers {}", wording::wrench(&self.state.delivered)),
                     false => format!(
-                        "the device has delivered only {at_rest} samples in {} since the stop",
+                        "the device has delivered only {at_rest} of {SAMPLES} samples without force in {} since the stop",
                         wording::time(PATIENCE)
                     ),
                 });

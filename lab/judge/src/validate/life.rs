@@ -104,11 +104,14 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
         let drawn = model.centerline().map(|mut line| (line.info(), line.points(&input, POINTS)));
         works(model, "centerline")?;
         if let Some((info, points)) = drawn {
-            let is_drawn = points.is_some_and(|points| points.iter().all(Pose::is_finite));
-            if info.is_none() || !is_drawn {
-                return Err(
-                    "centerline returned no info, no points, or a point that is not finite".to_owned()
-                );
+            let problem = match (info, points) {
+                (None, _) => Some("no info"),
+                (_, None) => Some("no points"),
+                (_, Some(points)) if points.iter().all(Pose::is_finite) => None,
+                _ => Some("a point that is not finite"),
+            };
+            if let Some(problem) = problem {
+                return Err(format!("centerline returned {problem}"));
             }
         }
         if model.has_shape() {

@@ -110,7 +110,8 @@ pub fn validate(
             Ok(None) if check == Check::Contract(Rule::InsideMemory) => {
                 let patience = wording::time(patience);
                 let late = format!(
-                    "the life cycle of an instance needs more than {patience} with the guarding allocator"
+                    "the life cycle of an instance takes longer than {patience} with the guarding allocator; raise the \
+                     limit with `--timeout`"
                 );
                 Verdict { seen: Some(Outcome::Missing(late)), figures: None }
             }

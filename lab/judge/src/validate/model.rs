@@ -9,7 +9,7 @@ use crate::wording;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::abi::loader::Model;
 use flotor_hal::{
-    ActiveRegion, DQuat, DVec3, Demand, Input, Memory, Output, Pose, RegionShape, Twist, Wrench,
+    ActiveRegion, DQuat, DVec3, Demand, Input, Memory, Output, Pose, RegionShape, StepStatus, Twist, Wrench,
 };
 use std::time::Duration;
 
@@ -55,9 +55,19 @@ pub(super) fn demand(model: &mut Model) -> Result<(), String> {
                 || has_torque && is_other(all_of.torque_nm, less_of.torque_nm)
         });
         if let Some((tick, (all, less))) = other {
-            let [with, without] = [all, less].map(|output| wording::vector(output.wrench.force()));
+            let of_both = |text: fn(&Output) -> String| [all, less].map(text);
+            let (part, [with, without]) = if is_other(all.wrench.force_n, less.wrench.force_n) {
+                ("force", of_both(|output| format!("{} N", wording::vector(output.wrench.force()))))
+            } else if all.status() != less.status() {
+                (
+                    "status",
+                    of_both(|output| format!("`{}`", output.status().map_or("unknown", StepStatus::name))),
+                )
+            } else {
+                ("torque", of_both(|output| format!("{} N·m", wording::vector(output.wrench.torque()))))
+            };
             return Err(format!(
-                "step {tick} of a path returned the force {with} N with all outputs requested, and {without} N with {what}"
+                "step {tick} of a path returned the {part} {with} with all outputs requested, and {without} with {what}"
             ));
         }
     }
