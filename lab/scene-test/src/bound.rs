@@ -43,7 +43,7 @@ impl Bound {
             (None, None, Some(value), Some(within)) if within >= 0.0 => {
                 Ok(Some(Self::Near { value, within }))
             }
-            (None, None, Some(_), Some(_)) => Err("`within` must be 0 or more".to_owned()),
+            (None, None, Some(_), Some(within)) => Err(format!("within = {within}: write 0 or more")),
             _ => Err("write { min, max }, { min }, { max } or { value, within }".to_owned()),
         }
     }
@@ -103,7 +103,7 @@ pub(crate) fn number(value: &toml::Value) -> Result<f64, String> {
         toml::Value::Float(number) => *number,
         other => return Err(format!("write a number instead of this {}", other.type_str())),
     };
-    if number.is_finite() { Ok(number) } else { Err("write a finite number".to_owned()) }
+    if number.is_finite() { Ok(number) } else { Err(format!("write a finite number instead of {number}")) }
 }
 
 #[cfg(test)]

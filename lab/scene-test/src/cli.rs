@@ -101,7 +101,10 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
     };
     let cases: Vec<Case<'_>> = all.into_iter().filter(is_chosen).collect();
     if cases.is_empty() && arguments.shard.is_none() {
-        return Err(CommandError::Usage("no case matches; `flotor test --list` lists all cases".to_owned()));
+        let text = arguments.filter.as_deref().unwrap_or_default();
+        return Err(CommandError::Usage(format!(
+            "--filter {text}: no case matches; `flotor test --list` lists all cases"
+        )));
     }
     if arguments.list {
         return cases.iter().try_for_each(|case| report_line(format_args!("{}", case.name())));
@@ -184,7 +187,7 @@ fn found(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CommandError> {
         }
         if found.len() == before {
             return Err(CommandError::Usage(format!(
-                "{}: the folder contains no file NAME{SUFFIX}",
+                "{}: the folder contains no file NAME{SUFFIX}; give another folder, or a file",
                 path.display()
             )));
         }

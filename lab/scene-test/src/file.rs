@@ -197,7 +197,9 @@ impl TestFile {
         let folder = path.parent().unwrap_or(Path::new(""));
         let existing = |file: &Spanned<PathBuf>| {
             let found = folder.join(file.get_ref());
-            let missing = || (file.span().start, format!("the file {} does not exist", found.display()));
+            let missing = || {
+                (file.span().start, format!("the file {} does not exist; correct the path", found.display()))
+            };
             if found.is_file() { Ok(found.clone()) } else { Err(missing()) }
         };
         let scene = existing(&written.scene)?;
@@ -228,7 +230,8 @@ impl TestFile {
             let mut numbers = Vec::new();
             for (path, value) in &within {
                 flatten(path, value, &mut |path, value| {
-                    numbers.push((path.to_owned(), number(value)?));
+                    let number = number(value).map_err(|wrong| format!("`within.{path}`: {wrong}"))?;
+                    numbers.push((path.to_owned(), number));
                     Ok(())
                 })
                 .map_err(|wrong| (at, wrong))?;
@@ -292,7 +295,11 @@ impl TestFile {
         let checks_a_plugin = curve.is_some() || golden.is_some() || validate.is_some() || stress.is_some();
         let nothing = expect.is_empty() && reference.is_none() && digests.is_empty() && !checks_a_plugin;
         if nothing {
-            return Err((0, "the file has no expectation; write at least [expect]".to_owned()));
+            return Err((
+                0,
+                "the file has no expectation; write at least one, such as [expect] with late_ticks = 0"
+                    .to_owned(),
+            ));
         }
         Ok(self)
     }
@@ -346,7 +353,8 @@ fn settings(written: &BTreeMap<String, Value>) -> Result<Vec<(String, String)>, 
     let mut found = Vec::new();
     for (key, value) in written {
         flatten(key, value, &mut |key, value| {
-            found.push((key.to_owned(), scalar(value)?));
+            let text = scalar(value).map_err(|wrong| format!("`{key}`: {wrong}"))?;
+            found.push((key.to_owned(), text));
             Ok(())
         })?;
     }
@@ -363,9 +371,10 @@ fn settings_with_values(
             if !key.contains('.') {
                 return Err(format!("`{key}` is not PLUGIN.PARAMETER, such as spring.preset"));
             }
+            let text = |value: &Value| scalar(value).map_err(|wrong| format!("`{key}`: {wrong}"));
             let values = match value {
-                Value::Array(values) => values.iter().map(scalar).collect::<Result<Vec<_>, _>>()?,
-                one => vec![scalar(one)?],
+                Value::Array(values) => values.iter().map(text).collect::<Result<Vec<_>, _>>()?,
+                one => vec![text(one)?],
             };
             if values.is_empty() {
                 return Err(format!("`{key}` has an empty list; write at least one value"));
