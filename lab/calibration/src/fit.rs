@@ -64,7 +64,7 @@ pub struct Fit {
 pub fn fit(readings: &[Reading]) -> Result<Fit, CalibrationError> {
     let stops = distinct(readings.iter().map(|reading| u64::from(reading.stop)));
     let forces = distinct(readings.iter().map(|reading| reading.commanded_n.to_bits()));
-    let too_few = |needed| CalibrationError::TooFew {
+    let too_few = |needed: String| CalibrationError::TooFew {
         readings: readings.len(),
         heights: stops.len(),
         forces: forces.len(),
@@ -72,19 +72,20 @@ pub fn fit(readings: &[Reading]) -> Result<Fit, CalibrationError> {
     };
     if forces.len() < 2 {
         return Err(too_few(
-            "measure at two or more different forces, to separate the weight from the field",
+            "measure at two or more different forces (--force), to separate the weight from the field"
+                .to_owned(),
         ));
     }
     if stops.len() < MAX_DEGREE + 2 {
-        return Err(too_few("measure at more heights than the polynomial has coefficients"));
+        return Err(too_few(format!("measure at {} heights or more (--steps)", MAX_DEGREE + 2)));
     }
+    let same_heights = || too_few("measure at heights that differ more (--step-mm)".to_owned());
     let scale = Scale::of(readings);
     let candidates: Option<Vec<Candidate>> =
         (0..=MAX_DEGREE).map(|degree| cross_validate(readings, &stops, &scale, degree)).collect();
-    let candidates = candidates.ok_or_else(|| too_few("measure at different heights"))?;
+    let candidates = candidates.ok_or_else(same_heights)?;
     let degree = choose(&candidates);
-    let solution =
-        solution(readings.iter(), &scale, degree).ok_or_else(|| too_few("measure at different heights"))?;
+    let solution = solution(readings.iter(), &scale, degree).ok_or_else(same_heights)?;
 
     let shares: Vec<f64> = solution.x.iter().take(degree + 1).copied().collect();
     let calibration = VerticalCalibration::new(scale.range_m(), &scale.powers_of_height(&shares))?;

@@ -101,9 +101,12 @@ pub enum CalibrationError {
     /// The emergency-stop latch is pressed, or the watchdog process cannot be started as required.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The device or the force sensor rejects a parameter, activation or calibration, or the device is disconnected.
+    /// The device or the force sensor rejects a parameter, activation or calibration.
     #[error("the device or the force sensor rejected the request: {0}")]
     Refused(Refusal),
+    /// The device was lost.
+    #[error("the device is disconnected; connect the device and start again")]
+    Disconnected,
     /// The device faulted.
     #[error("device fault: {}", .0.advice())]
     Fault(Fault),
@@ -131,7 +134,7 @@ pub enum CalibrationError {
         /// Number of different commanded forces.
         forces: usize,
         /// Requirement in words.
-        needed: &'static str,
+        needed: String,
     },
     /// The fitted curve is not a valid calibration.
     #[error("invalid calibration: {0}")]

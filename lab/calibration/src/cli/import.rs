@@ -6,6 +6,7 @@ use clap::Args;
 use flotor_command::CommandError;
 use flotor_command::options::{new_file, number, real};
 use flotor_command::say;
+use flotor_hal::InvalidCalibration;
 use flotor_session::calibration_file::{
     CalibratedDevice, CalibrationFile, FORMAT, Quality, Source, VerticalCurve,
 };
@@ -56,9 +57,18 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<(), CommandError> {
         *first += 1.0;
     }
     let vertical = VerticalCurve { range_mm: *range_mm, coefficients_per_mm: coefficients };
-    vertical
-        .calibration()
-        .map_err(|invalid| CommandError::Usage(format!("invalid polynomial of --excess: {invalid}")))?;
+    vertical.calibration().map_err(|invalid| {
+        CommandError::Usage(match invalid {
+            InvalidCalibration::Range(_) => {
+                let [from, to] = range_mm;
+                format!(
+                    "--range-mm {from},{to}: write two heights within 1000 mm of the centre, the lower first"
+                )
+            }
+            InvalidCalibration::Count(_) => format!("--excess: {invalid}"),
+            InvalidCalibration::Share { .. } => format!("{invalid}; correct --excess, --at or --range-mm"),
+        })
+    })?;
     let note = if from_report {
         format!("CMU-RI-TR-07-21, section 3.4, taken at a commanded force of {at} N")
     } else {

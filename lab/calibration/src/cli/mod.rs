@@ -74,7 +74,7 @@ fn refused(error: CalibrationError) -> CommandError {
         CalibrationError::Plugin(error) => error.into(),
         CalibrationError::Run(error) => error.into(),
         CalibrationError::Fault(fault) => CommandError::DeviceFault(fault),
-        CalibrationError::Setting(_) | CalibrationError::Refused(_) => {
+        CalibrationError::Setting(_) | CalibrationError::Refused(_) | CalibrationError::Disconnected => {
             CommandError::PluginRefused(error.to_string())
         }
         CalibrationError::TooFew { .. }

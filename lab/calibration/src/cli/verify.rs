@@ -17,7 +17,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:\n  flotor calibrate verify calibration.toml --simulated\n  \
     flotor calibrate verify mine.toml --device maglev --set transport=usb --sensor /dev/ttyUSB0")]
 pub(super) struct VerifyArguments {
-    /// Calibration file
+    /// Calibration file to verify
     file: PathBuf,
     #[command(flatten)]
     rig: RigArguments,

@@ -8,7 +8,7 @@ use crate::sensor::ForceSensor;
 use flotor_core::limits::{Boundary, CEILING, Limits};
 use flotor_core::plausibility::PlausibilityCheck;
 use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
-use flotor_hal::{Embodiment, Fault, LoopConfig, Refusal, VerticalCalibration};
+use flotor_hal::{Embodiment, Fault, LoopConfig, VerticalCalibration};
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{Envelope, StopSwitch};
 use flotor_session::{Guardian, StopWithoutHost, WatchdogStart, start_watchdog_process};
@@ -134,7 +134,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         if let Some(holder) = self.holder.take() {
             self.opened = holder.end();
         }
-        let opened = self.opened.as_mut().ok_or_else(lost)?;
+        let opened = self.opened.as_mut().ok_or(CalibrationError::Disconnected)?;
         opened.calibrate_vertical(calibration).map_err(CalibrationError::Refused)
     }
 
@@ -162,7 +162,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
             })?;
             self.holder = Some(Holder::start(active, guard).map_err(CalibrationError::NoThread)?);
         }
-        self.holder.as_mut().ok_or_else(lost)
+        self.holder.as_mut().ok_or(CalibrationError::Disconnected)
     }
 }
 
@@ -175,12 +175,6 @@ fn without_wall() -> Boundary {
         damping_nms_per_rad: 0.0,
         ..Boundary::default()
     }
-}
-
-fn lost() -> CalibrationError {
-    CalibrationError::Refused(Refusal::resource(
-        "the device is disconnected; connect the device and start again",
-    ))
 }
 
 impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {

@@ -26,7 +26,7 @@ pub(crate) struct JitterArguments {
     /// Loop rate in Hz, 100 to 10000
     #[arg(long, value_parser = rate_hz, value_name = "HZ", default_value = "1000")]
     rate: f64,
-    /// Run both loops on this core
+    /// Run both loops on this core, from 0 (default: not pinned)
     #[arg(long, value_parser = core, value_name = "N")]
     core: Option<Core>,
     #[command(flatten)]

@@ -106,7 +106,9 @@ pub enum DivergenceCause {
         first_tick: u64,
     },
     /// The recording shows no cause.
-    #[error("probably another build of the plugin, or another machine")]
+    #[error(
+        "probably another build of the plugin, or another machine: replay with the plugin file and on the machine of the run"
+    )]
     OtherBuild,
 }
 
