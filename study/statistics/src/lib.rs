@@ -47,7 +47,7 @@ pub enum StatisticsError {
         found: usize,
     },
     /// A number is NaN or infinite.
-    #[error("{what}: value {index} is not finite; correct the value")]
+    #[error("{what}: value {} is not finite; correct the value", index + 1)]
     NotFinite {
         /// Name of the result.
         what: &'static str,

@@ -119,7 +119,7 @@ impl Design {
         filled.dedup();
         if filled.len() < combinations {
             return Err(StatisticsError::Design(format!(
-                "{} of {combinations} combinations of groups have no subject",
+                "subjects are missing in {} of {combinations} combinations of groups",
                 combinations - filled.len()
             )));
         }
