@@ -94,7 +94,7 @@ fn date(days: u64) -> (u64, u64, u64) {
 
 /// Error: a text is not a valid time of day in canonical form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the text is not a time like 2026-11-25T18:34:09.123Z")]
+#[error("the time does not have the form 2026-11-25T18:34:09.123Z")]
 pub struct ParseTimeError;
 
 impl FromStr for TimeOfDay {

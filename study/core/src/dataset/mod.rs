@@ -58,7 +58,7 @@ pub enum DatasetError {
     #[error(transparent)]
     Log(#[from] LogError),
     /// Error of a file or folder.
-    #[error("{}: {action}: {cause}", path.display())]
+    #[error("{}: {action}: {cause}; check the path, its permissions and the free disk space", path.display())]
     File {
         /// File or folder.
         path: PathBuf,
@@ -333,7 +333,7 @@ fn read_earlier(path: &Path) -> Result<Option<String>, DatasetError> {
     match std::fs::read_to_string(path) {
         Ok(text) => Ok(Some(text)),
         Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
-        Err(cause) => Err(DatasetError::file(path, "cannot read the file", cause)),
+        Err(cause) => Err(DatasetError::file(path, "cannot read the file as UTF-8 text", cause)),
     }
 }
 

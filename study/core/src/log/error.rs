@@ -26,7 +26,7 @@ fn line_text(line: usize) -> String {
 #[non_exhaustive]
 pub enum LogProblem {
     /// The file could not be read or written.
-    #[error("{action}: {cause}")]
+    #[error("{action}: {cause}; check the path, its permissions and the free disk space")]
     File {
         /// Attempted operation.
         action: &'static str,

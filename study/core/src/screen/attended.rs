@@ -206,7 +206,7 @@ impl ScreenStateMachine {
                 Input::Stop => Ok(Step::Stopped),
                 Input::Continue => Ok(Step::Read(self.texts.pop_front().unwrap_or_default())),
                 Input::Again | Input::Withdraw | Input::Practise | Input::Answer { .. } => {
-                    Err(InputError::NotNow("no question is open yet"))
+                    Err(InputError::NotNow("no question is open yet; continue until the question appears"))
                 }
             };
         }
@@ -217,7 +217,9 @@ impl ScreenStateMachine {
                 self.practice = std::mem::take(&mut self.offered).into();
                 self.go_to(Stage::Ready(Pause::PhaseChanges))
             }
-            (_, Input::Practise) => Err(InputError::NotNow("practice is not offered now")),
+            (_, Input::Practise) => {
+                Err(InputError::NotNow("practice is not offered now, only at the start of a resumed sitting"))
+            }
             (_, Input::Withdraw) => self.withdraw(),
             (Stage::Ready(_), Input::Continue) => self.go_to(Stage::Feel(0)),
             (Stage::Feel(index), Input::Continue) => {
@@ -241,7 +243,9 @@ impl ScreenStateMachine {
             }
             (Stage::Ask, Input::Answer { response }) => self.answer(&trial, response, time_s),
             (Stage::Ask, Input::Continue) => Err(InputError::NotNow("give an answer first")),
-            (_, Input::Answer { .. }) => Err(InputError::NotNow("no question is open yet")),
+            (_, Input::Answer { .. }) => {
+                Err(InputError::NotNow("no question is open yet; continue until the question appears"))
+            }
             (_, Input::Again) => Err(InputError::NotNow("the stimulus can be repeated after its end")),
         }
     }
@@ -311,7 +315,9 @@ impl ScreenStateMachine {
             }
             (_, undo) => {
                 self.undo = undo;
-                Err(InputError::NotNow("there is no answer that can be taken back now"))
+                Err(InputError::NotNow(
+                    "no answer can be taken back now; take an answer back before the next stimulus ends, and only once",
+                ))
             }
         }
     }
