@@ -129,13 +129,17 @@ pub struct AnalysisOptions {
 #[non_exhaustive]
 pub enum AnalysisError {
     /// Too few complete sittings.
-    #[error("complete sittings after exclusions: {complete}; an analysis needs at least 2")]
+    #[error(
+        "an analysis needs 2 or more complete sittings after exclusions, and the study has {complete}; complete more sittings"
+    )]
     TooFewSubjects {
         /// Number of complete sittings that no rule excluded.
         complete: usize,
     },
     /// A subject has no threshold in some condition.
-    #[error("{subject}: no track at base {base} in modality {modality} reached a threshold")]
+    #[error(
+        "{subject}: no track at base {base} in modality {modality} reached a threshold; `--each` shows the tracks of the subject"
+    )]
     NoThreshold {
         /// Number of the subject.
         subject: SubjectNumber,
