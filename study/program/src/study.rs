@@ -149,7 +149,7 @@ struct Common {
     /// Age of the person, for participants.tsv (human)
     #[arg(long, value_parser = count(1..=130_u16), value_name = "YEARS")]
     age: Option<u16>,
-    /// Sex of the person, for participants.tsv (human)
+    /// Sex of the person, one word, for participants.tsv (human)
     #[arg(long, value_name = "WORD", value_parser = word)]
     sex: Option<String>,
     /// Preferred hand of the person, for participants.tsv (human)
@@ -228,7 +228,7 @@ struct JndArguments {
     /// Weighted up-down: first step down, as a share of the base
     #[arg(long, default_value_t = 0.10, value_parser = real, value_name = "SHARE")]
     step: f64,
-    /// Target share of correct answers; "I don't know" counts half
+    /// Target share of correct answers, above 0.5 and below 1; "I don't know" counts half
     #[arg(long, default_value_t = 0.75, value_parser = real, value_name = "SHARE")]
     target: f64,
     /// Weighted up-down: numbers of the reversals that halve the step
@@ -269,7 +269,7 @@ struct JndArguments {
     /// Obvious pairs in each track to check attention; they do not count
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     obvious_pairs: u32,
-    /// Difference of the obvious pairs, as a share of the base
+    /// Difference of the obvious pairs, as a share of the base: 0.4 to the largest difference of a track
     #[arg(long, default_value_t = 0.6, value_parser = real, value_name = "SHARE")]
     obvious_difference: f64,
     /// Omit the practice pairs
@@ -558,10 +558,12 @@ fn unfit(error: ApparatusError) -> CommandError {
 
 fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
     let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
+    let subjects: Vec<String> = logs.iter().map(|log| log.begin.subject.get().to_string()).collect();
     let log = logs.into_iter().find(|log| log.begin.subject.get() == arguments.subject);
     let log = log.ok_or_else(|| {
         let (data, subject) = (arguments.data.display(), arguments.subject);
-        CommandError::Usage(format!("{data}: the study has no subject {subject}; choose one of its subjects"))
+        let subjects = subjects.join(", ");
+        CommandError::Usage(format!("{data}: the study has no subject {subject}; choose one of: {subjects}"))
     })?;
     log.annotate(&arguments.text).map_err(|error| CommandError::Failed(error.to_string()))
 }

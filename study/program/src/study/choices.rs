@@ -144,6 +144,6 @@ pub(super) fn range(text: &str) -> Result<(f64, f64), String> {
     if least < most {
         Ok((least, most))
     } else {
-        Err(format!("the range {least}-{most} is empty; write the smaller number first"))
+        Err(format!("the range {least}-{most} is empty; write two different numbers, the smaller first"))
     }
 }

@@ -77,7 +77,7 @@ pub(super) enum CurveError {
     #[error("the table has compressions only; give the length without load (--free-length-mm)")]
     NoFreeLength,
     /// The fitted range has too few points.
-    #[error("the middle of the deflection (30 to 70 %) has too few points: {0}; measure at more lengths")]
+    #[error("no line fits the middle of the deflection (30 to 70 %): {0}; measure at more lengths")]
     Statistics(#[from] StatisticsError),
     /// The force decreases with compression; holds the slope, N/m.
     #[error(

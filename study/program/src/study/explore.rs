@@ -63,10 +63,9 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let session = session.with_strength(arguments.options.strength());
     session.notices().into_iter().for_each(note);
     session.warnings().iter().for_each(note);
-    let model =
-        scene.models.first().map(|model| model.name.clone()).ok_or_else(|| {
-            CommandError::Usage(format!("{}: the scene has no model to explore", scene.title))
-        })?;
+    let model = scene.models.first().map(|model| model.name.clone()).ok_or_else(|| {
+        CommandError::Usage(format!("{}: the scene has no model to explore; add a `[[model]]`", scene.title))
+    })?;
     let mapping =
         scene.models.first().map_or(1.0, |model| model.mapping.motion_scale * model.mapping.force_scale);
     let watch = Shared::default();

@@ -171,8 +171,12 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
 
 /// Returns the only study file of a folder; an error if there is none, or more than one.
 fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
-    let entries = std::fs::read_dir(folder)
-        .map_err(|cause| CommandError::Usage(format!("{}: {cause}", folder.display())))?;
+    let entries = std::fs::read_dir(folder).map_err(|cause| {
+        CommandError::Usage(format!(
+            "{}: cannot read the folder: {cause}; name a study file",
+            folder.display()
+        ))
+    })?;
     let entries = entries.flatten().filter(|entry| {
         let name = entry.file_name();
         let name = name.to_string_lossy();
@@ -226,15 +230,17 @@ fn words(
         }
         let option = known.iter().find(|option| option.get_long() == Some(&name)).ok_or_else(|| {
             let names = known.iter().filter_map(|option| option.get_long());
-            let near =
-                nearest(&name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+            let near = nearest(&name, names).map_or_else(
+                || format!("; `flotor study {task} --help` lists the options"),
+                |near| format!("; did you mean `{near}`?"),
+            );
             refuse(format!("`flotor study {task}` has no such option{near}"))
         })?;
         let value_of = |value: &toml::Value| match plain(value) {
             Some(text) if PATHS.contains(&name.as_str()) => Ok(folder.join(text).into_os_string()),
             Some(text) => Ok(OsString::from(text)),
             None => Err(refuse(format!(
-                "the option accepts no value of type {}; write a number, a text or a list",
+                "the option accepts no value of type {}; write a number or a text",
                 kind(value)
             ))),
         };

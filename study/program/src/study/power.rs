@@ -16,16 +16,16 @@ use rayon::prelude::*;
     flotor study power --subjects 16..16 --ratio 1.1 --replications 6 --runs 400"
 )]
 pub(super) struct PowerArguments {
-    /// Smallest and largest number of subjects; up to five evenly spaced sizes in this range are simulated
+    /// Smallest and largest number of subjects, 3 or more; up to five evenly spaced sizes in this range are simulated
     #[arg(long, default_value = "8..32", value_parser = sizes, value_name = "FEWEST..MOST")]
     subjects: (u16, u16),
     /// Number of simulated studies of each size
     #[arg(long, default_value_t = 200, value_parser = count(10..=100_000_u32), value_name = "N")]
     runs: u32,
-    /// Ratio of the threshold without vision to the threshold with vision
+    /// Ratio of the threshold without vision to the threshold with vision, 0.1 to 10
     #[arg(long, default_value_t = 1.21, value_parser = real, value_name = "RATIO")]
     ratio: f64,
-    /// Share of trials answered without attention
+    /// Share of trials answered without attention, 0 to 0.5
     #[arg(long, default_value_t = 0.0, value_parser = real, value_name = "SHARE")]
     lapse: f64,
     /// Bases, in the unit of the stimulus
