@@ -52,14 +52,18 @@ pub enum AccessError {
         #[source]
         cause: io::Error,
     },
-    /// A member's name appears twice, or is reserved.
+    /// A member's name appears twice.
     #[error(
-        "the name `{0}` is given twice or reserved (`bridge`, `authority`, `anyone`): give each peer another \
-    name and one right"
+        "the name `{0}` is given twice; give each member one name and one right, which includes the lower rights"
     )]
     Twice(Name),
+    /// A member's name is reserved.
+    #[error(
+        "the name `{0}` is reserved, as are `{BRIDGE}`, `{AUTHORITY}` and `{ANYONE}`; give the member another name"
+    )]
+    Reserved(Name),
     /// A certificate could not be created.
-    #[error("cannot create a certificate: {0}")]
+    #[error("cannot create a certificate: {0}; check the values of --host")]
     Certificate(#[from] rcgen::Error),
 }
 
@@ -76,8 +80,11 @@ const AUTHORITY: &str = "authority";
 pub fn write_keys(folder: &Path, members: &Members) -> Result<Vec<PathBuf>, AccessError> {
     for (at, (name, _)) in members.peers.iter().enumerate() {
         let before = members.peers.iter().take(at).any(|(other, _)| other == name);
-        if before || [BRIDGE, AUTHORITY, ANYONE].contains(&name.to_string().as_str()) {
+        if before {
             return Err(AccessError::Twice(name.clone()));
+        }
+        if [BRIDGE, AUTHORITY, ANYONE].contains(&name.to_string().as_str()) {
+            return Err(AccessError::Reserved(name.clone()));
         }
     }
     std::fs::create_dir_all(folder).map_err(|cause| AccessError::File { path: folder.into(), cause })?;
@@ -279,7 +286,8 @@ fn access_control(members: &Members) -> Value {
     json!({ "enabled": true, "default_permission": "deny", "rules": rules, "subjects": subjects, "policies": policies })
 }
 
-fn word(right: Right) -> String {
+/// Returns the name of a right on the command line.
+pub(crate) fn word(right: Right) -> String {
     right.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
 }
 

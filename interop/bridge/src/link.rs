@@ -40,8 +40,14 @@ pub struct LinkOptions {
 pub enum LinkError {
     /// The configuration, or an endpoint of `--listen` or `--connect`, is invalid.
     #[error(
-        "{} is invalid: {reason}",
-        file.as_ref().map_or_else(|| "`--listen` or `--connect`".to_owned(), |f| format!("the configuration {}", f.display()))
+        "{} is invalid: {reason}; {}",
+        file.as_ref().map_or_else(
+            || "an endpoint of `--listen` or `--connect`".to_owned(),
+            |f| format!("the configuration {}", f.display())
+        ),
+        file.as_ref().map_or("write an endpoint such as tls/lab.example.org:7447", |_| {
+            "correct the file, or create new keys and configurations with `flotor bridge keys`"
+        })
     )]
     Config {
         /// Path of the configuration; `None` without one.
@@ -285,8 +291,8 @@ fn member_of(metadata: &Value) -> Name {
 }
 
 fn config_of(options: &LinkOptions) -> Result<Config, LinkError> {
-    let wrong =
-        |error: zenoh::Error| LinkError::Config { file: options.config.clone(), reason: error.to_string() };
+    // Of the options: an error of the file has its path.
+    let wrong = |error: zenoh::Error| LinkError::Config { file: None, reason: error.to_string() };
     let Some(path) = &options.config else {
         let mut config = Config::default();
         config.insert_json5("mode", "\"peer\"").map_err(wrong)?;

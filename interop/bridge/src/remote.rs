@@ -1,5 +1,6 @@
 //! Client of a bridge: receives a remote run, and sends requests.
 
+use crate::access;
 use crate::keys::Name;
 use crate::link::{Link, LinkError};
 use crate::request::{NumberedRequest, Refusal, Request, Right};
@@ -191,8 +192,9 @@ impl RequestClient {
             if status.allow < right {
                 let word = request.key().trim_start_matches("ask/");
                 return Err(format!(
-                    "the bridge `{}` rejects `{word}`; `flotor bridge serve --allow` sets the requests that a bridge accepts",
-                    self.name
+                    "the bridge `{}` rejects `{word}`; start the bridge with `flotor bridge serve --allow {}`",
+                    self.name,
+                    access::word(right)
                 ));
             }
             looks += 1;

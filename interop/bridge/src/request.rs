@@ -174,7 +174,7 @@ pub enum Refusal {
     )]
     Replayed,
     /// Meant for a run that has ended, or there is no run.
-    #[error("no run is active, or the request was for another run; try again")]
+    #[error("no run is active, or the request was for another run; start a run, or try again")]
     Stale,
     /// Based on a ticket of an earlier start of the bridge, or too old.
     #[error("the request is too old, or from before the start of the bridge; send a new request")]

@@ -361,7 +361,8 @@ impl Inside {
     fn start(&mut self) -> Result<(), String> {
         if let Some(pressed) = self.latch.state().pressed {
             return Err(format!(
-                "the emergency stop is pressed ({pressed}); its owner has to release the emergency stop first"
+                "the emergency stop is pressed ({pressed}); its owner has to release the emergency stop first, \
+                 with `flotor release` or `flotor bridge ask NAME release`"
             ));
         }
         if self.run.is_some() {
