@@ -110,7 +110,7 @@ fn setting(service: &Service, method: &str, key: &str, body: &Value) -> Answer {
     match method {
         "GET" => match shared.settings.get(key) {
             Some(value) => (200, value.clone()),
-            None => failed(404, "unknown setting"),
+            None => failed(404, &format!("unknown setting `{key}`; set the setting with POST first")),
         },
         "POST" => stored(shared.keep_setting(key, body)),
         "DELETE" => {
@@ -286,7 +286,12 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         ("DELETE", "damping") => view.damping = plain.damping,
         ("DELETE", "force_gate") => view.force_gate = plain.force_gate,
         ("DELETE", "transform") => view.workspace = plain.workspace,
-        _ => return Err(failed(405, "the setting does not support this HTTP method")),
+        _ => {
+            return Err(failed(
+                405,
+                &format!("the setting `{name}` does not support {method}; use another method"),
+            ));
+        }
     }
     match short {
         "basis" => Ok(json!({ "permutation": view.basis.name() })),
@@ -295,7 +300,10 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         "damping" => Ok(damping(view)),
         "force_gate" => Ok(force_gate(view)),
         "transform" => Ok(json!({ "transform": view.workspace.to_json() })),
-        _ => Err(failed(404, "unknown setting")),
+        _ => Err(failed(
+            404,
+            &format!("unknown setting `{name}`; the documentation of the service lists the settings"),
+        )),
     }
 }
 

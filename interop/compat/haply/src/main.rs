@@ -159,8 +159,8 @@ fn listen(option: &str, at: &str, reach: Reach) -> Result<(Port, SocketAddr), Co
         Ok((port, address))
     });
     bound.map_err(|cause| {
-        CommandError::Usage(format!(
-            "{option}: {cause}; if the port is in use, end Haply's own service or choose another port"
-        ))
+        let is_in_use = cause.kind() == std::io::ErrorKind::AddrInUse;
+        let advice = if is_in_use { "; end Haply's own service, or choose another port" } else { "" };
+        CommandError::Usage(format!("{option}: {cause}{advice}"))
     })
 }
