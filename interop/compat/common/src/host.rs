@@ -38,7 +38,9 @@ pub fn host() -> Option<&'static Host> {
     }
     let prepare = || {
         let prepare = || Host::prepare(Settings::from_environment()?, &StopSwitch::default());
-        let prepared = guarded(Err("the preparation of the run panicked".to_owned()), || quietly(prepare));
+        let panicked =
+            "internal error: the preparation of the run panicked; please report this error with the scene";
+        let prepared = guarded(Err(panicked.to_owned()), || quietly(prepare));
         prepared.map_err(|problem| report_line(&problem)).ok()
     };
     HOST.get_or_init(prepare).as_ref()
