@@ -63,7 +63,8 @@ impl LendArguments {
         flotor: &Path,
     ) -> Result<(), CommandError> {
         let absolute = |path: &Path| {
-            std::path::absolute(path).map_err(|cause| CommandError::file(path, "cannot be found", cause))
+            std::path::absolute(path)
+                .map_err(|cause| CommandError::file(path, "cannot determine the absolute path", cause))
         };
         if let Some(scene) = &self.scene {
             command.env("FLOTOR_SCENE", absolute(scene)?);

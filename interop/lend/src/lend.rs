@@ -214,8 +214,9 @@ fn folder_of_libraries(api: Option<Api>, program: &Program, own: &Path) -> Resul
 fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
     let Some(file) = &arguments.scene else { return Ok(()) };
     if file.is_dir() || !file.exists() {
+        let why = if file.is_dir() { "the path is a folder" } else { "the file does not exist" };
         return Err(CommandError::Usage(format!(
-            "`{}` is not a scene: the file does not exist; write the program after `--`",
+            "`{}` is not a scene: {why}; correct the path, or write the program after `--`",
             file.display()
         )));
     }

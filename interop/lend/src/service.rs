@@ -5,6 +5,7 @@ use crate::folder::Folder;
 use crate::stop_request::{Early, Stage, StopRequest, has_ended};
 use flotor_command::separate::{Built, SeparateProgram};
 use flotor_command::{CommandError, INTERRUPTED, note, say};
+use flotor_servo::THREAD_ADVICE;
 use flotor_servo::last_stop::spawn_unblocked;
 use flotor_servo::platform::process_group::end_with_this_thread;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
@@ -162,7 +163,9 @@ impl<'a> Served<'a> {
         };
         let thread = std::thread::Builder::new().name("flotor-service".to_owned()).spawn(read);
         thread.map_err(|cause| {
-            CommandError::Failed(format!("cannot start a thread for the output of the service: {cause}"))
+            CommandError::Failed(format!(
+                "cannot start a thread for the output of the service: {cause}; {THREAD_ADVICE}"
+            ))
         })?;
         let address = stop.poll(|stage| match served.output.try_recv() {
             Ok(address) => Some(Ok(address)),
