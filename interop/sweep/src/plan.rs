@@ -218,7 +218,9 @@ impl Plan {
             }
             (LayoutText::Sobol, Some(points)) => Layout::Sobol { points, seed: file.layout_seed },
             (LayoutText::Sobol, None) => {
-                return Err(unfit("layout = \"sobol\" needs `points = N`".into()));
+                return Err(unfit(
+                    "layout = \"sobol\" without `points`; write `points = N`, the number of points".into(),
+                ));
             }
         };
         let plan = Self {
@@ -247,8 +249,11 @@ impl Plan {
                 "the seed {large} is larger than {LARGEST_SEED} (2^53); write a smaller seed"
             ));
         }
-        if self.seeds.is_empty() || self.block == 0 {
-            return Err("`seeds` needs at least one seed, and `block` must be 1 or more".into());
+        if self.seeds.is_empty() {
+            return Err("`seeds` is empty; write at least one seed".into());
+        }
+        if self.block == 0 {
+            return Err("`block` is 0; write 1 or more".into());
         }
         if let Question::Run { .. } = self.question
             && let Some(axis) = self.axes.iter().find(|axis| !axis.key.contains('.'))
@@ -275,7 +280,7 @@ impl Plan {
         }
         match self.row_count() {
             Some(1..=MOST_ROWS) => Ok(()),
-            Some(0) => Err("the plan has no points; give each axis at least one value".into()),
+            Some(0) => Err("`points` is 0; write 1 or more".into()),
             _ => Err(format!("the plan has more than {MOST_ROWS} rows; split the plan")),
         }
     }
@@ -337,7 +342,7 @@ impl AxisText {
             }
             _ => {
                 return Err(format!(
-                    "axis `{key}` needs exactly one of: values = [..], words = [..], or from and to"
+                    "axis `{key}`: write exactly one of values = [..], words = [..], or from and to"
                 ));
             }
         };
