@@ -41,7 +41,10 @@ impl Sweep {
     fn do_task(&self, py: Python<'_>, number: usize) -> PyResult<()> {
         let task = self.tasks.get(number);
         let task = task.ok_or_else(|| {
-            refuse(format!("task {number} does not exist; the sweep has {} tasks", self.tasks.len()))
+            refuse(format!(
+                "task {number} does not exist; the sweep has {} tasks, numbered from 0",
+                self.tasks.len()
+            ))
         })?;
         py.detach(|| {
             if self.store.holds(task) {
