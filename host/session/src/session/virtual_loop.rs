@@ -162,6 +162,8 @@ impl LoopThread {
         let (sender, done) = sync_channel(1);
         let (clocks, clock) = sync_channel(1);
         let body = move || {
+            // The first wait of a thread allocates, which would otherwise happen between two ticks.
+            let _ = waiting.recv_timeout(Duration::ZERO);
             let _ = clocks.send(ThreadClock::of_this_thread());
             let mut is_first = true;
             for mut batch in waiting {
