@@ -73,6 +73,9 @@ fn what_is_no_curve_is_refused() {
         refused("compression_mm,force_n\n0,0\n1;2\n").starts_with("c:3: the line has 1 cell for 2 columns")
     );
     assert!(refused("compression_mm,force_n\n0,0\n1,nan\n").starts_with("c:3: `force_n` must be finite"));
-    assert!(refused("# bench\ncompression_mm,force_n\n0,0\n2,3\n1,4\n").starts_with("c:5: compression"));
+    assert!(
+        refused("# bench\ncompression_mm,force_n\n0,0\n2,3\n1,4\n")
+            .starts_with("c:5: the compression does not grow: 2.000000 mm")
+    );
     assert!(parse("# bench\n\ncompression_mm, force_n\n0, 0\n1, 2\n2, 4\n").is_ok());
 }

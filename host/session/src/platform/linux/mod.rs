@@ -2,6 +2,8 @@
 
 mod locale;
 mod machine;
+#[cfg(test)]
+mod tests;
 mod thread_clock;
 
 pub(crate) use machine::MachineState;
