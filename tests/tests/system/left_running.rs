@@ -192,7 +192,7 @@ fn nothing_is_left_of_a_plugin_that_starts_processes() {
     let hanging =
         Hanging::by("{ signal(SIGTERM, SIG_IGN); signal(SIGHUP, SIG_IGN); (void)!fork(); hang(); }");
     let scene = std::fs::read_to_string(hanging.path().join("scene.toml")).expect("it is written");
-    let _ = hanging.folder.file("isolated.toml", scene + "isolation = \"process\"\nrate_hz = 100\n");
+    let _ = hanging.folder.file("isolated.toml", scene + "isolation = \"process\"\n");
     for command in ISOLATING {
         let _ = std::fs::remove_file(hanging.path().join("hangs"));
         let started = hanging.flotor(command).env("FLOTOR_STEP_LIMIT_S", "600").leading_a_group().start();

@@ -424,7 +424,7 @@ fn the_script_for_a_laboratory_answers_its_questions() {
         ("[device.parameters]\nboundary_mm = 13\n", "boundary_mm = 13: "),
         ("[device.parameters]\nfade = 1\n", "no parameter `fade`"),
         ("[limits]\n", "the table [device.parameters] is missing"),
-        ("[device.parameters\n", "TOML parse error at line 1"),
+        ("[device.parameters\n", "line 1: unclosed table"),
     ] {
         let refusal = opened(&scratch.file("wrong.toml", text), &[]).expect_err(text).to_string();
         assert!(refusal.contains(words), "{refusal}");

@@ -85,7 +85,7 @@ fn a_wrong_script_is_told_with_file_line_and_key() {
     let ran = run_demo(&["hand_script=prss"]);
     assert!(ran.error().contains("a script is a TOML file or one of press, hold"), "{ran:?}");
     let ran = run_demo(&["hand_script=press", "hand_recording=run.mcap"]);
-    assert!(ran.error().contains("either `hand_script` or `hand_recording`, not both"), "{ran:?}");
+    assert!(ran.error().contains("`hand_script` and `hand_recording` are both set"), "{ran:?}");
 }
 
 #[test]

@@ -503,7 +503,7 @@ fn an_answer_is_taken_back_in_a_sitting() {
     assert_eq!((log.is_answered_anew(), log.trials.len(), log.withdrawn.len()), (true, 1, 2));
     let ran = person("json", &([go, go, go, &first, back, stop].join("\n") + "\n"), &again, &out);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
-    assert!(ran.stdout.contains("no answer that can be taken back"), "{ran:?}");
+    assert!(ran.stdout.contains("no answer can be taken back now"), "{ran:?}");
     let log = SittingLog::read(&log_of(&out, 1)).unwrap();
     assert_eq!((log.trials.len(), log.withdrawn.len()), (2, 2));
 }

@@ -88,7 +88,11 @@ fn rules_that_leave_nothing_say_what_they_took() {
     let ran = flotor(scratch.path(), &["analyse", "data"]);
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
     let last = ran.stderr.lines().last().unwrap_or_default();
-    assert!(last.starts_with("error: ") && last.contains("sittings after exclusions: 0; "), "{ran:?}");
+    assert!(
+        last.starts_with("error: ")
+            && last.contains("2 or more complete sittings after exclusions, and the study has 0;"),
+        "{ran:?}"
+    );
     let lines =
         ran.stderr.lines().filter(|line| line.starts_with("  sub-0") && line.contains("most_dont_know = 0"));
     assert_eq!(lines.count(), 6, "{ran:?}");

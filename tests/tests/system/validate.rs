@@ -58,7 +58,11 @@ fn every_mistake_of_a_model_is_found_under_its_rule() {
         ("TEXT_OF_BYTES", "loads", "not UTF-8"),
         ("TEXT_WITHOUT_END", "loads", "1125899906842624 bytes"),
         ("TEXT_NOWHERE", "schema", "has no doc; describe the parameter"),
-        ("OTHER_ID", "loads", "the id `fixture-c-other-model`, but its metadata have `fixture-c-bad-model`"),
+        (
+            "OTHER_ID",
+            "loads",
+            "the id `fixture-c-other-model`, but its metadata have the id `fixture-c-bad-model`",
+        ),
         ("NAN_IN_MOTION", "finite-in-motion", "NaN"),
         ("NAN_IN_MOTION", "live-parameters", "NaN"),
         ("CRASHES_IN_MOTION", "finite-in-motion", "by signal 11"),
