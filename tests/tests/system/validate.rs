@@ -125,7 +125,7 @@ fn every_mistake_of_a_device_is_found_under_its_rule() {
         ("NO_QUATERNION", "lifecycle", "the quaternion has length 0"),
         ("NAN_DELIVERED", "lifecycle", "NaN"),
         ("FAULTS_AFTER_STOP", "safe-stop", "after safe_stop, read at tick"),
-        ("SILENT_AFTER_STOP", "safe-stop", "the device has delivered only 0 samples"),
+        ("SILENT_AFTER_STOP", "safe-stop", "the device has delivered only 0 of 20 samples"),
         ("IGNORES_STOP", "safe-stop", "the device still delivers"),
         ("IGNORES_STOP_IN_SILENCE", "safe-stop", "its stop cannot be checked"),
     ];
