@@ -71,7 +71,7 @@ fn every_mistake_of_a_model_is_found_under_its_rule() {
         ("LIVE_WITHOUT_SETTER", "live-parameters", "`set_parameter` returned `unsupported`"),
         ("ABORTS_WHEN_SET", "live-parameters", "by signal 6"),
         ("REFUSES_WHEN_SET", "live-parameters", "rejects every live parameter"),
-        ("FORGETS_WHAT_IS_SET", "live-parameters", "reads back 500"),
+        ("FORGETS_WHAT_IS_SET", "live-parameters", "is 500 instead of 0"),
         ("ACTS_OUTSIDE", "activity", "outside its active region"),
         ("NEGATIVE_DAMPING", "passive", "damping must dissipate"),
         ("WHIRLS", "passive", "once round a circle in x and y"),
