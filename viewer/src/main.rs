@@ -52,7 +52,7 @@ struct Arguments {
     /// Key of the emergency stop in a sitting
     #[arg(long, value_enum, default_value_t, requires = "sitting")]
     stop_key: StopKey,
-    /// Draw the whole window with its panels (default: only the 3D view and the traces)
+    /// With --screenshot: draw the whole window with its panels (default: only the 3D view and the traces)
     #[arg(long, requires = "screenshot")]
     window: bool,
     /// Direction of the view, degrees: -360 to 360 to the right of the front, -2 to 88 above the horizon; and a zoom, 0.2 to 3

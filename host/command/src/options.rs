@@ -125,8 +125,8 @@ pub struct LendOptions {
 /// `--accept-shared-control-group`, of each command that drives a device.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct ControlGroupOption {
-    /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device;
-    /// without this option the command refuses such a device
+    /// Accept a device without a watchdog of its own although a kill of this program's control group also ends the watchdog
+    /// process, and no process stops the device (default: refuse)
     #[arg(long)]
     accept_shared_control_group: bool,
 }

@@ -34,7 +34,7 @@ const GRACE: Duration = Duration::from_millis(500);
 /// Command line arguments of the guard process started by `flotor lend`.
 #[derive(Args)]
 pub(crate) struct GuardArguments {
-    /// Process of `flotor lend`
+    /// Process id of `flotor lend`
     #[arg(long)]
     parent: i32,
     /// File for the end of the program

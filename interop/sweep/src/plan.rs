@@ -273,7 +273,7 @@ impl Plan {
             }
             if let Some(axis) = self.axes.iter().find(|axis| !matches!(axis.values, Values::Range { .. })) {
                 return Err(format!(
-                    "`{}` lists values, but layout = \"sobol\" needs `from` and `to`; write a range",
+                    "`{}` lists values, but layout = \"sobol\" needs `from` and `to`; write a range, or set layout = \"grid\"",
                     axis.key
                 ));
             }

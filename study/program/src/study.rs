@@ -115,7 +115,7 @@ struct Common {
     /// Number of the person (human; default: the first free number)
     #[arg(long, value_parser = count(1..=SubjectNumber::MOST), value_name = "N")]
     subject: Option<u16>,
-    /// Scene of the stimuli in TOML (default: a spring on the simulated flotor)
+    /// Scene of the stimuli in TOML (default: the model of the stimuli on the simulated flotor)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Set a parameter of a plugin of the scene (repeatable)

@@ -72,8 +72,8 @@ fn an_option_of_many_commands_is_the_same_in_each() {
         ),
         (
             "--accept-shared-control-group",
-            "| `--accept-shared-control-group` |  | Accept that a kill of this program's control group also ends \
-             the watchdog process, so that no process stops the device; without this option the command refuses such a device |",
+            "| `--accept-shared-control-group` |  | Accept a device without a watchdog of its own although a kill of this program's \
+             control group also ends the watchdog process, and no process stops the device (default: refuse) |",
             "run, study jnd, study magnitude, study force, study explore, calibrate vertical, \
              calibrate verify, lend",
         ),
