@@ -37,7 +37,7 @@ impl MachineParameters {
     /// Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If the coils cannot push in all six directions.
+    /// If the wrenches of the six coils are linearly dependent.
     pub fn limits(&self) -> Result<Wrench, InvalidParameter> {
         Ok(Coils::new(&self.actuation.geometry)?.pure_axis_limits())
     }
