@@ -189,8 +189,8 @@ impl Frames {
     }
 }
 
-/// Rounds torques, in units of the motor words, to words; scales all down by one factor if one exceeds [`MOST_WORD`];
-/// all zero if one is not finite. Real-time: bounded, no allocation.
+/// Rounds torques, in units of the motor words, to motor words. If a magnitude exceeds [`MOST_WORD`], all three torques are scaled
+/// down by a common factor; if a torque is not finite, all three words are 0. Real-time: bounded, no allocation.
 #[must_use]
 pub fn clipped_words(wanted: [f64; 3]) -> Clipped {
     let most = f64::from(MOST_WORD);
