@@ -92,8 +92,8 @@ impl Posture {
         (self.levers_m2 * (self.pulls_per_m * force_n)).to_array()
     }
 
-    /// Returns the force on the hand, N, in the board's frame, exerted by torques of the motors; not finite where an
-    /// arm has no lever. Not real-time: for emulators.
+    /// Returns the force on the hand, N, in the board's frame, exerted by torques of the motors; not finite in a singular posture
+    /// (inner and outer arm in line). Not real-time: for emulators.
     #[must_use]
     pub fn force_n(&self, torques_nm: [f64; 2]) -> DVec2 {
         self.pulls_per_m.inverse() * (DVec2::from_array(torques_nm) / self.levers_m2)
