@@ -49,7 +49,8 @@ impl LimitConfig {
         load_time_s: 60.0,
     };
 
-    /// Returns the force of the controller's own wall; `None` inside the wall. The damping resists outward motion only.
+    /// Returns the force of the controller's own wall, N; `None` in free space (closer to the centre than the wall), and for a
+    /// position that is not finite. The damping resists outward motion only.
     pub(super) fn wall(&self, position_m: DVec3, velocity_m_per_s: DVec3) -> Option<DVec3> {
         let distance_m = position_m.length();
         let depth_m = distance_m - self.wall_m;
