@@ -1,4 +1,4 @@
-//! Unix: sockets and terminals are descriptors with `poll`.
+//! Unix: waits for sockets with `poll`, and udev rules for access to USB and HID devices.
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use std::net::TcpStream;
