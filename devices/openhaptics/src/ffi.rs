@@ -60,7 +60,7 @@ sdk_functions! {
 
 /// Safe wrappers: each call passes numbers, and pointers to its own locals.
 impl Functions {
-    /// Returns a text of the interface or of the current device.
+    /// Returns the value of a string parameter of the SDK or of the current device (`hdGetString`); empty if the SDK returns null.
     pub(crate) fn text(&self, parameter: c_uint) -> String {
         // SAFETY: any number is legal; the text is static, or null.
         unsafe { static_text((self.hdGetString)(parameter)) }

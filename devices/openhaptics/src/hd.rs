@@ -85,7 +85,7 @@ pub(crate) struct Hd {
 /// Properties reported by a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Facts {
-    /// Centre of the usable workspace in the contract's axes, m.
+    /// Centre of the usable workspace, device frame, m.
     pub(crate) centre_m: DVec3,
     /// Half-extents of the usable workspace along the contract's axes, m.
     pub(crate) range_m: DVec3,
