@@ -78,7 +78,8 @@ impl Actuation {
     /// Creates cold coils without current. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a number is not physical, or the coils cannot push in all six directions.
+    /// If a number is not physical, or the wrenches of the six coils are linearly dependent, so that some forces or torques cannot
+    /// be produced.
     pub fn new(parameters: &ActuationParameters) -> Result<Self, InvalidParameter> {
         number("amplifier_bandwidth_hz", parameters.amplifier_bandwidth_hz, Domain::Positive)?;
         parameters.field.check()?;

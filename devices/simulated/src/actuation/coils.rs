@@ -77,7 +77,8 @@ impl Coils {
     /// Computes the matrices between currents and wrenches. Real-time: bounded, no allocation.
     ///
     /// # Errors
-    /// If a number is not physical, or the six coils cannot push in all six directions.
+    /// If a number is not physical, or the wrenches of the six coils are linearly dependent, so that some forces or torques cannot
+    /// be produced.
     pub fn new(geometry: &CoilGeometry) -> Result<Self, InvalidParameter> {
         number("coil_radius_mm", geometry.radius_m, Domain::Positive)?;
         number("coil_force_n", geometry.coil_force_n, Domain::Positive)?;

@@ -93,7 +93,8 @@ impl Intention {
         }
     }
 
-    /// Returns the intention `time_s` later. Real-time: bounded, no allocation.
+    /// Returns the intention with the position extrapolated by `time_s` at constant velocity; all other fields are unchanged.
+    /// Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn later(&self, time_s: f64) -> Self {
         Self { position_m: self.position_m + self.velocity_m_per_s * time_s, ..*self }
