@@ -1,4 +1,4 @@
-//! Linux: ELF, a copy in memory without a name, `dlopen`.
+//! Linux: ELF metadata, private copies of plugins in memory files (`memfd_create`), loading with `dlopen`.
 
 use super::NoSection;
 use crate::abi::metadata;
