@@ -50,8 +50,9 @@ pub fn stop_on_signals() -> Result<StopSwitch, CommandError> {
     take_signals(First::InOrder)
 }
 
-/// Returns the switch of [`stop_on_signals`] for a run that is yet to be prepared: as long as no device has been energised, the
-/// first signal ends the process, even while a plugin's code runs.
+/// Starts the signal thread and returns its stop switch, as [`stop_on_signals`] does, but for a process that has not yet prepared
+/// its run: until a device has been energised, the first signal ends the process, even while a plugin's code runs. Call this
+/// function before other threads start.
 ///
 /// # Errors
 /// If the system cannot block the signals or start a thread.
