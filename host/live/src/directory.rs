@@ -99,7 +99,8 @@ impl Directory {
         &self.path
     }
 
-    /// Returns true if this user owns the folder. Other folders are not trusted: in `/tmp` any user can create a folder of this name.
+    /// Returns true if the folder exists, is not a link and belongs to this user (on Windows the owner is not checked). Other
+    /// folders are not trusted: in `/tmp` any user can create a folder of this name.
     #[must_use]
     pub fn is_ours(&self) -> bool {
         std::fs::symlink_metadata(&self.path).is_ok_and(|attributes| is_ours(&attributes))
