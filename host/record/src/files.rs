@@ -46,7 +46,8 @@ impl NamedFile {
         format!("{HASH_PREFIX}{:016x}", self.hash)
     }
 
-    /// Returns keys and values of the entries for path and hash of the file that `parameter` names.
+    /// Returns the entries of this file in a recording, as key and value: `PARAMETER.path` and `PARAMETER.xxh3`, where `parameter`
+    /// is the id of the parameter that names the file.
     #[must_use]
     pub fn to_parameters(&self, parameter: &str) -> [(String, String); 2] {
         let path = self.path.to_string_lossy().into_owned();

@@ -67,7 +67,7 @@ impl Topic {
     }
 }
 
-/// Name of a field that every recording has and a message lacks.
+/// Name of a required field that is missing from a message, or whose value is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Missing(pub(crate) &'static str);
 
