@@ -282,7 +282,8 @@ impl Host {
         }
     }
 
-    /// Executes one tick in lockstep; returns true if there was a tick, false also without lockstep. Not real-time.
+    /// Executes one tick of a lockstep run; returns true if the run continues after the tick, false if the run has ended or is not
+    /// in lockstep. Not real-time.
     pub fn advance(&self) -> bool {
         self.reads.store(0, Ordering::Relaxed);
         match &mut *self.stage() {

@@ -30,7 +30,7 @@ pub enum Axes {
     Six,
 }
 
-/// Device of the scene, in the frame of its program model.
+/// Device of the scene as seen by a program: pose and wrench in the frame of the device's model `program`.
 pub struct Station {
     name: String,
     plugin: String,
