@@ -47,7 +47,9 @@ impl ErrorCurve {
         Ok(Self { ratios })
     }
 
-    /// Averages a force sensor's readings at each height over forces, runs and repetitions; `weight_n`: weight of the moving part.
+    /// Computes the curve from a force sensor's readings: at each stop, the mean height and the mean ratio of delivered force
+    /// (measured force plus `weight_n`) to commanded force, over all forces, runs and repetitions. `weight_n`: weight of the moving
+    /// part, N.
     #[must_use]
     pub fn of_readings(readings: &[Reading], weight_n: f64) -> Self {
         let mut stops: Vec<u32> = readings.iter().map(|reading| reading.stop).collect();
