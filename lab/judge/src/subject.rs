@@ -201,8 +201,8 @@ impl<'a> Subject<'a> {
         input
     }
 
-    /// Makes one call and checks the answer: finite apart from an energy of NaN, with a known status. Replaces a model that
-    /// panicked by a new instance.
+    /// Steps the model once and checks the output: known status, finite wrench, energy finite or NaN, and no [`StepStatus::Ok`] for
+    /// a non-finite pose. After a panic, replaces the model with a new instance.
     ///
     /// # Errors
     /// [`Trouble`] with the kind of the failure and its pose.
