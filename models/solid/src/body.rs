@@ -48,8 +48,8 @@ pub fn unevenness_m(mesh: &Mesh) -> f64 {
     above.chain(beside).fold(0.0, f64::max)
 }
 
-/// Solves for the stiffness of a plate bonded to the touched face of a mesh; also returns the estimated relative error of the
-/// stiffness, the largest over the modes. Not real-time.
+/// Solves for the stiffness of a solid against a rigid plate bonded to the touched face of its mesh; also returns the estimated
+/// relative error of the stiffness, the largest over the [`MODES`] modes of the plate. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.
@@ -61,8 +61,8 @@ pub fn plate(mesh: &Mesh, lame: Lame) -> Result<(RigidPatch, f64), NotPositive> 
     Ok((patch, error))
 }
 
-/// Solves for the stiffness of a plate bonded to the touched face of a mesh; also returns all nodal displacements by mode.
-/// Not real-time.
+/// Solves for the stiffness of a solid against a rigid plate bonded to the touched face of its mesh; also returns the displacements
+/// of all nodes for each of the [`MODES`] modes of the plate. Not real-time.
 ///
 /// # Errors
 /// [`NotPositive`] if the parameters do not describe an elastic solid.

@@ -161,8 +161,8 @@ impl Grid {
         nodes
     }
 
-    /// Returns the nodes of the element at a point, with their shape functions; a point outside is moved to the block. Not
-    /// real-time.
+    /// Returns the nodes of the element at a point, with the values of their shape functions there; a point outside is clamped to
+    /// the block. Not real-time.
     #[must_use]
     pub fn sample(&self, position_m: [f64; 3]) -> Sample {
         let points = element_points(self.order);
@@ -219,8 +219,8 @@ impl Elements {
         Self { order, mass, mixed, slope }
     }
 
-    /// Returns the stiffness matrix of a box with sides `size_m`, N/m: column-major, three degrees of freedom per node,
-    /// nodes x first.
+    /// Returns the element stiffness matrix of a box-shaped element with sides `size_m`, N/m: column-major, three degrees of
+    /// freedom per node, node index varying fastest along x, then y, then z.
     #[must_use]
     pub fn stiffness(&self, size_m: [f64; 3], lame: Lame) -> Vec<f64> {
         let side = self.order + 1;
