@@ -32,7 +32,8 @@ pub fn step<L: Law>(law: &L, input: &Input) -> Output {
     with_all_instructions(Step { law, input })
 }
 
-/// Runs a computation with the best instruction set of this machine. The result is the same to the bit.
+/// Runs a computation with AVX2 (x86-64-v3) if this machine has it, else with the baseline instruction set. The result is
+/// bit-identical with both.
 #[inline]
 pub(crate) fn with_all_instructions<C: NullaryFnOnce>(computation: C) -> C::Output {
     #[cfg(target_arch = "x86_64")]

@@ -139,8 +139,9 @@ impl RodBlend {
         &self.energy
     }
 
-    /// Returns the directions of a pose that may need remainder or rod; `None` where [`Self::energy`] is sufficient, or no rod has
-    /// a shape. Real-time: bounded, no allocation.
+    /// Returns the [`Directions`] of a pose at which the remainder or the rod may contribute. Returns `None` in the middle of the
+    /// workspace, where [`Self::energy`] is sufficient, and at poses where neither is used (unusable chord, or an angle or twist of
+    /// 78 degrees or more). Real-time: bounded, no allocation.
     #[inline]
     pub(crate) fn examine(&self, pose: &Pose) -> Option<Directions> {
         self.shares.examine(pose)

@@ -82,8 +82,9 @@ impl Thesis {
         length_mm / MM_PER_M
     }
 
-    /// Returns the wrench on the hand at a pose; this law has no energy. Defined for every pose, see the module.
-    /// Real-time: bounded, no allocation.
+    /// Returns the wrench on the hand at a pose; this law has no energy. Always finite: an output without a finite value is zero
+    /// with [`Validity::OutOfDomain`], and an invalid pose gives zero with [`Validity::InvalidInput`] (see the module
+    /// documentation). Real-time: bounded, no allocation.
     pub fn respond(&self, pose: &Pose, demand: Demand) -> Response {
         if !pose.is_valid() {
             return Response::none(Validity::InvalidInput);

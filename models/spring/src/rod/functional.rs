@@ -31,7 +31,8 @@ use flotor_lanes::matrix::dot;
 /// Coefficients of the bubbles: first those of `p_x`, then those of `p_y`; `N = 2 K`.
 pub(crate) type Shape<const N: usize> = [f64; N];
 
-/// Rigidities in units of the bending rigidity and the free length.
+/// Dimensionless shear compliance, softening and torsional rigidity of a rod, relative to the bending rigidity `alpha` and the free
+/// length `L0`, with the contact of its coils.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ratios {
     /// `alpha / (beta L0²)`

@@ -18,8 +18,9 @@ use flotor_lanes::{Real, Wide};
 pub(crate) const BUBBLES: usize = 10;
 pub(crate) const COEFFICIENTS: usize = 2 * BUBBLES;
 pub(crate) const STATIONS: usize = 16;
-/// Numbers of fours for all coefficients, and for one station of each pair.
+/// Number of vectors of four numbers that hold all coefficients.
 pub(super) const FOURS: usize = COEFFICIENTS / 4;
+/// Number of vectors of four numbers that hold one station of each mirrored pair.
 const GROUPS: usize = STATIONS / 8;
 
 /// Four numbers in memory.
