@@ -1,5 +1,5 @@
-//! Time of day in UTC, with a resolution of 1 ms, by which people can relate events to the files of other devices. Only the
-//! events of a person's sitting have times; simulated sittings do not depend on the time.
+//! UTC timestamps with a resolution of 1 ms, for relating events to the files of other devices. Only the events of a person's
+//! sitting have timestamps; simulated sittings do not depend on the clock.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;

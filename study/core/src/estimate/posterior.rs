@@ -34,7 +34,8 @@ struct Member {
 }
 
 impl PosteriorGrid {
-    /// Builds the grid from a prior, the target at the threshold, and the smallest and largest candidate difference.
+    /// Builds the grid from a prior, the target performance (`P(correct) + P(don't know) / 2` at the threshold), and the smallest
+    /// and largest candidate difference, as fractions of the base.
     #[must_use]
     pub fn new(prior: &Prior, target: f64, least_delta: f64, most_delta: f64) -> Self {
         let share = |index: u32, of: u32| f64::from(index) / f64::from(of.saturating_sub(1).max(1));
