@@ -351,7 +351,7 @@ pub(super) fn marks((low, high): (f64, f64)) -> Vec<GridMark> {
     (first..=last).map(|k| GridMark { value: k as f64 * step_size, step_size }).collect()
 }
 
-/// Formats a mark of an axis with at most six decimals, without trailing zeros and without a minus on zero.
+/// Formats an axis tick label with at most six decimals, without trailing zeros; negative zero is formatted as `0`.
 pub(super) fn short(value: f64) -> String {
     let rounded = (value * 1.0e6).round() / 1.0e6;
     if rounded == 0.0 { "0".to_owned() } else { format!("{rounded}") }

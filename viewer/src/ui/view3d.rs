@@ -24,7 +24,7 @@ const ZOOM_PER_POINT: f64 = 1.003;
 pub struct Subject<'a> {
     /// Bodies of the models.
     pub shapes: &'a mut [Shape],
-    /// Version of the bodies, incremented by every change except of the pose.
+    /// Version of the bodies, incremented on every change other than a change of pose.
     pub version: u64,
     /// Samples at the displayed time.
     pub moment: Moment<'a>,
