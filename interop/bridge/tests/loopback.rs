@@ -141,7 +141,7 @@ fn requests_reach_the_host_and_its_message_come_back() {
     assert!(matches!(asked.as_slice(), [Ask::Set { .. }, Ask::Set { .. }, Ask::MachineStop]), "{asked:?}");
     // Starting is the owner's, and this bridge does not let anybody.
     let refused = requests.run(Request::Start).unwrap_err();
-    assert!(refused.contains("does not take `start`"), "{refused}");
+    assert!(refused.contains("rejects `start`"), "{refused}");
 }
 
 #[test]
