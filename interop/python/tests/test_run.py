@@ -58,7 +58,7 @@ def test_events_have_names(tmp_path):
 def test_remedies_are_python(tmp_path):
     with pytest.raises(flotor.FlotorError, match=r"`flotor\.plugins\(\)` lists all"):
         flotor.Model("sprung-mattress")
-    with pytest.raises(flotor.FlotorError, match=r"`flotor\.Model\(ID\)\.parameters` lists them"):
+    with pytest.raises(flotor.FlotorError, match=r"`flotor\.Model\(ID\)\.parameters` lists the parameters"):
         flotor.Model("spring", zzzzzz=3)
 
 
