@@ -37,13 +37,13 @@ pub fn end_with_this_thread(command: &mut Command) {
     unsafe { command.pre_exec(end_with_parent) };
 }
 
-/// Starts the guard of the process group that this process leads: a copy of this process before `exec`. Without descriptors of
-/// processes (before Linux 5.3) there is none.
+/// Starts the guard of the process group that this process leads: a copy of this process before `exec`. Before Linux 5.9, which has
+/// the process descriptors and `close_range` that the guard needs, there is no guard: then the system kills the leader alone.
 fn start_guard() -> io::Result<()> {
     let Ok(leader) = pidfd_open(getpid(), PidfdFlags::empty()) else { return Ok(()) };
     // No signal at its end: the guard is a child that `wait` does not find, so that the plugin has no child it did not start.
     const NO_SIGNAL: c_long = 0;
-    // SAFETY: a copy with memory and stack of its own, which calls the system alone and does not return.
+    // SAFETY: a copy with memory and stack of its own, which makes system calls without locks or allocations, and never returns.
     match unsafe { libc::syscall(libc::SYS_clone, NO_SIGNAL, 0, 0, 0, 0) } {
         0 => kill_group_at_end_of(leader.as_fd()),
         -1 => Err(io::Error::last_os_error()),
