@@ -45,9 +45,10 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
         }
     }
     page.movements(analysis.task, &analysis.kinematics);
-    if analysis.unfinished_tracks > 0 {
+    let omitted = analysis.omitted_tracks();
+    if omitted > 0 {
         page.gap();
-        page.line(format!("{} tracks did not reach a threshold and are omitted", analysis.unfinished_tracks));
+        page.line(format!("{omitted} tracks did not reach a threshold and are omitted"));
     }
     page.end()
 }

@@ -171,9 +171,9 @@ fn jnd_page(
     }
     tracks(page, subjects, stimulus);
     movements(page, (analysis.task, analysis.thesis), &analysis.kinematics, levels, stimulus);
-    if analysis.unfinished_tracks > 0 {
-        let count = analysis.unfinished_tracks;
-        page.paragraph(&format!("{count} tracks did not reach a threshold and are omitted."));
+    let omitted = analysis.omitted_tracks();
+    if omitted > 0 {
+        page.paragraph(&format!("{omitted} tracks did not reach a threshold and are omitted."));
     }
 }
 
