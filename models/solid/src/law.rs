@@ -134,7 +134,7 @@ impl Description {
             (_, Tool::Spheres { .. }, _) => return self.spheres(&Self::solve, &|_, solve| solve()),
             (Body::Cylinder { radius_m, height_m }, ..) => {
                 let mesh = Mesh::cylinder(radius_m, height_m, resolution.bricks)
-                    .map_err(|problem| Refusal::parameter(format!("the cylinder: {problem}")))?;
+                    .map_err(|_| not_a_cylinder(radius_m, height_m))?;
                 return self.solve_on(&mesh);
             }
             (Body::File { .. }, ..) => {
@@ -211,6 +211,16 @@ impl Description {
     }
 }
 
+/// Returns the refusal of a cylinder without a mesh; the remedies of a mesh error are for mesh files.
+fn not_a_cylinder(radius_m: f64, height_m: f64) -> Refusal {
+    Refusal::parameter(format!(
+        "a cylinder of diameter {} mm and height {} mm cannot be meshed: set `size_x_mm` (diameter) and `size_z_mm` (height) \
+         to values above 0 and at most 10000 mm that differ less",
+        2.0e3 * radius_m,
+        1.0e3 * height_m
+    ))
+}
+
 fn sphere(prepared: Prepared) -> (Law, f64) {
     (Law::Sphere(Box::new(prepared.atlas)), prepared.mesh_error)
 }
@@ -235,5 +245,24 @@ impl From<NotPositive> for Refusal {
             "the stiffness matrix is not positive definite (degree of freedom {pivot}): lower `poisson_ratio`, or \
              make the sides of the body (of a mesh: of each element) more similar"
         ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::prepare::Resolution;
+
+    /// The remedies were those for a mesh file: a scaling factor of Gmsh, and the order of the nodes of an element.
+    #[test]
+    fn a_cylinder_that_cannot_be_meshed_is_refused_with_its_parameters() {
+        for (radius_m, height_m) in [(6.0, 0.1), (0.1, 11.0), (0.1, -0.1)] {
+            let body = Body::Cylinder { radius_m, height_m };
+            let tool = Tool::Sphere { radius_m: 0.01 };
+            let cylinder = Description { body, tool, poisson_ratio: 0.3, resolution: Resolution::QUICK };
+            let refusal = cylinder.solve().expect_err("no mesh").to_string();
+            assert!(refusal.contains("`size_x_mm`") && refusal.contains("`size_z_mm`"), "{refusal}");
+            assert!(!refusal.contains("Mesh.") && !refusal.contains("nodes"), "{refusal}");
+        }
     }
 }
