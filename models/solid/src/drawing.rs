@@ -496,7 +496,7 @@ mod tests {
         for share in [0.05, 0.2, 0.5, 0.9] {
             let cell_m = 1.25 * contact_radius_m(1.0, share) / f64::from(rings);
             let problem = Problem { radius_m: 1.0, depth_m: share, cell_m, on_face: &[], smooth: &[] };
-            let contact = patch.solve(&problem, before.as_ref());
+            let contact = patch.solve(&problem, before.as_ref()).expect("a solution");
             let drawn = contact_radius_m(1.0, share);
             assert!((contact.reach * cell_m - drawn).abs() < 1.5 * cell_m, "{share}: {}", contact.reach);
             before = Some(contact);
@@ -505,7 +505,7 @@ mod tests {
 
     #[test]
     fn the_surface_goes_round_the_sphere_and_its_pressure_is_the_force() {
-        let atlas = sphere_on_half_space(0.3, 0.01).atlas;
+        let atlas = sphere_on_half_space(0.3, 0.01).expect("a law").atlas;
         let description = Description {
             body: Body::HalfSpace,
             tool: Tool::Sphere { radius_m: 0.01 },

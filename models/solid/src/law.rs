@@ -9,12 +9,13 @@ use crate::grid::Lame;
 use crate::half_space::HalfSpace;
 use crate::mesh::Mesh;
 use crate::prepare::{
-    BodyKind, Prepared, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
+    BodyKind, Prepared, Unsolved, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
 };
 use crate::punch::{Outline, extrapolated};
 use crate::remainder::{Face, Remainder};
 use crate::rigid::{MODES, RigidPatch};
 use crate::several::{ExtraCompliance, Spheres};
+use crate::sphere::NotConverged;
 use crate::table::Table;
 use crate::tetrahedra;
 use flotor_hal::Refusal;
@@ -146,7 +147,7 @@ impl Description {
                 return Ok(sphere(sphere_on_block(poisson_ratio, radius_m, size, resolution)?));
             }
             (Body::HalfSpace, Tool::Sphere { radius_m }, _) => {
-                return Ok(sphere(sphere_on_half_space(poisson_ratio, radius_m)));
+                return Ok(sphere(sphere_on_half_space(poisson_ratio, radius_m)?));
             }
             (Body::Block(size), Tool::Punch { outline, bond }, _) => {
                 let extent_m = outline.extent_m();
@@ -245,6 +246,18 @@ impl From<NotPositive> for Refusal {
             "the stiffness matrix is not positive definite (degree of freedom {pivot}): lower `poisson_ratio`, or \
              make the sides of the body (of a mesh: of each element) more similar"
         ))
+    }
+}
+
+impl From<Unsolved> for Refusal {
+    fn from(cause: Unsolved) -> Self {
+        match cause {
+            Unsolved::NotPositive(cause) => cause.into(),
+            Unsolved::NotConverged(NotConverged { depth }) => Self::parameter(format!(
+                "the contact of the sphere at a depth of {depth:.3} radii has no solution: lower `poisson_ratio`, or choose another \
+                 `resolution`"
+            )),
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::dense::NotPositive;
 use crate::half_space::HalfSpace;
 use crate::mesh::Mesh;
 use crate::remainder::{Face, Fineness, Remainder, Size};
-use crate::sphere::{Contact, Patch, Problem};
+use crate::sphere::{Contact, NotConverged, Patch, Problem};
 use crate::spline::{Curve, End, Volume};
 use crate::table::Table;
 
@@ -74,6 +74,27 @@ pub struct Prepared {
     pub mesh_error: f64,
 }
 
+/// Reason why a law has no solution.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Unsolved {
+    /// The parameters do not describe an elastic solid.
+    NotPositive(NotPositive),
+    /// The contact of the sphere has no solution.
+    NotConverged(NotConverged),
+}
+
+impl From<NotPositive> for Unsolved {
+    fn from(cause: NotPositive) -> Self {
+        Self::NotPositive(cause)
+    }
+}
+
+impl From<NotConverged> for Unsolved {
+    fn from(cause: NotConverged) -> Self {
+        Self::NotConverged(cause)
+    }
+}
+
 /// Returns the cell size at which the contact fills about four fifths of the patch, m. The radius of the contact is Hertz's
 /// radius, reduced at large depth.
 fn cell_m(radius_m: f64, depth_m: f64, rings: i32) -> f64 {
@@ -81,7 +102,7 @@ fn cell_m(radius_m: f64, depth_m: f64, rings: i32) -> f64 {
 }
 
 /// Solves contacts with a half-space for roots of depth, in radii of a sphere of radius one.
-fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Vec<Contact> {
+fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Result<Vec<Contact>, NotConverged> {
     let patch = Patch::new(solid, rings);
     let mut contacts: Vec<Contact> = Vec::with_capacity(roots.len());
     for root in roots {
@@ -93,10 +114,10 @@ fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Vec<Contact> {
             on_face: &[],
             smooth: &[],
         };
-        let contact = patch.solve(&problem, contacts.last());
+        let contact = patch.solve(&problem, contacts.last())?;
         contacts.push(contact);
     }
-    contacts
+    Ok(contacts)
 }
 
 /// Returns the square roots of depth over radius at which contacts are solved.
@@ -125,12 +146,14 @@ fn column(
         let on_face: Vec<bool> = points.iter().map(|&at| on_face(at)).collect();
         let smooth = table.among(&points);
         let problem = Problem { radius_m, depth_m, cell_m, on_face: &on_face, smooth: &smooth };
-        let contact = patch.solve(&problem, start.as_ref());
-        let ratio = contact.energy_j / (unbounded.energy_j * radius_m * radius_m * radius_m);
-        let is_contact = contact.residual < 1.0e-4 && ratio.is_finite() && ratio > 0.0;
+        let ratio =
+            |contact: &Contact| contact.energy_j / (unbounded.energy_j * radius_m * radius_m * radius_m);
+        let solution = patch.solve(&problem, start.as_ref()).map(|contact| (ratio(&contact), contact));
+        let solution = solution.ok().filter(|(ratio, _)| ratio.is_finite() && *ratio > 0.0);
         // Near a corner the shallowest contact already has a ratio other than one; off the face it has none.
-        let before = ratios.last().copied().unwrap_or(if is_contact { ratio } else { 1.0 });
-        if is_contact && (ratio / before - 1.0).abs() < 0.3 {
+        let first = solution.as_ref().map_or(1.0, |(ratio, _)| *ratio);
+        let before = ratios.last().copied().unwrap_or(first);
+        if let Some((ratio, contact)) = solution.filter(|(ratio, _)| (ratio / before - 1.0).abs() < 0.3) {
             ratios.push(ratio);
             (start, solved) = (Some(contact), ratio);
         } else {
@@ -149,11 +172,11 @@ fn hertz(poisson_ratio: f64, root: f64) -> f64 {
 
 /// Returns the energy relative to Hertz's, by square root of depth. It is divided by its value at the smallest depth, where
 /// Hertz's law is exact, to remove the error of the cells.
-fn profile(solid: &HalfSpace) -> Curve {
+fn profile(solid: &HalfSpace) -> Result<Curve, NotConverged> {
     let top = DEEPEST_SOLVED.sqrt();
     let mut roots = vec![0.01];
     roots.extend((1..=PROFILE_LEVELS).map(|level| top * level as f64 / PROFILE_LEVELS as f64));
-    let contacts = unbounded(solid, PROFILE_RINGS, &roots);
+    let contacts = unbounded(solid, PROFILE_RINGS, &roots)?;
     let shares: Vec<f64> = roots
         .iter()
         .zip(&contacts)
@@ -161,7 +184,7 @@ fn profile(solid: &HalfSpace) -> Curve {
         .collect();
     let values = shares.iter().map(|share| share / shares[0]).collect();
     roots[0] = 0.0;
-    Curve::new(roots, values, [End::Parabola; 2])
+    Ok(Curve::new(roots, values, [End::Parabola; 2]))
 }
 
 /// Returns the end conditions of a face's ratios: zero slope on a mirror plane of the block.
@@ -181,33 +204,36 @@ fn atlas(solid: &HalfSpace, radius_m: f64, profile: Curve, body: TouchedBody) ->
 }
 
 /// Prepares the law of a sphere on a half-space. Not real-time.
-#[must_use]
-pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Prepared {
+///
+/// # Errors
+/// [`Unsolved`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
+pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Result<Prepared, Unsolved> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
-    Prepared { atlas: atlas(&solid, radius_m, profile(&solid), TouchedBody::HalfSpace), mesh_error: 0.0 }
+    let atlas = atlas(&solid, radius_m, profile(&solid)?, TouchedBody::HalfSpace);
+    Ok(Prepared { atlas, mesh_error: 0.0 })
 }
 
 /// Prepares the law of a sphere on a block. Not real-time: some seconds.
 ///
 /// # Errors
-/// [`NotPositive`] if the parameters do not describe an elastic solid.
+/// [`Unsolved`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
 pub fn sphere_on_block(
     poisson_ratio: f64,
     radius_m: f64,
     size: Size,
     resolution: Resolution,
-) -> Result<Prepared, NotPositive> {
+) -> Result<Prepared, Unsolved> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
     let remainder = Remainder::new(size, solid, resolution.fineness())?;
     let rounding_m = rounding_m(size, radius_m);
     let builder = Builder { solid, size, radius_m, rounding_m, remainder: &remainder, resolution };
-    let top = builder.ratios(Face::Top);
-    let side_x = builder.ratios(Face::SideX);
-    let side_y = if size.half_x_m == size.half_y_m { side_x.clone() } else { builder.ratios(Face::SideY) };
+    let top = builder.ratios(Face::Top)?;
+    let side_x = builder.ratios(Face::SideX)?;
+    let side_y = if size.half_x_m == size.half_y_m { side_x.clone() } else { builder.ratios(Face::SideY)? };
     let ratios = Box::new([top, side_x, side_y]);
     let mesh_error = builder.mesh_error()?;
     let body = TouchedBody::Block { size, ratios, rounding_m };
-    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), body), mesh_error })
+    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid)?, body), mesh_error })
 }
 
 /// Positions at which contacts on a block are compared, in halves of a side from the middle.
@@ -266,19 +292,19 @@ fn around([radius_m, height_m]: [f64; 2]) -> Size {
 /// `rings`: number of cells of a contact from its middle to its rim. Not real-time: some seconds.
 ///
 /// # Errors
-/// [`NotPositive`] if the parameters do not describe an elastic solid.
+/// [`Unsolved`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
 pub fn sphere_on_mesh(
     mesh: &Mesh,
     body_kind: BodyKind,
     poisson_ratio: f64,
     radius_m: f64,
     rings: i32,
-) -> Result<Prepared, NotPositive> {
+) -> Result<Prepared, Unsolved> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
     let body = Body::new(mesh, solid)?;
     let patch = Patch::new(&solid, rings);
     let roots = roots();
-    let reference = unbounded(&solid, rings, &roots);
+    let reference = unbounded(&solid, rings, &roots)?;
     let outline_m = outline_m(mesh);
     let column = |table: &Table, place_m: [f64; 2]| {
         let on_face = |at: [f64; 2]| body.is_on_face(at);
@@ -327,7 +353,7 @@ pub fn sphere_on_mesh(
     };
     // Evaluate in the middle, and at an eighth of the side from an edge.
     let mesh_error = body.mesh_error(radius_m, &[[0.0; 2], [0.75 * outline_m[0][1], 0.0]]);
-    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), touched), mesh_error })
+    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid)?, touched), mesh_error })
 }
 
 impl Prepared {
@@ -441,13 +467,13 @@ impl Builder<'_> {
     }
 
     /// Computes the ratio of the block's energy to that of a half-space, by position and square root of depth over radius.
-    fn ratios(&self, face: Face) -> Volume {
+    fn ratios(&self, face: Face) -> Result<Volume, NotConverged> {
         let [p, q, _] = face.axes();
         let table = self.table(face);
         let rings = self.resolution.rings;
         let patch = Patch::new(&self.solid, rings);
         let roots = roots();
-        let reference = unbounded(&self.solid, rings, &roots);
+        let reference = unbounded(&self.solid, rings, &roots)?;
         let inside = |axis: usize, x: f64| {
             if axis < 2 { x.abs() <= self.half_along(axis) } else { -self.size.height_m <= x && x <= 0.0 }
         };
@@ -475,7 +501,7 @@ impl Builder<'_> {
         let mut levels = vec![0.0];
         levels.extend(roots);
         let [a, b] = places;
-        Volume::new([a, b, levels], &values, ends(face))
+        Ok(Volume::new([a, b, levels], &values, ends(face)))
     }
 
     /// Estimates the relative error of the stiffness under the sphere, in the middle of the top and at an eighth of the side

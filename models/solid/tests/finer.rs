@@ -72,11 +72,7 @@ impl Bench {
                 on_face: &on_face,
                 smooth: &smooth,
             };
-            let contact = self.patch.solve(&problem, before.as_ref());
-            if contact.residual > 1.0e-4 {
-                return None;
-            }
-            before = Some(contact);
+            before = Some(self.patch.solve(&problem, before.as_ref()).ok()?);
         }
         let local = before?.force_n;
         let mut force = [0.0; 3];
