@@ -89,7 +89,10 @@ impl FromStr for InjectedFault {
     fn from_str(text: &str) -> Result<Self, Unknown> {
         let unknown = || Unknown(text.to_owned());
         let (rest, after_s) = match text.split_once('+') {
-            Some((rest, ms)) => (rest, ms.parse::<f64>().map_err(|_| unknown())? * 1.0e-3),
+            Some((rest, ms)) => {
+                let delay_ms = ms.parse().ok().filter(|delay_ms: &f64| delay_ms.is_finite());
+                (rest, delay_ms.ok_or_else(unknown)? * 1.0e-3)
+            }
             None => (text, 0.0),
         };
         let (kind, when) = match rest.split_once('@') {
@@ -241,7 +244,9 @@ mod tests {
         };
         assert_eq!(read("status=5/10@flying+200"), Ok(expected));
         assert_eq!(read("reset").map(|one| one.when), Ok(When::Anytime));
-        for wrong in ["", "rest", "status=5/0", "reset@up", "reset+soon", "status=x/1"] {
+        for wrong in
+            ["", "rest", "status=5/0", "reset@up", "reset+soon", "reset+nan", "reset+inf", "status=x/1"]
+        {
             assert!(read(wrong).is_err(), "{wrong}");
         }
     }

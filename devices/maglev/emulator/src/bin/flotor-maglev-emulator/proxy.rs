@@ -52,11 +52,7 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
     let mut sets = arguments.sets.iter().map(|text| key_value(text)).collect::<Result<Vec<_>, _>>()?;
     sets.splice(0..0, resting(device, &sets));
     for (key, value) in &sets {
-        // Numbers are written as numbers, other values as strings.
-        match value.parse::<f64>() {
-            Ok(number) => writeln!(scene, "{key} = {number:?}")?,
-            Err(_) => writeln!(scene, "{key} = {value:?}")?,
-        }
+        writeln!(scene, "{key} = {}", toml_value(value))?;
     }
     scene.push_str("[limits]\n");
     if let Some(felt) = capabilities(device, &sets).as_ref().and_then(felt) {
@@ -80,6 +76,15 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
         "[[model]]\nplugin = \"ml-api\"\n[model.parameters]\nlisten = {listen:?}\nreach = \"{reach}\"\n{parameters}"
     )?;
     Ok(scene)
+}
+
+/// Returns a value in TOML: a finite number as a number, any other value as a string. The host refuses `nan` for a number with its
+/// key and range; as a number of Rust, `NaN`, it is not TOML.
+fn toml_value(value: &str) -> String {
+    match value.parse::<f64>() {
+        Ok(number) if number.is_finite() => format!("{number:?}"),
+        _ => format!("{value:?}"),
+    }
 }
 
 /// Returns default settings of the simulated flotor for keys not given; none if the command line configures a hand.
@@ -108,4 +113,14 @@ fn felt(device: &Capabilities) -> Option<[f64; 3]> {
         *most_n = if is_driven { *most_n } else { 0.0 };
     }
     (is_driven != [true; 3]).then_some(felt_n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_that_is_no_finite_number_is_a_string() {
+        assert_eq!(["2.5", "hold", "nan"].map(toml_value), ["2.5", "\"hold\"", "\"nan\""]);
+    }
 }
