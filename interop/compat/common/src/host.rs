@@ -1,7 +1,7 @@
 //! The single run of a process: prepared at the first access, started by the first open device, ended with the program.
 
 use crate::process::{at_end, guarded, is_copy, is_first, library, notice_copies, quietly};
-use crate::run::{LockstepRun, Prepared, is_emergency_stopped, report_line};
+use crate::run::{LockstepRun, Prepared, is_emergency_stopped, report_line, report_no_thread};
 use crate::settings::{Pace, Settings, SharedControlGroup, env_value};
 use crate::station::{Station, Turn};
 use flotor_servo::{Clock, StopSwitch, guest, monotonic_ns};
@@ -239,9 +239,12 @@ impl Host {
         let run = move || {
             guarded((), || prepared.run(&stop, stations_so_far()));
         };
-        let Ok(thread) = thread.spawn(run) else {
-            report_line("cannot start a thread for the run; end other programs of this user");
-            return Stage::Over;
+        let thread = match thread.spawn(run) {
+            Ok(thread) => thread,
+            Err(cause) => {
+                report_no_thread("the run", &cause);
+                return Stage::Over;
+            }
         };
         let since = Instant::now();
         while self.stations.iter().any(|station| station.ticks() == 0) {

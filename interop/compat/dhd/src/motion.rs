@@ -1,6 +1,6 @@
 //! Entry points of regulation and motion: hold the handle, move it along a line, track targets without a planned motion.
 
-use crate::basic::{angles, put6, read, read_live, turning, with};
+use crate::basic::{angles, put6, read, read_live, turning};
 use crate::device::{FRAME, Open, Switch, live, open};
 use crate::error::{Code, DONE, failed, result};
 use crate::kept::{POSITION_MOVE, ROTATION_MOVE};
@@ -13,7 +13,7 @@ use std::ffi::c_int;
 use std::time::Duration;
 
 fn begin(id: i8) -> c_int {
-    with(live(id), start)
+    result(live(id).and_then(|open| start(&open)).map(|()| DONE))
 }
 
 /// Converts angles about x, then y, then z, to a rotation vector in Flotor's axes.
