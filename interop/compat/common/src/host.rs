@@ -52,10 +52,13 @@ pub fn host() -> Option<&'static Host> {
 /// # Errors
 /// One line: the reason why the scene cannot be run, or that this process already has a run.
 pub fn prepare(settings: Settings, stop: &StopSwitch) -> Result<&'static Host, String> {
+    let second = || "this process already has a run; use another process".to_owned();
+    if HOST.get().is_some() {
+        return Err(second());
+    }
     let prepared = Host::prepare(settings, stop)?;
-    HOST.get_or_init(|| Some(prepared))
-        .as_ref()
-        .ok_or_else(|| "this process already has a run; use another process".to_owned())
+    HOST.set(Some(prepared)).map_err(|_| second())?;
+    HOST.get().and_then(Option::as_ref).ok_or_else(second)
 }
 
 /// Returns the run of this process, if prepared already. Not real-time.
@@ -353,4 +356,19 @@ fn executable(folder: &Path) -> Option<PathBuf> {
 fn plugin_folders(folder: &Path) -> Vec<PathBuf> {
     let installed = folder.ancestors().nth(2).map(|root| root.join("plugins"));
     [folder.join("deps"), folder.to_path_buf(), folder.join("..")].into_iter().chain(installed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A second call opened all devices a second time, and returned the first run.
+    #[test]
+    fn a_second_run_of_a_process_is_refused_before_its_scene_is_read() {
+        HOST.get_or_init(|| None);
+        let settings = Settings::from_environment().expect("nothing is set");
+        let settings = Settings { scene: Some(PathBuf::from("/nosuch/scene.toml")), ..settings };
+        let refused = prepare(settings, &StopSwitch::default()).err();
+        assert_eq!(refused.as_deref(), Some("this process already has a run; use another process"));
+    }
 }
