@@ -36,8 +36,8 @@ pub(super) struct VerticalArguments {
     /// Number of sweeps over all heights for each force
     #[arg(long, default_value_t = 2, value_name = "N", value_parser = count(1..=100_u32))]
     runs: u32,
-    /// Number of steps down from the top
-    #[arg(long, default_value_t = 14, value_name = "N", value_parser = count(1..=200_u32))]
+    /// Number of steps down from the top, at least 7
+    #[arg(long, default_value_t = 14, value_name = "N", value_parser = count(7..=200_u32))]
     steps: u32,
     /// Length of a step in mm
     #[arg(long, default_value_t = 1.0, value_name = "MM", value_parser = number("mm", "length", 0.01..=22.0))]
