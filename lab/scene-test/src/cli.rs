@@ -37,7 +37,8 @@ enum Command {
     flotor test models --shard 2/4 --json -\n  flotor test jelly.test.toml --bless\n\n\
     Exit codes: 0 all passed, 1 a case failed, 2 usage or configuration: nothing was judged.")]
 struct TestArguments {
-    /// Files NAME.test.toml, or folders with such files (default: this folder); folders named `target` are skipped
+    /// Files NAME.test.toml, or folders with such files (default: this folder); subfolders named `target` or `.NAME`
+    /// are skipped
     #[arg(value_name = "FOLDER|FILE")]
     paths: Vec<PathBuf>,
     /// Run only the case of this name, or the cases whose name contains this text
@@ -52,7 +53,7 @@ struct TestArguments {
     /// Run only part K of N disjoint parts of the cases
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// Longest time of one run, evaluation, validation or stress test
+    /// Longest time of one run, evaluation, replay, validation or stress test
     #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "5min")]
     timeout: f64,
     #[command(flatten)]
@@ -103,7 +104,7 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
     if cases.is_empty() && arguments.shard.is_none() {
         let text = arguments.filter.as_deref().unwrap_or_default();
         return Err(CommandError::Usage(format!(
-            "--filter {text}: no case matches; `flotor test --list` lists all cases"
+            "--filter {text}: no case matches; `--list` instead of `--filter` lists all cases"
         )));
     }
     if arguments.list {

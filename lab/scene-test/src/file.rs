@@ -151,7 +151,7 @@ struct WrittenGolden {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "write short, full, or a table with `size`, and optionally `pass` and `set`")]
 enum WrittenStress {
     Size(String),
     Table(StressTable),
@@ -263,7 +263,12 @@ impl TestFile {
                 Value::Boolean(true) => Some(Validate::Models),
                 Value::Boolean(false) => None,
                 Value::String(file) => Some(Validate::File(folder.join(file))),
-                _ => return Err((value.span().start, "write true, or the path of a plugin file".to_owned())),
+                _ => {
+                    return Err((
+                        value.span().start,
+                        "write true, false or the path of a plugin file".into(),
+                    ));
+                }
             },
         };
         let stress = written.stress.map(|stress| {
@@ -454,10 +459,11 @@ mod tests {
             ("[set]\nspring = 3", "F:3: `spring` is not PLUGIN.PARAMETER"),
             ("[expect]\nlate_ticks = 0\npeak_force_n = { min = 2, max = 1 }", "F:4: `peak_force_n`: min = 2"),
             ("stress = \"shrt\"\n", "F:2: unknown size `shrt`"),
+            ("stress = 3", "write short, full, or a table"),
             ("[stress]\nsize = \"short\"\npass = [\"M11\"]", "unknown measure `M11`"),
             ("[golden]\nrecording = \"no.mcap\"\nwithin_n = 1", "F:3: the file"),
             ("", "the file has no expectation"),
-            ("validate = 3", "F:2: write true, or the path"),
+            ("validate = 3", "F:2: write true, false or the path"),
             ("[expect]\nend = \"finished\"", "nothing"),
         ] {
             let told = wrong(rest);
