@@ -88,7 +88,7 @@ pub enum DivergenceCause {
     },
     /// Ticks are missing; before them the wrench is equal bit for bit.
     #[error(
-        "{ticks} ticks are missing after tick {after_tick}, so the states of models and couplings are unknown"
+        "ticks are missing after tick {after_tick} ({ticks} of them), so the states of models and couplings are unknown"
     )]
     Gap {
         /// Last tick before the missing ones.
