@@ -53,7 +53,9 @@ impl Flotor {
     ) -> Result<ProcessResult, String> {
         self.try_run(arguments, input).map_err(|cause| match cause {
             Trouble::Missing(error) => error.to_string(),
-            Trouble::System(cause) => format!("cannot run flotor: {cause}"),
+            Trouble::System(cause) => {
+                format!("cannot run flotor, or keep its output in a temporary file: {cause}")
+            }
             Trouble::Late => {
                 format!(
                     "the process did not end within {} s, and was killed; raise the limit with --timeout",
