@@ -12,7 +12,7 @@ pub enum Unmergeable {
     #[error("the first column is not `{0}`; write `{0}` first, and separate the columns with tabs")]
     NoKey(&'static str),
     /// The number of cells in a line differs from the number of columns.
-    #[error("line {line} has {cells} cells instead of {columns}, one for each column")]
+    #[error("line {line}: the number of cells is {cells}, but the number of columns is {columns}")]
     Ragged {
         /// Line, from 1.
         line: usize,
@@ -21,6 +21,9 @@ pub enum Unmergeable {
         /// Number of columns in the table.
         columns: usize,
     },
+    /// The file is not a text in UTF-8.
+    #[error("the file is not saved as UTF-8")]
+    NotUtf8,
     /// The text is not a JSON object.
     #[error("the text is not a JSON object ({0})")]
     NotAnObject(String),

@@ -76,7 +76,7 @@ pub enum DatasetError {
         problem: Unmergeable,
     },
     /// The folder has no study.
-    #[error("{}: not the folder of a study (no logs under sourcedata/); give the folder of `study --out`", .0.display())]
+    #[error("{}: not the folder of a study (no logs under sourcedata/); give the folder that `flotor study` has written (--out)", .0.display())]
     NoStudy(PathBuf),
     /// The folder has logs of different studies.
     #[error("{}: {what}, unlike {}; delete the file that does not belong to the study, or use another folder", path.display(), other.display())]
@@ -130,7 +130,7 @@ pub enum DatasetError {
         root: PathBuf,
     },
     /// The subject has begun, but is not complete.
-    #[error("{subject} is incomplete after {trials} trials in {}; add --resume to continue", root.display())]
+    #[error("{subject} in {} is incomplete (answered trials: {trials}); add --resume to continue", root.display())]
     Unfinished {
         /// Number of the subject.
         subject: SubjectNumber,
@@ -214,7 +214,10 @@ impl Dataset {
     fn log_paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
         let mut paths: Vec<PathBuf> = Vec::new();
         let source = self.root.join("sourcedata");
-        let folders = std::fs::read_dir(&source).map_err(|_| DatasetError::NoStudy(self.root.clone()))?;
+        let folders = std::fs::read_dir(&source).map_err(|cause| match cause.kind() {
+            ErrorKind::PermissionDenied => DatasetError::file(&source, "cannot read the folder", cause),
+            _ => DatasetError::NoStudy(self.root.clone()),
+        })?;
         for folder in folders.flatten().filter(|entry| entry.path().is_dir()) {
             let files =
                 std::fs::read_dir(folder.path()).into_iter().flatten().flatten().map(|file| file.path());
@@ -333,7 +336,10 @@ fn read_earlier(path: &Path) -> Result<Option<String>, DatasetError> {
     match std::fs::read_to_string(path) {
         Ok(text) => Ok(Some(text)),
         Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
-        Err(cause) => Err(DatasetError::file(path, "cannot read the file as UTF-8 text", cause)),
+        Err(cause) if cause.kind() == ErrorKind::InvalidData => {
+            Err(DatasetError::Unmergeable { path: path.into(), problem: Unmergeable::NotUtf8 })
+        }
+        Err(cause) => Err(DatasetError::file(path, "cannot read the file", cause)),
     }
 }
 
@@ -346,10 +352,10 @@ fn replace(path: &Path, text: &str) -> Result<(), DatasetError> {
     std::fs::write(&aside, text)
         .map_err(|cause| DatasetError::file(&aside, "cannot write the file", cause))?;
     std::fs::rename(&aside, path)
-        .map_err(|cause| DatasetError::file(path, "cannot replace the earlier file", cause))
+        .map_err(|cause| DatasetError::file(path, "cannot rename the new file to this name", cause))
 }
 
-fn make_folder(folder: &Path) -> Result<(), DatasetError> {
+pub(crate) fn make_folder(folder: &Path) -> Result<(), DatasetError> {
     std::fs::create_dir_all(folder)
         .map_err(|cause| DatasetError::file(folder, "cannot make the folder", cause))
 }

@@ -42,6 +42,9 @@ pub enum LogProblem {
     /// A line has invalid syntax.
     #[error("the line does not belong to an event log: {0}; use an unchanged copy")]
     Text(String),
+    /// The chain is intact, but this version cannot parse the event or its time.
+    #[error("this version cannot read the line: {0}; use the version that wrote the log")]
+    Unknown(String),
     /// The hash chain is broken.
     #[error(
         "the hash chain is broken: this line or an earlier one was changed, removed or exchanged; use an unchanged \

@@ -71,13 +71,13 @@ impl SittingLog {
             // Windows programs or git may have changed the line ends to CRLF.
             let text = text.strip_suffix('\r').unwrap_or(text);
             let (found, event) = parts(text).ok_or_else(|| {
-                at(number, LogProblem::Text("the line has no `chain` and `event`".to_owned()))
+                at(number, LogProblem::Text("the line does not consist of `chain` and `event`".to_owned()))
             })?;
             before = chain(&before, event);
             if found != before {
                 return Err(at(number, LogProblem::Chain));
             }
-            let not_read = |error: &dyn std::fmt::Display| at(number, LogProblem::Text(error.to_string()));
+            let not_read = |error: &dyn std::fmt::Display| at(number, LogProblem::Unknown(error.to_string()));
             let (event, time) = unstamped(event);
             let time: Option<TimeOfDay> =
                 time.map(str::parse).transpose().map_err(|error| not_read(&error))?;
@@ -153,9 +153,9 @@ impl SittingLog {
                 self.incidents.push((self.sitting.presented(), time, incident));
                 Ok(())
             }
-            Event::End { trials } if !self.sitting.is_over() || trials != self.sitting.presented() => Err(
-                LogProblem::Order("`end` is in the log before the experiment is over; use an unchanged copy"),
-            ),
+            Event::End { trials } if !self.sitting.is_over() || trials != self.sitting.presented() => {
+                Err(LogProblem::Order("`end` does not follow the last trial; use an unchanged copy"))
+            }
             Event::End { .. } => {
                 self.complete = true;
                 Ok(())
