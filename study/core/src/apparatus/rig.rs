@@ -10,6 +10,7 @@
 use super::watch::Watch;
 use super::{Apparatus, Kinematics};
 use crate::conduct::{ApparatusOrFrontEndError, Presenter};
+use crate::dataset::{DatasetError, make_folder};
 use crate::kinematics::KinematicsMeter;
 use crate::protocol::SubjectNumber;
 use crate::trial::{Exploration, Trial};
@@ -45,8 +46,8 @@ impl TrialFiles {
     ///
     /// # Errors
     /// If the folder cannot be created.
-    pub fn make(folder: PathBuf, prefix: String) -> std::io::Result<Self> {
-        std::fs::create_dir_all(&folder)?;
+    pub fn make(folder: PathBuf, prefix: String) -> Result<Self, DatasetError> {
+        make_folder(&folder)?;
         Ok(Self { folder, prefix })
     }
 

@@ -81,7 +81,8 @@ pub(super) enum CurveError {
     Statistics(#[from] StatisticsError),
     /// The force decreases with compression; holds the slope, N/m.
     #[error(
-        "the force falls as the spring is compressed ({0:.1} N/m); check whether length and compression are interchanged"
+        "the force does not rise as the spring is compressed (slope {0:.1} N/m); check the sign of the forces, and whether length \
+         and compression are interchanged"
     )]
     Falling(f64),
     /// The points have too few different compressions for a curve; holds their number, zero compression included.
@@ -113,7 +114,7 @@ impl MeasuredCurve {
             "length_mm,force_n" => Abscissa::Length,
             "compression_mm,force_n" => Abscissa::Compression,
             _ => {
-                let problem = "the header is `length_mm,force_n` or `compression_mm,force_n`";
+                let problem = "the header must be `length_mm,force_n` or `compression_mm,force_n`";
                 return Err(table.header_problem(problem).into());
             }
         };

@@ -150,7 +150,8 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let (file, further) = arguments.file_and_options();
     let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
     let text = read_text(&file, "the study file").map_err(|wrong| {
-        CommandError::Usage(format!("{}; name a study file", wrong.in_file(file.display())))
+        let advice = if wrong.line == 0 { "; name a study file" } else { "" };
+        CommandError::Usage(wrong.in_file(file.display()) + advice)
     })?;
     let (words, exclusion) = words(&file, &text, further)?;
     let command = clap::Command::new("study").no_binary_name(true);

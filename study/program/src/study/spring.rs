@@ -32,10 +32,10 @@ pub(super) struct SpringArguments {
     /// Plot the measurement and the fitted spring
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Write a scene with the fitted spring, for `study jnd --scene` and `run`
+    /// Write a scene with the fitted spring, for `flotor study jnd --scene` and `flotor run`
     #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     scene: Option<PathBuf>,
-    /// Write a scene with the measured curve, and the table of the curve
+    /// Write a scene with the measured curve, and beside it the table of the curve, FILE.csv
     #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     curve_scene: Option<PathBuf>,
     #[command(flatten)]
