@@ -28,7 +28,10 @@ impl fmt::Display for Cost {
             let each_ms = processor.as_secs_f64() * 1.0e3 / *pictures as f64;
             write!(f, " ({each_ms:.2} ms a picture)")?;
         }
-        write!(f, ", {resident_mib} MiB of memory")
+        match resident_mib {
+            0 => Ok(()),
+            known_mib => write!(f, ", {known_mib} MiB of memory"),
+        }
     }
 }
 

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum ExportError {
     /// The file cannot be written.
-    #[error("cannot write `{}`: {cause}; choose a folder you may write to", path.display())]
+    #[error("cannot write `{}`: {cause}; check the folder, its permissions and the free disk space", path.display())]
     Write {
         /// Path of the file.
         path: PathBuf,

@@ -90,14 +90,18 @@ impl Texts {
     /// # Errors
     /// A message of one line if the file cannot be read, or a key is missing or unknown, or lacks the placeholder of its number.
     pub fn read(file: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(file)
-            .map_err(|cause| format!("cannot read the texts: {cause}; check the path and its permissions"))?;
+        let text = std::fs::read_to_string(file).map_err(|cause| {
+            format!("cannot read the texts: {cause}; check path and permissions, and that the file is UTF-8")
+        })?;
         Self::parse(&text)
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let texts: Self =
-            toml::from_str(text).map_err(|error| error.to_string().trim().replace('\n', " "))?;
+        // Without the picture of the line, whose lines contain a bar.
+        let in_words = |error: toml::de::Error| {
+            error.to_string().lines().filter(|line| !line.contains('|')).collect::<Vec<_>>().join(": ")
+        };
+        let texts: Self = toml::from_str(text).map_err(in_words)?;
         for (key, text, place) in [
             ("count", &texts.count, "{number}"),
             ("count", &texts.count, "{of_about}"),
