@@ -39,7 +39,7 @@ pub enum ApparatusError {
     #[error(
         "stimulus {stimulus}: the scene has no model `{}`{} (its models: {})",
         stimulus.model, nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")),
-        models.join(", ")
+        listed(models)
     )]
     NoModel {
         /// The stimulus as requested.
@@ -53,7 +53,7 @@ pub enum ApparatusError {
     #[error(
         "stimulus {stimulus}: `{}` has no numeric parameter `{}`{} (numeric parameters: {})",
         stimulus.model, stimulus.parameter,
-        nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")), numbers.join(", ")
+        nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")), listed(numbers)
     )]
     NoParameter {
         /// The stimulus as requested.
@@ -105,6 +105,11 @@ pub enum ApparatusError {
         /// Id of the missing parameter.
         missing: &'static str,
     },
+}
+
+/// Joins names for an error.
+fn listed(names: &[String]) -> String {
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 /// Way to change the stimulus in a running model.
