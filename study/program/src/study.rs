@@ -84,7 +84,7 @@ enum Task {
 /// Values of `--observer`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 enum ObserverOption {
-    /// Signal detection with known thresholds, a simulated hand, virtual time
+    /// A simulated observer of signal detection with known thresholds and a simulated hand, in virtual time
     #[default]
     Simulated,
     /// A person at the device, in real time

@@ -94,10 +94,10 @@ impl StudyFile {
         toml::from_str(text).map_err(|error| {
             let start = error.span().map_or(0, |span| span.start);
             let line = 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
-            let message = error.message().replace('\n', " ");
-            let is_large = message.contains("too large");
-            let message =
-                if is_large { format!("{message}; the largest seed is {LARGEST_SEED}") } else { message };
+            let mut message = error.message().replace('\n', " ");
+            if message.contains("too large") {
+                message += &format!("; write numbers below 2^63, and a seed up to {LARGEST_SEED}");
+            }
             CommandError::Usage(format!("{}:{line}: {message}", file.display()))
         })
     }
