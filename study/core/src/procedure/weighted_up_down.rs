@@ -123,10 +123,12 @@ impl WeightedUpDownRule {
         )?;
         if !(self.floor > 0.0 && self.floor < self.ceiling) {
             let legal = "must be above 0 (equal stimuli have no correct answer) and below --ceiling";
+            let legal = format!("{legal} ({})", self.ceiling);
             return Err(InvalidRule::new("--floor", self.floor, legal));
         }
         if !(self.initial_delta > self.floor && self.initial_delta <= self.ceiling) {
-            let legal = "must be above --floor and up to --ceiling";
+            let legal =
+                format!("must be above --floor ({}) and up to --ceiling ({})", self.floor, self.ceiling);
             return Err(InvalidRule::new("--initial", self.initial_delta, legal));
         }
         if self.stop_after == 0 {

@@ -92,11 +92,11 @@ fn impossible_settings_are_refused() {
     assert_eq!(refused(|rule| rule.first_step = f64::NAN), "--step NaN: must be above 0 and below 1");
     assert_eq!(
         refused(|rule| rule.initial_delta = 0.0),
-        "--initial 0: must be above --floor and up to --ceiling"
+        "--initial 0: must be above --floor (0.01) and up to --ceiling (0.95)"
     );
     for floor in [0.0, -0.1] {
         let said = refused(|rule| rule.floor = floor);
-        let legal = "must be above 0 (equal stimuli have no correct answer) and below --ceiling";
+        let legal = "must be above 0 (equal stimuli have no correct answer) and below --ceiling (0.95)";
         assert_eq!(said, format!("--floor {floor}: {legal}"));
     }
     assert_eq!(refused(|rule| rule.average_from = 9), "--average-from 9: must be 1 to --stop-after (8)");
