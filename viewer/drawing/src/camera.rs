@@ -52,7 +52,7 @@ impl std::str::FromStr for View {
             format!(
                 "`{text}` is not a view; write AZIMUTH,INCLINATION or AZIMUTH,INCLINATION,ZOOM, such as 30,15 or \
                  30,15,2: degrees to \
-                 the right and, from -2 to 88, above the horizon, and a zoom of 0.2 to 3"
+                 the right, -360 to 360, and above the horizon, -2 to 88, and a zoom, 0.2 to 3"
             )
         };
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().map_err(|_| wrong()));
