@@ -28,10 +28,7 @@ impl fmt::Display for Cost {
             let each_ms = processor.as_secs_f64() * 1.0e3 / *pictures as f64;
             write!(f, " ({each_ms:.2} ms a picture)")?;
         }
-        match resident_mib {
-            0 => Ok(()),
-            known_mib => write!(f, ", {known_mib} MiB of memory"),
-        }
+        write!(f, ", {resident_mib} MiB of memory")
     }
 }
 

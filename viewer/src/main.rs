@@ -34,8 +34,7 @@ use std::sync::mpsc::channel;
 #[derive(Parser)]
 #[command(name = "flotor-viewer", version, about, max_term_width = 110)]
 struct Arguments {
-    /// Recording to show; in the window and in a picture of the window also a second recording over the first, dashed (default: the
-    /// newest run)
+    /// Recording to show; in a window or its picture also a second recording over the first, dashed (default: the newest run)
     #[arg(value_name = "FILE.mcap", num_args = 0..=2)]
     recording: Vec<PathBuf>,
     /// File of a plugin, for drawing its model in a recording; without the file the model is not drawn (repeatable)
@@ -247,11 +246,8 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
     if !arguments.sitting {
         return Ok(Start::Live(wanted));
     }
-    let mut prompt = connect_stdio().map_err(|cause| {
-        Failure::file(format!(
-            "cannot start the threads for messages of the experiment: {cause}; end other programs"
-        ))
-    })?;
+    let no_thread = |cause: std::io::Error| format!("cannot start a thread: {cause}; end other programs");
+    let mut prompt = connect_stdio().map_err(no_thread).map_err(Failure::file)?;
     prompt.stop_key = arguments.stop_key;
     prompt.texts = arguments.texts.clone().unwrap_or_else(Texts::english);
     Ok(Start::Sitting(wanted, Box::new(prompt)))

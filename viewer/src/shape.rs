@@ -80,8 +80,7 @@ pub enum Posed {
 pub enum ShapeError {
     /// The plugin file of the model is unknown.
     #[error(
-        "the plugin `{id}` of model `{name}` was not found; for a recording, add its folder to FLOTOR_PLUGIN_PATH; for a \
-         running session, restore its file"
+        "the plugin `{id}` of model `{name}` was not found; add its folder to FLOTOR_PLUGIN_PATH (recording), or restore its file (running session)"
     )]
     NoPlugin {
         /// Name of the model in the scene.

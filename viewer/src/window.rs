@@ -30,9 +30,8 @@ pub enum WindowError {
     NoDisplay(String),
     /// There is no adapter for drawing.
     #[error(
-        "cannot open a window: {0}; install a driver for your GPU, or, on Debian or Ubuntu, the packages \
-         `libegl1 libgl1-mesa-dri` for drawing on the processor; without either, \
-         `flotor view --screenshot OUT.png FILE.mcap` draws a picture"
+        "cannot open a window: {0}; install a driver for your GPU, or (Debian, Ubuntu) `libegl1 libgl1-mesa-dri` \
+         for drawing on the processor; without either, `flotor view --screenshot OUT.png FILE.mcap` draws a picture"
     )]
     NoAdapter(String),
     /// The display or the adapter of an open window was lost.
