@@ -109,7 +109,7 @@ pub enum CoupleError {
     #[error(transparent)]
     Directory(#[from] DirectoryError),
     /// A thread could not be created.
-    #[error("cannot start a thread for the coupling: {0}; end other programs of this user")]
+    #[error("cannot start a thread: {0}; end other programs of this user")]
     Thread(#[from] std::io::Error),
 }
 

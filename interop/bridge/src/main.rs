@@ -52,25 +52,25 @@ enum Command {
     Serve(ServeArguments),
     /// Republish a remote run on this machine, for `flotor view`
     Attach {
-        /// Name of the bridge, as `flotor bridge list` prints it
+        /// Name of the bridge, such as lab or zenoh/lab, as `flotor bridge list` prints it
         name: Name,
     },
     /// Couple a hand here to a remote hand: forward the peer state of couplings with `partner = "elsewhere"`
     Couple {
-        /// Name of the bridge, as `flotor bridge list` prints it
+        /// Name of the bridge, such as lab or zenoh/lab, as `flotor bridge list` prints it
         name: Name,
     },
     /// Record a remote run until it ends
     Record {
-        /// Name of the bridge, as `flotor bridge list` prints it
+        /// Name of the bridge, such as lab or zenoh/lab, as `flotor bridge list` prints it
         name: Name,
         /// Recording to write
         #[arg(value_name = "FILE.mcap")]
         file: PathBuf,
     },
-    /// Send a request to a remote run
+    /// Send a request to a bridge and its run
     Ask {
-        /// Name of the bridge, as `flotor bridge list` prints it
+        /// Name of the bridge, such as lab or zenoh/lab, as `flotor bridge list` prints it
         name: Name,
         #[command(subcommand)]
         request: RequestArgument,
@@ -83,13 +83,13 @@ enum Command {
 
 #[derive(Args)]
 struct ServeArguments {
-    /// Name of this bridge on the network (default: the machine's name)
+    /// Name of this bridge on the network: 1 to 40 letters a to z, digits or hyphens (default: the machine's name)
     #[arg(long)]
     name: Option<Name>,
     /// Highest right whose requests are accepted; the access control of the network sets the right of each member
     #[arg(long, value_enum, default_value = "watch")]
     allow: Right,
-    /// Scene that members may start from the network, with `--allow own` (default: none)
+    /// Scene file (TOML), or name of one of Flotor's own scenes, that members may start, with `--allow own` (default: none)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Publish every Nth tick only
@@ -99,7 +99,7 @@ struct ServeArguments {
 
 #[derive(Subcommand)]
 enum RequestArgument {
-    /// Emergency stop: the force is zero at once, and the run ends
+    /// Emergency stop: all forces on the bridge's machine are zero at once, the runs end, and none starts before the release
     EmergencyStop,
     /// Normal stop: the force fades out
     Stop,
@@ -116,7 +116,7 @@ enum RequestArgument {
         /// Blend weight, 0 to 1
         weight: f64,
     },
-    /// Start the bridge's scene
+    /// Start the scene of `flotor bridge serve --scene`
     Start,
     /// Release an emergency stop
     Release,
@@ -126,19 +126,19 @@ enum RequestArgument {
 struct KeysArguments {
     /// New folder for keys and configurations
     folder: PathBuf,
-    /// Name or address under which the bridge is reached (repeatable)
+    /// Name or address under which the bridge is reached, without a port: members connect to port 7447 (repeatable)
     #[arg(long = "host", required = true, value_name = "HOST")]
     hosts: Vec<String>,
     /// A member who may watch and press the emergency stop (repeatable)
     #[arg(long, value_name = "NAME")]
     watch: Vec<Name>,
-    /// A member who may also change parameters (repeatable)
+    /// A member who may also change parameters and blend weights, stop a run in the normal way, and couple a hand (repeatable)
     #[arg(long, value_name = "NAME")]
     operate: Vec<Name>,
-    /// A member who may also start runs and release an emergency stop (repeatable)
+    /// A member who may also start the bridge's scene and release an emergency stop (repeatable)
     #[arg(long, value_name = "NAME")]
     own: Vec<Name>,
-    /// Validity of the keys, in days
+    /// Validity of the keys in days, at most 36500
     #[arg(long, value_name = "DAYS", default_value = "365", value_parser = clap::value_parser!(u64).range(1..=36_500))]
     days: u64,
 }
@@ -164,7 +164,10 @@ fn main() -> ExitCode {
             let is_usage = error.downcast_ref::<LinkError>().is_some_and(|e| {
                 matches!(
                     e,
-                    LinkError::Config { .. } | LinkError::WithoutKeys { .. } | LinkError::ExposedKey { .. }
+                    LinkError::Config { .. }
+                        | LinkError::Endpoint { .. }
+                        | LinkError::WithoutKeys { .. }
+                        | LinkError::ExposedKey { .. }
                 )
             });
             if is_usage { ExitCode::from(USAGE) } else { ExitCode::FAILURE }
@@ -272,7 +275,7 @@ fn list(session: &Link) -> Result<(), LinkError> {
     let names = bridges(session)?;
     if names.is_empty() {
         report_line(
-            "no bridge found; start a bridge with `flotor bridge serve`, or give its endpoint with --connect",
+            "no bridge found; start a bridge with `flotor bridge serve`, or give its endpoint with --connect or --config",
         );
     }
     for name in names {
@@ -308,7 +311,10 @@ fn report_keys(link: &Link) {
     }
     const SOON_DAYS: u64 = 30;
     if let Some(days) = link.days_left().filter(|days| *days < SOON_DAYS) {
-        report_line(&format!("the keys expire in {days} days; make new keys with `flotor bridge keys`"));
+        report_line(&format!(
+            "remaining validity of the keys: less than {} d; make new keys with `flotor bridge keys`",
+            days + 1
+        ));
     }
 }
 

@@ -52,9 +52,9 @@ pub enum Right {
     /// Observe a run and press the emergency stop
     #[default]
     Watch,
-    /// Also change parameters and stop a run in the normal way
+    /// Also change parameters and blend weights, stop a run in the normal way, and couple a hand
     Operate,
-    /// Also start the scene, release an emergency stop
+    /// Also start the scene, and release an emergency stop
     Own,
 }
 
@@ -166,7 +166,7 @@ pub enum Refusal {
     #[error("the request is malformed, or has the wrong key; use both programs from one build")]
     Malformed,
     /// Longer than [`MAX_REQUEST_BYTES`].
-    #[error("the request is longer than {MAX_REQUEST_BYTES} bytes; use both programs from one build")]
+    #[error("the request is longer than {MAX_REQUEST_BYTES} bytes; send fewer values at once")]
     TooLong,
     /// Number not higher than the number of the session's last request.
     #[error(

@@ -181,8 +181,9 @@ impl RequestHandler {
         let mut inside = self.lock();
         inside.status.run = 0;
         inside.status.title.clear();
+        let words = "the run ended before the host replied, so the request may have had no effect";
         for (query, _) in inside.run.take().into_iter().flat_map(|run| run.open.into_values()) {
-            reply(&query, Some("the run ended before the host replied".to_owned()));
+            reply(&query, Some(words.to_owned()));
         }
     }
 
@@ -234,7 +235,7 @@ impl RequestHandler {
             run.open.retain(|_, (query, since)| {
                 let is_late = since.elapsed() > ANSWER_WAIT;
                 if is_late {
-                    reply(query, Some("the host does not reply".to_owned()));
+                    reply(query, Some(format!("the host has not replied for {ANSWER_WAIT:?}; try again")));
                 }
                 !is_late
             });
@@ -361,8 +362,8 @@ impl Inside {
     fn start(&mut self) -> Result<(), String> {
         if let Some(pressed) = self.latch.state().pressed {
             return Err(format!(
-                "the emergency stop is pressed ({pressed}); its owner has to release the emergency stop first, \
-                 with `flotor release` or `flotor bridge ask NAME release`"
+                "the emergency stop is pressed ({pressed}); release the emergency stop first, with `flotor \
+                 release` on the machine of the bridge, or with `flotor bridge ask NAME release`"
             ));
         }
         if self.run.is_some() {
