@@ -111,8 +111,13 @@ pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
     let mut command = Command::new(program);
     end_with_this_thread(command.args(rest));
     // This process always blocks these signals: a pending signal would end it.
-    let child =
-        command.spawn().map_err(|cause| CommandError::file(program.as_ref(), "cannot be started", cause))?;
+    let child = command.spawn().map_err(|cause| {
+        CommandError::Failed(format!(
+            "`{}` cannot be started: {cause}; check that it is a program for this machine, or a script whose first line names \
+             an existing interpreter",
+            program.display()
+        ))
+    })?;
     let program = Pid::from_child(&child);
     let mut status = None;
     while status.is_none() && !is_orphaned() {
