@@ -50,9 +50,9 @@ pub fn host() -> Option<&'static Host> {
 /// before [`host`]. Not real-time.
 ///
 /// # Errors
-/// One line: the reason why the scene cannot be run, or that this process already has a run.
+/// One line: the reason why the scene cannot be run, or that this process has already prepared a run.
 pub fn prepare(settings: Settings, stop: &StopSwitch) -> Result<&'static Host, String> {
-    let second = || "this process already has a run; use another process".to_owned();
+    let second = || "this process has already prepared a run, or failed to; start another process".to_owned();
     if HOST.get().is_some() {
         return Err(second());
     }
@@ -249,6 +249,7 @@ impl Host {
                 return Stage::Over;
             }
         };
+        let Ok(thread) = thread.spawn(run).map_err(told) else { return Stage::Over };
         let since = Instant::now();
         while self.stations.iter().any(|station| station.ticks() == 0) {
             if thread.is_finished() || since.elapsed() > BEGIN {
@@ -369,6 +370,9 @@ mod tests {
         let settings = Settings::from_environment().expect("nothing is set");
         let settings = Settings { scene: Some(PathBuf::from("/nosuch/scene.toml")), ..settings };
         let refused = prepare(settings, &StopSwitch::default()).err();
-        assert_eq!(refused.as_deref(), Some("this process already has a run; use another process"));
+        assert_eq!(
+            refused.as_deref(),
+            Some("this process has already prepared a run, or failed to; start another process")
+        );
     }
 }

@@ -53,7 +53,7 @@ use std::time::Duration;
     flotor emulate haply-service proxy.toml --record run.mcap   the device of a scene, within the scene's limits\n  \
     flotor lend --api haply -- python3 my_program.py        the same for one program")]
 struct Arguments {
-    /// Scene file in TOML (default: a simulated flotor held by a hand)
+    /// Scene file (TOML), or name of one of Flotor's own scenes (default: FLOTOR_SCENE, else a simulated flotor held by a hand)
     scene: Option<PathBuf>,
     /// Address of the simulation channel and HTTP (port 0: any free port)
     #[arg(long, default_value = "127.0.0.1:10001", value_name = "HOST:PORT")]
@@ -160,7 +160,8 @@ fn listen(option: &str, at: &str, reach: Reach) -> Result<(Port, SocketAddr), Co
     });
     bound.map_err(|cause| {
         let is_in_use = cause.kind() == std::io::ErrorKind::AddrInUse;
-        let advice = if is_in_use { "; end Haply's own service, or choose another port" } else { "" };
+        let advice =
+            if is_in_use { "; end the program that uses the port, such as Haply's own service" } else { "" };
         CommandError::Usage(format!("{option}: {cause}{advice}"))
     })
 }

@@ -149,7 +149,7 @@ pub(crate) fn of_vector(vector: DVec3) -> Value {
 }
 
 /// Presets by name; true for an origin at the centre of the range.
-const PRESETS: [(&str, bool); 6] = [
+pub(crate) const PRESETS: [(&str, bool); 6] = [
     ("defaults", false),
     ("arm_front", false),
     ("arm_front_centered", true),
