@@ -249,7 +249,6 @@ impl Host {
                 return Stage::Over;
             }
         };
-        let Ok(thread) = thread.spawn(run).map_err(told) else { return Stage::Over };
         let since = Instant::now();
         while self.stations.iter().any(|station| station.ticks() == 0) {
             if thread.is_finished() || since.elapsed() > BEGIN {
