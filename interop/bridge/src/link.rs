@@ -50,9 +50,7 @@ pub enum LinkError {
         reason: String,
     },
     /// A text of `--listen` or `--connect` is not an endpoint.
-    #[error(
-        "`{option} {endpoint}` is not an endpoint; write PROTOCOL/ADDRESS, such as tls/lab.example.org:7447"
-    )]
+    #[error("`{option} {endpoint}` is not PROTOCOL/ADDRESS; write, for example, tls/lab.example.org:7447")]
     Endpoint {
         /// Command line option.
         option: &'static str,
@@ -69,19 +67,15 @@ pub enum LinkError {
     },
     /// An endpoint is open to other users, and without keys they would have all rights of `--allow`.
     #[error(
-        "`{endpoint}` is open to other users, and only keys distinguish members: create keys with `flotor bridge \
-         keys` and give their configuration with --config (for a bridge bridge.json5), or accept every peer with \
-         --without-keys"
+        "`{endpoint}` is open to other users, and only keys distinguish members: give a configuration of `flotor \
+         bridge keys` with --config (a bridge: bridge.json5), or accept every peer with --without-keys"
     )]
     WithoutKeys {
         /// Offending endpoint.
         endpoint: String,
     },
     /// The session cannot be opened.
-    #[error(
-        "cannot open the session: {0}; check the endpoint and the keys: to listen, the address must be free, and to \
-         connect, the bridge must be running"
-    )]
+    #[error("cannot open the session: {0}; check the keys, and that the endpoint is free or its bridge runs")]
     Open(String),
     /// A network operation has failed.
     #[error("network error: {0}; check the connection and the peer")]

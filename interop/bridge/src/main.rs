@@ -161,15 +161,9 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {}", escaped(&error.to_string()));
-            let is_usage = error.downcast_ref::<LinkError>().is_some_and(|e| {
-                matches!(
-                    e,
-                    LinkError::Config { .. }
-                        | LinkError::Endpoint { .. }
-                        | LinkError::WithoutKeys { .. }
-                        | LinkError::ExposedKey { .. }
-                )
-            });
+            let is_usage = error
+                .downcast_ref::<LinkError>()
+                .is_some_and(|e| !matches!(e, LinkError::Open(_) | LinkError::Network(_)));
             if is_usage { ExitCode::from(USAGE) } else { ExitCode::FAILURE }
         }
     }
@@ -311,9 +305,9 @@ fn report_keys(link: &Link) {
     }
     const SOON_DAYS: u64 = 30;
     if let Some(days) = link.days_left().filter(|days| *days < SOON_DAYS) {
+        let most = days + 1;
         report_line(&format!(
-            "remaining validity of the keys: less than {} d; make new keys with `flotor bridge keys`",
-            days + 1
+            "the keys expire in less than {most} d, or have expired; make new keys with `flotor bridge keys`"
         ));
     }
 }
