@@ -74,11 +74,7 @@ fn number(service: &Service, entry: &Value, name: fn(usize) -> String) -> Option
     let id = entry.get("device_id").and_then(Value::as_str).unwrap_or_default();
     let number = (0..service.host.stations().len()).find(|number| name(*number).eq_ignore_ascii_case(id));
     if number.is_none() {
-        service.refuse(
-            "device_id",
-            "no device has this id; `GET /devices` lists the devices",
-            &entry.to_string(),
-        );
+        service.refuse("device_id", "unknown device; `GET /devices` lists the ids", &entry.to_string());
     }
     number
 }
@@ -149,8 +145,7 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
             let along =
                 value.get("vector").filter(|vector| !vector.is_null()).map_or(Some(DVec3::ZERO), vector);
             let damping = along.map(|along| along + scalar).filter(|damping| damping.min_element() >= 0.0);
-            view.damping = damping
-                .ok_or("the damping needs a `scalar`, or a `vector` of x, y, z, of 0 N·s/m or more")?;
+            view.damping = damping.ok_or("`scalar` and the x, y, z of `vector` must be 0 N·s/m or more")?;
         }
         "force_gate" => {
             let gain = value.get("gain").and_then(Value::as_f64).filter(|gain| (0.0..=1.0).contains(gain));
@@ -217,7 +212,7 @@ fn command(service: &Service, shared: &mut Shared, session: u64, device: usize, 
         let Some(value) = value else {
             service.refuse(
                 name,
-                "the command needs three finite numbers: x, y, z, or for joints a0, a1, a2",
+                "the command needs finite x, y, z (joints: a0, a1, a2)",
                 &command.to_string(),
             );
             continue;
