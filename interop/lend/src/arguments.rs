@@ -64,9 +64,9 @@ impl LendArguments {
     ) -> Result<(), CommandError> {
         let absolute = |path: &Path| {
             std::path::absolute(path).map_err(|cause| {
+                let path = path.display();
                 CommandError::Failed(format!(
-                    "`{}`: cannot determine the current folder: {cause}; give the absolute path",
-                    path.display()
+                    "`{path}`: cannot determine the current folder: {cause}; give the absolute path"
                 ))
             })
         };

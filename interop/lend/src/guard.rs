@@ -112,10 +112,9 @@ pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
     end_with_this_thread(command.args(rest));
     // This process always blocks these signals: a pending signal would end it.
     let child = command.spawn().map_err(|cause| {
+        let name = program.display();
         CommandError::Failed(format!(
-            "`{}` cannot be started: {cause}; check that it is a program for this machine, or a script whose first line names \
-             an existing interpreter",
-            program.display()
+            "`{name}` cannot be started: {cause}; check that it is for this processor, or that its interpreter exists"
         ))
     })?;
     let program = Pid::from_child(&child);
