@@ -235,7 +235,10 @@ impl RequestHandler {
             run.open.retain(|_, (query, since)| {
                 let is_late = since.elapsed() > ANSWER_WAIT;
                 if is_late {
-                    reply(query, Some(format!("the host has not replied for {ANSWER_WAIT:?}; try again")));
+                    reply(
+                        query,
+                        Some(format!("the host has not replied for {} s; try again", ANSWER_WAIT.as_secs())),
+                    );
                 }
                 !is_late
             });
