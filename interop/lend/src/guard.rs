@@ -114,7 +114,7 @@ pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
     let child = command.spawn().map_err(|cause| {
         let name = program.display();
         CommandError::Failed(format!(
-            "`{name}` cannot be started: {cause}; check that it is for this processor, or that its interpreter exists"
+            "`{name}` cannot be started: {cause}; check its processor architecture, and that its interpreter exists"
         ))
     })?;
     let program = Pid::from_child(&child);
