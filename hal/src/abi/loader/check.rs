@@ -19,7 +19,7 @@ pub(super) enum Proof {
 /// `entry` is a live entry whose magic, size and contract version were checked: its pointers may be followed.
 pub(super) unsafe fn contract(entry: &'static Entry) -> Result<Proof, String> {
     if entry.layouts.is_null() || !entry.layouts.is_aligned() || entry.layout_count == 0 {
-        return Err("the plugin has no layout table".to_owned());
+        return Err("the plugin has no valid layout table".to_owned());
     }
     // SAFETY: the contract of an entry: a static array of so many rows.
     let theirs = unsafe { std::slice::from_raw_parts(entry.layouts, entry.layout_count as usize) };
