@@ -239,10 +239,9 @@ pub fn duration_s(text: &str) -> Result<f64, String> {
         "h" => 3600.0,
         other => return Err(format!("unknown unit of time `{other}`; use ms, s, min or h")),
     };
-    let number: f64 = number
-        .trim()
-        .parse()
-        .map_err(|_| format!("invalid duration `{text}`; write a number and a unit, such as 10s or 500ms"))?;
+    let number: f64 = number.trim().parse().map_err(|_| {
+        format!("invalid duration `{text}`; write a number, in s or with its unit, such as 10, 10s or 500ms")
+    })?;
     let seconds = number * scale;
     let is_legal = (0.0..=31_536_000.0).contains(&seconds);
     if is_legal {

@@ -95,8 +95,9 @@ impl SeparateProgram<'_> {
     /// # Errors
     /// If the program is missing or cannot be started.
     pub fn become_with(&self, arguments: &[OsString]) -> Result<(), CommandError> {
-        let cause = become_program(self.command()?.args(arguments));
-        Err(CommandError::file(self.program.as_ref(), "cannot be started", cause))
+        let mut command = self.command()?;
+        let cause = become_program(command.args(arguments));
+        Err(CommandError::file(command.get_program().as_ref(), "cannot be started", cause))
     }
 }
 
