@@ -73,6 +73,7 @@ pub fn process_number() -> u32 {
 fn remedy(cause: &io::Error) -> &'static str {
     match cause.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room on its disk",
+        io::ErrorKind::InvalidInput => "set XDG_RUNTIME_DIR to a folder with a shorter path",
         _ if is_out_of_descriptors(cause) => "close some files, or allow more (`ulimit -n`)",
         _ => "set XDG_RUNTIME_DIR to a folder you may write to",
     }

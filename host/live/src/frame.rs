@@ -57,7 +57,7 @@ impl Kind {
 
 /// Error of a frame with a payload above [`MAX_PAYLOAD`]: the other end uses another protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a frame of {length} bytes exceeds {MAX_PAYLOAD}: protocol mismatch; use both sides from one build")]
+#[error("a frame of {length} bytes exceeds the limit of {MAX_PAYLOAD} bytes")]
 pub struct LongFrame {
     /// Length in the frame's head, bytes.
     pub length: usize,

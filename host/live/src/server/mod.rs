@@ -52,7 +52,7 @@ pub enum PublishError {
     #[error(transparent)]
     Directory(#[from] DirectoryError),
     /// A thread cannot be started.
-    #[error("cannot start the telemetry threads: {0}; end other programs of this user")]
+    #[error("cannot start a thread: {0}; end other programs of this user")]
     Thread(#[from] io::Error),
 }
 
