@@ -219,7 +219,7 @@ fn a_plugin_that_hangs_before_a_run_is_named_and_ends_it() {
     let isolated = scene_of(&scratch, HONEST, "IN_CREATE=hang();", "isolation = \"process\"\n");
     let ran = run(&scratch, &isolated, "virtual");
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
-    assert!(ran.error().contains("`create` or `prepare` did not return within 1 s"), "{ran:?}");
+    assert!(ran.error().contains("loading, `create` or `prepare` did not return within 1 s"), "{ran:?}");
 }
 
 #[test]

@@ -105,8 +105,8 @@ impl Worker {
                 if is_late {
                     let create_timeout_s = config.create_timeout.as_secs_f64();
                     return Err(Refusal::broken(format!(
-                        "`create` or `prepare` did not return within {create_timeout_s} s in the worker \
-                         process; check the plugin with `flotor validate`"
+                        "loading, `create` or `prepare` did not return within {create_timeout_s} s in the worker process; \
+                         check the plugin with `flotor validate`, or raise the limit with `FLOTOR_CALL_LIMIT_S`"
                     )));
                 }
                 Err(Refusal::broken(format!(
