@@ -56,7 +56,7 @@ impl fmt::Display for Exceeded {
             Self::Waiting(limit) => {
                 write!(
                     f,
-                    " within {} s and used no processor time: the call is blocked ({REMEDY})",
+                    " within {} s, without measured use of a processor: the call may be blocked ({REMEDY})",
                     limit.as_secs_f64()
                 )
             }

@@ -305,7 +305,8 @@ impl<'t> Section<'t> {
                 DeValue::Boolean(flag) => flag.to_string(),
                 other => {
                     let (key, found) = (key.get_ref(), other.type_str());
-                    let problem = format!("`{key}` must be a number, a word or true/false; found: {found}");
+                    let problem =
+                        format!("`{key}` must be a number, text in quotes, or true or false; found: {found}");
                     return Err(location.problem(problem));
                 }
             };
