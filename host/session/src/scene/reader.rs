@@ -246,7 +246,8 @@ impl<'t> Section<'t> {
             && let Some(mut both) = self.section(key)?
         {
             let norm = both.require("norm")?.number(range.clone())?;
-            let axes = both.require("axes")?.axes(range)?;
+            let axes = both.require("axes")?;
+            let axes = axes.each_in_range(axes.numbers()?, &range)?;
             both.finish()?;
             return Ok(Bound::ball(norm).and(Bound::box_of(axes)));
         }
@@ -431,7 +432,7 @@ impl Value<'_> {
     }
 
     fn no_bound(&self) -> SceneError {
-        self.must_be("one number (the largest norm) or three numbers (the largest along each axis)")
+        self.must_be("one number (the largest norm), three numbers (the largest along each axis), or { norm, axes } for both")
     }
 
     /// Returns a whole number in `range`.
