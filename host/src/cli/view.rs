@@ -26,7 +26,8 @@ pub(crate) struct ViewArguments {
     /// Recording, or zenoh/NAME for a remote session (default: the newest session of this machine)
     #[arg(value_name = "FILE.mcap | zenoh/NAME")]
     file: Option<PathBuf>,
-    /// Second recording, drawn over the first: with dashed traces, and the handle as a transparent ball
+    /// Second recording, drawn over the first (with --screenshot: only with --window): with dashed traces, and the handle as a
+    /// transparent ball
     #[arg(value_name = "FILE.mcap", conflicts_with_all = ["export", "screen"])]
     second: Option<PathBuf>,
     /// Write a picture of one moment (PNG); needs no display and no GPU
