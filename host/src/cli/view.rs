@@ -33,7 +33,7 @@ pub(crate) struct ViewArguments {
     /// Write a picture of one moment (PNG); needs no display and no GPU
     #[arg(long, value_name = "OUT.png", requires = "file")]
     screenshot: Option<PathBuf>,
-    /// With --screenshot: draw the whole window with its panels
+    /// With --screenshot: draw the whole window with its panels (default: only the 3D view and the traces)
     #[arg(long, requires = "screenshot")]
     window: bool,
     /// Show the session of this process (default: the newest session)
