@@ -49,10 +49,8 @@ pub fn warn(line: &str) {
 /// # Errors
 /// If the link cannot be replaced or created.
 pub fn link_to(target: &Path, link: &Path) -> Result<(), Box<dyn Error>> {
-    if link.is_symlink() {
-        std::fs::remove_file(link)?;
-    }
-    std::os::unix::fs::symlink(target, link).map_err(|error| {
+    let cleared = if link.is_symlink() { std::fs::remove_file(link) } else { Ok(()) };
+    cleared.and_then(|()| std::os::unix::fs::symlink(target, link)).map_err(|error| {
         let link = link.display();
         format!("cannot create the link {link}: {error}; name a new file in a folder you may write to").into()
     })

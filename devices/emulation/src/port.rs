@@ -11,7 +11,8 @@ use std::sync::Once;
 /// Command line options that admit programs of other users or machines.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ReachArguments {
-    /// TCP: allow connections of every user of this machine (default: only of your own user)
+    /// TCP: allow connections of every user of this machine (default: only of your own user and of root); no effect with
+    /// --allow-remote, which allows those of every user
     #[arg(long)]
     allow_users: bool,
     /// TCP: permit an address that other machines reach; every program that reaches the port can then command the device
@@ -66,7 +67,7 @@ impl Port {
             let problem = format!(
                 "{at} can be reached from other machines, and every program that reaches the address commands the \
                  device; listen at 127.0.0.1, or \
-                 add --allow-remote"
+                 add --allow-remote (in a scene with the model `ml-api`: `reach = \"any-machine\"`)"
             );
             return Err(io::Error::new(ErrorKind::InvalidInput, problem));
         }
@@ -103,7 +104,8 @@ impl Port {
             };
             REFUSAL.call_once(|| {
                 warn(&format!(
-                    "a connection was refused: {cause}; --allow-users permits connections of every user"
+                    "a connection was refused: {cause}; --allow-users (in a scene with the model `ml-api`: \
+                     `reach = \"this-machine\"`) permits connections of every user"
                 ))
             });
         }
