@@ -89,14 +89,14 @@ impl From<ChipLost> for BootFailure {
 impl fmt::Display for BootFailure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Lost => f.write_str("the Falcon was unplugged, or its hub was reset; connect the Falcon without a \
-            hub, and try again"),
+            Self::Lost => f.write_str("the Falcon was unplugged, its hub was reset, or its emulator has ended; connect the \
+            Falcon without a hub, or start the emulator, and try again"),
             Self::ShortPacket => f.write_str(
                 "the USB chip sends packets without the two bytes of its status; connect the Falcon without a hub, and try again",
             ),
             Self::NoFirmware => f.write_str(
-                "the Falcon has no firmware after power-off; give your own firmware file with `firmware`: the file \
-                 `nvent` is in libnifalcon's folder `firmware` and in the driver for Windows",
+                "the Falcon sends no reports, probably because it has no firmware after power-off; give your own firmware \
+                 file with `firmware`: the file `nvent` is in libnifalcon's folder `firmware` and in the driver for Windows",
             ),
             Self::NoPrompt => write!(
                 f,

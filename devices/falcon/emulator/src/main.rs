@@ -32,15 +32,15 @@ struct Arguments {
     /// Power state at the start: with or without running firmware
     #[arg(long, value_enum, default_value = "on")]
     power: Power,
-    /// Amplitude, from the middle of the motion to its ends, in mm, 0 to 40
+    /// Amplitude, from the middle of the motion to its ends, in mm, 0 to 40; no effect with --calibration-rig
     #[arg(long, default_value_t = 15.0, value_name = "MM", value_parser = amplitude_mm)]
     amplitude_mm: f64,
-    /// Frequency of the motion, in Hz, 0 to 10
+    /// Frequency of the motion, in Hz, 0 to 10; no effect with --calibration-rig
     #[arg(long, default_value_t = 0.5, value_name = "HZ", value_parser = frequency_hz)]
     frequency_hz: f64,
     #[command(flatten)]
     rig: RigArguments,
-    /// End when the first host disconnects
+    /// TCP: end when the first host disconnects
     #[arg(long)]
     once: bool,
 }
