@@ -26,7 +26,8 @@ const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "library",
         choices![],
-        "Library of the SDK, libdrd.so.3 (default: searched in $FDSDK and in the library folders of the system)",
+        "Library of the SDK: libdrd.so.3, on Windows drdms64.dll (default: searched in $FDSDK, $FORCEDIM_SDK, $FD_SDK_DIR, \
+         $ForceDimensionSDK_DIR, $LD_LIBRARY_PATH (on Windows $PATH) and the library folders of user and system)",
     ),
     STAND_IN,
     Parameter::real(
@@ -172,7 +173,7 @@ impl Device for ForceDimensionDevice {
             return Err((
                 self,
                 Refusal::resource(
-                    "the thread of the device has ended and closed the device; open the device again",
+                    "the thread of the device has ended and closed the device; start the program again",
                 ),
             ));
         };

@@ -224,8 +224,8 @@ impl HaplyDevice {
             Refusal::resource(match no_answer {
                 NoAnswer::Lost => "the port of the board was closed; check that the board is plugged in",
                 NoAnswer::Silent => {
-                    "no board of this device replies at this port; check that the board is switched on, and \
-                     that `port` is the port of the board"
+                    "no Haply board replies at `port`; check that the board is switched on, and that `port` is \
+                     the port of the board"
                 }
             })
         })?;

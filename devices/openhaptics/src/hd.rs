@@ -62,10 +62,12 @@ impl Failed {
         let remedy = match self.code {
             0x0300 => {
                 "check that the device is connected, configured with the maker's setup program, and permitted for \
-                 this user: `flotor doctor --device openhaptics`"
+                 this user (on Linux, `flotor doctor --device openhaptics` checks this)"
             }
             0x0301 => "end the other program, or remove the other device of the scene, that uses this device",
-            0x0302 | 0x0303 => "check cable, hub and power, and the folder $GTDD_HOME",
+            0x0302 | 0x0303 => {
+                "check cable, hub and power, and the configuration of the device (on Linux in the folder $GTDD_HOME)"
+            }
             _ => "test the device with the maker's own diagnostic program first",
         };
         Refusal::resource(format!(

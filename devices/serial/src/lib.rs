@@ -45,7 +45,7 @@ impl fmt::Display for NotOpened {
         match self {
             Self::Forbidden { remedy } => write!(f, "this user may not open the port; {remedy}"),
             Self::InUse => f.write_str("another program uses the port; close that program first"),
-            Self::NoPort => write!(f, "the file is not a serial port; {}", platform::PORT_LIST),
+            Self::NoPort => write!(f, "the file is not a usable serial port; {}", platform::PORT_LIST),
             Self::Missing { cause } => {
                 write!(f, "{cause}; check that the device is connected; {}", platform::PORT_LIST)
             }

@@ -251,7 +251,8 @@ fn a_calibration_that_cannot_be_says_why_and_lets_the_handle_down() {
     assert!(ran.error().contains("cannot open the force sensor at"), "{}", ran.error());
     let ran = calibrate(&emulator, Path::new("/dev/null"), &["vertical"]);
     assert!(
-        ran.error().contains("cannot open the force sensor at /dev/null: the file is not a serial port"),
+        ran.error()
+            .contains("cannot open the force sensor at /dev/null: the file is not a usable serial port"),
         "{}",
         ran.error()
     );
