@@ -66,8 +66,7 @@ impl Port {
         if reach != Reach::AnyMachine && addresses.iter().any(|address| !address.ip().is_loopback()) {
             let problem = format!(
                 "{at} can be reached from other machines, and every program that reaches the address commands the \
-                 device; listen at 127.0.0.1, or \
-                 add --allow-remote (in a scene with the model `ml-api`: `reach = \"any-machine\"`)"
+                 device; listen at 127.0.0.1, or add --allow-remote (in a scene with the model `ml-api`: `reach = \"any-machine\"`)"
             );
             return Err(io::Error::new(ErrorKind::InvalidInput, problem));
         }
@@ -104,8 +103,7 @@ impl Port {
             };
             REFUSAL.call_once(|| {
                 warn(&format!(
-                    "a connection was refused: {cause}; --allow-users (in a scene with the model `ml-api`: \
-                     `reach = \"this-machine\"`) permits connections of every user"
+                    "a connection was refused: {cause}; --allow-users (in a scene with the model `ml-api`: `reach = \"this-machine\"`) permits connections of every user"
                 ))
             });
         }

@@ -50,8 +50,7 @@ impl Failed {
     pub(crate) fn refusal(&self) -> Refusal {
         let remedy = match self.code {
             NO_DRIVER => {
-                "no driver lets this user open the USB device: on Linux, `flotor doctor --device force-dimension` prints the \
-                 udev rule; on Windows, install the driver of the SDK"
+                "no driver lets this user open the USB device: on Linux, `flotor doctor --device force-dimension` prints the udev rule; on Windows, install the driver of the SDK"
             }
             NO_DEVICE => "connect the device and switch it on; on Linux, `lsusb -d 1451:` lists it",
             IN_USE => "end the other program that uses the device",
@@ -109,8 +108,7 @@ impl Dhd {
                 }
                 Err(Refusal::resource(format!(
                     "no free device has the serial number {wanted} (serial numbers found: {}); correct \
-                     `serial`, connect the device, or end the program that uses it; without `serial` the error of the first \
-                     device is shown",
+                     `serial`, connect the device, or end the program that uses it; without `serial` the error of the first device is shown",
                     if found.is_empty() { "none".to_owned() } else { found.join(", ") }
                 )))
             }

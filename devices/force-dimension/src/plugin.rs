@@ -26,8 +26,7 @@ const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "library",
         choices![],
-        "Library of the SDK: libdrd.so.3, on Windows drdms64.dll (default: searched in $FDSDK, $FORCEDIM_SDK, $FD_SDK_DIR, \
-         $ForceDimensionSDK_DIR, $LD_LIBRARY_PATH (on Windows $PATH) and the library folders of user and system)",
+        "Library of the SDK: libdrd.so.3, on Windows drdms64.dll (default: searched in $FDSDK, $FORCEDIM_SDK, $FD_SDK_DIR, $ForceDimensionSDK_DIR, $LD_LIBRARY_PATH (on Windows $PATH) and the library folders of user and system)",
     ),
     STAND_IN,
     Parameter::real(

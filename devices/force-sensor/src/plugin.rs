@@ -45,8 +45,7 @@ impl ForceSensor {
                 PollResult::Malformed => {
                     let answer = self.line.last();
                     return Err(format!(
-                        "the force sensor at {port} answers `{answer}` instead of a force like `F 1.234`, at most \
-                         {PLAUSIBLE_N} N; remove the cause of a reported error, or set `port` to the port of the force sensor"
+                        "the force sensor at {port} answers `{answer}` instead of a force like `F 1.234`, at most {PLAUSIBLE_N} N; remove the cause of a reported error, or set `port` to the port of the force sensor"
                     ));
                 }
                 PollResult::Nothing if self.line.silence() > self.timeout => {

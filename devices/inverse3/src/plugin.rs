@@ -32,10 +32,7 @@ const STOP_NS: u64 = 100_000_000;
 const SCHEMA: &[Parameter] = &[
     Parameter::text("address", "Address of the Inverse Service (default: 127.0.0.1:10001)"),
     Parameter::text("device", "Id of the Inverse3, from its label (default: the only one)"),
-    Parameter::text(
-        "grip",
-        "Id of the VerseGrip, or `none` to use the arm without a grip (default: the only one, or no grip if there is none)",
-    ),
+    Parameter::text("grip", "Id of the VerseGrip; `none`: no grip (default: the only one, if there is one)"),
     Parameter::real("max_force_n", "N", 0.0, 20.0, 5.0, "Largest force on the hand"),
     Parameter::real(
         "range_mm",

@@ -51,9 +51,10 @@ impl std::fmt::Display for Aborted {
                 "the controller does not reply; check the power of the controller and the load of this \
                  machine",
             ),
-            Self::Faulted(condition) => {
-                write!(f, "the controller faulted ({condition}); check that the handle is free to move")
-            }
+            Self::Faulted(condition) => write!(
+                f,
+                "the controller ended the levitation (faults: {condition}); free the handle, and end other programs that use the controller"
+            ),
         }
     }
 }

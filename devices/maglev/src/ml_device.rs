@@ -64,7 +64,7 @@ fn refused(address: &str, failed: Failed) -> Refusal {
         Failed::At(_, NoResults::Refused(Status::RECEIVE_ONLY)) => "; end the other program first",
         Failed::At(_, NoResults::Malformed) => "; use a controller with the ML API 1.5b, and check `address`",
         Failed::At(_, NoResults::Refused(_)) => {
-            "; correct the parameters of the device that this request transfers, or restart the controller"
+            "; remove this cause, correct the parameters of the device that this request transfers, or restart the controller"
         }
         Failed::Faulted(_) | Failed::NoTick => "",
     };

@@ -170,14 +170,12 @@ fn refused(options: &Options, unanswered: Unanswered) -> Refusal {
         Kind::Serial | Kind::Usb | Kind::Hid => "",
     };
     Refusal::resource(match unanswered {
-        Unanswered::Lost => {
-            format!(
-                "the controller at {address} closed the connection; end other programs that use the controller"
-            )
-        }
-        Unanswered::Silent => {
-            format!("no controller of this device replies at {address}; check its power and `address`{hint}")
-        }
+        Unanswered::Lost => format!(
+            "the connection to the controller at {address} was lost; check cable and power, and end other programs that use the controller"
+        ),
+        Unanswered::Silent => format!(
+            "no controller of this device replies at {address}; check its power, `address` and `protocol`, and end other programs that use the controller{hint}"
+        ),
     })
 }
 

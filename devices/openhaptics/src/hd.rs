@@ -65,9 +65,7 @@ impl Failed {
                  this user (on Linux, `flotor doctor --device openhaptics` checks this)"
             }
             0x0301 => "end the other program, or remove the other device of the scene, that uses this device",
-            0x0302 | 0x0303 => {
-                "check cable, hub and power, and the configuration of the device (on Linux in the folder $GTDD_HOME)"
-            }
+            0x0302 | 0x0303 => "check cable, hub, power and configuration (on Linux the folder $GTDD_HOME)",
             _ => "test the device with the maker's own diagnostic program first",
         };
         Refusal::resource(format!(

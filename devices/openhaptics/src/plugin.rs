@@ -22,8 +22,7 @@ const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "library",
         choices![],
-        "Library of OpenHaptics: libHD.so, on Windows hd.dll (default: searched in $OH_SDK_BASE, $3DTOUCH_BASE, \
-         $LD_LIBRARY_PATH (on Windows $PATH) and the library folders of user and system)",
+        "Library of OpenHaptics: libHD.so, on Windows hd.dll (default: searched in $OH_SDK_BASE, $3DTOUCH_BASE, $LD_LIBRARY_PATH (on Windows $PATH) and the library folders of user and system)",
     ),
     STAND_IN,
     Parameter::text(

@@ -83,8 +83,7 @@ impl fmt::Display for InvalidParameter {
             Self::TooStiff { steps_per_ms, limit } => write!(
                 f,
                 "the simulation of flotor and hand would need {:.0} steps per millisecond, above the limit of \
-                 {limit:.0}: lower the stiffness and damping of the hand or the drag (damping_ns_per_m, \
-                 damping_nms_per_rad), or raise mass_kg, hand_mass_kg or the moments of inertia",
+                 {limit:.0}: lower the stiffness and damping of the hand or the drag (damping_ns_per_m, damping_nms_per_rad), or raise mass_kg, hand_mass_kg or the moments of inertia",
                 steps_per_ms.ceil()
             ),
         }

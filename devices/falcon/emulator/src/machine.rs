@@ -23,9 +23,7 @@ const WORDS_PER_NM: f64 = 10_000.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Power {
     /// Power was off: the boot loader waits for a firmware, the arms are not homed.
-    #[value(
-        help = "After power-off: the boot loader waits for a firmware and accepts any bytes; the arms are not homed"
-    )]
+    #[value(help = "After power-off: the boot loader waits for a firmware (any bytes); arms are not homed")]
     Off,
     /// Power stayed on since an earlier program: the firmware runs, the arms are homed.
     #[value(help = "The firmware runs, and the arms are homed")]

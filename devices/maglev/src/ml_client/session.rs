@@ -64,11 +64,10 @@ impl std::fmt::Display for Failed {
             Self::At(function, why) => write!(f, "{}: {why}", function.name()),
             Self::Faulted(bits) => write!(
                 f,
-                "the controller stays faulted ({bits}); hold the handle within the range of the sensors"
+                "the controller stays faulted ({bits}); hold the handle still within the range of the sensors, and let hot coils cool"
             ),
             Self::NoTick => f.write_str(
-                "the controller sends no ticks; check that no firewall blocks connections from the \
-                 controller, and restart the controller",
+                "the controller sends no ticks; end other programs that use the controller, and restart the controller",
             ),
         }
     }

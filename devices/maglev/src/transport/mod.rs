@@ -142,7 +142,7 @@ impl std::fmt::Display for OpenError {
             Self::Busy { address } => {
                 write!(f, "{address} is in use by another program; close that program first")
             }
-            Self::Forbidden { address, remedy } => write!(f, "this user may not use {address}; {remedy}"),
+            Self::Forbidden { address, remedy } => write!(f, "no access to {address}; {remedy}"),
             Self::Address { address, expected } => {
                 write!(f, "`address` = `{address}` is not valid; write {expected}")
             }

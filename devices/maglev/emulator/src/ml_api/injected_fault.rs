@@ -74,7 +74,7 @@ impl fmt::Display for Unknown {
         write!(
             f,
             "`{}` is not a fault: write KIND[@STATE][+MS]; kinds: silence, half-frame, close, reset, stall, wrong-length, \
-             status=CODE/N, late-tick, out-of-range, over-temperature, over-current, over-speed; states: landed, \
+             status=CODE/N (CODE decimal), late-tick, out-of-range, over-temperature, over-current, over-speed; states: landed, \
              taking-off, flying, ticking, landing",
             self.0
         )

@@ -29,7 +29,7 @@ const SCHEMA: &[Parameter] = &[
         "reach",
         REACHES,
         0,
-        "Programs that may connect: those of this user, of every user of this machine, or of every machine \
+        "Programs that may connect: those of this user and of root, of every user of this machine, or of every machine \
          that reaches the address",
     ),
     Parameter::choice(

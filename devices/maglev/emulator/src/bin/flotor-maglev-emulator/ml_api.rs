@@ -24,7 +24,7 @@ const ON_STATOR: &[(&str, &str)] =
 #[command(next_help_heading = "ML API")]
 pub(crate) struct MlApiArguments {
     /// Serve this device, by the id of its plugin, instead of the emulated device: `--set` sets its parameters; the host's
-    /// envelope and watchdog stay active
+    /// envelope and watchdog stay active; no effect then: --transport, --link, --pace, --seed, --serial, --once, --hand
     #[arg(long, value_name = "ID", conflicts_with_all = ["faults", "presses", "plant", "calibration_rig"])]
     pub(crate) device: Option<String>,
     /// Recording file of the run with `--device`
@@ -36,7 +36,7 @@ pub(crate) struct MlApiArguments {
     /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device
     #[arg(long, requires = "device")]
     pub(crate) accept_shared_control_group: bool,
-    /// Hand on the flotor at the start
+    /// Hand that holds the flotor; no effect with --device or --calibration-rig
     #[arg(long, value_enum, default_value = "none", value_name = "WHO")]
     hand: HandOption,
     /// Effect of a force command on the gains
@@ -53,11 +53,11 @@ pub(crate) struct MlApiArguments {
     #[arg(long, default_value_t = 500.0, value_name = "MS", value_parser = watchdog_ms)]
     watchdog_ms: f64,
     /// Fault to inject, as KIND[@STATE][+MS], like reset@flying+200 (repeatable): silence, half-frame, close, reset, stall,
-    /// wrong-length, status=CODE/N (every Nth call), late-tick, out-of-range, over-temperature, over-current, over-speed;
+    /// wrong-length, status=CODE/N (CODE decimal, every Nth call), late-tick, out-of-range, over-temperature, over-current, over-speed;
     /// states landed, taking-off, flying, ticking, landing
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<InjectedFault>,
-    /// Button press, as left@1.5-2, in s from the start (repeatable)
+    /// Press of the button left or right, as left@1.5-2, in s from the start (repeatable)
     #[arg(long = "press", value_name = "BUTTON@FROM-TO")]
     presses: Vec<Press>,
 }

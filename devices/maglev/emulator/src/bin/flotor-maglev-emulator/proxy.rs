@@ -24,7 +24,7 @@ const RESTING: &[(&str, &str)] =
 /// Replaces this process by `flotor run`; returns only on failure.
 pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     if arguments.protocol != ProtocolOption::MlApi {
-        return Err(Refusal::parameter("--device needs --protocol ml-api; add this option").into());
+        return Err(Refusal::parameter("--device needs --protocol ml-api; add --protocol ml-api").into());
     }
     let scene = anonymous_file(&scene(device, arguments)?)?;
     // The descriptor stays open across `exec`: only this process can use its path.
@@ -33,7 +33,7 @@ pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box
     let record = &arguments.ml_api.record;
     let error = Command::new(&host).arg("run").arg(&file).arg("--record").arg(record).exec();
     Err(format!(
-        "cannot start the host {}: {error}; build the host with `cargo build --release`",
+        "cannot start the host {}: {error}; build this program and the host with `cargo build --release`",
         host.display()
     )
     .into())
