@@ -142,7 +142,7 @@ impl Options {
             let connected = RemoteChip::connect(address);
             return connected.map(|chip| Arc::new(chip) as Arc<dyn Chip>).map_err(|error| {
                 Refusal::resource(format!(
-                    "no emulated Falcon at {address} ({error}); start one with `flotor emulate falcon`, which prints its address"
+                    "no emulated Falcon at {address} ({error}); start one with `flotor emulate falcon` (on Linux), which prints its address"
                 ))
             });
         }

@@ -118,7 +118,7 @@ impl Drop for UsbChip {
 fn refused(error: Error) -> String {
     match error {
         Error::NotFound => "no Falcon is plugged in (USB 0403:cb48); check cable and power. Without a Falcon, start \
-        the emulator with `flotor emulate falcon`, for `address = \"tcp:127.0.0.1:4108\"`"
+        the emulator with `flotor emulate falcon` (on Linux), for `address = \"tcp:127.0.0.1:4108\"`"
             .to_owned(),
         Error::Access => format!("no access to the Falcon; {}", access_remedy(VENDOR, PRODUCT)),
         Error::Busy => "the Falcon is in use by another program; close that program first".to_owned(),

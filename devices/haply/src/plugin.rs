@@ -138,7 +138,7 @@ impl SimpleDevice for HaplyDevice {
         let path = settings.text("port").ok_or_else(|| {
             Refusal::resource(format!(
                 "no `port` for the board; set the port, as in {PORT_EXAMPLE}; without hardware start the emulator \
-                 with `cargo run -p flotor-haply --example emulated_board`, which prints its port"
+                 with `cargo run -p flotor-haply --example emulated_board` (on Linux), which prints its port"
             ))
         })?;
         let board = Board::open(path).map_err(Refusal::resource)?;

@@ -60,7 +60,7 @@ impl Session {
         let of_service = |cause: String| format!("the Inverse Service at {address}: {cause}");
         let mut socket = Socket::connect(address, PATIENCE).map_err(|cause| {
             of_service(format!(
-                "{cause}; check `address`, and start Haply's service, or `flotor emulate haply-service` without hardware"
+                "{cause}; check `address`, and start Haply's service, or `flotor emulate haply-service` (on Linux) without hardware"
             ))
         })?;
         let mut talk = |text: &str| {

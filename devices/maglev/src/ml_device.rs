@@ -59,7 +59,7 @@ pub(crate) struct MlActive {
 fn refused(address: &str, failed: Failed) -> Refusal {
     let hint = match failed {
         Failed::At(_, NoResults::Lost | NoResults::Silent) => {
-            "; check its power and the network; without hardware start the emulator with `flotor emulate maglev --protocol ml-api`"
+            "; check its power and the network; without hardware start the emulator with `flotor emulate maglev --protocol ml-api` (on Linux)"
         }
         Failed::At(_, NoResults::Refused(Status::RECEIVE_ONLY)) => "; end the other program first",
         Failed::At(_, NoResults::Malformed) => "; use a controller with the ML API 1.5b, and check `address`",

@@ -166,7 +166,7 @@ fn connect(options: &Options) -> Result<(HostLink, Description), Refusal> {
 fn refused(options: &Options, unanswered: Unanswered) -> Refusal {
     let Options { kind, address, .. } = options;
     let hint = match kind {
-        Kind::Tcp => "; without hardware start the emulator with `flotor emulate maglev`",
+        Kind::Tcp => "; without hardware start the emulator with `flotor emulate maglev` (on Linux)",
         Kind::Serial | Kind::Usb | Kind::Hid => "",
     };
     Refusal::resource(match unanswered {

@@ -30,8 +30,8 @@ pub(crate) struct MlApiArguments {
     /// Recording file of the run with `--device`
     #[arg(long, default_value = "ml-api.mcap", value_name = "FILE")]
     pub(crate) record: std::path::PathBuf,
-    /// With --device: watchdog limit of a tick of the host, in ms, 1 to 60000 (default: as in a scene without `watchdog_ms`)
-    #[arg(long, requires = "device", value_name = "MS", value_parser = watchdog_ms)]
+    /// With --device: watchdog limit of a tick of the host, in ms, 3 to 60000 (default: 100)
+    #[arg(long, requires = "device", value_name = "MS", value_parser = host_watchdog_ms)]
     pub(crate) host_watchdog_ms: Option<f64>,
     /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device
     #[arg(long, requires = "device")]
@@ -57,7 +57,7 @@ pub(crate) struct MlApiArguments {
     /// states landed, taking-off, flying, ticking, landing
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<InjectedFault>,
-    /// Press of the button left or right, as left@1.5-2, in s from the start (repeatable)
+    /// Press of the left or right button, as left@1.5-2, in s from the start (repeatable)
     #[arg(long = "press", value_name = "BUTTON@FROM-TO")]
     presses: Vec<Press>,
 }
@@ -73,6 +73,11 @@ enum HandOption {
 /// Returns the name of a value on the command line.
 fn name(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
+/// Parses a limit of at least three periods of the host's loop at 1 kHz.
+fn host_watchdog_ms(text: &str) -> Result<f64, String> {
+    within(text, 3.0, 60_000.0, "ms")
 }
 
 fn watchdog_ms(text: &str) -> Result<f64, String> {

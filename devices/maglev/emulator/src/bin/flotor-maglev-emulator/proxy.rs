@@ -24,7 +24,7 @@ const RESTING: &[(&str, &str)] =
 /// Replaces this process by `flotor run`; returns only on failure.
 pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     if arguments.protocol != ProtocolOption::MlApi {
-        return Err(Refusal::parameter("--device needs --protocol ml-api; add --protocol ml-api").into());
+        return Err(Refusal::parameter("--device serves the ML API only; add --protocol ml-api").into());
     }
     let scene = anonymous_file(&scene(device, arguments)?)?;
     // The descriptor stays open across `exec`: only this process can use its path.
