@@ -119,7 +119,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.5,
         12.0,
         12.0,
-        "Distance from home to each of the two walls perpendicular to x",
+        "Distance from home to each of the two walls perpendicular to x; no effect beyond `wall_radius_mm`",
     )
     .live(),
     Parameter::real(
@@ -128,7 +128,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.5,
         12.0,
         12.0,
-        "Distance from home to each of the two walls perpendicular to y",
+        "Distance from home to each of the two walls perpendicular to y; no effect beyond `wall_radius_mm`",
     )
     .live(),
     Parameter::real(
@@ -137,7 +137,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.5,
         12.0,
         12.0,
-        "Distance from home to each of the two walls perpendicular to z",
+        "Distance from home to each of the two walls perpendicular to z; no effect beyond `wall_radius_mm`",
     )
     .live(),
     Parameter::real(
