@@ -159,7 +159,7 @@ pub fn configure(chosen: &Chosen, force_gate: f64) -> String {
     )
 }
 
-/// Returns path and both values, as text, of the first setting of the arm that differs from its required value; `None` if all agree.
+/// Returns path and text of the first setting of the arm that differs from its required value; `None` if all agree.
 /// Not real-time.
 ///
 /// # Errors

@@ -53,8 +53,8 @@ pub(crate) struct MlApiArguments {
     #[arg(long, default_value_t = 500.0, value_name = "MS", value_parser = watchdog_ms)]
     watchdog_ms: f64,
     /// Fault to inject, as KIND[@STATE][+MS], like reset@flying+200 (repeatable): silence, half-frame, close, reset, stall,
-    /// wrong-length, status=CODE/N (CODE decimal, every Nth call), late-tick, out-of-range, over-temperature, over-current, over-speed;
-    /// states landed, taking-off, flying, ticking, landing
+    /// wrong-length, status=CODE/N (CODE decimal, every Nth call), late-tick, out-of-range, over-temperature, over-current,
+    /// over-speed; states landed, taking-off, flying, ticking, landing
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<InjectedFault>,
     /// Press of the left or right button, as left@1.5-2, in s from the start (repeatable)
