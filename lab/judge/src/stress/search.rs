@@ -20,6 +20,7 @@
 
 use super::continuity::{FELT_N, FELT_NM, HARMLESS, Jumps, Line, PIECES_MM, changes, close_in, standing_out};
 use super::energy::samples;
+use super::jacobian::size_n;
 use super::lap::{CONSERVATIVE, Dissipation, Lap};
 use super::measure::{Measure, PoseRecord, Verdict};
 use super::motion::Triangle;
@@ -257,7 +258,7 @@ impl Opponent<'_, '_> {
         let (best, size_n) = self.climb(None, |own, point| {
             let pose = own.pose(point);
             match own.subject.answer_at(pose) {
-                Ok(output) => output.wrench.force().length() + output.wrench.torque().length() / LEVER_M,
+                Ok(output) => size_n(&output.wrench),
                 Err(trouble) => {
                     own.tally.troubles += 1;
                     own.tally.trouble_at.get_or_insert(trouble.pose);
