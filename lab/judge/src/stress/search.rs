@@ -301,31 +301,17 @@ fn judge(total: &Tally) -> Measure {
     let (force, torque) = (total.jumps.force[last], total.jumps.torque[last]);
     // Judge each value by its own bound, and report the most severe.
     let graded = [
-        (force, FELT_N * HARMLESS, Verdict::of(force.value, FELT_N * HARMLESS, FELT_N), "step of force"),
-        (
-            torque,
-            FELT_NM * HARMLESS,
-            Verdict::of(torque.value, FELT_NM * HARMLESS, FELT_NM),
-            "step of torque",
-        ),
-        (
-            total.energy,
-            CONSERVATIVE,
-            Verdict::of(total.energy.value, CONSERVATIVE, CONSERVATIVE),
-            "energy of a lap",
-        ),
-        (
-            total.energy_in_motion,
-            CONSERVATIVE,
-            Verdict::of(total.energy_in_motion.value, CONSERVATIVE, CONSERVATIVE),
-            "energy of a lap in motion",
-        ),
+        (force, FELT_N * HARMLESS, FELT_N, "step of force"),
+        (torque, FELT_NM * HARMLESS, FELT_NM, "step of torque"),
+        (total.energy, CONSERVATIVE, CONSERVATIVE, "energy of a lap"),
+        (total.energy_in_motion, CONSERVATIVE, CONSERVATIVE, "energy of a lap in motion"),
     ];
     let (worst, bound, _, what) = graded
         .into_iter()
         .max_by(|(a, of_a, ..), (b, of_b, ..)| (a.value / of_a).total_cmp(&(b.value / of_b)))
         .unwrap_or(graded[0]);
-    let mut verdict = graded.iter().map(|(.., verdict, _)| *verdict).max().unwrap_or(Verdict::Pass);
+    let verdicts = graded.map(|(worst, bound, limit, _)| Verdict::of(worst.value, bound, limit));
+    let mut verdict = verdicts.into_iter().max().unwrap_or(Verdict::Pass);
     let mut comment = format!("{what}, relative to its bound, after {} tries", total.tries);
     let mut pose = worst.pose;
     if total.troubles > 0 {
