@@ -50,28 +50,24 @@ fn most(id: i8, axis: usize) -> f64 {
     }
 }
 
-fn vector(x: f64, y: f64, z: f64) -> DVec3 {
-    DVec3::new(x, y, z)
-}
-
 export! {
     /// Sets the force, N, and zero torque; waits for the next tick.
-    fn dhdSetForce(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { command(id, vector(x, y, z), None, true) }
+    fn dhdSetForce(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { command(id, DVec3::new(x, y, z), None, true) }
     /// Sets force, N, and torque, N·m; waits for the next tick.
     fn dhdSetForceAndTorque(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, id: i8) -> c_int [-1] {
-        command(id, vector(x, y, z), Some(vector(tx, ty, tz)), true)
+        command(id, DVec3::new(x, y, z), Some(DVec3::new(tx, ty, tz)), true)
     }
     /// Sets the force, N, and zero torque; ignores the gripper; waits for the next tick.
     fn dhdSetForceAndGripperForce(x: f64, y: f64, z: f64, _gripper: f64, id: i8) -> c_int [-1] {
-        command(id, vector(x, y, z), None, true)
+        command(id, DVec3::new(x, y, z), None, true)
     }
     /// Sets force, N, and torque, N·m; ignores the gripper; waits for the next tick.
     fn dhdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, _gripper: f64, id: i8) -> c_int [-1] {
-        command(id, vector(x, y, z), Some(vector(tx, ty, tz)), true)
+        command(id, DVec3::new(x, y, z), Some(DVec3::new(tx, ty, tz)), true)
     }
     /// Sets force, N, and torque, N·m, in addition to the regulation; returns at once.
     fn drdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, _gripper: f64, id: i8) -> c_int [-1] {
-        command(id, vector(x, y, z), Some(vector(tx, ty, tz)), false)
+        command(id, DVec3::new(x, y, z), Some(DVec3::new(tx, ty, tz)), false)
     }
     /// Reads the applied force, after all limits, N.
     fn dhdGetForce(x: Out<f64>, y: Out<f64>, z: Out<f64>, id: i8) -> c_int [-1] {
