@@ -5,7 +5,7 @@ use crate::device::{grip_id, inverse_id, kept_at_first};
 use crate::message::{NO_TRANSFORM, set};
 use crate::service::{MOST_SETTINGS_BYTES, Service, Session, Shared};
 use crate::state::{Extent, damping, force_gate, session_json, write};
-use crate::view::View;
+use crate::view::{Transform, View};
 use serde_json::{Value, json};
 
 /// Emulated version of the service.
@@ -272,18 +272,14 @@ PATCH; an arm has GET, POST and DELETE of gravity_compensation, handedness, home
 fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Value, Answer> {
     let plain = View::default();
     let short = name.strip_prefix("filters/").unwrap_or(name);
+    let patched = |before: &Transform| {
+        before.patched(body.get("transform").unwrap_or(body)).ok_or_else(|| failed(400, NO_TRANSFORM))
+    };
     match (method, short) {
         ("GET", _) => {}
-        ("POST" | "PATCH", "transform") => {
-            let patch = body.get("transform").unwrap_or(body);
-            view.workspace = view.workspace.patched(patch).ok_or_else(|| failed(400, NO_TRANSFORM))?;
-        }
+        ("POST" | "PATCH", "transform") => view.workspace = patched(&view.workspace)?,
         ("POST", _) => set(view, short, body).map_err(|why| failed(400, &why))?,
-        ("PATCH", "mount") => {
-            let patch = body.get("transform").unwrap_or(body);
-            let mount = view.mount.patched(patch).ok_or_else(|| failed(400, NO_TRANSFORM))?;
-            view.set_mount(mount);
-        }
+        ("PATCH", "mount") => view.set_mount(patched(&view.mount)?),
         ("DELETE", "basis") => view.basis = plain.basis,
         ("DELETE", "mount" | "preset") => {
             view.set_preset("defaults");
