@@ -135,7 +135,7 @@ impl Holder {
             seen(progress, &command);
             link.send(request(&command, self.period_us), tick.wrapping_mul(self.period_us)).map_err(lost)?;
             let newest = if self.lockstep {
-                link.wait_for(link.sequence(), PATIENCE).map_err(lost)?
+                link.wait_for(link.sequence, PATIENCE).map_err(lost)?
             } else {
                 std::thread::sleep((started + period * (tick + 1)).saturating_duration_since(Instant::now()));
                 link.take().map_err(lost)?

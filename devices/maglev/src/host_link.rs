@@ -34,7 +34,8 @@ pub(crate) struct HostLink {
     /// `None` once the link is lost: the system gives the name of the port to the next device only after this one is
     /// closed.
     transport: Option<Box<dyn Transport>>,
-    sequence: u32,
+    /// Sequence number of the newest request.
+    pub(crate) sequence: u32,
     /// 0 until armed.
     session: u32,
     intake: Intake,
@@ -49,11 +50,6 @@ impl HostLink {
     /// Returns the numbers of rejected replies, by reason.
     pub(crate) fn rejections(&self) -> &Rejections {
         self.intake.rejections()
-    }
-
-    /// Returns the sequence number of the newest request.
-    pub(crate) fn sequence(&self) -> u32 {
-        self.sequence
     }
 
     /// Sends a request. Real-time: bounded, no allocation; one system call.

@@ -31,7 +31,7 @@ const SLEW: [f64; 2] = [55.0e3, 6.3e3];
 pub(crate) struct MlDevice {
     session: Session,
     facts: Facts,
-    stop: Arc<Stop>,
+    pub(crate) stop: Arc<Stop>,
     pub(crate) calibration: VerticalCalibration,
 }
 
@@ -78,10 +78,6 @@ impl MlDevice {
         let facts = session.facts().map_err(|failed| refused(address, failed))?;
         let stop = Arc::new(Stop::open(address).map_err(Refusal::resource)?);
         Ok(Self { session, facts, stop, calibration: VerticalCalibration::NONE })
-    }
-
-    pub(crate) fn stop(&self) -> &Arc<Stop> {
-        &self.stop
     }
 
     /// Returns the version of the controller in place of a serial number, which the protocol does not have.

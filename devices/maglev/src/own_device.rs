@@ -238,7 +238,7 @@ impl OwnActive {
         #[allow(clippy::cast_possible_truncation)] // the clock on the wire wraps
         match self.opened.link.send(request, (tick.time_ns / 1000) as u32) {
             Ok(()) => {
-                self.awaited = Some(self.opened.link.sequence());
+                self.awaited = Some(self.opened.link.sequence);
                 Cycle::Fresh
             }
             Err(LinkLost) => Cycle::Fault(Fault::Disconnected),

@@ -35,7 +35,7 @@ impl std::fmt::Display for NoResults {
 
 /// A connection with timed reads of whole frames.
 pub(crate) struct Line {
-    stream: TcpStream,
+    pub(crate) stream: TcpStream,
     intake: Intake,
 }
 
@@ -45,10 +45,6 @@ impl Line {
         // Reset when dropped, so that the controller detects the end of its client at once.
         reset_when_dropped(&stream);
         Ok(Self { stream, intake: Intake::default() })
-    }
-
-    pub(crate) fn stream(&self) -> &TcpStream {
-        &self.stream
     }
 
     /// Sends a frame. Real-time: bounded, no allocation; one system call.
@@ -81,17 +77,13 @@ impl Line {
 pub(crate) struct Control {
     line: Line,
     outstanding: Option<(Function, Instant)>,
-    is_lost: bool,
+    /// True after an error of the connection or a timeout of [`Self::call`]; no further call is then sent.
+    pub(crate) is_lost: bool,
 }
 
 impl Control {
     pub(crate) fn new(line: Line) -> Self {
         Self { line, outstanding: None, is_lost: false }
-    }
-
-    /// Returns true after an error of the connection or a timeout of [`Self::call`]; no further call is then sent.
-    pub(crate) fn is_lost(&self) -> bool {
-        self.is_lost
     }
 
     /// Returns the start of the outstanding call, if any.

@@ -99,7 +99,7 @@ impl Session {
     }
 
     pub(crate) fn is_lost(&self) -> bool {
-        self.control.is_lost()
+        self.control.is_lost
     }
 
     /// Returns the number of ticks superseded by a newer tick before use.
@@ -327,7 +327,7 @@ impl Session {
 impl Drop for Session {
     /// Ends the session in the two steps of the protocol; a lost connection is reset.
     fn drop(&mut self) {
-        if self.control.is_lost() {
+        if self.control.is_lost {
             return;
         }
         if self.events.is_some() {
