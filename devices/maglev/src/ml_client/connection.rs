@@ -144,10 +144,9 @@ impl Events {
     pub(crate) fn open(address: &str, patience: Duration) -> Result<(Self, i32), NoResults> {
         let line = Line::open(address).map_err(|_| NoResults::Lost)?;
         let mut asking = Control::new(line);
-        match asking.call(&Request::Plain(Function::RequestToken), patience)? {
-            Results::Token(token) => Ok((Self { line: asking.line }, token)),
-            _ => Err(NoResults::Malformed),
-        }
+        let results = asking.call(&Request::Plain(Function::RequestToken), patience)?;
+        let token = results.try_into().map_err(|_| NoResults::Malformed)?;
+        Ok((Self { line: asking.line }, token))
     }
 
     /// Reads the next event; `None` without one within the budget, and for an unknown event, which is acknowledged as
