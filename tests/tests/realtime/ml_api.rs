@@ -6,8 +6,8 @@ use super::counted;
 use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, SampleWait, Tick, Wrench};
 use flotor_maglev_emulator::controller::Sample;
-use flotor_maglev_emulator::ml_api::server::Hub;
-use flotor_maglev_emulator::ml_api::{Controller, ControllerConfig, Machine, Server};
+use flotor_maglev_emulator::ml_api::server::{Hub, serve};
+use flotor_maglev_emulator::ml_api::{Controller, ControllerConfig, Machine};
 use flotor_maglev_emulator::port::{Port, Reach};
 use flotor_maglev_emulator::{Pace, Plant};
 use flotor_tests::TestSize;
@@ -106,7 +106,7 @@ fn a_minute_of_ticks_comes_at_the_controllers_rate_and_allocates_nothing() {
     let controller = Controller::new(ControllerConfig::DEFAULT);
     let hub = Arc::new(Hub::new(controller, Vec::new(), false, Box::new(|_| ())));
     let mut machine = Machine::new(Arc::clone(&hub), Pace::RealTime, Held);
-    let _server = Server::start(port, hub).expect("a thread starts");
+    serve(port, hub).expect("a thread starts");
     let stopped = Arc::clone(&stop);
     let machine = std::thread::spawn(move || machine.run(&stopped));
 

@@ -7,9 +7,9 @@ use clap::{Args, ValueEnum};
 use flotor_emulation::command_line::{say, within};
 use flotor_hal::Refusal;
 use flotor_maglev::ml_api::PORT;
-use flotor_maglev_emulator::ml_api::server::Hub;
+use flotor_maglev_emulator::ml_api::server::{self, Hub};
 use flotor_maglev_emulator::ml_api::{
-    Commanders, Controller, ControllerConfig, ForceCommand, InjectedFault, Machine, Server, Silence,
+    Commanders, Controller, ControllerConfig, ForceCommand, InjectedFault, Machine, Silence,
 };
 use flotor_maglev_emulator::{Pace, Plant};
 use std::error::Error;
@@ -143,7 +143,7 @@ fn run(
         Box::new(|line| say(&line.to_string())),
     ));
     let mut machine = Machine::new(Arc::clone(&hub), pace, plant);
-    let _server = Server::start(listen(arguments, PORT)?, hub)?;
+    server::serve(listen(arguments, PORT)?, hub)?;
     machine.run(&AtomicBool::new(false));
     Ok(())
 }
