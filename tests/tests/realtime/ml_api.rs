@@ -103,7 +103,7 @@ fn a_minute_of_ticks_comes_at_the_controllers_rate_and_allocates_nothing() {
     let port = Port::bind("127.0.0.1:0", Reach::ThisUser).expect("there is a free port");
     let address = port.address().expect("it is bound").to_string();
     let stop = Arc::new(AtomicBool::new(false));
-    let controller = Controller::new(ControllerConfig::DEFAULT);
+    let controller = Controller::new(ControllerConfig::default());
     let hub = Arc::new(Hub::new(controller, Vec::new(), false, Box::new(|_| ())));
     let mut machine = Machine::new(Arc::clone(&hub), Pace::RealTime, Held);
     serve(port, hub).expect("a thread starts");

@@ -79,12 +79,6 @@ impl<P: Plant> Emulator<P> {
         emulator
     }
 
-    /// Returns the emulated controller, with mode, condition and numbers of rejected requests.
-    #[must_use]
-    pub fn controller(&self) -> &Controller {
-        &self.controller
-    }
-
     /// Serves one host until the link is lost or `stop` is true, and passes mode changes and the end to `log`; then
     /// switches the coils off.
     pub fn serve(&mut self, link: &mut dyn Transport, stop: &AtomicBool, log: &mut dyn FnMut(Event)) {

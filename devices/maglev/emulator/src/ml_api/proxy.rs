@@ -87,7 +87,7 @@ impl ForceModel for MlApiModel {
             commanders: settings.one_of("commanders", [Commanders::One, Commanders::All]),
             silence: settings.one_of("on_silence", [Silence::Lands, Silence::Ignored]),
             watchdog_s: settings.number_or_default("watchdog_ms") * 1.0e-3,
-            ..ControllerConfig::DEFAULT
+            ..ControllerConfig::default()
         };
         let reaches = [Reach::ThisUser, Reach::ThisMachine, Reach::AnyMachine];
         Ok(Self {

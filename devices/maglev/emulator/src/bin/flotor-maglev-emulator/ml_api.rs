@@ -110,7 +110,7 @@ impl MlApiArguments {
             commanders: self.commanders,
             silence: self.on_silence,
             watchdog_s: self.watchdog_ms * 1.0e-3,
-            ..ControllerConfig::DEFAULT
+            ..ControllerConfig::default()
         }
     }
 }

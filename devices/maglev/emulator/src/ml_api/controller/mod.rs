@@ -14,5 +14,5 @@ mod progress;
 mod tests;
 
 pub use answer::Answer;
-pub use machine::{Commanders, Controller, ControllerConfig, Flight, ForceCommand, Injected, Silence};
+pub use machine::{Commanders, Controller, ControllerConfig, Flight, ForceCommand, Silence};
 pub use procedure::ProcedureId;

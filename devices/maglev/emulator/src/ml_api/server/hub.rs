@@ -146,8 +146,8 @@ impl Hub {
         }
         if state.commander == Some(id) {
             state.commander = None;
-            let lands = state.controller.config().silence == Silence::Lands;
-            if lands && matches!(state.controller.flight(), Flight::TakingOff | Flight::Flying) {
+            let lands = state.controller.config.silence == Silence::Lands;
+            if lands && matches!(state.controller.flight, Flight::TakingOff | Flight::Flying) {
                 (self.log)(format_args!("landing why=client-lost client={id}"));
                 state.controller.land();
             }
@@ -281,7 +281,7 @@ mod tests {
 
     #[test]
     fn a_tick_that_nobody_answers_is_waited_for_for_a_while() {
-        let controller = Controller::new(ControllerConfig::DEFAULT);
+        let controller = Controller::new(ControllerConfig::default());
         let hub = Hub::new(controller, Vec::new(), false, Box::new(|_| ()));
         let client = hub.connect("here");
         let token = hub.becomes_callback(hub.connect("here"));
