@@ -87,10 +87,9 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
 /// Reads the poses from a file or from standard input.
 fn read_poses(path: &Path) -> Result<Poses, CommandError> {
     let problem = |cause| {
+        let path = path.display();
         CommandError::Usage(format!(
-            "{}: {}",
-            path.display(),
-            format_args!("cannot read the poses: {cause}; check the path and its permissions")
+            "{path}: cannot read the poses: {cause}; check the path and its permissions"
         ))
     };
     let bytes = read(path).map_err(problem)?;

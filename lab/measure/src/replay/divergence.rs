@@ -123,7 +123,7 @@ pub(super) struct Evidence {
     /// First tick in which a model was disabled in the run only.
     disabled_at: Option<u64>,
     /// Cause of the first differing tick.
-    cause: Option<DivergenceCause>,
+    pub(super) cause: Option<DivergenceCause>,
 }
 
 impl Evidence {
@@ -166,11 +166,6 @@ impl Evidence {
             DivergenceCause::OtherBuild
         };
         self.cause = Some(cause);
-    }
-
-    /// Returns the cause of a difference in an unchanged replay; `None` if no tick differs.
-    pub(super) fn cause(&self) -> Option<DivergenceCause> {
-        self.cause.clone()
     }
 
     /// Returns a cause of a difference besides the change; `None` if no tick differs or the recording shows no such cause.

@@ -244,7 +244,7 @@ impl<'r> Replay<'r> {
             evidence.coverage.break_off(record.tick);
         }
         difference.finish();
-        let why = if self.held.is_nothing() { evidence.cause() } else { evidence.other_cause() };
+        let why = if self.held.is_nothing() { evidence.cause } else { evidence.other_cause() };
         let names = self.recording.run().devices().map(|device| device.name.clone());
         let found = plausibility.iter().map(PlausibilityCheck::found);
         let implausible = names.zip(found).filter(|(_, found)| found.first_tick().is_some()).collect();
