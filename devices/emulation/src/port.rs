@@ -47,7 +47,8 @@ pub enum Reach {
 /// Listening TCP port that admits the connections within its [`Reach`].
 #[derive(Debug)]
 pub struct Port {
-    listener: TcpListener,
+    /// Socket, for `poll`.
+    pub(crate) listener: TcpListener,
     reach: Reach,
 }
 
@@ -107,11 +108,6 @@ impl Port {
                 ))
             });
         }
-    }
-
-    /// Returns the socket, for `poll`.
-    pub(crate) fn listener(&self) -> &TcpListener {
-        &self.listener
     }
 }
 

@@ -68,7 +68,7 @@ impl Failed {
 pub(crate) struct Dhd {
     functions: Box<Functions>,
     id: i8,
-    wrist: Wrist,
+    pub(crate) wrist: Wrist,
 }
 
 /// Rotational axes of a device: none, sensed, or sensed and driven.
@@ -151,10 +151,6 @@ impl Dhd {
             (0, serial) => serial,
             _ => 0,
         }
-    }
-
-    pub(crate) fn wrist(&self) -> Wrist {
-        self.wrist
     }
 
     /// Returns whether the device is initialised, so that its positions are valid.

@@ -100,7 +100,7 @@ impl Device for ForceDimensionDevice {
                 dhd.name()
             )));
         }
-        let wrist = dhd.wrist();
+        let wrist = dhd.wrist;
         let of_kind = Kind::of_number(dhd.kind());
         let told = |id: &str, own: f64| match settings.number_or_default(id) {
             0.0 => own,

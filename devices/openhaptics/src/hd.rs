@@ -77,9 +77,9 @@ impl Failed {
 
 /// Open device of the SDK; dropping it closes the device.
 pub(crate) struct Hd {
-    functions: Functions,
+    pub(crate) functions: Functions,
     handle: c_uint,
-    facts: Facts,
+    pub(crate) facts: Facts,
 }
 
 /// Properties reported by a device.
@@ -171,14 +171,6 @@ impl Hd {
     pub(crate) fn failure(&self, what: &'static str) -> Failed {
         let code = self.functions.take_error();
         Failed { code, words: self.functions.words(code), what }
-    }
-
-    pub(crate) fn functions(&self) -> &Functions {
-        &self.functions
-    }
-
-    pub(crate) fn facts(&self) -> &Facts {
-        &self.facts
     }
 
     /// Returns the maker's name of the model and the serial number.
