@@ -184,18 +184,13 @@ impl Directory {
 /// Listening socket that other programs can find; dropping it removes the socket file.
 #[derive(Debug)]
 pub struct Listener {
-    socket: Arc<Listening>,
+    pub(crate) socket: Arc<Listening>,
     path: PathBuf,
     /// Metadata of the socket file after its creation.
     file: Option<Metadata>,
 }
 
 impl Listener {
-    #[must_use]
-    pub(crate) fn socket(&self) -> &Arc<Listening> {
-        &self.socket
-    }
-
     /// Waits for the next connection of a client, without a timeout.
     ///
     /// # Errors

@@ -73,7 +73,7 @@ pub struct ParameterText {
 /// Text of a scene, with an index of its lines.
 pub(super) struct Source<'t> {
     file: &'t Path,
-    text: &'t str,
+    pub(super) text: &'t str,
     /// Byte offsets of the line ends, for a lookup of line numbers by binary search.
     line_ends: Vec<usize>,
     /// Name and looked-up keys of each table that was read to its end.
@@ -110,10 +110,6 @@ impl<'t> Source<'t> {
     pub(super) fn new(file: &'t Path, text: &'t str) -> Self {
         let line_ends = text.match_indices('\n').map(|(at, _)| at).collect();
         Self { file, text, line_ends, seen: RefCell::default(), above: RefCell::default() }
-    }
-
-    pub(super) fn text(&self) -> &'t str {
-        self.text
     }
 
     /// Returns the tables that were read to their end, by name, with the keys looked up in each.

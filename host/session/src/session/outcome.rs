@@ -147,7 +147,7 @@ impl Epilogue {
         let Dismantled { devices, last_stop, forces, swaps, timing } = servo.dismantle();
         let mut unresponsive = None;
         let (mut outcomes, mut closing) = (Vec::new(), Vec::new());
-        for (name, device) in names.all().iter().zip(devices) {
+        for (name, device) in names.all.iter().zip(devices) {
             let (outcome, opened) = deactivate(&mut calls, name, device, &mut unresponsive);
             outcomes.push(outcome);
             closing.extend(opened.map(|opened| (name.clone(), opened)));
@@ -166,7 +166,7 @@ impl Epilogue {
         let unfreed_plugins = UnfreedPlugins { devices: closing, models: layers, last_stop, calls };
         let wall_s = started.elapsed().as_secs_f64();
         warnings.extend(controls.warnings());
-        warnings.extend(stop_time.as_ref().and_then(|time| time.warning(names.all())));
+        warnings.extend(stop_time.as_ref().and_then(|time| time.warning(&names.all)));
         let taken = heartbeat.signals_taken();
         if !taken.is_none() {
             warnings.push(format!(

@@ -301,7 +301,7 @@ impl Host {
     /// Waits for a tick that the caller has not seen, usually for a period and never longer than 10 ms; in lockstep executes the tick.
     /// Returns true if there was a tick. Not real-time.
     pub fn wait(&self, station: &Station) -> bool {
-        self.wait_in(station, station.turn())
+        self.wait_in(station, &station.turn)
     }
 
     /// Waits like [`Host::wait`], for one of several callers that share a device, each with its own record of seen ticks. Not real-time.
