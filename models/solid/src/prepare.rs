@@ -140,7 +140,7 @@ fn column(
     let (mut start, mut solved): (Option<Contact>, f64) = (None, 1.0);
     for (root, unbounded) in roots.iter().zip(reference) {
         let depth_m = radius_m * root * root;
-        let cell_m = cell_m(radius_m, depth_m, patch.rings());
+        let cell_m = cell_m(radius_m, depth_m, patch.rings);
         let points: Vec<[f64; 2]> =
             patch.points_m(cell_m).iter().map(|at| [at[0] + place_m[0], at[1] + place_m[1]]).collect();
         let on_face: Vec<bool> = points.iter().map(|&at| on_face(at)).collect();

@@ -12,7 +12,7 @@ use crate::half_space::{Block, HalfSpace};
 #[derive(Clone, Debug)]
 pub struct Patch {
     /// Number of cells from the middle to the rim.
-    rings: i32,
+    pub(crate) rings: i32,
     /// Positions of the cells, in units of a cell.
     cells: Vec<[i32; 2]>,
     /// Displacement under a unit force on a cell of side one, by offset of the target from the source.
@@ -94,12 +94,6 @@ impl Patch {
             })
             .collect();
         Self { rings, cells, kernel }
-    }
-
-    /// Returns the number of cells from the middle to the rim.
-    #[must_use]
-    pub fn rings(&self) -> i32 {
-        self.rings
     }
 
     /// Returns the number of cells.

@@ -218,14 +218,14 @@ impl Rod {
     /// Returns the state of the last tick's equilibrium. Real-time: bounded, no allocation.
     #[must_use]
     pub fn state(&self) -> State {
-        let unstable_directions = either!(&self.solver, equilibrium => equilibrium.unstable_directions());
+        let unstable_directions = either!(&self.solver, equilibrium => equilibrium.unstable_directions);
         State { branch: self.branch, unstable_directions }
     }
 
     /// Returns the cost of the last tick. Real-time: bounded, no allocation.
     #[must_use]
     pub fn work(&self) -> Work {
-        either!(&self.solver, equilibrium => equilibrium.work())
+        either!(&self.solver, equilibrium => equilibrium.work)
     }
 
     /// Fills in the sections of the rod after the last tick, from plate to plate, evenly in arc length of the unloaded
