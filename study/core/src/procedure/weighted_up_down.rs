@@ -205,18 +205,6 @@ impl WeightedUpDown {
         self.step
     }
 
-    /// Returns the number of reversals so far.
-    #[must_use]
-    pub fn reversals(&self) -> u32 {
-        self.reversals
-    }
-
-    /// Returns the number of trials so far.
-    #[must_use]
-    pub fn trials(&self) -> u32 {
-        self.trials
-    }
-
     /// Processes an answer. Returns true for a reversal; ignores answers after the end of the track.
     pub fn answer(&mut self, judgement: Judgement) -> bool {
         if self.is_done() {
