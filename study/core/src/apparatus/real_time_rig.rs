@@ -70,14 +70,14 @@ impl<'a> RealTimeRig<'a> {
         stop: &StopSwitch,
     ) -> Result<Self, ApparatusOrFrontEndError> {
         let options = RunOptions { clock: Clock::Real, seed: 0 };
-        let session = Session::prepare(apparatus.scene(), apparatus.registry(), &options)?;
-        let session = session.with_strength(apparatus.strength());
+        let session = Session::prepare(&apparatus.scene, &apparatus.registry, &options)?;
+        let session = session.with_strength(apparatus.strength);
         let (controls, warnings) = (session.controls(), session.warnings().to_vec());
         apparatus.show(&controls, false)?;
         let (shared, stop) = (Shared::default(), stop.clone());
-        let run = apparatus.describe(apparatus.scene(), Clock::Real, 0);
+        let run = apparatus.describe(&apparatus.scene, Clock::Real, 0);
         let host = Arc::new(OnlyStop { stop: stop.clone(), latch: session.latch().cloned() });
-        let publication = announce(&Directory::of_this_user(), apparatus.scene(), &run, &session, host);
+        let publication = announce(&Directory::of_this_user(), &apparatus.scene, &run, &session, host);
         let viewer_error = publication.as_ref().err().map(ToString::to_string);
         let observers = ObservedRun { observer: shared.clone(), publication: publication.ok() };
         let run = spawn_run(session, observers, stop.clone(), "the sitting has ended")?;
@@ -136,7 +136,7 @@ impl<'a> RealTimeRig<'a> {
         }
         let is_of_sitting = trial.number > 0;
         if let (Some(files), false, true) = (&self.files, watch.recording.is_on(), is_of_sitting) {
-            let run = self.apparatus.describe(self.apparatus.scene(), Clock::Real, 0);
+            let run = self.apparatus.describe(&self.apparatus.scene, Clock::Real, 0);
             // Keep the recording of a trial that was interrupted earlier.
             match Recorder::create(&files.next_of(trial), &run) {
                 Ok(recorder) => watch.recording = RunRecording::new(Some(recorder)),
@@ -168,7 +168,7 @@ impl<'a> RealTimeRig<'a> {
         self.apparatus.show(&self.controls, false)?;
         self.wait_for_fade();
         let kinematics = (self.kinematics != Kinematics::None).then(|| meter.finish()).flatten();
-        Ok(StimulusExploration { kinematics, boundary_hit: meter.out_of_range(), missed_ticks })
+        Ok(StimulusExploration { kinematics, boundary_hit: meter.out_of_range, missed_ticks })
     }
 
     /// Closes the recording of an answered trial; does nothing without a recording.
@@ -248,7 +248,7 @@ impl<'a> RealTimeRig<'a> {
     }
 
     fn wait_for_fade(&self) {
-        std::thread::sleep(Duration::from_secs_f64(self.apparatus.fade_s()) + SETTLE);
+        std::thread::sleep(Duration::from_secs_f64(self.apparatus.fade_s) + SETTLE);
     }
 
     /// Waits until the loop has sampled the stimulus at least once, at most 5 s: on a busy machine the time of a fade may pass

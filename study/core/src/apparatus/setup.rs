@@ -123,15 +123,16 @@ enum Route {
 
 /// Checked scene with its varied stimulus.
 pub struct Apparatus {
-    scene: Scene,
-    registry: Registry,
+    pub(super) scene: Scene,
+    pub(super) registry: Registry,
     stimulus: Stimulus,
     route: Route,
     /// Blend weight of the model while it is felt, 0 to 1; below, its fade time, s.
     weight: f64,
-    fade_s: f64,
+    pub(super) fade_s: f64,
     plugins: Vec<PluginReport>,
-    strength: Strength,
+    /// Permission for devices with limits above the host's force ceiling.
+    pub(super) strength: Strength,
     notices: Vec<String>,
 }
 
@@ -210,11 +211,6 @@ impl Apparatus {
         &self.notices
     }
 
-    /// Returns whether devices with limits above the host's force ceiling are permitted.
-    pub(super) fn strength(&self) -> Strength {
-        self.strength
-    }
-
     /// Checks that the first device has all parameters of a simulated hand.
     ///
     /// # Errors
@@ -285,14 +281,6 @@ impl Apparatus {
         self.route == Route::Swap
     }
 
-    pub(super) fn registry(&self) -> &Registry {
-        &self.registry
-    }
-
-    pub(super) fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
     /// Returns the scene with the hand parameters of a simulated subject.
     pub(super) fn scene_with_hand(&self, seed: u64, subject: SubjectNumber) -> Scene {
         let hand = HandManner::of(seed, subject);
@@ -308,11 +296,6 @@ impl Apparatus {
     /// Returns the description of the run for a recording.
     pub(super) fn describe(&self, scene: &Scene, clock: Clock, seed: u64) -> RunDescription {
         describe(scene, &options(clock, seed), &self.plugins)
-    }
-
-    /// Returns the fade time of the object, s.
-    pub(super) fn fade_s(&self) -> f64 {
-        self.fade_s
     }
 
     /// Starts to fade the object in (`shown`) or out.

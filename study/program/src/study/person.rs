@@ -148,7 +148,7 @@ fn note_conditions(
     screen_texts: Option<&str>,
 ) -> Result<(), LogError> {
     let notes = [
-        Some(format!("white noise: {}", noise.map_or("none", WhiteNoise::player))),
+        Some(format!("white noise: {}", noise.map_or("none", |noise| noise.name))),
         screen_texts.map(|texts| format!("texts of the screens: SHA-256 {}", digest(texts))),
         Some(format!("least time {} s, least movement {} mm", common.least_time, common.least_movement_mm)),
         common.feel_again.map(|times| format!("at most {times} repetitions of a trial")),

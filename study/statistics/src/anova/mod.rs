@@ -107,11 +107,11 @@ pub struct Sphericity {
 pub fn analyse(design: &Design, kind: SumOfSquares) -> Vec<Effect> {
     let between = design.between_terms();
     let full = Basis::of(&columns(design, between.iter()));
-    let rounding = ROUNDING * design.responses().trace_of_square();
+    let rounding = ROUNDING * design.responses.trace_of_square();
     let mut effects = Vec::new();
     let mut error_total = 0.0;
     for within in design.within_terms() {
-        let contrasts = design.responses().times(&design.contrasts(&within));
+        let contrasts = design.responses.times(&design.contrasts(&within));
         let error = full.residual_products(&contrasts);
         error_total += error.trace();
         for term in &between {
