@@ -240,7 +240,9 @@ fn what_cannot_be_opened_is_refused_in_one_sentence_with_what_to_do() {
         (
             plain(),
             vec![("grip", "1234")],
-            format!("no grip 1234 (its grips: {GRIP}); set `grip` to one of their ids, or to `none`"),
+            format!(
+                "no grip 1234 (its grips: {GRIP}); connect the grip, or set `grip` to one of their ids, or to `none`"
+            ),
         ),
         (answering(1, configured(0.3)), vec![], "`config.filters.force_gate.gain` of the device".to_owned()),
     ] {

@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<(), CommandError> {
             }
             InvalidCalibration::Count(_) => format!("--excess: {invalid}"),
             InvalidCalibration::Share { height_m, share } => format!(
-                "the ratio of delivered to commanded force is {share:?} at {:.3} mm, but must be between 0.5 and 2; correct \
+                "the ratio of delivered to commanded force is {share} at {:.3} mm, but must be between 0.5 and 2; correct \
                  --excess, --at or --range-mm",
                 height_m * 1.0e3
             ),
