@@ -10,27 +10,20 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 /// Cause of a call without results.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum NoResults {
     /// The connection is lost.
+    #[error("the controller closed the connection")]
     Lost,
     /// No reply within the timeout.
+    #[error("the controller did not answer in time")]
     Silent,
     /// The received frame is no reply to the call.
+    #[error("the controller sent a malformed reply")]
     Malformed,
     /// The controller rejected the call with this status.
+    #[error("the controller rejected the request: {0}")]
     Refused(Status),
-}
-
-impl std::fmt::Display for NoResults {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Lost => f.write_str("the controller closed the connection"),
-            Self::Silent => f.write_str("the controller did not answer in time"),
-            Self::Malformed => f.write_str("the controller sent a malformed reply"),
-            Self::Refused(status) => write!(f, "the controller rejected the request: {status}"),
-        }
-    }
 }
 
 /// A connection with timed reads of whole frames.

@@ -51,26 +51,18 @@ pub(crate) struct TakenOff {
 }
 
 /// Error of a session: failed call with its function, persistent faults, or missing ticks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Failed {
+    #[error("{}: {}", .0.name(), .1)]
     At(Function, NoResults),
+    #[error(
+        "the controller stays faulted ({0}); hold the handle still within the range of the sensors, and let hot coils cool"
+    )]
     Faulted(FaultBits),
+    #[error(
+        "the controller sends no ticks; end other programs that use the controller, and restart the controller"
+    )]
     NoTick,
-}
-
-impl std::fmt::Display for Failed {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::At(function, why) => write!(f, "{}: {why}", function.name()),
-            Self::Faulted(bits) => write!(
-                f,
-                "the controller stays faulted ({bits}); hold the handle still within the range of the sensors, and let hot coils cool"
-            ),
-            Self::NoTick => f.write_str(
-                "the controller sends no ticks; end other programs that use the controller, and restart the controller",
-            ),
-        }
-    }
 }
 
 /// Session with a controller: control connection, callback connection for events, and count of unacknowledged ticks.

@@ -3,7 +3,6 @@
 
 use super::controller::Flight;
 use flotor_maglev::ml_api::{FaultBits, Status};
-use std::fmt;
 use std::str::FromStr;
 
 /// Duration of an injected fault of the machine, s.
@@ -66,22 +65,13 @@ pub struct InjectedFault {
 }
 
 /// Error: text that describes no fault.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` is not a fault: write KIND[@STATE][+MS]; kinds: silence, half-frame, close, reset, stall, wrong-length, \
+     status=CODE/N (CODE decimal), late-tick, out-of-range, over-temperature, over-current, over-speed; states: landed, \
+     taking-off, flying, ticking, landing"
+)]
 pub struct Unknown(String);
-
-impl fmt::Display for Unknown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "`{}` is not a fault: write KIND[@STATE][+MS]; kinds: silence, half-frame, close, reset, stall, wrong-length, \
-             status=CODE/N (CODE decimal), late-tick, out-of-range, over-temperature, over-current, over-speed; states: landed, \
-             taking-off, flying, ticking, landing",
-            self.0
-        )
-    }
-}
-
-impl std::error::Error for Unknown {}
 
 impl FromStr for InjectedFault {
     type Err = Unknown;
