@@ -216,6 +216,23 @@ fn run(chip: &dyn Chip) -> Result<Report, BootFailure> {
     }
 }
 
+/// Prompts the boot loader until it replies.
+fn prompt(chip: &dyn Chip, line: &mut Line<'_>) -> Result<(), BootFailure> {
+    for _ in 0..PROMPTS {
+        chip.write(&PROMPT)?;
+        let mut answer = Vec::with_capacity(PROMPT_ANSWER.len() + 1);
+        while answer.len() <= PROMPT_ANSWER.len()
+            && let Some(byte) = line.next(ANSWER)?
+        {
+            answer.push(byte);
+            if answer.strip_prefix(&[0]).unwrap_or(&answer) == PROMPT_ANSWER {
+                return Ok(());
+            }
+        }
+    }
+    Err(BootFailure::NoPrompt)
+}
+
 /// Runs the handshake and loads the firmware.
 fn load(chip: &dyn Chip, firmware: &[u8]) -> Result<(), BootFailure> {
     chip.request(Request::Reset, 1)?;
@@ -228,26 +245,7 @@ fn load(chip: &dyn Chip, firmware: &[u8]) -> Result<(), BootFailure> {
         chip.request(Request::ModemLines, lines)?;
     }
     let mut line = Line::new(chip);
-    let mut has_answered = false;
-    for _ in 0..PROMPTS {
-        chip.write(&PROMPT)?;
-        let mut answer = Vec::with_capacity(PROMPT_ANSWER.len() + 1);
-        while answer.len() <= PROMPT_ANSWER.len()
-            && let Some(byte) = line.next(ANSWER)?
-        {
-            answer.push(byte);
-            has_answered = answer.strip_prefix(&[0]).unwrap_or(&answer) == PROMPT_ANSWER;
-            if has_answered {
-                break;
-            }
-        }
-        if has_answered {
-            break;
-        }
-    }
-    if !has_answered {
-        return Err(BootFailure::NoPrompt);
-    }
+    prompt(chip, &mut line)?;
     chip.request(Request::ModemLines, DTR_LOW)?;
     chip.request(Request::BaudRate, LOAD_DIVISOR)?;
     chip.write(&[AGREED])?;
