@@ -31,7 +31,8 @@ pub(crate) struct MlApiArguments {
     #[arg(long, default_value = "ml-api.mcap", value_name = "FILE")]
     pub(crate) record: std::path::PathBuf,
     /// With --device: watchdog limit of a tick of the host, in ms, 3 to 60000 (default: 100)
-    #[arg(long, requires = "device", value_name = "MS", value_parser = host_watchdog_ms)]
+    // At least three periods of the host's loop at 1 kHz.
+    #[arg(long, requires = "device", value_name = "MS", value_parser = within(3.0, 60_000.0, "ms"))]
     pub(crate) host_watchdog_ms: Option<f64>,
     /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device
     #[arg(long, requires = "device")]
@@ -50,7 +51,7 @@ pub(crate) struct MlApiArguments {
     on_silence: Silence,
     /// Longest time without an acknowledged tick while a client commands forces and is registered for ticks, in ms,
     /// 1 to 60000
-    #[arg(long, default_value_t = 500.0, value_name = "MS", value_parser = watchdog_ms)]
+    #[arg(long, default_value_t = 500.0, value_name = "MS", value_parser = within(1.0, 60_000.0, "ms"))]
     watchdog_ms: f64,
     /// Fault to inject, as KIND[@STATE][+MS], like reset@flying+200 (repeatable): silence, half-frame, close, reset, stall,
     /// wrong-length, status=CODE/N (CODE decimal, every Nth call), late-tick, out-of-range, over-temperature, over-current,
@@ -73,15 +74,6 @@ enum HandOption {
 /// Returns the name of a value on the command line.
 fn name(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
-}
-
-/// Parses a limit of at least three periods of the host's loop at 1 kHz.
-fn host_watchdog_ms(text: &str) -> Result<f64, String> {
-    within(text, 3.0, 60_000.0, "ms")
-}
-
-fn watchdog_ms(text: &str) -> Result<f64, String> {
-    within(text, 1.0, 60_000.0, "ms")
 }
 
 impl MlApiArguments {
