@@ -1,7 +1,7 @@
 //! Implementation of the device contract for Force Dimension's devices, with their parameters.
 
 use crate::dhd::{Dhd, Setup, Which, Wrist};
-use crate::driver::{Driver, Why};
+use crate::driver::Driver;
 use crate::kind::Kind;
 use flotor_hal::{
     ActiveDevice, Axes, Capabilities, Choices, ConnectionDevice, Cycle, Device, DeviceInfo, DeviceState,
@@ -188,15 +188,8 @@ impl Device for ForceDimensionDevice {
                 let end = LoopEnd::new(Arc::clone(&self.exchange), self.setup.most, self.timeout);
                 Ok(EnergizedDevice { opened: self, driver, end })
             }
-            Err((dhd, why)) => {
+            Err((dhd, refusal)) => {
                 self.dhd = dhd;
-                let refusal = match why {
-                    Why::Failed(failed) => failed.refusal(),
-                    Why::NoThread(error) => Refusal::resource(format!(
-                        "cannot start a thread for the device: {error}; end other programs of this user, or raise \
-                             the limit of its threads"
-                    )),
-                };
                 Err((self, refusal))
             }
         }
