@@ -113,33 +113,18 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     ),
     Parameter::real("wall_radius_mm", "mm", 1.0, 12.0, 11.0, "Radius of the spherical wall about home")
         .live(),
-    Parameter::real(
+    plane(
         "wall_x_mm",
-        "mm",
-        0.5,
-        12.0,
-        12.0,
         "Distance from home to each of the two walls perpendicular to x; no effect beyond `wall_radius_mm`",
-    )
-    .live(),
-    Parameter::real(
+    ),
+    plane(
         "wall_y_mm",
-        "mm",
-        0.5,
-        12.0,
-        12.0,
         "Distance from home to each of the two walls perpendicular to y; no effect beyond `wall_radius_mm`",
-    )
-    .live(),
-    Parameter::real(
+    ),
+    plane(
         "wall_z_mm",
-        "mm",
-        0.5,
-        12.0,
-        12.0,
         "Distance from home to each of the two walls perpendicular to z; no effect beyond `wall_radius_mm`",
-    )
-    .live(),
+    ),
     Parameter::real(
         "wall_stiffness_n_per_m",
         "N/m",
@@ -189,6 +174,11 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     )
     .live(),
 ];
+
+/// Returns the parameter of the distance from home to two opposite walls.
+const fn plane(id: &'static str, doc: &'static str) -> Parameter {
+    Parameter::real(id, "mm", 0.5, 12.0, 12.0, doc).live()
+}
 
 /// Protocol of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
