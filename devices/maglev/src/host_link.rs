@@ -132,7 +132,7 @@ impl HostLink {
         &mut self,
         request: Request,
         patience: Duration,
-        mut satisfies: impl FnMut(&Received, u32) -> Option<T>,
+        mut satisfies: impl FnMut(&Received) -> Option<T>,
     ) -> Result<T, Unanswered> {
         let started = Instant::now();
         while started.elapsed() < patience {
@@ -142,7 +142,7 @@ impl HostLink {
                 let transport = self.transport.as_mut().ok_or(Unanswered::Lost)?;
                 let incoming = transport.wait(rest).map_err(|LinkLost| Unanswered::Lost)?;
                 let received = self.judge(&incoming);
-                if let Some(answer) = satisfies(&received, self.sequence) {
+                if let Some(answer) = satisfies(&received) {
                     return Ok(answer);
                 }
             }
@@ -157,7 +157,7 @@ impl HostLink {
             pages.push(self.ask(
                 Request::Describe { page: number },
                 patience,
-                |received, _| match received {
+                |received| match received {
                     Received::Page(page) if page.number() == number => Some(*page),
                     _ => None,
                 },
@@ -193,7 +193,7 @@ impl HostLink {
     }
 
     fn ask_mode(&mut self, request: Request, mode: Mode, patience: Duration) -> Result<Status, Unanswered> {
-        self.ask(request, patience, |received, _| match received {
+        self.ask(request, patience, |received| match received {
             Received::Status(newest) if newest.status.mode == mode => Some(newest.status),
             _ => None,
         })
