@@ -2,10 +2,10 @@
 
 use super::state::{Callback, CallbackEnd, Client, EVENTS, Id, Log, Next, State};
 use crate::controller::Sample;
-use crate::ml_api::controller::{Answer, Controller, Flight, ProcedureId, Silence};
+use crate::ml_api::controller::{Answer, Controller, Flight, ProcedureId, Silence, is_command};
 use crate::ml_api::injected_fault::{Deed, InjectedFault, Plan};
 use flotor_hal::Wrench;
-use flotor_maglev::ml_api::{EventKind, Function, InvalidRequest, Reply, Request};
+use flotor_maglev::ml_api::{EventKind, InvalidRequest, Reply, Request};
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -247,18 +247,6 @@ impl Hub {
         drop(state);
         self.changed.notify_all();
     }
-}
-
-/// Returns true for a function that only sets the target or the wrench of the next servo interval.
-fn is_command(function: Function) -> bool {
-    matches!(
-        function,
-        Function::SetForces
-            | Function::SetForceAxis
-            | Function::SetCurrents
-            | Function::SetDesiredPosition
-            | Function::SetVelocity
-    )
 }
 
 /// Result of a wait for acknowledgements.
