@@ -108,10 +108,7 @@ fn capabilities(device: &str, sets: &[(&str, &str)]) -> Option<Capabilities> {
 /// of 0 on the axes without actuators, as the controller model commands all six axes.
 fn felt(device: &Capabilities) -> Option<[f64; 3]> {
     let is_driven = [Axes::X, Axes::Y, Axes::Z].map(|axis| device.actuated.contains(axis));
-    let mut felt_n = device.max_force_n;
-    for (most_n, is_driven) in felt_n.iter_mut().zip(is_driven) {
-        *most_n = if is_driven { *most_n } else { 0.0 };
-    }
+    let felt_n = std::array::from_fn(|axis| if is_driven[axis] { device.max_force_n[axis] } else { 0.0 });
     (is_driven != [true; 3]).then_some(felt_n)
 }
 
