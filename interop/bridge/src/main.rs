@@ -12,7 +12,7 @@ use flotor_bridge::request::{Request, Right};
 use flotor_bridge::serve::{Launcher, Service, serve};
 use flotor_bridge::stop_channel::press_both_ways;
 use flotor_hal::terminal::{escaped, escaped_arguments};
-use flotor_live::{Directory, SetValue};
+use flotor_live::Directory;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -73,7 +73,7 @@ enum Command {
         /// Name of the bridge, such as lab or zenoh/lab, as `flotor bridge list` prints it
         name: Name,
         #[command(subcommand)]
-        request: RequestArgument,
+        request: Request,
     },
     /// List the bridges on the network
     List,
@@ -97,31 +97,6 @@ struct ServeArguments {
     every: u32,
 }
 
-#[derive(Subcommand)]
-enum RequestArgument {
-    /// Emergency stop: all forces on the bridge's machine are zero at once, the runs end, and none starts before the release
-    EmergencyStop,
-    /// Normal stop: the force fades out
-    Stop,
-    /// Change live parameters, all in the same tick
-    Set {
-        /// New value of a live parameter, such as spring.gamma_n=20 (repeatable)
-        #[arg(required = true, value_name = "PLUGIN.KEY=VALUE", value_parser = set_value)]
-        values: Vec<SetValue>,
-    },
-    /// Change the blend weight of a model
-    Weight {
-        /// Name of the model in the scene
-        model: String,
-        /// Blend weight, 0 to 1
-        weight: f64,
-    },
-    /// Start the scene of `flotor bridge serve --scene`
-    Start,
-    /// Release an emergency stop
-    Release,
-}
-
 #[derive(Args)]
 struct KeysArguments {
     /// New folder for keys and configurations
@@ -141,12 +116,6 @@ struct KeysArguments {
     /// Validity of the keys in days, at most 36500
     #[arg(long, value_name = "DAYS", default_value = "365", value_parser = clap::value_parser!(u64).range(1..=36_500))]
     days: u64,
-}
-
-fn set_value(text: &str) -> Result<SetValue, String> {
-    let parts = text.split_once('=').and_then(|(key, value)| Some((key.split_once('.')?, value)));
-    let ((plugin, parameter), value) = parts.ok_or("write PLUGIN.KEY=VALUE, such as spring.gamma_n=20")?;
-    Ok(SetValue { plugin: plugin.to_owned(), parameter: parameter.to_owned(), value: value.to_owned() })
 }
 
 /// Exit code for errors of the command line or the configuration.
@@ -193,14 +162,14 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             report_line(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
             record_run(&remote, &file, &stop)?;
         }
-        Command::Ask { name, request: RequestArgument::EmergencyStop } => {
+        Command::Ask { name, request: Request::EmergencyStop } => {
             let link = link.or_this_user(&directory, None);
             let datagrams = stop_channel(&link)?;
             press_both_ways(link, datagrams, &name)?;
         }
         Command::Ask { name, request } => {
             let remote = Remote::listen(&visit(link, &directory)?, &name)?;
-            remote.requests().run(request.into())?;
+            remote.requests().run(request)?;
         }
         Command::List => list(&visit(link, &directory)?)?,
         Command::Keys(arguments) => make_keys(arguments)?,
@@ -317,17 +286,4 @@ fn service(arguments: ServeArguments) -> Result<Service, Box<dyn Error>> {
     let program = std::env::current_exe()?.with_file_name(format!("flotor{}", std::env::consts::EXE_SUFFIX));
     let launcher = scene.map(|scene| Launcher::new(program, scene));
     Ok(Service { name: name.unwrap_or_else(Name::of_this_machine), allow, every, launcher })
-}
-
-impl From<RequestArgument> for Request {
-    fn from(argument: RequestArgument) -> Self {
-        match argument {
-            RequestArgument::EmergencyStop => Request::EmergencyStop,
-            RequestArgument::Stop => Request::Stop,
-            RequestArgument::Set { values } => Request::Set { values },
-            RequestArgument::Weight { model, weight } => Request::Weight { model, weight },
-            RequestArgument::Start => Request::Start,
-            RequestArgument::Release => Request::Release,
-        }
-    }
 }
