@@ -244,18 +244,15 @@ impl RequestHandler {
             });
         }
         let status = self.now(&inside);
-        let has_changed = match &inside.reported {
-            None => true,
-            Some((last, since)) => {
-                since.elapsed() >= STATUS_PERIOD
-                    || Status {
-                        published: last.published,
-                        ticket: last.ticket,
-                        couplings: last.couplings.clone(),
-                        ..status.clone()
-                    } != *last
-            }
-        };
+        let has_changed = inside.reported.as_ref().is_none_or(|(last, since)| {
+            since.elapsed() >= STATUS_PERIOD
+                || Status {
+                    published: last.published,
+                    ticket: last.ticket,
+                    couplings: last.couplings.clone(),
+                    ..status.clone()
+                } != *last
+        });
         if has_changed {
             inside.reported = Some((status.clone(), Instant::now()));
             drop(inside);
