@@ -306,11 +306,10 @@ impl Sweep {
         let scene = self.scene_at(&point, scene)?;
         let options = flotor_session::RunOptions { clock: flotor_servo::Clock::Virtual, seed: point.seed };
         match flotor_session::Session::prepare(&scene, &Registry::search(folders), &options) {
-            Ok(_) => Ok(()),
             Err(flotor_session::RunError::Scene(error)) => Err(error.into()),
             Err(flotor_session::RunError::Lookup(error)) => Err(error.into()),
             // Other errors belong to this point, and become its row.
-            Err(_) => Ok(()),
+            Ok(_) | Err(_) => Ok(()),
         }
     }
 }
@@ -353,14 +352,9 @@ fn check_model_axes(plan: &Plan, plugin: &Plugin) -> Result<(), SweepError> {
 
 /// Returns the files of a scene's plugins.
 fn used_plugins(scene: &Scene, registry: &Registry) -> Result<Vec<PathBuf>, SweepError> {
-    let mut files = Vec::new();
-    for device in &scene.devices {
-        files.push(registry.load(&device.plugin.plugin, PluginKind::Device)?.metadata().path.clone());
-    }
-    for model in &scene.models {
-        files.push(registry.load(&model.plugin.plugin, PluginKind::Model)?.metadata().path.clone());
-    }
-    Ok(files)
+    let devices = scene.devices.iter().map(|device| (&device.plugin.plugin, PluginKind::Device));
+    let models = scene.models.iter().map(|model| (&model.plugin.plugin, PluginKind::Model));
+    devices.chain(models).map(|(id, kind)| Ok(registry.load(id, kind)?.metadata().path.clone())).collect()
 }
 
 fn digest_file(hash: &mut Xxh3, path: &Path) -> Result<(), SweepError> {
