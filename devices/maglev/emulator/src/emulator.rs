@@ -63,7 +63,8 @@ const LOCKSTEP_NAP: Duration = Duration::from_micros(20);
 
 /// An emulated controller with its plant.
 pub struct Emulator<P> {
-    controller: Controller,
+    /// Controller, with mode, condition and numbers of rejected requests.
+    pub controller: Controller,
     plant: P,
     pace: Pace,
     now_us: u64,
