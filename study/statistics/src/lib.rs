@@ -169,6 +169,11 @@ fn check(what: &'static str, values: &[f64], needed: usize) -> Result<(), Statis
     Ok(())
 }
 
+/// Checks that two paired lists have the same length.
+fn check_lengths(what: &'static str, left: usize, right: usize) -> Result<(), StatisticsError> {
+    if left == right { Ok(()) } else { Err(StatisticsError::Lengths { what, left, right }) }
+}
+
 /// Converts a count to `f64`; counts are far below 2^53.
 fn count(n: usize) -> f64 {
     n as f64
