@@ -60,9 +60,14 @@ pub fn linear(levels: &[f64], responses: &[Vec<f64>]) -> Result<LinearTrend, Sta
         one_sample(&contrasts, 0.0)
     };
     let error_df = count(responses.len()) - 1.0;
-    let test = Outcome::from(test).map(|test| {
+    let test = test.map(|test| {
         let f = test.value * test.value;
         ContrastTest { f, df: 1.0, error_df, p: fisher_above(f, 1.0, error_df) }
     });
-    Ok(LinearTrend { slope: line.slope, intercept: line.intercept, r_squared: line.r_squared, test })
+    Ok(LinearTrend {
+        slope: line.slope,
+        intercept: line.intercept,
+        r_squared: line.r_squared,
+        test: test.into(),
+    })
 }

@@ -59,7 +59,7 @@ pub struct Effect {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub partial_omega_squared: Option<EffectSize>,
     /// Reason for a missing F.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "reason")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub not_testable: Option<StatisticsError>,
     /// Generalised eta squared: fraction of the effect in the sum of squares of effect and all errors (Olejnik and Algina 2003,
     /// all factors manipulated).
@@ -75,11 +75,6 @@ impl Effect {
     pub fn is_testable(&self) -> bool {
         self.not_testable.is_none()
     }
-}
-
-#[allow(clippy::ref_option)] // signature required by serde
-fn reason<S: serde::Serializer>(reason: &Option<StatisticsError>, serializer: S) -> Result<S::Ok, S::Error> {
-    reason.as_ref().map(ToString::to_string).serialize(serializer)
 }
 
 /// Lower limit of the denominator of the Huynh-Feldt epsilon; a smaller difference is rounding error.
