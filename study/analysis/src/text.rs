@@ -157,8 +157,7 @@ impl Page {
         for measure in measures {
             self.effects(measure.measure, &measure.anova, published::movement(task, measure.measure));
             if let Some(exponent) = &measure.exponent {
-                let direction = published::direction(measure.measure);
-                let beside = direction.map_or_else(String::new, |direction| direction.beside(exponent));
+                let beside = published::direction(measure.measure, exponent).unwrap_or_default();
                 self.row("exponent of the stimulus", &exponent_text(exponent), &beside);
             }
         }

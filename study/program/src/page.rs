@@ -236,7 +236,7 @@ fn movements(
         page.paragraph(&format!("Effects on {}:", measure.measure));
         page.effects(&measure.anova, beside.effects(published::movement(task, measure.measure)));
         if let Some(exponent) = &measure.exponent {
-            let direction = published::direction(measure.measure).map(|direction| direction.beside(exponent));
+            let direction = published::direction(measure.measure, exponent);
             let beside = direction.filter(|_| beside == ThesisComparison::Thesis);
             let beside = beside.map_or(String::new(), |text| format!("; thesis: {text}"));
             page.paragraph(&format!("Exponent of the stimulus: {}{beside}.", exponent_text(exponent)));
