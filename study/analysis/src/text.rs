@@ -11,7 +11,7 @@ use flotor_statistics::t_test::TTest;
 use flotor_study::trial::Modality;
 
 pub(super) fn jnd(analysis: &JndAnalysis) -> String {
-    let mut page = Page::compared_with(analysis.thesis);
+    let mut page = Page { lines: Vec::new(), thesis: analysis.thesis };
     let JndAnalysis { subjects, pairs_per_subject, .. } = analysis;
     let thesis = analysis.thesis.text(" (thesis: about 200)");
     page.line(format!("{subjects} subjects, {pairs_per_subject:.1} pairs each{thesis}"));
@@ -54,7 +54,7 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
 }
 
 pub(super) fn magnitude(analysis: &MagnitudeAnalysis) -> String {
-    let mut page = Page::compared_with(analysis.thesis);
+    let mut page = Page { lines: Vec::new(), thesis: analysis.thesis };
     let MagnitudeAnalysis { subjects, trials_per_subject, repeated, .. } = analysis;
     let thesis = analysis.thesis.text(" (thesis: 72)");
     page.line(format!("{subjects} subjects, {trials_per_subject} ratings each{thesis}"));
@@ -95,10 +95,6 @@ struct Page {
 }
 
 impl Page {
-    fn compared_with(thesis: ThesisComparison) -> Self {
-        Self { lines: Vec::new(), thesis }
-    }
-
     fn line(&mut self, text: String) {
         self.lines.push(format!("  {text}"));
     }
