@@ -64,10 +64,6 @@ pub fn linear(levels: &[f64], responses: &[Vec<f64>]) -> Result<LinearTrend, Sta
         let f = test.value * test.value;
         ContrastTest { f, df: 1.0, error_df, p: fisher_above(f, 1.0, error_df) }
     });
-    Ok(LinearTrend {
-        slope: line.slope,
-        intercept: line.intercept,
-        r_squared: line.r_squared,
-        test: test.into(),
-    })
+    let test = test.into();
+    Ok(LinearTrend { slope: line.slope, intercept: line.intercept, r_squared: line.r_squared, test })
 }
