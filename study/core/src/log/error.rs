@@ -84,10 +84,10 @@ pub enum LogProblem {
 
 impl LogError {
     pub(crate) fn file(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
-        Self { path: path.into(), line: 0, problem: LogProblem::File { action, cause } }
+        Self::of_file(path, LogProblem::File { action, cause })
     }
 
-    pub(super) fn in_use(path: &Path) -> Self {
-        Self { path: path.into(), line: 0, problem: LogProblem::InUse }
+    pub(super) fn of_file(path: &Path, problem: LogProblem) -> Self {
+        Self { path: path.into(), line: 0, problem }
     }
 }
