@@ -61,7 +61,7 @@ pub enum LogProblem {
         found: u32,
     },
     /// An event is out of sequence; the text names the event.
-    #[error("{0}")]
+    #[error("{0}; use an unchanged copy")]
     Order(&'static str),
     /// The replayed experiment presents another trial or reaches another verdict.
     #[error(
