@@ -199,12 +199,6 @@ impl WeightedUpDown {
         self.delta
     }
 
-    /// Returns the current step D1, as a fraction of the base.
-    #[must_use]
-    pub fn step(&self) -> f64 {
-        self.step
-    }
-
     /// Processes an answer. Returns true for a reversal; ignores answers after the end of the track.
     pub fn answer(&mut self, judgement: Judgement) -> bool {
         if self.is_done() {
