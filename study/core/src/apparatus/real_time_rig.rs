@@ -204,15 +204,12 @@ impl<'a> RealTimeRig<'a> {
     /// Converts an error that ended the sitting to an incident: an emergency stop, or the end of the run.
     #[must_use]
     pub fn incident_of(&self, error: &(dyn std::error::Error + Send + Sync + 'static)) -> Incident {
-        match error.downcast_ref::<RunEnded>().map(|ended| ended.0).or(self.ended) {
+        let ended = error.downcast_ref::<RunEnded>().map(|ended| ended.0);
+        match ended.or(self.ended) {
             Some(RunEnd::EmergencyStop(source)) => {
                 Incident::EmergencyStop { source: source.word().to_owned() }
             }
-            _ => {
-                let ended = error.downcast_ref::<RunEnded>();
-                let reason = ended.map_or_else(|| error.to_string(), |RunEnded(end)| end.cause());
-                Incident::RunEnded { reason }
-            }
+            _ => Incident::RunEnded { reason: ended.map_or_else(|| error.to_string(), |end| end.cause()) },
         }
     }
 
@@ -226,11 +223,7 @@ impl<'a> RealTimeRig<'a> {
             return Ok(ending);
         }
         self.stop.stop();
-        if let Some(run) = self.run.take() {
-            let outcome = run.join().map_err(|_| RunError::Thread("panicked"))?;
-            self.ended = Some(outcome?.end);
-        }
-        match self.ended {
+        match self.join()? {
             Some(end) if !end.is_in_order() => Err(RunEnded(end).into()),
             None | Some(_) => Ok(ending),
         }
@@ -269,24 +262,26 @@ impl<'a> RealTimeRig<'a> {
 
     /// Returns an error if the run has ended.
     fn check(&mut self) -> Result<(), ApparatusOrFrontEndError> {
-        match (&self.run, self.ended) {
-            (Some(run), _) if !run.is_finished() => return Ok(()),
-            (None, Some(end)) => return Err(RunEnded(end).into()),
-            _ => {}
+        if self.run.as_ref().is_some_and(|run| !run.is_finished()) {
+            return Ok(());
         }
-        let outcome = self.run.take().map(RunThread::join).transpose();
-        let outcome = outcome.ok().flatten().ok_or(RunError::Thread("panicked"))?;
-        let end = outcome?.end;
-        self.ended = Some(end);
+        let end = self.join()?.ok_or(RunError::Thread("panicked"))?;
         Err(RunEnded(end).into())
+    }
+
+    /// Waits for the end of the run, and returns its kind; `None` after a panic of the run that was already reported.
+    fn join(&mut self) -> Result<Option<RunEnd>, RunError> {
+        if let Some(run) = self.run.take() {
+            let outcome = run.join().map_err(|_| RunError::Thread("panicked"))?;
+            self.ended = Some(outcome?.end);
+        }
+        Ok(self.ended)
     }
 }
 
 impl Drop for RealTimeRig<'_> {
     fn drop(&mut self) {
         self.stop.stop();
-        if let Some(run) = self.run.take() {
-            let _ = run.join();
-        }
+        let _ = self.join();
     }
 }
