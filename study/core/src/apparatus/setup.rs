@@ -112,21 +112,13 @@ fn listed(names: &[String]) -> String {
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
-/// Way to change the stimulus in a running model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Route {
-    /// Live parameter.
-    Parameter,
-    /// Model replacement (hot swap), for a parameter that is read at creation.
-    Swap,
-}
-
 /// Checked scene with its varied stimulus.
 pub struct Apparatus {
     pub(super) scene: Scene,
     pub(super) registry: Registry,
     stimulus: Stimulus,
-    route: Route,
+    /// Mutability of the varied parameter: a fixed one changes by model replacement (hot swap).
+    mutability: Mutability,
     /// Blend weight of the model while it is felt, 0 to 1; below, its fade time, s.
     weight: f64,
     pub(super) fade_s: f64,
@@ -176,8 +168,8 @@ impl Apparatus {
         let stimulus = protocol.stimulus().clone();
         let model = find_model(&scene, &stimulus)?;
         let (weight, fade_s, name) = (model.blend.weight, model.blend.fade_s, model.name.clone());
-        let session =
-            Session::prepare(&scene, &registry, &options(Clock::Virtual, 0))?.with_strength(strength);
+        let options = RunOptions { clock: Clock::Virtual, seed: 0 };
+        let session = Session::prepare(&scene, &registry, &options)?.with_strength(strength);
         if let Some(device) = session.held_back().first() {
             return Err(ApparatusError::ExceedsForceCeiling { device: device.clone() });
         }
@@ -186,12 +178,10 @@ impl Apparatus {
         let schema = plugins.iter().skip(1).find(|plugin| plugin.name == name);
         let parameter = find_number(schema.map_or(&[], |plugin| plugin.schema), &stimulus)?;
         protocol.check_range(parameter.min(), parameter.max())?;
-        let route = match parameter.mutability() {
-            Mutability::Live => Route::Parameter,
-            Mutability::Fixed => Route::Swap,
-        };
+        let mutability = parameter.mutability();
         let stimulus = Stimulus { model: name, ..stimulus };
-        let apparatus = Self { scene, registry, stimulus, route, weight, fade_s, plugins, strength, notices };
+        let apparatus =
+            Self { scene, registry, stimulus, mutability, weight, fade_s, plugins, strength, notices };
         for value in protocol.extremes() {
             let scene = apparatus.with_stimulus(value);
             let refused = |cause| ApparatusError::Refused {
@@ -199,7 +189,7 @@ impl Apparatus {
                 value,
                 cause: Box::new(cause),
             };
-            let prepared = Session::prepare(&scene, &apparatus.registry, &options(Clock::Virtual, 0));
+            let prepared = Session::prepare(&scene, &apparatus.registry, &options);
             drop(prepared.map_err(refused)?);
         }
         Ok(apparatus)
@@ -278,7 +268,7 @@ impl Apparatus {
     /// Returns true if stimuli change by model replacement instead of live parameters.
     #[must_use]
     pub fn swaps_models(&self) -> bool {
-        self.route == Route::Swap
+        self.mutability == Mutability::Fixed
     }
 
     /// Returns the scene with the hand parameters of a simulated subject.
@@ -295,7 +285,7 @@ impl Apparatus {
 
     /// Returns the description of the run for a recording.
     pub(super) fn describe(&self, scene: &Scene, clock: Clock, seed: u64) -> RunDescription {
-        describe(scene, &options(clock, seed), &self.plugins)
+        describe(scene, &RunOptions { clock, seed }, &self.plugins)
     }
 
     /// Starts to fade the object in (`shown`) or out.
@@ -307,11 +297,11 @@ impl Apparatus {
     pub(super) fn set(&self, controls: &Controls, value: f64) -> Result<(), ControlError> {
         let Stimulus { model, parameter } = &self.stimulus;
         let value = value.to_string();
-        match self.route {
-            Route::Parameter => {
+        match self.mutability {
+            Mutability::Live => {
                 controls.set_parameters_at_once(&[NewValue { plugin: model, parameter, value: &value }])
             }
-            Route::Swap => controls.swap(&self.registry, model, None, &[(parameter, &value)]),
+            Mutability::Fixed => controls.swap(&self.registry, model, None, &[(parameter, &value)]),
         }
     }
 
@@ -329,10 +319,6 @@ fn input(used_as: String, path: &Path) -> Result<InputFile, ApparatusError> {
     let file = NamedFile::read(path).map_err(unreadable)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(InputFile { used_as, name, hash: file.hash_text() })
-}
-
-fn options(clock: Clock, seed: u64) -> RunOptions {
-    RunOptions { clock, seed }
 }
 
 fn text(key: &str, value: f64) -> ParameterText {
