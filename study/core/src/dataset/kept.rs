@@ -113,24 +113,19 @@ pub(super) fn object(
     let earlier: Map<String, Value> =
         serde_json::from_str(text).map_err(|error| Unmergeable::NotAnObject(error.to_string()))?;
     let mut merged = earlier.clone();
-    for (key, value) in generated {
-        match merged.get_mut(&key) {
-            Some(kept) if owned.contains(&key.as_str()) => *kept = value,
-            Some(kept) => complete(kept, value),
-            None => drop(merged.insert(key, value)),
-        }
-    }
+    complete(&mut merged, generated, owned);
     Ok((merged != earlier).then_some(merged))
 }
 
-/// Adds the keys of `more` that an object lacks, recursively; does not change other values.
-fn complete(kept: &mut Value, more: Value) {
-    if let (Value::Object(kept), Value::Object(more)) = (kept, more) {
-        for (key, value) in more {
-            match kept.get_mut(&key) {
-                Some(kept) => complete(kept, value),
-                None => drop(kept.insert(key, value)),
-            }
+/// Adds the keys of `more` that an object lacks, recursively, and replaces the values of the `owned` keys; does not change other
+/// values.
+fn complete(kept: &mut Map<String, Value>, more: Map<String, Value>, owned: &[&str]) {
+    for (key, value) in more {
+        match (kept.get_mut(&key), value) {
+            (Some(known), value) if owned.contains(&key.as_str()) => *known = value,
+            (Some(Value::Object(known)), Value::Object(more)) => complete(known, more, &[]),
+            (Some(_), _) => {}
+            (None, value) => drop(kept.insert(key, value)),
         }
     }
 }
