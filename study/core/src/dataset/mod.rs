@@ -181,21 +181,13 @@ impl Dataset {
     /// # Errors
     /// If a log is invalid or misplaced, there is no log, or logs belong to different studies.
     pub fn logs(&self) -> Result<Vec<SittingLog>, DatasetError> {
-        let mut logs = Vec::new();
-        self.each_log(|log| {
-            logs.push(log);
-            Ok(())
-        })?;
-        Ok(logs)
+        self.each_log()?.collect()
     }
 
     /// Reads and verifies the logs one by one, so that only one is in memory.
-    fn each_log(
-        &self,
-        mut take: impl FnMut(SittingLog) -> Result<(), DatasetError>,
-    ) -> Result<(), DatasetError> {
+    fn each_log(&self) -> Result<impl Iterator<Item = Result<SittingLog, DatasetError>>, DatasetError> {
         let mut first: Option<(Begin, PathBuf)> = None;
-        for path in self.log_paths()? {
+        let read = move |path: PathBuf| {
             let log = SittingLog::read(&path)?;
             let (subject, task) = (log.begin.subject, log.begin.protocol.task());
             let place = self.log_path(subject, task);
@@ -206,9 +198,9 @@ impl Dataset {
             if let Some(what) = begin.differs(&log.begin) {
                 return Err(DatasetError::Mixed { path, other: other.clone(), what });
             }
-            take(log)?;
-        }
-        Ok(())
+            Ok(log)
+        };
+        Ok(self.log_paths()?.into_iter().map(read))
     }
 
     fn log_paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
@@ -284,7 +276,8 @@ impl Dataset {
     pub fn write_tables(&self) -> Result<(), DatasetError> {
         let mut participants = table::PARTICIPANTS_HEAD.to_owned();
         let mut first = None;
-        self.each_log(|log| {
+        for log in self.each_log()? {
+            let log = log?;
             participants += &table::participant(&log);
             if log.complete {
                 let path = self.table_path(log.begin.subject, log.begin.protocol.task());
@@ -296,8 +289,7 @@ impl Dataset {
                 }
             }
             first.get_or_insert(log.begin);
-            Ok(())
-        })?;
+        }
         let Some(begin) = first else { return Ok(()) };
         complete_table(&self.root.join("participants.tsv"), &participants, table::PARTICIPANT)?;
         let task = format!("task-{}_beh.json", begin.protocol.task());

@@ -179,7 +179,7 @@ pub(super) fn description(begin: &Begin) -> (Map<String, Value>, &'static [&'sta
         "Observer": begin.observer,
         "Apparatus": begin.apparatus,
     });
-    (members(description), &["Seed", "ConfigHash", "Observer", "Apparatus"])
+    (members(&description), &["Seed", "ConfigHash", "Observer", "Apparatus"])
 }
 
 /// First column of the list of scans.
@@ -224,12 +224,9 @@ pub(super) fn participant_columns() -> (Map<String, Value>, &'static [&'static s
         "handedness": { "Description": "Preferred hand, if it was given" },
         "incidents": { "Description": "Interruptions and disturbances in the event log" },
     });
-    (members(columns), &[])
+    (members(&columns), &[])
 }
 
-fn members(object: Value) -> Map<String, Value> {
-    match object {
-        Value::Object(members) => members,
-        _ => Map::new(),
-    }
+fn members(object: &Value) -> Map<String, Value> {
+    object.as_object().cloned().unwrap_or_default()
 }
