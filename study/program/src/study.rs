@@ -586,36 +586,30 @@ fn tell(dataset: &Dataset) -> Result<(), CommandError> {
 }
 
 fn refused(error: CohortError) -> CommandError {
+    let message = error.to_string();
     match error {
         CohortError::Dataset(error) => crate::of_dataset(error),
-        CohortError::Sitting { subject, cause: ConductError::Outside(cause) } => {
-            let message = format!("{subject}: {cause}");
-            outside(cause, message)
-        }
-        CohortError::Sitting { subject, cause: ConductError::Trial { trial, cause } } => {
-            let message = format!("{subject}: trial {trial}: {cause}");
-            outside(cause, message)
-        }
-        sitting => CommandError::Failed(sitting.to_string()),
+        CohortError::Sitting {
+            cause: ConductError::Outside(cause) | ConductError::Trial { cause, .. },
+            ..
+        } => outside(cause, message),
+        _ => CommandError::Failed(message),
     }
 }
 
 /// Converts an apparatus error to a command error with the exit code of its cause. If a fault, an emergency stop, the watchdog
 /// or an oscillation ended the run, first prints `message`, which has subject and trial, as a note.
 fn outside(cause: ApparatusOrFrontEndError, message: String) -> CommandError {
-    let error = match cause.downcast_ref::<RunEnded>() {
-        Some(RunEnded(
-            end @ (RunEnd::DeviceFault(_)
-            | RunEnd::EmergencyStop(_)
-            | RunEnd::Watchdog(_)
-            | RunEnd::Oscillation
-            | RunEnd::Unguarded),
-        )) => CommandError::RunEnded(*end),
-        _ => {
-            let error = cause.downcast().map(|error| CommandError::Run(*error));
-            return error.unwrap_or(CommandError::Failed(message));
-        }
-    };
-    flotor_command::note(message);
-    error
+    if let Some(RunEnded(
+        end @ (RunEnd::DeviceFault(_)
+        | RunEnd::EmergencyStop(_)
+        | RunEnd::Watchdog(_)
+        | RunEnd::Oscillation
+        | RunEnd::Unguarded),
+    )) = cause.downcast_ref()
+    {
+        flotor_command::note(message);
+        return CommandError::RunEnded(*end);
+    }
+    cause.downcast().map_or(CommandError::Failed(message), |error| CommandError::Run(*error))
 }
