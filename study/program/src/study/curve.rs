@@ -66,13 +66,8 @@ const PARTS: u32 = 64;
 #[non_exhaustive]
 pub(super) enum CurveError {
     /// A line is invalid.
-    #[error("line {line}: {problem}")]
-    Line {
-        /// Line number, from 1.
-        line: usize,
-        /// Description of the problem.
-        problem: String,
-    },
+    #[error("line {}: {}", .0.line, .0.problem)]
+    Line(TextProblem),
     /// The free length is unknown.
     #[error("the table has compressions only; give the length without load (--free-length-mm)")]
     NoFreeLength,
@@ -91,8 +86,8 @@ pub(super) enum CurveError {
 }
 
 impl From<TextProblem> for CurveError {
-    fn from(TextProblem { line, problem }: TextProblem) -> Self {
-        Self::Line { line, problem }
+    fn from(problem: TextProblem) -> Self {
+        Self::Line(problem)
     }
 }
 
