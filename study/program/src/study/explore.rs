@@ -64,12 +64,11 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let session = session.with_strength(arguments.options.strength());
     session.notices().into_iter().for_each(note);
     session.warnings().iter().for_each(note);
-    let model = scene.models.first().map(|model| model.name.clone()).ok_or_else(|| {
+    let model = scene.models.first().ok_or_else(|| {
         let file = arguments.scene.as_deref().unwrap_or(Path::new("built-in study")).display();
         CommandError::Usage(format!("{file}: the scene has no model to explore; add a `[[model]]`"))
     })?;
-    let mapping =
-        scene.models.first().map_or(1.0, |model| model.mapping.motion_scale * model.mapping.force_scale);
+    let mapping = model.mapping.motion_scale * model.mapping.force_scale;
     let watch = Shared::default();
     watch.lock().meter = Some(KinematicsMeter::default());
     let description = describe(&scene, &options, session.plugins());
@@ -78,7 +77,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let mut prompt = Prompt {
         controls: session.controls(),
         registry,
-        model,
+        model: model.name.clone(),
         settings: Vec::new(),
         watch: watch.clone(),
         mapping,

@@ -61,7 +61,8 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         let files = TrialFiles::make(folder, format!("{subject}_task-{}", protocol.task()));
         rig.record_into(files.map_err(of_dataset)?);
     }
-    note_conditions(&mut log, common, noise.as_ref(), screen_texts.as_deref()).map_err(failed)?;
+    note_conditions(&mut log, common, noise.as_ref(), screen_texts.as_deref())
+        .map_err(|error| CommandError::Failed(error.to_string()))?;
     let mut attended = ScreenStateMachine::new(sitting, protocol, common.rest_every).after_reading(texts);
     if presented > 0 {
         attended = attended.with_practice_offered();
@@ -214,10 +215,6 @@ impl Front {
     }
 }
 
-fn failed(error: impl std::fmt::Display) -> CommandError {
-    CommandError::Failed(error.to_string())
-}
-
 /// Returns the requested subject number, else the first one without a log.
 fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<SubjectNumber, CommandError> {
     let is_new = |number: &SubjectNumber| !dataset.log_path(*number, protocol.task()).exists();
@@ -236,16 +233,15 @@ fn noise(common: &Common) -> Result<Option<WhiteNoise>, CommandError> {
         return Ok(None);
     }
     let noise = WhiteNoise::start();
-    match (&noise, common.noise) {
-        (None, NoiseOption::On) => Err(CommandError::Usage(
+    if noise.is_none() && common.noise == NoiseOption::On {
+        return Err(CommandError::Usage(
             "--noise on: no sound player works here (tried pw-cat, paplay, aplay); play white noise on headphones by other \
              means and use --noise off"
                 .to_owned(),
-        )),
-        (None, _) => {
-            note("no sound player works here: play white noise on headphones by other means");
-            Ok(noise)
-        }
-        _ => Ok(noise),
+        ));
     }
+    if noise.is_none() {
+        note("no sound player works here: play white noise on headphones by other means");
+    }
+    Ok(noise)
 }
