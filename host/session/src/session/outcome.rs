@@ -3,7 +3,7 @@
 use super::controls::Settled;
 use super::plugin_report::PluginNames;
 use super::{Controls, FaultyPlugin, PluginReport, StopTime, UnfreedPlugins};
-use crate::calls::{Call, CallError, CallThread, EndReserve, Progress, Unresponsive, end_limit};
+use crate::calls::{Call, CallError, CallThread, EndReserve, Unresponsive};
 use flotor_core::plausibility::ImplausibleSamples;
 use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
 use flotor_hal::{EnergyLedger, Fault};
@@ -202,16 +202,12 @@ fn deactivate(
     unresponsive: &mut Option<Unresponsive>,
 ) -> (DeviceOutcome, Option<OpenedDevice>) {
     let (who, float_changes) = (name.to_owned(), device.float_changes());
-    let told = calls.run_while(
-        end_limit(),
-        || true,
-        move |progress| {
-            progress.enter(&who, Call::Deactivate);
-            let ledger = device.energy_ledger();
-            let words = device.last_message();
-            (ledger, words, device.deactivate())
-        },
-    );
+    let told = calls.run_to_end(move |progress| {
+        progress.enter(&who, Call::Deactivate);
+        let ledger = device.energy_ledger();
+        let words = device.last_message();
+        (ledger, words, device.deactivate())
+    });
     let (ledger, words, opened) = told.unwrap_or_else(|error| {
         note(error, unresponsive);
         (None, String::new(), None)
@@ -235,17 +231,13 @@ fn last_words(
     unresponsive: &mut Option<Unresponsive>,
 ) -> (Layers, Vec<LayerReport>) {
     let names = names.clone();
-    let told = calls.run_while(
-        end_limit(),
-        || true,
-        move |progress: &Progress| {
-            let on_query = |model: usize| progress.enter(&names.model(model), Call::LastMessage);
-            let mut reports: Vec<LayerReport> =
-                retired.iter_mut().map(|(model, layer)| layer.report(*model, || on_query(*model))).collect();
-            reports.extend(forces.reports(on_query));
-            (forces.into_layers().chain(retired).collect(), reports)
-        },
-    );
+    let told = calls.run_to_end(move |progress| {
+        let on_query = |model: usize| progress.enter(&names.model(model), Call::LastMessage);
+        let mut reports: Vec<LayerReport> =
+            retired.iter_mut().map(|(model, layer)| layer.report(*model, || on_query(*model))).collect();
+        reports.extend(forces.reports(on_query));
+        (forces.into_layers().chain(retired).collect(), reports)
+    });
     told.unwrap_or_else(|error| {
         note(error, unresponsive);
         (Vec::new(), Vec::new())
