@@ -8,7 +8,7 @@ use crate::mesh::Mesh;
 use crate::remainder::{Face, Fineness, Remainder, Size};
 use crate::sphere::{Contact, NotConverged, Patch, Problem};
 use crate::spline::{Curve, End, Volume};
-use crate::table::Table;
+use crate::table::{Table, mirrored};
 
 /// Largest depth, in radii, for which the law is valid: beyond it a linear solid's force falls and the contact snaps through.
 const DEEPEST: f64 = 1.2;
@@ -253,10 +253,7 @@ pub fn beyond_half_space(
     let remainder = Remainder::new(size, solid, fineness)?;
     let [x, y] = [size.half_x_m, size.half_y_m].map(|half_m| BEYOND_PLACES.map(|share| share * half_m));
     let table = Table::new(&remainder, Face::Top, [&x, &y]);
-    let both = |half: &[f64]| -> Vec<f64> {
-        half.iter().skip(1).rev().map(|x| -x).chain(half.iter().copied()).collect()
-    };
-    let (x, y) = (both(&x), both(&y));
+    let (x, y) = (mirrored(&x), mirrored(&y));
     let points: Vec<[f64; 2]> = y.iter().flat_map(|&y| x.iter().map(move |&x| [x, y])).collect();
     let mut numbers = vec![x.len() as f64, y.len() as f64];
     numbers.extend(x.iter().chain(&y));
@@ -314,8 +311,7 @@ pub fn sphere_on_mesh(
     levels.extend(&roots);
     let touched = if let BodyKind::Cylinder(size @ [rim_m, height_m]) = body_kind {
         let rounding_m = rounding_m(around(size), radius_m);
-        let line = table_nodes(rim_m);
-        let line: Vec<f64> = line.iter().skip(1).rev().map(|x| -x).chain(line.iter().copied()).collect();
+        let line = mirrored(&table_nodes(rim_m));
         // Move points a little inside the polygon that the elements make of the rim.
         let nearest = |at: [f64; 2]| {
             let most = 0.999 * rim_m / (at[0] * at[0] + at[1] * at[1]).sqrt().max(0.999 * rim_m);
@@ -335,8 +331,7 @@ pub fn sphere_on_mesh(
         let spread = |shares: &[f64], k: usize, margin: f64| -> Vec<f64> {
             let [low, high] = outline_m[k];
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * margin);
-            let below = shares.iter().skip(1).rev().map(|share| middle - share * half);
-            below.chain(shares.iter().map(|share| middle + share * half)).collect()
+            mirrored(shares).iter().map(|share| middle + share * half).collect()
         };
         let [x, y] = [0, 1].map(|k| spread(&FACE_TABLE, k, 0.97));
         let table = body.table([x, y], |at| at);

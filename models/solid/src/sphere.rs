@@ -6,7 +6,7 @@
 //! for given normals (an active set and a Cholesky factorisation) and the normals for given pressures.
 
 use crate::dense::{self, NotPositive};
-use crate::half_space::{Block, HalfSpace};
+use crate::half_space::{Block, HalfSpace, add_scaled};
 
 /// Cells of a round patch, with the half-space's compliance between any two cells.
 #[derive(Clone, Debug)]
@@ -129,9 +129,7 @@ impl Patch {
                 let mut block =
                     self.between(pair / count, pair % count).map(|row| row.map(|u| u / problem.cell_m));
                 if let Some(extra) = problem.smooth.get(pair) {
-                    for (row, more) in block.iter_mut().zip(extra) {
-                        row.iter_mut().zip(more).for_each(|(u, m)| *u += m);
-                    }
+                    add_scaled(&mut block, extra, 1.0);
                 }
                 block
             })
