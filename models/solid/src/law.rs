@@ -138,11 +138,7 @@ impl Description {
                     .map_err(|_| not_a_cylinder(radius_m, height_m))?;
                 return self.solve_on(&mesh);
             }
-            (Body::File { .. }, ..) => {
-                return Err(Refusal::parameter(
-                    "body = \"file\" needs a mesh: set `file` to the path of a Gmsh file (.msh)",
-                ));
-            }
+            (Body::File { .. }, ..) => return Err(no_mesh()),
             (Body::Block(size), Tool::Sphere { radius_m }, _) => {
                 return Ok(sphere(sphere_on_block(poisson_ratio, radius_m, size, resolution)?));
             }
@@ -210,6 +206,11 @@ impl Description {
         let (patch, step) = extrapolated(&solid, Some(&table), outline, bond)?;
         Ok((Law::Bonded(Box::new(patch)), step.max(base.mesh_error(extent_m, &[[0.0; 2]]))))
     }
+}
+
+/// Returns the refusal of `body = "file"` without a mesh.
+pub(crate) fn no_mesh() -> Refusal {
+    Refusal::parameter("body = \"file\" needs a mesh: set `file` to the path of a Gmsh file (.msh)")
 }
 
 /// Returns the refusal of a cylinder without a mesh; the remedies of a mesh error are for mesh files.
