@@ -9,7 +9,7 @@ use crate::grid::Lame;
 use crate::half_space::HalfSpace;
 use crate::mesh::Mesh;
 use crate::prepare::{
-    BodyKind, Prepared, Unsolved, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
+    BodyKind, Prepared, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
 };
 use crate::punch::{Outline, extrapolated};
 use crate::remainder::{Face, Remainder};
@@ -250,15 +250,12 @@ impl From<NotPositive> for Refusal {
     }
 }
 
-impl From<Unsolved> for Refusal {
-    fn from(cause: Unsolved) -> Self {
-        match cause {
-            Unsolved::NotPositive(cause) => cause.into(),
-            Unsolved::NotConverged(NotConverged { depth }) => Self::parameter(format!(
-                "the contact of the sphere at a depth of {depth:.3} radii has no solution: lower `poisson_ratio`, or choose another \
-                 `resolution`"
-            )),
-        }
+impl From<NotConverged> for Refusal {
+    fn from(NotConverged { depth }: NotConverged) -> Self {
+        Self::parameter(format!(
+            "the contact of the sphere at a depth of {depth:.3} radii has no solution: lower `poisson_ratio`, or choose another \
+             `resolution`"
+        ))
     }
 }
 

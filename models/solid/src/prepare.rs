@@ -9,6 +9,7 @@ use crate::remainder::{Face, Fineness, Remainder, Size};
 use crate::sphere::{Contact, NotConverged, Patch, Problem};
 use crate::spline::{Curve, End, Volume};
 use crate::table::{Table, mirrored};
+use flotor_hal::Refusal;
 
 /// Largest depth, in radii, for which the law is valid: beyond it a linear solid's force falls and the contact snaps through.
 const DEEPEST: f64 = 1.2;
@@ -72,27 +73,6 @@ pub struct Prepared {
     /// Estimated relative error of the stiffness due to the elements: for a block from two grids, for a mesh from
     /// [`crate::recovery`], zero for a half-space.
     pub mesh_error: f64,
-}
-
-/// Reason why a law has no solution.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Unsolved {
-    /// The parameters do not describe an elastic solid.
-    NotPositive(NotPositive),
-    /// The contact of the sphere has no solution.
-    NotConverged(NotConverged),
-}
-
-impl From<NotPositive> for Unsolved {
-    fn from(cause: NotPositive) -> Self {
-        Self::NotPositive(cause)
-    }
-}
-
-impl From<NotConverged> for Unsolved {
-    fn from(cause: NotConverged) -> Self {
-        Self::NotConverged(cause)
-    }
 }
 
 /// Returns the cell size at which the contact fills about four fifths of the patch, m. The radius of the contact is Hertz's
@@ -206,8 +186,8 @@ fn atlas(solid: &HalfSpace, radius_m: f64, profile: Curve, body: TouchedBody) ->
 /// Prepares the law of a sphere on a half-space. Not real-time.
 ///
 /// # Errors
-/// [`Unsolved`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
-pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Result<Prepared, Unsolved> {
+/// A [`Refusal`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
+pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Result<Prepared, Refusal> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
     let atlas = atlas(&solid, radius_m, profile(&solid)?, TouchedBody::HalfSpace);
     Ok(Prepared { atlas, mesh_error: 0.0 })
@@ -216,13 +196,13 @@ pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Result<Prepare
 /// Prepares the law of a sphere on a block. Not real-time: some seconds.
 ///
 /// # Errors
-/// [`Unsolved`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
+/// A [`Refusal`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
 pub fn sphere_on_block(
     poisson_ratio: f64,
     radius_m: f64,
     size: Size,
     resolution: Resolution,
-) -> Result<Prepared, Unsolved> {
+) -> Result<Prepared, Refusal> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
     let remainder = Remainder::new(size, solid, resolution.fineness())?;
     let rounding_m = rounding_m(size, radius_m);
@@ -289,14 +269,14 @@ fn around([radius_m, height_m]: [f64; 2]) -> Size {
 /// `rings`: number of cells of a contact from its middle to its rim. Not real-time: some seconds.
 ///
 /// # Errors
-/// [`Unsolved`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
+/// A [`Refusal`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
 pub fn sphere_on_mesh(
     mesh: &Mesh,
     body_kind: BodyKind,
     poisson_ratio: f64,
     radius_m: f64,
     rings: i32,
-) -> Result<Prepared, Unsolved> {
+) -> Result<Prepared, Refusal> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
     let body = Body::new(mesh, solid)?;
     let patch = Patch::new(&solid, rings);
