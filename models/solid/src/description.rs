@@ -2,9 +2,8 @@
 
 use crate::parameters::{BodyChoice, ToolChoice, bond, resolution};
 use crate::plate::PlateBox;
-use crate::prepare::Resolution;
 use crate::punch::{Bond, Outline};
-use crate::remainder::Size;
+use crate::remainder::{Resolution, Size};
 use flotor_hal::{Refusal, Settings};
 
 /// Touched body.

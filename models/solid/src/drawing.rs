@@ -471,7 +471,8 @@ impl<'a> Loaded<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::prepare::{Resolution, sphere_on_half_space};
+    use crate::prepare::sphere_on_half_space;
+    use crate::remainder::Resolution;
     use crate::sphere::{Patch, Problem};
 
     #[test]

@@ -8,9 +8,7 @@ use crate::description::{Body, Description, Tool};
 use crate::grid::Lame;
 use crate::half_space::HalfSpace;
 use crate::mesh::Mesh;
-use crate::prepare::{
-    BodyKind, Prepared, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
-};
+use crate::prepare::{Prepared, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh};
 use crate::punch::{Outline, extrapolated};
 use crate::remainder::{Face, Remainder};
 use crate::rigid::{MODES, RigidPatch};
@@ -96,19 +94,9 @@ impl Description {
         Ok((Law::Spheres(Box::new(spheres)), mesh_error))
     }
 
-    /// Returns the kind of body under a sphere.
-    fn body_kind(&self) -> BodyKind {
-        match self.body {
-            Body::Block(size) => BodyKind::Block(size),
-            Body::Cylinder { radius_m, height_m } => BodyKind::Cylinder([radius_m, height_m]),
-            Body::File { .. } => BodyKind::Face,
-            Body::Beam { .. } | Body::HalfSpace => BodyKind::HalfSpace,
-        }
-    }
-
     fn read(&self, numbers: &[f64]) -> Option<(Law, f64)> {
         if let Tool::Sphere { radius_m } = self.tool {
-            let prepared = Prepared::from_numbers(numbers, self.poisson_ratio, radius_m, self.body_kind())?;
+            let prepared = Prepared::from_numbers(numbers, self.poisson_ratio, radius_m, self.body)?;
             return Some((Law::Sphere(Box::new(prepared.atlas)), prepared.mesh_error));
         }
         let (&mesh_error, rest) = numbers.split_first()?;
@@ -182,7 +170,7 @@ impl Description {
         }
         if let Tool::Sphere { radius_m } = self.tool {
             let rings = self.resolution.rings;
-            let prepared = sphere_on_mesh(mesh, self.body_kind(), self.poisson_ratio, radius_m, rings)?;
+            let prepared = sphere_on_mesh(mesh, self.body, self.poisson_ratio, radius_m, rings)?;
             return Ok(sphere(prepared));
         }
         let Tool::Punch { outline, bond } = self.tool else {
@@ -262,7 +250,7 @@ impl From<NotConverged> for Refusal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::prepare::Resolution;
+    use crate::remainder::Resolution;
 
     /// The remedies were those for a mesh file: a scaling factor of Gmsh, and the order of the nodes of an element.
     #[test]

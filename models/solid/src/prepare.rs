@@ -1,11 +1,12 @@
 //! Slow preparation of a law from a solid and a tool, before the loop.
 
 use crate::atlas::{Atlas, TouchedBody};
-use crate::body::{Body, outline_m};
+use crate::body::{Body as ElasticBody, outline_m};
 use crate::dense::NotPositive;
+use crate::description::Body;
 use crate::half_space::HalfSpace;
 use crate::mesh::Mesh;
-use crate::remainder::{Face, Fineness, Remainder, Size};
+use crate::remainder::{Face, Fineness, Remainder, Resolution, Size};
 use crate::sphere::{Contact, NotConverged, Patch, Problem};
 use crate::spline::{Curve, End, Volume};
 use crate::table::{Table, mirrored};
@@ -38,32 +39,6 @@ const FACE_PLACES: [f64; 5] = [0.0, 0.35, 0.65, 0.85, 1.0];
 /// End conditions of the ratios on a mesh's face and on a cylinder.
 const FACE_ENDS: [[End; 2]; 3] = [[End::Parabola; 2]; 3];
 const CYLINDER_ENDS: [[End; 2]; 3] = [[End::Level, End::Parabola], [End::Parabola; 2], [End::Parabola; 2]];
-
-/// Fineness of a preparation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Resolution {
-    /// Order of the elements.
-    pub order: usize,
-    /// Number of cells of a contact from its middle to its rim.
-    pub rings: i32,
-    /// Number of bricks along a side of the square in the middle of a cylinder.
-    pub bricks: usize,
-}
-
-impl Resolution {
-    /// Fastest preparation, largest error.
-    pub const QUICK: Self = Self { order: 2, rings: 5, bricks: 4 };
-    /// Default resolution.
-    pub const STANDARD: Self = Self { order: 3, rings: 6, bricks: 6 };
-    /// Slowest preparation, smallest error.
-    pub const FINE: Self = Self { order: 4, rings: 8, bricks: 8 };
-
-    /// Returns numbers and order of the elements for the remainder of a block.
-    #[must_use]
-    pub fn fineness(self) -> Fineness {
-        Fineness { across: 4, high: 5, order: self.order }
-    }
-}
 
 /// Prepared law of a sphere with its error estimate.
 #[derive(Clone, Debug, PartialEq)]
@@ -247,57 +222,44 @@ fn rounding_m(size: Size, radius_m: f64) -> f64 {
     (0.02 * least_m).min(0.25 * radius_m)
 }
 
-/// Kind of body under a sphere.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BodyKind {
-    /// Half-space `z <= 0`.
-    HalfSpace,
-    /// Block of these dimensions.
-    Block(Size),
-    /// Round cylinder: radius and height, m.
-    Cylinder([f64; 2]),
-    /// Touched face of a mesh.
-    Face,
-}
-
 /// Returns the size of the block around a cylinder.
-fn around([radius_m, height_m]: [f64; 2]) -> Size {
+fn around(radius_m: f64, height_m: f64) -> Size {
     Size { half_x_m: radius_m, half_y_m: radius_m, height_m }
 }
 
-/// Prepares the law of a sphere on the touched face of a mesh: top of a cylinder ([`BodyKind::Cylinder`]), or any plane face.
+/// Prepares the law of a sphere on the touched face of a mesh: top of a cylinder ([`Body::Cylinder`]), or any plane face.
 /// `rings`: number of cells of a contact from its middle to its rim. Not real-time: some seconds.
 ///
 /// # Errors
 /// A [`Refusal`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
 pub fn sphere_on_mesh(
     mesh: &Mesh,
-    body_kind: BodyKind,
+    body: Body,
     poisson_ratio: f64,
     radius_m: f64,
     rings: i32,
 ) -> Result<Prepared, Refusal> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
-    let body = Body::new(mesh, solid)?;
+    let elastic = ElasticBody::new(mesh, solid)?;
     let patch = Patch::new(&solid, rings);
     let roots = roots();
     let reference = unbounded(&solid, rings, &roots)?;
     let outline_m = outline_m(mesh);
     let column = |table: &Table, place_m: [f64; 2]| {
-        let on_face = |at: [f64; 2]| body.is_on_face(at);
+        let on_face = |at: [f64; 2]| elastic.is_on_face(at);
         column(&patch, table, radius_m, place_m, &roots, &reference, &on_face)
     };
     let mut levels = vec![0.0];
     levels.extend(&roots);
-    let touched = if let BodyKind::Cylinder(size @ [rim_m, height_m]) = body_kind {
-        let rounding_m = rounding_m(around(size), radius_m);
+    let touched = if let Body::Cylinder { radius_m: rim_m, height_m } = body {
+        let rounding_m = rounding_m(around(rim_m, height_m), radius_m);
         let line = mirrored(&table_nodes(rim_m));
         // Move points a little inside the polygon that the elements make of the rim.
         let nearest = |at: [f64; 2]| {
             let most = 0.999 * rim_m / (at[0] * at[0] + at[1] * at[1]).sqrt().max(0.999 * rim_m);
             at.map(|c| c * most)
         };
-        let table = body.table([line.clone(), line], nearest);
+        let table = elastic.table([line.clone(), line], nearest);
         let places: Vec<f64> = PLACES.iter().map(|share| share * (rim_m - 2.0 * rounding_m)).collect();
         let mut values = vec![1.0; 3 * places.len() * levels.len()];
         for (i, &place) in places.iter().enumerate() {
@@ -314,7 +276,7 @@ pub fn sphere_on_mesh(
             mirrored(shares).iter().map(|share| middle + share * half).collect()
         };
         let [x, y] = [0, 1].map(|k| spread(&FACE_TABLE, k, 0.97));
-        let table = body.table([x, y], |at| at);
+        let table = elastic.table([x, y], |at| at);
         let [x, y] = [0, 1].map(|k| spread(&FACE_PLACES, k, 0.92));
         let mut values = vec![1.0; x.len() * y.len() * levels.len()];
         for (j, &py) in y.iter().enumerate() {
@@ -327,7 +289,7 @@ pub fn sphere_on_mesh(
         TouchedBody::Face { outline_m, ratio: Box::new(Volume::new([x, y, levels], &values, FACE_ENDS)) }
     };
     // Evaluate in the middle, and at an eighth of the side from an edge.
-    let mesh_error = body.mesh_error(radius_m, &[[0.0; 2], [0.75 * outline_m[0][1], 0.0]]);
+    let mesh_error = elastic.mesh_error(radius_m, &[[0.0; 2], [0.75 * outline_m[0][1], 0.0]]);
     Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid)?, touched), mesh_error })
 }
 
@@ -353,40 +315,35 @@ impl Prepared {
 
     /// Restores a law from its numbers, bit for bit; `None` if they do not describe such a law. Not real-time.
     #[must_use]
-    pub fn from_numbers(
-        mut numbers: &[f64],
-        poisson_ratio: f64,
-        radius_m: f64,
-        body_kind: BodyKind,
-    ) -> Option<Self> {
+    pub fn from_numbers(mut numbers: &[f64], poisson_ratio: f64, radius_m: f64, body: Body) -> Option<Self> {
         let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
         let (&mesh_error, rest) = numbers.split_first()?;
         numbers = rest;
         let profile = Curve::from_numbers(&mut numbers, [End::Parabola; 2])?;
-        let body = match body_kind {
-            BodyKind::HalfSpace => TouchedBody::HalfSpace,
-            BodyKind::Block(size) => {
+        let touched = match body {
+            Body::HalfSpace | Body::Beam { .. } => TouchedBody::HalfSpace,
+            Body::Block(size) => {
                 let mut next = |face| Volume::from_numbers(&mut numbers, ends(face));
                 let ratios = Box::new([next(Face::Top)?, next(Face::SideX)?, next(Face::SideY)?]);
                 TouchedBody::Block { size, ratios, rounding_m: rounding_m(size, radius_m) }
             }
-            BodyKind::Cylinder(size @ [rim_m, height_m]) => {
+            Body::Cylinder { radius_m: rim_m, height_m } => {
                 let ratio = Box::new(Volume::from_numbers(&mut numbers, CYLINDER_ENDS)?);
                 TouchedBody::Cylinder {
                     radius_m: rim_m,
                     height_m,
                     ratio,
-                    rounding_m: rounding_m(around(size), radius_m),
+                    rounding_m: rounding_m(around(rim_m, height_m), radius_m),
                 }
             }
-            BodyKind::Face => {
+            Body::File { .. } => {
                 let ratio = Box::new(Volume::from_numbers(&mut numbers, FACE_ENDS)?);
                 let (&[a, b, c, d], rest) = numbers.split_first_chunk()?;
                 numbers = rest;
                 TouchedBody::Face { outline_m: [[a, b], [c, d]], ratio }
             }
         };
-        numbers.is_empty().then(|| Self { atlas: atlas(&solid, radius_m, profile, body), mesh_error })
+        numbers.is_empty().then(|| Self { atlas: atlas(&solid, radius_m, profile, touched), mesh_error })
     }
 }
 

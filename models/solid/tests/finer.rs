@@ -6,8 +6,7 @@ use flotor_hal::DVec3;
 use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::half_space::HalfSpace;
 use flotor_solid::law::Law;
-use flotor_solid::prepare::Resolution;
-use flotor_solid::remainder::{Face, Fineness, Remainder, Size};
+use flotor_solid::remainder::{Face, Fineness, Remainder, Resolution, Size};
 use flotor_solid::sphere::{Contact, Patch, Problem};
 use flotor_solid::table::Table;
 

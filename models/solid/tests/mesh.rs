@@ -11,9 +11,8 @@ use flotor_solid::gmsh;
 use flotor_solid::grid::Lame;
 use flotor_solid::law::Law;
 use flotor_solid::mesh::{Mesh, MeshStiffness};
-use flotor_solid::prepare::Resolution;
 use flotor_solid::punch::{Bond, Outline};
-use flotor_solid::remainder::Size;
+use flotor_solid::remainder::{Resolution, Size};
 use flotor_solid::rigid::RigidPatch;
 use std::fmt::Write as _;
 
