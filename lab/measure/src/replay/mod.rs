@@ -349,11 +349,9 @@ fn any_device(period_ns: u64) -> PlausibilityCheck {
 
 /// Checks a sample if it was new in the run: otherwise the record contains the last pose.
 fn look_at_sample(check: &mut PlausibilityCheck, record: &TickRecord) {
-    let mut without = Events::STALE_SAMPLE;
-    for event in [Events::NOT_FINITE, Events::IMPLAUSIBLE_SAMPLE, Events::DEVICE_FAULT] {
-        without.insert(event);
-    }
-    if record.events.intersects(without) {
+    let without =
+        [Events::STALE_SAMPLE, Events::NOT_FINITE, Events::IMPLAUSIBLE_SAMPLE, Events::DEVICE_FAULT];
+    if without.into_iter().any(|event| record.events.intersects(event)) {
         return;
     }
     let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
