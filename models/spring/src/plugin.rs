@@ -24,7 +24,7 @@ pub struct SpringModel {
 
 impl SpringModel {
     fn new(choice: Choice) -> Self {
-        Self { law: Prepared::new(&choice), choice, pace: Pace::default(), batch: Batch::new() }
+        Self { law: Prepared::new(&choice), choice, pace: Pace::default(), batch: Batch::default() }
     }
 }
 

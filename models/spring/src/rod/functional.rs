@@ -120,7 +120,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
 
     pub(crate) fn new(ratios: Ratios) -> Self {
         let () = Self::TWO_COMPONENTS;
-        Self { basis: Basis::new(), ratios }
+        Self { basis: Basis::default(), ratios }
     }
 
     /// Sets the rigidity ratios of the rod. Real-time: bounded, no allocation.
