@@ -180,7 +180,7 @@ impl Client {
             Kind::Change => Some(json(payload).map(Event::Change)),
             Kind::Answer => Some(json(payload).map(Event::Answer)),
             Kind::End => Some(json(payload).map(Event::End)),
-            Kind::Greeting | Kind::Run | Kind::Request | Kind::Unknown(_) => None,
+            Kind::Greeting | Kind::Run | Kind::Request => None,
         })?;
         event.transpose()
     }
