@@ -30,7 +30,10 @@ const REMEDY: &str = "set `FLOTOR_STEP_LIMIT_S` to raise the limit";
 #[non_exhaustive]
 pub enum Exceeded {
     /// Watchdog timeout; the watchdog has stopped the devices.
-    #[error("; the watchdog stopped the device after {} ms (`[limits] watchdog_ms` sets the limit)", .0.as_millis())]
+    #[error(
+        "; the watchdog stopped the device after {} ms (`[limits] watchdog_ms` sets the limit)",
+        .0.as_millis()
+    )]
     Watchdog(Duration),
     /// Limit of processor time.
     #[error(" within {} s of processor time ({REMEDY})", .0.as_secs_f64())]
