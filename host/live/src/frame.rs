@@ -87,8 +87,8 @@ impl Frames {
         self.bytes.extend(bytes);
     }
 
-    /// Removes the next complete frame from the buffer; returns its kind and payload, `None` if more bytes are needed. Skips frames of
-    /// kinds of a later version of the protocol.
+    /// Removes the next complete frame from the buffer; returns its kind and payload, `None` if more bytes are needed. Skips
+    /// frames of kinds of a later version of the protocol.
     ///
     /// # Errors
     /// [`LongFrame`] for a frame that is too long; the rest of the stream cannot be decoded.

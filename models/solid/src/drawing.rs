@@ -160,7 +160,8 @@ impl Drawing {
     }
 }
 
-/// Returns the surface of a body without a mesh, fine at `focus`. `steps`: numbers of steps of a block; `tool_m`: extent of the tool.
+/// Returns the surface of a body without a mesh, fine at `focus`. `steps`: numbers of steps of a block; `tool_m`: extent of the
+/// tool.
 fn skin_of(body: Body, focus: Focus, steps: [usize; 3], tool_m: f64) -> Skin {
     match body {
         Body::Block(size) => Skin::block([size.half_x_m, size.half_y_m], size.height_m, focus, steps),
