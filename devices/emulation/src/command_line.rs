@@ -19,7 +19,6 @@ pub fn arguments<T: Parser>() -> T {
 /// Returns the parser of an option whose number has these limits.
 ///
 /// The parser returns a message if the text is no number, or the number is outside the limits.
-#[must_use]
 pub fn within(
     least: f64,
     most: f64,
