@@ -5,6 +5,7 @@ use flotor_command::CommandError;
 use flotor_command::options::KeyValue;
 use flotor_command::say;
 use flotor_live::{Answer, Ask, ChangeMessage, Client, Directory, Event, LiveError, RefusalCause, Subject};
+use flotor_session::registry::Registry;
 use flotor_session::scene::is_named;
 use std::time::{Duration, Instant};
 
@@ -67,7 +68,7 @@ pub(crate) fn run(arguments: &SwapArguments) -> Result<(), CommandError> {
 
 /// Converts a plugin's path to an absolute path for the host, which may have another working directory; an id stays unchanged.
 fn for_host(plugin: &str) -> Result<String, CommandError> {
-    if !plugin.contains(std::path::is_separator) {
+    if !Registry::search(&[]).is_path(plugin) {
         return Ok(plugin.to_owned());
     }
     let whole = std::path::absolute(plugin).map_err(|cause| {
