@@ -127,3 +127,18 @@ fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMe
         CREATION_LIMIT.as_secs()
     )))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn a_file_of_this_folder_is_named_by_its_whole_path() {
+        // Tests run in the folder of their crate.
+        let file = for_host("Cargo.toml").unwrap_or_else(|error| panic!("{error}"));
+        assert!(Path::new(&file).is_absolute(), "{file}");
+        let id = for_host("spring").unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(id, "spring");
+    }
+}
