@@ -40,7 +40,7 @@ pub(crate) struct StressArguments {
     #[arg(long, value_enum)]
     symmetry: Option<Symmetry>,
     /// Compute only this measure, M0 to M9, or with --symmetry M10 (repeatable; default: all)
-    #[arg(long, value_parser = measure, value_name = "M0")]
+    #[arg(long, value_parser = measure, value_name = "M0", requires_if("M10", "symmetry"))]
     only: Vec<Part>,
     /// Limit of the processor time of one step, such as 5s or 500ms; ten times as long for a step that waits
     /// (default: FLOTOR_STEP_LIMIT_S in seconds, or 1s)
