@@ -71,8 +71,8 @@ pub(crate) struct ViewArguments {
     /// Colours: dark or light (default: dark, with --export light; in a window: the look of the last window)
     #[arg(long, value_name = "dark|light")]
     look: Option<String>,
-    /// Width and height of picture or window, 64 to 8192 pixels each (default: 1280x800, with --export 1800x1000; in a window:
-    /// the size of the last window)
+    /// Width and height of picture or window, 64 to 8192 pixels each (default: 1280x800, with --export 1800x1000, higher if the
+    /// traces need it; in a window: the size of the last window)
     #[arg(long, value_name = "WxH")]
     size: Option<String>,
     /// Size of text and lines, 1 to 3 (default: 1; in a window: the scale of the last window)
