@@ -1,5 +1,4 @@
-//! `flotor-viewer`: shows a session or a recording in a window, or writes a picture. Started by `flotor view`, which finds
-//! the plugins.
+//! `flotor-viewer`, which `flotor view` starts with the plugins: shows a session or a recording, or writes a picture.
 
 use clap::Parser;
 use flotor_drawing::camera::View;
@@ -314,9 +313,7 @@ fn screenshot(
     }
     let (mut shapes, missing) =
         history.first().map(|first| shapes_of(first.run(), &arguments.plugins)).unwrap_or_default();
-    for reason in missing {
-        eprintln!("note: {}", escaped(&reason.to_string()));
-    }
+    missing.iter().for_each(|reason| eprintln!("note: {}", escaped(&reason.to_string())));
     let options = PictureOptions { size_px, scale, look, view: arguments.view, chosen, at_s: arguments.at };
     let image = picture(history, &mut shapes, &options).map_err(Failure::usage)?;
     write_png(out, &image).map_err(Failure::file)
