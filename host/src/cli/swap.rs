@@ -79,7 +79,7 @@ fn for_host(plugin: &str) -> Result<String, CommandError> {
     // The given path is UTF-8, so the current folder is not.
     whole.into_os_string().into_string().map_err(|path| {
         CommandError::Usage(format!(
-            "`{}`: the path of the current folder is not valid UTF-8; move the plugin to another folder",
+            "`{}`: the path of the current folder is not valid UTF-8; move the plugin to a folder whose path is, and give its absolute path",
             path.display()
         ))
     })
