@@ -93,8 +93,8 @@ pub enum DatasetError {
         what: String,
     },
     /// A log is at the path of another subject or task, where its subject could count twice or under another number.
-    #[error("{}: the log is of {subject}, task {task}, and is in the wrong folder; remove the log, or move it to \
-    {}", path.display(), place.display())]
+    #[error("{}: the log is of {subject}, task {task}, and belongs at {}; move the log there, or remove the log if \
+    that file exists already", path.display(), place.display())]
     Misplaced {
         /// Path of the log.
         path: PathBuf,
