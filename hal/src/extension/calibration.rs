@@ -266,8 +266,8 @@ impl OpenedDevice {
         let calibrate = self.extensions().calibration.and_then(|table| table.calibrate_vertical);
         let Some(calibrate) = calibrate else {
             return Err(Refusal::unsupported(
-                "this device has no calibration of the vertical force; remove \
-            `calibration` from the scene",
+                "this device does not support a calibration of the vertical force; in a scene, remove \
+            `calibration`",
             ));
         };
         // SAFETY: a live instance, used by this thread only (`&mut`), pointers valid for the call.

@@ -212,8 +212,8 @@ impl OpenedDevice {
         let unfilled = IndependentStop::by_message(BY_ITSELF, &[0], StoppedState::Zero, 0);
         let Some(declared) = self.calls.query(ask, unfilled) else {
             return Err(Refusal::broken(
-                "the device plugin offers `flotor.independent-stop/1` but declares no stop; \
-            declare a stop or remove the extension",
+                "`independent_stop` of the device plugin failed; \
+            declare a stop or remove the extension `flotor.independent-stop/1`",
             ));
         };
         Independence::of(&declared)
