@@ -137,7 +137,7 @@ impl SimpleDevice for HaplyDevice {
     fn open(settings: &Settings<'_>) -> Result<Opened<Self>, Refusal> {
         let path = settings.text("port").ok_or_else(|| {
             Refusal::resource(format!(
-                "no `port` for the board; set the port, as in {PORT_EXAMPLE}; without hardware start the emulator \
+                "no `port` for the board; set the port, such as {PORT_EXAMPLE}; without hardware start the emulator \
                  with `cargo run -p flotor-haply --example emulated_board` (on Linux), which prints its port"
             ))
         })?;
