@@ -319,7 +319,7 @@ fn messages_of_another_version_are_told_with_the_version_that_is_needed() {
     );
     // Its states have another name for a field.
     let told = state(HELD_M, DVec3::ZERO).replace("cursor_velocity", "velocity");
-    refused_with(&answering(2, told), &[], &["the device state has no `cursor_velocity`", UPDATE]);
+    refused_with(&answering(2, told), &[], &["the device state has no valid `cursor_velocity`", UPDATE]);
 }
 
 #[test]
