@@ -13,10 +13,10 @@ use flotor_maglev::ml_api::{
 /// Effect of a force command on the gains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ForceCommand {
-    /// The force replaces the gains.
+    /// Its force replaces the force of the gains.
     #[value(name = "replace")]
     Replaces,
-    /// The force is added to the gains.
+    /// Its force is added to the force of the gains.
     #[value(name = "add")]
     Adds,
 }
