@@ -48,14 +48,14 @@ impl ForceModel for Wall {
         )
         .live(),
         Parameter::real("friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction").live(),
-        Parameter::choice("shape", SHAPES, 0, "Shape of the solid: half-space below a plane, ball, or cube"),
+        Parameter::choice("shape", SHAPES, 0, "Shape of the solid: plane (half-space), sphere, box (cube)"),
         Parameter::real(
             "size_mm",
             "mm",
             0.1,
             1000.0,
             10.0,
-            "Radius of the ball, or half the edge of the cube",
+            "Radius of the sphere, or half the edge of the box; no effect with a plane",
         ),
         Parameter::real("height_mm", "mm", -100.0, 100.0, 0.0, "Height of the top of the solid above home"),
     ];
