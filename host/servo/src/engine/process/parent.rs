@@ -106,7 +106,7 @@ impl Worker {
                     let create_timeout_s = config.create_timeout.as_secs_f64();
                     return Err(Refusal::broken(format!(
                         "loading, `create` or `prepare` did not return within {create_timeout_s} s in the worker process; \
-                         check the plugin with `flotor validate`, or raise the limit with `FLOTOR_CALL_LIMIT_S`"
+                         check the plugin with `flotor validate`, or raise the limit with the environment variable `FLOTOR_CALL_LIMIT_S`"
                     )));
                 }
                 Err(Refusal::broken(format!(
