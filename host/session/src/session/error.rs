@@ -26,7 +26,7 @@ pub enum RunError {
     /// Scene and device do not fit; the error lists all mismatches.
     #[error("the scene does not fit the device `{device}`: {}", mismatches.join("; "))]
     Mismatch {
-        /// Id of the device's plugin.
+        /// Id of the device's plugin; of several devices, the name in the scene.
         device: String,
         /// Mismatches, each with a remedy.
         mismatches: Vec<String>,
