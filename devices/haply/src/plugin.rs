@@ -36,7 +36,7 @@ const VERSIONS: Choices = choices!["v2", "v3"];
 
 const SCHEMA: &[Parameter] = &[
     Parameter::text("port", PORT_HELP),
-    Parameter::choice("hardware", VERSIONS, 1, "Version of the device: v2 (metal) or v3 (plastic, 3.1)"),
+    Parameter::choice("hardware", VERSIONS, 1, "Version of the device: v2 (metal) or v3 (plastic, also 3.1)"),
     Parameter::real("max_force_n", "N", 0.0, 10.0, 3.0, "Largest force on the hand"),
     Parameter::real(
         "velocity_cutoff_hz",
