@@ -14,7 +14,7 @@ pub use contract::{Contract, ContractFolder};
 pub use error::ScaffoldError;
 pub use name::{NameError, PluginName};
 
-use crate::platform::C_COMPILER;
+use crate::platform::{C_COMPILER, canonical};
 use flotor_hal::abi::{C_HEADER, PluginKind};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
@@ -60,7 +60,7 @@ pub fn scaffold(
         return Err(ScaffoldError::Clash { id: name.id().to_owned(), type_name: name.type_name() });
     }
     if contract.has_as_member(parent) {
-        return Err(ScaffoldError::InsideWorkspace(parent.into()));
+        return Err(ScaffoldError::InsideWorkspace(canonical(parent).unwrap_or_else(|_| parent.into())));
     }
     let folder = parent.join(name.id());
     make_folder(&folder)?;
