@@ -399,7 +399,7 @@ pub fn core(text: &str) -> Result<Core, String> {
         .parse()
         .map_err(|_| format!("invalid core number `{text}`; write a whole number, 0 or more"))?;
     Core::new(number).ok_or_else(|| {
-        format!("no core {number} on this machine; write a smaller number: the first core is 0")
+        format!("the system cannot address core {number}; write a smaller number: the first core is 0")
     })
 }
 
