@@ -33,7 +33,7 @@ mod tests;
 
 use flotor_hal::abi::loader::{LoadError, SettingError};
 use flotor_hal::{Fault, InvalidCalibration, Refusal};
-use flotor_session::RunError;
+use flotor_session::{RunError, THREAD_ADVICE};
 
 /// Failure of a calibration.
 #[derive(Debug, thiserror::Error)]
@@ -96,7 +96,7 @@ pub enum CalibrationError {
     #[error("the calibration was aborted; the handle was lowered, and no file was written")]
     Aborted,
     /// The thread that holds the handle cannot be started.
-    #[error("cannot start the thread of the holding controller: {0}; end other programs of this user")]
+    #[error("cannot start the thread of the holding controller: {0}; {THREAD_ADVICE}")]
     NoThread(std::io::Error),
     /// The emergency-stop latch is pressed, or the watchdog process cannot be started as required.
     #[error(transparent)]
