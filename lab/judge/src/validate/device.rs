@@ -314,11 +314,11 @@ impl Running {
         let mut at_rest = 0;
         while at_rest < SAMPLES {
             if started.elapsed() > PATIENCE {
+                let (time, force) = (wording::time(PATIENCE), wording::wrench(&self.state.delivered));
                 return Err(match self.delivers() {
-                    true => format!("the device still delivers {}", wording::wrench(&self.state.delivered)),
+                    true => format!("{time} after the stop the device still delivers {force}"),
                     false => format!(
-                        "the device has delivered only {at_rest} of {SAMPLES} samples without force in {} since the stop",
-                        wording::time(PATIENCE)
+                        "the device has delivered only {at_rest} of {SAMPLES} samples without force in {time} since the stop"
                     ),
                 });
             }

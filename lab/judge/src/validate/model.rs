@@ -257,7 +257,7 @@ fn agree(seen: &[(f64, f64)], [what, unit]: [&str; 2]) -> Result<(), String> {
     let example = seen.iter().find(differs).map_or(String::new(), |(own, gradient)| {
         format!(": {own:.4} {unit} instead of the {gradient:.4} {unit} of the energy's gradient")
     });
-    Err(format!("{what} and energy disagree in {different} of {} places{example}", seen.len()))
+    Err(format!("{what} and energy disagree in {different} of {} components{example}", seen.len()))
 }
 
 /// Steps the model around its active region, where a host does not step it and assumes zero.
