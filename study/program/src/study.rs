@@ -272,7 +272,8 @@ struct JndArguments {
     /// Obvious pairs in each track to check attention; they do not count
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     obvious_pairs: u32,
-    /// Difference of the obvious pairs, as a share of the base: 0.4 to the largest difference of a track
+    /// Difference of the obvious pairs, as a share of the base: 0.4 to the largest difference of a track; no effect without
+    /// --obvious-pairs
     #[arg(long, default_value_t = 0.6, value_parser = real, value_name = "SHARE")]
     obvious_difference: f64,
     /// Omit the practice pairs

@@ -39,7 +39,8 @@ pub(crate) struct StressArguments {
     /// Symmetry that the model should have; M10 checks it
     #[arg(long, value_enum)]
     symmetry: Option<Symmetry>,
-    /// Compute only this measure, M0 to M9, or with --symmetry M10 (repeatable; default: all)
+    /// Compute only this measure, M0 to M9, or with --symmetry M10; any of M2, M3 and M5 computes all three (repeatable; default:
+    /// all)
     #[arg(long, value_parser = measure, value_name = "M0", requires_if("M10", "symmetry"))]
     only: Vec<Part>,
     /// Limit of the processor time of one step, such as 5s or 500ms; ten times as long for a step that waits
