@@ -15,7 +15,6 @@ pub(super) struct WatchdogArguments {
 pub(super) fn run(arguments: WatchdogArguments) -> Result<(), CommandError> {
     // A signal to all processes of a run ends the host; this process must survive to stop the devices.
     stopping::outlive_signals();
-    let refused =
-        |error| CommandError::Usage(format!("`flotor watchdog` is started by a running host: {error}"));
+    let refused = |error| CommandError::Usage(format!("`flotor watchdog` is started by a host: {error}"));
     watchdog_process::serve(arguments.host).map_err(refused)
 }

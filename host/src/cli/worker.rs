@@ -28,7 +28,6 @@ pub(super) struct WorkerArguments {
 pub(super) fn run(arguments: WorkerArguments) -> Result<(), CommandError> {
     // Signals end a worker like any process; the signals of a terminal do not reach its separate process group.
     let WorkerArguments { plugin, host, period_ns, seed, sets } = arguments;
-    process::serve(&process::WorkerArguments { plugin, host, period_ns, seed, sets }, load_file).map_err(
-        |error| CommandError::Usage(format!("`flotor worker` is started by a running host: {error}")),
-    )
+    process::serve(&process::WorkerArguments { plugin, host, period_ns, seed, sets }, load_file)
+        .map_err(|error| CommandError::Usage(format!("`flotor worker` is started by a host: {error}")))
 }
