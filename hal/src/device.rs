@@ -160,6 +160,13 @@ impl Conditions {
     pub const fn contains(self, other: Conditions) -> bool {
         self.bits & other.bits == other.bits
     }
+
+    /// Returns the bits of the set. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub const fn bits(self) -> u32 {
+        self.bits
+    }
 }
 
 impl DeviceState {

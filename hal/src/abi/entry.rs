@@ -79,6 +79,18 @@ impl CallStatus {
             _ => Self::Panicked,
         }
     }
+
+    /// Returns the name of the status in messages: `ok`, `panicked`, `wrong phase`, `out of range` or `unsupported`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Panicked => "panicked",
+            Self::WrongPhase => "wrong phase",
+            Self::OutOfRange => "out of range",
+            Self::Unsupported => "unsupported",
+        }
+    }
 }
 
 /// [`Host::flags`] bit: the plugin has its own Rust runtime and may replace its panic hook with a silent hook.

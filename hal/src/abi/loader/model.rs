@@ -142,6 +142,16 @@ impl Model {
     pub fn last_message(&mut self) -> String {
         self.calls.last_message(self.table.last_message).for_people()
     }
+
+    /// Returns the reason of a call that failed with `status`, for people: the last message, or the status without a message. Not
+    /// real-time.
+    #[must_use]
+    pub fn reason(&mut self, status: CallStatus) -> String {
+        match self.last_message() {
+            text if text.is_empty() => format!("no message (call status `{}`)", status.name()),
+            text => text,
+        }
+    }
 }
 
 impl Drop for Model {
