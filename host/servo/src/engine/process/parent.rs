@@ -15,6 +15,7 @@ use flotor_hal::{
     WorkspaceBounds,
 };
 use std::io;
+use std::io::ErrorKind::{NotFound, PermissionDenied, WouldBlock};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::sync::Mutex;
@@ -58,8 +59,7 @@ impl Worker {
     /// # Errors
     /// The plugin's [`Refusal`], or a refusal with the cause if the worker process cannot be started, ends, or exceeds the timeout.
     pub fn start(config: &WorkerConfig<'_>) -> Result<Self, Refusal> {
-        let no_worker =
-            |error: io::Error| Refusal::resource(format!("cannot start a worker process: {error}"));
+        let no_worker = |error| Refusal::resource(format!("cannot start a worker process: {error}"));
         let file = create_file().map_err(no_worker)?;
         let memory = SharedMemory::map(&file).map_err(no_worker)?;
         let mut command = Command::new(program().map_err(no_worker)?);
@@ -72,7 +72,7 @@ impl Worker {
         command.stdin(file).stdout(io::stderr());
         // Terminal signals go to the host alone: it needs the model until the force has faded out.
         process_group::lead_until_parent_ends(&mut command);
-        let child = spawn(command).map_err(|error| no_worker(with_advice(error)))?;
+        let child = spawn(command).map_err(no_worker)?;
         let mut worker = Self {
             child,
             memory,
@@ -291,14 +291,13 @@ type Start = (Command, Sender<io::Result<Child>>);
 fn spawn(command: Command) -> io::Result<Child> {
     static STARTER: Mutex<Option<Sender<Start>>> = Mutex::new(None);
     let (reply, child) = channel();
-    {
-        let mut starter = lock(&STARTER);
-        let starter = match &mut *starter {
-            Some(starter) => starter,
-            none => none.insert(start_starter()?),
-        };
-        let _ = starter.send((command, reply)); // the thread ends after this sender
-    }
+    let mut starter = lock(&STARTER);
+    let sender = match &mut *starter {
+        Some(sender) => sender,
+        none => none.insert(start_starter().map_err(|error| cannot_start(&command, &error))?),
+    };
+    let _ = sender.send((command, reply)); // the thread ends after this sender
+    drop(starter);
     child.recv().map_err(|_| io::Error::other("the thread that starts worker processes has ended"))?
 }
 
@@ -308,18 +307,20 @@ fn start_starter() -> io::Result<Sender<Start>> {
     let thread = std::thread::Builder::new().name("flotor-starter".to_owned());
     thread.spawn(move || {
         for (mut command, reply) in orders {
-            let _ = reply.send(command.spawn());
+            let _ = reply.send(command.spawn().map_err(|error| cannot_start(&command, &error)));
         }
     })?;
     Ok(starter)
 }
 
-/// Adds advice to the error if a limit of processes or threads is reached (`EAGAIN`).
-fn with_advice(error: io::Error) -> io::Error {
-    match error.kind() {
-        io::ErrorKind::WouldBlock => io::Error::other(format!("{error}; {THREAD_ADVICE}")),
-        _ => error,
-    }
+/// Names the program in the error of its start, with advice.
+pub(crate) fn cannot_start(command: &Command, error: &io::Error) -> io::Error {
+    let said = format!("`{}` cannot be started: {error}", command.get_program().display());
+    io::Error::other(match error.kind() {
+        NotFound | PermissionDenied => format!("{said}; check that the file exists and is executable"),
+        WouldBlock => format!("{said}; {THREAD_ADVICE}"), // `EAGAIN`: a limit of processes or threads
+        _ => said,
+    })
 }
 
 /// Returns the `flotor` executable for child processes: the one set in guest mode, this program, or `flotor` in this program's
@@ -336,8 +337,7 @@ pub(crate) fn program() -> io::Result<PathBuf> {
     let folders = own.ancestors().skip(1).take(2).map(|folder| folder.join(&name));
     folders.into_iter().find(|file| file.is_file()).ok_or_else(|| {
         io::Error::other(format!(
-            "the program `{name}` for worker processes is neither in the folder of `{}` nor in the folder \
-             above; copy it there",
+            "the program `{name}` is neither in the folder of `{}` nor in the folder above; copy it to one of these folders",
             own.display()
         ))
     })
