@@ -172,6 +172,7 @@ fn coupling_summary(
 /// Returns the problem of a model as text; "ok" without a problem.
 fn health_words(health: &ModelHealth, words: &str) -> String {
     let us = |ns: u64| ns as f64 * 1.0e-3;
+    let words = if words.is_empty() { "no message" } else { words };
     if let Some(tick) = health.panicked_at {
         return format!("panicked at tick {tick}, no force since: {words}");
     }
