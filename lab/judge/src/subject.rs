@@ -210,8 +210,8 @@ impl<'a> Subject<'a> {
         let trouble = |kind| Err(Trouble { kind, pose: input.pose });
         let output = match call(&mut self.model, input) {
             Ok(output) => output,
-            Err(CallStatus::Panicked) => {
-                let words = self.model.last_message();
+            Err(panicked @ CallStatus::Panicked) => {
+                let words = self.model.reason(panicked);
                 self.replace();
                 return trouble(TroubleKind::Panicked(words));
             }

@@ -253,7 +253,11 @@ impl Running {
             ));
         }
         if !KNOWN.contains(state.conditions) {
-            return Err("`conditions` has bits that the contract does not define; clear them".to_owned());
+            return Err(format!(
+                "`conditions` is {:#x}, but the contract defines only the bits {:#x}; clear the others",
+                state.conditions.bits(),
+                KNOWN.bits()
+            ));
         }
         let Sampled { count, first, last } = self.sampled;
         let now = state.sampled_ns;

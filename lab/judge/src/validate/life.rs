@@ -39,8 +39,9 @@ pub(super) fn live(subject: &Subject, after: After<'_>) -> Result<(), Outcome> {
         return Err(format!("last_message returned {problem}").into());
     }
     after("last_message", model.float_changes())?;
-    if model.reset() != CallStatus::Ok {
-        return Err("reset failed".to_owned().into());
+    match model.reset() {
+        CallStatus::Ok => {}
+        status => return Err(format!("reset failed: {}", model.reason(status)).into()),
     }
     after("reset", model.float_changes())?;
     drop(model);
@@ -56,7 +57,7 @@ fn steps(model: &mut Model) -> Result<(), String> {
             model.step(&input, &mut output)
         };
         if status != CallStatus::Ok {
-            return Err(format!("step {} failed: {}", sent.tick, model.last_message()));
+            return Err(format!("step {} failed: {}", sent.tick, model.reason(status)));
         }
         if *input != sent {
             return Err(format!("step {} changed its input", sent.tick));
@@ -67,7 +68,7 @@ fn steps(model: &mut Model) -> Result<(), String> {
     let _calls = enter_call(&inputs);
     match model.step_batch(&inputs, &mut outputs) {
         CallStatus::Ok => Ok(()),
-        other => Err(format!("step_batch returned `{}`", wording::status(other))),
+        other => Err(format!("step_batch returned `{}`", other.name())),
     }
 }
 
@@ -93,11 +94,17 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
             let mut field = Box::new(LinearField::NONE);
             let answer = model.linear_field(&input, &mut field);
             works(model, "linear-field")?;
-            if answer != CallStatus::Ok || !field.is_finite() {
+            let at = wording::pose(&input.pose);
+            if answer != CallStatus::Ok {
                 return Err(format!(
-                    "linear-field returned `{}`: {}",
-                    wording::status(answer),
-                    wording::linear_field(&field)
+                    "linear-field returned `{}` at {at}; return ok at every pose, or do not offer flotor.linear-field/1",
+                    answer.name()
+                ));
+            }
+            if !field.is_finite() {
+                let field = wording::linear_field(&field);
+                return Err(format!(
+                    "linear-field returned a field that is not finite at {at}: {field}; return finite numbers"
                 ));
             }
         }
@@ -123,7 +130,7 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
         let answer = model.read_details(&mut values);
         works(model, "details")?;
         if !matches!(answer, CallStatus::Ok | CallStatus::Unsupported) {
-            return Err(format!("details answered `{}`", wording::status(answer)));
+            return Err(format!("details answered `{}`", answer.name()));
         }
     }
     after("an extension", model.float_changes())

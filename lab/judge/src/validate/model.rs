@@ -83,7 +83,7 @@ fn is_other(first: [f64; 3], second: [f64; 3]) -> bool {
 fn demanded(model: &mut Model, of: impl Fn(u64) -> Demand) -> Result<Vec<Output>, String> {
     match model.reset() {
         CallStatus::Ok => {}
-        other => return Err(format!("reset returned `{}`", wording::status(other))),
+        other => return Err(format!("reset returned `{}`", other.name())),
     }
     let serves = model.serves();
     walk(500)
@@ -119,7 +119,7 @@ pub(super) fn reset_repeats(model: &mut Model) -> Result<(), String> {
     let first = run(model)?;
     match model.reset() {
         CallStatus::Ok => {}
-        other => return Err(format!("reset returned `{}`", wording::status(other))),
+        other => return Err(format!("reset returned `{}`", other.name())),
     }
     let second = run(model)?;
     let differs = first.iter().zip(&second).position(|(a, b)| a.wrench != b.wrench);

@@ -60,8 +60,8 @@ pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
 /// Makes one step; returns the answer, or a description of the failure.
 pub(super) fn step(model: &mut Model, input: &Input) -> Result<Output, String> {
     call(model, input).map_err(|status| match status {
-        CallStatus::Panicked => format!("{} the model {}", place(input), model.last_message()),
-        other => format!("{} the model returned `{}`", place(input), wording::status(other)),
+        CallStatus::Panicked => format!("{} the model failed: {}", place(input), model.reason(status)),
+        other => format!("{} the model returned `{}`", place(input), other.name()),
     })
 }
 
