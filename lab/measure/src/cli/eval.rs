@@ -75,8 +75,8 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
     let bar = progress_bar(handles.len() as u64, "{wide_bar} {pos}/{len} poses  {elapsed}");
     let answers = evaluation.answers(&handles, &|| bar.inc(1)).map_err(|error| match error {
         EvaluateError::Load(error) => CommandError::from(error),
-        panicked @ EvaluateError::Panicked(_) => {
-            CommandError::PluginRefused(format!("{}: {panicked}", plugin.metadata().path.display()))
+        failed @ EvaluateError::Failed(_) => {
+            CommandError::PluginRefused(format!("{}: {failed}", plugin.metadata().path.display()))
         }
     })?;
     bar.finish_and_clear();
