@@ -83,12 +83,14 @@ pub enum CalibrationError {
     },
     /// The device limited the commanded force.
     #[error(
-        "the device exerts less than the {command_n} N of the plan at {height_mm:.1} mm (it is saturated): plan smaller forces \
-         (--force)"
+        "the device exerts only {delivered_n:.2} N of the planned {command_n} N at {height_mm:.1} mm, because it is saturated; \
+         plan smaller forces (--force)"
     )]
     Saturated {
         /// Commanded force, N.
         command_n: f64,
+        /// Delivered force, N.
+        delivered_n: f64,
         /// Height of the handle, mm.
         height_mm: f64,
     },

@@ -192,8 +192,8 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
             if report.state == Holding::Steady(command_n) && is_close && report.moved_m <= REST_M {
                 // The saturation flag alone proves nothing: for a tick, a coil may saturate that holds a locked axis.
                 if report.saturated > 0 && report.delivered_n < command_n - STEADY_N {
-                    let height_mm = report.height_m * 1.0e3;
-                    return Err(CalibrationError::Saturated { command_n, height_mm });
+                    let (height_mm, delivered_n) = (report.height_m * 1.0e3, report.delivered_n);
+                    return Err(CalibrationError::Saturated { command_n, delivered_n, height_mm });
                 }
                 self.tell(None)?;
                 self.restless = report.restless;
