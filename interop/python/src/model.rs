@@ -111,7 +111,7 @@ impl Model {
             CallStatus::Unsupported => Err(refuse(format!(
                 "`{id}` cannot change in an existing model; create a new model with this value"
             ))),
-            _ => Err(refuse(format!("`{id}`: {}", instance.last_message()))),
+            status => Err(refuse(format!("`{id}`: {}", instance.reason(status)))),
         }
     }
 
@@ -150,7 +150,7 @@ impl Model {
             let mut instance = self.lock()?;
             match instance.step_batch(inputs, outputs) {
                 CallStatus::Ok => Ok(()),
-                _ => Err(refuse(format!("the model failed: {}", instance.last_message()))),
+                status => Err(refuse(format!("the model `{}` failed: {}", self.id(), instance.reason(status)))),
             }
         })
     }
