@@ -297,7 +297,8 @@ struct MagnitudeArguments {
     /// Stimuli presented once more in each replication to check the consistency of ratings; they do not count
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     repeat_checks: u32,
-    /// Number of stimuli presented as practice before each modality, 0: no practice
+    /// Number of stimuli presented as practice before each modality (the smallest, the largest and random others), at most all
+    /// of --stimuli; 0: no practice
     #[arg(long, default_value_t = 5, value_parser = count(0..=1000_u32), value_name = "N")]
     demo: u32,
 }
