@@ -218,7 +218,8 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         50.0,
         10.87,
-        "Full: variation of the ratio of delivered to commanded vertical force, peak to peak over ±7 mm",
+        "Full: variation of the ratio of delivered to commanded vertical force, peak to peak over heights of -7 to \
+         7 mm from home",
     ),
     Parameter::real("coil_ambient_c", "°C", -40.0, 300.0, 20.0, "Full: ambient temperature of the coils"),
     Parameter::real(
