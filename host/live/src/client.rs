@@ -245,14 +245,18 @@ fn silent() -> LiveError {
     io::Error::from(ErrorKind::TimedOut).into()
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
     use super::*;
-    use std::os::unix::net::UnixStream;
+    use crate::platform::Listening;
 
     #[test]
     fn a_host_that_does_not_read_gets_whole_requests_and_then_the_end_of_the_connection() {
-        let (client, mut host) = UnixStream::pair().expect("a pair of sockets");
+        let folder = tempfile::tempdir().expect("a folder for the socket");
+        let path = folder.path().join("host");
+        let listening = Listening::bind(&path).expect("a free path");
+        let client = connect(&path).expect("a host that listens");
+        let mut host = listening.accept().expect("a client").expect("an open socket");
         client.set_write_timeout(Some(Duration::from_millis(10))).expect("a time-out is legal");
         let client = RequestClient { stream: Arc::new(Mutex::new(client)), number: Arc::default() };
         let asked = (0..1_000_000).take_while(|_| client.ask(Ask::EmergencyStop).is_ok()).count();
