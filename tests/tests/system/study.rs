@@ -22,6 +22,7 @@ use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tools::{Tool, required};
 use rustix::process::Signal;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -682,6 +683,51 @@ fn a_sitting_that_runs_elsewhere_is_not_continued_here() {
     drop(running);
     let resumed = person("terminal", "\n\n\n1\nq\n", &["--no-demo", "--subject", "1", "--resume"], &out);
     assert_eq!(resumed.code, Some(exit_code::OK), "{resumed:?}");
+    assert_eq!(SittingLog::read(&path).unwrap().trials.len(), 2);
+}
+
+/// The same with two programs: the second start is refused in the middle of a trial of the first, which goes on to its end.
+#[test]
+fn a_second_program_is_refused_beside_a_running_sitting() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let scene = scratch.patient_scene(flotor_session::scene::STUDY).display().to_string();
+    let arguments = PERSON.into_iter().chain(["json", "--scene", &scene, "--no-demo", "--subject", "1"]);
+    let arguments: Vec<&str> = arguments.collect();
+    let script = "mkfifo lines && exec 3<>lines && exec \"$@\" <&3";
+    let first = study(&arguments, &out).through_shell(script).inside(scratch.path()).start();
+    let path = log_of(&out, 1);
+    let until = Instant::now() + Duration::from_secs(60);
+    let wait_for = |trials: usize| {
+        while SittingLog::read(&path).map_or(0, |log| log.trials.len()) < trials {
+            assert!(Instant::now() < until, "no trial {trials}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    };
+    let lines = scratch.path().join("lines");
+    while !path.exists() {
+        assert!(Instant::now() < until, "no sitting begins");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let say = |words: &[&str]| {
+        let mut pipe = std::fs::OpenOptions::new().write(true).open(&lines).unwrap();
+        pipe.write_all((words.join("\n") + "\n").as_bytes()).unwrap();
+    };
+    let go = r#"{"input":"continue"}"#;
+    let answer = r#"{"input":"answer","response":"first"}"#;
+    say(&[go, go, go, answer, go]);
+    wait_for(1);
+    for more in [&[][..], &["--resume"]] {
+        let arguments: Vec<&str> = arguments.iter().chain(more).copied().collect();
+        let refused = study(&arguments, &out).reading([go, go, answer].join("\n")).run();
+        assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{refused:?}");
+        assert!(refused.error().contains("another process is running this sitting"), "{refused:?}");
+    }
+    say(&[go, answer]);
+    wait_for(2);
+    say(&[r#"{"input":"stop"}"#]);
+    let ran = first.wait();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     assert_eq!(SittingLog::read(&path).unwrap().trials.len(), 2);
 }
 
