@@ -8,6 +8,7 @@
 
 #![allow(clippy::unwrap_used)] // tests may panic
 
+#[allow(unreachable_pub)] // another crate's, included
 #[path = "../../../tests/src/printed.rs"]
 mod printed;
 #[path = "../../../tests/src/random.rs"]
