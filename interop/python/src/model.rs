@@ -150,7 +150,9 @@ impl Model {
             let mut instance = self.lock()?;
             match instance.step_batch(inputs, outputs) {
                 CallStatus::Ok => Ok(()),
-                status => Err(refuse(format!("the model `{}` failed: {}", self.id(), instance.reason(status)))),
+                status => {
+                    Err(refuse(format!("the model `{}` failed: {}", self.id(), instance.reason(status))))
+                }
             }
         })
     }
