@@ -26,12 +26,23 @@ pub mod exit_code {
     pub const DEVICE_FAULT: i32 = 4;
 }
 
-/// Runs a program and writes the peak memory of its processes as the last line of standard error.
+/// Runs a program and writes its peak memory, with its processes', as the last line of standard error. A shell starts the program and ends,
+/// so that the program becomes a child of the script (`PR_SET_CHILD_SUBREAPER`): a direct child would count the memory of Python,
+/// more than that of many commands, as its own before it starts.
 const PEAK: &str = "
-import resource, subprocess, sys
-code = subprocess.call(sys.argv[1:])
-print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, file=sys.stderr)
-sys.exit(code)
+import ctypes, os, sys
+assert ctypes.CDLL(None).prctl(36, 1, 0, 0, 0) == 0
+numbers, number = os.pipe()
+os.set_inheritable(number, True)
+shell = ['sh', '-c', f'\"$@\" {number}>&- & echo $! >&{number}', 'sh']
+os.posix_spawnp('sh', shell + sys.argv[1:], os.environ)
+os.close(number)
+program = int(os.read(numbers, 20))
+while True:
+    ended, status, usage = os.wait4(-1, 0)
+    if ended == program:
+        print(usage.ru_maxrss, file=sys.stderr)
+        sys.exit(os.waitstatus_to_exitcode(status))
 ";
 
 /// Builder for a run of the program.
@@ -145,8 +156,7 @@ impl Flotor {
     }
 
     /// Runs the program to its end with Python; also returns the peak resident memory of the largest of its processes, KiB. The
-    /// kernel measures it: samples of a test would miss the last moments of a short run on a busy machine. The memory of Python
-    /// itself, some 10 MB, is the least value.
+    /// kernel measures it: samples of a test would miss the last moments of a short run on a busy machine.
     ///
     /// # Panics
     /// As [`Self::run`], or if the memory is no number.
