@@ -58,8 +58,6 @@ pub use extension::centerline::{CenterlineInfo, CenterlineModel};
 pub use extension::connection::{ConnectionDevice, UsbAccess, UsbKind};
 pub use extension::details::{Detail, DetailsModel};
 pub use extension::energy_ledger::{EnergyLedger, EnergyLedgerDevice};
-#[cfg(feature = "loader")]
-pub use extension::independent_stop::means::Independence;
 pub use extension::independent_stop::{
     IndependentStop, IndependentStopDevice, STOP_MESSAGE_BYTES, StoppedState,
 };

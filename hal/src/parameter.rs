@@ -266,6 +266,14 @@ pub struct ParameterValue {
     pub(crate) text: Str,
 }
 
+impl ParameterValue {
+    /// Builds the value of the parameter at `index`, with the text of a text or a file.
+    #[must_use]
+    pub const fn new(index: u32, number: f64, text: Str) -> Self {
+        Self { index, reserved: 0, number, text }
+    }
+}
+
 /// Explicitly set values of one instance, without defaults.
 ///
 /// A plugin resolves the other values itself, because a default may depend on another parameter (a preset).

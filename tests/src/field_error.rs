@@ -4,8 +4,8 @@
 use crate::watched::watch;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{DVec3, Demand, Input, LoopConfig, Output};
+use flotor_loader::Plugin;
 
 /// Result of a run with an asynchronous membrane (`field`), and of the membrane itself stepped at each tick (`direct`).
 #[derive(Clone, Debug)]

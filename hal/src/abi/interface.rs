@@ -5,13 +5,13 @@ use super::Str;
 use std::ffi::c_void;
 use std::marker::PhantomData;
 
-/// A function table of the contract.
+/// A function table of the contract; implemented by this crate for each of its tables.
 ///
 /// # Safety
 /// The type is `repr(C)`, starts with a `u32`, which is its size in bytes, and is valid for any bits: the other fields
 /// are numbers, pointers, texts and functions that may be null. Plugins of this contract return a table of this type
 /// for `ID`.
-pub(crate) unsafe trait Table: Sized + 'static {
+pub unsafe trait Table: Sized + 'static {
     /// Id of the interface or extension.
     const ID: &'static str;
 }

@@ -17,8 +17,8 @@ use flotor_core::PluginIndex;
 use flotor_core::demand::ObserverDemand;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Tick, Wrench};
+use flotor_loader::ActiveDevice;
 
 /// Settings of the loop for one run.
 #[derive(Clone, Copy, Debug)]

@@ -8,8 +8,8 @@ use flotor_core::plausibility::{
     Implausible, ImplausibleSamples, PlausibilityCheck, Trust, normalised, stale_ticks_limit,
 };
 use flotor_core::trace::Events;
-use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Axes, Capabilities, Conditions, Cycle, Demand, Fault, Tick};
+use flotor_loader::ActiveDevice;
 
 /// Timeout for a device that takes no commands, as a multiple of the sample timeout; the last command stays applied meanwhile.
 const UNTAKEN_TIMES: u32 = 10;

@@ -371,8 +371,8 @@ impl ProgramModel {
 mod tests {
     use super::*;
     use flotor_hal::abi::CallStatus;
-    use flotor_hal::abi::loader::{Model, Plugin, Setting};
     use flotor_hal::{DVec3, Pose};
+    use flotor_loader::{Model, Plugin, Setting};
 
     const PUSH: Wrench = Wrench { force_n: [1.0, -2.0, 3.0], torque_nm: [0.1, 0.0, 0.0] };
 

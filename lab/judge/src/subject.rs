@@ -6,11 +6,11 @@
 use crate::PERIOD_NS;
 use crate::watch::enter_call;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::{
     DVec3, Demand, Input, LoopConfig, Memory, Output, Pose, StepStatus, Twist,
     orientation_from_rotation_vector, rotation_vector,
 };
+use flotor_loader::{LoadError, Model, Plugin, Setting};
 
 /// Largest translation in a step of a walk, m.
 const STEP_M: f64 = 0.05e-3;

@@ -1,7 +1,7 @@
 //! Networks in motion: frequency, momentum, inactive blocks, and the field a faster loop is given.
 
-use flotor_hal::abi::loader::{Model, Plugin};
 use flotor_hal::{DQuat, DVec3, Input, Output, Pose};
+use flotor_loader::{Model, Plugin};
 use flotor_membrane::ball::Ball;
 use flotor_membrane::mesh::{Link, Mesh, Sheet};
 use flotor_membrane::network::{Network, Surroundings};

@@ -7,9 +7,9 @@
 //! is compared whole, so that no backtrace and no panic message of a plugin slips through.
 
 use flotor_core::trace::Events;
-use flotor_hal::abi::loader::{LoadError, Setting, read_metadata};
 use flotor_hal::abi::{ABI_MAJOR, ABI_MINOR, CallStatus, MAGIC};
 use flotor_hal::{Input, Output, Pose, Wrench};
+use flotor_loader::{LoadError, Setting, read_metadata};
 use flotor_servo::ModelHealth;
 use flotor_servo::RunEnd;
 use flotor_session::Outcome;

@@ -9,10 +9,10 @@ pub use stepped::Stepped;
 
 use asynchronous::AsynchronousModel;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{
     ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
 };
+use flotor_loader::Model;
 use process::Worker;
 
 /// Model, executed in one of three ways.

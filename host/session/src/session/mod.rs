@@ -44,9 +44,9 @@ use fit::check_fit;
 use flotor_core::demand::ObserverDemand;
 use flotor_core::{period_ns, to_ns};
 use flotor_coupling::{Line, LinkTimeouts, Reach};
-use flotor_hal::abi::loader::Stopper;
 use flotor_hal::{Capabilities, LoopConfig};
 use flotor_live::{Directory, WrenchLimits};
+use flotor_loader::Stopper;
 use flotor_servo::{
     Clock, Core, Coupled, Envelope, Forces, ParameterQueue, RunConfig, Servo, Standby, StopSwitch,
     swap_queues,

@@ -5,8 +5,8 @@ use super::plugin_report::PluginNames;
 use super::{Controls, FaultyPlugin, PluginReport, StopTime, UnfreedPlugins};
 use crate::calls::{Call, CallError, CallThread, EndReserve, Progress, Unresponsive, end_limit};
 use flotor_core::plausibility::ImplausibleSamples;
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
 use flotor_hal::{EnergyLedger, Fault};
+use flotor_loader::{ActiveDevice, OpenedDevice};
 use flotor_servo::{
     CouplingOutcome, Dismantled, EnvelopeEffects, Forces, Heartbeat, Layer, LayerReport, Loop, ModelHealth,
     RealTimeReport, Reported, RunEnd, Servo, Stuck, Timing,

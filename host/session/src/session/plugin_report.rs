@@ -3,8 +3,8 @@
 use crate::scene::Isolation;
 use flotor_core::PluginIndex;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::Metadata;
 use flotor_hal::{Demand, Embodiment, Parameter, SoftRange};
+use flotor_loader::Metadata;
 use flotor_servo::Place;
 use flotor_servo::last_stop::TakenSignals;
 

@@ -13,10 +13,10 @@ use flotor_core::limits::Bound;
 use flotor_core::mapping::Mapping;
 use flotor_core::to_ns;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{Metadata, OpenedDevice, Plugin, Setting};
 use flotor_hal::{
     Capabilities, DVec3, Demand, Embodiment, LoopConfig, Parameter, ParameterKind, SampledLoop, SoftRange,
 };
+use flotor_loader::{Metadata, OpenedDevice, Plugin, Setting};
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerConfig};
 use flotor_servo::last_stop::{SignalGuard, TakenSignals};

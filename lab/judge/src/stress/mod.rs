@@ -55,7 +55,7 @@ pub use symmetry::Symmetry;
 use crate::subject::Subject;
 use crate::{Progress, Size};
 use flotor_hal::Memory;
-use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
+use flotor_loader::{LoadError, Plugin, Setting};
 
 /// Reference period of the loop, s.
 const PERIOD_S: f64 = 1.0e-3;

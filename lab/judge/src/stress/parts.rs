@@ -12,7 +12,7 @@ use super::{
 };
 use crate::platform::{anonymous_file, end_at_once, ending_signal, standard_input};
 use crate::{Progress, watch};
-use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
+use flotor_loader::{LoadError, Plugin, Setting};
 use flotor_session::PluginProcess;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Seek, Write};

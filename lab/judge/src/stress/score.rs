@@ -52,7 +52,7 @@ impl StressReport {
         // Sorts "M2" before "M10".
         measures.sort_by_key(|measure| (measure.id.len(), measure.id.clone()));
         let schema = setup.plugin.parameters();
-        let named = |setting: &flotor_hal::abi::loader::Setting| {
+        let named = |setting: &flotor_loader::Setting| {
             let parameter = schema.get(setting.index())?;
             Some((parameter.id().to_owned(), setting.display()))
         };

@@ -1,12 +1,12 @@
 //! Small laws with one known flaw each: the measures meant for it fail, and no other.
 
 use super::{Measure, Part, Setup, Size, StressOptions, StressReport, Verdict, measure_all};
-use flotor_hal::abi::loader::Plugin;
 use flotor_hal::abi::model_entry;
 use flotor_hal::{
     DVec3, Demand, ForceModel, Input, Memory, ModelInfo, Output, Pose, Refusal, Settings, Wrench,
     rotation_vector,
 };
+use flotor_loader::Plugin;
 use std::io::Write;
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -14,8 +14,8 @@ use crate::sampling::{Random, Sobol};
 use crate::subject::{Subject, Trouble, TroubleKind};
 use crate::tally::{Worst, tally};
 use crate::wording;
-use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Input, Memory, Pose, StepStatus, Twist};
+use flotor_loader::LoadError;
 
 const NAME: &str = "totality";
 /// Poses per block.

@@ -8,9 +8,9 @@ use super::subject::Subject;
 use crate::watch::enter_call;
 use crate::wording;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{Model, OpenedDevice};
 use flotor_hal::extension::linear_field::LinearField;
 use flotor_hal::{Input, Mutability, Output, Parameter, Pose, Wrench};
+use flotor_loader::{Model, OpenedDevice};
 
 /// Number of steps of a model, and of ticks of a device.
 const STEPS: u64 = 300;

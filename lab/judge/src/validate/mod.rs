@@ -27,8 +27,8 @@ pub use rule::Check;
 
 use crate::platform::{anonymous_file, end_at_once, ending_signal, locked, standard_input};
 use crate::{watch, wording};
-use flotor_hal::abi::loader::read_metadata;
 use flotor_hal::conformance::Rule;
+use flotor_loader::read_metadata;
 use flotor_session::PluginProcess;
 use flotor_session::scene::KeyValue;
 use patience::Ended;

@@ -2,8 +2,8 @@
 
 use super::float_control::preserving_float_control;
 use super::setting::{Setting, index_of, live_index, to_raw};
-use crate::abi::{CallStatus, Instance, Message};
-use crate::{Parameter, ParameterValue, Refusal, RefusalKind};
+use flotor_hal::abi::{CallStatus, Instance, Message};
+use flotor_hal::{Parameter, ParameterValue, Refusal, RefusalKind};
 
 /// Reason of a refusal if the table lacks a required function.
 pub(super) const INCOMPLETE: &str =

@@ -2,6 +2,8 @@
 
 use super::interfaces::Interface;
 use super::model::ModelTables;
+use flotor_hal::Parameter;
+use flotor_hal::abi::check_schema;
 
 /// Maximum number of entries of a list.
 const MOST_ENTRIES: u32 = 4096;
@@ -33,6 +35,22 @@ pub(crate) unsafe fn static_list<T>(first: *const T, count: u32) -> &'static [T]
     unsafe { std::slice::from_raw_parts(first, count as usize) }
 }
 
+/// Returns the schema of a table, or the problem if a count or a text is invalid.
+///
+/// # Safety
+/// `parameters` is null or the address of `count` parameters that stay for ever, as far as `count` is legal.
+pub(super) unsafe fn checked_schema(
+    parameters: *const Parameter,
+    count: u32,
+) -> Result<&'static [Parameter], String> {
+    if !parameters.is_null() && count > MOST_ENTRIES {
+        return Err(format!("the plugin has {count} parameters, above the limit of {MOST_ENTRIES}"));
+    }
+    // SAFETY: as this function demands.
+    let schema = unsafe { static_list(parameters, count) };
+    check_schema(schema).map(|()| schema)
+}
+
 fn list(what: &str, is_there: bool, count: u32) -> Result<(), String> {
     match count {
         0 => Ok(()),
@@ -41,5 +59,21 @@ fn list(what: &str, is_there: bool, count: u32) -> Result<(), String> {
         }
         _ if !is_there => Err(format!("{count} {what} at a null pointer; set the pointer to their list")),
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_count_that_cannot_be_is_refused_before_anything_is_read() {
+        let one = Parameter::real("stiffness_n_per_m", "N/m", 0.0, 1.0, 0.5, "Stiffness");
+        // SAFETY: it is refused before it is read.
+        let refused = unsafe { checked_schema(&raw const one, 1_000_000) };
+        assert_eq!(
+            refused.err(),
+            Some("the plugin has 1000000 parameters, above the limit of 4096".to_owned())
+        );
     }
 }

@@ -2,10 +2,9 @@
 
 use super::guarded::{GuardedInstance, INCOMPLETE};
 use super::setting::Setting;
-use crate::abi::{CallStatus, ForceTable, Instance};
 use crate::extension::ModelExtensions;
-use crate::extension::variant::VariantInfo;
-use crate::{Demand, Input, LoopConfig, Memory, ModelInfo, Output, Parameter, Refusal};
+use flotor_hal::abi::{CallStatus, ForceTable, Instance};
+use flotor_hal::{Demand, Input, LoopConfig, Memory, ModelInfo, Output, Parameter, Refusal, VariantInfo};
 
 type StepFn = unsafe extern "C" fn(Instance, *const Input, *mut Output) -> u32;
 

@@ -1,8 +1,8 @@
 //! Errors of loading a plugin: one readable line with file, cause and remedy.
 
 use super::platform::{COPY_REMEDY, link_remedy};
-use crate::abi::{CONTRACT, PluginKind};
-use crate::{Refusal, RefusalKind};
+use flotor_hal::abi::{CONTRACT, PluginKind};
+use flotor_hal::{Refusal, RefusalKind};
 use std::path::PathBuf;
 
 /// Reason why a plugin was not loaded. Every variant prints one line: file, cause, remedy.

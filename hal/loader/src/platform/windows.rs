@@ -1,7 +1,7 @@
 //! Windows: PE, a copy in the folder for temporary files, `LoadLibrary`.
 
 use super::NoSection;
-use crate::abi::metadata;
+use flotor_hal::abi::metadata;
 use libloading::os::windows::Library;
 use object::ReadRef;
 use object::pe::{ImageDosHeader, ImageNtHeaders64};

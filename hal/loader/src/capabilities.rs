@@ -3,7 +3,7 @@
 //! The safety envelope, the boundary wall and the sample check take their limits from these numbers: a missing,
 //! infinite or contradictory number would leave the hand unprotected. Each refusal names the field and the remedy.
 
-use crate::{Axes, Capabilities, Refusal};
+use flotor_hal::{Axes, Capabilities, Refusal};
 
 /// Value of a capability field with its largest plausible value. Zero is allowed; a value above `most` indicates a wrong
 /// unit or corrupt memory.
@@ -34,7 +34,7 @@ const MOST_RATE_HZ: f64 = 1.0e7;
 pub(super) fn check(declared: &Capabilities) -> Result<(), Refusal> {
     for (field, axes) in [("sensed", declared.sensed), ("actuated", declared.actuated)] {
         if !Axes::ALL.contains(axes) {
-            let found = format!("{:#b}", axes.bits);
+            let found = format!("{:#b}", axes.bits());
             return Err(wrong(field, &found, "there are six axes; clear the bits above the sixth"));
         }
     }
@@ -49,7 +49,7 @@ pub(super) fn check(declared: &Capabilities) -> Result<(), Refusal> {
     let rotation = Group {
         names: ["the rotation about x", "the rotation about y", "the rotation about z"],
         load: "torque",
-        axes: [Axes { bits: 1 << 3 }, Axes { bits: 1 << 4 }, Axes { bits: 1 << 5 }],
+        axes: [Axes::RX, Axes::RY, Axes::RZ],
         range: number("range_rad", declared.range_rad, 1.0e3, "rad"),
         limit: number("max_torque_nm", declared.max_torque_nm, 1.0e5, "N·m"),
         slew: number("max_torque_slew_nm_per_s", declared.max_torque_slew_nm_per_s, 1.0e10, "N·m/s"),
@@ -92,8 +92,8 @@ pub(super) fn check_unchanged(before: &Capabilities, now: &Capabilities) -> Resu
     };
     let changed = numbers(before).into_iter().zip(numbers(now)).find(|(before, now)| before != now);
     let masks = || match before.sensed == now.sensed {
-        true => format!("`actuated` was {:#b}, then {:#b}", before.actuated.bits, now.actuated.bits),
-        false => format!("`sensed` was {:#b}, then {:#b}", before.sensed.bits, now.sensed.bits),
+        true => format!("`actuated` was {:#b}, then {:#b}", before.actuated.bits(), now.actuated.bits()),
+        false => format!("`sensed` was {:#b}, then {:#b}", before.sensed.bits(), now.sensed.bits()),
     };
     let changed = changed.map_or_else(masks, |((field, before), (_, now))| {
         format!("`{field}` was {}, then {}", list(&before), list(&now))
@@ -251,12 +251,19 @@ mod tests {
         }
     }
 
+    /// Axes as a foreign plugin may write them.
+    #[allow(unsafe_code)]
+    fn axes(bits: u32) -> Axes {
+        // SAFETY: `Axes` is a `repr(C)` struct of one `u32` and valid for any bits.
+        unsafe { std::mem::transmute::<u32, Axes>(bits) }
+    }
+
     #[test]
     fn what_contradicts_itself_is_refused_with_what_to_mend() {
         let cases = [
             (Capabilities { rate_hz: [1000.0, 100.0], ..HELD }, "declare the slowest rate first"),
-            (Capabilities { sensed: Axes { bits: 0x7f }, ..HELD }, "`sensed` is 0b1111111: there are six"),
-            (Capabilities { actuated: Axes { bits: u32::MAX }, ..HELD }, "clear the bits above the sixth"),
+            (Capabilities { sensed: axes(0x7f), ..HELD }, "`sensed` is 0b1111111: there are six"),
+            (Capabilities { actuated: axes(u32::MAX), ..HELD }, "clear the bits above the sixth"),
             (
                 Capabilities { max_torque_nm: [0.0; 3], ..HELD },
                 "the rotation about x is driven, so declare its largest torque",

@@ -5,25 +5,27 @@
 //! `LoadLibrary`) -> entry -> kind -> layouts -> function tables -> declarations. No code of the plugin runs before `dlopen`, and a
 //! file that fails an earlier check is never passed to `dlopen`: a truncated library would raise SIGBUS there.
 
+#![allow(unsafe_code)] // opens libraries and calls their tables
+
 mod capabilities;
-mod check;
 mod declaration;
 mod device;
 mod error;
+mod extension;
 mod float_control;
 mod guarded;
 mod interfaces;
 mod library;
 mod metadata_file;
 mod model;
-pub(crate) mod platform;
-mod schema;
+mod offers;
+mod platform;
 mod setting;
 
-pub(crate) use declaration::static_list;
 pub use device::{ActiveDevice, OpenedDevice, Stopper};
 pub use error::LoadError;
-pub(crate) use interfaces::Offers;
+pub use extension::centerline::Centerline;
+pub use extension::independent_stop::Independence;
 pub use library::Plugin;
 pub use metadata_file::{Metadata, read_metadata};
 pub use model::Model;

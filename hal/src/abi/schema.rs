@@ -1,29 +1,19 @@
 //! Validation of a plugin's parameter schema: counts and texts come from a foreign library and are checked before use.
 
-use super::static_list;
+use super::{Choices, Str};
 use crate::Parameter;
-use crate::abi::{Choices, Str};
 
-/// Maximum number of parameters of a plugin, and of choices of a parameter.
-const MOST_ENTRIES: usize = 4096;
+/// Maximum number of choices of a parameter.
+const MOST_CHOICES: usize = 4096;
 /// Maximum length of a text, bytes.
 const MOST_BYTES: usize = 64 * 1024;
 
-/// Returns the schema of a table, or the problem if a count or a text is invalid.
+/// Checks the schema of a foreign plugin, before use.
 ///
-/// # Safety
-/// `parameters` is null or the address of `count` parameters that stay for ever, as far as `count` is legal.
-pub(super) unsafe fn checked(
-    parameters: *const Parameter,
-    count: u32,
-) -> Result<&'static [Parameter], String> {
-    if !parameters.is_null() && count as usize > MOST_ENTRIES {
-        return Err(format!("the plugin has {count} parameters, above the limit of {MOST_ENTRIES}"));
-    }
-    // SAFETY: as this function demands.
-    let schema = unsafe { static_list(parameters, count) };
-    schema.iter().enumerate().try_for_each(|(number, parameter)| check(number, parameter))?;
-    Ok(schema)
+/// # Errors
+/// The number of the first malformed parameter, counted from 0, and what is wrong with it.
+pub fn check_schema(schema: &[Parameter]) -> Result<(), String> {
+    schema.iter().enumerate().try_for_each(|(number, parameter)| check(number, parameter))
 }
 
 fn check(number: usize, parameter: &Parameter) -> Result<(), String> {
@@ -36,9 +26,9 @@ fn check(number: usize, parameter: &Parameter) -> Result<(), String> {
 }
 
 fn check_choices(choices: &Choices) -> Result<(), String> {
-    if choices.count() > MOST_ENTRIES {
+    if choices.count() > MOST_CHOICES {
         return Err(format!(
-            "the parameter has {} choices, above the limit of {MOST_ENTRIES}",
+            "the parameter has {} choices, above the limit of {MOST_CHOICES}",
             choices.count()
         ));
     }
@@ -46,7 +36,7 @@ fn check_choices(choices: &Choices) -> Result<(), String> {
 }
 
 /// Checks a text for display: length, UTF-8, and no control characters except line breaks.
-pub(super) fn check_text(name: &str, text: &Str) -> Result<(), String> {
+fn check_text(name: &str, text: &Str) -> Result<(), String> {
     let bytes = text.bytes();
     if bytes > MOST_BYTES {
         return Err(format!("`{name}` has {bytes} bytes, above the limit of {MOST_BYTES}"));
@@ -73,12 +63,6 @@ mod tests {
     #[test]
     fn counts_that_cannot_be_are_refused_before_anything_is_read() {
         let one = HONEST;
-        // SAFETY: it is refused before it is read.
-        let refused = unsafe { checked(&raw const one, 1_000_000) };
-        assert_eq!(
-            refused.err(),
-            Some("the plugin has 1000000 parameters, above the limit of 4096".to_owned())
-        );
         let choices = Choices::of_raw(&raw const one.id, 1 << 50);
         let said = told(&Parameter { choices, ..HONEST });
         assert_eq!(said, "parameter 0: the parameter has 1125899906842624 choices, above the limit of 4096");

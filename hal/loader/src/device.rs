@@ -3,9 +3,11 @@
 use super::capabilities::{check, check_unchanged};
 use super::guarded::{GuardedInstance, INCOMPLETE};
 use super::setting::Setting;
-use crate::abi::{CallStatus, CycleCode, DeviceTable, Instance};
 use crate::extension::DeviceExtensions;
-use crate::{Axes, Capabilities, Cycle, DeviceState, Fault, LoopConfig, Parameter, Refusal, Tick, Wrench};
+use flotor_hal::abi::{CallStatus, CycleCode, DeviceTable, Instance};
+use flotor_hal::{
+    Axes, Capabilities, Cycle, DeviceState, Fault, LoopConfig, Parameter, Refusal, Tick, Wrench,
+};
 use std::sync::Arc;
 
 /// Opened instance; closed when the last reference is dropped.
@@ -213,7 +215,8 @@ impl ActiveDevice {
     /// result. Not real-time.
     #[must_use]
     pub fn last_message(&mut self) -> String {
-        if let Some((function, CycleCode { code })) = self.unknown {
+        if let Some((function, code)) = self.unknown {
+            let code = code.code();
             return format!(
                 "`{function}` returned {code}, which is not a cycle; return a fault as FLOTOR_CYCLE_FAULT({code})"
             );

@@ -1,14 +1,14 @@
 //! Loads model plugins from files and steps each through a hundred poses: a host reduced to its use of plugins.
 //!
-//! `cargo run -p flotor-hal --features loader --example load_model -- target/debug/libflotor_wall.so`
+//! `cargo run -p flotor-loader --example load_model -- target/debug/libflotor_wall.so`
 //!
 //! Prints one line per file: id, version, last force and a checksum of all wrenches, or the reason why the file was
 //! rejected. The same model prints the same line on every system.
 
 #![allow(unsafe_code)] // a plugin file is loaded: its user trusts it
 
-use flotor_hal::abi::loader::{LoadError, Plugin};
 use flotor_hal::{Input, LoopConfig, Output, Pose};
+use flotor_loader::{LoadError, Plugin};
 use std::path::Path;
 
 const POSES: u32 = 100;

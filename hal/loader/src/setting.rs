@@ -1,7 +1,7 @@
 //! Conversion of user input (`spring.gamma_n=17`) to parameter values, checked against a plugin's schema.
 
-use crate::abi::Str;
-use crate::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Refusal};
+use flotor_hal::abi::Str;
+use flotor_hal::{Mutability, OutOfRange, Parameter, ParameterKind, ParameterValue, Refusal};
 
 /// Checked value of one parameter of a plugin's schema. Plugins with another schema reject the setting.
 #[derive(Clone, Debug)]
@@ -151,7 +151,7 @@ pub(super) unsafe fn to_raw(
         }
         // SAFETY: by the contract of this function nothing borrowed here outlives the setting.
         let text = unsafe { Str::borrowed(&setting.text) };
-        Ok(ParameterValue { index: setting.index, reserved: 0, number: setting.number, text })
+        Ok(ParameterValue::new(setting.index, setting.number, text))
     };
     settings.iter().map(raw).collect()
 }

@@ -1,11 +1,11 @@
 //! Comparison of the contract layouts of host and plugin; the first difference is reported in one line.
 
-use crate::abi::layout_table::CORE_COUNT;
-use crate::abi::{Entry, FieldLayout, LAYOUTS};
+use super::layout_table::CORE_COUNT;
+use super::{Entry, FieldLayout, LAYOUTS};
 
 /// Result of the second layout proof, after the layout tables compared equal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Proof {
+pub enum Proof {
     /// abi_stable confirms the layouts, including all function signatures.
     #[cfg_attr(not(feature = "layout-proof"), allow(dead_code))]
     Proven,
@@ -13,20 +13,27 @@ pub(super) enum Proof {
     NotProven,
 }
 
-/// Compares the layout tables and, if both sides carry an abi_stable proof, the proofs.
-///
-/// # Safety
-/// `entry` is a live entry whose magic, size and contract version were checked: its pointers may be followed.
-pub(super) unsafe fn contract(entry: &'static Entry) -> Result<Proof, String> {
-    if entry.layouts.is_null() || !entry.layouts.is_aligned() || entry.layout_count == 0 {
-        return Err("the plugin has no layout table".to_owned());
-    }
-    // SAFETY: the contract of an entry: a static array of so many rows.
-    let theirs = unsafe { std::slice::from_raw_parts(entry.layouts, entry.layout_count as usize) };
-    match difference(&LAYOUTS, theirs) {
-        Some(difference) => Err(difference),
-        // SAFETY: as for this function.
-        None => unsafe { second_proof(entry) },
+impl Entry {
+    /// Compares the layout table of the plugin with the table of this build and, if both carry an abi_stable proof, the
+    /// proofs. Not real-time; runs the plugin's code if it carries a proof.
+    ///
+    /// # Errors
+    /// A description of the first difference.
+    ///
+    /// # Safety
+    /// The entry came from [`Entry::at`] or from this build, and its contract version is the version of this build: its
+    /// pointers may be followed.
+    pub unsafe fn compare_layouts(&'static self) -> Result<Proof, String> {
+        if self.layouts.is_null() || !self.layouts.is_aligned() || self.layout_count == 0 {
+            return Err("the plugin has no layout table".to_owned());
+        }
+        // SAFETY: the contract of an entry: a static array of so many rows.
+        let theirs = unsafe { std::slice::from_raw_parts(self.layouts, self.layout_count as usize) };
+        match difference(&LAYOUTS, theirs) {
+            Some(difference) => Err(difference),
+            // SAFETY: as for this function.
+            None => unsafe { second_proof(self) },
+        }
     }
 }
 
@@ -62,11 +69,11 @@ unsafe fn second_proof(_: &'static Entry) -> Result<Proof, String> {
 }
 
 /// # Safety
-/// As for [`contract`].
+/// As for [`Entry::compare_layouts`].
 #[cfg(feature = "layout-proof")]
 unsafe fn second_proof(entry: &'static Entry) -> Result<Proof, String> {
-    use crate::abi::Str;
-    use crate::abi::layout_table::proof::types;
+    use super::Str;
+    use super::layout_table::proof::types;
     use abi_stable::library::AbiHeader;
     use abi_stable::type_layout::TypeLayout;
 
@@ -92,13 +99,13 @@ unsafe fn second_proof(entry: &'static Entry) -> Result<Proof, String> {
 /// # Safety
 /// Null, or the address of a static proof, or of as much of one as the size it starts with says.
 #[cfg(feature = "layout-proof")]
-unsafe fn whole_proof(address: *const crate::abi::LayoutProof) -> Option<&'static crate::abi::LayoutProof> {
+unsafe fn whole_proof(address: *const super::LayoutProof) -> Option<&'static super::LayoutProof> {
     if address.is_null() || !address.is_aligned() {
         return None;
     }
     // SAFETY: aligned, and every proof starts with its size, as this function demands.
     let size = unsafe { (&raw const (*address).size).read() };
-    if (size as usize) < size_of::<crate::abi::LayoutProof>() {
+    if (size as usize) < size_of::<super::LayoutProof>() {
         return None;
     }
     // SAFETY: aligned and, by its own word, whole; a static of a plugin, which is never unloaded.

@@ -1,7 +1,7 @@
 //! Linux: ELF metadata, private copies of plugins in memory files (`memfd_create`), loading with `dlopen`.
 
 use super::NoSection;
-use crate::abi::metadata;
+use flotor_hal::abi::metadata;
 use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
 use object::elf::FileHeader64;
 use object::read::elf::{FileHeader, ProgramHeader, SectionHeader};
@@ -147,8 +147,8 @@ fn end_of_section_headers(header: &FileHeader64<Endianness>) -> object::Result<u
 #[cfg(test)]
 mod tests {
     use super::link_remedy;
-    use crate::extension::independent_stop::means::Independence;
-    use crate::{IndependentStop, StoppedState};
+    use crate::Independence;
+    use flotor_hal::{IndependentStop, StoppedState};
     use std::io::Read;
     use std::os::fd::AsRawFd;
 
@@ -188,14 +188,16 @@ mod tests {
     fn what_cannot_be_used_is_refused() {
         let (reader, _writer) = std::io::pipe().expect("a pipe");
         let right = IndependentStop::by_message(reader.as_raw_fd(), b"stop", StoppedState::Zero, 0);
+        let by_message = |descriptor, message: &[u8]| {
+            IndependentStop::by_message(descriptor, message, StoppedState::Zero, 0)
+        };
         for (wrong, words) in [
             (right, "cannot be written"),
-            (IndependentStop { descriptor: 1_000_000, ..right }, "names the descriptor 1000000"),
-            (IndependentStop { descriptor: -7, ..right }, "names the negative descriptor -7"),
-            (IndependentStop { length: 65, ..right }, "has a message of 65 bytes"),
-            (IndependentStop { length: 0, ..right }, "has a message of 0 bytes"),
-            (IndependentStop { state: 2, ..right }, "state 2"),
-            (IndependentStop { descriptor: -1, ..right }, "no descriptor"),
+            (by_message(1_000_000, b"stop"), "names the descriptor 1000000"),
+            (by_message(-7, b"stop"), "names the negative descriptor -7"),
+            (by_message(reader.as_raw_fd(), &[1; 65]), "has a message of 65 bytes"),
+            (by_message(reader.as_raw_fd(), &[]), "has a message of 0 bytes"),
+            (by_message(-1, b"stop"), "no descriptor"),
         ] {
             let refused = Independence::of(&wrong).expect_err("it is wrong").to_string();
             assert!(refused.contains(words), "{refused}");

@@ -2,7 +2,7 @@
 
 use super::platform::NoSection;
 use super::{LoadError, platform};
-use crate::abi::{CONTRACT, PluginKind};
+use flotor_hal::abi::{CONTRACT, PluginKind};
 use object::{ReadCache, ReadRef};
 use std::fs::File;
 use std::path::{Path, PathBuf};

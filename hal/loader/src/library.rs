@@ -3,13 +3,14 @@
 use super::declaration;
 use super::interfaces::Interface;
 use super::model::{Model, ModelTables};
+use super::offers::Offers;
 use super::platform::PrivateCopy;
-use super::{LoadError, Metadata, OpenedDevice, Setting, check, metadata_file, schema};
-use crate::abi::{
-    ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, Entry, HOST_QUIET_PANICS, Host, MAGIC, PluginKind,
-};
+use super::{LoadError, Metadata, OpenedDevice, Setting, metadata_file};
 use crate::extension::{DeviceExtensions, ModelExtensions};
-use crate::{DeviceInfo, ModelInfo, Parameter};
+use flotor_hal::abi::{
+    ABI_CANDIDATE, ABI_MAJOR, ABI_MINOR, CONTRACT, Entry, HOST_QUIET_PANICS, Host, PluginKind, Proof,
+};
+use flotor_hal::{DeviceInfo, ModelInfo, Parameter};
 use object::ReadCache;
 use std::path::{Path, PathBuf};
 
@@ -28,7 +29,7 @@ pub struct Plugin {
     metadata: Metadata,
     interface: Interface,
     parameters: &'static [Parameter],
-    proof: check::Proof,
+    proof: Proof,
 }
 
 impl Plugin {
@@ -37,7 +38,7 @@ impl Plugin {
     /// The checks find mistakes of an author, not malice. [`super::read_metadata`] runs no code of the plugin.
     ///
     /// ```compile_fail,E0133
-    /// # use flotor_hal::abi::loader::Plugin;
+    /// # use flotor_loader::Plugin;
     /// let plugin = Plugin::load("libjelly.so".as_ref()); // needs `unsafe`: nothing guarantees the file
     /// ```
     ///
@@ -75,7 +76,7 @@ impl Plugin {
         let metadata = Metadata {
             path: PathBuf::new(),
             // The kind in the entry is the only source here; `from_entry` rejects an unknown kind.
-            kind: PluginKind::from_code(entry.kind).unwrap_or(PluginKind::Model),
+            kind: PluginKind::from_code(entry.kind_code()).unwrap_or(PluginKind::Model),
             id: String::new(),
             name: String::new(),
             doc: String::new(),
@@ -104,40 +105,41 @@ impl Plugin {
     ) -> Result<Self, LoadError> {
         let path = &metadata.path;
         // SAFETY: as this function demands.
-        let Some(entry) = (unsafe { whole_entry(entry) }) else {
+        let Some(entry) = (unsafe { Entry::at(entry) }) else {
             return Err(LoadError::NoEntry { path: path.clone(), symbol: metadata.entry.clone() });
         };
-        let theirs = (entry.abi_major, entry.abi_minor, entry.abi_candidate);
-        if theirs != (ABI_MAJOR, ABI_MINOR, ABI_CANDIDATE) {
-            let candidate = if entry.abi_candidate == 0 { "" } else { "-rc" };
+        let (major, minor, candidate) = entry.contract();
+        if (major, minor, candidate) != (ABI_MAJOR, ABI_MINOR, ABI_CANDIDATE) {
+            let candidate = if candidate == 0 { "" } else { "-rc" };
             return Err(LoadError::OtherContract {
                 path: path.clone(),
-                theirs: format!("{}.{}{candidate}", entry.abi_major, entry.abi_minor),
+                theirs: format!("{major}.{minor}{candidate}"),
             });
         }
-        if PluginKind::from_code(entry.kind) != Some(metadata.kind) {
+        if PluginKind::from_code(entry.kind_code()) != Some(metadata.kind) {
             return Err(LoadError::OtherEntryKind {
                 path: path.clone(),
                 metadata: metadata.kind.name(),
-                entry: entry.kind,
+                entry: entry.kind_code(),
             });
         }
         // SAFETY: magic, size and contract version were checked just above; the rest this function demands.
-        let proof = unsafe { check::contract(entry) };
+        let proof = unsafe { entry.compare_layouts() };
         let proof =
             proof.map_err(|difference| LoadError::LayoutDiffers { path: path.clone(), difference })?;
-        if let Some(init) = entry.init {
+        if let Some(init) = entry.init() {
             let flags = if matches!(runtime, Runtime::Own) { HOST_QUIET_PANICS } else { 0 };
             let host = Host { size: 16, abi_major: ABI_MAJOR, abi_minor: ABI_MINOR, flags, reserved: 0 };
             // SAFETY: `init` takes a host struct that is valid for the call; the contract says it does not unwind.
             unsafe { init(&raw const host) };
         }
         // SAFETY: the plugin keeps the contract, as this function demands.
-        let interface = unsafe { Interface::find(path, entry, metadata.kind) }?;
+        let offers = unsafe { Offers::of(path, entry) }?;
+        let interface = Interface::find(&offers, metadata.kind)?;
         let (parameters, count) = interface.parameters();
         // SAFETY: a table's schema is a static array of `parameter_count` parameters of the checked layout, unless that
         // number is above the limit; then no parameter is read.
-        let schema = unsafe { schema::checked(parameters, count) };
+        let schema = unsafe { declaration::checked_schema(parameters, count) };
         let parameters = schema.map_err(|problem| LoadError::Schema { path: path.clone(), problem })?;
         Ok(Self { metadata, interface, parameters, proof })
     }
@@ -152,7 +154,7 @@ impl Plugin {
     /// contract's own layout tables are always compared.
     #[must_use]
     pub fn layouts_proven(&self) -> bool {
-        self.proof == check::Proof::Proven
+        self.proof == Proof::Proven
     }
 
     /// Returns the parameter schema of the plugin.
@@ -222,30 +224,7 @@ impl Plugin {
         LoadError::OtherKind { path: path.clone(), id: id.clone(), found: kind.name(), wanted: wanted.name() }
     }
 
-    fn refused(&self, refusal: crate::Refusal) -> LoadError {
+    fn refused(&self, refusal: flotor_hal::Refusal) -> LoadError {
         LoadError::Refused { path: self.metadata.path.clone(), id: self.metadata.id.clone(), refusal }
     }
-}
-
-/// Returns the entry at an address; `None` if null, misaligned, too short or without the magic.
-///
-/// # Safety
-/// As for [`Plugin::from_entry`].
-unsafe fn whole_entry(address: *const Entry) -> Option<&'static Entry> {
-    if address.is_null() || !address.is_aligned() {
-        return None;
-    }
-    // SAFETY: not null, hence eight bytes at the least, as this function demands; bytes need no alignment.
-    let magic = unsafe { address.cast::<[u8; 8]>().read() };
-    if magic != MAGIC {
-        return None;
-    }
-    // SAFETY: what has the magic is an entry, as this function demands, and every one says its size behind
-    // it.
-    let size = unsafe { (&raw const (*address).size).read() };
-    if (size as usize) < size_of::<Entry>() {
-        return None;
-    }
-    // SAFETY: not null, aligned and, by its own word, whole; it stays for ever, and any bits are an `Entry`.
-    Some(unsafe { &*address })
 }

@@ -1,108 +1,43 @@
-//! Lookup of the function tables behind an entry; tables shorter than the contract's are rejected.
+//! Table lookup of a plugin by interface id; tables shorter than the contract's are rejected.
 
 use super::LoadError;
-use super::model::ModelTables;
-use crate::Parameter;
-use crate::abi::interface::Table;
-use crate::abi::{DeviceTable, Entry, ForceTable, PluginKind, Str};
-use crate::extension::{DeviceExtensions, ModelExtensions};
+use flotor_hal::abi::{Entry, Str, Table};
 use std::ffi::c_void;
 use std::path::Path;
 
-/// Function tables of a plugin, by its kind.
-#[derive(Clone, Copy)]
-pub(super) enum Interface {
-    Model(ModelTables),
-    Device { device: &'static DeviceTable, extensions: DeviceExtensions },
-}
-
-impl Interface {
-    /// Gets the tables of a plugin by its kind. Not real-time; runs the plugin's code.
-    ///
-    /// # Errors
-    /// [`LoadError::MissingFunction`] if the interface or a required function is missing, or if a table, also of an
-    /// extension, is shorter than the contract's.
-    ///
-    /// # Safety
-    /// `entry` is the entry of a plugin that keeps the contract: for any id, `get_interface` returns null or the address of a
-    /// static table that starts with its size in bytes and, up to this size, has the layout of the table of that id.
-    pub(super) unsafe fn find(
-        path: &Path,
-        entry: &'static Entry,
-        kind: PluginKind,
-    ) -> Result<Self, LoadError> {
-        let Some(get_interface) = entry.get_interface else {
-            return Err(lack(path, "the entry", "has no `get_interface`"));
-        };
-        let offers = Offers { path, get_interface };
-        match kind {
-            PluginKind::Device => offers.device(),
-            PluginKind::Model => offers.model(),
-        }
-    }
-
-    /// Returns id, name and description in the main table.
-    pub(super) fn texts(&self) -> [&'static str; 3] {
-        match self {
-            Self::Model(ModelTables { force, .. }) => [force.info.id(), force.info.name(), force.info.doc()],
-            Self::Device { device, .. } => [device.info.id(), device.info.name(), device.info.doc()],
-        }
-    }
-
-    /// Returns the unchecked list of parameters in the main table, with its length.
-    pub(super) fn parameters(&self) -> (*const Parameter, u32) {
-        match self {
-            Self::Model(ModelTables { force, .. }) => (force.parameters, force.parameter_count),
-            Self::Device { device, .. } => (device.parameters, device.parameter_count),
-        }
-    }
-}
-
 type GetInterface = unsafe extern "C" fn(id: Str) -> *const c_void;
 
-/// Table lookup of a plugin. `get_interface` meets the conditions of [`Interface::find`].
+/// Table lookup of a plugin. For any id, `get_interface` returns null or the address of a static table that starts with
+/// its size in bytes and, up to this size, has the layout of the table of that id.
 pub(crate) struct Offers<'a> {
     path: &'a Path,
     get_interface: GetInterface,
 }
 
-impl Offers<'_> {
-    fn device(&self) -> Result<Interface, LoadError> {
-        let device: &'static DeviceTable = self.required()?;
-        let functions = [
-            ("has no `open`", device.open.is_some()),
-            ("has no `close`", device.close.is_some()),
-            ("has no `capabilities`", device.capabilities.is_some()),
-            ("has no `activate`", device.activate.is_some()),
-            ("has no `deactivate`", device.deactivate.is_some()),
-            ("has no `read`", device.read.is_some()),
-            ("has no `write`", device.write.is_some()),
-            ("has no `safe_stop`", device.safe_stop.is_some()),
-        ];
-        self.check_functions(DeviceTable::ID, &functions)?;
-        let extensions = DeviceExtensions::of(self)?;
-        Ok(Interface::Device { device, extensions })
+impl<'a> Offers<'a> {
+    /// Returns the lookup of an entry.
+    ///
+    /// # Errors
+    /// [`LoadError::MissingFunction`] without `get_interface`.
+    ///
+    /// # Safety
+    /// `entry` is the entry of a plugin that keeps the contract, as [`Offers`] states it.
+    pub(super) unsafe fn of(path: &'a Path, entry: &'static Entry) -> Result<Self, LoadError> {
+        match entry.get_interface() {
+            Some(get_interface) => Ok(Self { path, get_interface }),
+            None => Err(lack(path, "the entry", "has no `get_interface`")),
+        }
     }
 
-    fn model(&self) -> Result<Interface, LoadError> {
-        let force: &'static ForceTable = self.required()?;
-        let functions = [
-            ("has no `create`", force.create.is_some()),
-            ("has no `destroy`", force.destroy.is_some()),
-            ("has no `step`", force.step.is_some()),
-        ];
-        self.check_functions(ForceTable::ID, &functions)?;
-        Ok(Interface::Model(ModelTables { force, extensions: ModelExtensions::of(self)? }))
-    }
-
-    fn required<T: Table>(&self) -> Result<&'static T, LoadError> {
+    /// Returns the table of an id that every plugin of its kind offers. Not real-time; runs the plugin's code.
+    pub(super) fn required<T: Table>(&self) -> Result<&'static T, LoadError> {
         self.table()?.ok_or_else(|| self.lacks(T::ID, "is missing"))
     }
 
     /// Returns the table of an id; `None` if the plugin does not offer the table. A table that is too short is a
     /// mistake, not an older contract: the contract fixes the sizes of all tables.
     pub(crate) fn table<T: Table>(&self) -> Result<Option<&'static T>, LoadError> {
-        // SAFETY: the plugin keeps the contract ([`Interface::find`]), by which any id may be asked for; this
+        // SAFETY: the plugin keeps the contract ([`Offers`]), by which any id may be asked for; this
         // one lives for ever.
         let table = unsafe { (self.get_interface)(Str::new(T::ID)) }.cast::<T>();
         if table.is_null() {
@@ -112,17 +47,18 @@ impl Offers<'_> {
             return Err(self.lacks(T::ID, "is not aligned"));
         }
         // SAFETY: not null, and aligned for a `T`, hence for the number it starts with ([`Table`]); so much
-        // of it is there, however short it is ([`Interface::find`]).
+        // of it is there, however short it is ([`Offers`]).
         let size = unsafe { table.cast::<u32>().read() };
         if (size as usize) < size_of::<T>() {
             return Err(self.lacks(T::ID, "is shorter than in the contract"));
         }
         // SAFETY: not null and aligned, as was seen above; a `T` by its id, whole by its own word, and a
-        // static of a library that is never unloaded ([`Interface::find`]); it takes any bits ([`Table`]).
+        // static of a library that is never unloaded ([`Offers`]); it takes any bits ([`Table`]).
         Ok(Some(unsafe { &*table }))
     }
 
-    fn check_functions(
+    /// Rejects a table without one of its required functions, each given with its presence.
+    pub(super) fn check_functions(
         &self,
         interface: &'static str,
         functions: &[(&'static str, bool)],
@@ -145,7 +81,8 @@ fn lack(path: &Path, interface: &'static str, missing: &'static str) -> LoadErro
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::extension::{
+    use flotor_hal::abi::{DeviceTable, ForceTable};
+    use flotor_hal::extension::{
         active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
         connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable,
         independent_stop::IndependentStopTable, linear_field::LinearFieldTable, pacing::PacingTable,
