@@ -282,6 +282,25 @@ typedef uint32_t FlotorStoppedState;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
+// Kind of a grip, which decides the units of all its numbers. In C, a `uint32_t` with these values.
+enum FlotorGripKind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // Opening in m, velocity in m/s, effort in N.
+    FlotorGripKind_Linear = 0,
+    // Opening in rad, velocity in rad/s, effort in N·m.
+    FlotorGripKind_Angular = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorGripKind FlotorGripKind;
+#else
+typedef uint32_t FlotorGripKind;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
 // Form of a [`Primitive`]. In C, a `uint32_t` with these values.
 enum FlotorForm
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -1035,6 +1054,52 @@ typedef struct FlotorPacingTable {
     uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
 } FlotorPacingTable;
 
+// Grip of a device as numbers that a host enforces, in the units of its kind. 40 bytes.
+typedef struct FlotorGripAxis {
+    // Code of a [`GripKind`].
+    uint32_t kind;
+    uint32_t reserved;
+    // Opening of the closed and of the open grip.
+    double range[2];
+    // Largest effort in both directions; 0: the grip is sensed only.
+    double max_effort;
+    // Maximum slew rate of the effort, per s.
+    double max_slew_per_s;
+} FlotorGripAxis;
+
+// Sample of a grip, in the units of its kind. 32 bytes.
+typedef struct FlotorGripState {
+    // Opening, larger when the grip is more open.
+    double opening;
+    // Velocity of the opening, positive while the grip opens.
+    double velocity;
+    // Effort delivered since the previous tick, as reported by the device.
+    double delivered;
+    // Code of a [`GripKind`], set by the host.
+    uint32_t kind;
+    uint32_t reserved;
+} FlotorGripState;
+
+// Function table `flotor.grip/1`: see [`GripDevice`], [`ActiveGrip`] and [`GripModel`]. A device sets the first three
+// functions, a model the last. All return a [`crate::abi::CallStatus`] code.
+typedef struct FlotorGripTable {
+    // Size of this table in the plugin's build, bytes.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Writes the grip of an opened device; `Unsupported` without one. Not real-time.
+    uint32_t (*axis)(FlotorInstance instance, struct FlotorGripAxis *axis);
+    // Writes the sample that the last `read` of an active device took. Real-time.
+    uint32_t (*read)(FlotorInstance instance, struct FlotorGripState *state);
+    // Sets the effort that the next `write` of an active device commands. Real-time.
+    uint32_t (*write)(FlotorInstance instance, double effort);
+    // Writes the effort of a model at a grip, right after the step with the same input. Real-time.
+    uint32_t (*effort)(FlotorInstance instance,
+                       const struct FlotorInput *input,
+                       const struct FlotorGripState *grip,
+                       double *effort);
+} FlotorGripTable;
+
 /* Version of the contract, for the metadata. */
 #define FLOTOR_CONTRACT "1.0-rc"
 /* Names of interfaces and extensions. */
@@ -1046,6 +1111,7 @@ typedef struct FlotorPacingTable {
 #define FLOTOR_INTERFACE_CONNECTION "flotor.connection/1"
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
+#define FLOTOR_INTERFACE_GRIP "flotor.grip/1"
 #define FLOTOR_INTERFACE_INDEPENDENT_STOP "flotor.independent-stop/1"
 #define FLOTOR_INTERFACE_LINEAR_FIELD "flotor.linear-field/1"
 #define FLOTOR_INTERFACE_PACING "flotor.pacing/1"
@@ -1294,6 +1360,25 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(DetailsTable, detail_count),
     FLOTOR_FIELD(DetailsTable, details),
     FLOTOR_FIELD(DetailsTable, values),
+    FLOTOR_STRUCT(GripAxis),
+    FLOTOR_FIELD(GripAxis, kind),
+    FLOTOR_FIELD(GripAxis, reserved),
+    FLOTOR_FIELD(GripAxis, range),
+    FLOTOR_FIELD(GripAxis, max_effort),
+    FLOTOR_FIELD(GripAxis, max_slew_per_s),
+    FLOTOR_STRUCT(GripState),
+    FLOTOR_FIELD(GripState, opening),
+    FLOTOR_FIELD(GripState, velocity),
+    FLOTOR_FIELD(GripState, delivered),
+    FLOTOR_FIELD(GripState, kind),
+    FLOTOR_FIELD(GripState, reserved),
+    FLOTOR_STRUCT(GripTable),
+    FLOTOR_FIELD(GripTable, size),
+    FLOTOR_FIELD(GripTable, reserved),
+    FLOTOR_FIELD(GripTable, axis),
+    FLOTOR_FIELD(GripTable, read),
+    FLOTOR_FIELD(GripTable, write),
+    FLOTOR_FIELD(GripTable, effort),
     FLOTOR_STRUCT(LinearField),
     FLOTOR_FIELD(LinearField, anchor),
     FLOTOR_FIELD(LinearField, wrench),

@@ -58,6 +58,7 @@ pub use extension::centerline::{CenterlineInfo, CenterlineModel};
 pub use extension::connection::{ConnectionDevice, UsbAccess, UsbKind};
 pub use extension::details::{Detail, DetailsModel};
 pub use extension::energy_ledger::{EnergyLedger, EnergyLedgerDevice};
+pub use extension::grip::{ActiveGrip, GripAxis, GripDevice, GripKind, GripModel, GripState};
 pub use extension::independent_stop::{
     IndependentStop, IndependentStopDevice, STOP_MESSAGE_BYTES, StoppedState,
 };

@@ -85,8 +85,8 @@ mod tests {
     use flotor_hal::extension::{
         active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
         connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable,
-        independent_stop::IndependentStopTable, linear_field::LinearFieldTable, pacing::PacingTable,
-        shape::ShapeTable, soft_range::SoftRangeTable, variant::VariantTable,
+        grip::GripTable, independent_stop::IndependentStopTable, linear_field::LinearFieldTable,
+        pacing::PacingTable, shape::ShapeTable, soft_range::SoftRangeTable, variant::VariantTable,
         workspace_bounds::WorkspaceBoundsTable,
     };
 
@@ -135,6 +135,7 @@ mod tests {
         is_held_to_its_length::<DeviceTable>();
         is_held_to_its_length::<EnergyLedgerTable>();
         is_held_to_its_length::<CalibrationTable>();
+        is_held_to_its_length::<GripTable>();
         is_held_to_its_length::<IndependentStopTable>();
         is_held_to_its_length::<PacingTable>();
         is_held_to_its_length::<ConnectionTable>();

@@ -17,13 +17,13 @@ pub unsafe trait Table: Sized + 'static {
 }
 
 /// Implements [`Table`] for a struct and defines `offer`, which builds the table of a plugin type, for the export
-/// macros.
+/// macros. `P of Kind` has a second type, which the compiler infers from the traits of the plugin type `P`.
 macro_rules! table {
-    ($table:ident: $id:literal, $plugin:ident: [$($bound:tt)+] { $($fields:tt)+ }) => {
+    ($table:ident: $id:literal, $plugin:ident $(of $kind:ident)?: [$($bound:tt)+] { $($fields:tt)+ }) => {
         #[doc(hidden)]
         #[must_use]
         #[allow(unreachable_pub, clippy::cast_possible_truncation)] // main interfaces stay here; sizes are small
-        pub const fn offer<$plugin: $($bound)+>() -> $crate::abi::Interface<$plugin> {
+        pub const fn offer<$plugin: $($bound)+ $(, $kind)?>() -> $crate::abi::Interface<$plugin> {
             let table = const { &$table { size: size_of::<$table>() as u32, $($fields)+ } };
             $crate::abi::Interface::of(table)
         }

@@ -9,6 +9,7 @@ pub mod centerline;
 pub mod connection;
 pub mod details;
 pub mod energy_ledger;
+pub mod grip;
 pub mod independent_stop;
 pub mod linear_field;
 pub mod pacing;
@@ -32,6 +33,7 @@ extensions! {
     active_region,
     centerline,
     details,
+    grip,
     linear_field,
     shape,
     soft_range,

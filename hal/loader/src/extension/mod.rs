@@ -8,6 +8,7 @@ pub(crate) mod centerline;
 mod connection;
 mod details;
 mod energy_ledger;
+mod grip;
 pub(crate) mod independent_stop;
 mod linear_field;
 mod pacing;
@@ -19,7 +20,7 @@ use crate::LoadError;
 use crate::offers::Offers;
 use flotor_hal::extension::{
     active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
-    connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable,
+    connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable, grip::GripTable,
     independent_stop::IndependentStopTable, linear_field::LinearFieldTable, pacing::PacingTable,
     shape::ShapeTable, soft_range::SoftRangeTable, variant::VariantTable,
     workspace_bounds::WorkspaceBoundsTable,
@@ -52,6 +53,7 @@ extensions! {
         active_region: ActiveRegionTable,
         centerline: CenterlineTable,
         details: DetailsTable,
+        grip: GripTable,
         linear_field: LinearFieldTable,
         shape: ShapeTable,
         soft_range: SoftRangeTable,
@@ -62,6 +64,7 @@ extensions! {
         calibration: CalibrationTable,
         connection: ConnectionTable,
         energy_ledger: EnergyLedgerTable,
+        grip: GripTable,
         independent_stop: IndependentStopTable,
         pacing: PacingTable,
     }
