@@ -5,6 +5,8 @@
 //! - [`limits`]: limits of force and motion, the wall at the end of a device's range; [`rendered_boundary`]: the same wall on
 //!   a device, in a loop; [`region`]: the vectors that limits allow.
 //! - [`plausibility`]: checks of device samples; [`oscillation`]: detection of an unstable loop.
+//! - [`grip`], [`grip_guard`]: the grip of a device, its check and limits; [`feel`]: stiffness and settling time that the hand
+//!   felt.
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between the two ends of a coupling.
 //! - [`guidance`]: the parameters that guide a simulated hand.
 //! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: number of a plugin in the run.
@@ -20,6 +22,9 @@ pub mod coupling;
 mod date;
 pub mod demand;
 mod fade;
+pub mod feel;
+pub mod grip;
+pub mod grip_guard;
 pub mod guidance;
 pub mod limits;
 mod lock;

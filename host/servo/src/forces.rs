@@ -3,9 +3,12 @@
 //! Servo and replay run the same code, so that a replay can be bit-exact.
 
 use super::Heartbeat;
-use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement, Slot};
+use super::models::{
+    Contribution, Layer, LayerReport, ModelHealth, ModelStack, Replacement, Slot, StepContext,
+};
 use flotor_core::ModelOutputs;
 use flotor_core::demand::TickDemand;
+use flotor_core::grip::GripRecord;
 use flotor_core::trace::Events;
 use flotor_coupling::{
     Coupling, CouplingDescription, CouplingEnds, Line, LinkStatistics, LinkTimeouts, PortSample, Pull, Reach,
@@ -21,6 +24,8 @@ pub struct Port {
     pub state: DeviceState,
     /// Wrench commanded to the device, applied until the next tick.
     pub commanded: Wrench,
+    /// Grip of the device; `None` without one.
+    pub grip: Option<GripRecord>,
     /// Model outputs that reach the hand at this device.
     at_hand: Demand,
     /// Model outputs computed in this tick.
@@ -44,6 +49,7 @@ impl Port {
         Self {
             state: DeviceState::HOME,
             commanded: Wrench::ZERO,
+            grip: None,
             at_hand,
             computed: at_hand,
             requested: Wrench::ZERO,
@@ -239,8 +245,11 @@ impl Forces {
         self.couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
         for (stack, port) in self.stacks.iter_mut().zip(&mut *ports) {
             let demand = TickDemand::new(port.at_hand, observed.limited_to(stack.observable()));
-            let (wrench, energy_j) = stack.step(tick, &port.state, demand, heartbeat, &mut port.events);
+            let sampled = port.grip.map(|grip| grip.state);
+            let context = StepContext { tick, state: &port.state, grip: sampled.as_ref(), demand };
+            let Contribution { wrench, energy_j, effort } = stack.step(&context, heartbeat, &mut port.events);
             port.take(demand, wrench, energy_j);
+            port.grip.iter_mut().for_each(|grip| grip.model = effort);
         }
         self.couplings.iter().for_each(|coupled| coupled.add_to(ports));
     }

@@ -4,10 +4,11 @@
 mod plugin_description;
 
 use flotor_core::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, PassivityMode};
+use flotor_core::grip::GripRecord;
 use flotor_core::mapping::MappingConfig;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs};
-use flotor_hal::{Pose, Twist, Wrench};
+use flotor_hal::{GripKind, GripState, Pose, Twist, Wrench};
 use flotor_record::{Note, PluginDescription, Recorder, Role, RunDescription, Severity};
 use flotor_servo::Clock;
 use plugin_description::described;
@@ -105,6 +106,11 @@ fn record() -> TickRecord {
         commanded: wrench(),
         delivered: wrench(),
         port_energy_j: 98.5,
+        grip: Some(GripRecord {
+            state: GripState::new(GripKind::Angular, 97.5, 96.5).with_delivered(95.5),
+            model: 94.5,
+            commanded: 93.5,
+        }),
         events: Events::from_bits(0b101),
         buttons: 0b10,
         lateness_ns: 1234,

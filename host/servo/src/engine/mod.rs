@@ -8,6 +8,7 @@ mod stepped;
 pub use stepped::Stepped;
 
 use asynchronous::AsynchronousModel;
+use flotor_core::grip::GripRecord;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
     ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
@@ -37,11 +38,18 @@ macro_rules! each {
 }
 
 impl Engine {
-    /// Steps the model; `output` is only valid for [`Stepped::Answered`]. Real-time: bounded by the model or its timeout, no allocation.
-    pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
+    /// Steps the model, also at a grip in its scale, where an asynchronous model has no effort; the results are only valid for
+    /// [`Stepped::Answered`]. Real-time: bounded by the model or its timeout, no allocation.
+    pub fn step(&mut self, input: &Input, output: &mut Output, grip: &mut Option<GripRecord>) -> Stepped {
         match self {
-            Self::Here(model) => model.step(input, output).into(),
-            Self::Process(worker) => worker.step(input, output),
+            Self::Here(model) => {
+                let stepped = model.step(input, output).into();
+                if let (Some(grip), Stepped::Answered) = (grip, stepped) {
+                    grip.model = model.grip(input, &grip.state);
+                }
+                stepped
+            }
+            Self::Process(worker) => worker.step(input, output, grip),
             Self::Asynchronous(model) => model.step(input, output),
         }
     }

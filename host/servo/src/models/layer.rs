@@ -5,11 +5,13 @@ use super::end_wall::EndWall;
 use crate::budget::{Allowed, Answer, Overrun, TimeBudget};
 use crate::engine::{Engine, Stepped};
 use flotor_core::demand::TickDemand;
+use flotor_core::grip::GripRecord;
 use flotor_core::mapping::{Blend, Mapping};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    DVec3, Demand, DeviceState, Input, Memory, Output, RegionShape, SampledLoop, StepStatus, Tick, Wrench,
+    DVec3, Demand, DeviceState, GripState, Input, Memory, Output, RegionShape, SampledLoop, StepStatus, Tick,
+    Wrench,
 };
 
 /// Health counters of a model, summed over its instances.
@@ -59,8 +61,8 @@ struct Object {
     mapping: Mapping,
     /// Wall at the bounds of the model; `None` for a model without bounds.
     end: Option<EndWall>,
-    /// Usable output of the last tick, in the model frame, kept for an engine whose next output may be late.
-    last: Option<Output>,
+    /// Usable output and effort of the last tick, in the model frame, kept for an engine whose next output may be late.
+    last: Option<(Output, f64)>,
     /// Tick of the last step.
     stepped_at: Option<u64>,
     /// Number of calls so far that changed the floating-point environment.
@@ -69,37 +71,41 @@ struct Object {
     is_disabled: bool,
 }
 
-/// Tick, state of the device and demanded outputs of a step.
+/// Tick, state of the device and of its grip, and demanded outputs of a step.
 #[derive(Clone, Copy)]
-pub(super) struct StepContext<'a> {
-    pub(super) tick: &'a Tick,
-    pub(super) state: &'a DeviceState,
-    pub(super) demand: TickDemand,
+pub(crate) struct StepContext<'a> {
+    pub(crate) tick: &'a Tick,
+    pub(crate) state: &'a DeviceState,
+    pub(crate) grip: Option<&'a GripState>,
+    pub(crate) demand: TickDemand,
 }
 
-/// Wrench and energy of one layer in a tick. An output that was not computed is NaN.
+/// Wrench, energy and effort of one layer, or of all, in a tick. An output that was not computed is NaN.
 #[derive(Clone, Copy)]
-pub(super) struct Contribution {
-    /// Wrench in the device frame, unweighted; the torque is NaN if it is not finite and only an observer requests it.
-    pub(super) wrench: Wrench,
+pub(crate) struct Contribution {
+    /// Wrench in the device frame; the torque is NaN if it is not finite and only an observer requests it.
+    pub(crate) wrench: Wrench,
     /// Stored energy scaled to the device, J; NaN where it is not finite.
-    pub(super) energy_j: f64,
+    pub(crate) energy_j: f64,
+    /// Effort at the grip scaled to the device, N or N·m; 0 without a grip.
+    pub(crate) effort: f64,
 }
 
 impl Contribution {
-    /// No wrench and no energy.
-    pub(super) const NONE: Contribution = Contribution { wrench: Wrench::ZERO, energy_j: 0.0 };
+    /// No wrench, no energy and no effort.
+    pub(super) const NONE: Contribution = Contribution { wrench: Wrench::ZERO, energy_j: 0.0, effort: 0.0 };
 
     /// Scales the contribution. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn times(self, part: f64) -> Self {
-        Self { wrench: self.wrench * part, energy_j: self.energy_j * part }
+        Self { wrench: self.wrench * part, energy_j: self.energy_j * part, effort: self.effort * part }
     }
 
     /// Adds two contributions. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn plus(self, other: Self) -> Self {
-        Self { wrench: self.wrench + other.wrench, energy_j: self.energy_j + other.energy_j }
+        let (wrench, effort) = (self.wrench + other.wrench, self.effort + other.effort);
+        Self { wrench, energy_j: self.energy_j + other.energy_j, effort }
     }
 }
 
@@ -234,12 +240,12 @@ impl Layer {
     /// Steps all objects that can act at the handle and returns the sum of their contributions; other objects are not called.
     #[inline]
     fn ask(&mut self, context: &StepContext<'_>, events: &mut Events) -> Contribution {
-        let StepContext { tick, state, demand } = *context;
+        let StepContext { tick, state, grip, demand } = *context;
         let Self { objects, broad, serves, memory, health, .. } = self;
         let mut share = Contribution::NONE;
         broad.for_each_near(objects, state.pose.position(), |object| {
             let input = object.mapping.input(tick, state, demand.computed().limited_to(*serves));
-            let Some(output) = object.answer(&input, demand, *memory, health, events) else {
+            let Some((output, effort)) = object.answer(&input, grip, demand, *memory, health, events) else {
                 events.insert(Events::MODEL_FAULT);
                 return;
             };
@@ -250,6 +256,9 @@ impl Layer {
                 share.wrench = share.wrench + push;
             }
             share.energy_j += output.energy_j * object.mapping.energy_scale();
+            if let Some(grip) = grip {
+                share.effort += object.mapping.effort_to_device(grip.kind(), effort);
+            }
             if output.status() != Some(StepStatus::Ok) {
                 events.insert(Events::MODEL_DEGRADED);
             }
@@ -316,16 +325,17 @@ impl Object {
         Some(Bounds::about(self.mapping.position_to_device(region.center()), half_sides_m))
     }
 
-    /// Steps the model. Returns the output, model frame, if it is usable; otherwise counts the problem in `health`.
+    /// Steps the model. Returns output and effort, model frame, if they are usable; otherwise counts the problem in `health`.
     #[inline(always)] // with the three of `Mapping` and `limit_wrench` 22 ns a tick
     fn answer(
         &mut self,
         input: &Input,
+        grip: Option<&GripState>,
         demand: TickDemand,
         memory: Memory,
         health: &mut ModelHealth,
         events: &mut Events,
-    ) -> Option<Output> {
+    ) -> Option<(Output, f64)> {
         if self.is_disabled {
             return None;
         }
@@ -336,7 +346,8 @@ impl Object {
         }
         self.stepped_at = Some(input.tick);
         let mut output = Output::new(Wrench::ZERO, 0.0, StepStatus::Ok);
-        let stepped = self.model.step(input, &mut output);
+        let mut grip = grip.map(|state| GripRecord::at(self.mapping.grip_to_model(state)));
+        let stepped = self.model.step(input, &mut output, &mut grip);
         if self.model.float_changes() != self.float_changes {
             self.float_changes = self.model.float_changes();
             events.insert(Events::FLOAT_ENVIRONMENT);
@@ -344,7 +355,9 @@ impl Object {
         }
         match stepped {
             Stepped::Answered => {
-                let usable = usable(demand, output);
+                let effort = grip.map_or(0.0, |grip| grip.model);
+                let usable = usable(demand, output).map(|output| (output, effort));
+                let usable = usable.filter(|_| effort.is_finite());
                 if usable.is_none() {
                     self.last = None;
                     ModelHealth::count(&mut health.rejected_ticks, &mut health.first_rejected, input.tick);
@@ -373,7 +386,7 @@ impl Object {
         }
     }
 
-    fn fail(&mut self, tick: u64, health: &mut ModelHealth) -> Option<Output> {
+    fn fail(&mut self, tick: u64, health: &mut ModelHealth) -> Option<(Output, f64)> {
         self.is_disabled = true;
         health.panicked_at.get_or_insert(tick);
         None

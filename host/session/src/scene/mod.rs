@@ -412,19 +412,16 @@ const MOST: f64 = f64::INFINITY;
 
 fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> {
     let default = Limits::default();
+    let force_n = section.bound_or("force_n", 0.0..=MOST, default.force_n)?;
+    let torque_nm = section.bound_or("torque_nm", 0.0..=MOST, default.torque_nm)?;
+    let mut number = |key, least, default| section.number_or(key, least..=MOST, default);
     let limits = Limits {
-        force_n: section.bound_or("force_n", 0.0..=MOST, default.force_n)?,
-        torque_nm: section.bound_or("torque_nm", 0.0..=MOST, default.torque_nm)?,
-        force_slew_n_per_s: section.number_or(
-            "force_slew_n_per_s",
-            1.0..=MOST,
-            default.force_slew_n_per_s,
-        )?,
-        torque_slew_nm_per_s: section.number_or(
-            "torque_slew_nm_per_s",
-            0.01..=MOST,
-            default.torque_slew_nm_per_s,
-        )?,
+        force_n,
+        torque_nm,
+        grip_force_n: number("grip_force_n", 0.0, default.grip_force_n)?,
+        grip_torque_nm: number("grip_torque_nm", 0.0, default.grip_torque_nm)?,
+        force_slew_n_per_s: number("force_slew_n_per_s", 1.0, default.force_slew_n_per_s)?,
+        torque_slew_nm_per_s: number("torque_slew_nm_per_s", 0.01, default.torque_slew_nm_per_s)?,
         velocity_m_per_s: section.bound_or("velocity_m_per_s", 1.0e-6..=MOST, default.velocity_m_per_s)?,
         angular_velocity_rad_per_s: section.bound_or(
             "angular_velocity_rad_per_s",

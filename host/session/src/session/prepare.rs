@@ -14,7 +14,8 @@ use flotor_core::mapping::Mapping;
 use flotor_core::to_ns;
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{
-    Capabilities, DVec3, Demand, Embodiment, LoopConfig, Parameter, ParameterKind, SampledLoop, SoftRange,
+    Capabilities, DVec3, Demand, Embodiment, GripAxis, LoopConfig, Parameter, ParameterKind, SampledLoop,
+    SoftRange,
 };
 use flotor_loader::{Metadata, OpenedDevice, Plugin, Setting};
 use flotor_servo::engine::asynchronous::AsynchronousModel;
@@ -65,6 +66,8 @@ fn calibrate(
 pub(super) struct Opened {
     pub(super) device: OpenedDevice,
     pub(super) capabilities: Capabilities,
+    /// Declared grip; `None` without one.
+    pub(super) grip: Option<GripAxis>,
     pub(super) embodiment: Embodiment,
     /// Means that stop the device after the end of this process.
     pub(super) stop: StopWithoutHost,
@@ -96,11 +99,12 @@ fn open_device(registry: &Registry, device: &DeviceUse) -> Result<(Opened, Plugi
         let refuse = |refusal| RunError::refused(opening.metadata(), refusal);
         let mut device = opening.open_device(&given)?;
         let capabilities = device.capabilities().map_err(refuse)?;
+        let grip = device.grip_axis().map_err(refuse)?;
         let stop = StopWithoutHost::of(&who, embodiment, &capabilities, &mut device).map_err(refuse)?;
         let values: Vec<f64> = (0..opening.parameters().len()).map(|index| device.parameter(index)).collect();
-        Ok::<_, RunError>((device, capabilities, stop, values))
+        Ok::<_, RunError>((device, capabilities, grip, stop, values))
     };
-    let (mut device, capabilities, stop, values) =
+    let (mut device, capabilities, grip, stop, values) =
         keeping_machine(name, || CallThread::default().run_while(limit(), is_to_begin, open))??;
     let mut report = report(&plugin, name, used, &settings, &values);
     if let Some(calibration) = calibration {
@@ -108,7 +112,7 @@ fn open_device(registry: &Registry, device: &DeviceUse) -> Result<(Opened, Plugi
     }
     report.signals_taken = signals.put_back();
     report.latency_s = capabilities.latency_s;
-    Ok((Opened { device, capabilities, embodiment, stop }, report))
+    Ok((Opened { device, capabilities, grip, embodiment, stop }, report))
 }
 
 /// Loads the plugin of a model and creates an instance at each of the model's positions. Not real-time; runs the plugin's code.

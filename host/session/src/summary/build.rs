@@ -12,7 +12,7 @@ use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;
 use flotor_core::trace::Events;
 use flotor_coupling::LinkStatistics;
-use flotor_hal::{Demand, EnergyLedger};
+use flotor_hal::{Demand, EnergyLedger, GripKind};
 use flotor_servo::{
     CouplingOutcome, Durations, EnvelopeEffects, ModelHealth, Overrun, Stage, StageEffect, Timing,
 };
@@ -49,7 +49,7 @@ impl RunSummary {
             stages_ns: StageSummary { read, models, envelope, write },
             peak_force_n: tally.largest(|device| device.peak_force_n),
             peak_torque_nm: tally.largest(|device| device.peak_torque_nm),
-            peak_stiffness_n_per_m: tally.largest(|device| device.feel.peak_stiffness_n_per_m),
+            peak_stiffness_n_per_m: tally.largest(|device| device.feel.peak_stiffness_n_per_m()),
             settled_after_s: (tally.devices.iter())
                 .map(|device| device.feel.settled_after_s())
                 .try_fold(0.0, |latest_s: f64, settled_s| Some(latest_s.max(settled_s?))),
@@ -131,6 +131,8 @@ fn device_summary(
         name: plugin.name.clone(),
         peak_force_n: tally.peak_force_n,
         peak_torque_nm: tally.peak_torque_nm,
+        peak_grip_force_n: tally.peak_effort(GripKind::Linear),
+        peak_grip_torque_nm: tally.peak_effort(GripKind::Angular),
         port_lowest_j: tally.port_lowest_j,
         port_end_j: tally.port_energy_j(),
         envelope: effects.map(EnvelopeSummary::of).unwrap_or_default(),

@@ -7,9 +7,11 @@ use super::path::{CONFIG, finite, walk};
 use super::subject::Subject;
 use crate::watch::enter_call;
 use crate::wording;
+use flotor_core::grip_guard::GripGuard;
+use flotor_core::limits::Limits;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::extension::linear_field::LinearField;
-use flotor_hal::{Input, Mutability, Output, Parameter, Pose, Wrench};
+use flotor_hal::{GripKind, GripState, Input, Mutability, Output, Parameter, Pose, Wrench};
 use flotor_loader::{Model, OpenedDevice};
 
 /// Number of steps of a model, and of ticks of a device.
@@ -101,6 +103,13 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
                 ));
             }
         }
+        for kind in [GripKind::Linear, GripKind::Angular] {
+            let effort = model.grip(&input, &GripState::new(kind, 0.01, -0.1));
+            works(model, "grip")?;
+            if !effort.is_finite() {
+                return Err(format!("grip returned the effort {effort}"));
+            }
+        }
         let drawn = model.centerline().map(|mut line| (line.info(), line.points(&input, POINTS)));
         works(model, "centerline")?;
         if let Some((info, points)) = drawn {
@@ -143,6 +152,7 @@ fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Outcome> {
         let _ = device.parameter(index);
     }
     drop(device.serial());
+    let grip = device.grip_axis().map_err(|refusal| refusal.to_string())?;
     after("an extension", 0)?;
     let stopper = device.stopper();
     let mut running = Running::start(device)?;
@@ -152,6 +162,13 @@ fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Outcome> {
     }
     after("read and write", running.device.float_changes())?;
     let _ = running.device.energy_ledger();
+    if let Some(axis) = grip {
+        let is_taken = running.device.write_grip(0.0);
+        let sample = running.device.read_grip(axis.kind());
+        if !is_taken || GripGuard::new(axis, &Limits::default()).check(sample).is_err() {
+            return Err("the grip takes no effort, or returns no plausible sample".to_owned().into());
+        }
+    }
     drop(running.device.last_message());
     after("an extension", running.device.float_changes())?;
     stopper.safe_stop();

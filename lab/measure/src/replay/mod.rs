@@ -13,6 +13,7 @@ use held::Held;
 use divergence::Evidence;
 use files::as_recorded;
 use flotor_core::coupling::{CouplingDescription, CouplingEnds};
+use flotor_core::grip::GripRecord;
 use flotor_core::plausibility::{ImplausibleSamples, PlausibilityCheck};
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs, period_ns};
@@ -92,6 +93,9 @@ pub struct Difference {
     /// Largest difference of stored energy, J; `None` where the recording contains no energy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_energy_j: Option<f64>,
+    /// Largest difference of the effort at a grip, N or N·m; `None` where the recording contains no grip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_effort: Option<f64>,
 }
 
 /// Result of a replay.
@@ -213,6 +217,7 @@ impl<'r> Replay<'r> {
                 buttons: record.buttons,
                 ..DeviceState::HOME
             };
+            port.grip = record.grip;
             port.events = Events::NONE;
             if let Some(check) = plausibility.get_mut(usize::from(record.device)) {
                 look_at_sample(check, record);
@@ -228,13 +233,13 @@ impl<'r> Replay<'r> {
             self.forces.step(&tick, &mut ports, observed, &heartbeat);
             evidence.look(tick.index, &records, &ports);
             let is_other =
-                |(record, port): (&TickRecord, &Port)| bits(&replayed(port, record)) != bits(&record.model);
+                |(record, port): (&TickRecord, &Port)| differs(record, &replayed(port, record), port);
             if records.iter().zip(&ports).any(is_other) {
                 evidence.differs(tick.index, &records, &ports);
             }
             for (port, record) in ports.iter_mut().zip(records.drain(..)) {
                 let outputs = replayed(port, &record);
-                difference.add(&record, &outputs);
+                difference.add(&record, &outputs, port);
                 look(&record, &outputs);
                 // Use the wrench that was commanded in the run.
                 port.commanded = record.commanded;
@@ -307,9 +312,9 @@ impl<'r> Replay<'r> {
 
 impl Difference {
     /// Adds one tick; the root mean squares contain sums until [`Self::finish`].
-    fn add(&mut self, record: &TickRecord, outputs: &ModelOutputs) {
+    fn add(&mut self, record: &TickRecord, outputs: &ModelOutputs, port: &Port) {
         self.ticks += 1;
-        if bits(outputs) != bits(&record.model) {
+        if differs(record, outputs, port) {
             self.differing_ticks += 1;
             self.first_tick.get_or_insert(record.tick);
             self.last_tick = Some(record.tick);
@@ -323,6 +328,10 @@ impl Difference {
             let torque_nm = finite((now - then).length());
             self.max_torque_nm = Some(self.max_torque_nm.unwrap_or(0.0).max(torque_nm));
             self.rms_torque_nm = Some(self.rms_torque_nm.unwrap_or(0.0) + torque_nm * torque_nm);
+        }
+        if let Some((now, then)) = port.grip.zip(record.grip) {
+            let effort = finite((now.model - then.model).abs());
+            self.max_effort = Some(self.max_effort.unwrap_or(0.0).max(effort));
         }
         if let Some((now_j, then_j)) = outputs.energy_j().zip(record.model.energy_j()) {
             self.max_energy_j = Some(self.max_energy_j.unwrap_or(0.0).max(finite((now_j - then_j).abs())));
@@ -340,6 +349,12 @@ impl Difference {
     pub fn is_bit_exact(&self) -> bool {
         self.differing_ticks == 0
     }
+}
+
+/// Returns true if some bit of the models' outputs now differs from the record, or of their effort at the grip.
+fn differs(record: &TickRecord, outputs: &ModelOutputs, port: &Port) -> bool {
+    let effort = |grip: Option<GripRecord>| grip.map(|grip| grip.model.to_bits());
+    bits(outputs) != bits(&record.model) || effort(port.grip) != effort(record.grip)
 }
 
 /// Returns the plausibility check of a device of unknown capabilities, held by a hand.

@@ -7,6 +7,7 @@ use crate::engine::records::DEMANDS;
 use crate::enter_worker_priority;
 use crate::last_stop::ignore_no_signal;
 use crate::platform::processes::HostProcess;
+use flotor_core::grip::GripRecord;
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind};
 use flotor_loader::{LoadError, Model, Plugin, Setting};
@@ -85,9 +86,12 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
 fn execute(model: &mut Model, memory: &SharedMemory) -> CallStatus {
     match memory.operation() {
         Some(Operation::Step) => {
-            let mut output = Output::default();
-            let status = model.step(&memory.input(), &mut output);
+            let (input, mut output) = (memory.input(), Output::default());
+            let status = model.step(&input, &mut output);
             memory.put_output(&output);
+            if let Some(grip) = memory.grip() {
+                memory.put_grip(Some(GripRecord { model: model.grip(&input, &grip.state), ..grip }));
+            }
             status
         }
         Some(Operation::SetParameter) => {

@@ -4,6 +4,7 @@
 
 use crate::engine::records::INPUT_WORDS;
 pub(super) use crate::platform::shared_memory::{SharedMemory, create_file};
+use flotor_core::grip::GRIP_WORDS;
 use flotor_core::words::FIELD_WORDS;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64};
 
@@ -33,6 +34,7 @@ pub(crate) struct SharedPage {
     pub(super) value: AtomicU64,
     pub(super) input: [AtomicU64; INPUT_WORDS],
     pub(super) output: [AtomicU64; OUTPUT_WORDS],
+    pub(super) grip: [AtomicU64; GRIP_WORDS],
     pub(super) region: [AtomicU64; REGION_WORDS],
     pub(super) bounds: [AtomicU64; BOUNDS_WORDS],
     pub(super) field: [AtomicU64; FIELD_WORDS],

@@ -8,6 +8,7 @@ use crate::engine::records::demand_of;
 use crate::engine::stepped::Stepped;
 use crate::platform::{process_group, processes};
 use crate::{THREAD_ADVICE, monotonic_ns};
+use flotor_core::grip::GripRecord;
 use flotor_core::lock;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
@@ -138,11 +139,16 @@ impl Worker {
         self.serves
     }
 
-    /// Steps the model; `output` is only valid for [`Stepped::Answered`]. Real-time: bounded by the reply timeout, no allocation.
+    /// Steps the model, also at a grip; the results are only valid for [`Stepped::Answered`]. Real-time: bounded by the timeout.
     #[inline]
-    pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
-        let put = |memory: &SharedMemory| memory.put_input(input);
-        let reply = self.request(Operation::Step, put, |memory| *output = memory.output());
+    pub fn step(&mut self, input: &Input, output: &mut Output, grip: &mut Option<GripRecord>) -> Stepped {
+        let asked = *grip;
+        let put = |memory: &SharedMemory| {
+            memory.put_input(input);
+            memory.put_grip(asked);
+        };
+        let reply =
+            self.request(Operation::Step, put, |memory| (*output, *grip) = (memory.output(), memory.grip()));
         reply.map_or_else(|missing| missing, Stepped::from)
     }
 

@@ -4,6 +4,7 @@ use super::memory::SharedPage;
 use crate::engine::records::{SentField, SentInput};
 pub(super) use crate::platform::shared_memory::wait_for_change;
 use crate::platform::shared_memory::wake;
+use flotor_core::grip::{self, GripRecord};
 use flotor_core::words::{Decoder, Encoder};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
@@ -95,6 +96,14 @@ impl SharedPage {
         let status = u32::try_from(words.word()).ok().and_then(StepStatus::from_code);
         let (wrench, status) = status.map_or((NOT_USABLE, StepStatus::Ok), |status| (wrench, status));
         Output::new(wrench, energy_j, status)
+    }
+
+    pub(super) fn put_grip(&self, grip: Option<GripRecord>) {
+        store(&self.grip, grip::to_words(grip));
+    }
+
+    pub(super) fn grip(&self) -> Option<GripRecord> {
+        grip::from_words(load(&self.grip))
     }
 
     pub(super) fn put_region(&self, region: &ActiveRegion) {

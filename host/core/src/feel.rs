@@ -1,6 +1,6 @@
 //! Felt stiffness and settling time of a run, from its tick records.
 
-use flotor_core::trace::{Events, TickRecord};
+use crate::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, Pose, rotation_vector};
 
 /// Shortest displacement over which stiffness is computed, and distance within which a handle is at rest, m: larger than the
@@ -13,20 +13,21 @@ const REST_NS: u64 = 500_000_000;
 
 /// Felt stiffness and settling time of one device, from its records in order, in constant memory.
 #[derive(Debug, Default)]
-pub(crate) struct Feel {
+pub struct Feel {
     /// Position, m, and force, N, at the start of the current displacement; `None` after a tick with an event.
     before: Option<(DVec3, DVec3)>,
     /// Pose at the start of the current rest.
     rest: Option<Pose>,
     /// Largest stiffness felt, N/m: increase of the force against the handle per displacement, over displacements of at least
     /// 0.1 mm; 0 if the force never increased.
-    pub(crate) peak_stiffness_n_per_m: f64,
+    peak_stiffness_n_per_m: f64,
     settled_ns: u64,
     newest_ns: u64,
 }
 
 impl Feel {
-    pub(crate) fn observe(&mut self, record: &TickRecord) {
+    /// Adds the next record of the device. Real-time: bounded, no allocation.
+    pub fn observe(&mut self, record: &TickRecord) {
         self.observe_force(record);
         self.newest_ns = record.time_ns;
         let is_near = |rest: &Pose| {
@@ -56,9 +57,17 @@ impl Feel {
         }
     }
 
+    /// Returns the largest stiffness felt, N/m: increase of the force against the handle per displacement, over displacements of 0.1
+    /// mm; 0 if the force never increased.
+    #[must_use]
+    pub fn peak_stiffness_n_per_m(&self) -> f64 {
+        self.peak_stiffness_n_per_m
+    }
+
     /// Returns the time from which on the handle stayed within 0.1 mm and 1 mrad of one pose, s; `None` for a handle that moved
     /// within the last half second.
-    pub(crate) fn settled_after_s(&self) -> Option<f64> {
+    #[must_use]
+    pub fn settled_after_s(&self) -> Option<f64> {
         let never_moved = self.settled_ns == 0;
         let rests = never_moved || self.newest_ns.saturating_sub(self.settled_ns) >= REST_NS;
         rests.then_some(self.settled_ns as f64 * 1.0e-9)
@@ -68,7 +77,7 @@ impl Feel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flotor_core::ModelOutputs;
+    use crate::ModelOutputs;
     use flotor_hal::{DQuat, Twist, Wrench};
 
     /// A handle that goes down a way within a number of ticks of 1 ms, in a spring, and then rests for as many.
@@ -88,6 +97,7 @@ mod tests {
                 commanded: force,
                 delivered: force,
                 port_energy_j: 0.0,
+                grip: None,
                 events,
                 buttons: 0,
                 lateness_ns: 0,
