@@ -171,6 +171,9 @@ mod documents {
 
     #[doc = include_str!("../../docs/src/concepts.md")]
     struct Concepts;
+
+    #[doc = include_str!("../../docs/src/grip.md")]
+    struct Grip;
 }
 
 #[cfg(test)]

@@ -28,6 +28,7 @@ mod falcon;
 mod force_sensor;
 mod gallery;
 mod golden;
+mod grip;
 mod hand_recording;
 mod hanging_device;
 mod haply;
