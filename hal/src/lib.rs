@@ -67,6 +67,7 @@ pub use extension::pacing::{PacingDevice, SampleWait};
 pub use extension::shape::{
     Form, InvalidShape, Part, Primitive, ScalarField, Shape, ShapeModel, Sides, Surface, SurfaceVertex,
 };
+pub use extension::snapshot::{Restorable, StateBytes};
 pub use extension::soft_range::{SoftRange, SoftRangeModel};
 pub use extension::variant::{VariantInfo, VariantModel};
 pub use extension::workspace_bounds::{WorkspaceBounds, WorkspaceBoundsModel};

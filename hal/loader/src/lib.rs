@@ -26,6 +26,7 @@ pub use device::{ActiveDevice, OpenedDevice, Stopper};
 pub use error::LoadError;
 pub use extension::centerline::Centerline;
 pub use extension::independent_stop::Independence;
+pub use extension::snapshot::InstanceState;
 pub use library::Plugin;
 pub use metadata_file::{Metadata, read_metadata};
 pub use model::Model;

@@ -86,8 +86,8 @@ mod tests {
         active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
         connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable,
         grip::GripTable, independent_stop::IndependentStopTable, linear_field::LinearFieldTable,
-        pacing::PacingTable, shape::ShapeTable, soft_range::SoftRangeTable, variant::VariantTable,
-        workspace_bounds::WorkspaceBoundsTable,
+        pacing::PacingTable, shape::ShapeTable, snapshot::SnapshotTable, soft_range::SoftRangeTable,
+        variant::VariantTable, workspace_bounds::WorkspaceBoundsTable,
     };
 
     /// One byte short of the shortest tables there are.
@@ -126,6 +126,7 @@ mod tests {
         is_held_to_its_length::<ForceTable>();
         is_held_to_its_length::<CenterlineTable>();
         is_held_to_its_length::<ShapeTable>();
+        is_held_to_its_length::<SnapshotTable>();
         is_held_to_its_length::<SoftRangeTable>();
         is_held_to_its_length::<VariantTable>();
         is_held_to_its_length::<DetailsTable>();

@@ -14,6 +14,7 @@ pub mod independent_stop;
 pub mod linear_field;
 pub mod pacing;
 pub mod shape;
+pub mod snapshot;
 pub mod soft_range;
 pub mod variant;
 pub mod workspace_bounds;
@@ -36,6 +37,7 @@ extensions! {
     grip,
     linear_field,
     shape,
+    snapshot,
     soft_range,
     variant,
     workspace_bounds,

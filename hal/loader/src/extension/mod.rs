@@ -13,6 +13,7 @@ pub(crate) mod independent_stop;
 mod linear_field;
 mod pacing;
 mod shape;
+pub(crate) mod snapshot;
 mod soft_range;
 mod workspace_bounds;
 
@@ -22,7 +23,7 @@ use flotor_hal::extension::{
     active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
     connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable, grip::GripTable,
     independent_stop::IndependentStopTable, linear_field::LinearFieldTable, pacing::PacingTable,
-    shape::ShapeTable, soft_range::SoftRangeTable, variant::VariantTable,
+    shape::ShapeTable, snapshot::SnapshotTable, soft_range::SoftRangeTable, variant::VariantTable,
     workspace_bounds::WorkspaceBoundsTable,
 };
 
@@ -56,6 +57,7 @@ extensions! {
         grip: GripTable,
         linear_field: LinearFieldTable,
         shape: ShapeTable,
+        snapshot: SnapshotTable,
         soft_range: SoftRangeTable,
         variant: VariantTable,
         workspace_bounds: WorkspaceBoundsTable,
@@ -67,6 +69,7 @@ extensions! {
         grip: GripTable,
         independent_stop: IndependentStopTable,
         pacing: PacingTable,
+        snapshot: SnapshotTable,
     }
 }
 
