@@ -6,7 +6,7 @@ use crate::touch::Touch;
 use flotor_hal::{
     DQuat, DVec3, ForceModel, Input, LinearField, LinearFieldModel, Memory, ModelInfo, Output, Parameter,
     Part, Pose, Primitive, Refusal, ScalarField, SetParameterError, Settings, Shape, ShapeModel, Sides,
-    SoftRange, SoftRangeModel, StepStatus, Surface, SurfaceVertex, Wrench, choices, read_text,
+    SoftRange, SoftRangeModel, StepStatus, Surface, SurfaceVertex, Wrench, choices, read_text, restorable,
 };
 use std::path::Path;
 
@@ -80,6 +80,10 @@ pub struct Membrane {
     untouched_m: Vec<DVec3>,
     drawn: Shape,
 }
+
+restorable!(Membrane { touch } without {
+    radius_m, coarseness_m, parameters, pictured, pictured_at_m, untouched_m, drawn
+});
 
 impl Membrane {
     /// Returns the centre of the ball for a position of the handle, m; at home the ball lies on the sheet.
@@ -259,7 +263,7 @@ impl SoftRangeModel for Membrane {
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("damping_per_s", 5.0, 500.0, 5.0)];
 }
 
-flotor_hal::export_model!(Membrane, linear_field, shape, soft_range);
+flotor_hal::export_model!(Membrane, linear_field, shape, snapshot, soft_range);
 
 #[cfg(test)]
 mod tests {

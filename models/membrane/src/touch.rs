@@ -2,7 +2,7 @@
 
 use crate::ball::Ball;
 use crate::network::{Network, State};
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, restorable};
 
 /// Network and the ball that touches it.
 #[derive(Debug)]
@@ -15,6 +15,8 @@ pub struct Touch {
     before: State,
     after: State,
 }
+
+restorable!(Touch { network, ball } without { untouched, before, after });
 
 /// Force on the ball, and its derivative with respect to the end point of the ball's movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

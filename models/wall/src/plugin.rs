@@ -31,6 +31,8 @@ pub struct Wall {
     drawn: hal::Shape,
 }
 
+hal::restorable!(Wall { proxy } without { shape, size_mm, height_m, surface, drawn_proxy, drawn });
+
 impl ForceModel for Wall {
     const INFO: ModelInfo = ModelInfo::new("wall", "Wall", "A stiff wall, sphere or box with friction")
         .serving(Demand::ALL)
@@ -166,7 +168,7 @@ impl SoftRangeModel for Wall {
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("friction", 0.0, 1.5, 0.01)];
 }
 
-flotor_hal::export_model!(Wall, active_region, shape, soft_range);
+flotor_hal::export_model!(Wall, active_region, shape, snapshot, soft_range);
 
 #[cfg(test)]
 mod tests {

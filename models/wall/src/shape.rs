@@ -1,8 +1,7 @@
 //! Convex solids, with their top at the origin.
 
 use crate::surface::Surface;
-use flotor_hal::DVec3;
-use flotor_hal::math;
+use flotor_hal::{DVec3, math, restorable};
 
 /// Solid whose highest point is the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +21,7 @@ pub enum Shape {
 }
 
 /// Place on a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[must_use]
 pub struct Place {
     /// Position from the top of the solid, m.
@@ -30,6 +29,8 @@ pub struct Place {
     /// Outward unit normal.
     pub normal: DVec3,
 }
+
+restorable!(Place { point_m, normal });
 
 impl Shape {
     /// Returns true for a point inside the solid, false on its surface. Real-time: bounded, no allocation.
