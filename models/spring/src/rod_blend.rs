@@ -18,6 +18,7 @@
 //! such poses and no history.
 
 use flotor_hal::glam::DVec3;
+use flotor_hal::{Restorable, StateBytes, restorable};
 use pulp::NullaryFnOnce;
 
 use crate::contract;
@@ -53,6 +54,10 @@ pub struct RodBlend {
     marked: (f64, Follows),
 }
 
+restorable!(RodBlend { rod, share, follows, marked } without {
+    energy, remainder, shares, spring, tolerance_n
+});
+
 /// Origin of the rod's equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Follows {
@@ -60,6 +65,12 @@ enum Follows {
     Pose,
     /// Followed from the last tick, after buckling or an unfinished search, until the rod's weight is zero.
     LastTick,
+}
+
+impl Restorable for Follows {
+    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
+        bytes.choice(self, &[Self::Pose, Self::LastTick]);
+    }
 }
 
 impl RodBlend {

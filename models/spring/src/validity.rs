@@ -1,5 +1,7 @@
 //! Validity of a law's response at a pose.
 
+use flotor_hal::{Restorable, StateBytes};
+
 /// Validity of one evaluation of a law. The wrench is finite in every case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[must_use]
@@ -16,6 +18,13 @@ pub enum Validity {
     OutOfDomain,
     /// The pose has NaN or infinity, or its quaternion is not of unit length. The wrench is zero.
     InvalidInput,
+}
+
+impl Restorable for Validity {
+    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
+        use Validity::{Clamped, InvalidInput, NotConverged, Ok, OutOfDomain};
+        bytes.choice(self, &[Ok, Clamped, NotConverged, OutOfDomain, InvalidInput]);
+    }
 }
 
 impl Validity {

@@ -1,4 +1,4 @@
-//! Tilt of least energy: a Newton step on an energy with a kink at zero tilt, the tip.
+//! Minimum of an energy with a kink at zero, the tip: `s.H s/2 - b.s + c |s|` in the plane, and the curvature `H` as observed.
 
 use flotor_hal::glam::{DMat2, DVec2};
 
@@ -12,26 +12,32 @@ const LEAST_CURVATURE: f64 = 1e-3;
 
 /// Quadratic model of the energy by the tilt, without its tip.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Quadratic {
+#[must_use]
+pub struct Quadratic {
     /// Observed curvature (N·m/rad).
     curvature: DMat2,
     /// Stiffness at rest (N·m/rad).
-    pub(super) stiffness_nm_per_rad: f64,
+    pub stiffness_nm_per_rad: f64,
 }
 
+flotor_hal::restorable!(Quadratic { curvature } without { stiffness_nm_per_rad });
+
 impl Quadratic {
-    /// Returns the model of a spring at rest.
-    pub(super) fn at_rest(stiffness_nm_per_rad: f64) -> Self {
+    /// Returns the model of a spring at rest. Real-time: bounded, no allocation.
+    pub fn at_rest(stiffness_nm_per_rad: f64) -> Self {
         Self { curvature: DMat2::from_diagonal(DVec2::splat(stiffness_nm_per_rad)), stiffness_nm_per_rad }
     }
 
-    /// Returns the tilt of least energy, from the slope at a tilt and the cost of lifting.
-    pub(super) fn least(&self, tilt_rad: DVec2, slope: DVec2, tip_nm: f64, largest_rad: f64) -> DVec2 {
+    /// Returns the tilt of least energy (rad), from the slope at a tilt (N·m) and the cost of lifting (N·m). Real-time:
+    /// bounded, no allocation.
+    #[must_use]
+    pub fn least(&self, tilt_rad: DVec2, slope: DVec2, tip_nm: f64, largest_rad: f64) -> DVec2 {
         tipped_minimum(self.curvature, self.curvature * tilt_rad - slope, tip_nm, largest_rad)
     }
 
     /// Applies a symmetric rank-one correction to the curvature (Nocedal and Wright, *Numerical Optimization*, 6.2).
-    pub(super) fn observe(&mut self, step: DVec2, change: DVec2, noise_rad: f64) {
+    /// Real-time: bounded, no allocation.
+    pub fn observe(&mut self, step: DVec2, change: DVec2, noise_rad: f64) {
         let deviation = change - self.curvature * step;
         if deviation.length() < LEAST_DEVIATION * noise_rad * self.stiffness_nm_per_rad {
             return;
