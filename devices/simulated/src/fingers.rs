@@ -9,7 +9,7 @@
 
 use crate::simulation::MAX_ADVANCE_NS;
 use crate::units::{MM, seconds};
-use flotor_hal::{GripAxis, GripKind, GripState, Settings, math};
+use flotor_hal::{GripAxis, GripKind, GripState, Settings, math, restorable};
 use std::f64::consts::TAU;
 
 /// Opening of the open grip, m.
@@ -69,6 +69,8 @@ pub(crate) struct Fingers {
     /// Effort delivered in the last tick, N.
     delivered_n: f64,
 }
+
+restorable!(Fingers { opening_m, velocity_m_per_s, time_ns, held_n, delivered_n } without { parameters });
 
 impl Fingers {
     /// Creates fingers at rest at the open stop.

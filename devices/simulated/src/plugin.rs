@@ -14,9 +14,9 @@ use crate::workspace::{
 use flotor_hal::{
     ActiveDevice, ActiveGrip, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, Damper, Device,
     DeviceInfo, DeviceState, EnergyLedger, EnergyLedgerDevice, Fault, GripAxis, GripDevice, GripState,
-    IndependentStop, IndependentStopDevice, LoopConfig, PacingDevice, Parameter, Pose, Refusal, SafeStop,
-    SampleWait, SampledLoop, SetParameterError, Settings, StopFlag, StoppedState, Tick, Twist,
-    VerticalCalibration, export_device,
+    IndependentStop, IndependentStopDevice, LoopConfig, PacingDevice, Parameter, Pose, Refusal, Restorable,
+    SafeStop, SampleWait, SampledLoop, SetParameterError, Settings, StateBytes, StopFlag, StoppedState, Tick,
+    Twist, VerticalCalibration, export_device,
 };
 use std::time::Duration;
 
@@ -48,6 +48,19 @@ pub struct RunningFlotor {
     is_limited: bool,
     /// Height of the latest sample, m, for the correction of the vertical force.
     height_m: f64,
+}
+
+/// Without the stop and the clock of the samples, which belong to this run, and without what is set while opened.
+impl Restorable for RunningFlotor {
+    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
+        let Self { simulation, machine, fingers, opened: _, samples: _, held, is_limited, height_m } = self;
+        simulation.pass(bytes);
+        machine.iter_mut().for_each(|machine| machine.pass(bytes));
+        fingers.iter_mut().for_each(|fingers| fingers.pass(bytes));
+        held.pass(bytes);
+        is_limited.pass(bytes);
+        height_m.pass(bytes);
+    }
 }
 
 /// Maximum slew rate of the force, N/s: full scale in a millisecond. An estimate; no value is published.
@@ -282,4 +295,4 @@ impl IndependentStopDevice for SimulatedFlotor {
     }
 }
 
-export_device!(SimulatedFlotor, calibration, pacing, energy_ledger, independent_stop, grip);
+export_device!(SimulatedFlotor, calibration, pacing, energy_ledger, independent_stop, grip, snapshot);
