@@ -1100,6 +1100,22 @@ typedef struct FlotorGripTable {
                        double *effort);
 } FlotorGripTable;
 
+// Function table `flotor.snapshot/1`: see [`Restorable`]. Real-time: bounded by the size of the state. Calls on a device
+// are valid in the active phase only. All return a [`crate::abi::CallStatus`] code.
+typedef struct FlotorSnapshotTable {
+    // Size of this table in the plugin's build, bytes.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Writes the number of bytes of the state, constant while the instance is prepared or active.
+    uint32_t (*count)(FlotorInstance instance, uint64_t *out);
+    // Writes the state to `count` bytes; `OutOfRange` for another number of bytes.
+    uint32_t (*save)(FlotorInstance instance, uint8_t *bytes, uint64_t count);
+    // Restores a state from `count` bytes; `OutOfRange` for another number of bytes, and for bytes that are no state:
+    // the caller then resets or destroys the instance.
+    uint32_t (*restore)(FlotorInstance instance, const uint8_t *bytes, uint64_t count);
+} FlotorSnapshotTable;
+
 /* Version of the contract, for the metadata. */
 #define FLOTOR_CONTRACT "1.0-rc"
 /* Names of interfaces and extensions. */
@@ -1116,6 +1132,7 @@ typedef struct FlotorGripTable {
 #define FLOTOR_INTERFACE_LINEAR_FIELD "flotor.linear-field/1"
 #define FLOTOR_INTERFACE_PACING "flotor.pacing/1"
 #define FLOTOR_INTERFACE_SHAPE "flotor.shape/1"
+#define FLOTOR_INTERFACE_SNAPSHOT "flotor.snapshot/1"
 #define FLOTOR_INTERFACE_SOFT_RANGE "flotor.soft-range/1"
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
 #define FLOTOR_INTERFACE_WORKSPACE_BOUNDS "flotor.workspace-bounds/1"
@@ -1415,6 +1432,12 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(ShapeTable, size),
     FLOTOR_FIELD(ShapeTable, reserved),
     FLOTOR_FIELD(ShapeTable, shape),
+    FLOTOR_STRUCT(SnapshotTable),
+    FLOTOR_FIELD(SnapshotTable, size),
+    FLOTOR_FIELD(SnapshotTable, reserved),
+    FLOTOR_FIELD(SnapshotTable, count),
+    FLOTOR_FIELD(SnapshotTable, save),
+    FLOTOR_FIELD(SnapshotTable, restore),
     FLOTOR_STRUCT(SoftRange),
     FLOTOR_FIELD(SoftRange, id),
     FLOTOR_FIELD(SoftRange, min),

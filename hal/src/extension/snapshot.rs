@@ -1,9 +1,11 @@
 //! Extension `flotor.snapshot/1`: saves and restores the state of a model or of an active device.
 //!
-//! The state is all that later outputs depend on, except parameters and loop settings: an instance of the same plugin
-//! with equal parameters and loop settings continues after a restore with the same bits. A model without a history has
-//! no state and needs no extension.
+//! The state consists of all numbers of an instance that affect later outputs, except parameters and loop settings: an
+//! instance of the same plugin with equal parameters and loop settings continues after a restore with the same bits. A
+//! model without a history has an empty state and needs no extension.
 
+#[cfg(feature = "loader")]
+use crate::Memory;
 use crate::abi::instance::call;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
