@@ -50,7 +50,7 @@ pub struct RunningFlotor {
     height_m: f64,
 }
 
-/// Without the stop and the clock of the samples, which belong to this run, and without what is set while opened.
+/// All but the stop, the clock of the samples, and the settings of the opened phase.
 impl Restorable for RunningFlotor {
     fn pass(&mut self, bytes: &mut StateBytes<'_>) {
         let Self { simulation, machine, fingers, opened: _, samples: _, held, is_limited, height_m } = self;
