@@ -4,6 +4,7 @@
 use super::device::Running;
 use super::outcome::Outcome;
 use super::path::{CONFIG, finite, walk};
+use super::restore;
 use super::subject::Subject;
 use crate::watch::enter_call;
 use crate::wording;
@@ -134,6 +135,8 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
         if !matches!(answer, CallStatus::Ok | CallStatus::Unsupported) {
             return Err(format!("details answered `{}`", wording::status(answer)));
         }
+        restore::saved_and_restored(model.state())?;
+        works(model, "snapshot")?;
     }
     after("an extension", model.float_changes())
 }
@@ -169,6 +172,7 @@ fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Outcome> {
             return Err("the grip takes no effort, or returns no plausible sample".to_owned().into());
         }
     }
+    restore::saved_and_restored(running.device.state())?;
     drop(running.device.last_message());
     after("an extension", running.device.float_changes())?;
     stopper.safe_stop();

@@ -4,7 +4,7 @@
 //! - `rule`: list of rules; `checks`: check of one rule, in this process; `outcome`: result of a check; `patience`: timeout of a
 //!   check.
 //! - `subject`: checked plugin; `life`: all calls of an instance; `untouched` and `guarded` check their side effects.
-//! - `path`: poses of the checks; `model`, `live_parameters`, `passive`, `locked`: checks of a model.
+//! - `path`: poses of the checks; `model`, `live_parameters`, `passive`, `restore`, `locked`: checks of a model.
 //! - `device`: checks of a device.
 
 mod checks;
@@ -17,6 +17,7 @@ mod outcome;
 mod passive;
 pub(crate) mod path;
 pub(crate) mod patience;
+mod restore;
 mod rule;
 mod subject;
 mod untouched;
