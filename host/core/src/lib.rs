@@ -9,6 +9,7 @@
 //!   felt.
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between the two ends of a coupling.
 //! - [`guidance`]: the parameters that guide a simulated hand.
+//! - [`snapshot`]: saved state of a model or device, refused by an instance of another origin.
 //! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: number of a plugin in the run.
 //! - [`fade()`]: smooth step of a force; [`civil_date()`]: date of a day.
 //! - [`words`]: encoding of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
@@ -38,6 +39,7 @@ mod quantile;
 mod random;
 pub mod region;
 pub mod rendered_boundary;
+pub mod snapshot;
 pub mod trace;
 pub mod words;
 
