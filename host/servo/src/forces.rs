@@ -15,7 +15,7 @@ use flotor_coupling::{
     RemoteEnd, Tank, TankState,
 };
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
+use flotor_hal::{DVec3, Demand, DeviceState, InstanceState, Tick, Wrench};
 
 /// State of one device in a tick, device frame.
 #[derive(Clone, Copy, Debug)]
@@ -318,8 +318,17 @@ impl Forces {
         self.slots().find_map(take)
     }
 
+    /// Iterates over the states of all instances, each with its model number; `None` for one whose state cannot be saved. Not part of
+    /// them: couplings, blends of models, and a layer that is fading out.
+    pub fn states(&mut self) -> impl Iterator<Item = (usize, Option<InstanceState<'_>>)> {
+        self.slots().flat_map(|slot| {
+            let number = slot.number;
+            slot.states().map(move |state| (number, state))
+        })
+    }
+
     /// Returns true while a layer is fading out. Real-time: bounded by the models, no allocation.
-    pub(crate) fn is_fading(&self) -> bool {
+    pub fn is_fading(&self) -> bool {
         self.stacks.iter().any(|stack| stack.slots.iter().any(Slot::is_fading))
     }
 

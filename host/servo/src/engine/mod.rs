@@ -11,7 +11,8 @@ use asynchronous::AsynchronousModel;
 use flotor_core::grip::GripRecord;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
+    ActiveRegion, Demand, Input, InstanceState, LinearField, LoopConfig, Memory, Output, Refusal,
+    WorkspaceBounds,
 };
 use flotor_loader::Model;
 use process::Worker;
@@ -78,6 +79,15 @@ impl Engine {
     /// Clears the history of the model. Real-time: bounded by the model or its timeout, no allocation.
     pub fn reset(&mut self) -> CallStatus {
         each!(self, model => model.reset())
+    }
+
+    /// Returns the state of the model, to save or restore; `None` for a model with a history that offers no snapshot, and for a
+    /// worker or asynchronous model.
+    pub fn state(&mut self) -> Option<InstanceState<'_>> {
+        match self {
+            Self::Here(model) => model.state(),
+            Self::Process(_) | Self::Asynchronous(_) => None,
+        }
     }
 
     /// Returns the active region of the model; everywhere for an asynchronous model. Real-time: bounded, no allocation.

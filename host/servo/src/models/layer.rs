@@ -10,7 +10,8 @@ use flotor_core::mapping::{Blend, Mapping};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    DVec3, Demand, DeviceState, GripState, Input, Memory, Output, RegionShape, SampledLoop, StepStatus, Tick,
+    DVec3, Demand, DeviceState, GripState, Input, InstanceState, Memory, Output, RegionShape, SampledLoop, StepStatus,
+    Tick,
     Wrench,
 };
 
@@ -291,6 +292,11 @@ impl Layer {
             }
         }
         worst
+    }
+
+    /// Iterates over the states of the model's instances; `None` for one whose state cannot be saved.
+    pub(super) fn states(&mut self) -> impl Iterator<Item = Option<InstanceState<'_>>> {
+        self.objects.iter_mut().map(|object| object.model.state())
     }
 
     /// Returns a report on the layer of the model numbered `model`. Queries the last message of an unhealthy model only, and calls

@@ -9,7 +9,7 @@ use super::fade::Fade;
 use super::layer::{Contribution, Layer, LayerReport, ModelHealth, StepContext};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{Demand, Tick};
+use flotor_hal::{Demand, InstanceState, Tick};
 
 pub(crate) struct Slot {
     /// Number of the model in the scene.
@@ -127,6 +127,11 @@ impl Slot {
     /// Changes a live parameter of the current layer. Real-time: bounded by its objects, no allocation.
     pub(super) fn set_parameter(&mut self, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
         self.current.set_parameter(tick, parameter, value)
+    }
+
+    /// Iterates over the states of the current layer's instances; `None` for one whose state cannot be saved.
+    pub(crate) fn states(&mut self) -> impl Iterator<Item = Option<InstanceState<'_>>> {
+        self.current.states()
     }
 
     /// Returns health and last message of the current layer. Not real-time.
