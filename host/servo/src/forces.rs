@@ -15,7 +15,8 @@ use flotor_coupling::{
     RemoteEnd, Tank, TankState,
 };
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{DVec3, Demand, DeviceState, InstanceState, Tick, Wrench};
+use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
+use flotor_loader::InstanceState;
 
 /// State of one device in a tick, device frame.
 #[derive(Clone, Copy, Debug)]

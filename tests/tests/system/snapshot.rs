@@ -1,12 +1,12 @@
 //! Outputs after a restore equal those after the save to the bit, in the same instance and in another one, for every shipped model and
 //! for the simulated device; bytes that are no state are refused.
 
-use flotor_hal::abi::loader::{ActiveDevice, Model, Plugin, Setting};
 use flotor_hal::abi::{CallStatus, Entry};
 use flotor_hal::{
     Cycle, DVec3, Demand, DeviceState, Input, LoopConfig, Output, Pose, Tick, Twist, Wrench,
     orientation_from_rotation_vector,
 };
+use flotor_loader::{ActiveDevice, Model, Plugin, Setting};
 use flotor_tests::TestSize;
 use flotor_tests::random::Random;
 

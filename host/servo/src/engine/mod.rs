@@ -11,10 +11,9 @@ use asynchronous::AsynchronousModel;
 use flotor_core::grip::GripRecord;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    ActiveRegion, Demand, Input, InstanceState, LinearField, LoopConfig, Memory, Output, Refusal,
-    WorkspaceBounds,
+    ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
 };
-use flotor_loader::Model;
+use flotor_loader::{InstanceState, Model};
 use process::Worker;
 
 /// Model, executed in one of three ways.

@@ -10,10 +10,10 @@ use flotor_core::mapping::{Blend, Mapping};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    DVec3, Demand, DeviceState, GripState, Input, InstanceState, Memory, Output, RegionShape, SampledLoop, StepStatus,
-    Tick,
+    DVec3, Demand, DeviceState, GripState, Input, Memory, Output, RegionShape, SampledLoop, StepStatus, Tick,
     Wrench,
 };
+use flotor_loader::InstanceState;
 
 /// Health counters of a model, summed over its instances.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

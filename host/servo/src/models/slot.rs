@@ -9,7 +9,8 @@ use super::fade::Fade;
 use super::layer::{Contribution, Layer, LayerReport, ModelHealth, StepContext};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{Demand, InstanceState, Tick};
+use flotor_hal::{Demand, Tick};
+use flotor_loader::InstanceState;
 
 pub(crate) struct Slot {
     /// Number of the model in the scene.

@@ -5,8 +5,8 @@ use super::path::{step, walk};
 use super::subject::Subject;
 use crate::wording;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
-use flotor_hal::{Input, InstanceState, Output};
+use flotor_hal::{Input, Output};
+use flotor_loader::{InstanceState, Model};
 
 /// Steps between two saved states, and after each of them: odd, so that the states lie at different places of a period.
 const BETWEEN: usize = 97;
