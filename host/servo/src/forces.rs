@@ -319,12 +319,12 @@ impl Forces {
         self.slots().find_map(take)
     }
 
-    /// Iterates over the states of all instances, each with its model number; `None` for one whose state cannot be saved. Not part of
-    /// them: couplings, blends of models, and a layer that is fading out.
-    pub fn states(&mut self) -> impl Iterator<Item = (usize, Option<InstanceState<'_>>)> {
+    /// Iterates over the states of all instances before a tick, each with its model number; `None` for one whose state cannot be
+    /// saved. Not part of them: couplings, blends of models, and a layer that is fading out.
+    pub fn states(&mut self, tick: u64) -> impl Iterator<Item = (usize, Option<InstanceState<'_>>)> {
         self.slots().flat_map(|slot| {
             let number = slot.number;
-            slot.states().map(move |state| (number, state))
+            slot.states(tick).map(move |state| (number, state))
         })
     }
 

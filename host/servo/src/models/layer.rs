@@ -294,9 +294,15 @@ impl Layer {
         worst
     }
 
-    /// Iterates over the states of the model's instances; `None` for one whose state cannot be saved.
-    pub(super) fn states(&mut self) -> impl Iterator<Item = Option<InstanceState<'_>>> {
-        self.objects.iter_mut().map(|object| object.model.state())
+    /// Iterates over the states of the model's instances before a tick; `None` for one whose state cannot be saved. A path-dependent
+    /// instance that was not stepped in the last tick is reset first, as before its next step.
+    pub(super) fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>> {
+        let memory = self.memory;
+        self.objects.iter_mut().map(move |object| {
+            let is_ready = object.forget_before(tick, memory);
+            object.stepped_at = tick.checked_sub(1);
+            object.model.state().filter(|_| is_ready)
+        })
     }
 
     /// Returns a report on the layer of the model numbered `model`. Queries the last message of an unhealthy model only, and calls
@@ -331,6 +337,14 @@ impl Object {
         Some(Bounds::about(self.mapping.position_to_device(region.center()), half_sides_m))
     }
 
+    /// Resets a path-dependent model that was not stepped in the tick before `tick`; false if the reset fails. Real-time: bounded by
+    /// the model, no allocation.
+    #[inline(always)]
+    fn forget_before(&mut self, tick: u64, memory: Memory) -> bool {
+        let was_inactive = self.stepped_at.is_some_and(|last| last + 1 != tick);
+        !(was_inactive && memory == Memory::PathDependent) || self.model.reset() == CallStatus::Ok
+    }
+
     /// Steps the model. Returns output and effort, model frame, if they are usable; otherwise counts the problem in `health`.
     #[inline(always)] // with the three of `Mapping` and `limit_wrench` 22 ns a tick
     fn answer(
@@ -345,9 +359,7 @@ impl Object {
         if self.is_disabled {
             return None;
         }
-        // A path-dependent model that was not stepped in the last tick is reset before its next step.
-        let was_inactive = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
-        if was_inactive && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
+        if !self.forget_before(input.tick, memory) {
             return self.fail(input.tick, health);
         }
         self.stepped_at = Some(input.tick);

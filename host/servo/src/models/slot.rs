@@ -130,9 +130,9 @@ impl Slot {
         self.current.set_parameter(tick, parameter, value)
     }
 
-    /// Iterates over the states of the current layer's instances; `None` for one whose state cannot be saved.
-    pub(crate) fn states(&mut self) -> impl Iterator<Item = Option<InstanceState<'_>>> {
-        self.current.states()
+    /// Iterates over the states of the current layer's instances before a tick; `None` for one whose state cannot be saved.
+    pub(crate) fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>> {
+        self.current.states(tick)
     }
 
     /// Returns health and last message of the current layer. Not real-time.

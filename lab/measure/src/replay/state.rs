@@ -39,14 +39,17 @@ impl Models<'_> {
                 _ => Err(rejected(report)),
             }
         };
-        Ok(ReplayState { tick, instances: forces.states().map(save).collect::<Result<_, ReplayError>>()? })
+        Ok(ReplayState {
+            tick,
+            instances: forces.states(tick).map(save).collect::<Result<_, ReplayError>>()?,
+        })
     }
 
     /// Restores the states of all instances. Not real-time.
     pub(super) fn restore(self, start: &ReplayState) -> Result<(), ReplayError> {
         let Self { forces, reports, config } = self;
         let mut instances = start.instances.iter();
-        for (model, state) in forces.states() {
+        for (model, state) in forces.states(start.tick) {
             let report = report(reports, model)?;
             let snapshot = instances.next().ok_or(ReplayError::OtherInstances)?;
             let bytes = snapshot.bytes_for(&origin(report, config))?;
