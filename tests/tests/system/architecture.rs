@@ -30,6 +30,8 @@ enum Role {
     Sync,
     /// Plain data and maths of a run.
     Core,
+    /// Numbers only: the force of a set of contacts.
+    Contact,
     /// Two devices held together.
     Coupling,
     /// The real-time core.
@@ -79,8 +81,8 @@ enum Role {
 }
 
 use Role::{
-    Analysis, Calibration, Command, Compat, Container, Contract, Core, Coupling, Drawing, DropIn, Emulator,
-    Fixture, Guard, History, Host, Judge, Lab, Lend, Live, Loader, OfDevices, OfEmulators, OfModels, Plot,
+    Analysis, Calibration, Command, Compat, Contact, Container, Contract, Core, Coupling, Drawing, DropIn,
+    Emulator, Fixture, Guard, History, Host, Judge, Lab, Lend, Live, Loader, OfDevices, OfEmulators, OfModels, Plot,
     Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
 };
 
@@ -96,6 +98,8 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("devices/emulation", OfEmulators, &[Contract]),
     ("host/sync", Sync, &[]),
     ("host/core", Core, &[Contract, Sync]),
+    // The core for the random numbers of its tests.
+    ("host/contact", Contact, &[Contract, Core]),
     ("host/coupling", Coupling, &[Contract, Sync, Core]),
     ("host/servo", Servo, &[Contract, Loader, Sync, Core, Coupling]),
     ("devices/mcap", Container, &[]),
@@ -507,6 +511,7 @@ const PORTED: &[&str] = &[
     "hal/loader/src/",
     "lab/calibration/src/",
     "host/command/src/",
+    "host/contact/src/",
     "host/core/src/",
     "host/coupling/src/",
     "lab/judge/src/",

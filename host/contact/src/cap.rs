@@ -1,0 +1,87 @@
+//! Offset of the tool from the handle that keeps a set of contacts from being stiffer than the coupling.
+
+use crate::contact::ContactSet;
+use crate::linear::{self, ROWS, Symmetric6, Vector6};
+use crate::{Contact, Coupling};
+use flotor_hal::DVec3;
+
+/// Coordinates of the offset: the offset is the sum of the columns, each times its coordinate, and its energy half the sum of
+/// the squared coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OffsetSpace {
+    columns: [Vector6; ROWS],
+    excess: f64,
+}
+
+impl OffsetSpace {
+    /// The handle and the tool coincide.
+    pub(crate) const RIGID: Self = Self { columns: linear::ZERO, excess: 1.0 };
+
+    /// Returns the offsets that the set needs behind the coupling. Real-time: bounded, no allocation.
+    ///
+    /// With the set's stiffness `N` in units of the coupling's, `N = V diag(s) V^T`, the compliance `V diag(max(0, 1 - 1/s)) V^T`
+    /// in series makes it `V diag(min(s, 1)) V^T`.
+    pub(crate) fn new(set: &ContactSet, coupling: &Coupling) -> Self {
+        let [linear, angular] = coupling.root_compliances();
+        let mut stiffness = linear::ZERO;
+        for contact in set.contacts() {
+            let arm = set.anchor().orientation() * contact.tool_point_m;
+            let mut add = |direction: DVec3, n_per_m: f64| {
+                let row = generalized(direction * linear, arm.cross(direction) * angular);
+                linear::add_square(&mut stiffness, &row, n_per_m);
+            };
+            add(contact.normal, contact.stiffness_n_per_m);
+            if sticks(contact) {
+                let (first, second) = contact.normal.any_orthonormal_pair();
+                add(first, contact.tangential_stiffness_n_per_m);
+                add(second, contact.tangential_stiffness_n_per_m);
+            }
+        }
+        Self::with_stiffness(&stiffness, [linear, angular])
+    }
+
+    fn with_stiffness(stiffness: &Symmetric6, [linear, angular]: [f64; 2]) -> Self {
+        let trace: f64 = stiffness.iter().enumerate().filter_map(|(row, values)| values.get(row)).sum();
+        if trace <= 1.0 {
+            return Self::RIGID; // no eigenvalue is above the trace
+        }
+        let mut space = Self::RIGID;
+        let (values, vectors) = linear::eigen(stiffness);
+        for ((column, value), vector) in space.columns.iter_mut().zip(values).zip(vectors) {
+            if value > 1.0 {
+                let [x, y, z, rx, ry, rz] = vector;
+                let length = (1.0 - 1.0 / value).sqrt();
+                let [linear, angular] = [linear * length, angular * length];
+                *column = generalized(DVec3::new(x, y, z) * linear, DVec3::new(rx, ry, rz) * angular);
+                space.excess = space.excess.max(value);
+            }
+        }
+        space
+    }
+
+    /// Returns true if no offset is needed: the set is nowhere stiffer than the coupling.
+    pub(crate) fn is_rigid(&self) -> bool {
+        self.excess <= 1.0
+    }
+
+    /// Returns the largest ratio of the set's stiffness to the coupling's, at least 1.
+    pub(crate) fn excess(&self) -> f64 {
+        self.excess
+    }
+
+    /// Returns the work of force and torque by each coordinate: the coordinates of the offset that they cause.
+    pub(crate) fn coordinates(&self, force: DVec3, torque: DVec3) -> Vector6 {
+        let generalized = generalized(force, torque);
+        self.columns.each_ref().map(|column| linear::dot(column, &generalized))
+    }
+}
+
+/// Returns true if a contact can have friction.
+pub(crate) fn sticks(contact: &Contact) -> bool {
+    contact.friction > 0.0 && contact.tangential_stiffness_n_per_m > 0.0
+}
+
+fn generalized(linear: DVec3, angular: DVec3) -> Vector6 {
+    let ([x, y, z], [rx, ry, rz]) = (linear.to_array(), angular.to_array());
+    [x, y, z, rx, ry, rz]
+}
