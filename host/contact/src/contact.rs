@@ -164,6 +164,11 @@ impl ContactSet {
         self.contacts.get(..self.count).unwrap_or_default()
     }
 
+    /// Returns true if the set is not too old.
+    pub(crate) fn is_valid_for(&self, age_s: f64) -> bool {
+        age_s <= self.validity.duration_s
+    }
+
     /// Returns true if the set still describes the surface. Real-time: bounded, no allocation.
     #[must_use]
     pub fn is_valid_at(&self, pose: &Pose, age_s: f64) -> bool {
@@ -171,7 +176,7 @@ impl ContactSet {
         let displacement_m = (pose.position() - self.anchor.position()).length();
         displacement_m <= self.validity.displacement_m
             && 2.0 * turn.xyz().length() <= self.validity.rotation_rad
-            && age_s <= self.validity.duration_s
+            && self.is_valid_for(age_s)
     }
 }
 

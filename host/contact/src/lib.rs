@@ -5,7 +5,7 @@
 //! handle then. Surfaces only push.
 //!
 //! ```
-//! use flotor_contact::{Contact, ContactSet, Coupling, Limits, Solver, Validity};
+//! use flotor_contact::{Contact, ContactSet, Coupling, Limits, Replacement, Solver, Validity};
 //! use flotor_hal::{DVec3, Pose, Twist};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -21,7 +21,8 @@
 //!     friction: 0.3,
 //! };
 //! let set = ContactSet::new(&Pose::HOME, &[floor], Validity::UNLIMITED)?;
-//! let mut solver = Solver::new(Coupling::new(10_000.0, 5.0)?, Limits::new(20.0, 1.0)?, 1.0e-3)?;
+//! let (coupling, limits) = (Coupling::new(10_000.0, 5.0)?, Limits::new(20.0, 1.0)?);
+//! let mut solver = Solver::new(coupling, limits, Replacement::Immediate, 1.0e-3)?;
 //! solver.replace(&set);
 //! let lowered = Pose { position_m: [0.0, 0.0, -0.002], ..Pose::HOME };
 //! assert_eq!(solver.solve(&lowered, &Twist::ZERO, 0.001).wrench.force_n, [0.0, 0.0, 2.0]);
@@ -92,8 +93,11 @@ mod coupling;
 mod law;
 mod linear;
 mod newton;
+mod replacement;
+mod slot;
 mod solver;
 
 pub use contact::{Contact, ContactSet, ContactSetError, Fault, MAX_CONTACTS, Validity};
 pub use coupling::{Coupling, Limits, NotPositive};
+pub use replacement::Replacement;
 pub use solver::{Outcome, Solution, Solver};

@@ -1,11 +1,14 @@
-//! Wrench of a contact set in every tick: friction from tick to tick, and the change from a set to the next.
+//! Wrench of a contact set in every tick.
 
-use crate::cap::{OffsetSpace, sticks};
-use crate::contact::{Contact, ContactSet, MAX_CONTACTS, are_usable, is_usable_pose};
+use crate::cap::OffsetSpace;
+use crate::contact::{ContactSet, MAX_CONTACTS, are_usable, is_usable_pose};
 use crate::coupling::{Coupling, Limits, NotPositive, check};
-use crate::law::{FrictionLaw, NormalLaw};
 use crate::linear::{Vector6, dot};
 use crate::newton::{MAX_STEPS, Minimum, Rows, Term, minimize};
+use crate::replacement::{
+    Balance, LONGEST_SPREAD_S, Replacement, SampledMotion, energy_j, relax, take_closest,
+};
+use crate::slot::{Role, Slot};
 use flotor_hal::{DVec3, Pose, Twist, Wrench};
 
 /// How a solve ended.
@@ -34,93 +37,68 @@ pub struct Solution {
     pub is_in_range: bool,
 }
 
-/// State of the friction of a contact.
-#[derive(Clone, Copy, Debug, Default)]
-struct Grip {
-    /// Point of the surface to which the tangential spring is fixed; none before the first solve.
-    anchor_m: Option<DVec3>,
-    /// Stretch of the tangential spring after the last solve.
-    stretch_m: DVec3,
-    /// Normal force in the last solve.
-    normal_n: f64,
-}
-
-/// A contact as a solve needs it.
-#[derive(Clone, Copy, Debug)]
-struct Prepared {
-    tool_point_m: DVec3,
-    normal: DVec3,
-    tangents: [DVec3; 2],
-    /// Gap of a point of the tool at the origin of the scene.
-    gap_at_origin_m: f64,
-    surface_velocity_m_per_s: DVec3,
-    stiffness_n_per_m: f64,
-    /// 0 without friction.
-    tangential_stiffness_n_per_m: f64,
-    /// Damping over the period.
-    damping_n_per_m: f64,
-    friction: f64,
-}
-
-impl Prepared {
-    const NONE: Self = Self {
-        tool_point_m: DVec3::ZERO,
-        normal: DVec3::Z,
-        tangents: [DVec3::X, DVec3::Y],
-        gap_at_origin_m: 0.0,
-        surface_velocity_m_per_s: DVec3::ZERO,
-        stiffness_n_per_m: 1.0,
-        tangential_stiffness_n_per_m: 0.0,
-        damping_n_per_m: 0.0,
-        friction: 0.0,
-    };
-}
+/// Contacts of the set, and as many of sets before whose force fades.
+const SLOTS: usize = 2 * MAX_CONTACTS;
 
 /// Contact set behind a coupling, with its friction.
 pub struct Solver {
     coupling: Coupling,
     limits: Limits,
+    replacement: Replacement,
     period_s: f64,
     set: ContactSet,
+    /// Set that the next solve is to use.
+    next: Option<ContactSet>,
     space: OffsetSpace,
-    contacts: [Prepared; MAX_CONTACTS],
-    rows: [Rows; MAX_CONTACTS],
-    terms: [Term; MAX_CONTACTS],
-    grips: [Grip; MAX_CONTACTS],
+    slots: [Slot; SLOTS],
+    rows: [Rows; SLOTS],
+    terms: [Term; SLOTS],
+    count: usize,
     /// Coordinates of the offset of the last solve.
     offset: Vector6,
-    /// Force and torque of the last solve, before the limits.
-    load: Wrench,
-    last_pose: Pose,
-    /// Age of the set in the last solve; none before the first with this set.
-    last_age_s: Option<f64>,
+    balance: Balance,
+    last_age_s: f64,
+    /// Time between the last two sets, s.
+    interval_s: f64,
+    since_replacement_s: f64,
 }
 
 impl Solver {
     /// Creates a solver without contacts; `period_s` is the time between solves. Not real-time.
     ///
     /// # Errors
-    /// If the period is not above 0.
-    pub fn new(coupling: Coupling, limits: Limits, period_s: f64) -> Result<Self, NotPositive> {
+    /// If the period, or the power of a surface, is not above 0.
+    pub fn new(
+        coupling: Coupling,
+        limits: Limits,
+        replacement: Replacement,
+        period_s: f64,
+    ) -> Result<Self, NotPositive> {
         check("period_s", period_s)?;
+        if let Replacement::Conserving { surface_power_w } = replacement {
+            check("surface_power_w", surface_power_w)?;
+        }
         Ok(Self {
             coupling,
             limits,
+            replacement,
             period_s,
             set: ContactSet::empty(),
+            next: None,
             space: OffsetSpace::RIGID,
-            contacts: [Prepared::NONE; MAX_CONTACTS],
-            rows: [Rows::ZERO; MAX_CONTACTS],
-            terms: [Term::NONE; MAX_CONTACTS],
-            grips: [Grip::default(); MAX_CONTACTS],
+            slots: [Slot::NONE; SLOTS],
+            rows: [Rows::ZERO; SLOTS],
+            terms: [Term::NONE; SLOTS],
+            count: 0,
             offset: [0.0; 6],
-            load: Wrench::ZERO,
-            last_pose: Pose::HOME,
-            last_age_s: None,
+            balance: Balance::EMPTY,
+            last_age_s: 0.0,
+            interval_s: f64::INFINITY,
+            since_replacement_s: f64::INFINITY,
         })
     }
 
-    /// Returns the set in use. Real-time: bounded, no allocation.
+    /// Returns the set of the last solve. Real-time: bounded, no allocation.
     #[must_use]
     pub fn set(&self) -> &ContactSet {
         &self.set
@@ -133,39 +111,50 @@ impl Solver {
         self.space.excess()
     }
 
-    /// Returns the normal forces of the last solve, N, in the order of the set. Real-time: bounded, no allocation.
+    /// Returns force on the tool and velocity of the surface of each contact in the last solve, N and m/s: first those of the set
+    /// in its order, then those that fade. Real-time: bounded, no allocation.
+    pub fn forces(&self) -> impl Iterator<Item = (DVec3, DVec3)> {
+        self.slots.iter().take(self.count).map(|slot| (slot.force, slot.surface_velocity_m_per_s))
+    }
+
+    /// Returns the normal forces of the last solve, N, in the same order. Real-time: bounded, no allocation.
     pub fn normal_forces_n(&self) -> impl Iterator<Item = f64> {
-        self.grips.iter().take(self.set.contacts().len()).map(|grip| grip.normal_n)
+        self.slots.iter().take(self.count).map(|slot| slot.normal_n)
     }
 
-    /// Replaces the set. A contact takes over the friction of the closest one of the last set. Real-time: bounded, no allocation.
+    /// Returns the largest part of the depth of a contact of the set that has no force yet, m. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn withheld_m(&self) -> f64 {
+        let live = self.slots.iter().take(self.count).filter(|slot| slot.role == Role::Live);
+        live.fold(0.0, |most, slot| slot.withheld_m.max(most))
+    }
+
+    /// Returns the energy that the springs store, J. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn stored_j(&self) -> f64 {
+        self.balance.stored_j()
+    }
+
+    /// Returns the energy that has been dissipated and can pay for withheld depth, J. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn available_j(&self) -> f64 {
+        self.balance.available_j()
+    }
+
+    /// Replaces the set from the next solve on. Real-time: bounded, no allocation.
     pub fn replace(&mut self, set: &ContactSet) {
-        let mut old = Old { contacts: self.contacts, grips: self.grips, count: self.set.contacts().len() };
-        self.set = *set;
-        self.space = OffsetSpace::new(set, &self.coupling);
-        self.offset = self.space.coordinates(self.load.force(), self.load.torque());
-        self.last_age_s = None;
-        let slots = self.contacts.iter_mut().zip(&mut self.rows).zip(&mut self.grips);
-        for (((prepared, rows), grip), contact) in slots.zip(set.contacts()) {
-            *prepared = Prepared::new(contact, set.anchor(), self.period_s);
-            *rows = prepared.rows(set.anchor(), &self.space);
-            *grip = old.take_closest(prepared).map_or(Grip::default(), |(stiffness_n_per_m, grip)| {
-                let point_m =
-                    self.last_pose.position() + self.last_pose.orientation() * prepared.tool_point_m;
-                let tool_m = prepared.with_offset(point_m, rows, &self.offset);
-                grip.moved(prepared, stiffness_n_per_m, tool_m)
-            });
-        }
+        self.next = Some(*set);
     }
 
-    /// Returns the wrench at a pose and twist of the handle; `age_s` is the time since the set was published. Real-time: bounded,
-    /// no allocation.
+    /// Returns the wrench at a pose and twist of the handle; `age_s` is the time since the newest set was published. Real-time:
+    /// bounded, no allocation.
     pub fn solve(&mut self, pose: &Pose, twist: &Twist, age_s: f64) -> Solution {
         let is_usable = is_usable_pose(pose)
             && are_usable(&twist.linear_m_per_s)
             && are_usable(&twist.angular_rad_per_s)
             && are_usable(&[age_s]);
         if !is_usable {
+            self.balance.interrupt();
             return Solution {
                 wrench: Wrench::ZERO,
                 outcome: Outcome::InvalidInput,
@@ -174,173 +163,210 @@ impl Solver {
                 is_in_range: false,
             };
         }
-        let elapsed_s = self.last_age_s.map_or(self.period_s, |last_s| (age_s - last_s).max(0.0));
-        self.last_age_s = Some(age_s);
-        self.last_pose = *pose;
-        let count = self.set.contacts().len();
-        let tick = Tick { pose, twist, age_s, elapsed_s, period_s: self.period_s };
-        let is_rigid = self.space.is_rigid();
-        for ((term, contact), grip) in
-            self.terms.iter_mut().zip(&self.contacts).zip(&mut self.grips).take(count)
-        {
-            *term = tick.term(contact, grip);
-            // Without an offset the normal force of this tick is known before the friction; else that of the last solve is used.
-            let normal_n = if is_rigid { term.normal.at(term.depth_m).0 } else { grip.normal_n };
-            term.friction.limit_n = contact.friction * normal_n;
+        let next = self.next.take();
+        let elapsed_s = if next.is_some() { self.period_s } else { (age_s - self.last_age_s).max(0.0) };
+        self.last_age_s = age_s;
+        self.since_replacement_s += elapsed_s;
+        self.advance(elapsed_s);
+        if let Some(set) = next {
+            self.exchange(&set, pose, age_s);
         }
-        let minimum = if is_rigid {
-            Minimum { offset: [0.0; 6], outcome: Outcome::Solved, steps: 0 }
-        } else {
-            let (rows, terms) = (self.rows.get(..count), self.terms.get(..count));
-            minimize(rows.unwrap_or_default(), terms.unwrap_or_default(), &self.offset, MAX_STEPS)
-        };
+        self.balance.move_to(pose, elapsed_s);
+        let is_valid = self.set.is_valid_at(pose, age_s);
+        self.expire(age_s);
+        self.prepare(pose, twist);
+        let minimum = self.minimum();
         self.offset = minimum.offset;
-        self.load = Wrench::ZERO;
-        let slots = self.contacts.iter().zip(&self.rows).zip(&self.terms).zip(&mut self.grips);
-        for (((contact, rows), term), grip) in slots.take(count) {
-            let arm_m = pose.orientation() * contact.tool_point_m;
-            let tool_m = contact.with_offset(pose.position() + arm_m, rows, &self.offset);
-            let force = grip.slip(contact, term, rows, &self.offset, tool_m);
-            self.load = self.load + Wrench::new(force, arm_m.cross(force));
-        }
-        let wrench = self.limits.limit(self.load);
+        let load = self.settle(pose);
+        let wrench = self.limits.limit(load);
+        let slots = self.slots.get(..self.count).unwrap_or_default();
+        self.balance.settle(&self.offset, slots, &wrench);
+        self.remove_faded();
         Solution {
             wrench,
             outcome: minimum.outcome,
             steps: minimum.steps,
-            is_limited: wrench != self.load,
-            is_in_range: self.set.is_valid_at(pose, age_s),
-        }
-    }
-}
-
-/// Pose, twist and times of a solve.
-struct Tick<'a> {
-    pose: &'a Pose,
-    twist: &'a Twist,
-    age_s: f64,
-    elapsed_s: f64,
-    period_s: f64,
-}
-
-impl Tick<'_> {
-    /// Returns the contact at the pose of the handle, still without a limit of friction.
-    #[inline]
-    fn term(&self, contact: &Prepared, grip: &mut Grip) -> Term {
-        let arm_m = self.pose.orientation() * contact.tool_point_m;
-        let point_m = self.pose.position() + arm_m;
-        let velocity = self.twist.linear() + self.twist.angular().cross(arm_m);
-        let surface_velocity = contact.surface_velocity_m_per_s;
-        let approach_m_per_s = contact.normal.dot(surface_velocity - velocity);
-        let travel_m = contact.normal.dot(surface_velocity) * self.age_s;
-        let gap_m = contact.gap_at_origin_m + contact.normal.dot(point_m) - travel_m;
-        let anchor_m = grip.anchor_m.map_or(point_m, |anchor_m| anchor_m + surface_velocity * self.elapsed_s);
-        grip.anchor_m = Some(anchor_m);
-        let approach_m = approach_m_per_s * self.period_s;
-        Term {
-            depth_m: -gap_m,
-            stretch_m: contact.tangents.map(|tangent| tangent.dot(point_m - anchor_m)),
-            normal: NormalLaw::new(contact.stiffness_n_per_m, contact.damping_n_per_m, approach_m),
-            friction: FrictionLaw { stiffness_n_per_m: contact.tangential_stiffness_n_per_m, limit_n: 0.0 },
-        }
-    }
-}
-
-impl Prepared {
-    fn new(contact: &Contact, anchor: &Pose, period_s: f64) -> Self {
-        let at_anchor_m = anchor.position() + anchor.orientation() * contact.tool_point_m;
-        let tangents = contact.normal.any_orthonormal_pair();
-        Self {
-            tool_point_m: contact.tool_point_m,
-            normal: contact.normal,
-            tangents: [tangents.0, tangents.1],
-            gap_at_origin_m: contact.gap_m - contact.normal.dot(at_anchor_m),
-            surface_velocity_m_per_s: contact.surface_velocity_m_per_s,
-            stiffness_n_per_m: contact.stiffness_n_per_m,
-            tangential_stiffness_n_per_m: if sticks(contact) {
-                contact.tangential_stiffness_n_per_m
-            } else {
-                0.0
-            },
-            damping_n_per_m: contact.damping_ns_per_m / period_s,
-            friction: contact.friction,
+            is_limited: wrench != load,
+            is_in_range: is_valid,
         }
     }
 
-    /// Returns the derivatives by the coordinates of the offset, with the arm that the tool has at the anchor: so the energy
-    /// depends on the pose through the gaps alone, and the wrench is its gradient.
-    fn rows(&self, anchor: &Pose, space: &OffsetSpace) -> Rows {
-        let arm = anchor.orientation() * self.tool_point_m;
-        let row = |direction: DVec3| space.coordinates(direction, arm.cross(direction));
-        Rows { normal: row(self.normal), tangents: self.tangents.map(row) }
-    }
-
-    /// Returns the place of a point of the tool whose place without the offset is `point_m`, as far as it is tangential.
-    fn with_offset(&self, point_m: DVec3, rows: &Rows, offset: &Vector6) -> DVec3 {
-        let [first, second] = rows.tangents.each_ref().map(|tangent| dot(tangent, offset));
-        let [along_first, along_second] = self.tangents;
-        point_m + along_first * first + along_second * second
-    }
-}
-
-impl Grip {
-    /// Returns the force on the tool, and moves the anchor as far as the contact slides: the stretch that is left has no more
-    /// energy than before.
-    #[inline]
-    fn slip(
-        &mut self,
-        contact: &Prepared,
-        term: &Term,
-        rows: &Rows,
-        offset: &Vector6,
-        tool_m: DVec3,
-    ) -> DVec3 {
-        let (depth_m, [first, second]) = term.at(rows, offset);
-        let [along_first, along_second] = contact.tangents;
-        let friction = term.friction.at([first, second]);
-        self.normal_n = term.normal.at(depth_m).0;
-        self.stretch_m = (along_first * first + along_second * second) * friction.held;
-        if friction.sliding.is_some() {
-            self.anchor_m = Some(tool_m - self.stretch_m);
+    /// Moves the surfaces.
+    fn advance(&mut self, elapsed_s: f64) {
+        for slot in self.slots.iter_mut().take(self.count) {
+            let velocity = slot.surface_velocity_m_per_s;
+            let power_w = slot.force.dot(velocity);
+            let share = match self.replacement {
+                Replacement::Conserving { surface_power_w } if power_w > surface_power_w => {
+                    surface_power_w / power_w
+                }
+                _ => 1.0,
+            };
+            slot.advance(velocity * (share * elapsed_s));
+            self.balance.add(power_w * share * elapsed_s);
         }
-        contact.normal * self.normal_n - self.stretch_m * contact.tangential_stiffness_n_per_m
     }
 
-    /// Returns the friction of a contact that takes the place of another: the same force, but no more energy.
-    fn moved(&self, contact: &Prepared, stiffness_n_per_m: f64, tool_m: DVec3) -> Self {
-        let across = self.stretch_m - contact.normal * contact.normal.dot(self.stretch_m);
-        let is_stiffer = contact.tangential_stiffness_n_per_m > stiffness_n_per_m;
-        let factor = if is_stiffer { stiffness_n_per_m / contact.tangential_stiffness_n_per_m } else { 1.0 };
-        let stretch_m = across * factor;
-        Self { anchor_m: self.anchor_m.map(|_| tool_m - stretch_m), stretch_m, normal_n: self.normal_n }
+    /// Computes the terms of the energy at a pose of the handle.
+    fn prepare(&mut self, pose: &Pose, twist: &Twist) {
+        let mut available_j = self.balance.available_j();
+        let is_conserving = self.replacement != Replacement::Immediate;
+        let slots = self.slots.iter_mut().zip(&self.rows).zip(&mut self.terms);
+        for ((slot, rows), term) in slots.take(self.count) {
+            let arm_m = pose.orientation() * slot.tool_point_m;
+            *term = slot.term(pose.position() + arm_m);
+            if is_conserving {
+                available_j -= relax(slot, term.depth_m - dot(&rows.normal, &self.offset), available_j);
+            }
+            term.depth_m -= slot.withheld_m;
+            term.normal = slot.normal_law(arm_m, twist, self.period_s);
+            // Without an offset the normal force of this tick is known before the friction; else that of the last solve is used.
+            let normal_n = if self.space.is_rigid() { term.normal.at(term.depth_m).0 } else { slot.normal_n };
+            term.friction = slot.friction_law(normal_n);
+        }
     }
-}
 
-/// Contacts of the set before.
-struct Old {
-    contacts: [Prepared; MAX_CONTACTS],
-    grips: [Grip; MAX_CONTACTS],
-    count: usize,
-}
+    fn minimum(&self) -> Minimum {
+        if self.space.is_rigid() {
+            return Minimum { offset: [0.0; 6], outcome: Outcome::Solved, steps: 0 };
+        }
+        let (rows, terms) = (self.rows.get(..self.count), self.terms.get(..self.count));
+        minimize(rows.unwrap_or_default(), terms.unwrap_or_default(), &self.offset, MAX_STEPS)
+    }
 
-/// Farthest point of the tool, m, and smallest cosine between normals, at which two contacts count as one.
-const SAME_POINT_M: f64 = 0.01;
-const SAME_NORMAL: f64 = 0.7;
+    /// Keeps the forces at the solved offset, and returns their sum.
+    fn settle(&mut self, pose: &Pose) -> Wrench {
+        let is_conserving = self.replacement != Replacement::Immediate;
+        let (mut load, mut sampled) = (Wrench::ZERO, SampledMotion::NONE);
+        let slots = self.slots.iter_mut().zip(&self.rows).zip(&self.terms);
+        for ((slot, rows), term) in slots.take(self.count) {
+            let arm_m = pose.orientation() * slot.tool_point_m;
+            let point_m = pose.position() + arm_m;
+            let (motion_m, is_touching) = (slot.motion_m(point_m), slot.depth_m > 0.0);
+            let is_sliding = slot.settle(term, rows, &self.offset, point_m);
+            if is_conserving && (is_touching || slot.depth_m > 0.0) {
+                let [first, second] = &rows.tangents;
+                let along = [&rows.normal, first, second];
+                for ((stiffness, part_m), row) in slot.sampled(motion_m, is_sliding).into_iter().zip(along) {
+                    sampled.add(stiffness, part_m, row);
+                }
+            }
+            load = load + Wrench::new(slot.force, arm_m.cross(slot.force));
+        }
+        if is_conserving {
+            self.balance.add(sampled.energy_j());
+        }
+        load
+    }
 
-impl Old {
-    /// Returns tangential stiffness and friction of the closest contact, each only once.
-    fn take_closest(&mut self, contact: &Prepared) -> Option<(f64, Grip)> {
-        let mut least = 1.0;
-        let mut closest = None;
-        for (old, grip) in self.contacts.iter().zip(&mut self.grips).take(self.count) {
-            let cosine = old.normal.dot(contact.normal);
-            let distance = (old.tool_point_m - contact.tool_point_m) / SAME_POINT_M;
-            let difference = distance.length_squared() + (1.0 - cosine);
-            if grip.anchor_m.is_some() && cosine >= SAME_NORMAL && difference < least {
-                least = difference;
-                closest = Some((old.tangential_stiffness_n_per_m, grip));
+    /// Lets all forces fade once a set is too old.
+    fn expire(&mut self, age_s: f64) {
+        if self.replacement == Replacement::Immediate || self.set.is_valid_for(age_s) {
+            return;
+        }
+        let ticks = (LONGEST_SPREAD_S / self.period_s).max(1.0);
+        for slot in self.slots.iter_mut().take(self.count).filter(|slot| slot.role == Role::Live) {
+            slot.role = Role::Fading;
+            slot.rate_m = slot.depth_m / ticks;
+        }
+    }
+
+    fn remove_faded(&mut self) {
+        if self.slots.iter().take(self.count).all(|slot| slot.role == Role::Live) {
+            return;
+        }
+        let mut kept = 0;
+        for place in 0..self.count {
+            let (Some(slot), Some(rows)) = (self.slots.get(place).copied(), self.rows.get(place).copied())
+            else {
+                return;
+            };
+            if slot.role == Role::Live || slot.depth_m > 0.0 {
+                if let (Some(slot_there), Some(rows_there)) =
+                    (self.slots.get_mut(kept), self.rows.get_mut(kept))
+                {
+                    (*slot_there, *rows_there) = (slot, rows);
+                }
+                kept += 1;
             }
         }
-        closest.map(|(stiffness_n_per_m, grip)| (stiffness_n_per_m, std::mem::take(grip)))
+        self.count = kept;
+    }
+
+    /// Replaces the set at the pose of the last solve, with all surfaces where they are now.
+    fn exchange(&mut self, set: &ContactSet, pose: &Pose, age_s: f64) {
+        let pose = self.balance.pose().copied().unwrap_or(*pose);
+        let mut old = self.slots;
+        let old_count = std::mem::replace(&mut self.count, set.contacts().len());
+        let old = old.get_mut(..old_count).unwrap_or_default();
+        (self.interval_s, self.since_replacement_s) = (self.since_replacement_s, 0.0);
+        self.set = *set;
+        self.space = OffsetSpace::new(set, &self.coupling);
+        for (slot, contact) in self.slots.iter_mut().zip(set.contacts()) {
+            *slot = Slot::new(contact, set.anchor(), age_s, self.period_s);
+            if let Some(old) = take_closest(old, slot) {
+                slot.inherit(&old);
+            }
+        }
+        let is_conserving = self.replacement != Replacement::Immediate;
+        if is_conserving {
+            self.keep_fading(old);
+        }
+        let mut load = Wrench::ZERO;
+        let slots = self.slots.iter().zip(&mut self.rows);
+        for (slot, rows) in slots.take(self.count) {
+            *rows = slot.rows(&self.space);
+            let arm_m = pose.orientation() * slot.tool_point_m;
+            let force = slot.spring_force();
+            load = load + Wrench::new(force, arm_m.cross(force));
+        }
+        self.offset = self.space.coordinates(load.force(), load.torque());
+        if is_conserving {
+            self.shrink_to_stored();
+        }
+        let ticks = ((0.5 * self.interval_s).min(LONGEST_SPREAD_S) / self.period_s).max(1.0);
+        for (slot, rows) in self.slots.iter_mut().zip(&self.rows).take(self.count) {
+            let point_m = slot.point_m(&pose);
+            if slot.anchor_m.is_some() {
+                slot.fix(rows, &self.offset, point_m);
+            }
+            slot.last_m = point_m;
+            if is_conserving {
+                let whole_m = slot.term(point_m).depth_m - dot(&rows.normal, &self.offset);
+                let depth_m = whole_m - slot.depth_m;
+                slot.withheld_m = if slot.depth_m > 0.0 { depth_m } else { depth_m.max(0.0) };
+                let change_m = if slot.role == Role::Live { slot.withheld_m.abs() } else { slot.depth_m };
+                slot.rate_m = slot.rate_m.max(change_m / ticks);
+            }
+        }
+    }
+
+    /// Appends the old contacts that still push, unless they would push into a surface of the new set.
+    fn keep_fading(&mut self, old: &[Slot]) {
+        for old in old.iter().filter(|old| old.depth_m > 0.0) {
+            let opposes = |slot: &Slot| slot.role == Role::Live && slot.normal.dot(old.normal) < 0.0;
+            let is_opposed = self.slots.iter().take(self.count).any(opposes);
+            if let Some(place) = self.slots.get_mut(self.count)
+                && !is_opposed
+            {
+                *place = *old;
+                place.role = Role::Fading;
+                self.count += 1;
+            }
+        }
+    }
+
+    /// Shortens all springs in one ratio if they and the coupling would store more than before.
+    fn shrink_to_stored(&mut self) {
+        let slots = self.slots.get_mut(..self.count).unwrap_or_default();
+        let (before_j, now_j) = (self.balance.stored_j(), energy_j(&self.offset, slots));
+        if now_j > before_j {
+            let share = (before_j / now_j).sqrt();
+            self.offset = self.offset.map(|part| part * share);
+            for slot in slots {
+                slot.depth_m *= share;
+                slot.stretch_m *= share;
+            }
+        }
     }
 }

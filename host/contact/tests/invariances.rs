@@ -3,13 +3,14 @@
 mod common;
 
 use common::{Case, PERIOD_S, cases, set, unlimited};
-use flotor_contact::{Contact, ContactSet, Coupling, Limits, Outcome, Solver, Validity};
+use flotor_contact::{Contact, ContactSet, Coupling, Limits, Outcome, Replacement, Solver, Validity};
 use flotor_core::Random;
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{Pose, Twist, Wrench};
 
 fn wrenches(case: &Case) -> Vec<Wrench> {
-    let mut solver = Solver::new(case.coupling, unlimited(), PERIOD_S).expect("a period above 0");
+    let mut solver =
+        Solver::new(case.coupling, unlimited(), Replacement::Immediate, PERIOD_S).expect("a period above 0");
     solver.replace(&set(&case.anchor, &case.contacts));
     case.ticks.iter().map(|(pose, twist, age_s)| solver.solve(pose, twist, *age_s).wrench).collect()
 }
@@ -79,9 +80,12 @@ fn equal_inputs_have_equal_bits() {
 fn no_answer_is_above_the_limits_or_not_a_number() {
     let limits = Limits::new(5.0, 0.1).expect("above 0");
     let (mut limited, mut unsolved, mut ticks) = (0, 0, 0);
+    let conserving = Replacement::Conserving { surface_power_w: 1.0 };
     for seed in 0..cases(500, 20_000) as u64 {
+        let replacement = if seed % 2 == 0 { Replacement::Immediate } else { conserving };
         let mut random = Random::new(51, seed);
-        let mut solver = Solver::new(Case::new(seed).coupling, limits, PERIOD_S).expect("a period above 0");
+        let mut solver =
+            Solver::new(Case::new(seed).coupling, limits, replacement, PERIOD_S).expect("a period above 0");
         let mut any = |scale: f64| random.vector() * scale * 10.0_f64.powf(random.symmetric() * 12.0);
         for tick in 0..20_u64 {
             // Sets that follow one another without sense, tools that jump, and numbers of any size.
@@ -113,7 +117,8 @@ fn no_answer_is_above_the_limits_or_not_a_number() {
 fn a_tick_with_numbers_that_are_not_finite_gives_no_force_and_spoils_nothing() {
     let case = Case::new(3);
     let expected = wrenches(&case);
-    let mut solver = Solver::new(case.coupling, unlimited(), PERIOD_S).expect("a period above 0");
+    let mut solver =
+        Solver::new(case.coupling, unlimited(), Replacement::Immediate, PERIOD_S).expect("a period above 0");
     solver.replace(&set(&case.anchor, &case.contacts));
     let mut found = Vec::new();
     for (pose, twist, age_s) in &case.ticks {
@@ -134,7 +139,8 @@ fn a_tick_with_numbers_that_are_not_finite_gives_no_force_and_spoils_nothing() {
 fn a_set_says_where_and_how_long_it_is_valid() {
     let validity = Validity { displacement_m: 1.0e-3, rotation_rad: 0.1, duration_s: 0.03 };
     let set = ContactSet::new(&Pose::HOME, &[common::floor(0.0)], validity).expect("consistent");
-    let mut solver = Solver::new(Coupling::RIGID, unlimited(), PERIOD_S).expect("a period above 0");
+    let mut solver = Solver::new(Coupling::RIGID, unlimited(), Replacement::Immediate, PERIOD_S)
+        .expect("a period above 0");
     solver.replace(&set);
     let mut is_in_range = |pose: Pose, age_s| solver.solve(&pose, &Twist::ZERO, age_s).is_in_range;
     assert!(is_in_range(common::at(DVec3::X * 0.9e-3), 0.03));

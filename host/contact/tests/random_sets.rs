@@ -4,7 +4,7 @@ mod common;
 
 use common::reference::Reference;
 use common::{Case, PERIOD_S, cases, unlimited};
-use flotor_contact::{Outcome, Solver};
+use flotor_contact::{Outcome, Replacement, Solver};
 
 #[test]
 fn forces_are_those_of_a_generic_convex_solver() {
@@ -14,7 +14,8 @@ fn forces_are_those_of_a_generic_convex_solver() {
     for seed in 0..u64::try_from(count).expect("small") {
         let case = Case::new(seed);
         let mut reference = Reference::new(&case);
-        let mut solver = Solver::new(case.coupling, unlimited(), PERIOD_S).expect("a period above 0");
+        let mut solver = Solver::new(case.coupling, unlimited(), Replacement::Immediate, PERIOD_S)
+            .expect("a period above 0");
         solver.replace(&case.set());
         for (pose, twist, age_s) in &case.ticks {
             let answer = reference.tick(pose, twist, *age_s, PERIOD_S);

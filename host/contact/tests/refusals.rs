@@ -3,7 +3,9 @@
 mod common;
 
 use common::floor;
-use flotor_contact::{Contact, ContactSet, ContactSetError, Coupling, Fault, Limits, Solver, Validity};
+use flotor_contact::{
+    Contact, ContactSet, ContactSetError, Coupling, Fault, Limits, Replacement, Solver, Validity,
+};
 use flotor_hal::Pose;
 use flotor_hal::glam::DVec3;
 
@@ -70,6 +72,6 @@ fn settings_have_to_be_above_zero() {
         assert_eq!(Coupling::new(1.0, number).expect_err("wrong").field, "stiffness_nm_per_rad");
         assert_eq!(Limits::new(number, 1.0).expect_err("wrong").to_string(), "`force_n` is not above 0");
         let limits = Limits::new(1.0, 1.0).expect("above 0");
-        assert!(Solver::new(Coupling::RIGID, limits, number).is_err());
+        assert!(Solver::new(Coupling::RIGID, limits, Replacement::Immediate, number).is_err());
     }
 }

@@ -1,0 +1,228 @@
+//! A contact in the loop: its plane, its friction, and the part of its gap that is withheld.
+
+use crate::cap::{OffsetSpace, sticks};
+use crate::contact::Contact;
+use crate::law::{FrictionLaw, NormalLaw};
+use crate::linear::{Vector6, dot};
+use crate::newton::{Rows, Term};
+use flotor_hal::{DVec3, Pose, Twist};
+
+/// Part of a slot in the newest set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Role {
+    /// A contact of the set.
+    Live,
+    /// A contact of a set before, whose force fades.
+    Fading,
+}
+
+/// Contact with its state.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Slot {
+    pub(crate) role: Role,
+    pub(crate) tool_point_m: DVec3,
+    pub(crate) normal: DVec3,
+    pub(crate) stiffness_n_per_m: f64,
+    /// 0 without friction.
+    pub(crate) tangential_stiffness_n_per_m: f64,
+    pub(crate) friction: f64,
+    pub(crate) surface_velocity_m_per_s: DVec3,
+    tangents: [DVec3; 2],
+    arm_at_anchor_m: DVec3,
+    /// Gap of a point of the tool at the origin of the scene; falls as the surface moves.
+    gap_at_origin_m: f64,
+    /// Damping over the period.
+    damping_n_per_m: f64,
+    /// Part of the depth without a force; below 0, force without depth.
+    pub(crate) withheld_m: f64,
+    /// Largest change of the withheld part in a tick.
+    pub(crate) rate_m: f64,
+    /// Place of the point of the tool in the last solve, without the offset.
+    pub(crate) last_m: DVec3,
+    /// Motion of the surface since the last solve.
+    travel_m: DVec3,
+    /// Compression of the spring in the last solve.
+    pub(crate) depth_m: f64,
+    /// Force along the normal in the last solve.
+    pub(crate) normal_n: f64,
+    /// Force on the tool in the last solve.
+    pub(crate) force: DVec3,
+    /// Stretch of the tangential spring after the last solve.
+    pub(crate) stretch_m: DVec3,
+    /// Point of the surface to which the tangential spring is fixed; none before the first solve.
+    pub(crate) anchor_m: Option<DVec3>,
+}
+
+impl Slot {
+    /// Slot without a contact.
+    pub(crate) const NONE: Self = Self {
+        role: Role::Fading,
+        tool_point_m: DVec3::ZERO,
+        normal: DVec3::Z,
+        stiffness_n_per_m: 1.0,
+        tangential_stiffness_n_per_m: 0.0,
+        friction: 0.0,
+        surface_velocity_m_per_s: DVec3::ZERO,
+        tangents: [DVec3::X, DVec3::Y],
+        arm_at_anchor_m: DVec3::ZERO,
+        gap_at_origin_m: 0.0,
+        damping_n_per_m: 0.0,
+        withheld_m: 0.0,
+        rate_m: 0.0,
+        last_m: DVec3::ZERO,
+        travel_m: DVec3::ZERO,
+        depth_m: 0.0,
+        normal_n: 0.0,
+        force: DVec3::ZERO,
+        stretch_m: DVec3::ZERO,
+        anchor_m: None,
+    };
+
+    /// Creates the slot of a contact, `age_s` after its set was published.
+    pub(crate) fn new(contact: &Contact, anchor: &Pose, age_s: f64, period_s: f64) -> Self {
+        let arm_at_anchor_m = anchor.orientation() * contact.tool_point_m;
+        let (first, second) = contact.normal.any_orthonormal_pair();
+        let travelled = contact.surface_velocity_m_per_s * age_s;
+        Self {
+            role: Role::Live,
+            tool_point_m: contact.tool_point_m,
+            normal: contact.normal,
+            stiffness_n_per_m: contact.stiffness_n_per_m,
+            tangential_stiffness_n_per_m: if sticks(contact) {
+                contact.tangential_stiffness_n_per_m
+            } else {
+                0.0
+            },
+            friction: contact.friction,
+            surface_velocity_m_per_s: contact.surface_velocity_m_per_s,
+            tangents: [first, second],
+            arm_at_anchor_m,
+            gap_at_origin_m: contact.gap_m
+                - contact.normal.dot(anchor.position() + arm_at_anchor_m + travelled),
+            damping_n_per_m: contact.damping_ns_per_m / period_s,
+            ..Self::NONE
+        }
+    }
+
+    /// Returns the derivatives by the coordinates of the offset, with the arm that the tool has at the anchor: so the energy
+    /// depends on the pose through the gaps alone, and the wrench is its gradient.
+    pub(crate) fn rows(&self, space: &OffsetSpace) -> Rows {
+        let row = |direction: DVec3| space.coordinates(direction, self.arm_at_anchor_m.cross(direction));
+        Rows { normal: row(self.normal), tangents: self.tangents.map(row) }
+    }
+
+    /// Moves the surface.
+    #[inline]
+    pub(crate) fn advance(&mut self, travel_m: DVec3) {
+        self.travel_m = travel_m;
+        self.gap_at_origin_m -= self.normal.dot(travel_m);
+        self.anchor_m = self.anchor_m.map(|anchor_m| anchor_m + travel_m);
+    }
+
+    /// Returns the place of the contact's point of the tool without the offset.
+    #[inline]
+    pub(crate) fn point_m(&self, pose: &Pose) -> DVec3 {
+        pose.position() + pose.orientation() * self.tool_point_m
+    }
+
+    /// Returns depth and stretch without the offset and without the withheld part, and no law yet.
+    #[inline]
+    pub(crate) fn term(&self, point_m: DVec3) -> Term {
+        let anchor_m = self.anchor_m.unwrap_or(point_m);
+        Term {
+            depth_m: -(self.gap_at_origin_m + self.normal.dot(point_m)),
+            stretch_m: self.tangents.map(|tangent| tangent.dot(point_m - anchor_m)),
+            ..Term::NONE
+        }
+    }
+
+    /// Returns the law along the normal at a twist.
+    #[inline]
+    pub(crate) fn normal_law(&self, arm_m: DVec3, twist: &Twist, period_s: f64) -> NormalLaw {
+        let velocity = twist.linear() + twist.angular().cross(arm_m);
+        let approach_m = self.normal.dot(self.surface_velocity_m_per_s - velocity) * period_s;
+        NormalLaw::new(self.stiffness_n_per_m, self.damping_n_per_m, approach_m)
+    }
+
+    /// Returns the friction under a normal force.
+    #[inline]
+    pub(crate) fn friction_law(&self, normal_n: f64) -> FrictionLaw {
+        FrictionLaw {
+            stiffness_n_per_m: self.tangential_stiffness_n_per_m,
+            limit_n: self.friction * normal_n,
+        }
+    }
+
+    /// Returns how far the handle has moved the point of the tool against the surface since the last solve.
+    #[inline]
+    pub(crate) fn motion_m(&self, point_m: DVec3) -> DVec3 {
+        point_m - self.last_m - self.travel_m
+    }
+
+    /// Keeps the force at a solved offset, and moves the anchor as far as the contact slides: the stretch that is left has no
+    /// more energy than before. Returns true if it slides.
+    #[inline]
+    pub(crate) fn settle(&mut self, term: &Term, rows: &Rows, offset: &Vector6, point_m: DVec3) -> bool {
+        let (depth_m, [first, second]) = term.at(rows, offset);
+        self.last_m = point_m;
+        let [along_first, along_second] = self.tangents;
+        let friction = term.friction.at([first, second]);
+        self.normal_n = term.normal.at(depth_m).0;
+        self.depth_m = if depth_m > 0.0 { depth_m } else { 0.0 };
+        if depth_m < 0.0 && self.withheld_m > 0.0 {
+            // The spring does not touch: what is withheld beyond the tool costs nothing.
+            self.withheld_m = (self.withheld_m + depth_m).max(0.0);
+        }
+        self.stretch_m = (along_first * first + along_second * second) * friction.held;
+        if friction.sliding.is_some() || self.anchor_m.is_none() {
+            self.fix(rows, offset, point_m);
+        }
+        self.force = self.normal * self.normal_n - self.stretch_m * self.tangential_stiffness_n_per_m;
+        friction.sliding.is_some()
+    }
+
+    /// Fixes the tangential spring where its stretch is that of this slot.
+    pub(crate) fn fix(&mut self, rows: &Rows, offset: &Vector6, point_m: DVec3) {
+        let [first, second] = rows.tangents.each_ref().map(|tangent| dot(tangent, offset));
+        let [along_first, along_second] = self.tangents;
+        self.anchor_m = Some(point_m + along_first * first + along_second * second - self.stretch_m);
+    }
+
+    /// Takes over spring and friction of a contact in whose place this one comes: the same forces, but no more energy.
+    pub(crate) fn inherit(&mut self, old: &Slot) {
+        let ratio = old.stiffness_n_per_m / self.stiffness_n_per_m;
+        self.depth_m = old.depth_m * if ratio < 1.0 { ratio } else { ratio.sqrt() };
+        let across = old.stretch_m - self.normal * self.normal.dot(old.stretch_m);
+        let is_stiffer = self.tangential_stiffness_n_per_m > old.tangential_stiffness_n_per_m;
+        let share = old.tangential_stiffness_n_per_m / self.tangential_stiffness_n_per_m;
+        self.stretch_m = if is_stiffer { across * share } else { across };
+        self.normal_n = old.normal_n;
+        self.force = self.spring_force();
+        self.anchor_m = old.anchor_m;
+    }
+
+    /// Returns the stiffnesses along and across the normal that a motion meets, with the parts of the motion there.
+    #[inline]
+    pub(crate) fn sampled(&self, motion_m: DVec3, is_sliding: bool) -> [(f64, f64); 3] {
+        let [first, second] = self.tangents;
+        let across = if is_sliding { 0.0 } else { self.tangential_stiffness_n_per_m };
+        [
+            (self.stiffness_n_per_m, self.normal.dot(motion_m)),
+            (across, first.dot(motion_m)),
+            (across, second.dot(motion_m)),
+        ]
+    }
+
+    /// Returns the force of both springs on the tool.
+    pub(crate) fn spring_force(&self) -> DVec3 {
+        self.normal * (self.stiffness_n_per_m * self.depth_m)
+            - self.stretch_m * self.tangential_stiffness_n_per_m
+    }
+
+    /// Returns the energy of both springs, J.
+    #[inline]
+    pub(crate) fn stored_j(&self) -> f64 {
+        0.5 * self.stiffness_n_per_m * self.depth_m * self.depth_m
+            + 0.5 * self.tangential_stiffness_n_per_m * self.stretch_m.length_squared()
+    }
+}
