@@ -1,8 +1,8 @@
 //! Offset of the tool from the handle that keeps a set of contacts from being stiffer than the coupling.
 
+use crate::Coupling;
 use crate::contact::ContactSet;
 use crate::linear::{self, ROWS, Symmetric6, Vector6};
-use crate::{Contact, Coupling};
 use flotor_hal::DVec3;
 
 /// Coordinates of the offset: the offset is the sum of the columns, each times its coordinate, and its energy half the sum of
@@ -31,11 +31,9 @@ impl OffsetSpace {
                 linear::add_square(&mut stiffness, &row, n_per_m);
             };
             add(contact.normal, contact.stiffness_n_per_m);
-            if sticks(contact) {
-                let (first, second) = contact.normal.any_orthonormal_pair();
-                add(first, contact.tangential_stiffness_n_per_m);
-                add(second, contact.tangential_stiffness_n_per_m);
-            }
+            let (first, second) = contact.normal.any_orthonormal_pair();
+            add(first, contact.sticking_n_per_m());
+            add(second, contact.sticking_n_per_m());
         }
         Self::with_stiffness(&stiffness, [linear, angular])
     }
@@ -74,11 +72,6 @@ impl OffsetSpace {
         let generalized = generalized(force, torque);
         self.columns.each_ref().map(|column| linear::dot(column, &generalized))
     }
-}
-
-/// Returns true if a contact can have friction.
-pub(crate) fn sticks(contact: &Contact) -> bool {
-    contact.friction > 0.0 && contact.tangential_stiffness_n_per_m > 0.0
 }
 
 fn generalized(linear: DVec3, angular: DVec3) -> Vector6 {

@@ -15,7 +15,7 @@ const UNIT_TOLERANCE: f64 = 1.0e-6;
 const GAP_TOLERANCE_M: f64 = 1.0e-6;
 
 /// Contact between a point of the tool and a plane that stands for the surface nearby.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Contact {
     /// Point on the tool, tool frame, m.
     pub tool_point_m: DVec3,
@@ -38,49 +38,44 @@ pub struct Contact {
 }
 
 impl Contact {
-    /// Returns the numbers of this contact with the names of their fields.
-    fn numbers(&self) -> [(&'static str, [f64; 3]); 9] {
-        let alone = |number| [number, 0.0, 0.0];
-        [
-            ("tool_point_m", self.tool_point_m.to_array()),
-            ("surface_point_m", self.surface_point_m.to_array()),
-            ("normal", self.normal.to_array()),
-            ("gap_m", alone(self.gap_m)),
-            ("surface_velocity_m_per_s", self.surface_velocity_m_per_s.to_array()),
-            ("stiffness_n_per_m", alone(self.stiffness_n_per_m)),
-            ("tangential_stiffness_n_per_m", alone(self.tangential_stiffness_n_per_m)),
-            ("damping_ns_per_m", alone(self.damping_ns_per_m)),
-            ("friction", alone(self.friction)),
-        ]
+    /// Returns the stiffness across the normal, 0 without friction.
+    pub(crate) fn sticking_n_per_m(&self) -> f64 {
+        if self.friction > 0.0 { self.tangential_stiffness_n_per_m } else { 0.0 }
     }
 
     /// Returns the contact with a normal of length 1 to rounding, or the first field that is wrong.
     fn checked(&self, anchor: &Pose) -> Result<Self, (&'static str, Fault)> {
-        if let Some((field, _)) = self.numbers().into_iter().find(|(_, numbers)| !are_usable(numbers)) {
-            return Err((field, Fault::NotFinite));
-        }
-        if !is_unit(self.normal.length()) {
-            return Err(("normal", Fault::NotUnit));
-        }
-        let normal = self.normal.normalize();
-        if self.stiffness_n_per_m <= 0.0 {
-            return Err(("stiffness_n_per_m", Fault::NotPositive));
-        }
-        let not_negative = [
-            ("tangential_stiffness_n_per_m", self.tangential_stiffness_n_per_m),
-            ("damping_ns_per_m", self.damping_ns_per_m),
-            ("friction", self.friction),
+        let vectors = [
+            ("tool_point_m", self.tool_point_m),
+            ("surface_point_m", self.surface_point_m),
+            ("normal", self.normal),
+            ("surface_velocity_m_per_s", self.surface_velocity_m_per_s),
         ];
-        if let Some((field, _)) = not_negative.into_iter().find(|(_, number)| *number < 0.0) {
-            return Err((field, Fault::Negative));
+        let numbers = [
+            ("gap_m", self.gap_m, -LARGEST),
+            ("stiffness_n_per_m", self.stiffness_n_per_m, f64::MIN_POSITIVE),
+            ("tangential_stiffness_n_per_m", self.tangential_stiffness_n_per_m, 0.0),
+            ("damping_ns_per_m", self.damping_ns_per_m, 0.0),
+            ("friction", self.friction, 0.0),
+        ];
+        for (field, vector) in vectors {
+            accept(are_usable(&vector.to_array()), field, Fault::NotFinite)?;
         }
+        for (field, number, least) in numbers {
+            accept(are_usable(&[number]), field, Fault::NotFinite)?;
+            accept(number >= least, field, Fault::TooSmall)?;
+        }
+        accept(is_unit(self.normal.length()), "normal", Fault::NotUnit)?;
+        let normal = self.normal.normalize();
         let tool_point_m = anchor.position() + anchor.orientation() * self.tool_point_m;
         let distance_m = normal.dot(tool_point_m - self.surface_point_m);
-        if (distance_m - self.gap_m).abs() > GAP_TOLERANCE_M {
-            return Err(("gap_m", Fault::Inconsistent));
-        }
+        accept((distance_m - self.gap_m).abs() <= GAP_TOLERANCE_M, "gap_m", Fault::Inconsistent)?;
         Ok(Self { normal, ..*self })
     }
+}
+
+fn accept(is_right: bool, field: &'static str, fault: Fault) -> Result<(), (&'static str, Fault)> {
+    if is_right { Ok(()) } else { Err((field, fault)) }
 }
 
 /// Range of motion from the anchor and time from publication within which a set describes the surface.
@@ -136,19 +131,8 @@ impl ContactSet {
 
     /// Returns the set without contacts, always valid. Real-time: bounded, no allocation.
     #[must_use]
-    pub const fn empty() -> Self {
-        let unused = Contact {
-            tool_point_m: DVec3::ZERO,
-            surface_point_m: DVec3::ZERO,
-            normal: DVec3::Z,
-            gap_m: 0.0,
-            surface_velocity_m_per_s: DVec3::ZERO,
-            stiffness_n_per_m: 1.0,
-            tangential_stiffness_n_per_m: 0.0,
-            damping_ns_per_m: 0.0,
-            friction: 0.0,
-        };
-        let contacts = [unused; MAX_CONTACTS];
+    pub fn empty() -> Self {
+        let contacts = [Contact::default(); MAX_CONTACTS];
         Self { anchor: Pose::HOME, contacts, count: 0, validity: Validity::UNLIMITED }
     }
 
@@ -210,10 +194,8 @@ pub enum Fault {
     NotFinite,
     /// Not of length 1.
     NotUnit,
-    /// Not above 0.
-    NotPositive,
-    /// Below 0.
-    Negative,
+    /// Below 0, or a stiffness along the normal of 0.
+    TooSmall,
     /// Not the distance between the two points along the normal.
     Inconsistent,
 }
@@ -240,8 +222,7 @@ impl fmt::Display for Fault {
         f.write_str(match self {
             Self::NotFinite => "is not finite, or larger than 1e9",
             Self::NotUnit => "does not have length 1: normalize it",
-            Self::NotPositive => "is not above 0",
-            Self::Negative => "is below 0",
+            Self::TooSmall => "is too small: a stiffness is above 0, damping and friction are not below 0",
             Self::Inconsistent => {
                 "is not the distance from the point of the surface to that of the tool along the normal: \
                  give all three for the pose of the anchor"

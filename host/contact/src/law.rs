@@ -5,7 +5,7 @@
 /// Spring and damper: with approach speed `v` and stiffness `k`, the force is `k d + b v` and never below 0. A contact that is
 /// younger than a period cannot have approached for all of it, so the damper's part is at most `b d / period`: the force starts
 /// at 0 and is a continuous function of depth that never falls, the slope of a convex energy.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct NormalLaw {
     start_m: f64,
     knee_m: f64,
@@ -14,10 +14,6 @@ pub(crate) struct NormalLaw {
 }
 
 impl NormalLaw {
-    /// Law of a contact that never touches.
-    pub(crate) const NONE: Self =
-        Self { start_m: f64::INFINITY, knee_m: f64::INFINITY, first_n_per_m: 0.0, then_n_per_m: 0.0 };
-
     /// Creates the law for a tick; `damping_n_per_m` is damping divided by the period.
     #[inline]
     pub(crate) fn new(stiffness_n_per_m: f64, damping_n_per_m: f64, approach_m: f64) -> Self {
@@ -47,7 +43,7 @@ impl NormalLaw {
 
 /// Friction as a function of the stretch of the tangential spring: linear up to a limit, constant beyond (Huber's function is
 /// the energy).
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FrictionLaw {
     pub(crate) stiffness_n_per_m: f64,
     pub(crate) limit_n: f64,

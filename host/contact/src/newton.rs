@@ -9,22 +9,17 @@ use crate::Outcome;
 use crate::law::{FrictionLaw, NormalLaw};
 use crate::linear::{self, Vector6};
 
-/// Derivatives of depth and stretch of a contact by the coordinates of the offset.
-#[derive(Clone, Copy, Debug)]
+/// Derivatives of gap and stretch of a contact by the coordinates of the offset.
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Rows {
-    /// Of the gap: the depth falls by it.
     pub(crate) normal: Vector6,
-    /// Of the stretch.
     pub(crate) tangents: [Vector6; 2],
 }
 
-impl Rows {
-    pub(crate) const ZERO: Self = Self { normal: [0.0; 6], tangents: [[0.0; 6]; 2] };
-}
-
 /// A contact in a tick, at the pose of the handle.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Term {
+    pub(crate) rows: Rows,
     pub(crate) depth_m: f64,
     pub(crate) stretch_m: [f64; 2],
     pub(crate) normal: NormalLaw,
@@ -32,20 +27,13 @@ pub(crate) struct Term {
 }
 
 impl Term {
-    pub(crate) const NONE: Self = Self {
-        depth_m: 0.0,
-        stretch_m: [0.0; 2],
-        normal: NormalLaw::NONE,
-        friction: FrictionLaw { stiffness_n_per_m: 0.0, limit_n: 0.0 },
-    };
-
     /// Returns depth and stretch at an offset.
     #[inline]
-    pub(crate) fn at(&self, rows: &Rows, offset: &Vector6) -> (f64, [f64; 2]) {
+    pub(crate) fn at(&self, offset: &Vector6) -> (f64, [f64; 2]) {
         let [first, second] = self.stretch_m;
-        let [along_first, along_second] = &rows.tangents;
+        let [along_first, along_second] = &self.rows.tangents;
         (
-            self.depth_m - linear::dot(&rows.normal, offset),
+            self.depth_m - linear::dot(&self.rows.normal, offset),
             [first + linear::dot(along_first, offset), second + linear::dot(along_second, offset)],
         )
     }
@@ -73,12 +61,12 @@ pub(crate) struct Minimum {
 
 /// Returns the offset of least energy, or after `most_steps` the one with the smallest gradient so far. Real-time: bounded, no
 /// allocation.
-pub(crate) fn minimize(rows: &[Rows], terms: &[Term], start: &Vector6, most_steps: u32) -> Minimum {
+pub(crate) fn minimize(terms: &[Term], start: &Vector6, most_steps: u32) -> Minimum {
     let mut offset = *start;
     let mut best = Minimum { offset, outcome: Outcome::BestIterate, steps: 0 };
     let mut smallest = f64::INFINITY;
     for steps in 0..=most_steps {
-        let (gradient, rounding) = gradient(rows, terms, &offset);
+        let (gradient, rounding) = gradient(terms, &offset);
         let square = linear::dot(&gradient, &gradient);
         if square < smallest {
             (smallest, best.offset) = (square, offset);
@@ -87,11 +75,11 @@ pub(crate) fn minimize(rows: &[Rows], terms: &[Term], start: &Vector6, most_step
         if square <= rounding * rounding {
             return Minimum { offset, outcome: Outcome::Solved, steps };
         }
-        let newton = linear::solve(second_derivative(rows, terms, &offset), &gradient);
+        let newton = linear::solve(second_derivative(terms, &offset), &gradient);
         let direction = newton.map(|part| -part);
         let first = linear::dot(&gradient, &direction);
         let enough = SLOPE_TOLERANCE * first.abs() + rounding * norm(&direction);
-        let length = step_length(rows, terms, &offset, &direction, enough);
+        let length = step_length(terms, &offset, &direction, enough);
         linear::add(&mut offset, &direction, length);
     }
     best
@@ -99,12 +87,13 @@ pub(crate) fn minimize(rows: &[Rows], terms: &[Term], start: &Vector6, most_step
 
 /// Returns the gradient of the energy, and the size of its rounding error.
 #[inline]
-fn gradient(rows: &[Rows], terms: &[Term], offset: &Vector6) -> (Vector6, f64) {
+fn gradient(terms: &[Term], offset: &Vector6) -> (Vector6, f64) {
     let mut gradient = *offset;
     let size: f64 = offset.iter().map(|part| part.abs()).sum();
     let mut rounding = size;
-    for (rows, term) in rows.iter().zip(terms) {
-        let (depth, stretch) = term.at(rows, offset);
+    for term in terms {
+        let rows = &term.rows;
+        let (depth, stretch) = term.at(offset);
         let (force, slope) = term.normal.at(depth);
         if slope > 0.0 {
             linear::add(&mut gradient, &rows.normal, -force);
@@ -130,10 +119,11 @@ fn norm(vector: &Vector6) -> f64 {
 
 /// Returns the second derivative of the piece of the energy at an offset.
 #[inline]
-fn second_derivative(rows: &[Rows], terms: &[Term], offset: &Vector6) -> linear::Symmetric6 {
+fn second_derivative(terms: &[Term], offset: &Vector6) -> linear::Symmetric6 {
     let mut matrix = linear::IDENTITY;
-    for (rows, term) in rows.iter().zip(terms) {
-        let (depth, stretch) = term.at(rows, offset);
+    for term in terms {
+        let rows = &term.rows;
+        let (depth, stretch) = term.at(offset);
         let (_, slope) = term.normal.at(depth);
         if slope > 0.0 {
             linear::add_square(&mut matrix, &rows.normal, slope);
@@ -165,11 +155,11 @@ fn second_derivative(rows: &[Rows], terms: &[Term], offset: &Vector6) -> linear:
 ///
 /// The slope never falls along the line. Newton's method on it, inside an interval that is known to have the root.
 #[inline]
-fn step_length(rows: &[Rows], terms: &[Term], offset: &Vector6, direction: &Vector6, enough: f64) -> f64 {
+fn step_length(terms: &[Term], offset: &Vector6, direction: &Vector6, enough: f64) -> f64 {
     let (mut below, mut above) = (0.0, f64::INFINITY);
     let mut length = 1.0;
     for _ in 0..MAX_SLOPES {
-        let (slope, curvature) = slope(rows, terms, offset, direction, length);
+        let (slope, curvature) = slope(terms, offset, direction, length);
         if slope.abs() <= enough {
             return length;
         }
@@ -192,13 +182,14 @@ fn step_length(rows: &[Rows], terms: &[Term], offset: &Vector6, direction: &Vect
 
 /// Returns first and second derivative of the energy along a line.
 #[inline]
-fn slope(rows: &[Rows], terms: &[Term], offset: &Vector6, direction: &Vector6, length: f64) -> (f64, f64) {
+fn slope(terms: &[Term], offset: &Vector6, direction: &Vector6, length: f64) -> (f64, f64) {
     let mut there = *offset;
     linear::add(&mut there, direction, length);
     let mut slope = linear::dot(&there, direction);
     let mut curvature = linear::dot(direction, direction);
-    for (rows, term) in rows.iter().zip(terms) {
-        let (depth, stretch) = term.at(rows, &there);
+    for term in terms {
+        let rows = &term.rows;
+        let (depth, stretch) = term.at(&there);
         let (force, rise) = term.normal.at(depth);
         if rise > 0.0 {
             let along = linear::dot(&rows.normal, direction);
@@ -229,33 +220,32 @@ mod tests {
     use super::*;
 
     /// Sixteen stiff contacts whose planes cut off a corner of the offsets.
-    fn corner() -> ([Rows; 16], [Term; 16]) {
-        let rows = std::array::from_fn(|contact| {
+    fn corner() -> [Term; 16] {
+        std::array::from_fn(|contact| {
             let part = |row: usize| (((contact * 7 + row * 5) % 11) as f64 - 5.0) / 10.0;
-            Rows {
-                normal: std::array::from_fn(part),
-                tangents: [std::array::from_fn(|row| part(row + 1)); 2],
+            Term {
+                rows: Rows {
+                    normal: std::array::from_fn(part),
+                    tangents: [std::array::from_fn(|row| part(row + 1)); 2],
+                },
+                depth_m: 0.1 * (contact as f64 - 4.0),
+                stretch_m: [0.02 * contact as f64, -0.1],
+                normal: NormalLaw::new(1.0e3, 0.0, 0.0),
+                friction: FrictionLaw { stiffness_n_per_m: 1.0e3, limit_n: 0.5 * contact as f64 },
             }
-        });
-        let terms = std::array::from_fn(|contact| Term {
-            depth_m: 0.1 * (contact as f64 - 4.0),
-            stretch_m: [0.02 * contact as f64, -0.1],
-            normal: NormalLaw::new(1.0e3, 0.0, 0.0),
-            friction: FrictionLaw { stiffness_n_per_m: 1.0e3, limit_n: 0.5 * contact as f64 },
-        });
-        (rows, terms)
+        })
     }
 
     #[test]
     fn the_best_iterate_is_returned_where_the_steps_end_too_early() {
-        let (rows, terms) = corner();
-        let solved = minimize(&rows, &terms, &[0.0; 6], MAX_STEPS);
+        let terms = corner();
+        let solved = minimize(&terms, &[0.0; 6], MAX_STEPS);
         assert_eq!(solved.outcome, Outcome::Solved);
         assert!(solved.steps > 2, "{} steps: the case is too easy", solved.steps);
-        let length = |offset: &Vector6| norm(&gradient(&rows, &terms, offset).0);
+        let length = |offset: &Vector6| norm(&gradient(&terms, offset).0);
         let mut last = length(&[0.0; 6]);
         for most in 0..solved.steps {
-            let ended = minimize(&rows, &terms, &[0.0; 6], most);
+            let ended = minimize(&terms, &[0.0; 6], most);
             assert_eq!((ended.outcome, ended.steps), (Outcome::BestIterate, most));
             assert!(length(&ended.offset) <= last, "after {most} steps");
             last = length(&ended.offset);

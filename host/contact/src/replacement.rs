@@ -142,7 +142,8 @@ pub(crate) fn relax(slot: &mut Slot, whole_m: f64, available_j: f64) -> f64 {
         return 0.0;
     }
     let depth_m = (whole_m - slot.withheld_m).max(0.0);
-    let (stiffness, force) = (slot.stiffness_n_per_m, slot.stiffness_n_per_m * depth_m);
+    let stiffness = slot.contact.stiffness_n_per_m;
+    let force = stiffness * depth_m;
     let cost_j = |fall_m: f64| (force + 0.5 * stiffness * fall_m) * fall_m;
     let mut fall_m = slot.rate_m.min(slot.withheld_m);
     if cost_j(fall_m) > available_j {
@@ -160,17 +161,17 @@ const SAME_POINT_M: f64 = 0.01;
 const SAME_NORMAL: f64 = 0.99;
 
 /// Returns the closest of the old contacts, each only once.
-pub(crate) fn take_closest(old: &mut [Slot], contact: &Slot) -> Option<Slot> {
+pub(crate) fn take_closest(old: &mut [Slot], slot: &Slot) -> Option<Slot> {
     let mut least = 1.0;
     let mut closest = None;
     for old in old {
-        let cosine = old.normal.dot(contact.normal);
-        let distance = (old.tool_point_m - contact.tool_point_m) / SAME_POINT_M;
+        let cosine = old.contact.normal.dot(slot.contact.normal);
+        let distance = (old.contact.tool_point_m - slot.contact.tool_point_m) / SAME_POINT_M;
         let difference = distance.length_squared() + (1.0 - cosine);
         if old.anchor_m.is_some() && cosine >= SAME_NORMAL && difference < least {
             least = difference;
             closest = Some(old);
         }
     }
-    closest.map(|old| std::mem::replace(old, Slot::NONE))
+    closest.map(std::mem::take)
 }

@@ -1,6 +1,6 @@
 //! A contact in the loop: its plane, its friction, and the part of its gap that is withheld.
 
-use crate::cap::{OffsetSpace, sticks};
+use crate::cap::OffsetSpace;
 use crate::contact::Contact;
 use crate::law::{FrictionLaw, NormalLaw};
 use crate::linear::{Vector6, dot};
@@ -8,31 +8,24 @@ use crate::newton::{Rows, Term};
 use flotor_hal::{DVec3, Pose, Twist};
 
 /// Part of a slot in the newest set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Role {
     /// A contact of the set.
     Live,
     /// A contact of a set before, whose force fades.
+    #[default]
     Fading,
 }
 
 /// Contact with its state.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Slot {
     pub(crate) role: Role,
-    pub(crate) tool_point_m: DVec3,
-    pub(crate) normal: DVec3,
-    pub(crate) stiffness_n_per_m: f64,
-    /// 0 without friction.
-    pub(crate) tangential_stiffness_n_per_m: f64,
-    pub(crate) friction: f64,
-    pub(crate) surface_velocity_m_per_s: DVec3,
+    pub(crate) contact: Contact,
     tangents: [DVec3; 2],
     arm_at_anchor_m: DVec3,
     /// Gap of a point of the tool at the origin of the scene; falls as the surface moves.
     gap_at_origin_m: f64,
-    /// Damping over the period.
-    damping_n_per_m: f64,
     /// Part of the depth without a force; below 0, force without depth.
     pub(crate) withheld_m: f64,
     /// Largest change of the withheld part in a tick.
@@ -54,53 +47,19 @@ pub(crate) struct Slot {
 }
 
 impl Slot {
-    /// Slot without a contact.
-    pub(crate) const NONE: Self = Self {
-        role: Role::Fading,
-        tool_point_m: DVec3::ZERO,
-        normal: DVec3::Z,
-        stiffness_n_per_m: 1.0,
-        tangential_stiffness_n_per_m: 0.0,
-        friction: 0.0,
-        surface_velocity_m_per_s: DVec3::ZERO,
-        tangents: [DVec3::X, DVec3::Y],
-        arm_at_anchor_m: DVec3::ZERO,
-        gap_at_origin_m: 0.0,
-        damping_n_per_m: 0.0,
-        withheld_m: 0.0,
-        rate_m: 0.0,
-        last_m: DVec3::ZERO,
-        travel_m: DVec3::ZERO,
-        depth_m: 0.0,
-        normal_n: 0.0,
-        force: DVec3::ZERO,
-        stretch_m: DVec3::ZERO,
-        anchor_m: None,
-    };
-
     /// Creates the slot of a contact, `age_s` after its set was published.
-    pub(crate) fn new(contact: &Contact, anchor: &Pose, age_s: f64, period_s: f64) -> Self {
+    pub(crate) fn new(contact: &Contact, anchor: &Pose, age_s: f64) -> Self {
         let arm_at_anchor_m = anchor.orientation() * contact.tool_point_m;
         let (first, second) = contact.normal.any_orthonormal_pair();
         let travelled = contact.surface_velocity_m_per_s * age_s;
         Self {
             role: Role::Live,
-            tool_point_m: contact.tool_point_m,
-            normal: contact.normal,
-            stiffness_n_per_m: contact.stiffness_n_per_m,
-            tangential_stiffness_n_per_m: if sticks(contact) {
-                contact.tangential_stiffness_n_per_m
-            } else {
-                0.0
-            },
-            friction: contact.friction,
-            surface_velocity_m_per_s: contact.surface_velocity_m_per_s,
+            contact: *contact,
             tangents: [first, second],
             arm_at_anchor_m,
             gap_at_origin_m: contact.gap_m
                 - contact.normal.dot(anchor.position() + arm_at_anchor_m + travelled),
-            damping_n_per_m: contact.damping_ns_per_m / period_s,
-            ..Self::NONE
+            ..Self::default()
         }
     }
 
@@ -108,48 +67,41 @@ impl Slot {
     /// depends on the pose through the gaps alone, and the wrench is its gradient.
     pub(crate) fn rows(&self, space: &OffsetSpace) -> Rows {
         let row = |direction: DVec3| space.coordinates(direction, self.arm_at_anchor_m.cross(direction));
-        Rows { normal: row(self.normal), tangents: self.tangents.map(row) }
+        Rows { normal: row(self.contact.normal), tangents: self.tangents.map(row) }
     }
 
     /// Moves the surface.
     #[inline]
     pub(crate) fn advance(&mut self, travel_m: DVec3) {
         self.travel_m = travel_m;
-        self.gap_at_origin_m -= self.normal.dot(travel_m);
+        self.gap_at_origin_m -= self.contact.normal.dot(travel_m);
         self.anchor_m = self.anchor_m.map(|anchor_m| anchor_m + travel_m);
     }
 
-    /// Returns the place of the contact's point of the tool without the offset.
+    /// Returns the depth of a point of the tool, and the stretch of its tangential spring, without offset and withheld part.
     #[inline]
-    pub(crate) fn point_m(&self, pose: &Pose) -> DVec3 {
-        pose.position() + pose.orientation() * self.tool_point_m
-    }
-
-    /// Returns depth and stretch without the offset and without the withheld part, and no law yet.
-    #[inline]
-    pub(crate) fn term(&self, point_m: DVec3) -> Term {
+    pub(crate) fn reach(&self, point_m: DVec3) -> (f64, [f64; 2]) {
         let anchor_m = self.anchor_m.unwrap_or(point_m);
-        Term {
-            depth_m: -(self.gap_at_origin_m + self.normal.dot(point_m)),
-            stretch_m: self.tangents.map(|tangent| tangent.dot(point_m - anchor_m)),
-            ..Term::NONE
-        }
+        let stretch_m = self.tangents.map(|tangent| tangent.dot(point_m - anchor_m));
+        (-(self.gap_at_origin_m + self.contact.normal.dot(point_m)), stretch_m)
     }
 
     /// Returns the law along the normal at a twist.
     #[inline]
     pub(crate) fn normal_law(&self, arm_m: DVec3, twist: &Twist, period_s: f64) -> NormalLaw {
+        let Contact { normal, surface_velocity_m_per_s, stiffness_n_per_m, damping_ns_per_m, .. } =
+            self.contact;
         let velocity = twist.linear() + twist.angular().cross(arm_m);
-        let approach_m = self.normal.dot(self.surface_velocity_m_per_s - velocity) * period_s;
-        NormalLaw::new(self.stiffness_n_per_m, self.damping_n_per_m, approach_m)
+        let approach_m = normal.dot(surface_velocity_m_per_s - velocity) * period_s;
+        NormalLaw::new(stiffness_n_per_m, damping_ns_per_m / period_s, approach_m)
     }
 
     /// Returns the friction under a normal force.
     #[inline]
     pub(crate) fn friction_law(&self, normal_n: f64) -> FrictionLaw {
         FrictionLaw {
-            stiffness_n_per_m: self.tangential_stiffness_n_per_m,
-            limit_n: self.friction * normal_n,
+            stiffness_n_per_m: self.contact.sticking_n_per_m(),
+            limit_n: self.contact.friction * normal_n,
         }
     }
 
@@ -162,8 +114,8 @@ impl Slot {
     /// Keeps the force at a solved offset, and moves the anchor as far as the contact slides: the stretch that is left has no
     /// more energy than before. Returns true if it slides.
     #[inline]
-    pub(crate) fn settle(&mut self, term: &Term, rows: &Rows, offset: &Vector6, point_m: DVec3) -> bool {
-        let (depth_m, [first, second]) = term.at(rows, offset);
+    pub(crate) fn settle(&mut self, term: &Term, offset: &Vector6, point_m: DVec3) -> bool {
+        let (depth_m, [first, second]) = term.at(offset);
         self.last_m = point_m;
         let [along_first, along_second] = self.tangents;
         let friction = term.friction.at([first, second]);
@@ -175,9 +127,9 @@ impl Slot {
         }
         self.stretch_m = (along_first * first + along_second * second) * friction.held;
         if friction.sliding.is_some() || self.anchor_m.is_none() {
-            self.fix(rows, offset, point_m);
+            self.fix(&term.rows, offset, point_m);
         }
-        self.force = self.normal * self.normal_n - self.stretch_m * self.tangential_stiffness_n_per_m;
+        self.force = self.contact.normal * self.normal_n - self.stretch_m * self.contact.sticking_n_per_m();
         friction.sliding.is_some()
     }
 
@@ -190,24 +142,37 @@ impl Slot {
 
     /// Takes over spring and friction of a contact in whose place this one comes: the same forces, but no more energy.
     pub(crate) fn inherit(&mut self, old: &Slot) {
-        let ratio = old.stiffness_n_per_m / self.stiffness_n_per_m;
+        let ratio = old.contact.stiffness_n_per_m / self.contact.stiffness_n_per_m;
         self.depth_m = old.depth_m * if ratio < 1.0 { ratio } else { ratio.sqrt() };
-        let across = old.stretch_m - self.normal * self.normal.dot(old.stretch_m);
-        let is_stiffer = self.tangential_stiffness_n_per_m > old.tangential_stiffness_n_per_m;
-        let share = old.tangential_stiffness_n_per_m / self.tangential_stiffness_n_per_m;
+        let across = old.stretch_m - self.contact.normal * self.contact.normal.dot(old.stretch_m);
+        let is_stiffer = self.contact.sticking_n_per_m() > old.contact.sticking_n_per_m();
+        let share = old.contact.sticking_n_per_m() / self.contact.sticking_n_per_m();
         self.stretch_m = if is_stiffer { across * share } else { across };
         self.normal_n = old.normal_n;
         self.force = self.spring_force();
         self.anchor_m = old.anchor_m;
     }
 
+    /// Withholds the part of a depth that the spring does not have; it may change in so many ticks.
+    pub(crate) fn withhold(&mut self, whole_m: f64, ticks: f64) {
+        let depth_m = whole_m - self.depth_m;
+        self.withheld_m = if self.depth_m > 0.0 { depth_m } else { depth_m.max(0.0) };
+        let change_m = if self.role == Role::Live { self.withheld_m.abs() } else { self.depth_m };
+        self.rate_m = self.rate_m.max(change_m / ticks);
+    }
+
+    /// Returns true for an old contact whose force has ended.
+    pub(crate) fn has_faded(&self) -> bool {
+        self.role == Role::Fading && self.depth_m <= 0.0
+    }
+
     /// Returns the stiffnesses along and across the normal that a motion meets, with the parts of the motion there.
     #[inline]
     pub(crate) fn sampled(&self, motion_m: DVec3, is_sliding: bool) -> [(f64, f64); 3] {
         let [first, second] = self.tangents;
-        let across = if is_sliding { 0.0 } else { self.tangential_stiffness_n_per_m };
+        let across = if is_sliding { 0.0 } else { self.contact.sticking_n_per_m() };
         [
-            (self.stiffness_n_per_m, self.normal.dot(motion_m)),
+            (self.contact.stiffness_n_per_m, self.contact.normal.dot(motion_m)),
             (across, first.dot(motion_m)),
             (across, second.dot(motion_m)),
         ]
@@ -215,14 +180,14 @@ impl Slot {
 
     /// Returns the force of both springs on the tool.
     pub(crate) fn spring_force(&self) -> DVec3 {
-        self.normal * (self.stiffness_n_per_m * self.depth_m)
-            - self.stretch_m * self.tangential_stiffness_n_per_m
+        self.contact.normal * (self.contact.stiffness_n_per_m * self.depth_m)
+            - self.stretch_m * self.contact.sticking_n_per_m()
     }
 
     /// Returns the energy of both springs, J.
     #[inline]
     pub(crate) fn stored_j(&self) -> f64 {
-        0.5 * self.stiffness_n_per_m * self.depth_m * self.depth_m
-            + 0.5 * self.tangential_stiffness_n_per_m * self.stretch_m.length_squared()
+        0.5 * self.contact.stiffness_n_per_m * self.depth_m * self.depth_m
+            + 0.5 * self.contact.sticking_n_per_m() * self.stretch_m.length_squared()
     }
 }

@@ -4,7 +4,7 @@ use crate::cap::OffsetSpace;
 use crate::contact::{ContactSet, MAX_CONTACTS, are_usable, is_usable_pose};
 use crate::coupling::{Coupling, Limits, NotPositive, check};
 use crate::linear::{Vector6, dot};
-use crate::newton::{MAX_STEPS, Minimum, Rows, Term, minimize};
+use crate::newton::{MAX_STEPS, Minimum, Term, minimize};
 use crate::replacement::{
     Balance, LONGEST_SPREAD_S, Replacement, SampledMotion, energy_j, relax, take_closest,
 };
@@ -51,7 +51,6 @@ pub struct Solver {
     next: Option<ContactSet>,
     space: OffsetSpace,
     slots: [Slot; SLOTS],
-    rows: [Rows; SLOTS],
     terms: [Term; SLOTS],
     count: usize,
     /// Coordinates of the offset of the last solve.
@@ -86,9 +85,8 @@ impl Solver {
             set: ContactSet::empty(),
             next: None,
             space: OffsetSpace::RIGID,
-            slots: [Slot::NONE; SLOTS],
-            rows: [Rows::ZERO; SLOTS],
-            terms: [Term::NONE; SLOTS],
+            slots: [Slot::default(); SLOTS],
+            terms: [Term::default(); SLOTS],
             count: 0,
             offset: [0.0; 6],
             balance: Balance::EMPTY,
@@ -114,12 +112,7 @@ impl Solver {
     /// Returns force on the tool and velocity of the surface of each contact in the last solve, N and m/s: first those of the set
     /// in its order, then those that fade. Real-time: bounded, no allocation.
     pub fn forces(&self) -> impl Iterator<Item = (DVec3, DVec3)> {
-        self.slots.iter().take(self.count).map(|slot| (slot.force, slot.surface_velocity_m_per_s))
-    }
-
-    /// Returns the normal forces of the last solve, N, in the same order. Real-time: bounded, no allocation.
-    pub fn normal_forces_n(&self) -> impl Iterator<Item = f64> {
-        self.slots.iter().take(self.count).map(|slot| slot.normal_n)
+        self.slots.iter().take(self.count).map(|slot| (slot.force, slot.contact.surface_velocity_m_per_s))
     }
 
     /// Returns the largest part of the depth of a contact of the set that has no force yet, m. Real-time: bounded, no allocation.
@@ -127,18 +120,6 @@ impl Solver {
     pub fn withheld_m(&self) -> f64 {
         let live = self.slots.iter().take(self.count).filter(|slot| slot.role == Role::Live);
         live.fold(0.0, |most, slot| slot.withheld_m.max(most))
-    }
-
-    /// Returns the energy that the springs store, J. Real-time: bounded, no allocation.
-    #[must_use]
-    pub fn stored_j(&self) -> f64 {
-        self.balance.stored_j()
-    }
-
-    /// Returns the energy that has been dissipated and can pay for withheld depth, J. Real-time: bounded, no allocation.
-    #[must_use]
-    pub fn available_j(&self) -> f64 {
-        self.balance.available_j()
     }
 
     /// Replaces the set from the next solve on. Real-time: bounded, no allocation.
@@ -155,13 +136,8 @@ impl Solver {
             && are_usable(&[age_s]);
         if !is_usable {
             self.balance.interrupt();
-            return Solution {
-                wrench: Wrench::ZERO,
-                outcome: Outcome::InvalidInput,
-                steps: 0,
-                is_limited: false,
-                is_in_range: false,
-            };
+            let (wrench, outcome) = (Wrench::ZERO, Outcome::InvalidInput);
+            return Solution { wrench, outcome, steps: 0, is_limited: false, is_in_range: false };
         }
         let next = self.next.take();
         let elapsed_s = if next.is_some() { self.period_s } else { (age_s - self.last_age_s).max(0.0) };
@@ -172,7 +148,6 @@ impl Solver {
             self.exchange(&set, pose, age_s);
         }
         self.balance.move_to(pose, elapsed_s);
-        let is_valid = self.set.is_valid_at(pose, age_s);
         self.expire(age_s);
         self.prepare(pose, twist);
         let minimum = self.minimum();
@@ -181,20 +156,26 @@ impl Solver {
         let wrench = self.limits.limit(load);
         let slots = self.slots.get(..self.count).unwrap_or_default();
         self.balance.settle(&self.offset, slots, &wrench);
-        self.remove_faded();
+        while self.slots.get(..self.count).and_then(<[_]>::last).is_some_and(Slot::has_faded) {
+            self.count -= 1;
+        }
         Solution {
             wrench,
             outcome: minimum.outcome,
             steps: minimum.steps,
             is_limited: wrench != load,
-            is_in_range: is_valid,
+            is_in_range: self.set.is_valid_at(pose, age_s),
         }
+    }
+
+    fn is_conserving(&self) -> bool {
+        self.replacement != Replacement::Immediate
     }
 
     /// Moves the surfaces.
     fn advance(&mut self, elapsed_s: f64) {
         for slot in self.slots.iter_mut().take(self.count) {
-            let velocity = slot.surface_velocity_m_per_s;
+            let velocity = slot.contact.surface_velocity_m_per_s;
             let power_w = slot.force.dot(velocity);
             let share = match self.replacement {
                 Replacement::Conserving { surface_power_w } if power_w > surface_power_w => {
@@ -210,19 +191,19 @@ impl Solver {
     /// Computes the terms of the energy at a pose of the handle.
     fn prepare(&mut self, pose: &Pose, twist: &Twist) {
         let mut available_j = self.balance.available_j();
-        let is_conserving = self.replacement != Replacement::Immediate;
-        let slots = self.slots.iter_mut().zip(&self.rows).zip(&mut self.terms);
-        for ((slot, rows), term) in slots.take(self.count) {
-            let arm_m = pose.orientation() * slot.tool_point_m;
-            *term = slot.term(pose.position() + arm_m);
+        let is_conserving = self.is_conserving();
+        for (slot, term) in self.slots.iter_mut().zip(&mut self.terms).take(self.count) {
+            let arm_m = pose.orientation() * slot.contact.tool_point_m;
+            let (whole_m, stretch_m) = slot.reach(pose.position() + arm_m);
             if is_conserving {
-                available_j -= relax(slot, term.depth_m - dot(&rows.normal, &self.offset), available_j);
+                available_j -= relax(slot, whole_m - dot(&term.rows.normal, &self.offset), available_j);
             }
-            term.depth_m -= slot.withheld_m;
-            term.normal = slot.normal_law(arm_m, twist, self.period_s);
+            let depth_m = whole_m - slot.withheld_m;
+            let normal = slot.normal_law(arm_m, twist, self.period_s);
             // Without an offset the normal force of this tick is known before the friction; else that of the last solve is used.
-            let normal_n = if self.space.is_rigid() { term.normal.at(term.depth_m).0 } else { slot.normal_n };
-            term.friction = slot.friction_law(normal_n);
+            let normal_n = if self.space.is_rigid() { normal.at(depth_m).0 } else { slot.normal_n };
+            *term =
+                Term { rows: term.rows, depth_m, stretch_m, normal, friction: slot.friction_law(normal_n) };
         }
     }
 
@@ -230,23 +211,21 @@ impl Solver {
         if self.space.is_rigid() {
             return Minimum { offset: [0.0; 6], outcome: Outcome::Solved, steps: 0 };
         }
-        let (rows, terms) = (self.rows.get(..self.count), self.terms.get(..self.count));
-        minimize(rows.unwrap_or_default(), terms.unwrap_or_default(), &self.offset, MAX_STEPS)
+        minimize(self.terms.get(..self.count).unwrap_or_default(), &self.offset, MAX_STEPS)
     }
 
     /// Keeps the forces at the solved offset, and returns their sum.
     fn settle(&mut self, pose: &Pose) -> Wrench {
-        let is_conserving = self.replacement != Replacement::Immediate;
+        let is_conserving = self.is_conserving();
         let (mut load, mut sampled) = (Wrench::ZERO, SampledMotion::NONE);
-        let slots = self.slots.iter_mut().zip(&self.rows).zip(&self.terms);
-        for ((slot, rows), term) in slots.take(self.count) {
-            let arm_m = pose.orientation() * slot.tool_point_m;
+        for (slot, term) in self.slots.iter_mut().zip(&self.terms).take(self.count) {
+            let arm_m = pose.orientation() * slot.contact.tool_point_m;
             let point_m = pose.position() + arm_m;
             let (motion_m, is_touching) = (slot.motion_m(point_m), slot.depth_m > 0.0);
-            let is_sliding = slot.settle(term, rows, &self.offset, point_m);
+            let is_sliding = slot.settle(term, &self.offset, point_m);
             if is_conserving && (is_touching || slot.depth_m > 0.0) {
-                let [first, second] = &rows.tangents;
-                let along = [&rows.normal, first, second];
+                let [first, second] = &term.rows.tangents;
+                let along = [&term.rows.normal, first, second];
                 for ((stiffness, part_m), row) in slot.sampled(motion_m, is_sliding).into_iter().zip(along) {
                     sampled.add(stiffness, part_m, row);
                 }
@@ -261,7 +240,7 @@ impl Solver {
 
     /// Lets all forces fade once a set is too old.
     fn expire(&mut self, age_s: f64) {
-        if self.replacement == Replacement::Immediate || self.set.is_valid_for(age_s) {
+        if !self.is_conserving() || self.set.is_valid_for(age_s) {
             return;
         }
         let ticks = (LONGEST_SPREAD_S / self.period_s).max(1.0);
@@ -269,28 +248,6 @@ impl Solver {
             slot.role = Role::Fading;
             slot.rate_m = slot.depth_m / ticks;
         }
-    }
-
-    fn remove_faded(&mut self) {
-        if self.slots.iter().take(self.count).all(|slot| slot.role == Role::Live) {
-            return;
-        }
-        let mut kept = 0;
-        for place in 0..self.count {
-            let (Some(slot), Some(rows)) = (self.slots.get(place).copied(), self.rows.get(place).copied())
-            else {
-                return;
-            };
-            if slot.role == Role::Live || slot.depth_m > 0.0 {
-                if let (Some(slot_there), Some(rows_there)) =
-                    (self.slots.get_mut(kept), self.rows.get_mut(kept))
-                {
-                    (*slot_there, *rows_there) = (slot, rows);
-                }
-                kept += 1;
-            }
-        }
-        self.count = kept;
     }
 
     /// Replaces the set at the pose of the last solve, with all surfaces where they are now.
@@ -303,40 +260,34 @@ impl Solver {
         self.set = *set;
         self.space = OffsetSpace::new(set, &self.coupling);
         for (slot, contact) in self.slots.iter_mut().zip(set.contacts()) {
-            *slot = Slot::new(contact, set.anchor(), age_s, self.period_s);
+            *slot = Slot::new(contact, set.anchor(), age_s);
             if let Some(old) = take_closest(old, slot) {
                 slot.inherit(&old);
             }
         }
-        let is_conserving = self.replacement != Replacement::Immediate;
-        if is_conserving {
+        if self.is_conserving() {
             self.keep_fading(old);
         }
         let mut load = Wrench::ZERO;
-        let slots = self.slots.iter().zip(&mut self.rows);
-        for (slot, rows) in slots.take(self.count) {
-            *rows = slot.rows(&self.space);
-            let arm_m = pose.orientation() * slot.tool_point_m;
+        for (slot, term) in self.slots.iter().zip(&mut self.terms).take(self.count) {
+            term.rows = slot.rows(&self.space);
             let force = slot.spring_force();
-            load = load + Wrench::new(force, arm_m.cross(force));
+            load = load + Wrench::new(force, (pose.orientation() * slot.contact.tool_point_m).cross(force));
         }
         self.offset = self.space.coordinates(load.force(), load.torque());
-        if is_conserving {
+        if self.is_conserving() {
             self.shrink_to_stored();
         }
+        let is_conserving = self.is_conserving();
         let ticks = ((0.5 * self.interval_s).min(LONGEST_SPREAD_S) / self.period_s).max(1.0);
-        for (slot, rows) in self.slots.iter_mut().zip(&self.rows).take(self.count) {
-            let point_m = slot.point_m(&pose);
+        for (slot, term) in self.slots.iter_mut().zip(&self.terms).take(self.count) {
+            slot.last_m = pose.position() + pose.orientation() * slot.contact.tool_point_m;
             if slot.anchor_m.is_some() {
-                slot.fix(rows, &self.offset, point_m);
+                slot.fix(&term.rows, &self.offset, slot.last_m);
             }
-            slot.last_m = point_m;
             if is_conserving {
-                let whole_m = slot.term(point_m).depth_m - dot(&rows.normal, &self.offset);
-                let depth_m = whole_m - slot.depth_m;
-                slot.withheld_m = if slot.depth_m > 0.0 { depth_m } else { depth_m.max(0.0) };
-                let change_m = if slot.role == Role::Live { slot.withheld_m.abs() } else { slot.depth_m };
-                slot.rate_m = slot.rate_m.max(change_m / ticks);
+                let whole_m = slot.reach(slot.last_m).0 - dot(&term.rows.normal, &self.offset);
+                slot.withhold(whole_m, ticks);
             }
         }
     }
@@ -344,7 +295,8 @@ impl Solver {
     /// Appends the old contacts that still push, unless they would push into a surface of the new set.
     fn keep_fading(&mut self, old: &[Slot]) {
         for old in old.iter().filter(|old| old.depth_m > 0.0) {
-            let opposes = |slot: &Slot| slot.role == Role::Live && slot.normal.dot(old.normal) < 0.0;
+            let opposes =
+                |slot: &Slot| slot.role == Role::Live && slot.contact.normal.dot(old.contact.normal) < 0.0;
             let is_opposed = self.slots.iter().take(self.count).any(opposes);
             if let Some(place) = self.slots.get_mut(self.count)
                 && !is_opposed
