@@ -38,28 +38,27 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Creates limits of the magnitudes of force and torque. Not real-time.
+    /// Creates limits of the magnitudes of force and torque; the torque's is 0 for a device without torques. Not real-time.
     ///
     /// # Errors
-    /// If a limit is not above 0.
+    /// If the limit of the force is not above 0, or that of the torque below 0.
     pub fn new(force_n: f64, torque_nm: f64) -> Result<Self, NotPositive> {
         check("force_n", force_n)?;
-        check("torque_nm", torque_nm)?;
+        check("torque_nm", if torque_nm == 0.0 { 1.0 } else { torque_nm })?;
         Ok(Self { force_n, torque_nm })
     }
 
-    /// Returns the wrench with force and torque shortened to the limits. Real-time: bounded, no allocation.
-    pub(crate) fn limit(&self, wrench: Wrench) -> Wrench {
-        // The division may round up: one unit in the last place less is never above the limit.
-        let shortened = |vector: flotor_hal::DVec3, longest: f64| {
-            let length = vector.length();
-            if length <= longest {
-                vector
-            } else {
-                vector * ((longest / length) * (1.0 - 4.0 * f64::EPSILON))
-            }
-        };
-        Wrench::new(shortened(wrench.force(), self.force_n), shortened(wrench.torque(), self.torque_nm))
+    /// Returns the wrench with force and torque shortened to the limits, and true if one of them was; a torque that the device
+    /// does not have does not count. Real-time: bounded, no allocation.
+    pub(crate) fn limit(&self, wrench: &Wrench) -> (Wrench, bool) {
+        let [(force, is_weaker), (torque, is_looser)] =
+            [(wrench.force(), self.force_n), (wrench.torque(), self.torque_nm)].map(|(vector, longest)| {
+                let length = vector.length();
+                // The division may round up: some units in the last place less are never above the limit.
+                let share = (longest / length) * (1.0 - 4.0 * f64::EPSILON);
+                if length <= longest { (vector, false) } else { (vector * share, longest > 0.0) }
+            });
+        (Wrench::new(force, torque), is_weaker || is_looser)
     }
 }
 

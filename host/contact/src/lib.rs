@@ -74,6 +74,20 @@
 //! is `mu` times the change of the normal force in one tick (at 10 kN/m, 0.1 m/s, 1 kHz and `mu = 0.5`: 0.5 N at the most), and
 //! a contact that closes has no friction in its first tick. At a steady normal force the error is 0.
 //!
+//! # The change of a set
+//!
+//! With [`Replacement::Conserving`] a new set adds no energy, whatever it says. Depth that it has and the set before did not is
+//! withheld; contacts that it lacks fade. The withheld depth falls only as far as dissipated energy pays for it: work of the hand
+//! and of the declared surface velocities (up to a power for each contact), less the energy of the springs. Where the tool has
+//! left a contact, its withheld depth is gone. All changes take half the time between two sets, 20 ms at the most, and the forces
+//! of a set that is older than it says fade in 20 ms.
+//!
+//! - A surface at rest, and one that moves as it says, have the same force as computed in the loop.
+//! - A surface that moves without a declared velocity pushes a hand at rest only as far as energy was dissipated before.
+//! - Over a convex surface each new plane is less deep than the last one was by then: the energy is lost, and sliding feels like
+//!   viscous friction. On a ball of 20 mm at 0.1 m/s the force differs by up to 10 % at 100 Hz, 4 % at 200 Hz, one period late.
+//! - The energy is that of the returned wrench. A caller that scales the wrench differently from tick to tick adds the difference.
+//!
 //! # Sources
 //!
 //! Tool behind a coupling: J. Colgate, M. Stanley, J. Brown, "Issues in the haptic display of tool use", IROS 1995; M. Ortega,

@@ -5,7 +5,6 @@
 //! on; the method ends in finitely many steps where all pieces are quadratic (L. Qi, J. Sun, "A nonsmooth version of Newton's
 //! method", Mathematical Programming 58, 1993), and the line search makes it converge from everywhere.
 
-use crate::Outcome;
 use crate::law::{FrictionLaw, NormalLaw};
 use crate::linear::{self, Vector6};
 
@@ -55,7 +54,8 @@ const ROUNDINGS: f64 = 8.0;
 /// Result of a minimisation.
 pub(crate) struct Minimum {
     pub(crate) offset: Vector6,
-    pub(crate) outcome: Outcome,
+    /// False if the steps ended before the minimum.
+    pub(crate) is_reached: bool,
     pub(crate) steps: u32,
 }
 
@@ -63,7 +63,7 @@ pub(crate) struct Minimum {
 /// allocation.
 pub(crate) fn minimize(terms: &[Term], start: &Vector6, most_steps: u32) -> Minimum {
     let mut offset = *start;
-    let mut best = Minimum { offset, outcome: Outcome::BestIterate, steps: 0 };
+    let mut best = Minimum { offset, is_reached: false, steps: 0 };
     let mut smallest = f64::INFINITY;
     for steps in 0..=most_steps {
         let (gradient, rounding) = gradient(terms, &offset);
@@ -73,7 +73,7 @@ pub(crate) fn minimize(terms: &[Term], start: &Vector6, most_steps: u32) -> Mini
         }
         best.steps = steps;
         if square <= rounding * rounding {
-            return Minimum { offset, outcome: Outcome::Solved, steps };
+            return Minimum { offset, is_reached: true, steps };
         }
         let newton = linear::solve(second_derivative(terms, &offset), &gradient);
         let direction = newton.map(|part| -part);
@@ -240,13 +240,13 @@ mod tests {
     fn the_best_iterate_is_returned_where_the_steps_end_too_early() {
         let terms = corner();
         let solved = minimize(&terms, &[0.0; 6], MAX_STEPS);
-        assert_eq!(solved.outcome, Outcome::Solved);
+        assert!(solved.is_reached);
         assert!(solved.steps > 2, "{} steps: the case is too easy", solved.steps);
         let length = |offset: &Vector6| norm(&gradient(&terms, offset).0);
         let mut last = length(&[0.0; 6]);
         for most in 0..solved.steps {
             let ended = minimize(&terms, &[0.0; 6], most);
-            assert_eq!((ended.outcome, ended.steps), (Outcome::BestIterate, most));
+            assert_eq!((ended.is_reached, ended.steps), (false, most));
             assert!(length(&ended.offset) <= last, "after {most} steps");
             last = length(&ended.offset);
         }

@@ -139,6 +139,8 @@ impl Solver {
             let (wrench, outcome) = (Wrench::ZERO, Outcome::InvalidInput);
             return Solution { wrench, outcome, steps: 0, is_limited: false, is_in_range: false };
         }
+        // Before the work of this tick, of which the springs will store a part.
+        let available_j = self.balance.available_j();
         let next = self.next.take();
         let elapsed_s = if next.is_some() { self.period_s } else { (age_s - self.last_age_s).max(0.0) };
         self.last_age_s = age_s;
@@ -149,11 +151,11 @@ impl Solver {
         }
         self.balance.move_to(pose, elapsed_s);
         self.expire(age_s);
-        self.prepare(pose, twist);
+        self.prepare(pose, twist, available_j);
         let minimum = self.minimum();
         self.offset = minimum.offset;
         let load = self.settle(pose);
-        let wrench = self.limits.limit(load);
+        let (wrench, is_limited) = self.limits.limit(&load);
         let slots = self.slots.get(..self.count).unwrap_or_default();
         self.balance.settle(&self.offset, slots, &wrench);
         while self.slots.get(..self.count).and_then(<[_]>::last).is_some_and(Slot::has_faded) {
@@ -161,9 +163,9 @@ impl Solver {
         }
         Solution {
             wrench,
-            outcome: minimum.outcome,
+            outcome: if minimum.is_reached { Outcome::Solved } else { Outcome::BestIterate },
             steps: minimum.steps,
-            is_limited: wrench != load,
+            is_limited,
             is_in_range: self.set.is_valid_at(pose, age_s),
         }
     }
@@ -189,8 +191,7 @@ impl Solver {
     }
 
     /// Computes the terms of the energy at a pose of the handle.
-    fn prepare(&mut self, pose: &Pose, twist: &Twist) {
-        let mut available_j = self.balance.available_j();
+    fn prepare(&mut self, pose: &Pose, twist: &Twist, mut available_j: f64) {
         let is_conserving = self.is_conserving();
         for (slot, term) in self.slots.iter_mut().zip(&mut self.terms).take(self.count) {
             let arm_m = pose.orientation() * slot.contact.tool_point_m;
@@ -209,7 +210,7 @@ impl Solver {
 
     fn minimum(&self) -> Minimum {
         if self.space.is_rigid() {
-            return Minimum { offset: [0.0; 6], outcome: Outcome::Solved, steps: 0 };
+            return Minimum { offset: [0.0; 6], is_reached: true, steps: 0 };
         }
         minimize(self.terms.get(..self.count).unwrap_or_default(), &self.offset, MAX_STEPS)
     }

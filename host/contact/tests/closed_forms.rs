@@ -3,7 +3,7 @@
 mod common;
 
 use common::{PERIOD_S, at, floor, set, unlimited};
-use flotor_contact::{Contact, Coupling, Outcome, Replacement, Solution, Solver};
+use flotor_contact::{Contact, Coupling, Limits, Outcome, Replacement, Solution, Solver};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{Pose, Twist, Wrench};
 
@@ -81,6 +81,19 @@ fn parallel_contacts_add_up_to_the_coupling_and_no_further() {
     let solution = solver(Coupling::RIGID, &corners(2000.0)).solve(&turned, &Twist::ZERO, 0.0);
     let expected = -4.0 * 2000.0 * 0.01 * 0.02_f64.sin() * 0.01 * 0.02_f64.cos();
     assert!((solution.wrench.torque().x - expected).abs() < 1.0e-12, "{:?}", solution.wrench);
+}
+
+#[test]
+fn a_device_without_torques_has_none_and_is_not_limited_by_that() {
+    let limits = Limits::new(3.0, 0.0).expect("no torque");
+    let mut solver = Solver::new(Coupling::RIGID, limits, Replacement::Immediate, PERIOD_S).expect("above 0");
+    solver.replace(&set(&Pose::HOME, &[Contact { tool_point_m: DVec3::X * 0.01, ..floor(0.0) }]));
+    let pressed = solver.solve(&at(DVec3::Z * -1.0e-3), &Twist::ZERO, 0.0);
+    assert_eq!((pressed.wrench.torque(), pressed.is_limited), (DVec3::ZERO, false));
+    assert_close(pressed.wrench.force(), DVec3::Z);
+    let deeper = solver.solve(&at(DVec3::Z * -4.0e-3), &Twist::ZERO, 0.0);
+    assert!(deeper.is_limited);
+    assert_close(deeper.wrench.force(), DVec3::Z * 3.0);
 }
 
 #[test]

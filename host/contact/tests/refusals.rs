@@ -68,6 +68,7 @@ fn settings_have_to_be_above_zero() {
     for number in [0.0, -1.0, f64::NAN] {
         assert_eq!(Coupling::new(1.0, number).expect_err("wrong").field, "stiffness_nm_per_rad");
         assert_eq!(Limits::new(number, 1.0).expect_err("wrong").to_string(), "`force_n` is not above 0");
+        assert_eq!(Limits::new(1.0, number).is_ok(), number == 0.0, "no torque, or a limit above 0");
         let limits = Limits::new(1.0, 1.0).expect("above 0");
         assert!(Solver::new(Coupling::RIGID, limits, Replacement::Immediate, number).is_err());
     }

@@ -275,7 +275,7 @@ impl Sequence {
     }
 
     /// Energy of sampled springs in a motion, `K T / 2` times the integral of the squared relative speed.
-    fn sampled_j(&self, contacts: &[Contact], before: &Pose, pose: &Pose) -> f64 {
+    fn sampled_j<'a>(&self, contacts: impl Iterator<Item = &'a Contact>, before: &Pose, pose: &Pose) -> f64 {
         let mut sum = 0.0;
         for contact in contacts {
             let point = |pose: &Pose| pose.position() + pose.orientation() * contact.tool_point_m;
@@ -299,8 +299,10 @@ impl Sequence {
         let random = &mut random;
         let coupling = Coupling::new(self.coupling[0], self.coupling[1]).expect("above 0");
         let mut solver = Solver::new(coupling, unlimited(), CONSERVING, PERIOD_S).expect("a period above 0");
-        let (mut pose, mut velocity, mut spin) = (Pose::HOME, DVec3::ZERO, DVec3::ZERO);
-        let mut contacts = Vec::new();
+        let (mut pose, mut last_pose) = (Pose::HOME, Pose::HOME);
+        let (mut velocity, mut spin) = (DVec3::ZERO, DVec3::ZERO);
+        // Contacts of the set before still fade.
+        let (mut contacts, mut before_last) = (Vec::new(), Vec::new());
         let (mut age_s, mut next) = (0.0, 0);
         let (mut energy, mut allowed, mut worst) = (0.0, 0.0, f64::NEG_INFINITY);
         let longest = 1 + random.bits() % 100;
@@ -312,20 +314,22 @@ impl Sequence {
             if tick == next {
                 next += 1 + random.bits() % longest;
                 age_s = random.unit() * 0.1;
-                contacts = self.contacts(random, &pose);
+                before_last = std::mem::replace(&mut contacts, self.contacts(random, &pose));
                 solver.replace(&set(&pose, &contacts));
             }
+            // The motion since the last tick, against both sets where one has just replaced the other.
+            allowed += 1.15 * self.sampled_j(contacts.iter().chain(&before_last), &last_pose, &pose)
+                + 0.1e-3 / 60.0 * PERIOD_S;
+            worst = worst.max(-energy - allowed);
             let solution = solver.solve(&pose, &Twist::new(velocity, spin), age_s);
             assert!(solution.wrench.is_finite() && solution.outcome == Outcome::Solved, "{solution:?}");
             // The force acts until the next tick; a surface moves with at most 1 W.
             energy += solver.forces().map(|(force, speed)| force.dot(speed).min(1.0) * PERIOD_S).sum::<f64>();
-            let before = pose;
             let step = DQuat::from_xyzw(0.5e-3 * spin.x, 0.5e-3 * spin.y, 0.5e-3 * spin.z, 1.0).normalize();
+            last_pose = pose;
             pose = Pose::new(pose.position() + velocity * PERIOD_S, (step * pose.orientation()).normalize());
-            energy -= solution.wrench.force().dot(pose.position() - before.position());
+            energy -= solution.wrench.force().dot(pose.position() - last_pose.position());
             energy -= solution.wrench.torque().dot(step.xyz() * 2.0);
-            allowed += 1.15 * self.sampled_j(&contacts, &before, &pose) + 0.1e-3 / 60.0 * PERIOD_S;
-            worst = worst.max(-energy - allowed);
         }
         worst
     }
