@@ -1,9 +1,15 @@
 //! Offset of the tool from the handle that keeps a set of contacts from being stiffer than the coupling.
 
 use crate::Coupling;
-use crate::contact::ContactSet;
 use crate::linear::{self, ROWS, Symmetric6, Vector6};
 use flotor_hal::DVec3;
+
+/// Spring between the tool and a surface.
+pub(crate) struct Spring {
+    pub(crate) arm_m: DVec3,
+    pub(crate) direction: DVec3,
+    pub(crate) stiffness_n_per_m: f64,
+}
 
 /// Coordinates of the offset: the offset is the sum of the columns, each times its coordinate, and its energy half the sum of
 /// the squared coordinates.
@@ -17,23 +23,16 @@ impl OffsetSpace {
     /// The handle and the tool coincide.
     pub(crate) const RIGID: Self = Self { columns: linear::ZERO, excess: 1.0 };
 
-    /// Returns the offsets that the set needs behind the coupling. Real-time: bounded, no allocation.
+    /// Returns the offsets that springs need behind the coupling. Real-time: bounded, no allocation.
     ///
-    /// With the set's stiffness `N` in units of the coupling's, `N = V diag(s) V^T`, the compliance `V diag(max(0, 1 - 1/s)) V^T`
+    /// With their stiffness `N` in units of the coupling's, `N = V diag(s) V^T`, the compliance `V diag(max(0, 1 - 1/s)) V^T`
     /// in series makes it `V diag(min(s, 1)) V^T`.
-    pub(crate) fn new(set: &ContactSet, coupling: &Coupling) -> Self {
+    pub(crate) fn new(coupling: &Coupling, springs: impl Iterator<Item = Spring>) -> Self {
         let [linear, angular] = coupling.root_compliances();
         let mut stiffness = linear::ZERO;
-        for contact in set.contacts() {
-            let arm = set.anchor().orientation() * contact.tool_point_m;
-            let mut add = |direction: DVec3, n_per_m: f64| {
-                let row = generalized(direction * linear, arm.cross(direction) * angular);
-                linear::add_square(&mut stiffness, &row, n_per_m);
-            };
-            add(contact.normal, contact.stiffness_n_per_m);
-            let (first, second) = contact.normal.any_orthonormal_pair();
-            add(first, contact.sticking_n_per_m());
-            add(second, contact.sticking_n_per_m());
+        for Spring { arm_m, direction, stiffness_n_per_m } in springs {
+            let row = generalized(direction * linear, arm_m.cross(direction) * angular);
+            linear::add_square(&mut stiffness, &row, stiffness_n_per_m);
         }
         Self::with_stiffness(&stiffness, [linear, angular])
     }

@@ -141,7 +141,9 @@ pub(crate) fn relax(slot: &mut Slot, whole_m: f64, available_j: f64) -> f64 {
         slot.withheld_m = (slot.withheld_m + slot.rate_m).min(0.0);
         return 0.0;
     }
+    // Behind a coupling the solve moves the tool once more: as far again as this motion changes the depth, to be safe.
     let depth_m = (whole_m - slot.withheld_m).max(0.0);
+    let depth_m = depth_m.max(slot.depth_m) + (depth_m - slot.depth_m).abs();
     let stiffness = slot.contact.stiffness_n_per_m;
     let force = stiffness * depth_m;
     let cost_j = |fall_m: f64| (force + 0.5 * stiffness * fall_m) * fall_m;

@@ -1,6 +1,6 @@
 //! A contact in the loop: its plane, its friction, and the part of its gap that is withheld.
 
-use crate::cap::OffsetSpace;
+use crate::cap::{OffsetSpace, Spring};
 use crate::contact::Contact;
 use crate::law::{FrictionLaw, NormalLaw};
 use crate::linear::{Vector6, dot};
@@ -166,16 +166,18 @@ impl Slot {
         self.role == Role::Fading && self.depth_m <= 0.0
     }
 
-    /// Returns the stiffnesses along and across the normal that a motion meets, with the parts of the motion there.
+    /// Returns the springs along and across the normal.
     #[inline]
-    pub(crate) fn sampled(&self, motion_m: DVec3, is_sliding: bool) -> [(f64, f64); 3] {
+    pub(crate) fn springs(&self) -> [Spring; 3] {
         let [first, second] = self.tangents;
-        let across = if is_sliding { 0.0 } else { self.contact.sticking_n_per_m() };
-        [
-            (self.contact.stiffness_n_per_m, self.contact.normal.dot(motion_m)),
-            (across, first.dot(motion_m)),
-            (across, second.dot(motion_m)),
-        ]
+        let across = self.contact.sticking_n_per_m();
+        let spring = |direction: DVec3, stiffness_n_per_m: f64| Spring {
+            arm_m: self.arm_at_anchor_m,
+            direction,
+            stiffness_n_per_m,
+        };
+        let along = self.contact.stiffness_n_per_m;
+        [spring(self.contact.normal, along), spring(first, across), spring(second, across)]
     }
 
     /// Returns the force of both springs on the tool.

@@ -102,8 +102,8 @@ impl Solver {
         &self.set
     }
 
-    /// Returns the largest ratio of the set's stiffness, all contacts touching, to the coupling's; at least 1. Real-time:
-    /// bounded, no allocation.
+    /// Returns the largest ratio of the stiffness of all contacts, touching or not, to the coupling's; at least 1. Contacts that
+    /// fade count. Real-time: bounded, no allocation.
     #[must_use]
     pub fn excess(&self) -> f64 {
         self.space.excess()
@@ -226,9 +226,11 @@ impl Solver {
             let is_sliding = slot.settle(term, &self.offset, point_m);
             if is_conserving && (is_touching || slot.depth_m > 0.0) {
                 let [first, second] = &term.rows.tangents;
-                let along = [&term.rows.normal, first, second];
-                for ((stiffness, part_m), row) in slot.sampled(motion_m, is_sliding).into_iter().zip(along) {
-                    sampled.add(stiffness, part_m, row);
+                let rows = [&term.rows.normal, first, second];
+                // Across the normal a contact that slides has no spring.
+                let count = if is_sliding { 1 } else { 3 };
+                for (spring, row) in slot.springs().into_iter().zip(rows).take(count) {
+                    sampled.add(spring.stiffness_n_per_m, spring.direction.dot(motion_m), row);
                 }
             }
             load = load + Wrench::new(slot.force, arm_m.cross(slot.force));
@@ -259,7 +261,6 @@ impl Solver {
         let old = old.get_mut(..old_count).unwrap_or_default();
         (self.interval_s, self.since_replacement_s) = (self.since_replacement_s, 0.0);
         self.set = *set;
-        self.space = OffsetSpace::new(set, &self.coupling);
         for (slot, contact) in self.slots.iter_mut().zip(set.contacts()) {
             *slot = Slot::new(contact, set.anchor(), age_s);
             if let Some(old) = take_closest(old, slot) {
@@ -269,6 +270,8 @@ impl Solver {
         if self.is_conserving() {
             self.keep_fading(old);
         }
+        let springs = self.slots.iter().take(self.count).flat_map(Slot::springs);
+        self.space = OffsetSpace::new(&self.coupling, springs);
         let mut load = Wrench::ZERO;
         for (slot, term) in self.slots.iter().zip(&mut self.terms).take(self.count) {
             term.rows = slot.rows(&self.space);

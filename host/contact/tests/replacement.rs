@@ -352,6 +352,9 @@ fn sets_without_sense_give_the_hand_no_energy() {
         let mut worst = f64::NEG_INFINITY;
         for seed in 0..cases(30, 15_000) as u64 {
             let excess = sequence.excess_j(seed, 1000);
+            if excess > 0.0 {
+                println!("  {seed} {excess:e}");
+            }
             worst = worst.max(excess);
         }
         println!(
