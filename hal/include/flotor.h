@@ -33,6 +33,9 @@
 // Maximum number of coefficients of a calibration: a polynomial of degree seven.
 #define FLOTOR_CALIBRATION_COEFFICIENTS 8
 
+// Largest number of contacts in a set.
+#define FLOTOR_MAX_CONTACTS 16
+
 // Capacity of a stop message, bytes.
 #define FLOTOR_STOP_MESSAGE_BYTES 64
 
@@ -895,6 +898,28 @@ typedef struct FlotorDetailsTable {
     uint32_t (*values)(FlotorInstance instance, double *values, uint32_t capacity);
 } FlotorDetailsTable;
 
+// Contact between a point of the tool and a plane that stands for the surface nearby, in the model frame. 136 bytes.
+typedef struct FlotorContact {
+    // Point on the tool, relative to the handle and in its orientation, m; zero for a tool that is a point.
+    double tool_point_m[3];
+    // Closest point on the surface at the anchor, m.
+    double surface_point_m[3];
+    // Unit normal of the surface, towards the tool.
+    double normal[3];
+    // Distance of the point on the tool from the surface at the anchor, along the normal, m; below 0 inside.
+    double gap_m;
+    // Velocity of the surface, m/s. Its power is the model's: a host limits it.
+    double surface_velocity_m_per_s[3];
+    // Stiffness along the normal, N/m; above 0.
+    double stiffness_n_per_m;
+    // Stiffness across the normal while the contact sticks, N/m; 0: no friction.
+    double tangential_stiffness_n_per_m;
+    // Damping along the normal, N·s/m.
+    double damping_ns_per_m;
+    // Coefficient of friction.
+    double friction;
+} FlotorContact;
+
 // Wrench around a pose, in the model frame: `W(d) = W0 - K d`. 416 bytes.
 //
 // `d` is the displacement from the anchor: position in m, then the rotation vector of the turn from the anchor's
@@ -914,6 +939,42 @@ typedef struct FlotorLinearField {
     // Loop time for which the field was computed, ns.
     uint64_t time_ns;
 } FlotorLinearField;
+
+// Contacts near a pose, in the model frame. 2688 bytes.
+typedef struct FlotorContactSet {
+    // Pose of the handle for which the contacts were computed.
+    struct FlotorPose anchor;
+    // Contacts; only the first [`Self::count`] count.
+    struct FlotorContact contacts[FLOTOR_MAX_CONTACTS];
+    // Number of contacts.
+    uint32_t count;
+    // 1 with a bilateral part, 0 without.
+    uint32_t has_field;
+    // Largest displacement from the anchor for which the set is valid, m; above 0, may be infinite. Beyond, a host continues the
+    // planes and counts the ticks.
+    double valid_m;
+    // Largest rotation from the anchor for which the set is valid, rad; above 0, may be infinite.
+    double valid_rad;
+    // Longest age for which the set is valid, s; 0: three periods of the model. The forces of an older set fade.
+    double valid_s;
+    // Bilateral part, a force that also pulls; read only if [`Self::has_field`] is not 0.
+    struct FlotorLinearField field;
+    // Loop time for which the set was computed, ns.
+    uint64_t time_ns;
+} FlotorContactSet;
+
+// Function table `flotor.contact-set/1`: see [`ContactSetModel`].
+typedef struct FlotorContactSetTable {
+    // Size of this table in the plugin's build, bytes.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Writes the contacts at an input, after the time since the previous call; returns a [`crate::abi::CallStatus`]
+    // code. Not real-time, but bounded.
+    uint32_t (*contact_set)(FlotorInstance instance,
+                            const struct FlotorInput *input,
+                            struct FlotorContactSet *set);
+} FlotorContactSetTable;
 
 // Function table `flotor.linear-field/1`: see [`LinearFieldModel`].
 typedef struct FlotorLinearFieldTable {
@@ -1125,6 +1186,7 @@ typedef struct FlotorSnapshotTable {
 #define FLOTOR_INTERFACE_CALIBRATION "flotor.calibration/1"
 #define FLOTOR_INTERFACE_CENTERLINE "flotor.centerline/1"
 #define FLOTOR_INTERFACE_CONNECTION "flotor.connection/1"
+#define FLOTOR_INTERFACE_CONTACT_SET "flotor.contact-set/1"
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
 #define FLOTOR_INTERFACE_GRIP "flotor.grip/1"
@@ -1367,6 +1429,30 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(CenterlineTable, reserved),
     FLOTOR_FIELD(CenterlineTable, info),
     FLOTOR_FIELD(CenterlineTable, centerline),
+    FLOTOR_STRUCT(Contact),
+    FLOTOR_FIELD(Contact, tool_point_m),
+    FLOTOR_FIELD(Contact, surface_point_m),
+    FLOTOR_FIELD(Contact, normal),
+    FLOTOR_FIELD(Contact, gap_m),
+    FLOTOR_FIELD(Contact, surface_velocity_m_per_s),
+    FLOTOR_FIELD(Contact, stiffness_n_per_m),
+    FLOTOR_FIELD(Contact, tangential_stiffness_n_per_m),
+    FLOTOR_FIELD(Contact, damping_ns_per_m),
+    FLOTOR_FIELD(Contact, friction),
+    FLOTOR_STRUCT(ContactSet),
+    FLOTOR_FIELD(ContactSet, anchor),
+    FLOTOR_FIELD(ContactSet, contacts),
+    FLOTOR_FIELD(ContactSet, count),
+    FLOTOR_FIELD(ContactSet, has_field),
+    FLOTOR_FIELD(ContactSet, valid_m),
+    FLOTOR_FIELD(ContactSet, valid_rad),
+    FLOTOR_FIELD(ContactSet, valid_s),
+    FLOTOR_FIELD(ContactSet, field),
+    FLOTOR_FIELD(ContactSet, time_ns),
+    FLOTOR_STRUCT(ContactSetTable),
+    FLOTOR_FIELD(ContactSetTable, size),
+    FLOTOR_FIELD(ContactSetTable, reserved),
+    FLOTOR_FIELD(ContactSetTable, contact_set),
     FLOTOR_STRUCT(Detail),
     FLOTOR_FIELD(Detail, id),
     FLOTOR_FIELD(Detail, unit),

@@ -56,6 +56,7 @@ pub use extension::calibration::{
 };
 pub use extension::centerline::{CenterlineInfo, CenterlineModel};
 pub use extension::connection::{ConnectionDevice, UsbAccess, UsbKind};
+pub use extension::contact_set::{Contact, ContactSet, ContactSetModel, MAX_CONTACTS};
 pub use extension::details::{Detail, DetailsModel};
 pub use extension::energy_ledger::{EnergyLedger, EnergyLedgerDevice};
 pub use extension::grip::{ActiveGrip, GripAxis, GripDevice, GripKind, GripModel, GripState};

@@ -84,10 +84,10 @@ mod tests {
     use flotor_hal::abi::{DeviceTable, ForceTable};
     use flotor_hal::extension::{
         active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
-        connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable,
-        grip::GripTable, independent_stop::IndependentStopTable, linear_field::LinearFieldTable,
-        pacing::PacingTable, shape::ShapeTable, snapshot::SnapshotTable, soft_range::SoftRangeTable,
-        variant::VariantTable, workspace_bounds::WorkspaceBoundsTable,
+        connection::ConnectionTable, contact_set::ContactSetTable, details::DetailsTable,
+        energy_ledger::EnergyLedgerTable, grip::GripTable, independent_stop::IndependentStopTable,
+        linear_field::LinearFieldTable, pacing::PacingTable, shape::ShapeTable, snapshot::SnapshotTable,
+        soft_range::SoftRangeTable, variant::VariantTable, workspace_bounds::WorkspaceBoundsTable,
     };
 
     /// One byte short of the shortest tables there are.
@@ -131,6 +131,7 @@ mod tests {
         is_held_to_its_length::<VariantTable>();
         is_held_to_its_length::<DetailsTable>();
         is_held_to_its_length::<ActiveRegionTable>();
+        is_held_to_its_length::<ContactSetTable>();
         is_held_to_its_length::<LinearFieldTable>();
         is_held_to_its_length::<WorkspaceBoundsTable>();
         is_held_to_its_length::<DeviceTable>();

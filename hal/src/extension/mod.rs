@@ -7,6 +7,7 @@ pub mod active_region;
 pub mod calibration;
 pub mod centerline;
 pub mod connection;
+pub mod contact_set;
 pub mod details;
 pub mod energy_ledger;
 pub mod grip;
@@ -33,6 +34,7 @@ macro_rules! extensions {
 extensions! {
     active_region,
     centerline,
+    contact_set,
     details,
     grip,
     linear_field,

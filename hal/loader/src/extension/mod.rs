@@ -6,6 +6,7 @@ mod active_region;
 mod calibration;
 pub(crate) mod centerline;
 mod connection;
+mod contact_set;
 mod details;
 mod energy_ledger;
 mod grip;
@@ -21,10 +22,10 @@ use crate::LoadError;
 use crate::offers::Offers;
 use flotor_hal::extension::{
     active_region::ActiveRegionTable, calibration::CalibrationTable, centerline::CenterlineTable,
-    connection::ConnectionTable, details::DetailsTable, energy_ledger::EnergyLedgerTable, grip::GripTable,
-    independent_stop::IndependentStopTable, linear_field::LinearFieldTable, pacing::PacingTable,
-    shape::ShapeTable, snapshot::SnapshotTable, soft_range::SoftRangeTable, variant::VariantTable,
-    workspace_bounds::WorkspaceBoundsTable,
+    connection::ConnectionTable, contact_set::ContactSetTable, details::DetailsTable,
+    energy_ledger::EnergyLedgerTable, grip::GripTable, independent_stop::IndependentStopTable,
+    linear_field::LinearFieldTable, pacing::PacingTable, shape::ShapeTable, snapshot::SnapshotTable,
+    soft_range::SoftRangeTable, variant::VariantTable, workspace_bounds::WorkspaceBoundsTable,
 };
 
 macro_rules! extensions {
@@ -53,6 +54,7 @@ extensions! {
     ModelExtensions {
         active_region: ActiveRegionTable,
         centerline: CenterlineTable,
+        contact_set: ContactSetTable,
         details: DetailsTable,
         grip: GripTable,
         linear_field: LinearFieldTable,
