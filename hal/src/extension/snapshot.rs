@@ -4,8 +4,6 @@
 //! instance of the same plugin with equal parameters and loop settings continues after a restore with the same bits. A
 //! model without a history has an empty state and needs no extension.
 
-#[cfg(feature = "loader")]
-use crate::Memory;
 use crate::abi::instance::call;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;

@@ -322,7 +322,7 @@ impl Forces {
     /// Iterates over the states of all instances before a tick, each with its model number; `None` for one whose state cannot be
     /// saved. Not part of them: couplings, blends of models, and a layer that is fading out.
     pub fn states(&mut self, tick: u64) -> impl Iterator<Item = (usize, Option<InstanceState<'_>>)> {
-        self.slots().flat_map(|slot| {
+        self.slots().flat_map(move |slot| {
             let number = slot.number;
             slot.states(tick).map(move |state| (number, state))
         })
