@@ -1,10 +1,7 @@
 //! Contacts, and sets of them that have passed all checks.
 
-use flotor_hal::{DVec3, Pose};
+use flotor_hal::{DVec3, MAX_CONTACTS, Pose};
 use std::fmt;
-
-/// Largest number of contacts in a set.
-pub const MAX_CONTACTS: usize = 16;
 
 /// Largest magnitude of a number in a set, in a pose and in a twist. Products of five such numbers are still finite.
 pub(crate) const LARGEST: f64 = 1.0e9;
@@ -38,6 +35,21 @@ pub struct Contact {
 }
 
 impl Contact {
+    /// Returns a contact as a model publishes it, with nothing checked.
+    fn unchecked(contact: &flotor_hal::Contact) -> Self {
+        Self {
+            tool_point_m: DVec3::from_array(contact.tool_point_m),
+            surface_point_m: DVec3::from_array(contact.surface_point_m),
+            normal: DVec3::from_array(contact.normal),
+            gap_m: contact.gap_m,
+            surface_velocity_m_per_s: DVec3::from_array(contact.surface_velocity_m_per_s),
+            stiffness_n_per_m: contact.stiffness_n_per_m,
+            tangential_stiffness_n_per_m: contact.tangential_stiffness_n_per_m,
+            damping_ns_per_m: contact.damping_ns_per_m,
+            friction: contact.friction,
+        }
+    }
+
     /// Returns the stiffness across the normal, 0 without friction.
     pub(crate) fn sticking_n_per_m(&self) -> f64 {
         if self.friction > 0.0 { self.tangential_stiffness_n_per_m } else { 0.0 }
@@ -127,6 +139,30 @@ impl ContactSet {
             *slot = checked.map_err(|(field, fault)| ContactSetError::Contact { index, field, fault })?;
         }
         Ok(set)
+    }
+
+    /// Checks a set as a model publishes it; one without a validity in time of its own is valid for `valid_s`. Real-time: bounded,
+    /// no allocation.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn published(set: &flotor_hal::ContactSet, valid_s: f64) -> Result<Self, ContactSetError> {
+        let mut contacts = [Contact::default(); MAX_CONTACTS];
+        contacts
+            .iter_mut()
+            .zip(&set.contacts)
+            .for_each(|(place, contact)| *place = Contact::unchecked(contact));
+        let count = set.count as usize;
+        let contacts = contacts.get(..count).ok_or(ContactSetError::TooMany { count })?;
+        let duration_s = if set.valid_s == 0.0 { valid_s } else { set.valid_s };
+        let validity = Validity { displacement_m: set.valid_m, rotation_rad: set.valid_rad, duration_s };
+        Self::new(&set.anchor, contacts, validity)
+    }
+
+    /// Returns the set with each contact exchanged.
+    pub(crate) fn map(mut self, mut exchange: impl FnMut(Contact) -> Contact) -> Self {
+        self.contacts.iter_mut().take(self.count).for_each(|contact| *contact = exchange(*contact));
+        self
     }
 
     /// Returns the set without contacts, always valid. Real-time: bounded, no allocation.

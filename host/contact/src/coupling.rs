@@ -24,6 +24,10 @@ impl Coupling {
         Ok(Self { stiffness_n_per_m, stiffness_nm_per_rad })
     }
 
+    pub(crate) fn stiffness_n_per_m(&self) -> f64 {
+        self.stiffness_n_per_m
+    }
+
     /// Returns the square roots of the compliances of translation and rotation.
     pub(crate) fn root_compliances(&self) -> [f64; 2] {
         [self.stiffness_n_per_m, self.stiffness_nm_per_rad].map(|stiffness| (1.0 / stiffness).sqrt())

@@ -107,11 +107,13 @@ mod coupling;
 mod law;
 mod linear;
 mod newton;
+mod published;
 mod replacement;
 mod slot;
 mod solver;
 
-pub use contact::{Contact, ContactSet, ContactSetError, Fault, MAX_CONTACTS, Validity};
+pub use contact::{Contact, ContactSet, ContactSetError, Fault, Validity};
 pub use coupling::{Coupling, Limits, NotPositive};
+pub use published::{FeltStiffness, PublishedContacts, Shortcoming, Touch};
 pub use replacement::Replacement;
 pub use solver::{Outcome, Solution, Solver};

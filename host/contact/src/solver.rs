@@ -1,7 +1,7 @@
 //! Wrench of a contact set in every tick.
 
 use crate::cap::OffsetSpace;
-use crate::contact::{ContactSet, MAX_CONTACTS, are_usable, is_usable_pose};
+use crate::contact::{ContactSet, are_usable, is_usable_pose};
 use crate::coupling::{Coupling, Limits, NotPositive, check};
 use crate::linear::{Vector6, dot};
 use crate::newton::{MAX_STEPS, Minimum, Term, minimize};
@@ -9,7 +9,7 @@ use crate::replacement::{
     Balance, LONGEST_SPREAD_S, Replacement, SampledMotion, energy_j, relax, take_closest,
 };
 use crate::slot::{Role, Slot};
-use flotor_hal::{DVec3, Pose, Twist, Wrench};
+use flotor_hal::{DVec3, MAX_CONTACTS, Pose, Twist, Wrench};
 
 /// How a solve ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +77,11 @@ impl Solver {
         if let Replacement::Conserving { surface_power_w } = replacement {
             check("surface_power_w", surface_power_w)?;
         }
-        Ok(Self {
+        Ok(Self::empty(coupling, limits, replacement, period_s))
+    }
+
+    fn empty(coupling: Coupling, limits: Limits, replacement: Replacement, period_s: f64) -> Self {
+        Self {
             coupling,
             limits,
             replacement,
@@ -93,7 +97,18 @@ impl Solver {
             last_age_s: 0.0,
             interval_s: f64::INFINITY,
             since_replacement_s: f64::INFINITY,
-        })
+        }
+    }
+
+    /// Forgets all contacts, their friction and their energy. Real-time: bounded, no allocation.
+    pub fn clear(&mut self) {
+        *self = Self::empty(self.coupling, self.limits, self.replacement, self.period_s);
+    }
+
+    /// Returns true if the last solve had no contact, and no other set waits. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.count == 0 && self.next.is_none()
     }
 
     /// Returns the set of the last solve. Real-time: bounded, no allocation.
@@ -107,6 +122,14 @@ impl Solver {
     #[must_use]
     pub fn excess(&self) -> f64 {
         self.space.excess()
+    }
+
+    /// Returns the largest stiffness of all contacts and the stiffness behind the coupling, N/m, if the coupling reduces it. Real-time:
+    /// bounded, no allocation.
+    #[must_use]
+    pub fn reduced_n_per_m(&self) -> Option<[f64; 2]> {
+        let felt_n_per_m = self.coupling.stiffness_n_per_m();
+        (!self.space.is_rigid()).then(|| [self.space.excess() * felt_n_per_m, felt_n_per_m])
     }
 
     /// Returns force on the tool and velocity of the surface of each contact in the last solve, N and m/s: first those of the set

@@ -3,10 +3,10 @@
 
 pub(crate) mod reference;
 
-use flotor_contact::{Contact, ContactSet, Coupling, Limits, MAX_CONTACTS, Validity};
+use flotor_contact::{Contact, ContactSet, Coupling, Limits, Validity};
 use flotor_core::Random;
 use flotor_hal::glam::{DQuat, DVec3};
-use flotor_hal::{Pose, Twist};
+use flotor_hal::{MAX_CONTACTS, Pose, Twist};
 
 pub(crate) const PERIOD_S: f64 = 1.0e-3;
 
