@@ -103,7 +103,8 @@ fn a_wall_that_is_published_only_while_it_is_touched_neither_pulls_nor_gives_ene
     for (ticks, latency) in [(10, 10), (5, 5), (2, 2)] {
         for frequency_hz in [1.0, 3.0, 8.0] {
             let mut contacts = contacts(Coupling::RIGID, f64::INFINITY);
-            let z_m = |tick: u64| 1.5e-3 * (std::f64::consts::TAU * frequency_hz * tick as f64 * PERIOD_S).cos();
+            let z_m =
+                |tick: u64| 1.5e-3 * (std::f64::consts::TAU * frequency_hz * tick as f64 * PERIOD_S).cos();
             let mut computed = None;
             let (mut last_n, mut out_j, mut felt_n) = (0.0, 0.0, 0.0_f64);
             for tick in 0..4000_u64 {
@@ -121,10 +122,14 @@ fn a_wall_that_is_published_only_while_it_is_touched_neither_pulls_nor_gives_ene
                 }
                 let touch = contacts.touch(&input);
                 let force_n = touch.map_or(0.0, |touch| touch.wrench.force().z);
-                let travel_m = (z_m(tick + 1) - z_m(tick)).abs().max((z_m(tick) - z_m(tick.saturating_sub(1))).abs());
+                let travel_m =
+                    (z_m(tick + 1) - z_m(tick)).abs().max((z_m(tick) - z_m(tick.saturating_sub(1))).abs());
                 let spread_m = 1.5e-3 / (0.5 * ticks as f64);
                 assert!(force_n >= 0.0, "{force_n} N in tick {tick}");
-                assert!((force_n - last_n).abs() <= 1.5 * STIFFNESS_N_PER_M * (travel_m + spread_m), "tick {tick}");
+                assert!(
+                    (force_n - last_n).abs() <= 1.5 * STIFFNESS_N_PER_M * (travel_m + spread_m),
+                    "tick {tick}"
+                );
                 out_j += force_n * (z_m(tick + 1) - z_m(tick));
                 (last_n, felt_n) = (force_n, felt_n.max(force_n));
             }

@@ -4,10 +4,12 @@
 //! - [`mapping`]: mapping between the device frame and a model's frame.
 //! - [`limits`]: limits of force and motion, the wall at the end of a device's range; [`rendered_boundary`]: the same wall on
 //!   a device, in a loop; [`region`]: the vectors that limits allow.
+//! - [`asynchronous`]: timing of an asynchronous model, and the limits of its contacts.
 //! - [`plausibility`]: checks of device samples; [`oscillation`]: detection of an unstable loop.
 //! - [`grip`], [`grip_guard`]: the grip of a device, its check and limits; [`feel`]: stiffness and settling time that the hand
 //!   felt.
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between the two ends of a coupling.
+//! - [`health`]: problems of a model, counted and as text.
 //! - [`guidance`]: the parameters that guide a simulated hand.
 //! - [`snapshot`]: saved state of a model or device, refused by an instance of another origin.
 //! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: number of a plugin in the run.
@@ -17,6 +19,7 @@
 //! The crate reads no files, starts no threads and, apart from [`lock()`], makes no system calls.
 #![forbid(unsafe_code)]
 
+pub mod asynchronous;
 mod change;
 mod clock;
 pub mod coupling;
@@ -27,6 +30,7 @@ pub mod feel;
 pub mod grip;
 pub mod grip_guard;
 pub mod guidance;
+pub mod health;
 pub mod limits;
 mod lock;
 pub mod mapping;

@@ -45,16 +45,6 @@ impl Default for Blend {
     }
 }
 
-/// Rate and latency of the linear fields of an asynchronous model.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldTiming {
-    /// Rate of new fields, Hz.
-    pub rate_hz: f64,
-    /// Time from the sample of the handle to the field computed from it, s. Exact on the virtual clock; on the real
-    /// clock, the computing time of the model.
-    pub latency_s: f64,
-}
-
 /// Mapping between a device and one instance of a model: frames, scales and home position.
 #[derive(Clone, Copy, Debug)]
 #[must_use]

@@ -210,6 +210,15 @@ messages! {
     FieldTiming: Copy {
         rate_hz: Option<f64> = 1 [double, optional],
         latency_s: Option<f64> = 2 [double, optional],
+        contacts: Option<ContactLimits> = 3 [message, optional],
+    }
+
+    ContactLimits: Copy {
+        stiffness_n_per_m: Option<f64> = 1 [double, optional],
+        per_damping_1_per_s: Option<f64> = 2 [double, optional],
+        surface_power_w: Option<f64> = 3 [double, optional],
+        force_n: Option<f64> = 4 [double, optional],
+        torque_nm: Option<f64> = 5 [double, optional],
     }
 
     Blend: Copy {

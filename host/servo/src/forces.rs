@@ -3,12 +3,11 @@
 //! Servo and replay run the same code, so that a replay can be bit-exact.
 
 use super::Heartbeat;
-use super::models::{
-    Contribution, Layer, LayerReport, ModelHealth, ModelStack, Replacement, Slot, StepContext,
-};
+use super::models::{Contribution, Layer, LayerReport, ModelStack, Replacement, Slot, StepContext};
 use flotor_core::ModelOutputs;
 use flotor_core::demand::TickDemand;
 use flotor_core::grip::GripRecord;
+use flotor_core::health::ModelHealth;
 use flotor_core::trace::Events;
 use flotor_coupling::{
     Coupling, CouplingDescription, CouplingEnds, Line, LinkStatistics, LinkTimeouts, PortSample, Pull, Reach,

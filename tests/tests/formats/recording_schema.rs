@@ -293,6 +293,14 @@ fn expected_run() -> Vec<String> {
     );
     lines.push("plugins[2].device = 1".to_owned());
     lines.extend(["rate_hz = 200.0", "latency_s = 0.0025"].map(|line| format!("plugins[2].field.{line}")));
+    let contacts = [
+        "stiffness_n_per_m = 900.0",
+        "per_damping_1_per_s = 250.0",
+        "surface_power_w = 0.5",
+        "force_n = 3.0",
+        "torque_nm = inf",
+    ];
+    lines.extend(contacts.map(|line| format!("plugins[2].field.contacts.{line}")));
     let coupling = [
         "name = \"pair\"",
         "stiffness_n_per_m = 600.5",

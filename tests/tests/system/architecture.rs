@@ -102,7 +102,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     // The core for the random numbers of its tests.
     ("host/contact", Contact, &[Contract, Core]),
     ("host/coupling", Coupling, &[Contract, Sync, Core]),
-    ("host/servo", Servo, &[Contract, Loader, Sync, Core, Coupling]),
+    ("host/servo", Servo, &[Contract, Loader, Sync, Core, Contact, Coupling]),
     ("devices/mcap", Container, &[]),
     ("host/record", Record, &[Contract, Sync, Core, Container]),
     ("host/live", Live, &[Contract, Sync, Core, Record]),
@@ -117,7 +117,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("host/plot", Plot, &[]),
     ("host/command", Command, &[Contract, Loader, Sync, Core, Servo, Record, Live, Session]),
     ("lab/guard", Guard, &[]),
-    ("lab/judge", Judge, &[Contract, Loader, Core, Session, Plot]),
+    ("lab/judge", Judge, &[Contract, Loader, Core, Contact, Session, Plot]),
     (
         "lab/measure",
         Lab,

@@ -8,10 +8,11 @@ mod stepped;
 pub use stepped::Stepped;
 
 use asynchronous::AsynchronousModel;
+use flotor_contact::FeltStiffness;
 use flotor_core::grip::GripRecord;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
+    ActiveRegion, ContactSet, Demand, Input, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
 };
 use flotor_loader::{InstanceState, Model};
 use process::Worker;
@@ -22,7 +23,7 @@ pub enum Engine {
     Here(Model),
     /// In a worker process: a crash or hang of the model does not stop the loop.
     Process(Worker),
-    /// Asynchronous, at the model's own rate; the loop evaluates a local linear model.
+    /// Asynchronous, at the model's own rate; the loop evaluates its contacts or its local linear model.
     Asynchronous(Box<AsynchronousModel>),
 }
 
@@ -107,21 +108,21 @@ impl Engine {
         }
     }
 
-    /// Returns true if the model has a linear field; false for an asynchronous model. Not real-time.
-    pub fn has_linear_field(&self) -> bool {
+    /// Returns true if the model can run asynchronously; false for a model that already does. Not real-time.
+    pub fn has_local_model(&self) -> bool {
         match self {
-            Self::Here(model) => model.has_linear_field(),
-            Self::Process(worker) => worker.has_linear_field(),
+            Self::Here(model) => model.has_local_model(),
+            Self::Process(worker) => worker.has_local_model(),
             Self::Asynchronous(_) => false,
         }
     }
 
-    /// Computes the linear field at an input; `field` is only valid for [`Stepped::Answered`]. Returns [`Stepped::Broken`] for an
-    /// asynchronous model. Not real-time.
-    pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
+    /// Computes the contacts or the linear field at an input; `set` is only valid for [`Stepped::Answered`]. Returns
+    /// [`Stepped::Broken`] for an asynchronous model. Not real-time.
+    pub fn local_model(&mut self, input: &Input, set: &mut ContactSet) -> Stepped {
         match self {
-            Self::Here(model) => model.linear_field(input, field).into(),
-            Self::Process(worker) => worker.linear_field(input, field),
+            Self::Here(model) => model.local_model(input, set).into(),
+            Self::Process(worker) => worker.local_model(input, set),
             Self::Asynchronous(_) => Stepped::Broken,
         }
     }
@@ -150,6 +151,14 @@ impl Engine {
         match self {
             Self::Here(model) => model.float_changes(),
             Self::Process(_) | Self::Asynchronous(_) => 0,
+        }
+    }
+
+    /// Returns what the hand has felt of the stiffness of contacts, in the model frame. Real-time: bounded, no allocation.
+    pub fn felt_stiffness(&self) -> FeltStiffness {
+        match self {
+            Self::Asynchronous(model) => model.felt_stiffness(),
+            Self::Here(_) | Self::Process(_) => FeltStiffness::default(),
         }
     }
 

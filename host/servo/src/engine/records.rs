@@ -1,7 +1,7 @@
-//! Inputs and linear fields as arrays of words, which two threads or two processes share.
+//! Inputs and contact sets as arrays of words, which two threads or two processes share.
 
-use flotor_core::words::{Decoder, Encoder, FIELD_WORDS, MOTION_WORDS};
-use flotor_hal::{Demand, Input, LinearField};
+use flotor_core::words::{CONTACT_SET_WORDS, Decoder, Encoder, MOTION_WORDS};
+use flotor_hal::{ContactSet, Demand, Input};
 use flotor_sync::Words;
 
 /// Number of words of an input: motion, time, period, tick, and one for buttons and demand.
@@ -42,29 +42,29 @@ impl Words<INPUT_WORDS> for SentInput {
     }
 }
 
-/// Field sent from one thread or process to another.
+/// Contact set sent from one thread or process to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct SentField(pub(super) LinearField);
+pub(super) struct SentSet(pub(super) ContactSet);
 
-impl Words<FIELD_WORDS> for SentField {
+impl Words<CONTACT_SET_WORDS> for SentSet {
     #[inline]
-    fn to_words(&self) -> [u64; FIELD_WORDS] {
-        Encoder::of_zeros().field(&self.0).finish()
+    fn to_words(&self) -> [u64; CONTACT_SET_WORDS] {
+        Encoder::of_zeros().contact_set(&self.0).finish()
     }
 
     #[inline]
-    fn from_words(words: &[u64; FIELD_WORDS]) -> Self {
-        Self(Decoder::of(words).field())
+    fn from_words(words: &[u64; CONTACT_SET_WORDS]) -> Self {
+        Self(Decoder::of(words).contact_set())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flotor_hal::{Pose, Twist, Wrench};
+    use flotor_hal::{Contact, LinearField, Pose, Twist, Wrench};
 
     #[test]
-    fn inputs_and_fields_cross_bit_for_bit() {
+    fn inputs_and_contact_sets_cross_bit_for_bit() {
         let mut number = 0.0;
         let mut next = || {
             number += 0.1;
@@ -94,6 +94,21 @@ mod tests {
             valid_rad: next(),
             time_ns: 12_345,
         };
-        assert_eq!(SentField::from_words(&SentField(field).to_words()), SentField(field));
+        let contacts = std::array::from_fn(|_| Contact {
+            tool_point_m: std::array::from_fn(|_| next()),
+            surface_point_m: std::array::from_fn(|_| next()),
+            normal: std::array::from_fn(|_| next()),
+            gap_m: next(),
+            surface_velocity_m_per_s: std::array::from_fn(|_| next()),
+            stiffness_n_per_m: next(),
+            tangential_stiffness_n_per_m: next(),
+            damping_ns_per_m: next(),
+            friction: next(),
+        });
+        let (valid_m, valid_rad, valid_s) = (next(), next(), next());
+        let (anchor, count, has_field, time_ns) = (pose, 16, 1, 67_890);
+        let set =
+            ContactSet { anchor, contacts, count, has_field, valid_m, valid_rad, valid_s, field, time_ns };
+        assert_eq!(SentSet::from_words(&SentSet(set).to_words()), SentSet(set));
     }
 }

@@ -2,10 +2,12 @@
 
 use super::broad_phase::{Bounds, BroadPhase};
 use super::end_wall::EndWall;
-use crate::budget::{Allowed, Answer, Overrun, TimeBudget};
+use crate::budget::{Allowed, Answer, TimeBudget};
 use crate::engine::{Engine, Stepped};
+use flotor_contact::Shortcoming;
 use flotor_core::demand::TickDemand;
 use flotor_core::grip::GripRecord;
+use flotor_core::health::ModelHealth;
 use flotor_core::mapping::{Blend, Mapping};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
@@ -14,47 +16,6 @@ use flotor_hal::{
     Wrench,
 };
 use flotor_loader::InstanceState;
-
-/// Health counters of a model, summed over its instances.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ModelHealth {
-    /// Tick of the first panic or violation of the contract by an instance; the instance is disabled from then on.
-    pub panicked_at: Option<u64>,
-    /// Number of outputs with non-finite numbers or an unknown status; each was replaced by no force.
-    pub rejected_ticks: u64,
-    /// First tick with a rejected output.
-    pub first_rejected: Option<u64>,
-    /// Tick at which the process of an instance was found to have ended; the instance is disabled from then on.
-    pub lost_at: Option<u64>,
-    /// Number of ticks in which the last field of an asynchronous model was too old.
-    pub late_ticks: u64,
-    /// First late tick.
-    pub first_late: Option<u64>,
-    /// Number of steps without a reply in time from a worker process. Late replies alone are no fault: the time budget limits their
-    /// number.
-    pub late_answers: u64,
-    /// Overrun for which the model was disabled; `None` for a model that is not disabled.
-    pub overrun: Option<Overrun>,
-    /// Number of steps that changed the floating-point environment, which the host restored each time.
-    pub float_changes: u64,
-    /// First tick with a changed floating-point environment.
-    pub first_float_change: Option<u64>,
-}
-
-impl ModelHealth {
-    /// Returns true without a problem to report; late replies alone are no problem.
-    #[must_use]
-    pub fn is_good(&self) -> bool {
-        *self == Self { late_answers: self.late_answers, ..Self::default() }
-    }
-
-    /// Counts a tick with a problem, and stores the first one.
-    #[cold]
-    fn count(counter: &mut u64, first: &mut Option<u64>, tick: u64) {
-        *counter += 1;
-        first.get_or_insert(tick);
-    }
-}
 
 /// One instance of a model with its mapping.
 struct Object {
@@ -308,7 +269,7 @@ impl Layer {
     /// Returns a report on the layer of the model numbered `model`. Queries the last message of an unhealthy model only, and calls
     /// `on_query` before the query. Not real-time.
     pub fn report(&mut self, model: usize, on_query: impl FnOnce()) -> LayerReport {
-        let Self { generation, health, .. } = *self;
+        let (generation, health) = (self.generation, self.health());
         let words = if health.is_good() {
             String::new()
         } else {
@@ -316,6 +277,19 @@ impl Layer {
             self.last_message()
         };
         LayerReport { model, generation, health, words }
+    }
+
+    /// Returns the health counters, with the stiffness of contacts. Not real-time.
+    pub(super) fn health(&self) -> ModelHealth {
+        let mut health = self.health;
+        for Object { model, mapping, .. } in &self.objects {
+            let (felt, scale) = (model.felt_stiffness(), mapping.stiffness_scale());
+            let contacts = &mut health.contacts;
+            contacts.undamped_n_per_m = contacts.undamped_n_per_m.max(felt.undamped_n_per_m * scale);
+            let at_hand = felt.reduced_n_per_m.map(|pair| pair.map(|stiffness| stiffness * scale));
+            contacts.reduced_n_per_m = contacts.reduced_n_per_m.or(at_hand);
+        }
+        health
     }
 
     /// Returns the first non-empty last message of the instances. Not real-time.
@@ -369,39 +343,40 @@ impl Object {
         if self.model.float_changes() != self.float_changes {
             self.float_changes = self.model.float_changes();
             events.insert(Events::FLOAT_ENVIRONMENT);
-            ModelHealth::count(&mut health.float_changes, &mut health.first_float_change, input.tick);
+            health.float_changes.count(input.tick);
         }
         match stepped {
-            Stepped::Answered => {
-                let effort = grip.map_or(0.0, |grip| grip.model);
-                let usable = usable(demand, output).map(|output| (output, effort));
-                let usable = usable.filter(|_| effort.is_finite());
-                if usable.is_none() {
-                    self.last = None;
-                    ModelHealth::count(&mut health.rejected_ticks, &mut health.first_rejected, input.tick);
-                } else if self.model.may_be_late() {
-                    self.last = usable;
-                }
-                usable
-            }
+            Stepped::Answered => {}
+            Stepped::Short(Shortcoming::Aged) => health.contacts.aged.count(input.tick),
+            Stepped::Short(Shortcoming::Unsolved) => health.contacts.unsolved.count(input.tick),
+            Stepped::Refused => health.refused_sets.count(input.tick),
             // The last output replaces one late output; a second late output in a row has no replacement.
             Stepped::Late => {
                 events.insert(Events::MODEL_OVERRUN);
                 health.late_answers += 1;
-                self.last.take()
+                return self.last.take();
             }
             Stepped::Silent => {
                 events.insert(Events::MODEL_OVERRUN);
-                ModelHealth::count(&mut health.late_ticks, &mut health.first_late, input.tick);
-                self.last.take()
+                health.late.count(input.tick);
+                return self.last.take();
             }
-            Stepped::Broken => self.fail(input.tick, health),
+            Stepped::Broken => return self.fail(input.tick, health),
             Stepped::Gone => {
                 self.is_disabled = true;
                 health.lost_at.get_or_insert(input.tick);
-                None
+                return None;
             }
         }
+        let effort = grip.map_or(0.0, |grip| grip.model);
+        let usable = usable(demand, output).map(|output| (output, effort)).filter(|_| effort.is_finite());
+        if usable.is_none() {
+            self.last = None;
+            health.rejected.count(input.tick);
+        } else if self.model.may_be_late() {
+            self.last = usable;
+        }
+        usable
     }
 
     fn fail(&mut self, tick: u64, health: &mut ModelHealth) -> Option<(Output, f64)> {

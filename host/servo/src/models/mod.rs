@@ -12,7 +12,7 @@ mod slot;
 
 pub use end_wall::pushes_at_home;
 pub(crate) use layer::{Contribution, StepContext};
-pub use layer::{Layer, LayerReport, ModelHealth};
+pub use layer::{Layer, LayerReport};
 pub(crate) use slot::Slot;
 
 use super::{Heartbeat, Place};

@@ -6,7 +6,8 @@
 
 use super::broad_phase::Bounds;
 use super::fade::Fade;
-use super::layer::{Contribution, Layer, LayerReport, ModelHealth, StepContext};
+use super::layer::{Contribution, Layer, LayerReport, StepContext};
+use flotor_core::health::ModelHealth;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, Tick};
@@ -137,7 +138,7 @@ impl Slot {
 
     /// Returns health and last message of the current layer. Not real-time.
     pub(crate) fn health(&mut self) -> (ModelHealth, String) {
-        (self.current.health, self.current.last_message())
+        (self.current.health(), self.current.last_message())
     }
 
     /// Returns reports on all layers of the slot. Not real-time.

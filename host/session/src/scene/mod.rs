@@ -12,9 +12,10 @@ mod setting;
 pub use change::{Alternative, ChangeUse, ChangeWhat};
 pub use devices::DeviceUse;
 pub use devices::{is_named, without_device};
+use flotor_core::asynchronous::{ContactLimits, FieldTiming, StiffnessCap};
 use flotor_core::coupling::{CouplingDescription, PassivityMode};
 use flotor_core::limits::{Boundary, Limits};
-use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
+use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_core::plausibility::is_rotation;
 pub use own::{OWN_SCENES, OwnScene};
 pub use reader::{Location, ParameterText, SceneError};
@@ -111,7 +112,7 @@ pub struct ModelUse {
     pub blend: Blend,
     /// Isolation of the model from the host process.
     pub isolation: Isolation,
-    /// Timing of an asynchronous model, whose local linear model the loop evaluates; `None`: the loop steps the model itself.
+    /// Timing of an asynchronous model, whose contacts or local linear model the loop evaluates; `None`: the loop steps the model.
     pub field: Option<FieldTiming>,
     /// Time limit of a step, s; `None`: half a period on the real clock, no limit on the virtual clock.
     pub budget_s: Option<f64>,
@@ -315,15 +316,21 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
     Ok(on.into_iter().map(on_device).collect())
 }
 
-/// Reads the timing of an asynchronous model.
+/// Reads timing and limits of an asynchronous model.
 fn field(mut section: Section<'_>) -> Result<FieldTiming, SceneError> {
     let rate_hz = section.require("rate_hz")?.number(1.0..=10_000.0)?;
     let period_s = 1.0 / rate_hz;
     let latency_s =
         section.number("latency_ms", 0.0..=period_s * 1.0e3)?.map(|milliseconds| milliseconds * 1.0e-3);
+    let known = ContactLimits::UNKNOWN;
+    let contacts = ContactLimits {
+        cap: section.read("cap", Value::truth)?.unwrap_or(true).then_some(StiffnessCap::UNKNOWN),
+        surface_power_w: section.number_or("surface_power_w", 1.0e-6..=100.0, known.surface_power_w)?,
+        ..known
+    };
     section.finish()?;
     // Default: the model needs its whole period.
-    Ok(FieldTiming { rate_hz, latency_s: latency_s.unwrap_or(period_s) })
+    Ok(FieldTiming { rate_hz, latency_s: latency_s.unwrap_or(period_s), contacts })
 }
 
 fn blend(mut section: Section<'_>) -> Result<Blend, SceneError> {

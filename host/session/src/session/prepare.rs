@@ -161,6 +161,7 @@ pub(super) fn prepare_model_while(
     report.signals_taken = signals.put_back();
     report.estimates = estimates;
     report.isolation = Some(isolation);
+    report.field = model.field;
     Ok((layer, report))
 }
 
@@ -174,7 +175,11 @@ pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
         if model.isolation == Isolation::ByOrigin && (clock == Clock::Virtual || is_simulated) {
             model.isolation = Isolation::None;
         }
-        model.latency_s = device.map_or(0.0, |device| device.capabilities.latency_s);
+        let Some(Opened { capabilities, .. }) = device else { continue };
+        model.latency_s = capabilities.latency_s;
+        if let Some(field) = &mut model.field {
+            field.contacts = field.contacts.on(capabilities, &scene.limits, 1.0 / scene.rate_hz);
+        }
     }
     scene
 }
@@ -242,7 +247,8 @@ impl ModelBuilder {
         let budget_ns = budget_ns(model, *clock, config.period_ns);
         let mapping = Mapping::new(&model.mapping);
         let instance = |place_m: &[f64; 3]| {
-            let (mut engine, mapping) = (self.engine(budget_ns, progress)?, mapping.at(*place_m));
+            let mapping = mapping.at(*place_m);
+            let mut engine = self.engine(&mapping, budget_ns, progress)?;
             if pushes_at_home(&engine.workspace_bounds(), &mapping) {
                 let problem = format!(
                     "at {} mm the workspace limits of the model exclude the home of its device, and the wall at these \
@@ -273,7 +279,12 @@ impl ModelBuilder {
     }
 
     /// Creates and prepares one instance: in the loop, in a worker, or asynchronous.
-    fn engine(&self, budget_ns: Option<u64>, progress: &Progress) -> Result<Engine, RunError> {
+    fn engine(
+        &self,
+        mapping: &Mapping,
+        budget_ns: Option<u64>,
+        progress: &Progress,
+    ) -> Result<Engine, RunError> {
         let Self { isolation, plugin, settings, model, config, clock } = self;
         let no = |refusal| RunError::refused(plugin.metadata(), refusal);
         progress.enter(&model.name, Call::Create);
@@ -300,13 +311,13 @@ impl ModelBuilder {
             engine.prepare(config).map_err(no)?;
             return Ok(engine);
         };
-        if !engine.has_linear_field() {
-            let problem =
-                "the plugin has no local linear model; remove `[model.field]` to run it in the loop";
+        if !engine.has_local_model() {
+            let problem = "the plugin has no contacts and no local linear model; remove `[model.field]` to run it in the loop";
             return Err(complain(model, problem).into());
         }
         progress.enter(&model.name, Call::Prepare);
-        let slow = AsynchronousModel::start(engine, plugin.parameters().len(), timing, config, *clock);
+        let parameters = plugin.parameters().len();
+        let slow = AsynchronousModel::start(engine, parameters, (timing, mapping), config, *clock);
         Ok(Engine::Asynchronous(Box::new(slow.map_err(no)?)))
     }
 }
@@ -374,6 +385,7 @@ fn report(
         latency_s: 0.0,
         at_hand: Demand::WRENCH,
         isolation: None,
+        field: None,
         signals_taken: TakenSignals::default(),
         estimates: Vec::new(),
     }

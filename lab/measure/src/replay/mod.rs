@@ -19,6 +19,7 @@ use divergence::Evidence;
 use files::as_recorded;
 use flotor_core::coupling::{CouplingDescription, CouplingEnds};
 use flotor_core::grip::GripRecord;
+use flotor_core::health::ModelHealth;
 use flotor_core::plausibility::{ImplausibleSamples, PlausibilityCheck};
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs, period_ns};
@@ -26,7 +27,7 @@ use flotor_coupling::{LinkTimeouts, Reach};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{Axes, Capabilities, Demand, DeviceState, LoopConfig, Tick};
 use flotor_record::{Ending, Recording, Role, RunDescription};
-use flotor_servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
+use flotor_servo::{Clock, Coupled, Forces, Heartbeat, Port, Replacement};
 use flotor_session::program;
 use flotor_session::registry::Registry;
 use flotor_session::scene::{

@@ -9,7 +9,7 @@ use crate::last_stop::ignore_no_signal;
 use crate::platform::processes::HostProcess;
 use flotor_core::grip::GripRecord;
 use flotor_hal::abi::{CallStatus, PluginKind};
-use flotor_hal::{LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind};
+use flotor_hal::{ContactSet, LoopConfig, Memory, Output, Refusal, RefusalKind};
 use flotor_loader::{LoadError, Model, Plugin, Setting};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -57,8 +57,8 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
             put_extent(&mut model, &memory);
             let serves = DEMANDS.map(|demand| model.serves().contains(demand));
             let remembers = model.memory() == Memory::PathDependent;
-            let has_field = model.has_linear_field();
-            (Greeting::Ready { parameters, serves, remembers, has_field }, Some(model))
+            let has_local_model = model.has_local_model();
+            (Greeting::Ready { parameters, serves, remembers, has_local_model }, Some(model))
         }
         Err(refusal) => (Greeting::Refused { kind: refusal.kind as u32, reason: refusal.reason }, None),
     };
@@ -101,10 +101,10 @@ fn execute(model: &mut Model, memory: &SharedMemory) -> CallStatus {
             put_extent(model, memory);
             status
         }
-        Some(Operation::Field) => {
-            let mut field = LinearField::NONE;
-            let status = model.linear_field(&memory.input(), &mut field);
-            memory.put_field(&field);
+        Some(Operation::LocalModel) => {
+            let mut set = ContactSet::NONE;
+            let status = model.local_model(&memory.input(), &mut set);
+            memory.put_contact_set(&set);
             status
         }
         Some(Operation::Reset) => model.reset(),
