@@ -73,6 +73,12 @@ impl Shape {
         }
     }
 
+    /// Returns the place on the face that a point outside faces; on a cube on the plane of that face. Real-time: bounded, no
+    /// allocation.
+    pub fn facing(&self, outside_m: DVec3) -> Place {
+        self.nearest(outside_m, self.entry(outside_m, self.centre_m()).normal)
+    }
+
     /// Slides a proxy on the surface towards the place nearest to the handle, as far as Coulomb's friction requires:
     /// until the tangential spring force is at most `mu` times the normal force, `K |t| <= mu F_n`. The energy that the
     /// spring loses is dissipated. Real-time: bounded, no allocation.
