@@ -12,7 +12,7 @@ use flotor_core::grip_guard::GripGuard;
 use flotor_core::limits::Limits;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::extension::linear_field::LinearField;
-use flotor_hal::{GripKind, GripState, Input, Mutability, Output, Parameter, Pose, Wrench};
+use flotor_hal::{ContactSet, GripKind, GripState, Input, Mutability, Output, Parameter, Pose, Wrench};
 use flotor_loader::{Model, OpenedDevice};
 
 /// Number of steps of a model, and of ticks of a device.
@@ -110,6 +110,21 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
             if !effort.is_finite() {
                 return Err(format!("grip returned the effort {effort}"));
             }
+        }
+        if model.has_contact_set() {
+            let mut set = Box::new(ContactSet::NONE);
+            let answer = model.contact_set(&input, &mut set);
+            works(model, "contact-set")?;
+            if answer != CallStatus::Ok || !set.bilateral().is_finite() {
+                return Err(format!(
+                    "contact-set returned `{}`; its bilateral part: {}",
+                    wording::status(answer),
+                    wording::linear_field(&set.bilateral())
+                ));
+            }
+            // Any period: how long a set is valid does not make it right or wrong.
+            flotor_contact::ContactSet::published(&set, 1.0)
+                .map_err(|error| format!("contact-set: {error}"))?;
         }
         let drawn = model.centerline().map(|mut line| (line.info(), line.points(&input, POINTS)));
         works(model, "centerline")?;
