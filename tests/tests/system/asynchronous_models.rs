@@ -187,3 +187,47 @@ fn the_scene_of_the_book_is_read() {
     let scene = Scene::load(&workspace_root().join("host/scenes/membrane-200hz.toml")).expect("it is right");
     assert_eq!(scene.models[0].field.map(|field| (field.rate_hz, field.latency_s)), Some((200.0, 0.005)));
 }
+
+/// A hand that swings through the surface of a wall computed at 200 Hz.
+fn wall(model: &str) -> String {
+    format!(
+        "duration_s = 1\n[device]\nplugin = \"simulated\"\n[device.parameters]\nhand = \"oscillate\"\nhand_centre_mm = 0\n\
+         hand_amplitude_mm = 1.5\nhand_frequency_hz = 3\n[[model]]\nplugin = \"wall\"\n{model}[model.field]\nrate_hz = 200\n"
+    )
+}
+
+#[test]
+fn contacts_of_a_process_of_its_own_have_the_same_bits() {
+    let forces = |scene: &str| -> Vec<_> {
+        watch(scene).records.iter().map(|record| record.model.force().to_array().map(f64::to_bits)).collect()
+    };
+    let here = forces(&wall(""));
+    assert!(here.iter().any(|force| force[2] != 0));
+    assert_eq!(here, forces(&wall("isolation = \"process\"\n")));
+}
+
+#[test]
+fn contacts_replay_to_the_bit_with_the_limits_of_their_device() {
+    let scratch = Scratch::default();
+    let scene = scratch.file("scene.toml", wall("[model.parameters]\ndamping_ns_per_m = 1\n"));
+    let (scene, recording) =
+        (scene.display().to_string(), scratch.path().join("run.mcap").display().to_string());
+    let ran = Flotor::with(["run", &scene, "--clock", "virtual", "--record", &recording]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    // 2000 N/m with 1 N s/m are 4 times what half a period allows: half of b / 2 over 0.5 ms.
+    let told = format!("{}{}", ran.stdout, ran.stderr);
+    assert!(told.contains("the contacts of `wall` have 500 N/m instead of 2000"), "{told}");
+    let ran = Flotor::with(["replay", &recording, "--json", "-"]).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let report: Value = serde_json::from_str(&ran.stdout).expect("the summary is JSON");
+    assert_eq!(report["bit_exact"], Value::from(true), "{report}");
+}
+
+#[test]
+fn a_scene_switches_the_cap_off() {
+    let damped = wall("[model.parameters]\ndamping_ns_per_m = 1\n");
+    let told = |scene: &str| watch(scene).outcome.warnings.join("\n");
+    assert!(told(&damped).contains("have 500 N/m instead of 2000"));
+    assert!(!told(&format!("{damped}cap = false\n")).contains("instead of 2000"));
+    assert!(told(&wall("")).contains("have no damping up to 2000 N/m"));
+}
