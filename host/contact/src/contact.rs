@@ -173,7 +173,6 @@ impl ContactSet {
     }
 
     /// Returns the pose of the tool for which the set was computed. Real-time: bounded, no allocation.
-    #[must_use]
     pub fn anchor(&self) -> &Pose {
         &self.anchor
     }
