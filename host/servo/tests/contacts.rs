@@ -5,8 +5,8 @@ use flotor_core::health::ModelHealth;
 use flotor_core::limits::{Boundary, Limits};
 use flotor_core::mapping::{Blend, Mapping, MappingConfig};
 use flotor_core::trace::{Events, TickRecord};
-use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Capabilities, LoopConfig, SampledLoop};
+use flotor_loader::{Plugin, Setting};
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::{
     Clock, Engine, Envelope, Forces, Guarded, Layer, Loop, ParameterQueue, RunConfig, Schedule, Standby,
