@@ -33,8 +33,17 @@ pub trait Restorable {
 
 /// Implements [`Restorable`] for a struct: `restorable!(Seat { tilt_rad, hold } without { radius_m })` lists the fields
 /// of the state, then all others. A struct with type or constant parameters: `restorable!([const N: usize] Shape<N> { .. })`.
+/// An enum without data: `restorable!(Branch = Unbuckled | Buckled)`, with all its variants.
 #[macro_export]
 macro_rules! restorable {
+    ($name:ident = $($variant:ident)|+) => {
+        impl $crate::Restorable for $name {
+            fn pass(&mut self, bytes: &mut $crate::StateBytes<'_>) {
+                match self { $(Self::$variant => {})+ } // a missing variant is a compile error
+                bytes.choice(self, &[$(Self::$variant),+]);
+            }
+        }
+    };
     ([$($generics:tt)*] $name:ty { $($field:ident),* $(,)? } $(without { $($other:ident),* $(,)? })?) => {
         impl<$($generics)*> $crate::Restorable for $name {
             fn pass(&mut self, bytes: &mut $crate::StateBytes<'_>) {

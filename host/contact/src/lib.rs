@@ -104,6 +104,7 @@
 mod cap;
 mod contact;
 mod coupling;
+mod cross_fade;
 mod law;
 mod linear;
 mod newton;
@@ -114,6 +115,7 @@ mod solver;
 
 pub use contact::{Contact, ContactSet, ContactSetError, Fault, Validity};
 pub use coupling::{Coupling, Limits, NotPositive};
+pub use cross_fade::CrossFade;
 pub use published::{FeltStiffness, PublishedContacts, Shortcoming, Touch};
 pub use replacement::Replacement;
 pub use solver::{Outcome, Solution, Solver};

@@ -46,7 +46,7 @@ pub use forces::{Coupled, CouplingOutcome, Forces, Port};
 pub use heartbeat::{Heartbeat, Place, Stuck};
 pub use hot_swap::{HostSwaps, LoopSwaps, swap_queues};
 pub use last_stop::{LastStop, Unwound};
-pub use models::{Layer, LayerReport, Replacement, pushes_at_home};
+pub use models::{Layer, LayerReport, Replacement};
 pub use parameters::{
     ChangeReport, ChangeSender, PLUGIN, Pace, ParameterChange, ParameterQueue, ReportReceiver,
     ScheduledChange, WEIGHT,

@@ -44,7 +44,7 @@ pub struct Solid {
 }
 
 restorable!(Solid { friction, depth_m, contacts } without {
-    law, mesh_error, youngs_modulus_pa, parameters, description, mesh, drawing, nothing
+    law, mesh_error, parameters, description, mesh, drawing, nothing
 });
 
 /// Maximum size of a mesh file, bytes: beyond any body that can be solved for.

@@ -18,7 +18,7 @@
 //! such poses and no history.
 
 use flotor_hal::glam::DVec3;
-use flotor_hal::{Restorable, StateBytes, restorable};
+use flotor_hal::restorable;
 use pulp::NullaryFnOnce;
 
 use crate::contract;
@@ -54,9 +54,8 @@ pub struct RodBlend {
     marked: (f64, Follows),
 }
 
-restorable!(RodBlend { rod, share, follows, marked } without {
-    energy, remainder, shares, spring, tolerance_n
-});
+restorable!(RodBlend { rod, share, follows, marked }
+    without { energy, remainder, shares, spring, tolerance_n });
 
 /// Origin of the rod's equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,11 +66,7 @@ enum Follows {
     LastTick,
 }
 
-impl Restorable for Follows {
-    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
-        bytes.choice(self, &[Self::Pose, Self::LastTick]);
-    }
-}
+restorable!(Follows = Pose | LastTick);
 
 impl RodBlend {
     /// Prepares both laws for the default tolerance. Not real-time: the rod allocates.

@@ -29,7 +29,8 @@
 //! limit, found by rolling and sliding in turns. If a tick begins with the base pulled off the ground, the base gives way along
 //! the straight line to its hanging place, only as far as it needs to stand again; so the force has no step there.
 //!
-//! `base` has the pose of the base and the load on it; [`flotor_lanes::tipped`] finds the tilt of least energy; `friction` has the friction limit.
+//! `base` has the pose of the base and the load on it; [`flotor_lanes::tipped`] finds the tilt of least energy; `friction` has the
+//! friction limit.
 //!
 //! Derivation: the book, chapter "The spring"; the step with a tip is the proximal Newton step of Lee, Sun
 //! and Saunders (2014); one bound for force and torque of friction: Howe and Cutkosky (1996), a limit surface.

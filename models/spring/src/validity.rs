@@ -1,7 +1,5 @@
 //! Validity of a law's response at a pose.
 
-use flotor_hal::{Restorable, StateBytes};
-
 /// Validity of one evaluation of a law. The wrench is finite in every case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[must_use]
@@ -20,12 +18,7 @@ pub enum Validity {
     InvalidInput,
 }
 
-impl Restorable for Validity {
-    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
-        use Validity::{Clamped, InvalidInput, NotConverged, Ok, OutOfDomain};
-        bytes.choice(self, &[Ok, Clamped, NotConverged, OutOfDomain, InvalidInput]);
-    }
-}
+flotor_hal::restorable!(Validity = Ok | Clamped | NotConverged | OutOfDomain | InvalidInput);
 
 impl Validity {
     /// Returns true if the wrench is the response of the spring: accurate, of a shape in motion, or beyond the accurate range.

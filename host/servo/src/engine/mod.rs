@@ -2,7 +2,6 @@
 
 pub mod asynchronous;
 pub mod process;
-mod records;
 mod stepped;
 
 pub use stepped::Stepped;

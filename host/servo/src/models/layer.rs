@@ -1,11 +1,11 @@
 //! One force model with all its instances: the unit that is blended, faded and replaced.
 
 use super::broad_phase::{Bounds, BroadPhase};
-use super::end_wall::EndWall;
 use crate::budget::{Allowed, Answer, TimeBudget};
 use crate::engine::{Engine, Stepped};
 use flotor_contact::Shortcoming;
 use flotor_core::demand::TickDemand;
+use flotor_core::end_wall::EndWall;
 use flotor_core::grip::GripRecord;
 use flotor_core::health::ModelHealth;
 use flotor_core::mapping::{Blend, Mapping};

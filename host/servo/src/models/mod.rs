@@ -5,12 +5,10 @@
 //! without an object that can act at the handle, or with weight 0, is not stepped.
 
 mod broad_phase;
-mod end_wall;
 mod fade;
 mod layer;
 mod slot;
 
-pub use end_wall::pushes_at_home;
 pub(crate) use layer::{Contribution, StepContext};
 pub use layer::{Layer, LayerReport};
 pub(crate) use slot::Slot;

@@ -9,6 +9,7 @@ use crate::scene::{
     CalibrationUse, DeviceUse, Isolation, ModelUse, ParameterText, PluginUse, Scene, SceneError,
 };
 use flotor_core::demand::hand_demand;
+use flotor_core::end_wall::pushes_at_home;
 use flotor_core::limits::Bound;
 use flotor_core::mapping::Mapping;
 use flotor_core::to_ns;
@@ -21,7 +22,7 @@ use flotor_loader::{Metadata, OpenedDevice, Plugin, Setting};
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerConfig};
 use flotor_servo::last_stop::{SignalGuard, TakenSignals};
-use flotor_servo::{Clock, Engine, Layer, TimeBudget, pushes_at_home};
+use flotor_servo::{Clock, Engine, Layer, TimeBudget};
 use std::borrow::Cow;
 use std::time::Duration;
 

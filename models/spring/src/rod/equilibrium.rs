@@ -118,9 +118,8 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     work: Work,
 }
 
-restorable!([const K: usize, const N: usize, const Q: usize] Equilibrium<K, N, Q> {
-    shape, history, marked, matrix, damping, unstable_directions
-} without { functional, effort, stride, work });
+restorable!([const K: usize, const N: usize, const Q: usize] Equilibrium<K, N, Q>
+    { shape, history, marked, matrix, damping, unstable_directions } without { functional, effort, stride, work });
 
 /// Cost of a tick: numbers of evaluations of the rod's energy, of matrices computed, and of factorisations.
 /// Reproducible in tests, unlike the time.
@@ -173,9 +172,8 @@ struct CachedMatrix<const N: usize> {
     steps_left: u32,
 }
 
-restorable!([const N: usize] CachedMatrix<N> {
-    factored, reaction, shape, plate, touching, softest, neutral, steps_left
-});
+restorable!([const N: usize] CachedMatrix<N>
+    { factored, reaction, shape, plate, touching, softest, neutral, steps_left });
 
 impl<const N: usize> CachedMatrix<N> {
     /// Returns a placeholder that is valid for no step.

@@ -12,14 +12,12 @@
 //! and each answer is delayed by the latency in the scene: all runs are identical, bit for bit.
 
 mod contacts;
-mod cross_fade;
 mod source;
 mod thread;
 
 use crate::{Clock, Engine, Stepped};
 use contacts::contacts;
-use cross_fade::CrossFade;
-use flotor_contact::{ContactSetError, FeltStiffness, PublishedContacts};
+use flotor_contact::{ContactSetError, CrossFade, FeltStiffness, PublishedContacts};
 use flotor_core::asynchronous::FieldTiming;
 use flotor_core::mapping::Mapping;
 use flotor_core::{period_ns, to_ns};

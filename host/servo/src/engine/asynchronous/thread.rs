@@ -3,8 +3,8 @@
 //! Loop and thread share two latest-value cells, a queue of commands and two flags; neither waits for the other.
 
 use super::source::Source;
-use crate::engine::records::{INPUT_WORDS, SentInput, SentSet};
 use crate::{Engine, Stepped, THREAD_ADVICE, enter_worker_priority};
+use flotor_core::sent::{INPUT_WORDS, SentInput, SentSet};
 use flotor_core::words::CONTACT_SET_WORDS;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{ContactSet, Input, Pose, Refusal};

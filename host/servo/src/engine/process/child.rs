@@ -3,11 +3,11 @@
 use super::Greeting;
 use super::memory::{MESSAGE_BYTES, SharedMemory};
 use super::shared_words::{Operation, wait_for_change};
-use crate::engine::records::DEMANDS;
 use crate::enter_worker_priority;
 use crate::last_stop::ignore_no_signal;
 use crate::platform::processes::HostProcess;
 use flotor_core::grip::GripRecord;
+use flotor_core::sent::DEMANDS;
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{ContactSet, LoopConfig, Memory, Output, Refusal, RefusalKind};
 use flotor_loader::{LoadError, Model, Plugin, Setting};

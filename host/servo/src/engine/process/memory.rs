@@ -2,9 +2,9 @@
 //!
 //! All fields are atomics, and every bit pattern is a valid value: neither process can make the other read invalid data.
 
-use crate::engine::records::INPUT_WORDS;
 pub(super) use crate::platform::shared_memory::{SharedMemory, create_file};
 use flotor_core::grip::GRIP_WORDS;
+use flotor_core::sent::INPUT_WORDS;
 use flotor_core::words::CONTACT_SET_WORDS;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64};
 

@@ -4,12 +4,12 @@ use super::Greeting;
 use super::child::WHOLE;
 use super::memory::{SharedMemory, create_file};
 use super::shared_words::{Operation, wait_for_change};
-use crate::engine::records::demand_of;
 use crate::engine::stepped::Stepped;
 use crate::platform::{process_group, processes};
 use crate::{THREAD_ADVICE, monotonic_ns};
 use flotor_core::grip::GripRecord;
 use flotor_core::lock;
+use flotor_core::sent::demand_of;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
     ActiveRegion, ContactSet, Demand, Input, LoopConfig, Memory, Output, Refusal, RefusalKind,

@@ -1,10 +1,10 @@
 //! Encoding of requests and replies in shared memory.
 
 use super::memory::SharedPage;
-use crate::engine::records::{SentInput, SentSet};
 pub(super) use crate::platform::shared_memory::wait_for_change;
 use crate::platform::shared_memory::wake;
 use flotor_core::grip::{self, GripRecord};
+use flotor_core::sent::{SentInput, SentSet};
 use flotor_core::words::{Decoder, Encoder};
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{ActiveRegion, ContactSet, Input, Output, RegionShape, StepStatus, WorkspaceBounds, Wrench};

@@ -1,5 +1,5 @@
 use super::*;
-use flotor_core::mapping::MappingConfig;
+use crate::mapping::MappingConfig;
 use flotor_hal::DQuat;
 
 /// Ends a millimetre below home and nowhere else.

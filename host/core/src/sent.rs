@@ -1,26 +1,26 @@
 //! Inputs and contact sets as arrays of words, which two threads or two processes share.
 
-use flotor_core::words::{CONTACT_SET_WORDS, Decoder, Encoder, MOTION_WORDS};
+use crate::words::{CONTACT_SET_WORDS, Decoder, Encoder, MOTION_WORDS};
 use flotor_hal::{ContactSet, Demand, Input};
 use flotor_sync::Words;
 
 /// Number of words of an input: motion, time, period, tick, and one for buttons and demand.
-pub(super) const INPUT_WORDS: usize = MOTION_WORDS + 4;
+pub const INPUT_WORDS: usize = MOTION_WORDS + 4;
 
 /// Demands in the order of their bits in a record.
-pub(super) const DEMANDS: [Demand; 3] = [Demand::FORCE, Demand::TORQUE, Demand::ENERGY];
+pub const DEMANDS: [Demand; 3] = [Demand::FORCE, Demand::TORQUE, Demand::ENERGY];
 
 const NO_DEMAND: Demand = Demand::FORCE.limited_to(Demand::TORQUE);
 
 /// Returns the sum of the flagged demands; flags in the order of [`DEMANDS`].
-pub(super) fn demand_of(flags: [bool; 3]) -> Demand {
+pub fn demand_of(flags: [bool; 3]) -> Demand {
     let demands = DEMANDS.iter().zip(flags).filter_map(|(demand, flag)| flag.then_some(*demand));
     demands.fold(NO_DEMAND, Demand::with)
 }
 
 /// Input sent from one thread or process to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct SentInput(pub(super) Input);
+pub struct SentInput(pub Input);
 
 impl Words<INPUT_WORDS> for SentInput {
     #[inline]
@@ -44,7 +44,7 @@ impl Words<INPUT_WORDS> for SentInput {
 
 /// Contact set sent from one thread or process to another.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct SentSet(pub(super) ContactSet);
+pub struct SentSet(pub ContactSet);
 
 impl Words<CONTACT_SET_WORDS> for SentSet {
     #[inline]

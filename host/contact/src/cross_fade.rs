@@ -2,8 +2,9 @@
 
 use flotor_hal::{LinearField, Pose, Wrench};
 
-/// Newest field, the field before the newest, and the fade between both.
-pub(super) struct CrossFade {
+/// Bilateral part of published sets: newest field, the field before the newest, and the fade between both.
+#[derive(Clone, Copy, Debug)]
+pub struct CrossFade {
     old: LinearField,
     new: LinearField,
     /// Arrival of the new field, ns.
@@ -13,18 +14,19 @@ pub(super) struct CrossFade {
 
 impl CrossFade {
     /// Creates a cross-fade without force; each field fades in over `fade_ns`.
-    pub(super) fn new(fade_ns: u64) -> Self {
+    #[must_use]
+    pub fn new(fade_ns: u64) -> Self {
         Self { old: LinearField::NONE, new: LinearField::NONE, since_ns: 0, fade_ns }
     }
 
     /// Resets to no force. Real-time: bounded, no allocation.
-    pub(super) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         *self = Self::new(self.fade_ns);
     }
 
     /// Starts the fade to a new field. The old field is re-anchored at `pose` with the present wrench, so that the force does not
     /// jump even if the last fade is not over. Real-time: bounded, no allocation.
-    pub(super) fn take(&mut self, field: LinearField, pose: &Pose, now_ns: u64) {
+    pub fn take(&mut self, field: LinearField, pose: &Pose, now_ns: u64) {
         let share = self.share(now_ns);
         let (wrench, _) = self.at(pose, now_ns);
         let mut stiffness = self.old.stiffness;
@@ -47,7 +49,8 @@ impl CrossFade {
     }
 
     /// Returns the wrench at a pose, and true if the fields in use are valid at the pose. Real-time: bounded, no allocation.
-    pub(super) fn at(&self, pose: &Pose, now_ns: u64) -> (Wrench, bool) {
+    #[must_use]
+    pub fn at(&self, pose: &Pose, now_ns: u64) -> (Wrench, bool) {
         let share = self.share(now_ns);
         let (new, is_new_valid) = self.new.at(pose);
         if share >= 1.0 {
