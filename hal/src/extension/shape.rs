@@ -285,17 +285,20 @@ layout! {
 }
 
 impl ShapeView {
-    /// View of a shape without any part.
-    pub const EMPTY: Self = Self {
-        primitives: null(),
-        vertices: null(),
-        triangles: null(),
-        primitive_count: 0,
-        vertex_count: 0,
-        triangle_count: 0,
-        sides: Sides::Outer as u32,
-        field: ScalarField::NONE,
-    };
+    /// Returns the view of a shape without any part.
+    #[must_use]
+    pub const fn empty() -> Self {
+        Self {
+            primitives: null(),
+            vertices: null(),
+            triangles: null(),
+            primitive_count: 0,
+            vertex_count: 0,
+            triangle_count: 0,
+            sides: Sides::Outer as u32,
+            field: ScalarField::NONE,
+        }
+    }
 
     /// Returns the view of a shape, valid as long as the shape is not changed.
     fn of(shape: &Shape) -> Self {

@@ -18,7 +18,7 @@ impl Model {
     /// [`InvalidShape`]; for a model without a shape, [`InvalidShape::Failed`].
     pub fn shape(&mut self, input: &Input) -> Result<Shape, InvalidShape> {
         let ask = self.extensions.shape.and_then(|table| table.shape).ok_or(InvalidShape::Failed)?;
-        let mut view = ShapeView::EMPTY;
+        let mut view = ShapeView::empty();
         // SAFETY: a live instance used by this thread only (`&mut`), pointers valid for the call.
         let code = self.calls.call(|instance| unsafe { ask(instance, input, &raw mut view) });
         if code != CallStatus::Ok as u32 {
