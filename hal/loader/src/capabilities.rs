@@ -252,7 +252,6 @@ mod tests {
     }
 
     /// Axes as a foreign plugin may write them.
-    #[allow(unsafe_code)]
     fn axes(bits: u32) -> Axes {
         // SAFETY: `Axes` is a `repr(C)` struct of one `u32` and valid for any bits.
         unsafe { std::mem::transmute::<u32, Axes>(bits) }

@@ -98,7 +98,6 @@ impl IndependentStop {
     }
 
     /// Builds the refusal of a declaration: "the independent stop of the device", then `problem`.
-    #[must_use]
     pub fn refusal(problem: &str) -> Refusal {
         Refusal::broken(format!("the independent stop of the device {problem}"))
     }

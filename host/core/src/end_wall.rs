@@ -2,6 +2,8 @@
 //!
 //! The wall is part of the model's contribution: wall and model fade together, yield together to a higher priority, and are removed
 //! together. The [boundary](crate::limits::Boundary) of the device acts as well; the handle meets the nearer of the two walls first.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
 use crate::mapping::Mapping;
 use flotor_hal::{DVec3, Damper, Pose, SampledLoop, Twist, WorkspaceBounds, Wrench};

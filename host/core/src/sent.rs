@@ -1,4 +1,6 @@
 //! Inputs and contact sets as arrays of words, which two threads or two processes share.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
 use crate::words::{CONTACT_SET_WORDS, Decoder, Encoder, MOTION_WORDS};
 use flotor_hal::{ContactSet, Demand, Input};
@@ -12,7 +14,7 @@ pub const DEMANDS: [Demand; 3] = [Demand::FORCE, Demand::TORQUE, Demand::ENERGY]
 
 const NO_DEMAND: Demand = Demand::FORCE.limited_to(Demand::TORQUE);
 
-/// Returns the sum of the flagged demands; flags in the order of [`DEMANDS`].
+/// Returns the sum of the flagged demands; flags in the order of [`DEMANDS`]. Real-time: bounded, no allocation.
 pub fn demand_of(flags: [bool; 3]) -> Demand {
     let demands = DEMANDS.iter().zip(flags).filter_map(|(demand, flag)| flag.then_some(*demand));
     demands.fold(NO_DEMAND, Demand::with)
