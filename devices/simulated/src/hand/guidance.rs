@@ -66,7 +66,8 @@ impl Restorable for Phase {
             Self::Releasing(follower, since_ns) => (2, follower, since_ns),
         };
         bytes.choice(&mut code, &[0, 1, 2]);
-        (follower.pass(bytes), since_ns.pass(bytes));
+        follower.pass(bytes);
+        since_ns.pass(bytes);
         *self = match code {
             0 => Self::Free,
             1 => Self::Guided(follower),
