@@ -348,7 +348,7 @@ fn a_state_of_other_settings_or_of_no_tick_is_refused_in_one_line() {
     let state = scratch.path().join("state.json").display().to_string();
     report(&recording, &["--save-state", &state, "--at-tick", "300"], exit_code::OK);
     let version = std::fs::read_to_string(&state).expect("it was written");
-    let other = scratch.file("other.json", &version.replacen("\"version\":\"", "\"version\":\"9", 1));
+    let other = scratch.file("other.json", version.replacen("\"version\":\"", "\"version\":\"9", 1));
     let other = other.display().to_string();
     let cases: [(&[&str], &str); 5] = [
         (
