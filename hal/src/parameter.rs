@@ -213,10 +213,18 @@ pub struct OutOfRange {
     pub value: f64,
 }
 
+impl OutOfRange {
+    /// Returns true if the number is in the range, so that only its fraction is illegal: the index of a choice. Not real-time.
+    #[must_use]
+    pub fn has_fraction(&self) -> bool {
+        (self.min..=self.max).contains(&self.value)
+    }
+}
+
 impl fmt::Display for OutOfRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { min, max, value } = self;
-        match (*min..=*max).contains(value) {
+        match self.has_fraction() {
             true => write!(f, "{value} is not a whole number from {min} to {max}"), // the index of a choice
             false => write!(f, "{value} is outside {min} to {max}"),
         }

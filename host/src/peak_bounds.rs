@@ -33,7 +33,8 @@ impl FromStr for PeakBound {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.split_once('=').and_then(|(key, value)| Some((key, value.parse().ok()?)));
+        let number = |value: &str| value.parse().ok().filter(|number: &f64| number.is_finite());
+        let parts = text.split_once('=').and_then(|(key, value)| Some((key, number(value)?)));
         let (peak, value_si) = match parts {
             Some(("peak_force_n", value)) => (Peak::Force, value),
             Some(("peak_torque_nm", value)) => (Peak::Torque, value),
@@ -151,8 +152,8 @@ mod tests {
             assert!(svg.contains(text), "{text}: {svg}");
         }
         assert_eq!(svg.matches("magnitude").count(), 2, "no torque: the heading and the description");
-        assert!(
-            "end=finished".parse::<PeakBound>().is_err() && "peak_force_n=x".parse::<PeakBound>().is_err()
-        );
+        for wrong in ["end=finished", "peak_force_n=x", "peak_force_n=nan", "peak_torque_nm=inf"] {
+            assert!(wrong.parse::<PeakBound>().is_err(), "{wrong}");
+        }
     }
 }

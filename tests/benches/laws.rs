@@ -65,7 +65,7 @@ fn batch<L: Law>(criterion: &mut Criterion, name: &str, law: &L, batch: &Batch, 
 /// The instruction sets of this machine, by name.
 fn batches() -> Vec<(&'static str, Batch)> {
     #[allow(unused_mut)] // other machines than x86-64 have nothing to add
-    let mut batches = vec![("best", Batch::new()), ("one-lane", Batch::on(pulp::Arch::Scalar))];
+    let mut batches = vec![("best", Batch::default()), ("one-lane", Batch::on(pulp::Arch::Scalar))];
     #[cfg(target_arch = "x86_64")]
     if let Some(avx2) = pulp::x86::V3::try_new() {
         batches.push(("avx2", Batch::on(pulp::Arch::V3(avx2))));

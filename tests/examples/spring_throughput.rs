@@ -45,7 +45,7 @@ fn batches() -> Vec<(&'static str, Batch)> {
         batches.extend(pulp::x86::V4::try_new().map(|avx512| ("AVX-512", Batch::on(pulp::Arch::V4(avx512)))));
     }
     #[cfg(not(target_arch = "x86_64"))]
-    batches.push(("best", Batch::new()));
+    batches.push(("best", Batch::default()));
     batches
 }
 

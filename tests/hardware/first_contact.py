@@ -134,7 +134,7 @@ class Laboratory:
         finally:
             self.lands()
             self.report.write()
-            print(f"\nThe answers are in {self.options.out}; please send them in.")
+            print(f"\nThe answers are in {self.options.out}; please attach the file to an issue of Flotor.")
 
     def looks(self):
         self.ask("1. Reading only: nothing moves.")
@@ -194,7 +194,7 @@ class Laboratory:
             self.report.say("statuses", take_off_in_a_fault=takeoff)
             time.sleep(0.5)
         else:
-            raise SystemExit("the controller stays faulted; the output file has the cause")
+            raise SystemExit(f"the controller stays faulted (faults {fault:#x}); end their cause, and start again")
         began = time.monotonic()
         status, _ = self.control.call(TAKE_OFF, timeout_s=PROCEDURE_TIMEOUT_S)
         self.report.say("take_off", status=status, seconds=round(time.monotonic() - began, 2), at=self.control.pose()[2])
@@ -211,7 +211,7 @@ class Laboratory:
         self.gravity = list(struct.unpack("<6f", results[:24]))
         self.report.say("gravity", status=status, seconds=round(time.monotonic() - began, 2), wrench=self.gravity)
         if not 1.0 < self.gravity[2] < 20.0:
-            raise SystemExit("the measured weight is not the weight of a flotor; stopped")
+            raise SystemExit(f"the measured weight, {self.gravity[2]:.2f} N, is not that of a flotor (1 N to 20 N); start again, and touch nothing in step 4")
         self.control.call(SET_GRAVITY, struct.pack("<6f", *self.gravity))
         self.report.say("gravity", defy_status=self.control.call(DEFY_GRAVITY)[0])
 
@@ -349,12 +349,12 @@ class Laboratory:
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("address", help="IPv4 address of the controller")
-    parser.add_argument("--port", type=int, default=5678)
-    parser.add_argument("--out", default="first-contact.toml", help="file for the results")
-    parser.add_argument("--force-limit", type=float, default=2.0, help="largest force beyond the weight, N (at most 5)")
-    parser.add_argument("--steps", type=int, default=9, help="number of steps to execute, of nine")
-    parser.add_argument("--yes", action="store_true", help="do not wait for Enter")
+    parser.add_argument("address", help="address or host name of the controller")
+    parser.add_argument("--port", type=int, default=5678, help="TCP port of the controller (default: %(default)s)")
+    parser.add_argument("--out", default="first-contact.toml", help="file for the results, which is overwritten (default: %(default)s)")
+    parser.add_argument("--force-limit", type=float, default=2.0, help="largest force beyond the weight, N, from 0 to 5 (default: %(default)s)")
+    parser.add_argument("--steps", type=int, default=9, help="number of steps to execute, from 1 to 9 (default: %(default)s)")
+    parser.add_argument("--yes", action="store_true", help="do not wait for Enter before each step")
     options = parser.parse_args()
     options.force_limit = max(0.0, min(5.0, options.force_limit))
     try:

@@ -86,7 +86,7 @@ def main(folder, sheets):
     found, pictures, wrong = renderers(), sorted(folder.glob("*.svg")), 0
     print(f"{len(pictures)} pictures, by {', '.join(found)}")
     if len(found) < 4 or not pictures:
-        sys.exit("needs four renderers and a picture")
+        sys.exit(f"{folder} needs an SVG file, and this machine four of the renderers")
     for picture in pictures:
         size, drawings = size_of(picture), {}
         with tempfile.TemporaryDirectory() as scratch:

@@ -116,7 +116,8 @@ fn library(model: &str) -> PathBuf {
 
 fn frame(criterion: &mut Criterion<ProcessorTime>) {
     let history = history();
-    let (palette, scale) = (Palette::of(Look::Dark), ArrowScale::fitting(history.samples()));
+    let (palette, scale) =
+        (Palette::of(Look::Dark), history.samples().fold(ArrowScale::default(), ArrowScale::with));
     for model in ["spring", "solid", "membrane"] {
         let (mut shapes, missing) = shapes_of(&run(model), &[library(model)]);
         assert!(missing.is_empty() && shapes.len() == 1, "{missing:?}");
@@ -204,7 +205,8 @@ fn whole_picture(criterion: &mut Criterion<ProcessorTime>) {
     let run = history();
     let (mut shapes, _) = shapes_of(run.run(), &[library("spring")]);
     let camera = Camera::experimenter(SceneBuilder::height_mm(&shapes));
-    let (palette, scale) = (Palette::of(Look::Dark), ArrowScale::fitting(run.samples()));
+    let (palette, scale) =
+        (Palette::of(Look::Dark), run.samples().fold(ArrowScale::default(), ArrowScale::with));
     let sample = run.at(0.2).expect("ten seconds");
     let mut builder = SceneBuilder::default();
     let (mesh, _) = builder.build(
@@ -276,7 +278,7 @@ fn scene_by_adapter(criterion: &mut Criterion) {
     let (history, palette) = (history(), Palette::of(Look::Dark));
     let (mut shapes, _) = shapes_of(history.run(), &[library("spring")]);
     let camera = Camera::experimenter(SceneBuilder::height_mm(&shapes));
-    let scale = ArrowScale::fitting(history.samples());
+    let scale = history.samples().fold(ArrowScale::default(), ArrowScale::with);
     let sample = *history.at(0.2).expect("ten seconds");
     let mut builder = SceneBuilder::default();
     let (mesh, _) =

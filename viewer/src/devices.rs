@@ -93,7 +93,7 @@ impl Devices {
     /// Returns a scale of arrows that fits all samples of all devices.
     pub fn scale(&self) -> ArrowScale {
         let scales = self.seen.iter().map(|seen| seen.event_counts.scale());
-        scales.reduce(ArrowScale::larger).unwrap_or_else(|| ArrowScale::fitting(std::iter::empty()))
+        scales.fold(ArrowScale::default(), ArrowScale::larger)
     }
 
     /// Returns the events in the newest ticks of all devices.

@@ -5,20 +5,13 @@ use flotor_core::trace::Events;
 use flotor_history::Sample;
 
 /// Counts of events since the first sample, and a scale of arrows for the largest wrench.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct EventCounts {
     counts: [u64; Events::NAMES.len()],
     scale: ArrowScale,
     since_s: Option<f64>,
     /// Number of dropped ticks.
     pub dropped: u64,
-}
-
-impl Default for EventCounts {
-    fn default() -> Self {
-        let scale = ArrowScale::fitting(std::iter::empty());
-        Self { counts: [0; Events::NAMES.len()], scale, since_s: None, dropped: 0 }
-    }
 }
 
 impl EventCounts {

@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum ExportError {
     /// The file cannot be written.
-    #[error("cannot write `{}`: {cause}; choose a folder you may write to", path.display())]
+    #[error("cannot write `{}`: {cause}; check the folder, its permissions and the free disk space", path.display())]
     Write {
         /// Path of the file.
         path: PathBuf,
@@ -150,18 +150,13 @@ pub fn svg(history: &History, device: Option<&str>, plots: &PlotStack) -> String
             .size_px(plots.export.size_px.map(|length| length / f64::from(SCALE)))
             .scale(f64::from(SCALE))
             .paper(paper);
-    let figure = plots.in_sight().iter().map(panel).fold(figure, Figure::panel);
-    match curve {
-        Some((axis, curve)) => figure.panel(force_position(&curve, plots.units, axis)),
-        None => figure,
-    }
-    .to_svg()
+    let beside = curve.map(|(axis, curve)| force_position(&curve, plots.units, axis));
+    plots.in_sight().iter().map(panel).chain(beside).fold(figure, Figure::panel).to_svg()
 }
 
 /// Marks faults and limits of the displayed time in a panel.
-fn with_events(history: &History, [from_s, to_s]: [f64; 2], panel: Panel) -> Panel {
+fn with_events(history: &History, [from_s, to_s]: [f64; 2], mut panel: Panel) -> Panel {
     let (mut limited, mut faults) = (Spans::default(), Events::NONE);
-    let mut panel = panel;
     for sample in history.between(from_s, to_s) {
         for (fault, name) in sample.events.named().filter(|(event, _)| Events::FAULTS.intersects(*event)) {
             if !faults.intersects(fault) {

@@ -1,5 +1,6 @@
 //! Data feed of a running host: a reading thread, and the data received since the last frame.
 
+use flotor_core::lock;
 use flotor_core::trace::TickRecord;
 use flotor_live::{
     Answer, Ask, ChangeMessage, Client, End, EndKind, Event, Greeting, LiveError, RequestClient,
@@ -8,7 +9,7 @@ use flotor_record::RunDescription;
 use std::collections::VecDeque;
 use std::io::ErrorKind;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Largest number of buffered ticks; beyond it the oldest are dropped, because a hidden window reads no ticks.
@@ -176,10 +177,6 @@ impl Waiting {
         }
         self.state == FeedState::Running
     }
-}
-
-fn lock(waiting: &Mutex<Waiting>) -> MutexGuard<'_, Waiting> {
-    flotor_core::lock(waiting)
 }
 
 /// Returns the decimation of ticks for pictures: at least a thousand ticks per second are read.

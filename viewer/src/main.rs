@@ -34,11 +34,11 @@ use std::sync::mpsc::channel;
 #[derive(Parser)]
 #[command(name = "flotor-viewer", version, about, max_term_width = 110)]
 struct Arguments {
-    /// Recording to show, and a second recording over the first, dashed (default: the newest running host)
+    /// Recording to show; in a window or its picture also a second recording over the first, dashed (default: the newest run)
     #[arg(value_name = "FILE.mcap", num_args = 0..=2)]
     recording: Vec<PathBuf>,
     /// File of a plugin, for drawing its model in a recording; without the file the model is not drawn (repeatable)
-    #[arg(long = "plugin", value_name = "PLUGIN.so")]
+    #[arg(long = "plugin", value_name = "PLUGIN")]
     plugins: Vec<PathBuf>,
     /// Write a picture instead of opening a window; needs no display and no GPU
     #[arg(long, value_name = "OUT.png", requires = "recording")]
@@ -55,8 +55,8 @@ struct Arguments {
     /// With --screenshot: draw the whole window with its panels (default: only the 3D view and the traces)
     #[arg(long, requires = "screenshot")]
     window: bool,
-    /// Direction of the view, degrees: -360 to 360 to the right of the front, -2 to 88 above the horizon; and a zoom, 0.2 to 3
-    /// (default: 31.5,13.8,1)
+    /// With --screenshot: direction of the view, degrees: -360 to 360 to the right of the front, -2 to 88 above the horizon; and a
+    /// zoom, 0.2 to 3 (default: 31.5,13.8,1)
     #[arg(long, value_name = "AZIMUTH,INCLINATION[,ZOOM]", allow_hyphen_values = true)]
     #[arg(requires = "screenshot", conflicts_with = "window")]
     view: Option<View>,
@@ -86,13 +86,13 @@ struct Arguments {
     /// Force of an arrow of full length, N; set this force for comparable pictures (default: the largest force of the run)
     #[arg(long, value_name = "NEWTONS", value_parser = arrow_force, conflicts_with_all = ["sitting", "export"])]
     arrow_force: Option<f64>,
-    /// Title of the file of traces (default: the title of the run)
+    /// With --export: title of the plot (default: the title of the scene)
     #[arg(long, value_name = "TEXT", requires = "export")]
     title: Option<String>,
-    /// Draw a screen of a sitting instead, from a line written by `flotor study --screen json`
+    /// With --screenshot: draw a screen of a sitting, as `flotor study --screen json` writes it
     #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view", "traces", "force_position", "device", "arrow_force"], value_parser = screen)]
     screen: Option<Screen>,
-    /// File with the texts of the screens in the language of the participant (default: English)
+    /// With --sitting or --screen: file (TOML) with the texts of the screens, in the language of the person (default: English)
     #[arg(long, value_name = "FILE", value_parser = texts)]
     texts: Option<Texts>,
     #[command(flatten)]
@@ -246,7 +246,8 @@ fn live(arguments: &Arguments) -> Result<Start, Failure> {
     if !arguments.sitting {
         return Ok(Start::Live(wanted));
     }
-    let mut prompt = connect_stdio().map_err(Failure::file)?;
+    let no_thread = |cause: std::io::Error| format!("cannot start a thread: {cause}; end other programs");
+    let mut prompt = connect_stdio().map_err(no_thread).map_err(Failure::file)?;
     prompt.stop_key = arguments.stop_key;
     prompt.texts = arguments.texts.clone().unwrap_or_else(Texts::english);
     Ok(Start::Sitting(wanted, Box::new(prompt)))

@@ -50,7 +50,7 @@ pub enum PictureError {
         known: Vec<String>,
     },
     /// The time is outside the recording.
-    #[error("{at_s} s is outside the recording; choose a time from {:.3} to {:.3} s", span_s[0], span_s[1])]
+    #[error("{at_s} s is outside the recording; choose a time from {:.4} to {:.4} s", span_s[0], span_s[1])]
     Moment {
         /// Requested time, s.
         at_s: f64,
@@ -61,7 +61,7 @@ pub enum PictureError {
     #[error(transparent)]
     TooLow(#[from] TooLow),
     /// The file cannot be written.
-    #[error("cannot write the picture `{}`: {cause}; name a file in a folder you may write to", path.display())]
+    #[error("cannot write the picture `{}`: {cause}; check the folder, its permissions and the free disk space", path.display())]
     Write {
         /// Path of the file.
         path: PathBuf,

@@ -23,16 +23,15 @@ pub struct ArrowScale {
     pub torque_nm: f64,
 }
 
-impl ArrowScale {
-    /// Returns the scale at which the largest force and torque of the samples have arrows of full length, with a lower limit for
-    /// samples with small forces and torques, or without samples.
-    pub fn fitting<'a>(samples: impl Iterator<Item = &'a Sample>) -> Self {
-        /// Smallest scale: smaller forces and torques have short arrows.
-        const LEAST: ArrowScale = ArrowScale { force_n: FULL_FORCE * 1.0e-3, torque_nm: 1.0e-5 };
-        samples.fold(LEAST, |scale, sample| scale.with(sample))
+impl Default for ArrowScale {
+    /// Returns the smallest scale: smaller forces and torques have short arrows.
+    fn default() -> Self {
+        Self { force_n: FULL_FORCE * 1.0e-3, torque_nm: 1.0e-5 }
     }
+}
 
-    /// Returns the scale enlarged to fit one more sample.
+impl ArrowScale {
+    /// Returns the scale enlarged to fit one more sample, whose force and torque then have arrows of full length at most.
     pub fn with(self, sample: &Sample) -> Self {
         Self {
             force_n: self.force_n.max(FULL_FORCE * sample.force_n().length()),
@@ -522,7 +521,7 @@ mod tests {
 
     fn build(builder: &mut SceneBuilder, sample: &Sample, shows_arrows: bool) -> Mesh {
         let (palette, camera) = (Palette::of(Look::Dark), Camera::experimenter(SceneBuilder::height_mm(&[])));
-        let scale = ArrowScale::fitting([sample].into_iter());
+        let scale = ArrowScale::default().with(sample);
         builder
             .build(&mut [], Moment::of(&[*sample]), &palette, &camera, 400.0, scale, shows_arrows)
             .0

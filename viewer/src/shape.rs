@@ -79,7 +79,9 @@ pub enum Posed {
 #[non_exhaustive]
 pub enum ShapeError {
     /// The plugin file of the model is unknown.
-    #[error("the plugin `{id}` of model `{name}` was not found; add its folder to FLOTOR_PLUGIN_PATH")]
+    #[error(
+        "the plugin `{id}` of model `{name}` was not found; add its folder to FLOTOR_PLUGIN_PATH (recording), or restore its file (running session)"
+    )]
     NoPlugin {
         /// Name of the model in the scene.
         name: String,
@@ -90,7 +92,7 @@ pub enum ShapeError {
     #[error(transparent)]
     Refused(#[from] LoadError),
     /// A recorded setting does not fit the plugin.
-    #[error("model `{name}`: {problem}; another version of the plugin made the recording: use that version")]
+    #[error("model `{name}`: {problem}; the run used another version of the plugin: use that version")]
     Setting {
         /// Name of the model in the scene.
         name: String,

@@ -30,8 +30,8 @@ pub enum WindowError {
     NoDisplay(String),
     /// There is no adapter for drawing.
     #[error(
-        "cannot open a window: {0}; install a driver for your GPU, or `libegl1 libgl1-mesa-dri` for drawing \
-         on the processor; without either, `flotor view --screenshot OUT.png FILE.mcap` draws a picture"
+        "cannot open a window: {0}; install a driver for your GPU, or (Debian, Ubuntu) `libegl1 libgl1-mesa-dri` \
+         for drawing on the processor; without either, `flotor view --screenshot OUT.png FILE.mcap` draws a picture"
     )]
     NoAdapter(String),
     /// The display or the adapter of an open window was lost.
@@ -48,8 +48,8 @@ pub struct WindowOptions {
     /// Light or dark (default: dark, with --export light; in a window: the look of the last window)
     #[arg(long, value_enum)]
     pub look: Option<Look>,
-    /// Width and height of picture or window, 64 to 8192 pixels each (default: 1280x800, with --export 1800x1000; in a window: the size of the last
-    /// window)
+    /// Width and height of picture or window, 64 to 8192 pixels each (default: 1280x800, with --export 1800x1000, higher if
+    /// the traces need it; in a window: the size of the last window)
     #[arg(long, value_parser = size, value_name = "WxH")]
     pub size: Option<[usize; 2]>,
     /// Size of text and lines, 1 to 3 (default: 1; in a window: the scale of the last window)

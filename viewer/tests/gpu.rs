@@ -90,7 +90,7 @@ fn an_adapter_and_the_processor_draw_the_same_scene() {
     for look in [Look::Dark, Look::Light] {
         let palette = Palette::of(look);
         let (camera, size) = (Camera::experimenter(SceneBuilder::height_mm(&shapes)), [641, 400]);
-        let (mut builder, scale) = (SceneBuilder::default(), ArrowScale::fitting([&sample].into_iter()));
+        let (mut builder, scale) = (SceneBuilder::default(), ArrowScale::default().with(&sample));
         let (mesh, _) =
             builder.build(&mut shapes, Moment::of(&[sample]), &palette, &camera, 400.0, scale, true);
         let view = View { camera: &camera, backdrop: palette.backdrop, size };

@@ -32,7 +32,7 @@ impl Clients {
     /// # Errors
     /// If the port cannot be set to non-blocking.
     pub fn of(port: Port) -> io::Result<Self> {
-        port.listener().set_nonblocking(true)?;
+        port.listener.set_nonblocking(true)?;
         Ok(Self { port, silent: Vec::new() })
     }
 
@@ -83,7 +83,7 @@ impl Clients {
     fn wait(&self, timeout: &Timespec) -> io::Result<Ready> {
         let streams = self.silent.iter().map(|(stream, _)| PollFd::new(stream, PollFlags::IN));
         let mut all: Vec<PollFd<'_>> = streams.collect();
-        all.push(PollFd::new(self.port.listener(), PollFlags::IN));
+        all.push(PollFd::new(&self.port.listener, PollFlags::IN));
         match poll(&mut all, Some(timeout)) {
             Ok(_) | Err(rustix::io::Errno::INTR) => {}
             Err(error) => return Err(error.into()),

@@ -16,19 +16,23 @@ pub fn arguments<T: Parser>() -> T {
     })
 }
 
-/// Parses the number of an option, from `least` to `most`; `unit` is for the error message.
+/// Returns the parser of an option whose number has these limits.
 ///
-/// # Errors
-/// A message: the text is no number, or the number is outside the limits.
-pub fn within(text: &str, least: f64, most: f64, unit: &str) -> Result<f64, String> {
-    let number: f64 = text
-        .trim()
-        .parse()
-        .map_err(|_| format!("`{text}` is not a number; write {least} to {most}, without the unit {unit}"))?;
-    if (least..=most).contains(&number) {
-        Ok(number)
-    } else {
-        Err(format!("must be {least} to {most} {unit}"))
+/// The parser returns a message if the text is no number, or the number is outside the limits.
+pub fn within(
+    least: f64,
+    most: f64,
+    unit: &'static str,
+) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync {
+    move |text: &str| {
+        let number: f64 = text.trim().parse().map_err(|_| {
+            format!("`{text}` is not a number; write {least} to {most}, without the unit {unit}")
+        })?;
+        if (least..=most).contains(&number) {
+            Ok(number)
+        } else {
+            Err(format!("must be {least} to {most} {unit}"))
+        }
     }
 }
 
@@ -49,10 +53,8 @@ pub fn warn(line: &str) {
 /// # Errors
 /// If the link cannot be replaced or created.
 pub fn link_to(target: &Path, link: &Path) -> Result<(), Box<dyn Error>> {
-    if link.is_symlink() {
-        std::fs::remove_file(link)?;
-    }
-    std::os::unix::fs::symlink(target, link).map_err(|error| {
+    let cleared = if link.is_symlink() { std::fs::remove_file(link) } else { Ok(()) };
+    cleared.and_then(|()| std::os::unix::fs::symlink(target, link)).map_err(|error| {
         let link = link.display();
         format!("cannot create the link {link}: {error}; name a new file in a folder you may write to").into()
     })
@@ -64,12 +66,12 @@ mod tests {
 
     #[test]
     fn numbers_beyond_their_limits_are_refused_with_them() {
-        assert_eq!(within(" 7 ", 0.1, 7.0, "mm"), Ok(7.0));
+        assert_eq!(within(0.1, 7.0, "mm")(" 7 "), Ok(7.0));
         for text in ["7.01", "0", "-1", "inf", "NaN"] {
-            assert_eq!(within(text, 0.1, 7.0, "mm"), Err("must be 0.1 to 7 mm".to_owned()), "{text}");
+            assert_eq!(within(0.1, 7.0, "mm")(text), Err("must be 0.1 to 7 mm".to_owned()), "{text}");
         }
         assert_eq!(
-            within("1 mm", 0.1, 7.0, "mm"),
+            within(0.1, 7.0, "mm")("1 mm"),
             Err("`1 mm` is not a number; write 0.1 to 7, without the unit mm".to_owned())
         );
     }

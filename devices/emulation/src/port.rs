@@ -11,7 +11,8 @@ use std::sync::Once;
 /// Command line options that admit programs of other users or machines.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ReachArguments {
-    /// TCP: allow connections of every user of this machine (default: only of your own user)
+    /// TCP: allow connections of every user of this machine (default: only of your own user and of root); no effect with
+    /// --allow-remote, which allows those of every user
     #[arg(long)]
     allow_users: bool,
     /// TCP: permit an address that other machines reach; every program that reaches the port can then command the device
@@ -46,7 +47,8 @@ pub enum Reach {
 /// Listening TCP port that admits the connections within its [`Reach`].
 #[derive(Debug)]
 pub struct Port {
-    listener: TcpListener,
+    /// Socket, for `poll`.
+    pub(crate) listener: TcpListener,
     reach: Reach,
 }
 
@@ -65,8 +67,7 @@ impl Port {
         if reach != Reach::AnyMachine && addresses.iter().any(|address| !address.ip().is_loopback()) {
             let problem = format!(
                 "{at} can be reached from other machines, and every program that reaches the address commands the \
-                 device; listen at 127.0.0.1, or \
-                 add --allow-remote"
+                 device; listen at 127.0.0.1, or add --allow-remote (in a scene with the model `ml-api`: `reach = \"any-machine\"`)"
             );
             return Err(io::Error::new(ErrorKind::InvalidInput, problem));
         }
@@ -103,15 +104,10 @@ impl Port {
             };
             REFUSAL.call_once(|| {
                 warn(&format!(
-                    "a connection was refused: {cause}; --allow-users permits connections of every user"
+                    "a connection was refused: {cause}; --allow-users (in a scene with the model `ml-api`: `reach = \"this-machine\"`) permits connections of every user"
                 ))
             });
         }
-    }
-
-    /// Returns the socket, for `poll`.
-    pub(crate) fn listener(&self) -> &TcpListener {
-        &self.listener
     }
 }
 

@@ -26,23 +26,17 @@ const LINE_BYTES: usize = 80;
 #[derive(Args, Clone, Debug)]
 pub struct RigArguments {
     /// Hold the handle in a calibration rig instead of a hand: a stand that moves down step by step, and a force sensor
-    /// at a serial port of this name
+    /// at a pseudo terminal; the path is of a symbolic link to the terminal
     #[arg(long, value_name = "PATH")]
     calibration_rig: Option<PathBuf>,
     /// Calibration rig: step of the stand, in mm, 0.1 to 7
-    #[arg(long, default_value_t = 1.0, value_name = "MM", requires = "calibration_rig", value_parser = step_mm)]
+    #[arg(long, default_value_t = 1.0, value_name = "MM", requires = "calibration_rig")]
+    #[arg(value_parser = within(0.1, TOP_MM, "mm"))]
     rig_step_mm: f64,
     /// Calibration rig: time at each step, in s, 0.1 to 600
-    #[arg(long, default_value_t = 1.0, value_name = "S", requires = "calibration_rig", value_parser = stop_s)]
+    #[arg(long, default_value_t = 1.0, value_name = "S", requires = "calibration_rig")]
+    #[arg(value_parser = within(0.1, 600.0, "s"))]
     rig_stop_s: f64,
-}
-
-fn step_mm(text: &str) -> Result<f64, String> {
-    within(text, 0.1, TOP_MM, "mm")
-}
-
-fn stop_s(text: &str) -> Result<f64, String> {
-    within(text, 0.1, 600.0, "s")
 }
 
 impl RigArguments {

@@ -9,7 +9,6 @@
 
 use crate::chip::{Chip, ChipLost, PACKET_BYTES, PAYLOAD_BYTES, Request, payload};
 use crate::protocol::{Command, Frames, Parsed, Report};
-use std::fmt;
 use std::time::{Duration, Instant};
 
 /// Baud rate divisor for the prompt: 9600 baud.
@@ -48,19 +47,44 @@ const QUIET: Duration = Duration::from_millis(20);
 const SETTLED: Duration = Duration::from_millis(500);
 
 /// Error at the start of a device.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BootFailure {
     /// The chip is gone.
+    #[error(
+        "the Falcon was unplugged, its hub was reset, or its emulator has ended; connect the \
+            Falcon without a hub, or start the emulator, and try again"
+    )]
     Lost,
     /// A packet without its two status bytes: the chip is no FTDI, or the link is broken.
+    #[error(
+        "the USB chip sends packets without the two bytes of its status; connect the Falcon without a hub, and try again"
+    )]
     ShortPacket,
     /// No firmware runs, and the user named no file.
+    #[error(
+        "the Falcon sends no reports, probably because it has no firmware after power-off; give your own firmware \
+         file with `firmware`: the file `nvent` is in libnifalcon's folder `firmware` and in the driver for Windows"
+    )]
     NoFirmware,
     /// The loader did not reply to the prompt.
+    #[error(
+        "the boot loader answered none of {PROMPTS} prompts; switch the Falcon off and on, and try again"
+    )]
     NoPrompt,
     /// The loader did not agree to receive a firmware: its reply, `None` on timeout.
+    #[error(
+        "the boot loader {}; switch the Falcon off and on, and try again",
+        .0.map_or_else(
+            || "did not accept the upload of a firmware".to_owned(),
+            |byte| format!("replied {byte:#04x} instead of {AGREED:#04x}")
+        )
+    )]
     NotAgreed(Option<u8>),
     /// The echo of a byte of the firmware differs.
+    #[error(
+        "byte {at} of the firmware, {sent:#04x}, came back as {came:#04x}; switch the Falcon off and on, \
+         connect the Falcon without a hub, and try again"
+    )]
     Echo {
         /// Index of the byte, from 0.
         at: usize,
@@ -70,65 +94,31 @@ pub enum BootFailure {
         came: u8,
     },
     /// A byte of the firmware had no echo.
+    #[error(
+        "byte {at} of the firmware did not come back; switch the Falcon off and on, connect the Falcon \
+         without a hub, and try again"
+    )]
     NoEcho {
         /// Index of the byte, from 0.
         at: usize,
     },
     /// The firmware was loaded but sends no report.
+    #[error(
+        "the Falcon received the firmware but sends no reports; switch the Falcon off and on, and check \
+         that `firmware` names a firmware of the Falcon"
+    )]
     NoReport,
     /// The device sends reports without a command, or more than one report for a command.
+    #[error(
+        "the Falcon sends reports without a command, so every report would be late; unplug the Falcon, plug \
+         it in again, and try again"
+    )]
     StaleReports,
 }
 
 impl From<ChipLost> for BootFailure {
     fn from(_: ChipLost) -> Self {
         Self::Lost
-    }
-}
-
-impl fmt::Display for BootFailure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Lost => f.write_str("the Falcon was unplugged, or its hub was reset; connect the Falcon without a \
-            hub, and try again"),
-            Self::ShortPacket => f.write_str(
-                "the USB chip sends packets without the two bytes of its status; connect the Falcon without a hub, and try again",
-            ),
-            Self::NoFirmware => f.write_str(
-                "the Falcon has no firmware after power-off; give your own firmware file with `firmware`: the file \
-                 `nvent` is in libnifalcon's folder `firmware` and in the driver for Windows",
-            ),
-            Self::NoPrompt => write!(
-                f,
-                "the boot loader answered none of {PROMPTS} prompts; switch the Falcon off and on, and try \
-                 again"
-            ),
-            Self::NotAgreed(None) => f.write_str(
-                "the boot loader did not accept the upload of a firmware; switch the Falcon off and on, and try again",
-            ),
-            Self::NotAgreed(Some(byte)) => write!(
-                f,
-                "the boot loader replied {byte:#04x} instead of {AGREED:#04x}; switch the Falcon off and on, and try again"
-            ),
-            Self::Echo { at, sent, came } => write!(
-                f,
-                "byte {at} of the firmware, {sent:#04x}, came back as {came:#04x}; switch the Falcon off and on, \
-                 connect the Falcon without a hub, and try again"
-            ),
-            Self::NoEcho { at } => write!(
-                f,
-                "byte {at} of the firmware did not come back; switch the Falcon off and on, connect the Falcon \
-                 without a hub, and try again"
-            ),
-            Self::NoReport => f.write_str(
-                "the Falcon received the firmware but sends no reports; switch the Falcon off and on, and check \
-                 that `firmware` names a firmware of the Falcon",
-            ),
-            Self::StaleReports => f.write_str(
-                "the Falcon sends reports without a command, so every report would be late; unplug the Falcon, plug \
-                 it in again, and try again",
-            ),
-        }
     }
 }
 
@@ -226,6 +216,23 @@ fn run(chip: &dyn Chip) -> Result<Report, BootFailure> {
     }
 }
 
+/// Prompts the boot loader until it replies.
+fn prompt(chip: &dyn Chip, line: &mut Line<'_>) -> Result<(), BootFailure> {
+    for _ in 0..PROMPTS {
+        chip.write(&PROMPT)?;
+        let mut answer = Vec::with_capacity(PROMPT_ANSWER.len() + 1);
+        while answer.len() <= PROMPT_ANSWER.len()
+            && let Some(byte) = line.next(ANSWER)?
+        {
+            answer.push(byte);
+            if answer.strip_prefix(&[0]).unwrap_or(&answer) == PROMPT_ANSWER {
+                return Ok(());
+            }
+        }
+    }
+    Err(BootFailure::NoPrompt)
+}
+
 /// Runs the handshake and loads the firmware.
 fn load(chip: &dyn Chip, firmware: &[u8]) -> Result<(), BootFailure> {
     chip.request(Request::Reset, 1)?;
@@ -238,26 +245,7 @@ fn load(chip: &dyn Chip, firmware: &[u8]) -> Result<(), BootFailure> {
         chip.request(Request::ModemLines, lines)?;
     }
     let mut line = Line::new(chip);
-    let mut has_answered = false;
-    for _ in 0..PROMPTS {
-        chip.write(&PROMPT)?;
-        let mut answer = Vec::with_capacity(PROMPT_ANSWER.len() + 1);
-        while answer.len() <= PROMPT_ANSWER.len()
-            && let Some(byte) = line.next(ANSWER)?
-        {
-            answer.push(byte);
-            has_answered = answer.strip_prefix(&[0]).unwrap_or(&answer) == PROMPT_ANSWER;
-            if has_answered {
-                break;
-            }
-        }
-        if has_answered {
-            break;
-        }
-    }
-    if !has_answered {
-        return Err(BootFailure::NoPrompt);
-    }
+    prompt(chip, &mut line)?;
     chip.request(Request::ModemLines, DTR_LOW)?;
     chip.request(Request::BaudRate, LOAD_DIVISOR)?;
     chip.write(&[AGREED])?;

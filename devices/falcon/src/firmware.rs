@@ -42,9 +42,10 @@ pub fn read(path: &str, expected: Option<&str>) -> Result<Vec<u8>, String> {
         return Ok(bytes);
     }
     Err(match expected {
+        _ if bytes.is_empty() => format!("firmware {path} is empty; set `firmware` to another file"),
         Some(expected) if expected.len() < LEAST_DIGITS => format!(
-            "`firmware_sha256` is {expected}, but must have {LEAST_DIGITS} or more digits; firmware {path} has the SHA-256 \
-             {digest}"
+            "`firmware_sha256` is {expected}, but must have {LEAST_DIGITS} or more hex digits; firmware {path} has the \
+             SHA-256 {digest}"
         ),
         Some(expected) => format!(
             "firmware {path} has the SHA-256 {digest}, but `firmware_sha256` is {expected}; set `firmware` to the file with \
@@ -87,7 +88,7 @@ mod tests {
         assert_eq!(read(&name, Some(known)), Ok(b"abc".to_vec()));
         for (expected, words) in [
             (None, "known firmware: nvent (8492 bytes"),
-            (Some("ba78"), "16 or more digits"),
+            (Some("ba78"), "16 or more hex digits"),
             (Some(&known[1..]), "give the first"),
         ] {
             let refused = read(&name, expected).expect_err("it is another");

@@ -40,7 +40,7 @@ const SCHEMA: &[Parameter] = &[
     ),
     Parameter::text(
         "firmware_sha256",
-        "First 16 or more digits of the SHA-256 of the firmware, to confirm a file that is not in the built-in list",
+        "First 16 or more hex digits of the SHA-256 of `firmware` (default: `firmware` must be in the built-in list)",
     ),
     Parameter::real("max_force_n", "N", 0.0, 20.0, 8.0, "Largest force on the hand"),
     Parameter::real(
@@ -142,7 +142,7 @@ impl Options {
             let connected = RemoteChip::connect(address);
             return connected.map(|chip| Arc::new(chip) as Arc<dyn Chip>).map_err(|error| {
                 Refusal::resource(format!(
-                    "no emulated Falcon at {address} ({error}); start one with `flotor emulate falcon`, which prints its address"
+                    "no emulated Falcon at {address} ({error}); start one with `flotor emulate falcon` (on Linux), which prints its address"
                 ))
             });
         }

@@ -118,11 +118,11 @@ impl Drop for UsbChip {
 fn refused(error: Error) -> String {
     match error {
         Error::NotFound => "no Falcon is plugged in (USB 0403:cb48); check cable and power. Without a Falcon, start \
-        the emulator with `flotor emulate falcon`, for `address = \"tcp:127.0.0.1:4108\"`"
+        the emulator with `flotor emulate falcon` (on Linux), for `address = \"tcp:127.0.0.1:4108\"`"
             .to_owned(),
-        Error::Access => format!("this user may not use the Falcon; {}", access_remedy(VENDOR, PRODUCT)),
+        Error::Access => format!("no access to the Falcon; {}", access_remedy(VENDOR, PRODUCT)),
         Error::Busy => "the Falcon is in use by another program; close that program first".to_owned(),
-        Error::NoDevice => "no Falcon has this serial number, or the Falcon was unplugged; set `address` to usb, or to usb: and a serial number"
+        Error::NoDevice => "no Falcon has the serial number in `address`, or the Falcon was unplugged; set `address` to usb, or to usb: and a serial number"
             .to_owned(),
         Error::Other if !has_bus() => "no USB bus can be reached here, as in most containers; start the container with `--device \
                                        /dev/bus/usb`. Without a Falcon, start the emulator with `flotor emulate falcon`"

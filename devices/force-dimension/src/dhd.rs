@@ -50,9 +50,9 @@ impl Failed {
     pub(crate) fn refusal(&self) -> Refusal {
         let remedy = match self.code {
             NO_DRIVER => {
-                "this user may not open the USB device: `flotor doctor --device force-dimension` prints the udev rule"
+                "no driver lets this user open the USB device: on Linux, `flotor doctor --device force-dimension` prints the udev rule; on Windows, install the driver of the SDK"
             }
-            NO_DEVICE => "connect the device and switch it on; `lsusb -d 1451:` lists the detected devices",
+            NO_DEVICE => "connect the device and switch it on; on Linux, `lsusb -d 1451:` lists it",
             IN_USE => "end the other program that uses the device",
             COM | TIMEOUT => "check cable, hub and power, and switch the device off and on",
             _ => "test the device with the maker's own programs first",
@@ -68,8 +68,8 @@ impl Failed {
 pub(crate) struct Dhd {
     functions: Box<Functions>,
     id: i8,
-    wrist: Wrist,
-    gripper: Gripper,
+    pub(crate) wrist: Wrist,
+    pub(crate) gripper: Gripper,
 }
 
 /// Gripper of a device: none, sensed, or sensed and driven.
@@ -117,7 +117,7 @@ impl Dhd {
                 }
                 Err(Refusal::resource(format!(
                     "no free device has the serial number {wanted} (serial numbers found: {}); correct \
-                     `serial`, or end the program that uses the device",
+                     `serial`, connect the device, or end the program that uses it; without `serial` the error of the first device is shown",
                     if found.is_empty() { "none".to_owned() } else { found.join(", ") }
                 )))
             }
@@ -167,14 +167,6 @@ impl Dhd {
         }
     }
 
-    pub(crate) fn wrist(&self) -> Wrist {
-        self.wrist
-    }
-
-    pub(crate) fn gripper(&self) -> Gripper {
-        self.gripper
-    }
-
     /// Returns whether the device is initialised, so that its positions are valid.
     pub(crate) fn is_initialized(&self) -> bool {
         let (code, status) = self.functions.status(self.id);
@@ -186,11 +178,11 @@ impl Dhd {
     pub(crate) fn initialize(&self) -> Result<(), Refusal> {
         let Some(code) = without_signals(|| self.functions.auto_init(self.id)) else {
             return Err(Refusal::resource(
-                "this library cannot initialise a device: name `libdrd.so.3` of the same SDK with `library`",
+                "this library cannot initialise a device: name libdrd.so.3 (on Windows drdms64.dll) of the same SDK with `library`",
             ));
         };
         let done = self.check(code, "the automatic initialisation").map_err(|failed| failed.refusal());
-        let stopped = self.check(self.functions.stop_regulation(self.id), "the end of the regulation");
+        let stopped = self.check(self.functions.stop_regulation(self.id), "ending the position control");
         done?;
         stopped.map(drop).map_err(|failed| failed.refusal())
     }
@@ -200,21 +192,21 @@ impl Dhd {
     pub(crate) fn energize(&self, setup: &Setup) -> Result<(), Failed> {
         let Self { functions, id, wrist, .. } = self;
         let [most_n, most_nm] = setup.most;
-        match self.check(functions.set_gravity_compensation(true, *id), "gravity compensation") {
+        match self.check(functions.set_gravity_compensation(true, *id), "enabling gravity compensation") {
             // Optional: some devices have none.
             Err(failed) if [NOT_AVAILABLE, NOT_IMPLEMENTED].contains(&failed.code) => {}
             done => drop(done?),
         }
-        self.check(functions.set_most_force(most_n, *id), "the limit of force")?;
-        self.check(functions.config_velocity(setup.window_ms, *id), "the velocity's window")?;
+        self.check(functions.set_most_force(most_n, *id), "setting the force limit")?;
+        self.check(functions.config_velocity(setup.window_ms, *id), "velocity estimation")?;
         if *wrist != Wrist::None {
-            self.check(functions.config_angular_velocity(setup.window_ms, *id), "the velocity's window")?;
+            self.check(functions.config_angular_velocity(setup.window_ms, *id), "velocity estimation")?;
         }
         if *wrist == Wrist::Driven {
-            self.check(functions.set_most_torque(most_nm, *id), "the limit of torque")?;
+            self.check(functions.set_most_torque(most_nm, *id), "setting the torque limit")?;
         }
-        self.check(functions.set_watchdog(setup.watchdog_units, *id), "the watchdog of the device")?;
-        self.check(functions.set_brakes(false, *id), "the brakes")?;
+        self.check(functions.set_watchdog(setup.watchdog_units, *id), "setting the watchdog of the device")?;
+        self.check(functions.set_brakes(false, *id), "releasing the brakes")?;
         self.check(functions.enable_force(true, *id), "enabling force")?;
         self.send(&Command::ZERO).map(drop)
     }

@@ -1,9 +1,8 @@
 //! Thread that polls the SDK: reads pose, velocity, grip and buttons, then sends the loop's command, a call that waits for the exchange.
 
 use crate::dhd::{Dhd, Failed, Given, Setup};
-use flotor_hal::{Conditions, Fault};
+use flotor_hal::{Conditions, Fault, Refusal};
 use flotor_vendor_sdk::{CommandCursor, Exchange, Sample, without_signals};
-use std::io;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -28,10 +27,10 @@ impl Driver {
         dhd: Dhd,
         setup: &Setup,
         exchange: &Arc<Exchange>,
-    ) -> Result<Self, (Option<Dhd>, Why)> {
+    ) -> Result<Self, (Option<Dhd>, Refusal)> {
         if let Err(failed) = dhd.energize(setup) {
             dhd.relax();
-            return Err((Some(dhd), Why::Failed(failed)));
+            return Err((Some(dhd), failed.refusal()));
         }
         let cursor = exchange.begin();
         let of_thread = Arc::clone(exchange);
@@ -39,7 +38,13 @@ impl Driver {
         let started = without_signals(|| thread.spawn(move || follow(dhd, &of_thread, cursor)));
         match started {
             Ok(thread) => Ok(Self { thread: Some(thread), exchange: Arc::clone(exchange) }),
-            Err(error) => Err((None, Why::NoThread(error))),
+            Err(error) => {
+                let reason = format!(
+                    "cannot start a thread for the device: {error}; end other programs of this user, or raise \
+                     the limit of its threads"
+                );
+                Err((None, Refusal::resource(reason)))
+            }
         }
     }
 
@@ -54,13 +59,6 @@ impl Drop for Driver {
     fn drop(&mut self) {
         drop(self.end());
     }
-}
-
-/// Reason why a device was not energised.
-#[derive(Debug)]
-pub(crate) enum Why {
-    Failed(Failed),
-    NoThread(io::Error),
 }
 
 fn follow(dhd: Dhd, exchange: &Exchange, mut cursor: CommandCursor) -> Dhd {

@@ -1,7 +1,7 @@
 //! Implementation of the device contract for Force Dimension's devices, with their parameters.
 
 use crate::dhd::{Dhd, Gripper, Setup, Which, Wrist};
-use crate::driver::{Driver, Why};
+use crate::driver::Driver;
 use crate::kind::{Kind, grip_axis, gripper_n};
 use flotor_hal::{
     ActiveDevice, ActiveGrip, Axes, Capabilities, Choices, ConnectionDevice, Cycle, Device, DeviceInfo,
@@ -27,7 +27,7 @@ const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "library",
         choices![],
-        "Library of the SDK, libdrd.so.3 (default: searched in $FDSDK and in the library folders of the system)",
+        "Library of the SDK: libdrd.so.3, on Windows drdms64.dll (default: searched in $FDSDK, $FORCEDIM_SDK, $FD_SDK_DIR, $ForceDimensionSDK_DIR, $LD_LIBRARY_PATH (on Windows $PATH) and the library folders of user and system)",
     ),
     STAND_IN,
     Parameter::real(
@@ -102,7 +102,7 @@ impl Device for ForceDimensionDevice {
                 dhd.name()
             )));
         }
-        let (wrist, gripper) = (dhd.wrist(), dhd.gripper());
+        let (wrist, gripper) = (dhd.wrist, dhd.gripper);
         let of_kind = Kind::of_number(dhd.kind());
         let told = |id: &str, own: f64| match settings.number_or_default(id) {
             0.0 => own,
@@ -175,7 +175,7 @@ impl Device for ForceDimensionDevice {
             return Err((
                 self,
                 Refusal::resource(
-                    "the thread of the device has ended and closed the device; open the device again",
+                    "the thread of the device has ended and closed the device; start the program again",
                 ),
             ));
         };
@@ -192,15 +192,8 @@ impl Device for ForceDimensionDevice {
                     .with_grip(gripper_n(self.gripper));
                 Ok(EnergizedDevice { opened: self, driver, end })
             }
-            Err((dhd, why)) => {
+            Err((dhd, refusal)) => {
                 self.dhd = dhd;
-                let refusal = match why {
-                    Why::Failed(failed) => failed.refusal(),
-                    Why::NoThread(error) => Refusal::resource(format!(
-                        "cannot start a thread for the device: {error}; end other programs of this user, or raise \
-                             the limit of its threads"
-                    )),
-                };
                 Err((self, refusal))
             }
         }

@@ -1,6 +1,7 @@
 //! Implementation of the device contract for the sensor: a device without axes, whose state contains a measured force.
 
 use crate::line::{LineLost, PollResult, SensorLine};
+use crate::protocol::PLAUSIBLE_N;
 use flotor_hal::{
     Capabilities, Cycle, DVec3, DeviceInfo, DeviceState, Fault, NothingToStop, Opened, Parameter, Refusal,
     Settings, Simple, SimpleDevice, Tick, Wrench, export_device,
@@ -44,8 +45,7 @@ impl ForceSensor {
                 PollResult::Malformed => {
                     let answer = self.line.last();
                     return Err(format!(
-                        "the force sensor at {port} answers `{answer}` instead of a force like `F 1.234`; \
-                         set `port` to the port of the force sensor"
+                        "the force sensor at {port} answers `{answer}` instead of a force like `F 1.234`, at most {PLAUSIBLE_N} N; remove the cause of a reported error, or set `port` to the port of the force sensor"
                     ));
                 }
                 PollResult::Nothing if self.line.silence() > self.timeout => {

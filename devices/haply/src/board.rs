@@ -55,7 +55,7 @@ impl Board {
     /// One sentence with the cause and the remedy.
     pub fn open(path: &str) -> Result<Self, String> {
         let port = Port::open(path, BAUD)
-            .map_err(|reason| format!("cannot open the board at {path}, the `port`: {reason}"))?;
+            .map_err(|reason| format!("cannot open the board at {path} (`port`): {reason}"))?;
         Ok(Self::on(port))
     }
 

@@ -138,7 +138,7 @@ impl SimpleDevice for HaplyDevice {
         let path = settings.text("port").ok_or_else(|| {
             Refusal::resource(format!(
                 "no `port` for the board; set the port, as in {PORT_EXAMPLE}; without hardware start the emulator \
-                 with `cargo run -p flotor-haply --example emulated_board`, which prints its port"
+                 with `cargo run -p flotor-haply --example emulated_board` (on Linux), which prints its port"
             ))
         })?;
         let board = Board::open(path).map_err(Refusal::resource)?;
@@ -224,8 +224,8 @@ impl HaplyDevice {
             Refusal::resource(match no_answer {
                 NoAnswer::Lost => "the port of the board was closed; check that the board is plugged in",
                 NoAnswer::Silent => {
-                    "no board of this device replies at this port; check that the board is switched on, and \
-                     that `port` is the port of the board"
+                    "no Haply board replies at `port`; check that the board is switched on, and that `port` is \
+                     the port of the board"
                 }
             })
         })?;

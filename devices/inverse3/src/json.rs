@@ -144,10 +144,8 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// If the value is no number.
     pub fn number(&mut self) -> Result<f64, Malformed> {
-        match self.scalar()? {
-            Scalar::Number(number) => Ok(number),
-            _ => Err(Malformed),
-        }
+        let Scalar::Number(number) = self.scalar()? else { return Err(Malformed) };
+        Ok(number)
     }
 
     /// Reads `true` or `false`.
@@ -155,10 +153,8 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// If the value is neither `true` nor `false`.
     pub fn flag(&mut self) -> Result<bool, Malformed> {
-        match self.scalar()? {
-            Scalar::Flag(flag) => Ok(flag),
-            _ => Err(Malformed),
-        }
+        let Scalar::Flag(flag) = self.scalar()? else { return Err(Malformed) };
+        Ok(flag)
     }
 
     /// Reads a scalar value.

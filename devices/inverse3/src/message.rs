@@ -159,7 +159,7 @@ pub fn configure(chosen: &Chosen, force_gate: f64) -> String {
     )
 }
 
-/// Returns path and value of the first setting of the arm that differs from its required value; `None` if all agree.
+/// Returns path and text of the first setting of the arm that differs from its required value; `None` if all agree.
 /// Not real-time.
 ///
 /// # Errors
@@ -186,7 +186,8 @@ pub fn differing(
         match element.at(path)? {
             Some(said) if said == *value => {}
             None if *presence == Presence::Optional => {}
-            said => return Ok(Some((path, said.map_or("nothing".to_owned(), |said| said.to_string())))),
+            None => return Ok(Some((path, format!("missing, not {value}")))),
+            Some(said) => return Ok(Some((path, format!("{said}, not {value}")))),
         }
     }
     Ok(None)

@@ -32,7 +32,7 @@ const STOP_NS: u64 = 100_000_000;
 const SCHEMA: &[Parameter] = &[
     Parameter::text("address", "Address of the Inverse Service (default: 127.0.0.1:10001)"),
     Parameter::text("device", "Id of the Inverse3, from its label (default: the only one)"),
-    Parameter::text("grip", "Id of the VerseGrip, or none (default: the only one)"),
+    Parameter::text("grip", "Id of the VerseGrip; `none`: no grip (default: the only one, if there is one)"),
     Parameter::real("max_force_n", "N", 0.0, 20.0, 5.0, "Largest force on the hand"),
     Parameter::real(
         "range_mm",
@@ -59,7 +59,7 @@ const SCHEMA: &[Parameter] = &[
         500.0,
         30.0,
         "Cutoff frequency of the low-pass filter of the angular velocity, which is estimated by finite \
-         differences of the orientation",
+         differences of the orientation; no effect without a grip",
     ),
     Parameter::real("timeout_ms", "ms", 5.0, 10_000.0, 100.0, "Timeout for messages of the service"),
 ];

@@ -60,7 +60,7 @@ impl Session {
         let of_service = |cause: String| format!("the Inverse Service at {address}: {cause}");
         let mut socket = Socket::connect(address, PATIENCE).map_err(|cause| {
             of_service(format!(
-                "{cause}; start Haply's service, or `flotor emulate haply-service` without hardware"
+                "{cause}; check `address`, and start Haply's service, or `flotor emulate haply-service` (on Linux) without hardware"
             ))
         })?;
         let mut talk = |text: &str| {
@@ -78,7 +78,7 @@ impl Session {
         let wanted = message::settings(request.force_gate);
         if let Some((path, said)) = message::differing(&reported, &chosen.arm, &wanted).map_err(failed)? {
             return Err(of_service(format!(
-                "`{}` of the device {} is {said} and cannot be changed; the force on the hand would differ from the commanded force. End other programs that configure the device, and update the service to 3.5 or newer",
+                "`{}` of the device {} is {said}, and cannot be changed; the force on the hand would differ from the commanded force. End other programs that configure the device, and update the service to 3.5 or newer",
                 path.join("."),
                 chosen.arm
             )));
@@ -136,6 +136,7 @@ fn choose(request: &Request, Inventory { arms, grips }: &Inventory) -> Result<Ch
     let listed = |ids: &[&str]| if ids.is_empty() { "none".to_owned() } else { ids.join(", ") };
     let ids: Vec<&str> = arms.iter().map(String::as_str).collect();
     let arm = match (&request.arm, arms.as_slice()) {
+        (_, []) => return Err("the service has no device; connect a device and switch it on".to_owned()),
         (Some(named), _) => arms.iter().find(|id| id.eq_ignore_ascii_case(named)).ok_or_else(|| {
             format!(
                 "the service has no device {named}; set `device` to the id of one of its devices: {}",
@@ -143,7 +144,6 @@ fn choose(request: &Request, Inventory { arms, grips }: &Inventory) -> Result<Ch
             )
         })?,
         (None, [only]) => only,
-        (None, []) => return Err("the service has no device; connect a device and switch it on".to_owned()),
         (None, _) => {
             return Err(format!(
                 "the service has several devices ({}); set `device` to one of their ids",
@@ -166,8 +166,8 @@ fn choose(request: &Request, Inventory { arms, grips }: &Inventory) -> Result<Ch
             let found: Option<&Grip> = grips.iter().find(|grip| grip.id.eq_ignore_ascii_case(named));
             Some(found.cloned().ok_or_else(|| {
                 format!(
-                    "the service has no grip {named} (its grips: {}); set `grip` to one of their ids, or to \
-                     `none` to use the arm without a grip",
+                    "the service has no grip {named} (its grips: {}); connect the grip, or set `grip` to one of \
+                     their ids, or to `none` to use the arm without a grip",
                     listed(&ids)
                 )
             })?)

@@ -44,7 +44,7 @@ impl Socket {
     /// Error text: unknown host name, error of the operating system, or a server that rejects the WebSocket upgrade.
     pub fn connect(address: &str, patience: Duration) -> Result<Self, String> {
         let lookup = address.to_socket_addrs().map_err(|error| error.to_string())?;
-        let mut failed = "unknown host name; check the address".to_owned();
+        let mut failed = "unknown host name".to_owned();
         for candidate in lookup {
             match TcpStream::connect_timeout(&candidate, patience) {
                 Ok(stream) => return Self::on(stream, address, patience).map_err(|error| error.to_string()),

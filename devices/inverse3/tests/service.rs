@@ -240,7 +240,9 @@ fn what_cannot_be_opened_is_refused_in_one_sentence_with_what_to_do() {
         (
             plain(),
             vec![("grip", "1234")],
-            format!("no grip 1234 (its grips: {GRIP}); set `grip` to one of their ids, or to `none`"),
+            format!(
+                "no grip 1234 (its grips: {GRIP}); connect the grip, or set `grip` to one of their ids, or to `none`"
+            ),
         ),
         (answering(1, configured(0.3)), vec![], "`config.filters.force_gate.gain` of the device".to_owned()),
     ] {
@@ -279,7 +281,11 @@ fn where_no_service_listens_the_address_and_what_to_start_are_named() {
     refused_with(
         &service,
         &[("address", "127.0.0.1:1")],
-        &["127.0.0.1:1", "refused", "start Haply's service, or `flotor emulate haply-service`"],
+        &[
+            "127.0.0.1:1",
+            "refused",
+            "check `address`, and start Haply's service, or `flotor emulate haply-service`",
+        ],
     );
 }
 
@@ -306,7 +312,11 @@ fn messages_of_another_version_are_told_with_the_version_that_is_needed() {
     refused_with(&of_old("nonsense"), &[], &["the service sent a malformed device state", UPDATE]);
     // It knows no presets.
     let told = configured(0.0).replace("\"preset\":\"arm_front_centered\",", "");
-    refused_with(&of_old(&told), &[], &["`config.preset` of the device", "is nothing", UPDATE]);
+    refused_with(
+        &of_old(&told),
+        &[],
+        &["`config.preset` of the device", "is missing, not `arm_front_centered`", UPDATE],
+    );
     // Its states have another name for a field.
     let told = state(HELD_M, DVec3::ZERO).replace("cursor_velocity", "velocity");
     refused_with(&answering(2, told), &[], &["the device state has no `cursor_velocity`", UPDATE]);

@@ -31,31 +31,22 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const VALID_PERIODS: u32 = 3;
 
 /// Cause of a failed homing or landing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Aborted {
     /// The link broke.
+    #[error("the link to the controller was lost; check the cable and the power of the controller")]
     Lost,
     /// No reply within the timeout.
+    #[error(
+        "the controller does not reply; check the power of the controller and the load of this \
+         machine"
+    )]
     Silent,
     /// The controller left the mode [`Mode::Levitating`].
+    #[error(
+        "the controller ended the levitation (faults: {0}); free the handle, and end other programs that use the controller"
+    )]
     Faulted(Condition),
-}
-
-impl std::fmt::Display for Aborted {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Lost => f.write_str(
-                "the link to the controller was lost; check the cable and the power of the controller",
-            ),
-            Self::Silent => f.write_str(
-                "the controller does not reply; check the power of the controller and the load of this \
-                 machine",
-            ),
-            Self::Faulted(condition) => {
-                write!(f, "the controller faulted ({condition}); check that the handle is free to move")
-            }
-        }
-    }
 }
 
 /// Position controller of the handle for take-off and landing.
@@ -134,7 +125,7 @@ impl Holder {
             seen(progress, &command);
             link.send(request(&command, self.period_us), tick.wrapping_mul(self.period_us)).map_err(lost)?;
             let newest = if self.lockstep {
-                link.wait_for(link.sequence(), PATIENCE).map_err(lost)?
+                link.wait_for(link.sequence, PATIENCE).map_err(lost)?
             } else {
                 std::thread::sleep((started + period * (tick + 1)).saturating_duration_since(Instant::now()));
                 link.take().map_err(lost)?

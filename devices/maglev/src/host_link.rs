@@ -34,7 +34,8 @@ pub(crate) struct HostLink {
     /// `None` once the link is lost: the system gives the name of the port to the next device only after this one is
     /// closed.
     transport: Option<Box<dyn Transport>>,
-    sequence: u32,
+    /// Sequence number of the newest request.
+    pub(crate) sequence: u32,
     /// 0 until armed.
     session: u32,
     intake: Intake,
@@ -49,11 +50,6 @@ impl HostLink {
     /// Returns the numbers of rejected replies, by reason.
     pub(crate) fn rejections(&self) -> &Rejections {
         self.intake.rejections()
-    }
-
-    /// Returns the sequence number of the newest request.
-    pub(crate) fn sequence(&self) -> u32 {
-        self.sequence
     }
 
     /// Sends a request. Real-time: bounded, no allocation; one system call.
@@ -136,7 +132,7 @@ impl HostLink {
         &mut self,
         request: Request,
         patience: Duration,
-        mut satisfies: impl FnMut(&Received, u32) -> Option<T>,
+        mut satisfies: impl FnMut(&Received) -> Option<T>,
     ) -> Result<T, Unanswered> {
         let started = Instant::now();
         while started.elapsed() < patience {
@@ -146,7 +142,7 @@ impl HostLink {
                 let transport = self.transport.as_mut().ok_or(Unanswered::Lost)?;
                 let incoming = transport.wait(rest).map_err(|LinkLost| Unanswered::Lost)?;
                 let received = self.judge(&incoming);
-                if let Some(answer) = satisfies(&received, self.sequence) {
+                if let Some(answer) = satisfies(&received) {
                     return Ok(answer);
                 }
             }
@@ -161,7 +157,7 @@ impl HostLink {
             pages.push(self.ask(
                 Request::Describe { page: number },
                 patience,
-                |received, _| match received {
+                |received| match received {
                     Received::Page(page) if page.number() == number => Some(*page),
                     _ => None,
                 },
@@ -197,7 +193,7 @@ impl HostLink {
     }
 
     fn ask_mode(&mut self, request: Request, mode: Mode, patience: Duration) -> Result<Status, Unanswered> {
-        self.ask(request, patience, |received, _| match received {
+        self.ask(request, patience, |received| match received {
             Received::Status(newest) if newest.status.mode == mode => Some(newest.status),
             _ => None,
         })

@@ -31,7 +31,7 @@ const SLEW: [f64; 2] = [55.0e3, 6.3e3];
 pub(crate) struct MlDevice {
     session: Session,
     facts: Facts,
-    stop: Arc<Stop>,
+    pub(crate) stop: Arc<Stop>,
     pub(crate) calibration: VerticalCalibration,
 }
 
@@ -59,12 +59,12 @@ pub(crate) struct MlActive {
 fn refused(address: &str, failed: Failed) -> Refusal {
     let hint = match failed {
         Failed::At(_, NoResults::Lost | NoResults::Silent) => {
-            "; check its power and the network; without hardware start the emulator with `flotor emulate maglev --protocol ml-api`"
+            "; check its power and the network; without hardware start the emulator with `flotor emulate maglev --protocol ml-api` (on Linux)"
         }
         Failed::At(_, NoResults::Refused(Status::RECEIVE_ONLY)) => "; end the other program first",
         Failed::At(_, NoResults::Malformed) => "; use a controller with the ML API 1.5b, and check `address`",
         Failed::At(_, NoResults::Refused(_)) => {
-            "; correct the parameters of the device that this request transfers, or restart the controller"
+            "; remove this cause, correct the parameters of the device that this request transfers, or restart the controller"
         }
         Failed::Faulted(_) | Failed::NoTick => "",
     };
@@ -78,10 +78,6 @@ impl MlDevice {
         let facts = session.facts().map_err(|failed| refused(address, failed))?;
         let stop = Arc::new(Stop::open(address).map_err(Refusal::resource)?);
         Ok(Self { session, facts, stop, calibration: VerticalCalibration::NONE })
-    }
-
-    pub(crate) fn stop(&self) -> &Arc<Stop> {
-        &self.stop
     }
 
     /// Returns the version of the controller in place of a serial number, which the protocol does not have.

@@ -166,18 +166,16 @@ fn connect(options: &Options) -> Result<(HostLink, Description), Refusal> {
 fn refused(options: &Options, unanswered: Unanswered) -> Refusal {
     let Options { kind, address, .. } = options;
     let hint = match kind {
-        Kind::Tcp => "; without hardware start the emulator with `flotor emulate maglev`",
+        Kind::Tcp => "; without hardware start the emulator with `flotor emulate maglev` (on Linux)",
         Kind::Serial | Kind::Usb | Kind::Hid => "",
     };
     Refusal::resource(match unanswered {
-        Unanswered::Lost => {
-            format!(
-                "the controller at {address} closed the connection; end other programs that use the controller"
-            )
-        }
-        Unanswered::Silent => {
-            format!("no controller of this device replies at {address}; check its power and `address`{hint}")
-        }
+        Unanswered::Lost => format!(
+            "the connection to the controller at {address} was lost; check cable and power, and end other programs that use the controller"
+        ),
+        Unanswered::Silent => format!(
+            "no controller of this device replies at {address}; check its power, `address` and `protocol`, and end other programs that use the controller{hint}"
+        ),
     })
 }
 
@@ -240,7 +238,7 @@ impl OwnActive {
         #[allow(clippy::cast_possible_truncation)] // the clock on the wire wraps
         match self.opened.link.send(request, (tick.time_ns / 1000) as u32) {
             Ok(()) => {
-                self.awaited = Some(self.opened.link.sequence());
+                self.awaited = Some(self.opened.link.sequence);
                 Cycle::Fresh
             }
             Err(LinkLost) => Cycle::Fault(Fault::Disconnected),

@@ -25,8 +25,8 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::choice("transport", TRANSPORTS, 0, "Transport to the controller"),
     Parameter::text(
         "address",
-        "Address: host:port (default 127.0.0.1, port 5679, with ml-api 5678), path of a serial port, or \
-         vendor:product in hex (usb, hid)",
+        "Address: host:port (tcp; default 127.0.0.1:5679, with ml-api 127.0.0.1:5678), a port such as /dev/ttyACM0 or COM3 \
+         (serial), or vendor:product or vendor:product:serial, ids in hex (usb, hid)",
     ),
     Parameter::choice(
         "pace",
@@ -41,7 +41,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         1000.0,
         8.0,
         "Timeout of the controller's watchdog: without a command for this time the controller ends the \
-         session and holds the handle",
+         session, holds the handle and lands it; no effect with ml-api",
     ),
     Parameter::real("timeout_ms", "ms", 2.0, 10_000.0, 15.0, "Timeout for replies of the controller"),
     Parameter::real(
@@ -50,7 +50,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         -50.0,
         50.0,
         0.0,
-        "Vertical force that the controller adds; a calibration corrects the sum",
+        "Vertical force that the controller adds by itself; a calibration corrects the sum; no effect without a calibration",
     ),
     Parameter::real(
         "takeoff_ms",
@@ -58,14 +58,14 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         10_000.0,
         0.0,
-        "Time to bring the handle home before the scene becomes active; 0: the scene is active at once",
+        "Time to bring the handle home before the scene becomes active; 0: the scene is active at once; no effect with ml-api, whose controller takes off by itself",
     ),
     Parameter::choice(
         "gravity",
         GRAVITY,
         0,
-        "Gravity compensation: off (the controller or the scene compensates), defy (measured at take-off, then applied); \
-         auto: off, with ml-api defy",
+        "Gravity compensation: off (the controller or the scene compensates), defy (measured at take-off, then applied; needs \
+         `takeoff_ms` except with ml-api); auto: off, with ml-api defy",
     ),
     Parameter::real(
         "fade_ms",
@@ -95,7 +95,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "first_contact",
         choices![],
-        "With ml-api: report of tests/hardware/first_contact.py; its parameters replace the defaults",
+        "Report of tests/hardware/first_contact.py, for ml-api; its parameters replace the defaults (default: no report)",
     ),
     Parameter::real(
         "landing_ms",
@@ -103,43 +103,28 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         10_000.0,
         0.0,
-        "Time in which the handle is lowered at the end; 0: the handle is not lowered",
+        "Time in which the handle is lowered at the end; 0: the handle is not lowered; no effect with ml-api, whose controller lands by itself",
     ),
     Parameter::choice(
         "walls",
         WALLS,
         0,
-        "Additional walls, inside the walls of the scene: off, maker (the maker's boundary mode), or thesis",
+        "Additional walls, inside the walls of the scene: off (the parameters of walls, angles and yaw have no effect), maker (the maker's boundary mode), or thesis",
     ),
     Parameter::real("wall_radius_mm", "mm", 1.0, 12.0, 11.0, "Radius of the spherical wall about home")
         .live(),
-    Parameter::real(
+    plane(
         "wall_x_mm",
-        "mm",
-        0.5,
-        12.0,
-        12.0,
-        "Distance from home to each of the two walls perpendicular to x",
-    )
-    .live(),
-    Parameter::real(
+        "Distance from home to each of the two walls perpendicular to x; no effect beyond `wall_radius_mm`",
+    ),
+    plane(
         "wall_y_mm",
-        "mm",
-        0.5,
-        12.0,
-        12.0,
-        "Distance from home to each of the two walls perpendicular to y",
-    )
-    .live(),
-    Parameter::real(
+        "Distance from home to each of the two walls perpendicular to y; no effect beyond `wall_radius_mm`",
+    ),
+    plane(
         "wall_z_mm",
-        "mm",
-        0.5,
-        12.0,
-        12.0,
-        "Distance from home to each of the two walls perpendicular to z",
-    )
-    .live(),
+        "Distance from home to each of the two walls perpendicular to z; no effect beyond `wall_radius_mm`",
+    ),
     Parameter::real(
         "wall_stiffness_n_per_m",
         "N/m",
@@ -176,7 +161,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         1.0,
         0.15,
-        "Damping beyond the angle limit; with the walls of the thesis at every angle",
+        "Damping beyond the angle limit; with the walls of the thesis, or a yaw spring, at every angle",
     )
     .live(),
     Parameter::real(
@@ -185,10 +170,15 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         50.0,
         0.0,
-        "Stiffness of the yaw spring about home; reduced to the stability limit",
+        "Stiffness of the yaw spring about home; 0: no spring; reduced to the stability limit",
     )
     .live(),
 ];
+
+/// Returns the parameter of the distance from home to two opposite walls.
+const fn plane(id: &'static str, doc: &'static str) -> Parameter {
+    Parameter::real(id, "mm", 0.5, 12.0, 12.0, doc).live()
+}
 
 /// Protocol of the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -302,15 +292,15 @@ impl Values {
         let parameters = table.get("device").and_then(|device| device.get("parameters"));
         let Some(parameters) = parameters.and_then(toml::Value::as_table) else {
             return Err(wrong(
-                &"the table [device.parameters] is missing; complete three steps of \
-                     tests/hardware/first_contact.py, which then writes this table",
+                &"the table [device.parameters] is missing; name a report that \
+                     tests/hardware/first_contact.py has written",
             ));
         };
         for (id, value) in parameters {
             let Some(index) = SCHEMA.iter().position(|parameter| parameter.id() == id) else {
                 return Err(wrong(&format_args!(
-                    "the device has no parameter `{id}`; remove the line, or run the script of this \
-                     version again"
+                    "the device has no parameter `{id}`; remove the line, or run \
+                     tests/hardware/first_contact.py of this version again"
                 )));
             };
             #[allow(clippy::cast_precision_loss)] // numbers written by people

@@ -86,7 +86,7 @@ impl Device for MaglevDevice {
     fn stopper(&self) -> Switch {
         match &self.opened {
             Opened::Own(device) => Switch::Coils(device.stopper()),
-            Opened::MlApi(device) => Switch::Land(LandSwitch(Arc::clone(device.stop()))),
+            Opened::MlApi(device) => Switch::Land(LandSwitch(Arc::clone(&device.stop))),
         }
     }
 
@@ -139,7 +139,7 @@ impl IndependentStopDevice for MaglevDevice {
     fn independent_stop(&self) -> IndependentStop {
         match &self.opened {
             Opened::Own(device) => device.independent_stop(),
-            Opened::MlApi(device) => device.stop().independent(),
+            Opened::MlApi(device) => device.stop.independent(),
         }
     }
 }

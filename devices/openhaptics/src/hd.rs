@@ -62,10 +62,10 @@ impl Failed {
         let remedy = match self.code {
             0x0300 => {
                 "check that the device is connected, configured with the maker's setup program, and permitted for \
-                 this user: `flotor doctor --device openhaptics`"
+                 this user (on Linux, `flotor doctor --device openhaptics` checks this)"
             }
             0x0301 => "end the other program, or remove the other device of the scene, that uses this device",
-            0x0302 | 0x0303 => "check cable, hub and power, and the folder $GTDD_HOME",
+            0x0302 | 0x0303 => "check cable, hub, power and configuration (on Linux the folder $GTDD_HOME)",
             _ => "test the device with the maker's own diagnostic program first",
         };
         Refusal::resource(format!(
@@ -77,9 +77,9 @@ impl Failed {
 
 /// Open device of the SDK; dropping it closes the device.
 pub(crate) struct Hd {
-    functions: Functions,
+    pub(crate) functions: Functions,
     handle: c_uint,
-    facts: Facts,
+    pub(crate) facts: Facts,
 }
 
 /// Properties reported by a device.
@@ -171,14 +171,6 @@ impl Hd {
     pub(crate) fn failure(&self, what: &'static str) -> Failed {
         let code = self.functions.take_error();
         Failed { code, words: self.functions.words(code), what }
-    }
-
-    pub(crate) fn functions(&self) -> &Functions {
-        &self.functions
-    }
-
-    pub(crate) fn facts(&self) -> &Facts {
-        &self.facts
     }
 
     /// Returns the maker's name of the model and the serial number.

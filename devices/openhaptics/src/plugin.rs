@@ -22,7 +22,7 @@ const SCHEMA: &[Parameter] = &[
     Parameter::file(
         "library",
         choices![],
-        "Library of OpenHaptics, libHD.so (default: searched in the library folders of the SDK and the system)",
+        "Library of OpenHaptics: libHD.so, on Windows hd.dll (default: searched in $OH_SDK_BASE, $3DTOUCH_BASE, $LD_LIBRARY_PATH (on Windows $PATH) and the library folders of user and system)",
     ),
     STAND_IN,
     Parameter::text(
@@ -66,7 +66,7 @@ impl Device for TouchDevice {
         let policy = settings.one_of(STAND_IN.id(), [DropInPolicy::Refuse, DropInPolicy::Accept]);
         let hd = Hd::open(settings.text("library"), policy, settings.text("name"))?;
         hd.calibrate()?;
-        let Facts { force_n, torque_nm, gives_torque, .. } = *hd.facts();
+        let Facts { force_n, torque_nm, gives_torque, .. } = hd.facts;
         let told = |id: &str, own: f64| match settings.number_or_default(id) {
             0.0 => own,
             told => told.min(own),
@@ -84,7 +84,7 @@ impl Device for TouchDevice {
     }
 
     fn capabilities(&self) -> Capabilities {
-        let Facts { range_m, is_turned, gives_torque, stiffness_n_per_m, .. } = *self.hd.facts();
+        let Facts { range_m, is_turned, gives_torque, stiffness_n_per_m, .. } = self.hd.facts;
         let [force_n, torque_nm] = self.most;
         Capabilities {
             sensed: if is_turned { Axes::ALL } else { Axes::TRANSLATION },

@@ -91,14 +91,14 @@ impl Driver {
         let client =
             DeviceClient { hd: Arc::clone(&hd), exchange: Arc::clone(&exchange), cursor, force: Force::Off };
         let mut clients = clients();
-        let scheduled = hd.functions().schedule(Box::new(client));
+        let scheduled = hd.functions.schedule(Box::new(client));
         if !scheduled.is_in() {
             // A rejected client is never called; it is freed with the others.
             clients.retired.push(scheduled);
             return Err(hd.failure("scheduling"));
         }
         if clients.running == 0 {
-            without_signals(|| hd.functions().start_scheduler());
+            without_signals(|| hd.functions.start_scheduler());
         }
         clients.running += 1;
         drop(clients);
@@ -111,7 +111,7 @@ impl Drop for Driver {
     /// Sends zero force, then unschedules the device; ends the scheduler with its last client. Not real-time.
     fn drop(&mut self) {
         let Some(scheduled) = self.scheduled.take() else { return };
-        let functions = self.hd.functions();
+        let functions = &self.hd.functions;
         self.exchange.end();
         self.exchange.stop();
         let mut clients = clients();

@@ -7,7 +7,6 @@
 mod platform;
 
 use serialport::{ClearBuffer, SerialPort};
-use std::fmt;
 use std::io::{self, Read, Write};
 
 /// Help text of a plugin's parameter `port`.
@@ -22,38 +21,27 @@ pub const PORT_EXAMPLE: &str = platform::PORT_EXAMPLE;
 pub struct Port(platform::System);
 
 /// Error of opening a port. Displays as the cause and the remedy.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum NotOpened {
     /// This user has no permission.
+    #[error("this user may not open the port; {remedy}")]
     Forbidden {
         /// Remedy, as a clause.
         remedy: &'static str,
     },
     /// Another program uses the port.
+    #[error("another program uses the port; close that program first")]
     InUse,
     /// The path is no serial port.
+    #[error("the file is not a usable serial port; {}", platform::PORT_LIST)]
     NoPort,
     /// There is no file at the path, or another error of the system.
+    #[error("{cause}; check that the device is connected; {}", platform::PORT_LIST)]
     Missing {
         /// Error of the system, as text.
         cause: String,
     },
 }
-
-impl fmt::Display for NotOpened {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Forbidden { remedy } => write!(f, "this user may not open the port; {remedy}"),
-            Self::InUse => f.write_str("another program uses the port; close that program first"),
-            Self::NoPort => write!(f, "the file is not a serial port; {}", platform::PORT_LIST),
-            Self::Missing { cause } => {
-                write!(f, "{cause}; check that the device is connected; {}", platform::PORT_LIST)
-            }
-        }
-    }
-}
-
-impl std::error::Error for NotOpened {}
 
 impl Port {
     /// Opens the port with the system's path or name (`/dev/ttyACM0`, `COM3`) at the rate `baud`. Not real-time.

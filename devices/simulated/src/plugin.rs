@@ -179,7 +179,7 @@ impl CalibrationDevice for SimulatedFlotor {
     fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
         if self.machine.is_none() {
             let reason =
-                "preset plain has an even field, so there is nothing to calibrate; set preset = \"full\"";
+                "preset `plain` has an even field, so there is nothing to calibrate; set `preset` to `full`";
             return Err(Refusal::unsupported(reason));
         }
         self.calibration = *calibration;

@@ -78,12 +78,13 @@ impl fmt::Display for InvalidParameter {
             ),
             Self::DiodesInALine => f.write_str(
                 "the three LEDs do not span a plane, so the sensors cannot measure all six coordinates; set \
-                 led_2_deg and led_3_deg to different angles, both away from 0°",
+                 led_2_deg and led_3_deg to angles that differ from each other and from 0° (360° equals 0°)",
             ),
             Self::TooStiff { steps_per_ms, limit } => write!(
                 f,
-                "the simulation of flotor and hand would need {steps_per_ms:.0} steps per millisecond, above \
-                 the limit of {limit:.0}: lower stiffness or damping, or raise mass and inertia"
+                "the simulation of flotor and hand would need {:.0} steps per millisecond, above the limit of \
+                 {limit:.0}: lower the stiffness and damping of the hand or the drag (damping_ns_per_m, damping_nms_per_rad), or raise mass_kg, hand_mass_kg or the moments of inertia",
+                steps_per_ms.ceil()
             ),
         }
     }

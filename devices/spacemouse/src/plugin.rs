@@ -41,7 +41,7 @@ const SCHEMA: &[Parameter] = &[
         0.0,
         32.0,
         1.0,
-        "Button that moves the pose home while pressed; 0: none",
+        "Number, from 1, of the button that moves the pose home while pressed; 0: none",
     )
     .live(),
     Parameter::text("path", PATH_HELP),

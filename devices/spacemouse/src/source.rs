@@ -41,9 +41,9 @@ pub struct HidPuck(HidDevice);
 
 fn refused(path: &str, error: &HidError) -> Refusal {
     Refusal::resource(if is_refused(error) {
-        format!("this user may not use {path}; {ACCESS_REMEDY}")
+        format!("no access to {path}; {ACCESS_REMEDY}")
     } else {
-        format!("cannot open {path}: {error}; check the connection of the device")
+        format!("cannot open {path}: {error}; check the connection of the device, and its `path`")
     })
 }
 

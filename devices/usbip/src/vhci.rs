@@ -30,7 +30,7 @@ pub fn attach(stream: &UnixStream, speed: Speed) -> io::Result<()> {
         let hint = match error.kind() {
             ErrorKind::NotFound => "load the kernel module: sudo modprobe vhci_hcd",
             ErrorKind::PermissionDenied => "only root may attach a device; use sudo",
-            _ => "no virtual port accepted the device",
+            _ => "no virtual port accepted the device; end other programs that emulate USB devices",
         };
         io::Error::new(error.kind(), format!("{FOLDER}: {error}; {hint}"))
     };

@@ -23,6 +23,8 @@ const LOOK: Duration = Duration::from_micros(100);
 const SAMPLE_WORDS: usize = 24;
 /// Words of a command: wrench 6, effort.
 const COMMAND_WORDS: usize = 7;
+/// Conditions of a sample, in the order of their bits in the word.
+const CONDITIONS: [Conditions; 3] = [Conditions::SATURATED, Conditions::EXCESS_FORCE, Conditions::NOISY];
 
 /// Synchronisation of loop and SDK.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +48,7 @@ pub struct Sample {
     pub grip: GripState,
     /// Buttons, one bit each.
     pub buttons: u32,
-    /// Conditions of the device; [`Exchange::publish`] transmits saturation only.
+    /// Conditions of the device.
     pub conditions: Conditions,
 }
 
@@ -111,7 +113,7 @@ impl Exchange {
 
     // ------------------------------------------------------------ the thread of the SDK
 
-    /// Publishes a new sample, with saturation as its only condition. Called by the thread of the SDK.
+    /// Publishes a new sample. Called by the thread of the SDK.
     pub fn publish(&self, sample: &Sample) {
         let mut words = [0; SAMPLE_WORDS];
         let Sample { pose, twist, delivered, grip, buttons, conditions } = sample;
@@ -120,11 +122,8 @@ impl Exchange {
         let grip = [grip.opening, grip.velocity, grip.delivered];
         let numbers = numbers.chain(&delivered.force_n).chain(&delivered.torque_nm).chain(&grip);
         let numbers = numbers.map(|number| number.to_bits());
-        let saturated = u64::from(conditions.contains(Conditions::SATURATED));
-        words
-            .iter_mut()
-            .zip(numbers.chain([u64::from(*buttons), saturated]))
-            .for_each(|(place, word)| *place = word);
+        let numbers = numbers.chain([u64::from(*buttons), word_of(*conditions)]);
+        words.iter_mut().zip(numbers).for_each(|(place, word)| *place = word);
         self.sample.put(&words);
         self.tell();
     }
@@ -243,14 +242,14 @@ impl Exchange {
         let numbers = words.map(f64::from_bits);
         let [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, fx, fy, fz, tx, ty, tz, g, vg, fg, ..] =
             numbers;
-        let [.., buttons, saturated] = words;
+        let [.., buttons, conditions] = words;
         let state = DeviceState {
             pose: Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] },
             twist: Twist { linear_m_per_s: [vx, vy, vz], angular_rad_per_s: [wx, wy, wz] },
             delivered: Wrench { force_n: [fx, fy, fz], torque_nm: [tx, ty, tz] },
             sampled_ns: 0,
             buttons: u32::try_from(buttons).unwrap_or(0),
-            conditions: if saturated == 1 { Conditions::SATURATED } else { Conditions::NONE },
+            conditions: conditions_of(conditions),
         };
         let grip = GripState::new(GripKind::Linear, g, vg).with_delivered(fg);
         (count > 0).then_some((count, state, grip))
@@ -295,6 +294,19 @@ impl Exchange {
     }
 }
 
+/// Returns the word with a bit for each of [`CONDITIONS`].
+fn word_of(conditions: Conditions) -> u64 {
+    let bit = |(number, condition): (usize, Conditions)| u64::from(conditions.contains(condition)) << number;
+    CONDITIONS.into_iter().enumerate().map(bit).sum()
+}
+
+/// Returns the conditions of a word from [`word_of`].
+fn conditions_of(word: u64) -> Conditions {
+    let is_set = |(number, _): &(usize, Conditions)| (word >> number) & 1 == 1;
+    let set = CONDITIONS.into_iter().enumerate().filter(is_set);
+    set.fold(Conditions::NONE, |conditions, (_, condition)| conditions.with(condition))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -314,6 +326,19 @@ mod tests {
         assert_eq!(exchange.next_command(&mut cursor), Command::ZERO, "the loop is gone");
         exchange.command(&PUSH);
         assert_eq!(exchange.next_command(&mut cursor), PUSH, "and back");
+    }
+
+    /// Only saturation arrived.
+    #[test]
+    fn every_condition_of_a_sample_arrives() {
+        let exchange = Exchange::new(Pace::Real);
+        let sets = [Conditions::NONE, CONDITIONS[0].with(CONDITIONS[1]).with(CONDITIONS[2])];
+        for conditions in CONDITIONS.into_iter().chain(sets) {
+            let (pose, twist, delivered) = (Pose::HOME, Twist::ZERO, Wrench::ZERO);
+            let grip = GripState::new(GripKind::Linear, 0.0, 0.0);
+            exchange.publish(&Sample { pose, twist, delivered, grip, buttons: 0, conditions });
+            assert_eq!(exchange.newest().map(|(_, state, _)| state.conditions), Some(conditions));
+        }
     }
 
     #[test]

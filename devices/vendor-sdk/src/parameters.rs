@@ -27,6 +27,6 @@ pub const fn max_force(most_n: f64) -> Parameter {
 
 /// Declares the parameter `max_torque_nm`, N·m, with the range 0 to `most_nm`; 0: the limit of the device.
 pub const fn max_torque(most_nm: f64) -> Parameter {
-    let doc = "Largest torque on the hand; 0: the limit of the device";
+    let doc = "Largest torque on the hand; 0: the limit of the device, if known; no effect without driven rotational axes";
     Parameter::real("max_torque_nm", "N·m", 0.0, most_nm, 0.0, doc)
 }

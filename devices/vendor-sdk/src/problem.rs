@@ -2,13 +2,13 @@
 
 use crate::platform::{LIBRARY_ENDING, missing_remedy};
 use std::ffi::OsStr;
-use std::fmt;
 use std::path::{Path, PathBuf};
 
 /// Error of loading the library of an SDK.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LibraryProblem {
     /// No folder contains the library, or the chosen file does not exist.
+    #[error("{}", not_found(sdk, searched))]
     NotFound {
         /// Name of the SDK.
         sdk: &'static str,
@@ -16,6 +16,7 @@ pub enum LibraryProblem {
         searched: Vec<PathBuf>,
     },
     /// The file cannot be read.
+    #[error("{path} cannot be read ({reason}); check its path and its permissions")]
     Unreadable {
         /// Path of the file.
         path: PathBuf,
@@ -23,11 +24,15 @@ pub enum LibraryProblem {
         reason: String,
     },
     /// The file is no shared library.
+    #[error(
+        "{path} is not a shared library; name the file that ends in {LIBRARY_ENDING} with the parameter `library`"
+    )]
     NotALibrary {
         /// Path of the file.
         path: PathBuf,
     },
     /// The library is for another processor.
+    #[error("{path} is for {found} and this program for {needed}; install the SDK for {needed}")]
     Architecture {
         /// Path of the file.
         path: PathBuf,
@@ -37,6 +42,7 @@ pub enum LibraryProblem {
         needed: String,
     },
     /// The system's loader rejects the library, usually because of a missing dependency.
+    #[error("{path} cannot be loaded ({reason}); {}", missing_remedy(path))]
     Refused {
         /// Path of the file.
         path: PathBuf,
@@ -44,11 +50,18 @@ pub enum LibraryProblem {
         reason: String,
     },
     /// The file is Flotor's own drop-in library, which simulates a device, and the policy rejects drop-in libraries.
+    #[error(
+        "{path} is Flotor's own drop-in library, which has no device; name the vendor's library with `library`, \
+         or accept a simulated device with `stand_in = true`"
+    )]
     StandIn {
         /// Path of the file.
         path: PathBuf,
     },
     /// The library lacks a function.
+    #[error(
+        "{path} lacks the function `{function}`; install {needed} or later, or name another file with `library`"
+    )]
     MissingFunction {
         /// Path of the file.
         path: PathBuf,
@@ -58,6 +71,9 @@ pub enum LibraryProblem {
         needed: String,
     },
     /// The SDK is older than the plugin needs.
+    #[error(
+        "{path} is version {found}; install version {needed} or later, or name another file with `library`"
+    )]
     TooOld {
         /// Path of the file.
         path: PathBuf,
@@ -68,66 +84,22 @@ pub enum LibraryProblem {
     },
 }
 
-impl fmt::Display for LibraryProblem {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NotFound { sdk, searched } => {
-                let remedy = "install the SDK, or name its library with the parameter `library`";
-                if let [place] = searched.as_slice() {
-                    return write!(f, "the file {} of {sdk} does not exist; {remedy}", place.display());
-                }
-                let named = |part: fn(&PathBuf) -> Option<&OsStr>| {
-                    let mut names: Vec<String> = Vec::new();
-                    for name in searched.iter().filter_map(part).map(|name| name.display().to_string()) {
-                        if !names.contains(&name) {
-                            names.push(name);
-                        }
-                    }
-                    names.join(", ")
-                };
-                let folders = named(|place| place.parent().map(Path::as_os_str));
-                write!(
-                    f,
-                    "no library of {sdk} found (searched for {} in {folders}); {remedy}",
-                    named(|place| place.file_name())
-                )
-            }
-            Self::Unreadable { path, reason } => {
-                write!(f, "{} cannot be read ({reason}); check its path and its permissions", path.display())
-            }
-            Self::NotALibrary { path } => write!(
-                f,
-                "{} is not a shared library; name the file that ends in {LIBRARY_ENDING} with the parameter `library`",
-                path.display()
-            ),
-            Self::Architecture { path, found, needed } => write!(
-                f,
-                "{} is for {found} and this program for {needed}; install the SDK for {needed}",
-                path.display()
-            ),
-            Self::Refused { path, reason } => {
-                write!(f, "{} cannot be loaded ({reason}); {}", path.display(), missing_remedy(path))
-            }
-            Self::StandIn { path } => write!(
-                f,
-                "{} is Flotor's own drop-in library, which has no device; name the vendor's library with `library`, \
-                 or accept a simulated device with `stand_in = true`",
-                path.display()
-            ),
-            Self::MissingFunction { path, function, needed } => {
-                write!(
-                    f,
-                    "{} lacks the function `{function}`; install {needed} or later, or name another file with `library`",
-                    path.display()
-                )
-            }
-            Self::TooOld { path, found, needed } => write!(
-                f,
-                "{} is version {found}; install version {needed} or later, or name another file with `library`",
-                path.display()
-            ),
-        }
+/// Returns the text of [`LibraryProblem::NotFound`].
+fn not_found(sdk: &str, searched: &[PathBuf]) -> String {
+    let remedy = "install the SDK, or name its library with the parameter `library`";
+    if let [place] = searched {
+        return format!("the file {} of {sdk} does not exist; {remedy}", place.display());
     }
+    let named = |part: fn(&PathBuf) -> Option<&OsStr>| {
+        let mut names: Vec<String> = Vec::new();
+        for name in searched.iter().filter_map(part).map(|name| name.display().to_string()) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names.join(", ")
+    };
+    let folders = named(|place| place.parent().map(Path::as_os_str));
+    let files = named(|place| place.file_name());
+    format!("no library of {sdk} found (searched for {files} in {folders}); {remedy}")
 }
-
-impl std::error::Error for LibraryProblem {}

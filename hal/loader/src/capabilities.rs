@@ -157,7 +157,7 @@ impl Number<f64> {
     }
 
     fn wrong(&self, mend: &str) -> Refusal {
-        wrong(self.field, &self.value.to_string(), mend)
+        wrong(self.field, &list(&[self.value]), mend)
     }
 }
 

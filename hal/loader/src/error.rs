@@ -83,7 +83,10 @@ pub enum LoadError {
         cause: std::io::Error,
     },
     /// The entry that the metadata names is not exported, or not an entry.
-    #[error("{}: no plugin entry `{symbol}` in the library; export the entry with default visibility", path.display())]
+    #[error(
+        "{}: no plugin entry `{symbol}` in the library; export the entry with default visibility, and build the plugin \
+         with the export macros or the current header", path.display()
+    )]
     NoEntry {
         /// Path of the plugin.
         path: PathBuf,

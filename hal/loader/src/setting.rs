@@ -36,7 +36,8 @@ pub enum SettingError {
         value: String,
     },
     /// The number is outside the range or, for a choice, not an integer.
-    #[error("`{id}` = {}: must be {} to {}{}", range.value, range.min, range.max, if unit.is_empty() { String::new() } else { format!(" {unit}") })]
+    #[error("`{id}` = {}: must be {}{} to {}{}", range.value, if range.has_fraction() { "a whole number from " } else { "" },
+        range.min, range.max, if unit.is_empty() { String::new() } else { format!(" {unit}") })]
     OutOfRange {
         /// Id of the parameter.
         id: String,
@@ -83,7 +84,7 @@ impl Setting {
             ParameterKind::Real => {
                 let number = value.trim().parse::<f64>().map_err(|_| SettingError::NotANumber {
                     id: id.to_owned(),
-                    unit: parameter.unit().to_owned(),
+                    unit: unit_of(parameter),
                     value: value.to_owned(),
                 })?;
                 Self::number(schema, id, number)
@@ -99,7 +100,7 @@ impl Setting {
         let (index, parameter) = find(schema, id)?;
         parameter.check(number).map_err(|range| SettingError::OutOfRange {
             id: id.to_owned(),
-            unit: parameter.unit().to_owned(),
+            unit: unit_of(parameter),
             range,
         })?;
         Ok(Self { parameter, index, number, text: String::new() })
@@ -129,6 +130,11 @@ impl Setting {
             ParameterKind::Real => self.number.to_string(),
         }
     }
+}
+
+/// Returns the unit of a parameter for an error; empty if dimensionless.
+fn unit_of(parameter: &Parameter) -> String {
+    Some(parameter.unit()).filter(|unit| *unit != "1").unwrap_or_default().to_owned()
 }
 
 /// Converts settings to the form of the plugin boundary.

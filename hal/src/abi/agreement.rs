@@ -25,7 +25,7 @@ impl Entry {
     /// pointers may be followed.
     pub unsafe fn compare_layouts(&'static self) -> Result<Proof, String> {
         if self.layouts.is_null() || !self.layouts.is_aligned() || self.layout_count == 0 {
-            return Err("the plugin has no layout table".to_owned());
+            return Err("the plugin has no valid layout table".to_owned());
         }
         // SAFETY: the contract of an entry: a static array of so many rows.
         let theirs = unsafe { std::slice::from_raw_parts(self.layouts, self.layout_count as usize) };

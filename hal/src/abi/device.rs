@@ -172,8 +172,7 @@ impl<D: Device> Phase<D> {
 /// Builds the refusal for a call outside the opened phase.
 pub(crate) fn not_opened() -> Refusal {
     Refusal::broken(
-        "the device is active, or an earlier call failed; call the function on an opened device that is \
-         not active",
+        "the device is active, or an earlier call panicked; deactivate the device, or close and open it again",
     )
 }
 

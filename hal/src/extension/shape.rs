@@ -394,13 +394,13 @@ pub enum InvalidShape {
 impl std::fmt::Display for InvalidShape {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Failed => "the model returned an error instead of a shape",
+            Self::Failed => "the model has no shape, or returned an error instead of its shape",
             Self::TooLarge => "the shape has 1048576 or more vertices, triangles or primitives; return fewer",
             Self::Empty => "the shape has neither a primitive nor a triangle; return at least one",
             Self::Missing => "the shape has a list that is null or misaligned although its length is not 0",
             Self::Corner => "a triangle of the shape has an index beyond the list of vertices",
             Self::Number => {
-                "a position, normal, value or side of the shape is not finite, or a side is negative"
+                "a pose, position, normal, value or side of the shape is not finite, or a side is negative"
             }
             Self::Text => "the name or the unit of the field is longer than 64 bytes",
         })

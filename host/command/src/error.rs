@@ -46,8 +46,8 @@ pub enum CommandError {
     RunEnded(RunEnd),
     /// The device sets the pace, at a rate above the loop rate of the scene.
     #[error(
-        "the device paces the loop with {samples_per_s} samples a second, above the scene's `rate_hz = {rate_hz}`: ramps would be \
-         too short and slew limits too high; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
+        "the device paces the loop with {samples_per_s} samples a second, above the loop rate of {rate_hz} Hz: ramps would be too \
+         short and slew limits too high; raise `rate_hz` (or `--rate`) to at least {samples_per_s}, or set `pacing = \"host\"`"
     )]
     TooFast {
         /// Sample rate of the device, Hz.

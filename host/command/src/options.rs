@@ -239,10 +239,9 @@ pub fn duration_s(text: &str) -> Result<f64, String> {
         "h" => 3600.0,
         other => return Err(format!("unknown unit of time `{other}`; use ms, s, min or h")),
     };
-    let number: f64 = number
-        .trim()
-        .parse()
-        .map_err(|_| format!("invalid duration `{text}`; write a number and a unit, such as 10s or 500ms"))?;
+    let number: f64 = number.trim().parse().map_err(|_| {
+        format!("invalid duration `{text}`; write a number, in s or with its unit, such as 10, 10s or 500ms")
+    })?;
     let seconds = number * scale;
     let is_legal = (0.0..=31_536_000.0).contains(&seconds);
     if is_legal {
@@ -351,12 +350,13 @@ fn file_of(text: &str, kind: &str) -> Result<Option<PathBuf>, String> {
     Ok(file.extension().is_none_or(|extension| extension.eq_ignore_ascii_case(kind)).then_some(file))
 }
 
-/// Parses a floating-point number, without a check of its range: infinity and NaN are numbers, too.
+/// Parses a finite floating-point number, without a check of its range.
 ///
 /// # Errors
-/// If the text is not a number.
+/// If the text is not a number, or the number is infinite or NaN.
 pub fn real(text: &str) -> Result<f64, String> {
-    text.trim().parse().map_err(|_| "write a number such as 0.75".to_owned())
+    let number = text.trim().parse().ok().filter(|number: &f64| number.is_finite());
+    number.ok_or_else(|| "write a number such as 0.75".to_owned())
 }
 
 /// Parses a seed, at most [`LARGEST_SEED`].
@@ -411,6 +411,21 @@ mod tests {
         }
         assert_eq!(rate_hz("1000 Hz"), Ok(1000.0));
         assert_eq!(rate_hz("99"), Err("the range is 100 to 10000 Hz".to_owned()));
+    }
+
+    /// The error of clap has the option and the value before this text.
+    #[test]
+    fn a_number_without_a_range_is_finite() {
+        assert_eq!((real(" -0.5 "), real("1e3")), (Ok(-0.5), Ok(1000.0)));
+        let argument = clap::Arg::new("step").long("step").value_parser(real);
+        let command = with_negative_numbers(Command::new("test").arg(argument));
+        for wrong in ["nan", "inf", "-inf", "infinity", "1e999", "half"] {
+            let matched = command.clone().try_get_matches_from(["test", &format!("--step={wrong}")]);
+            let error = matched.unwrap_err().to_string();
+            for part in [format!("'{wrong}'").as_str(), "--step", "write a number such as 0.75"] {
+                assert!(error.contains(part), "{error}");
+            }
+        }
     }
 
     #[test]

@@ -95,8 +95,9 @@ impl SeparateProgram<'_> {
     /// # Errors
     /// If the program is missing or cannot be started.
     pub fn become_with(&self, arguments: &[OsString]) -> Result<(), CommandError> {
-        let cause = become_program(self.command()?.args(arguments));
-        Err(CommandError::file(self.program.as_ref(), "cannot be started", cause))
+        let mut command = self.command()?;
+        let cause = become_program(command.args(arguments));
+        Err(CommandError::file(command.get_program().as_ref(), "cannot be started", cause))
     }
 }
 
@@ -151,6 +152,8 @@ mod tests {
         );
         assert!(missing.contains("installation lacks it") && missing.contains(build), "{missing}");
         let missing = sweep.missing(Path::new("/f/target/debug/flotor"));
-        assert!(missing.contains("target/sweep/release") && !missing.contains("installation"), "{missing}");
+        let folder: PathBuf = ["/f/target", "sweep", "release"].iter().collect();
+        assert!(missing.contains(&folder.display().to_string()), "{missing}");
+        assert!(!missing.contains("installation"), "{missing}");
     }
 }

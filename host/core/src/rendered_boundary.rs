@@ -109,13 +109,14 @@ impl RenderedBoundary {
 /// Prints the stable stiffness of the wall, its beginning and the force that it withstands.
 impl Display for RenderedBoundary {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { period_s, latency_s, stiffness_n_per_m, holds_n, .. } = *self;
+        let Self { period_s, latency_s, stiffness_n_per_m, damping_ns_per_m, holds_n, .. } = *self;
         let begins_mm = self.begins_m.into_iter().fold(f64::INFINITY, f64::min) * 1.0e3;
         write!(
             f,
-            "at {:.0} Hz and {:.1} ms of latency it is stable with {stiffness_n_per_m:.0} N/m",
+            "at {:.0} Hz and {:.1} ms of latency it {} {stiffness_n_per_m:.0} N/m",
             1.0 / period_s,
-            latency_s * 1.0e3
+            latency_s * 1.0e3,
+            if damping_ns_per_m > 0.0 { "is stable with" } else { "has" }
         )?;
         if begins_mm.is_finite() {
             write!(f, ", begins {begins_mm:.1} mm from home and withstands {holds_n:.1} N")?;

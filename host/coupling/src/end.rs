@@ -21,10 +21,12 @@ const RETURN_S: f64 = 0.1;
 /// Local end of a coupling: virtual spring and damper at one device, limited by an energy tank.
 pub struct End {
     config: CouplingConfig,
-    mapping: Mapping,
+    /// Mapping from the device's frame to the shared frame.
+    pub(super) mapping: Mapping,
     observer: PortObserver,
     controller: Controller,
-    tank: Tank,
+    /// Energy tank of this end, shared frame.
+    pub(super) tank: Tank,
     bounce: Bounce,
     partner: Option<PeerState>,
     /// Fraction of the requested wrench, 0 to 1: below one after the tank was too low.
@@ -81,7 +83,7 @@ impl End {
     /// allocation.
     #[inline]
     pub(super) fn call(&self, state: &DeviceState) -> PeerState {
-        self.peer_state(state, self.tank.passed_on_j())
+        self.peer_state(state, self.tank.passed_on_j)
     }
 
     #[inline]
@@ -104,12 +106,7 @@ impl End {
     /// Returns the total energy passed on to the partner, J. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn passed_on_j(&self) -> f64 {
-        self.tank.passed_on_j()
-    }
-
-    /// Returns the mapping from the device's frame to the shared frame.
-    pub(super) fn mapping(&self) -> &Mapping {
-        &self.mapping
+        self.tank.passed_on_j
     }
 
     /// Returns the wrench that this end requests, device frame; zero without a peer state. Discards energy in the tank
@@ -180,12 +177,6 @@ impl End {
     #[inline]
     fn bounce_j(&self) -> f64 {
         self.bounce.stored_j / self.mapping.energy_scale()
-    }
-
-    /// Returns the energy tank of this end, shared frame.
-    #[must_use]
-    pub fn tank(&self) -> &Tank {
-        &self.tank
     }
 }
 

@@ -106,6 +106,6 @@ impl Coupling {
     #[must_use]
     pub fn tanks(&self) -> [&Tank; 2] {
         let [first, second] = &self.ends;
-        [first.tank(), second.tank()]
+        [&first.tank, &second.tank]
     }
 }

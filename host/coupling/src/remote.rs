@@ -112,7 +112,7 @@ impl RemoteEnd {
         let (from_partner, incoming) = latest(NOBODY);
         let end = End::new(config, &end.mapping, period_s);
         let end = Self {
-            claims: Claims::new(config, end.mapping(), reach, period_s),
+            claims: Claims::new(config, &end.mapping, reach, period_s),
             brake: Brake::new(reach, period_s),
             end,
             timeouts,
@@ -173,7 +173,7 @@ impl RemoteEnd {
     /// Returns the state of this end's energy tank. Real-time: bounded, no allocation.
     #[must_use]
     pub fn tank(&self) -> TankState {
-        self.end.tank().state()
+        self.end.tank.state()
     }
 
     /// Returns the statistics of the partner's messages. Real-time: bounded, no allocation.
@@ -190,7 +190,7 @@ impl RemoteEnd {
         let newest = self.incoming.read().filter(|(version, _)| *version != self.version);
         if let Some((version, dispatch)) = newest {
             self.version = version;
-            if self.claims.can_be(&dispatch.state, self.end.mapping()) {
+            if self.claims.can_be(&dispatch.state, &self.end.mapping) {
                 self.receive(&dispatch, now_ns, here);
             } else {
                 self.is_implausible = true;
@@ -231,7 +231,7 @@ impl RemoteEnd {
             }
             Hold::On { heard_ns, .. } => now_ns - heard_ns,
         };
-        let mapping = self.end.mapping();
+        let mapping = &self.end.mapping;
         let accepted = self.claims.accept(&dispatch.state, here, mapping, silent_ns as f64 * 1.0e-9);
         self.end.receive(&accepted);
         self.link.cut_ticks += u64::from(self.claims.is_cut);

@@ -14,7 +14,8 @@ pub struct Tank {
     level_j: f64,
     lowest_j: f64,
     gone_in_j: f64,
-    passed_on_j: f64,
+    /// Total energy passed on to the partner, J.
+    pub(super) passed_on_j: f64,
     /// Running total of the partner, as received last.
     received_j: f64,
     discarded_j: f64,
@@ -47,12 +48,6 @@ impl Tank {
             self.level_j += passed_on_j - self.received_j;
             self.received_j = passed_on_j;
         }
-    }
-
-    /// Returns the total energy passed on to the partner, J.
-    #[inline]
-    pub(super) fn passed_on_j(&self) -> f64 {
-        self.passed_on_j
     }
 
     /// Returns the state of the tank for reports, J. Real-time: bounded, no allocation.

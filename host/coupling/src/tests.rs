@@ -142,7 +142,7 @@ fn the_pair_generates_no_energy_whatever_becomes_of_the_messages() {
                 way.iter().filter(|(arrives, _)| *arrives == tick).for_each(|(_, peer)| end.receive(peer));
                 way.retain(|(arrives, _)| *arrives > tick);
             }
-            let gone_in_j: f64 = ends.iter().map(|end| end.tank().state().gone_in_j).sum();
+            let gone_in_j: f64 = ends.iter().map(|end| end.tank.state().gone_in_j).sum();
             assert!(gone_in_j >= -1.0e-12, "seed {seed}, tick {tick}: {gone_in_j} J");
             for index in [0, 1] {
                 // Hands that push now here, now there, softly held in the middle.

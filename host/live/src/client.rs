@@ -40,7 +40,7 @@ pub enum LiveError {
     #[error("the host uses protocol version {0}, this program version {PROTOCOL}; use both from one build")]
     Protocol(u32),
     /// A message of the host is malformed.
-    #[error("malformed message from the host: {0}; use both from one build")]
+    #[error("malformed message from the host: {0}; use the host and this program from one build")]
     Malformed(String),
 }
 
@@ -180,7 +180,7 @@ impl Client {
             Kind::Change => Some(json(payload).map(Event::Change)),
             Kind::Answer => Some(json(payload).map(Event::Answer)),
             Kind::End => Some(json(payload).map(Event::End)),
-            Kind::Greeting | Kind::Run | Kind::Request | Kind::Unknown(_) => None,
+            Kind::Greeting | Kind::Run | Kind::Request => None,
         })?;
         event.transpose()
     }

@@ -73,6 +73,7 @@ pub fn process_number() -> u32 {
 fn remedy(cause: &io::Error) -> &'static str {
     match cause.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "make room on its disk",
+        io::ErrorKind::InvalidInput => "set XDG_RUNTIME_DIR to a folder with a shorter path",
         _ if is_out_of_descriptors(cause) => "close some files, or allow more (`ulimit -n`)",
         _ => "set XDG_RUNTIME_DIR to a folder you may write to",
     }
@@ -183,18 +184,13 @@ impl Directory {
 /// Listening socket that other programs can find; dropping it removes the socket file.
 #[derive(Debug)]
 pub struct Listener {
-    socket: Arc<Listening>,
+    pub(crate) socket: Arc<Listening>,
     path: PathBuf,
     /// Metadata of the socket file after its creation.
     file: Option<Metadata>,
 }
 
 impl Listener {
-    #[must_use]
-    pub(crate) fn socket(&self) -> &Arc<Listening> {
-        &self.socket
-    }
-
     /// Waits for the next connection of a client, without a timeout.
     ///
     /// # Errors

@@ -15,21 +15,19 @@ const RECORD: usize = 8 * RECORD_WORDS;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// [`crate::Greeting`].
-    Greeting,
+    Greeting = 1,
     /// `flotor.Run`.
-    Run,
+    Run = 2,
     /// Records of ticks ([`ticks_from_payload`]).
-    Ticks,
+    Ticks = 3,
     /// [`crate::ChangeMessage`].
-    Change,
+    Change = 4,
     /// [`crate::Answer`].
-    Answer,
+    Answer = 5,
     /// [`crate::End`].
-    End,
+    End = 6,
     /// [`crate::Request`].
-    Request,
-    /// Kind of a later version of the protocol: to be ignored.
-    Unknown(u8),
+    Request = 16,
 }
 
 impl Kind {
@@ -37,27 +35,15 @@ impl Kind {
     const KNOWN: [Self; 7] =
         [Self::Greeting, Self::Run, Self::Ticks, Self::Change, Self::Answer, Self::End, Self::Request];
 
-    const fn byte(self) -> u8 {
-        match self {
-            Self::Greeting => 1,
-            Self::Run => 2,
-            Self::Ticks => 3,
-            Self::Change => 4,
-            Self::Answer => 5,
-            Self::End => 6,
-            Self::Request => 16,
-            Self::Unknown(byte) => byte,
-        }
-    }
-
-    fn of(byte: u8) -> Self {
-        Self::KNOWN.into_iter().find(|kind| kind.byte() == byte).unwrap_or(Self::Unknown(byte))
+    /// Returns the kind of a byte; `None` for a kind of a later version of the protocol.
+    fn of(byte: u8) -> Option<Self> {
+        Self::KNOWN.into_iter().find(|kind| *kind as u8 == byte)
     }
 }
 
 /// Error of a frame with a payload above [`MAX_PAYLOAD`]: the other end uses another protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("a frame of {length} bytes exceeds {MAX_PAYLOAD}: protocol mismatch; use both sides from one build")]
+#[error("a frame of {length} bytes exceeds the limit of {MAX_PAYLOAD} bytes")]
 pub struct LongFrame {
     /// Length in the frame's head, bytes.
     pub length: usize,
@@ -70,7 +56,7 @@ pub fn frame(kind: Kind, payload: &[u8]) -> Vec<u8> {
     let length = u32::try_from(payload.len()).unwrap_or(u32::MAX);
     let mut bytes = Vec::with_capacity(HEAD + payload.len());
     bytes.extend(length.to_le_bytes());
-    bytes.push(kind.byte());
+    bytes.push(kind as u8);
     bytes.extend(payload);
     bytes
 }
@@ -101,22 +87,25 @@ impl Frames {
         self.bytes.extend(bytes);
     }
 
-    /// Removes the next complete frame from the buffer; returns its kind and payload, `None` if more bytes are needed.
+    /// Removes the next complete frame from the buffer; returns its kind and payload, `None` if more bytes are needed. Skips
+    /// frames of kinds of a later version of the protocol.
     ///
     /// # Errors
     /// [`LongFrame`] for a frame that is too long; the rest of the stream cannot be decoded.
     pub fn take(&mut self) -> Result<Option<(Kind, &[u8])>, LongFrame> {
-        let Some((head, rest)) = self.bytes[self.taken..].split_first_chunk::<HEAD>() else {
-            return Ok(None);
-        };
-        let [a, b, c, d, kind] = *head;
-        let length = usize::try_from(u32::from_le_bytes([a, b, c, d])).unwrap_or(usize::MAX);
-        if length > MAX_PAYLOAD {
-            return Err(LongFrame { length });
+        while let Some((head, rest)) = self.bytes[self.taken..].split_first_chunk::<HEAD>() {
+            let [a, b, c, d, kind] = *head;
+            let length = usize::try_from(u32::from_le_bytes([a, b, c, d])).unwrap_or(usize::MAX);
+            if length > MAX_PAYLOAD {
+                return Err(LongFrame { length });
+            }
+            let Some(payload) = rest.get(..length) else { break };
+            self.taken += HEAD + length;
+            if let Some(kind) = Kind::of(kind) {
+                return Ok(Some((kind, payload)));
+            }
         }
-        let Some(payload) = rest.get(..length) else { return Ok(None) };
-        self.taken += HEAD + length;
-        Ok(Some((Kind::of(kind), payload)))
+        Ok(None)
     }
 }
 
@@ -156,8 +145,8 @@ mod tests {
         let records = [record(1), record(2)];
         let stream: Vec<u8> = [
             frame(Kind::Answer, b"{}"),
+            vec![2, 0, 0, 0, 99, 7, 7], // of a later version of the protocol
             frame(Kind::Ticks, &ticks_to_payload(3, records.iter())),
-            frame(Kind::Unknown(99), b""),
         ]
         .concat();
         for cut in 0..stream.len() {
@@ -169,10 +158,7 @@ mod tests {
                     seen.push((kind, payload.to_vec()));
                 }
             }
-            assert_eq!(
-                seen.iter().map(|(kind, _)| *kind).collect::<Vec<_>>(),
-                [Kind::Answer, Kind::Ticks, Kind::Unknown(99)]
-            );
+            assert_eq!(seen.iter().map(|(kind, _)| *kind).collect::<Vec<_>>(), [Kind::Answer, Kind::Ticks]);
             assert_eq!(ticks_from_payload(&seen[1].1), (3, records.to_vec()));
         }
     }

@@ -30,7 +30,8 @@ const SPARE_DESCRIPTORS: usize = 4;
 /// Emergency stop latch of all runs of this user on this machine. Clones share the opened file.
 #[derive(Clone, Debug)]
 pub struct Latch {
-    directory: Directory,
+    /// Folder of the runs that the latch stops.
+    pub(crate) directory: Directory,
     path: PathBuf,
     kept: Arc<Kept>,
 }
@@ -133,11 +134,6 @@ impl Latch {
         let file = self.kept.file.iter().cycle().take(SPARE_DESCRIPTORS);
         let spare = file.flat_map(File::try_clone).collect();
         *lock(&self.kept.spare) = spare;
-    }
-
-    /// Returns the folder of the runs that the latch stops.
-    pub(crate) fn directory(&self) -> &Directory {
-        &self.directory
     }
 
     /// Reads the present state. A file that cannot be read counts as pressed; a folder of another user has no latch, because only

@@ -26,7 +26,7 @@ impl Latch {
     }
 
     fn unconfirmed(&self, until: Instant) -> Result<Vec<u32>, DirectoryError> {
-        let runs = self.directory().try_runs()?;
+        let runs = self.directory.try_runs()?;
         let mut open: Vec<Stopping> =
             runs.into_iter().map(|run| Stopping { run, connection: None }).collect();
         loop {

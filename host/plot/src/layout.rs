@@ -139,7 +139,7 @@ impl<'a> Draft<'a> {
         let y = panel.y.domain(extent, if has_bars { Fit::OnZero } else { Fit::Padded });
         // Numbers at an axis without data would be misleading.
         let y_ticks = match extent.is_empty() && panel.y.fixed.is_none() {
-            true => Ticks::none(),
+            true => Ticks::default(),
             false => Ticks::fit(&y, height_px, Spacing::Vertical { pitch_px: Y_LABEL_PITCH_PX }),
         };
         Self { panel, x_axis, x, y, y_ticks, has_x_labels, has_data }

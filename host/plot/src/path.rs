@@ -12,17 +12,13 @@ const ERROR_CAP_PX: f64 = 5.0;
 /// Path data under construction.
 #[derive(Debug, Default)]
 pub(super) struct Path {
-    data: String,
+    pub(super) data: String,
     at: (f64, f64),
     /// Start and length of a horizontal step at the end of the data, which a following step in the same direction extends.
     level: Option<(usize, f64)>,
 }
 
 impl Path {
-    pub(super) fn data(&self) -> &str {
-        &self.data
-    }
-
     pub(super) fn is_empty(&self) -> bool {
         self.data.is_empty()
     }

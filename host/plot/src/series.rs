@@ -13,18 +13,12 @@ const OPEN_BIN_DECADES: f64 = 0.5;
 #[must_use]
 pub struct Series {
     pub(super) label: String,
-    slot: Option<Look>,
+    /// Colour and dash; `None`: by the position of the series in its panel.
+    slot: Option<Slot>,
     weight: Weight,
     pub(super) shape: Shape,
     /// Number of samples or bins given, drawable or not.
     pub(super) given: usize,
-}
-
-/// Source of colour and dash.
-#[derive(Debug, Clone, Copy)]
-enum Look {
-    Slot(usize),
-    Axis(usize),
 }
 
 /// Samples with the kind of drawing.
@@ -159,13 +153,13 @@ impl Series {
     /// Sets the palette entry `slot` (counted from 0), so that a quantity has the same style in every panel, or a
     /// theory line the colour of its measured points.
     pub fn slot(mut self, slot: usize) -> Self {
-        self.slot = Some(Look::Slot(slot));
+        self.slot = Some(Slot::new(slot));
         self
     }
 
     /// Sets the colour of vector component 0, 1 or 2 (x, y or z): the line is solid, with the same colour in every panel and picture.
     pub fn axis(mut self, component: usize) -> Self {
-        self.slot = Some(Look::Axis(component));
+        self.slot = Some(Slot::of_axis(component));
         self
     }
 
@@ -177,12 +171,7 @@ impl Series {
 
     /// Returns colour, dash and marker of the series at `index` in its panel.
     pub(super) fn look(&self, index: usize) -> Slot {
-        let slot = match self.slot {
-            None => Slot::new(index),
-            Some(Look::Slot(slot)) => Slot::new(slot),
-            Some(Look::Axis(component)) => Slot::of_axis(component),
-        };
-        slot.with_weight(self.weight)
+        self.slot.unwrap_or_else(|| Slot::new(index)).with_weight(self.weight)
     }
 
     /// Returns the x range of the samples that can be drawn, in the coordinates of the x scale.

@@ -14,7 +14,8 @@ const REDUCED: f64 = 512.0;
 /// Not real-time: adding an interval may allocate, at most 16 KiB.
 #[derive(Debug, Clone, Default)]
 pub struct Spans {
-    stretches: Vec<[f64; 2]>,
+    /// Begin and end of each interval, in order.
+    pub(super) stretches: Vec<[f64; 2]>,
     is_open: bool,
 }
 
@@ -39,11 +40,6 @@ impl Spans {
     /// Ends the current interval; the next [`Self::extend`] begins another.
     pub fn interrupt(&mut self) {
         self.is_open = false;
-    }
-
-    /// Returns begin and end of each interval, in order.
-    pub(super) fn stretches(&self) -> &[[f64; 2]] {
-        &self.stretches
     }
 
     fn reduce(&mut self) {
@@ -74,7 +70,7 @@ mod tests {
             }
         }
         spans.extend(f64::NAN);
-        assert_eq!(spans.stretches(), [[10.0, 19.0], [50.0, 50.0]]);
+        assert_eq!(spans.stretches, [[10.0, 19.0], [50.0, 50.0]]);
     }
 
     #[test]
@@ -87,8 +83,8 @@ mod tests {
                 spans.interrupt();
             }
         }
-        assert!(spans.stretches().len() <= CAPACITY && spans.stretches.capacity() <= CAPACITY);
-        let covered = |x: f64| spans.stretches().iter().any(|[from, to]| *from <= x && x <= *to);
+        assert!(spans.stretches.len() <= CAPACITY && spans.stretches.capacity() <= CAPACITY);
+        let covered = |x: f64| spans.stretches.iter().any(|[from, to]| *from <= x && x <= *to);
         assert!([0.0, 3.0, 300_000.0, 399_999.0, 600_000.0, 999_999.0].into_iter().all(covered));
         assert!(!covered(500_000.0), "the long gap remains");
     }

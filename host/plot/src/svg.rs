@@ -18,7 +18,6 @@ use super::mark::{Direction, MarkLook};
 use super::path::Path;
 use super::projection::Projection;
 use super::series::{Series, Shape};
-use super::spans::Spans;
 use super::text::{self, escape, px};
 use super::theme::{Slot, font_px, style_sheet};
 
@@ -150,7 +149,7 @@ impl Writer {
             return;
         }
         let dash = if dash.is_empty() { String::new() } else { format!(" stroke-dasharray=\"{dash}\"") };
-        self.raw(&format!("<path class=\"{class}\"{dash} d=\"{}\"/>\n", path.data()));
+        self.raw(&format!("<path class=\"{class}\"{dash} d=\"{}\"/>\n", path.data));
     }
 
     fn cell(&mut self, cell: &Cell<'_>) {
@@ -207,7 +206,7 @@ impl Writer {
         let projection @ Projection { x, frame, .. } = &cell.projection;
         let mut path = Path::default();
         let mut reached = f64::NEG_INFINITY;
-        for stretch in cell.draft.panel.limited.iter().flat_map(Spans::stretches) {
+        for stretch in cell.draft.panel.limited.iter().flat_map(|spans| &spans.stretches) {
             let ends = stretch.map(|at| x.scale.forward(at).map(|at| projection.x_px(at)));
             let [Some(from), Some(to)] = ends else { continue };
             let to = to.max(from + LEAST_STRETCH_PX).min(frame.right());

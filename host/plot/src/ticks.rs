@@ -16,8 +16,8 @@ const SMALLEST_PLAIN: f64 = 1e-2;
 /// Decades labelled in plain digits (0.001 to 10 000); if one is outside, all labels of the axis are powers of ten.
 const PLAIN_DECADES: std::ops::RangeInclusive<i32> = -3..=4;
 
-/// Ticks of one axis; positions are fractions of its domain.
-#[derive(Debug, Clone, PartialEq)]
+/// Ticks of one axis; positions are fractions of its domain. The default is an axis without ticks.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Ticks {
     pub(super) major: Vec<Tick>,
     pub(super) minor: Vec<f64>,
@@ -54,11 +54,6 @@ impl Spacing {
 }
 
 impl Ticks {
-    /// Returns no ticks, for an axis without numbers.
-    pub(super) fn none() -> Self {
-        Self { major: Vec::new(), minor: Vec::new(), exponent: 0 }
-    }
-
     /// Returns the densest ticks with enough distance between their labels on an axis of `length_px`.
     pub(super) fn fit(domain: &Domain, length_px: f64, spacing: Spacing) -> Self {
         let most = match spacing {
@@ -82,7 +77,7 @@ impl Ticks {
             let tick = Tick { position, label: value.to_string() };
             (-END_TOLERANCE..=1.0 + END_TOLERANCE).contains(&position).then_some(tick)
         };
-        Self { major: values.iter().filter_map(tick).collect(), ..Self::none() }
+        Self { major: values.iter().filter_map(tick).collect(), ..Self::default() }
     }
 
     /// Places at most about `most` ticks.

@@ -18,7 +18,7 @@ pub enum FileError {
         found: u64,
     },
     /// The path leads to no file, or to another file.
-    #[error("the file was removed or replaced during the run")]
+    #[error("the file was removed or replaced while it was written")]
     Replaced,
 }
 

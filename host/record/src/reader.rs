@@ -43,7 +43,7 @@ pub enum Damage {
     #[error("a tick has no pose of the same time on `/tf`")]
     NoPose,
     /// Number of tick records that are missing from the sequence.
-    #[error("{0} ticks are missing")]
+    #[error("{}", gap(*.0))]
     Gap(u32),
 }
 
@@ -101,9 +101,11 @@ pub enum ReadError {
     #[error("`{}` is damaged {}: {cause}; {}",
         path.display(),
         after_tick.map_or_else(|| "before its first tick".to_owned(), |tick| format!("after tick {tick}")),
-        after_tick.map_or("the recording contains no readable tick: record again", |_| {
-            "the ticks before the damage are intact: `flotor repair` copies them to a new file"
-        }))]
+        match (after_tick, cause) {
+            (None, _) => "the recording contains no readable tick: record again",
+            (_, Damage::File(_)) => "the ticks before the damage are intact: `flotor repair` copies them to a new file",
+            _ => "the ticks before the damage are intact; for the others, record again",
+        })]
     Damaged {
         /// Path of the file.
         path: PathBuf,
@@ -282,6 +284,15 @@ fn read_run(path: &Path, message: &Message<Topic>) -> Result<RunDescription, Rea
 fn decode<M: prost::Message + Default>(message: &Message<Topic>) -> Result<M, Damage> {
     let topic = message.topic.name();
     M::decode(message.data.as_slice()).map_err(|cause| Damage::Message { topic, cause })
+}
+
+/// Describes a gap of so many ticks; a number that wraps is a step back.
+fn gap(missing: u32) -> String {
+    match missing {
+        1 => "a tick is missing".to_owned(),
+        ..=0x7fff_ffff => format!("{missing} ticks are missing"),
+        _ => "the tick numbers go back: ticks are repeated, or another recording is appended".to_owned(),
+    }
 }
 
 fn lacks(message: &Message<Topic>, Missing(field): Missing) -> Damage {

@@ -511,7 +511,7 @@ fn a_recording_that_another_program_removes_replaces_or_cuts_is_an_error() {
         fs::write(path, "another").unwrap();
     };
     let cut = |path: &Path| File::options().write(true).open(path).unwrap().set_len(9).unwrap();
-    holds(&damaged(&remove, &[]), &["lost.mcap", "removed or replaced", "record again"]);
+    holds(&damaged(&remove, &[]), &["lost.mcap", "removed or replaced", "try again"]);
     holds(&damaged(&replace, &[]), &["lost.mcap", "removed or replaced"]);
     holds(&damaged(&cut, &[]), &["lost.mcap", "to 9 bytes"]);
     // The recording goes on after the cut: the next chunk finds it.

@@ -44,8 +44,8 @@ pub enum RecordError {
     },
     /// The file could not be written to.
     #[error(
-        "cannot continue writing the recording `{}`: {cause}; the part written before is readable; make room or \
-         name another file, and record again",
+        "cannot write the recording `{}`: {cause}; ticks written before are readable; make room or name another file, \
+         and try again",
         path.display()
     )]
     Write {
@@ -56,7 +56,7 @@ pub enum RecordError {
         cause: io::Error,
     },
     /// Another program removed or replaced the file, or changed its length, during the run.
-    #[error("the recording `{}` is lost or damaged: {damage}; record again", path.display())]
+    #[error("the recording `{}` is lost or damaged: {damage}; try again", path.display())]
     Lost {
         /// Path of the file.
         path: PathBuf,

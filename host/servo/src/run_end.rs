@@ -69,8 +69,8 @@ impl RunEnd {
             Self::EmergencyStop(source) => format!("emergency stop ({})", source.word()),
             Self::TooFast(samples_per_s) => {
                 format!(
-                    "the device sends {samples_per_s} samples a second, more than the `rate_hz` of the \
-                     scene; set `rate_hz = {samples_per_s}`, or `pacing = \"host\"`"
+                    "the device sends {samples_per_s} samples a second, more than the loop rate; raise `rate_hz` \
+                     to at least {samples_per_s}, or set `pacing = \"host\"`"
                 )
             }
             Self::NotPaced => {

@@ -182,7 +182,7 @@ impl CalibrationFile {
             let cause =
                 message.split(", expected one of").next().unwrap_or_default().replace(" field ", " key ");
             let problem =
-                format!("the file is not a calibration file ({cause}); write one with `flotor calibrate`");
+                format!("the file is not a valid calibration file ({cause}); correct the file, or write a new one with `flotor calibrate`");
             error(file, before.matches('\n').count() + 1, problem)
         })?;
         let wrong = |keys: &[&str], problem: String| error(file, line_of(text, keys), problem);
@@ -198,8 +198,8 @@ impl CalibrationFile {
             InvalidCalibration::Range(_) => {
                 let [from, to] = read.vertical.range_mm;
                 wrong(&["vertical", "range_mm"], format!(
-                    "[vertical] the range {from:?} mm to {to:?} mm is invalid; write two finite heights, the \
-                     lower first"))
+                    "[vertical] the range {from:?} mm to {to:?} mm is invalid; write two heights within 1000 mm of \
+                     the centre, the lower first"))
             }
             other => wrong(&["vertical", "coefficients_per_mm"], format!("[vertical] {other}")),
         })?;
@@ -225,9 +225,9 @@ impl CalibrationFile {
         if wanted == plugin && (wanted_serial.is_empty() || wanted_serial == serial) {
             return Ok(());
         }
-        let problem = format!(
-            "the file is for `{wanted}` {wanted_serial}, the device is `{plugin}` {serial}; calibrate this device"
-        );
+        let [wanted, device] = [(&**wanted, &**wanted_serial), (plugin, serial)]
+            .map(|(id, serial)| format!("`{id}` {serial}").trim_end().to_owned());
+        let problem = format!("the file is for {wanted}, the device is {device}; calibrate this device");
         Err(error(file, 0, problem))
     }
 }
@@ -267,11 +267,11 @@ mod tests {
             assert_ne!(text, EXAMPLE, "{from} stands in the example");
             CalibrationFile::parse("c.toml", &text).unwrap_err().to_string()
         };
-        let unknown = "c.toml:4: the file is not a calibration file (unknown key `seriel`, expected `plugin` or `serial`); write one with `flotor calibrate`";
+        let unknown = "c.toml:4: the file is not a valid calibration file (unknown key `seriel`, expected `plugin` or `serial`); correct the file, or write a new one with `flotor calibrate`";
         assert_eq!(said("serial", "seriel"), unknown);
         assert_eq!(
             said("format = 1", "model = 1"),
-            "c.toml:1: the file is not a calibration file (unknown key `model`); write one with `flotor calibrate`"
+            "c.toml:1: the file is not a valid calibration file (unknown key `model`); correct the file, or write a new one with `flotor calibrate`"
         );
         assert!(said("[-7.0, 7.0]", "[-7.0, true]").starts_with("c.toml:6: "));
         assert!(said("format = 1", "format = 2").contains("format 2, but this program reads format 1"));

@@ -5,7 +5,6 @@
 use crate::calls::STEP_LIMIT_VARIABLE;
 use crate::platform::ThreadClock;
 use flotor_servo::StopSwitch;
-use std::fmt;
 use std::time::{Duration, Instant};
 
 /// Default limit of the processor time of a call.
@@ -27,42 +26,27 @@ pub fn step_limit() -> Duration {
 const REMEDY: &str = "set `FLOTOR_STEP_LIMIT_S` to raise the limit";
 
 /// Limit that a call has exceeded.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Exceeded {
     /// Watchdog timeout; the watchdog has stopped the devices.
+    #[error(
+        "; the watchdog stopped the device after {} ms (`[limits] watchdog_ms` sets the limit)",
+        .0.as_millis()
+    )]
     Watchdog(Duration),
     /// Limit of processor time.
+    #[error(" within {} s of processor time ({REMEDY})", .0.as_secs_f64())]
     Processor(Duration),
     /// Limit of the time in which the thread needed no processor.
+    #[error(
+        " within {} s, without measured use of a processor: the call may be blocked ({REMEDY})",
+        .0.as_secs_f64()
+    )]
     Waiting(Duration),
     /// Limit of the time after a stop request.
+    #[error(" within {} s after the request to stop", .0.as_secs_f64())]
     Stop(Duration),
-}
-
-impl fmt::Display for Exceeded {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Watchdog(limit) => {
-                write!(
-                    f,
-                    "; the watchdog stopped the device after {} ms (`[limits] watchdog_ms` sets the limit)",
-                    limit.as_millis()
-                )
-            }
-            Self::Processor(limit) => {
-                write!(f, " within {} s of processor time ({REMEDY})", limit.as_secs_f64())
-            }
-            Self::Waiting(limit) => {
-                write!(
-                    f,
-                    " within {} s and used no processor time: the call is blocked ({REMEDY})",
-                    limit.as_secs_f64()
-                )
-            }
-            Self::Stop(limit) => write!(f, " within {} s after the request to stop", limit.as_secs_f64()),
-        }
-    }
 }
 
 /// Timer of a call at a place of the loop, polled from another thread.

@@ -120,17 +120,11 @@ pub struct Port {
     lapses: Arc<Lapses>,
 }
 
-impl Default for Port {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl Port {
-    /// Creates a port with disabled force, and connects the next model that is created with the [number](Self::number) of the port
+    /// Opens a port with disabled force, and connects the next model that is created with the [number](Self::number) of the port
     /// as `port`. Not real-time.
     #[must_use]
-    pub fn new() -> Self {
+    pub fn open() -> Self {
         let (publisher, command) = latest(NO_COMMAND);
         let (number, lapses) = (NEXT.fetch_add(1, Ordering::Relaxed), Arc::<Lapses>::default());
         lock(&FREE).push((number, ModelEnd { command, lapses: Arc::clone(&lapses) }));
@@ -243,7 +237,7 @@ pub fn connect(scene: &mut Scene) -> Vec<Connected> {
                 ..model
             }));
         }
-        let port = Port::new();
+        let port = Port::open();
         let model = scene.models.iter_mut().find(is_ours);
         let (mapping, ramp_ns) = model.map_or((Mapping::new(&Default::default()), 0), |model| {
             *model = model.replaced_by(None, &[("port", &port.number().to_string())]);
@@ -413,7 +407,7 @@ mod tests {
 
     /// A port and its model: valid for 50 ms, fading for 50 ms, rising for 200 ms.
     fn connected() -> (Port, Model) {
-        let port = Port::new();
+        let port = Port::open();
         let model = model(port.number()).expect("its port is free");
         (port, model)
     }

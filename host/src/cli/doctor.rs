@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
     code is 0, and with `--device` 1 if the device is not ready to start."
 )]
 pub(crate) struct DoctorArguments {
-    /// Id of a device: check why the device does not start (default: check the machine)
+    /// Id of a device plugin, or path to its file: check why the device does not start (default: check the machine)
     #[arg(long, value_name = "ID")]
     device: Option<String>,
     /// Set a parameter of the device (repeatable)

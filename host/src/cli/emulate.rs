@@ -41,8 +41,8 @@ pub(crate) fn run(arguments: &EmulateArguments) -> Result<(), CommandError> {
         && device.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
     if !is_id {
         return Err(CommandError::Usage(format!(
-            "`{device}` is not the name of an emulator: a name starts with a letter; `flotor emulate NAME --help` \
-             lists the options"
+            "`{device}` is not the name of an emulator: write a letter first, then letters, digits, `-` and `_`; \
+             `flotor emulate NAME --help` lists the options"
         )));
     }
     let program = format!("flotor-{device}-emulator");

@@ -42,8 +42,8 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
     flotor run wall                                   another of Flotor's own scenes (`flotor scenes`)\n  \
     flotor run scene.toml --set spring.variant=closed-form --record run.mcap\n  \
     flotor eval --model spring --set preset=thesis-2 --poses poses.csv --out -\n\n\
-    Exit codes: 0 ok, 2 usage or configuration, 3 a plugin was refused or failed, 4 device fault or emergency\n\
-    stop, 1 anything else.")]
+    Exit codes: 0 ok, 2 usage or configuration, 3 a plugin was refused or failed, 4 device fault, or device\n\
+    stopped (emergency stop, watchdog, oscillation), 130 forced end (on Windows another code), 1 anything else.")]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,

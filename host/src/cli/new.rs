@@ -22,10 +22,11 @@ pub(crate) struct NewArguments {
     /// Programming language
     #[arg(long, value_enum, default_value = "rust")]
     language: Language,
-    /// Folder of the contract's sources (default: the sources of this installation)
+    /// With --language rust: folder of the contract's sources (default: the sources of this installation; if there are none, and
+    /// without --vendor, the crate of the registry)
     #[arg(long, value_name = "PATH")]
     hal: Option<PathBuf>,
-    /// Copy the contract's sources into the new folder: it then builds in every checkout
+    /// With --language rust: copy the contract's sources into the new folder, which then builds in every checkout
     #[arg(long)]
     vendor: bool,
 }

@@ -20,7 +20,7 @@ use std::time::Instant;
     flotor plugins --json | python3 -m json.tool"
 )]
 pub(crate) struct PluginsArguments {
-    /// Id of a plugin: show its parameters, which loads the plugin (default: list all plugins)
+    /// Id of a plugin, or path to its file: show its parameters, which loads the plugin (default: list all plugins)
     id: Option<String>,
     /// Setting with which the model's error estimate and time per tick are measured (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE", requires = "id", conflicts_with = "json")]

@@ -58,16 +58,15 @@ fn record_local(out: &Path) -> Result<(), CommandError> {
         0 => String::new(),
         dropped => format!(", {} {dropped} ticks dropped by the host", style::warning("without")),
     };
-    let (RecordingEnd::Complete(words) | RecordingEnd::Cut(words)) = &end;
+    let words = end.as_ref().map_or_else(ToString::to_string, Clone::clone);
     let printed = report_line(format_args!("{}: {ticks} ticks{lost}; {words}", out.display()));
-    let whole = match end {
-        RecordingEnd::Complete(_) => Ok(()),
-        RecordingEnd::Cut(_) => Err(CommandError::Failed(
+    let whole = end.map(drop).map_err(|_| {
+        CommandError::Failed(
             "the connection was lost before the end of the run, so the recording is incomplete; the file \
              contains the ticks received until then. To record without a connection, use `flotor run --record`"
                 .to_owned(),
-        )),
-    };
+        )
+    });
     first_error([whole, printed])
 }
 
@@ -75,22 +74,15 @@ fn record_local(out: &Path) -> Result<(), CommandError> {
 struct Kept {
     ticks: u64,
     dropped: u64,
-    end: RecordingEnd,
-}
-
-/// End of a recording, with the text to print.
-enum RecordingEnd {
-    /// The run is over, or the user stopped the recording.
-    Complete(String),
-    /// The connection was lost without an end message.
-    Cut(String),
+    /// Text on the end of the run or of the recording, or the error if the connection was lost without an end message.
+    end: Result<String, LiveError>,
 }
 
 fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, CommandError> {
     let mut recorder = Recorder::create(out, client.run())?;
     let lost = |error: LiveError| CommandError::Failed(error.to_string());
     client.request_client().ask(Ask::Watch { every: 1 }).map_err(lost)?;
-    let mut kept = Kept { ticks: 0, dropped: 0, end: RecordingEnd::Complete("stopped recording".to_owned()) };
+    let mut kept = Kept { ticks: 0, dropped: 0, end: Ok("stopped recording".to_owned()) };
     while !stop.is_stop_requested() {
         match client.next(LOOK_PERIOD) {
             // The only request is the one to receive ticks.
@@ -113,12 +105,12 @@ fn keep(mut client: Client, out: &Path, stop: &StopSwitch) -> Result<Kept, Comma
             }
             Ok(Some(Event::Change(change))) => recorder.change(&change)?,
             Ok(Some(Event::End(end))) => {
-                kept.end = RecordingEnd::Complete(end.words);
+                kept.end = Ok(end.words);
                 break;
             }
             // The recorded ticks are valid; the message reports that the connection was lost.
             Err(error) => {
-                kept.end = RecordingEnd::Cut(error.to_string());
+                kept.end = Err(error);
                 break;
             }
         }

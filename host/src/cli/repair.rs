@@ -15,7 +15,7 @@ use std::path::PathBuf;
     Example:\n  flotor repair cut.mcap --out whole.mcap"
 )]
 pub(crate) struct RepairArguments {
-    /// Truncated recording
+    /// Truncated or damaged recording
     recording: PathBuf,
     /// File to write
     #[arg(long, value_parser = mcap_file, value_name = "FILE.mcap")]

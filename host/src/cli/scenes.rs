@@ -16,6 +16,7 @@ use std::collections::BTreeSet;
     flotor scenes wall > mine.toml      a scene to edit and run with `flotor run mine.toml`")]
 pub(crate) struct ScenesArguments {
     /// Name of a scene: print its text (default: list all scenes)
+    #[arg(conflicts_with = "json")]
     name: Option<String>,
     #[command(flatten)]
     json: JsonOption,

@@ -6,7 +6,6 @@ use flotor_command::options::KeyValue;
 use flotor_command::say;
 use flotor_live::{Answer, Ask, ChangeMessage, Client, Directory, Event, LiveError, RefusalCause, Subject};
 use flotor_session::scene::is_named;
-use std::path::MAIN_SEPARATOR;
 use std::time::{Duration, Instant};
 
 /// Timeout for the host's reply, which follows the creation of the model.
@@ -27,7 +26,7 @@ const SWAP_LIMIT: Duration = Duration::from_secs(5);
     flotor swap spring --plugin ./target/release/libmine.so --run 4711"
 )]
 pub(crate) struct SwapArguments {
-    /// Name of the model in the scene
+    /// Name of the model in the scene; NAME@DEVICE for one of several devices
     model: String,
     /// The new plugin: its id or the path of its file (default: the same plugin)
     #[arg(long, value_name = "ID|FILE")]
@@ -68,13 +67,20 @@ pub(crate) fn run(arguments: &SwapArguments) -> Result<(), CommandError> {
 
 /// Converts a plugin's path to an absolute path for the host, which may have another working directory; an id stays unchanged.
 fn for_host(plugin: &str) -> Result<String, CommandError> {
-    if !plugin.contains(MAIN_SEPARATOR) {
+    if !plugin.contains(std::path::is_separator) {
         return Ok(plugin.to_owned());
     }
-    let whole = std::path::absolute(plugin)
-        .map_err(|cause| CommandError::file(plugin.as_ref(), "cannot determine the absolute path", cause))?;
+    let whole = std::path::absolute(plugin).map_err(|cause| {
+        CommandError::Failed(format!(
+            "`{plugin}`: cannot make the path absolute: {cause}; give the absolute path"
+        ))
+    })?;
+    // The given path is UTF-8, so the current folder is not.
     whole.into_os_string().into_string().map_err(|path| {
-        CommandError::Usage(format!("`{}`: the path is not valid UTF-8; rename the file", path.display()))
+        CommandError::Usage(format!(
+            "`{}`: the path of the current folder is not valid UTF-8; move the plugin to another folder",
+            path.display()
+        ))
     })
 }
 

@@ -23,16 +23,17 @@ use std::process::Stdio;
     flotor view --screenshot run.png --view 80,5,1.5 run.mcap\n  \
     flotor view --measure 10 run.mcap             number of pictures and processor time in 10 s")]
 pub(crate) struct ViewArguments {
-    /// Recording, or zenoh/NAME for a remote session (default: the running host)
+    /// Recording, or zenoh/NAME for a remote session (default: the newest session of this machine)
     #[arg(value_name = "FILE.mcap | zenoh/NAME")]
     file: Option<PathBuf>,
-    /// Second recording, drawn over the first: with dashed traces, and the handle as a transparent ball
+    /// Second recording, drawn over the first (with --screenshot: only with --window): with dashed traces, and the handle as a
+    /// transparent ball
     #[arg(value_name = "FILE.mcap", conflicts_with_all = ["export", "screen"])]
     second: Option<PathBuf>,
     /// Write a picture of one moment (PNG); needs no display and no GPU
     #[arg(long, value_name = "OUT.png", requires = "file")]
     screenshot: Option<PathBuf>,
-    /// With --screenshot: draw the whole window with its panels
+    /// With --screenshot: draw the whole window with its panels (default: only the 3D view and the traces)
     #[arg(long, requires = "screenshot")]
     window: bool,
     /// Show the session of this process (default: the newest session)
@@ -48,16 +49,17 @@ pub(crate) struct ViewArguments {
     /// Plot force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z")]
     force_position: Option<String>,
-    /// Force of an arrow of full length, N; set this force for comparable pictures (default: the largest force of the run)
+    /// Force of an arrow of full length, 0.001 to 10000 N; set this force for comparable pictures (default: the largest force of
+    /// the run)
     #[arg(long, value_name = "NEWTONS", conflicts_with = "export")]
     arrow_force: Option<String>,
-    /// With --export: title of the plot (default: the title of the scene)
+    /// With --export: title of a plot (default: the title of the run)
     #[arg(long, value_name = "TEXT", requires = "export")]
     title: Option<String>,
     /// With --screenshot: draw a screen of a sitting, as `flotor study --screen json` writes it
     #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view", "traces", "force_position", "device", "arrow_force"])]
     screen: Option<String>,
-    /// With --screen: file with the texts of the screens in another language
+    /// With --screen: file with the texts of the screens in another language (default: English)
     #[arg(long, value_name = "FILE", requires = "screen")]
     texts: Option<String>,
     /// Device of the recording whose numbers and traces are shown, where there are several (default: the first)
@@ -66,16 +68,18 @@ pub(crate) struct ViewArguments {
     /// Time in the recording to show, s (default: the time of the largest force)
     #[arg(long, value_name = "SECONDS", requires = "file", conflicts_with = "export")]
     at: Option<String>,
-    /// Colours: dark or light (default: dark; with --export: light)
+    /// Colours: dark or light (default: dark, with --export light; in a window: the look of the last window)
     #[arg(long, value_name = "dark|light")]
     look: Option<String>,
-    /// Width and height of picture or window in pixels, each 64 to 8192 (default: 1280x800)
+    /// Width and height of picture or window, 64 to 8192 pixels each (default: 1280x800, with --export 1800x1000; in a window:
+    /// the size of the last window)
     #[arg(long, value_name = "WxH")]
     size: Option<String>,
-    /// Size of text and lines, 1 to 3 (default: 1)
+    /// Size of text and lines, 1 to 3 (default: 1; in a window: the scale of the last window)
     #[arg(long, value_name = "FACTOR", conflicts_with = "export")]
     scale: Option<String>,
-    /// With --screenshot: degrees of the camera to the right and above the horizon, and magnification (default: 31.5,13.8)
+    /// With --screenshot: camera in degrees, -360 to 360 to the right and -2 to 88 above the horizon, and a zoom, 0.2 to 3
+    /// (default: 31.5,13.8,1)
     #[arg(long, value_name = "AZIMUTH,INCLINATION[,ZOOM]", allow_hyphen_values = true)]
     #[arg(requires = "screenshot", conflicts_with = "window")]
     view: Option<String>,

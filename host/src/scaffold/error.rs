@@ -11,7 +11,7 @@ pub enum ScaffoldError {
     #[error(transparent)]
     Name(#[from] NameError),
     /// The plugin's type would have the name of a type of the contract that the template uses.
-    #[error("type `{type_name}` of plugin `{id}` clashes with a type of the contract; use `my-{id}`")]
+    #[error("type `{type_name}` of plugin `{id}` clashes with a name that the template uses; use `my-{id}`")]
     Clash {
         /// Id of the plugin.
         id: String,
@@ -30,8 +30,8 @@ pub enum ScaffoldError {
     InsideWorkspace(PathBuf),
     /// The contract's sources were not found; the path is the last folder searched.
     #[error(
-        "the sources of the contract (`hal/`, `share/flotor/hal/`) are neither in a folder above this program nor at {}; give \
-         their folder with --hal PATH",
+        "the sources of the contract (manifest and `src/` of flotor-hal) are not at {}; give their folder, such as \
+         `share/flotor/hal` of an installation, with --hal PATH",
         .0.display()
     )]
     NoContract(PathBuf),
@@ -44,7 +44,7 @@ pub enum ScaffoldError {
         reason: String,
     },
     /// A path is not valid UTF-8, or has characters that cargo's configuration cannot hold.
-    #[error("{}: the path is not valid UTF-8, or has quotes or backslashes; use another folder", .0.display())]
+    #[error("{}: the path is not valid UTF-8, or has a double quote, a backslash or a line break; use another folder", .0.display())]
     NotText(PathBuf),
     /// A file cannot be read.
     #[error("{}: cannot read the file: {cause}; check its permissions", path.display())]

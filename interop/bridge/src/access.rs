@@ -44,7 +44,7 @@ pub const STOP_KEYS: &str = "stop_keys";
 #[non_exhaustive]
 pub enum AccessError {
     /// A file could not be created.
-    #[error("{}: {cause}; choose a new folder in a place where you may write: the command overwrites no keys", path.display())]
+    #[error("cannot create {}: {cause}; choose a new folder in a place where you may write: the command overwrites no keys", path.display())]
     File {
         /// Path of the file.
         path: PathBuf,

@@ -43,18 +43,13 @@ pub enum Side {
 }
 
 impl Side {
-    fn tells(self, name: &Name, coupling: &str) -> String {
+    /// Returns the key of a coupling on which this side publishes, and the key that this side subscribes to.
+    fn keys(self, name: &Name, coupling: &str) -> (String, Option<String>) {
+        let [news, couple] = ["news", "couple"].map(|part| name.key(&format!("{part}/{coupling}")));
         match self {
-            Side::Serving | Side::ServingReadOnly => name.key(&format!("news/{coupling}")),
-            Side::Visiting => name.key(&format!("couple/{coupling}")),
-        }
-    }
-
-    fn incoming_key(self, name: &Name, coupling: &str) -> Option<String> {
-        match self {
-            Side::Serving => Some(name.key(&format!("couple/{coupling}"))),
-            Side::ServingReadOnly => None,
-            Side::Visiting => Some(name.key(&format!("news/{coupling}"))),
+            Side::Serving => (news, Some(couple)),
+            Side::ServingReadOnly => (news, None),
+            Side::Visiting => (couple, Some(news)),
         }
     }
 }
@@ -109,7 +104,7 @@ pub enum CoupleError {
     #[error(transparent)]
     Directory(#[from] DirectoryError),
     /// A thread could not be created.
-    #[error("cannot start a thread for the coupling: {0}; end other programs of this user")]
+    #[error("cannot start a thread: {0}; end other programs of this user")]
     Thread(#[from] std::io::Error),
 }
 
@@ -253,12 +248,12 @@ impl Coupler {
                 }
             }
         };
-        let key = side.incoming_key(name, &found.name);
+        let (outgoing, incoming) = side.keys(name, &found.name);
         let subscriber =
-            key.map(|key| session.declare_subscriber(key).callback(receive).wait_now()).transpose()?;
+            incoming.map(|key| session.declare_subscriber(key).callback(receive).wait_now()).transpose()?;
         // Highest priority. Not express: on a slow network messages share a batch instead of being dropped.
         let tells = session
-            .declare_publisher(side.tells(name, &found.name))
+            .declare_publisher(outgoing)
             .congestion_control(CongestionControl::Drop)
             .priority(Priority::RealTime)
             .wait_now()?;

@@ -29,7 +29,7 @@ pub struct Name(String);
 
 /// Error of a text that is not a valid name.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("invalid name `{0}`: use letters a to z, digits and hyphens, at most 40")]
+#[error("invalid name `{0}`: use 1 to 40 letters a to z, digits or hyphens")]
 pub struct NoName(String);
 
 impl Name {

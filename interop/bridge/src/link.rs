@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 use std::net::IpAddr;
 use std::ops::Deref;
 use std::path::PathBuf;
+use zenoh::config::EndPoint;
 use zenoh::{Config, Session, Wait};
 
 /// Prefix of Zenoh endpoints on Unix sockets.
@@ -23,10 +24,10 @@ pub struct LinkOptions {
     /// Zenoh configuration (JSON5): endpoints, keys, access control; `flotor bridge keys` writes configurations
     #[arg(long, value_name = "FILE", global = true)]
     pub config: Option<PathBuf>,
-    /// Endpoint to listen on, such as tls/0.0.0.0:7447 (repeatable)
+    /// Endpoint to listen on in place of those in --config, such as tls/0.0.0.0:7447 (repeatable)
     #[arg(long, value_name = "ENDPOINT", global = true)]
     pub listen: Vec<String>,
-    /// Endpoint to connect to, such as tls/lab.example.org:7447 (repeatable)
+    /// Endpoint to connect to in place of those in --config, such as tls/lab.example.org:7447 (repeatable)
     #[arg(long, value_name = "ENDPOINT", global = true)]
     pub connect: Vec<String>,
     /// Listen or connect beyond this machine without keys: every reachable peer has the rights of --allow
@@ -38,42 +39,43 @@ pub struct LinkOptions {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinkError {
-    /// The configuration, or an endpoint of `--listen` or `--connect`, is invalid.
+    /// The configuration, or a file that it names, cannot be read or is invalid.
     #[error(
-        "{} is invalid: {reason}; {}",
-        file.as_ref().map_or_else(
-            || "an endpoint of `--listen` or `--connect`".to_owned(),
-            |f| format!("the configuration {}", f.display())
-        ),
-        file.as_ref().map_or("write an endpoint such as tls/lab.example.org:7447", |_| {
-            "correct the file, or create new keys and configurations with `flotor bridge keys`"
-        })
-    )]
+        "cannot use the configuration {}: {reason}; correct the path or the file, or create new keys and \
+         configurations with `flotor bridge keys`", file.display())]
     Config {
-        /// Path of the configuration; `None` without one.
-        file: Option<PathBuf>,
+        /// Path of the configuration.
+        file: PathBuf,
         /// Cause.
         reason: String,
     },
-    /// Other users can read a private key: whoever has the key can act as the member until the certificate expires.
+    /// A text of `--listen` or `--connect` is not an endpoint.
+    #[error("`{option} {endpoint}` is not PROTOCOL/ADDRESS; write, for example, tls/lab.example.org:7447")]
+    Endpoint {
+        /// Command line option.
+        option: &'static str,
+        /// Given text.
+        endpoint: String,
+    },
+    /// Other users can access a secret key: whoever has the key can act as the member until the certificate expires.
     #[error(
-        "other users can read the private key in {}; run `chmod 600 {}`, and create new keys with `flotor \
-         bridge keys` if another user could have read the file", file.display(), file.display())]
+        "other users can access the secret key in {}; run `chmod 600 {}`, and create new keys with `flotor \
+         bridge keys` if another user may have read or changed the file", file.display(), file.display())]
     ExposedKey {
         /// Path of the file with the key.
         file: PathBuf,
     },
     /// An endpoint is open to other users, and without keys they would have all rights of `--allow`.
     #[error(
-        "`{endpoint}` is open to other users, and only keys distinguish members: create keys for --config \
-         with `flotor bridge keys`, or accept every peer with --without-keys"
+        "`{endpoint}` is open to other users, and only keys distinguish members: give a configuration of `flotor \
+         bridge keys` with --config (a bridge: bridge.json5), or accept every peer with --without-keys"
     )]
     WithoutKeys {
         /// Offending endpoint.
         endpoint: String,
     },
     /// The session cannot be opened.
-    #[error("cannot open the session: {0}; check that the endpoint is free and the peer is running")]
+    #[error("cannot open the session: {0}; check the keys, and that the endpoint is free or its bridge runs")]
     Open(String),
     /// A network operation has failed.
     #[error("network error: {0}; check the connection and the peer")]
@@ -82,8 +84,19 @@ pub enum LinkError {
 
 impl From<zenoh::Error> for LinkError {
     fn from(error: zenoh::Error) -> Self {
-        Self::Network(error.to_string())
+        Self::Network(words(&error))
     }
+}
+
+/// Returns the message of an error without the places in Zenoh's source (` at FILE.rs:LINE.`).
+fn words(error: &zenoh::Error) -> String {
+    let text = error.to_string();
+    let (mut words, mut rest) = (String::new(), text.as_str());
+    while let Some((before, after)) = rest.split_once(".rs:") {
+        words += before.rsplit_once(" at ").map_or(before, |(message, _)| message);
+        rest = after.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+    }
+    words + rest
 }
 
 /// Synchronous completion of a Zenoh operation, with its error as [`LinkError`].
@@ -208,7 +221,6 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     if let Some(file) = exposed_key(options, &config) {
         return Err(LinkError::ExposedKey { file });
     }
-    let wrong = |error: zenoh::Error| LinkError::Config { file: None, reason: error.to_string() };
     let has_rules = has_rules(&config);
     // A visitor's configuration is the user's own; its access rules are not known here.
     let is_known = end == End::Serving || options.config.is_none();
@@ -225,14 +237,14 @@ pub fn open(options: &LinkOptions, end: End) -> Result<Link, LinkError> {
     if end == End::Serving && !has_rules {
         // Any peer may connect, but only the bridge may publish.
         for (key, value) in access::of_anyone() {
-            config.insert_json5(&format!("access_control/{key}"), &value.to_string()).map_err(wrong)?;
+            config.insert_json5(&format!("access_control/{key}"), &value.to_string())?;
         }
     }
     let metadata = says(&config, "metadata").unwrap_or_default();
     let has_members = end == End::Visiting || says(&config, "access_control/policies") != Some(json!([]));
     let lacks_stop_keys =
         has_members && metadata.get(access::EXPIRES).is_some() && metadata.get(access::STOP_KEYS).is_none();
-    let session = zenoh::open(config).wait().map_err(|error| LinkError::Open(error.to_string()))?;
+    let session = zenoh::open(config).wait().map_err(|error| LinkError::Open(words(&error)))?;
     let (member, expires_s) = (member_of(&metadata), metadata.get(access::EXPIRES).and_then(Value::as_u64));
     Ok(Link { session, member, expires_s, stop_channel, lacks_stop_keys })
 }
@@ -256,7 +268,7 @@ fn stop_channel_of(
     let metadata = says(config, "metadata").unwrap_or_default();
     let keys = match metadata.get(access::STOP_KEYS).and_then(Value::as_str) {
         Some(file) => StopKeys::read(file.as_ref()).map_err(|error| LinkError::Config {
-            file: options.config.clone(),
+            file: options.config.clone().unwrap_or_default(),
             reason: format!("{file}: {error}"),
         })?,
         None if end == End::Serving && has_rules(config) => return Ok(None),
@@ -291,23 +303,27 @@ fn member_of(metadata: &Value) -> Name {
 }
 
 fn config_of(options: &LinkOptions) -> Result<Config, LinkError> {
-    // Of the options: an error of the file has its path.
-    let wrong = |error: zenoh::Error| LinkError::Config { file: None, reason: error.to_string() };
-    let Some(path) = &options.config else {
-        let mut config = Config::default();
-        config.insert_json5("mode", "\"peer\"").map_err(wrong)?;
-        config.insert_json5("scouting/multicast/enabled", "false").map_err(wrong)?;
-        config.insert_json5("scouting/gossip/enabled", "false").map_err(wrong)?;
-        // Otherwise Zenoh lets a visitor listen on all interfaces.
-        config.insert_json5("listen/endpoints", &list(&options.listen)).map_err(wrong)?;
-        config.insert_json5("connect/endpoints", &list(&options.connect)).map_err(wrong)?;
-        return Ok(config);
-    };
-    let mut config = Config::from_file(path)
-        .map_err(|error| LinkError::Config { file: options.config.clone(), reason: error.to_string() })?;
-    for (key, given) in [("listen/endpoints", &options.listen), ("connect/endpoints", &options.connect)] {
-        if !given.is_empty() {
-            config.insert_json5(key, &list(given)).map_err(wrong)?;
+    let mut config = Config::default();
+    if let Some(path) = &options.config {
+        let text = std::fs::read_to_string(path).map_err(zenoh::Error::from);
+        config = text
+            .and_then(|text| Config::from_json5(&text))
+            .map_err(|error| LinkError::Config { file: path.clone(), reason: words(&error) })?;
+    } else {
+        config.insert_json5("mode", "\"peer\"")?;
+        config.insert_json5("scouting/multicast/enabled", "false")?;
+        config.insert_json5("scouting/gossip/enabled", "false")?;
+    }
+    for (option, key, given) in [
+        ("--listen", "listen/endpoints", &options.listen),
+        ("--connect", "connect/endpoints", &options.connect),
+    ] {
+        if let Some(endpoint) = given.iter().find(|text| text.parse::<EndPoint>().is_err()) {
+            return Err(LinkError::Endpoint { option, endpoint: endpoint.clone() });
+        }
+        // Without a configuration and an endpoint, Zenoh lets a visitor listen on all interfaces.
+        if options.config.is_none() || !given.is_empty() {
+            config.insert_json5(key, &list(given))?;
         }
     }
     Ok(config)

@@ -12,7 +12,7 @@ use flotor_bridge::request::{Request, Right};
 use flotor_bridge::serve::{Launcher, Service, serve};
 use flotor_bridge::stop_channel::press_both_ways;
 use flotor_hal::terminal::{escaped, escaped_arguments};
-use flotor_live::{Directory, SetValue};
+use flotor_live::Directory;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -52,28 +52,28 @@ enum Command {
     Serve(ServeArguments),
     /// Republish a remote run on this machine, for `flotor view`
     Attach {
-        /// Name of the bridge, as `flotor bridge list` prints it
+        /// Name of the bridge, such as lab or zenoh/lab, as `flotor bridge list` prints it
         name: Name,
     },
     /// Couple a hand here to a remote hand: forward the peer state of couplings with `partner = "elsewhere"`
     Couple {
-        /// Name of the bridge, as `flotor bridge list` prints it
+        /// Name of the bridge, such as lab or zenoh/lab, as `flotor bridge list` prints it
         name: Name,
     },
     /// Record a remote run until it ends
     Record {
-        /// Name of the bridge, as `flotor bridge list` prints it
+        /// Name of the bridge, such as lab or zenoh/lab, as `flotor bridge list` prints it
         name: Name,
         /// Recording to write
         #[arg(value_name = "FILE.mcap")]
         file: PathBuf,
     },
-    /// Send a request to a remote run
+    /// Send a request to a bridge and its run
     Ask {
-        /// Name of the bridge, as `flotor bridge list` prints it
+        /// Name of the bridge, such as lab or zenoh/lab, as `flotor bridge list` prints it
         name: Name,
         #[command(subcommand)]
-        request: RequestArgument,
+        request: Request,
     },
     /// List the bridges on the network
     List,
@@ -83,13 +83,13 @@ enum Command {
 
 #[derive(Args)]
 struct ServeArguments {
-    /// Name of this bridge on the network (default: the machine's name)
+    /// Name of this bridge on the network: 1 to 40 letters a to z, digits or hyphens (default: the machine's name)
     #[arg(long)]
     name: Option<Name>,
     /// Highest right whose requests are accepted; the access control of the network sets the right of each member
     #[arg(long, value_enum, default_value = "watch")]
     allow: Right,
-    /// Scene that members may start from the network, with `--allow own` (default: none)
+    /// Scene file (TOML), or name of one of Flotor's own scenes, that members may start, with `--allow own` (default: none)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Publish every Nth tick only
@@ -97,56 +97,25 @@ struct ServeArguments {
     every: u32,
 }
 
-#[derive(Subcommand)]
-enum RequestArgument {
-    /// Emergency stop: the force is zero at once, and the run ends
-    EmergencyStop,
-    /// Normal stop: the force fades out
-    Stop,
-    /// Change live parameters, all in the same tick
-    Set {
-        /// New value of a live parameter, such as spring.gamma_n=20 (repeatable)
-        #[arg(required = true, value_name = "PLUGIN.KEY=VALUE", value_parser = set_value)]
-        values: Vec<SetValue>,
-    },
-    /// Change the blend weight of a model
-    Weight {
-        /// Name of the model in the scene
-        model: String,
-        /// Blend weight, 0 to 1
-        weight: f64,
-    },
-    /// Start the bridge's scene
-    Start,
-    /// Release an emergency stop
-    Release,
-}
-
 #[derive(Args)]
 struct KeysArguments {
     /// New folder for keys and configurations
     folder: PathBuf,
-    /// Name or address under which the bridge is reached (repeatable)
+    /// Name or address under which the bridge is reached, without a port: members connect to port 7447 (repeatable)
     #[arg(long = "host", required = true, value_name = "HOST")]
     hosts: Vec<String>,
     /// A member who may watch and press the emergency stop (repeatable)
     #[arg(long, value_name = "NAME")]
     watch: Vec<Name>,
-    /// A member who may also change parameters (repeatable)
+    /// A member who may also change parameters and blend weights, stop a run in the normal way, and couple a hand (repeatable)
     #[arg(long, value_name = "NAME")]
     operate: Vec<Name>,
-    /// A member who may also start runs and release an emergency stop (repeatable)
+    /// A member who may also start the bridge's scene and release an emergency stop (repeatable)
     #[arg(long, value_name = "NAME")]
     own: Vec<Name>,
-    /// Validity of the keys, in days
+    /// Validity of the keys in days, at most 36500
     #[arg(long, value_name = "DAYS", default_value = "365", value_parser = clap::value_parser!(u64).range(1..=36_500))]
     days: u64,
-}
-
-fn set_value(text: &str) -> Result<SetValue, String> {
-    let parts = text.split_once('=').and_then(|(key, value)| Some((key.split_once('.')?, value)));
-    let ((plugin, parameter), value) = parts.ok_or("write PLUGIN.KEY=VALUE, such as spring.gamma_n=20")?;
-    Ok(SetValue { plugin: plugin.to_owned(), parameter: parameter.to_owned(), value: value.to_owned() })
 }
 
 /// Exit code for errors of the command line or the configuration.
@@ -161,12 +130,9 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {}", escaped(&error.to_string()));
-            let is_usage = error.downcast_ref::<LinkError>().is_some_and(|e| {
-                matches!(
-                    e,
-                    LinkError::Config { .. } | LinkError::WithoutKeys { .. } | LinkError::ExposedKey { .. }
-                )
-            });
+            let is_usage = error
+                .downcast_ref::<LinkError>()
+                .is_some_and(|e| !matches!(e, LinkError::Open(_) | LinkError::Network(_)));
             if is_usage { ExitCode::from(USAGE) } else { ExitCode::FAILURE }
         }
     }
@@ -196,14 +162,14 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
             report_line(&format!("waiting for a run of zenoh/{name} (Ctrl-C ends)"));
             record_run(&remote, &file, &stop)?;
         }
-        Command::Ask { name, request: RequestArgument::EmergencyStop } => {
+        Command::Ask { name, request: Request::EmergencyStop } => {
             let link = link.or_this_user(&directory, None);
             let datagrams = stop_channel(&link)?;
             press_both_ways(link, datagrams, &name)?;
         }
         Command::Ask { name, request } => {
             let remote = Remote::listen(&visit(link, &directory)?, &name)?;
-            remote.requests().run(request.into())?;
+            remote.requests().run(request)?;
         }
         Command::List => list(&visit(link, &directory)?)?,
         Command::Keys(arguments) => make_keys(arguments)?,
@@ -272,7 +238,7 @@ fn list(session: &Link) -> Result<(), LinkError> {
     let names = bridges(session)?;
     if names.is_empty() {
         report_line(
-            "no bridge found; start a bridge with `flotor bridge serve`, or give its endpoint with --connect",
+            "no bridge found; start a bridge with `flotor bridge serve`, or give its endpoint with --connect or --config",
         );
     }
     for name in names {
@@ -308,7 +274,10 @@ fn report_keys(link: &Link) {
     }
     const SOON_DAYS: u64 = 30;
     if let Some(days) = link.days_left().filter(|days| *days < SOON_DAYS) {
-        report_line(&format!("the keys expire in {days} days; make new keys with `flotor bridge keys`"));
+        let most = days + 1;
+        report_line(&format!(
+            "the keys expire in less than {most} d, or have expired; make new keys with `flotor bridge keys`"
+        ));
     }
 }
 
@@ -317,17 +286,4 @@ fn service(arguments: ServeArguments) -> Result<Service, Box<dyn Error>> {
     let program = std::env::current_exe()?.with_file_name(format!("flotor{}", std::env::consts::EXE_SUFFIX));
     let launcher = scene.map(|scene| Launcher::new(program, scene));
     Ok(Service { name: name.unwrap_or_else(Name::of_this_machine), allow, every, launcher })
-}
-
-impl From<RequestArgument> for Request {
-    fn from(argument: RequestArgument) -> Self {
-        match argument {
-            RequestArgument::EmergencyStop => Request::EmergencyStop,
-            RequestArgument::Stop => Request::Stop,
-            RequestArgument::Set { values } => Request::Set { values },
-            RequestArgument::Weight { model, weight } => Request::Weight { model, weight },
-            RequestArgument::Start => Request::Start,
-            RequestArgument::Release => Request::Release,
-        }
-    }
 }

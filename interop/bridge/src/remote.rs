@@ -234,8 +234,8 @@ impl RequestClient {
 }
 
 /// Error text for a missing reply, with the possible causes.
-const NOBODY_ANSWERS: &str = "no reply: the bridge has ended, or rejects this request or this peer; check `flotor \
-bridge serve --allow` and the access control of the network";
+const NOBODY_ANSWERS: &str = "no reply: no bridge of this name is reachable, or it is overloaded or rejects this request \
+of this member; check the name with `flotor bridge list`, and the rights with which the keys were created";
 
 /// Replies to a query.
 type Answers = FifoChannelHandler<Reply>;
@@ -257,8 +257,8 @@ fn done(answers: &Answers) -> Result<Option<()>, String> {
     let mut is_answered = None;
     for answer in answers.iter() {
         let answer = answer.into_result().map_err(|_| NOBODY_ANSWERS)?;
-        let answer: Answer =
-            serde_json::from_slice(&answer.payload().to_bytes()).map_err(|error| error.to_string())?;
+        let answer: Answer = serde_json::from_slice(&answer.payload().to_bytes())
+            .map_err(|error| format!("malformed reply: {error}; use both programs from one build"))?;
         answer.refused.map_or(Ok(()), Err)?;
         is_answered = Some(());
     }

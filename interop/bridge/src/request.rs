@@ -2,7 +2,7 @@
 
 use crate::keys::Name;
 use crate::wall_clock::since_1970;
-use clap::ValueEnum;
+use clap::{Subcommand, ValueEnum};
 use flotor_live::{Ask, SetValue};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -19,30 +19,37 @@ const FRESH_MS: u64 = 10_000;
 /// Member name of all peers without keys.
 pub const ANYONE: &str = "anyone";
 
-/// Request of a remote peer to the host, or to the bridge itself.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Request of a remote peer to the host, or to the bridge itself; its texts are the help of `flotor bridge ask`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Subcommand)]
 #[serde(tag = "request", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Request {
-    /// Press the emergency stop; permitted to all.
+    /// Emergency stop: all forces on the bridge's machine are zero at once, the runs end, and none starts before the release
     EmergencyStop,
-    /// Change live parameters.
+    /// Normal stop: the force fades out
+    Stop,
+    /// Change live parameters, all in the same tick
     Set {
-        /// New values.
+        /// New value of a live parameter, such as spring.gamma_n=20 (repeatable)
+        #[arg(required = true, value_name = "PLUGIN.KEY=VALUE", value_parser = set_value)]
         values: Vec<SetValue>,
     },
-    /// Change the blend weight of a model.
+    /// Change the blend weight of a model
     Weight {
-        /// Name of the model in the scene.
+        /// Name of the model in the scene
         model: String,
-        /// New weight, 0 to 1.
+        /// Blend weight, 0 to 1
         weight: f64,
     },
-    /// End the run normally: the force fades out.
-    Stop,
-    /// Start the bridge's scene.
+    /// Start the scene of `flotor bridge serve --scene`
     Start,
-    /// Release the emergency stop, so that a scene may be started again.
+    /// Release an emergency stop
     Release,
+}
+
+fn set_value(text: &str) -> Result<SetValue, String> {
+    let parts = text.split_once('=').and_then(|(key, value)| Some((key.split_once('.')?, value)));
+    let ((plugin, parameter), value) = parts.ok_or("write PLUGIN.KEY=VALUE, such as spring.gamma_n=20")?;
+    Ok(SetValue { plugin: plugin.to_owned(), parameter: parameter.to_owned(), value: value.to_owned() })
 }
 
 /// Right of a member; each right includes the lower rights.
@@ -52,9 +59,9 @@ pub enum Right {
     /// Observe a run and press the emergency stop
     #[default]
     Watch,
-    /// Also change parameters and stop a run in the normal way
+    /// Also change parameters and blend weights, stop a run in the normal way, and couple a hand
     Operate,
-    /// Also start the scene, release an emergency stop
+    /// Also start the scene, and release an emergency stop
     Own,
 }
 
@@ -166,7 +173,7 @@ pub enum Refusal {
     #[error("the request is malformed, or has the wrong key; use both programs from one build")]
     Malformed,
     /// Longer than [`MAX_REQUEST_BYTES`].
-    #[error("the request is longer than {MAX_REQUEST_BYTES} bytes; use both programs from one build")]
+    #[error("the request is longer than {MAX_REQUEST_BYTES} bytes; send fewer values at once")]
     TooLong,
     /// Number not higher than the number of the session's last request.
     #[error(

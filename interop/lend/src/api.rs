@@ -86,7 +86,7 @@ impl Api {
             let release = if folder.ends_with("debug") { "" } else { " --release" };
             CommandError::Usage(format!(
                 "the drop-in library for `--api {}` was found neither at `{}` nor in `{}`; build it with \
-                 `cargo build{release} -p {package}`",
+                 `cargo build{release} -p {package}` in Flotor's sources",
                 self.word(),
                 folder.join(built).display(),
                 compat.display()

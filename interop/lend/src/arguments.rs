@@ -24,10 +24,10 @@ use std::process::Command;
 )]
 #[command(mut_arg("json", |json| json.help("Write the summary as JSON; standard output is for the program")))]
 pub(crate) struct LendArguments {
-    /// The interface that the program calls (default: the program finds the three libraries)
+    /// The interface that the program calls (default: the program finds the libraries dhd, openhaptics and chai3d)
     #[arg(long, value_name = "dhd|openhaptics|chai3d|haply|ml-api")]
     pub(crate) api: Option<String>,
-    /// With --api haply or ml-api: address of the service (default: the address that programs expect, port 10001 or 5678)
+    /// With --api haply or ml-api: address of the service (default: where programs expect it, 127.0.0.1:10001 or 127.0.0.1:5678)
     #[arg(long, value_name = "HOST:PORT")]
     pub(crate) listen: Option<String>,
     /// Source of the time of the run
@@ -50,7 +50,7 @@ pub(crate) struct LendArguments {
 pub(crate) enum PaceOption {
     /// The machine's clock: the program runs at its own rate
     Real,
-    /// The program: each call that sets a force, or each callback of a scheduler, is one tick
+    /// The program: each call or message that sets a force, or each callback of a scheduler, is one tick; not with --api ml-api
     Lockstep,
 }
 
@@ -63,14 +63,18 @@ impl LendArguments {
         flotor: &Path,
     ) -> Result<(), CommandError> {
         let absolute = |path: &Path| {
-            std::path::absolute(path)
-                .map_err(|cause| CommandError::file(path, "cannot determine the absolute path", cause))
+            std::path::absolute(path).map_err(|cause| {
+                let path = path.display();
+                CommandError::Failed(format!(
+                    "`{path}`: cannot determine the current folder: {cause}; give the absolute path"
+                ))
+            })
         };
-        if let Some(scene) = &self.scene {
-            command.env("FLOTOR_SCENE", absolute(scene)?);
-        }
-        if let Some(record) = &self.options.record {
-            command.env("FLOTOR_RECORD", absolute(record)?);
+        for (variable, file) in [("FLOTOR_SCENE", &self.scene), ("FLOTOR_RECORD", &self.options.record)] {
+            match file {
+                Some(file) => command.env(variable, absolute(file)?),
+                None => command.env_remove(variable),
+            };
         }
         if !self.options.plugin_path.folders().is_empty() {
             let before = std::env::var_os(PATH_VARIABLE);
@@ -79,7 +83,7 @@ impl LendArguments {
             let folders = self.options.plugin_path.folders().iter().map(|folder| absolute(folder));
             let folders = folders.chain(before.map(Ok)).collect::<Result<Vec<_>, CommandError>>()?;
             let folders = std::env::join_paths(folders)
-                .map_err(|error| CommandError::Usage(format!("--plugin-path: {error}")))?;
+                .map_err(|error| CommandError::Usage(format!("--plugin-path: {error}; rename the folder")))?;
             command.env(PATH_VARIABLE, folders);
         }
         command.env("FLOTOR_PACE", if self.pace == PaceOption::Real { "real" } else { "lockstep" });

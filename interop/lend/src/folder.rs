@@ -14,7 +14,7 @@ impl Folder {
         // Left by a killed process with the same id.
         let _ = std::fs::remove_dir_all(&path);
         let made = std::fs::DirBuilder::new().mode(0o700).create(&path);
-        made.map_err(|cause| CommandError::file(&path, "cannot make a folder for the libraries", cause))?;
+        made.map_err(|cause| CommandError::file(&path, "cannot create the temporary folder", cause))?;
         Ok(Self(path))
     }
 

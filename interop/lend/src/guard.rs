@@ -111,8 +111,12 @@ pub(crate) fn run(arguments: &GuardArguments) -> Result<(), CommandError> {
     let mut command = Command::new(program);
     end_with_this_thread(command.args(rest));
     // This process always blocks these signals: a pending signal would end it.
-    let child =
-        command.spawn().map_err(|cause| CommandError::file(program.as_ref(), "cannot be started", cause))?;
+    let child = command.spawn().map_err(|cause| {
+        let name = program.display();
+        CommandError::Failed(format!(
+            "`{name}` cannot be started: {cause}; check its processor architecture, and that its interpreter exists"
+        ))
+    })?;
     let program = Pid::from_child(&child);
     let mut status = None;
     while status.is_none() && !is_orphaned() {

@@ -67,7 +67,9 @@ fn lend(arguments: &LendArguments) -> Result<i32, Early> {
     let interface = arguments.api.as_deref().map(Interface::of_word).transpose()?;
     check_scene(arguments)?;
     let program = Program::find(name)?;
-    let own = std::env::current_exe().map_err(|cause| CommandError::Failed(cause.to_string()))?;
+    let own = std::env::current_exe().map_err(|cause| {
+        CommandError::Failed(format!("cannot determine the path of this program: {cause}"))
+    })?;
     let flotor = own.with_file_name("flotor");
     let lending = Lending { arguments, program, rest, own, flotor, stop };
     match interface {
@@ -96,7 +98,7 @@ impl Lending<'_> {
     fn with_library(&self, api: Option<Api>) -> Result<i32, Early> {
         let Self { arguments, program, own, .. } = self;
         if arguments.listen.is_some() {
-            let usage = "--listen is for `--api haply` and `--api ml-api`".to_owned();
+            let usage = "--listen is for `--api haply` and `--api ml-api` only; omit the option".to_owned();
             return Err(CommandError::Usage(usage).into());
         }
         program.check(api)?;
@@ -159,8 +161,9 @@ impl Lending<'_> {
         if self.stop.stage() > Stage::Running {
             return Err(Early::Exit(INTERRUPTED));
         }
-        let guard = spawn_unblocked(command)
-            .map_err(|cause| CommandError::file(&self.program.path, "cannot be started", cause))?;
+        let guard = spawn_unblocked(command).map_err(|cause| {
+            CommandError::file(&self.own, "cannot start the guard process of the program", cause)
+        })?;
         let status = wait(guard, &self.stop);
         let end = match (ProgramEnd::read(&folder.program_end()), status.code()) {
             (Some(end), _) => end,
@@ -176,7 +179,9 @@ impl Lending<'_> {
         let before = std::env::var_os("LD_LIBRARY_PATH").filter(|path| !path.is_empty());
         let before = before.iter().flat_map(std::env::split_paths);
         let path = std::env::join_paths([folder.to_path_buf()].into_iter().chain(before));
-        command.env("LD_LIBRARY_PATH", path.map_err(|error| CommandError::Failed(error.to_string()))?);
+        let path =
+            path.map_err(|error| CommandError::Failed(format!("TMPDIR: {error}; choose another folder")))?;
+        command.env("LD_LIBRARY_PATH", path);
         if folder.join("lib").is_dir() {
             command.env("FDSDK", folder).env("FORCEDIM_SDK", folder);
         }
@@ -216,7 +221,8 @@ fn check_scene(arguments: &LendArguments) -> Result<(), CommandError> {
     if file.is_dir() || !file.exists() {
         let why = if file.is_dir() { "the path is a folder" } else { "the file does not exist" };
         return Err(CommandError::Usage(format!(
-            "`{}` is not a scene: {why}; correct the path, or write the program after `--`",
+            "`{}` is not a scene file: {why}; correct the path (`flotor scenes NAME` prints one of Flotor's own scenes), or \
+             write the program after `--`",
             file.display()
         )));
     }

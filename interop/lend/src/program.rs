@@ -72,14 +72,14 @@ impl Program {
         if native.bits == Bits::ThirtyTwo {
             return Err(CommandError::Usage(format!(
                 "`{name}` is a 32-bit program, and the drop-in libraries have 64 bits: build the program for 64 \
-                 bits, or use a service (`--api haply`, `--api ml-api`), which accepts every program"
+                 bits; only a program of a service (`--api haply`, `--api ml-api`) may have 32 bits"
             )));
         }
         if !native.is_dynamic {
             return Err(CommandError::Usage(format!(
                 "`{name}` is statically linked, so no drop-in library can replace its functions; link the program \
-                 with the shared library (`flotor lend` \
-                 brings libdhd, libdrd, libHD and libhdPhantom)"
+                 with the shared library (`flotor lend` has libdhd, libdrd, libHD and libhdPhantom); a program of a \
+                 service needs `--api haply` or `--api ml-api`"
             )));
         }
         let Some(api) = api.filter(|api| !native.calls(*api)) else { return Ok(()) };
@@ -88,8 +88,8 @@ impl Program {
         let others = [Api::Chai3d].into_iter().chain(Api::ALL);
         match others.into_iter().find(|other| native.calls(*other)) {
             Some(other) => Err(CommandError::Usage(format!(
-                "`{name}` calls {}, not `--api {}`: write `--api {}`, or omit the option",
-                other.library().marks.join(" and "),
+                "`{name}` uses {}, not the library of `--api {}`: write `--api {}`, or omit the option",
+                other.library().marks.join(" or "),
                 api.word(),
                 other.word()
             ))),

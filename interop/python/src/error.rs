@@ -11,9 +11,10 @@ pyo3::create_exception!(
 );
 
 /// Remedies for the command line, and their replacements in Python: the wheel has no command.
-const REMEDIES: [(&str, &str); 2] = [
+const REMEDIES: [(&str, &str); 3] = [
     ("`flotor plugins` lists", "`flotor.plugins()` lists"),
     ("`flotor plugins ID` lists", "`flotor.Model(ID).parameters` lists"),
+    (" (`flotor scenes` lists Flotor's own scenes)", ""),
 ];
 
 /// Converts any error of the host to the exception.

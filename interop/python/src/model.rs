@@ -38,7 +38,8 @@ pub(crate) struct Parameter {
 #[pymethods]
 impl Parameter {
     fn __repr__(&self) -> String {
-        let Self { id, unit, min, max, default, choices, .. } = self;
+        let Self { id, min, max, default, choices, .. } = self;
+        let unit = if self.unit == "1" { "" } else { &self.unit };
         let range = match (min, max) {
             (Some(min), Some(max)) => format!(", {min} to {max} {unit}").trim_end().to_owned(),
             _ if choices.is_empty() => String::new(),
@@ -208,7 +209,8 @@ impl Model {
             Ok(instance) => Ok(instance),
             Err(TryLockError::Poisoned(poisoned)) => Ok(poisoned.into_inner()),
             Err(TryLockError::WouldBlock) => Err(refuse(
-                "a thread stepped this model when the process was forked; create a new model here, or start processes by \"spawn\"",
+                "another thread holds this model, which was created before the process was forked; create a new model in this process, \
+                 or use the start method \"spawn\" of multiprocessing",
             )),
         }
     }

@@ -113,8 +113,8 @@ def test_a_damaged_task_is_done_again(plan, tmp_path):
         ('"z_m"', '"gama_n"', "did you mean"),
         ('model = "spring"', 'model = "sprung"', "did you mean `spring`"),
         ("steps = 512", "step = 512", "unknown field"),
-        ("from = -0.012", "from = 1", "no interval"),
-        ("block = 64", "block = 0", "at least 1"),
+        ("from = -0.012", "from = 1", "`from` below `to`"),
+        ("block = 64", "block = 0", "write 1 or more"),
     ],
 )
 def test_what_is_wrong_is_said_before_anything_runs(plan, tmp_path, old, new, words):

@@ -23,18 +23,18 @@ use std::sync::atomic::AtomicBool;
     flotor sweep plan.toml --out results --jobs 4 --plot force.svg --draw peak_force_n"
 )]
 struct Arguments {
-    /// The plan (TOML)
+    /// Plan of the sweep, a TOML file
     plan: PathBuf,
-    /// Folder of finished tasks and results.parquet (default: the plan's name without .toml)
+    /// Folder of finished tasks and results.parquet (default: the path of the plan without .toml)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Number of parallel tasks (default: one per core)
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
-    /// Draw the results as SVG
+    /// Draw the results to an SVG file
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Results to draw (default: the first four numbers)
+    /// Numeric results to draw, at most four, separated by commas (default: the first four); no effect without --plot
     #[arg(long, value_name = "COLUMN", value_delimiter = ',')]
     draw: Vec<String>,
     #[command(flatten)]
@@ -48,12 +48,7 @@ fn main() -> ExitCode {
 fn run(arguments: &Arguments) -> Result<(), CommandError> {
     let usage = |error: &dyn std::fmt::Display| CommandError::Usage(error.to_string());
     let other = |error: &dyn std::fmt::Display| CommandError::Failed(error.to_string());
-    let unwritten = |path: &Path, cause| {
-        CommandError::Failed(format!(
-            "{}: cannot write the file: {cause}; choose a folder where you may write",
-            path.display()
-        ))
-    };
+    let unwritten = |path: &Path, cause| CommandError::file(path, "cannot write the file", cause);
     let plan = Plan::load(&arguments.plan).map_err(|error| usage(&error))?;
     let sweep =
         Sweep::prepare(plan, arguments.options.plugin_path.folders()).map_err(|error| usage(&error))?;

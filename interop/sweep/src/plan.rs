@@ -213,7 +213,7 @@ impl Plan {
             (LayoutText::Grid, None) => Layout::Grid,
             (LayoutText::Grid, Some(_)) => {
                 return Err(unfit(
-                    "`points` is only for layout = \"sobol\"; in a grid, set `steps` of each axis".into(),
+                    "`points` is only for layout = \"sobol\"; in a grid, set `steps` of each range".into(),
                 ));
             }
             (LayoutText::Sobol, Some(points)) => Layout::Sobol { points, seed: file.layout_seed },
@@ -281,7 +281,10 @@ impl Plan {
         match self.row_count() {
             Some(1..=MOST_ROWS) => Ok(()),
             Some(0) => Err("`points` is 0; write 1 or more".into()),
-            _ => Err(format!("the plan has more than {MOST_ROWS} rows; split the plan")),
+            rows => {
+                let rows = rows.map_or("more than 2^64".to_owned(), |rows| rows.to_string());
+                Err(format!("the plan has {rows} rows, above the limit of {MOST_ROWS}; split the plan"))
+            }
         }
     }
 
@@ -320,17 +323,17 @@ impl AxisText {
     fn check(self) -> Result<Axis, String> {
         let Self { key, values, words, from, to, steps, scale } = self;
         let values = match (values, words, from, to) {
-            (Some(values), None, None, None) if values.iter().all(|v| v.is_finite()) => {
-                Values::Numbers(values)
-            }
-            (Some(_), None, None, None) => {
-                return Err(format!("axis `{key}`: a value is not finite; write finite numbers"));
-            }
+            (Some(values), None, None, None) => match values.iter().copied().find(|v| !v.is_finite()) {
+                None => Values::Numbers(values),
+                Some(value) => {
+                    return Err(format!("axis `{key}`: {value} is not finite; write finite numbers"));
+                }
+            },
             (None, Some(words), None, None) => Values::Words(words),
             (None, None, Some(from), Some(to)) => {
                 if !(from.is_finite() && to.is_finite() && from < to) {
                     return Err(format!(
-                        "axis `{key}`: `from` = {from} must be finite and below `to` = {to}"
+                        "axis `{key}`: `from` = {from} and `to` = {to} must be finite, and `from` below `to`"
                     ));
                 }
                 if scale == Scale::Log && from <= 0.0 {

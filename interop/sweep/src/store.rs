@@ -14,7 +14,7 @@ pub struct Store {
 
 /// Error of a store.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {action}: {cause}; check free space and permissions", path.display())]
+#[error("{}: {action}: {cause}; check the path, free space and permissions", path.display())]
 pub struct StoreError {
     /// Affected file or folder.
     pub path: PathBuf,
@@ -39,7 +39,7 @@ impl Store {
         let folder = folder.join("tasks");
         std::fs::create_dir_all(&folder).map_err(|cause| StoreError {
             path: folder.clone(),
-            action: "cannot make the folder",
+            action: "cannot create the folder",
             cause,
         })?;
         Ok(Self { folder })

@@ -26,7 +26,7 @@ pub enum TableError {
         all: usize,
     },
     /// The file cannot be written.
-    #[error("{}: cannot write the table: {cause}; choose a folder where you may write", path.display())]
+    #[error("{}: cannot write the table: {cause}; check free space and permissions", path.display())]
     File {
         /// Path of the file.
         path: PathBuf,
@@ -34,7 +34,7 @@ pub enum TableError {
         cause: std::io::Error,
     },
     /// The Parquet writer failed.
-    #[error("{}: cannot write the table: {cause}; choose a folder where you may write", path.display())]
+    #[error("{}: cannot write the table: {cause}; check free space and permissions", path.display())]
     Parquet {
         /// Path of the table.
         path: PathBuf,

@@ -221,7 +221,7 @@ impl Sweep {
     }
 
     fn run(&self, point: &Point, scene: &Scene, folders: &[PathBuf]) -> Vec<Cell> {
-        let answer = self.scene_at(point, scene).and_then(|scene| {
+        let answer = self.scene_at(point, scene).map_err(|e| e.to_string()).and_then(|scene| {
             let registry = Registry::search(folders);
             headless::run(&scene, &registry, point.seed, None, Demand::ALL).map_err(|e| e.to_string())
         });
@@ -241,11 +241,13 @@ impl Sweep {
     }
 
     /// Returns the scene with the settings of a point.
-    fn scene_at(&self, point: &Point, scene: &Scene) -> Result<Scene, String> {
+    fn scene_at(&self, point: &Point, scene: &Scene) -> Result<Scene, SweepError> {
         let mut scene = scene.clone();
         for (axis, value) in self.plan.axes.iter().zip(&point.values) {
-            let setting: PluginKeyValue = format!("{}={}", axis.key, value.text()).parse()?;
-            setting.apply(&mut scene)?;
+            let setting = format!("{}={}", axis.key, value.text()).parse::<PluginKeyValue>();
+            setting
+                .and_then(|setting| setting.apply(&mut scene))
+                .map_err(|problem| SweepError::Axis { key: axis.key.clone(), problem })?;
         }
         Ok(scene)
     }
@@ -301,16 +303,13 @@ impl Sweep {
     fn check_first_row(&self) -> Result<(), SweepError> {
         let Subject::Run { scene, folders } = &self.subject else { return Ok(()) };
         let point = Design::new(&self.plan).point(0);
-        let first = self.plan.axes.first().map(|axis| axis.key.clone()).unwrap_or_default();
-        let scene =
-            self.scene_at(&point, scene).map_err(|problem| SweepError::Axis { key: first, problem })?;
+        let scene = self.scene_at(&point, scene)?;
         let options = flotor_session::RunOptions { clock: flotor_servo::Clock::Virtual, seed: point.seed };
         match flotor_session::Session::prepare(&scene, &Registry::search(folders), &options) {
-            Ok(_) => Ok(()),
             Err(flotor_session::RunError::Scene(error)) => Err(error.into()),
             Err(flotor_session::RunError::Lookup(error)) => Err(error.into()),
             // Other errors belong to this point, and become its row.
-            Err(_) => Ok(()),
+            Ok(_) | Err(_) => Ok(()),
         }
     }
 }
@@ -353,14 +352,9 @@ fn check_model_axes(plan: &Plan, plugin: &Plugin) -> Result<(), SweepError> {
 
 /// Returns the files of a scene's plugins.
 fn used_plugins(scene: &Scene, registry: &Registry) -> Result<Vec<PathBuf>, SweepError> {
-    let mut files = Vec::new();
-    for device in &scene.devices {
-        files.push(registry.load(&device.plugin.plugin, PluginKind::Device)?.metadata().path.clone());
-    }
-    for model in &scene.models {
-        files.push(registry.load(&model.plugin.plugin, PluginKind::Model)?.metadata().path.clone());
-    }
-    Ok(files)
+    let devices = scene.devices.iter().map(|device| (&device.plugin.plugin, PluginKind::Device));
+    let models = scene.models.iter().map(|model| (&model.plugin.plugin, PluginKind::Model));
+    devices.chain(models).map(|(id, kind)| Ok(registry.load(id, kind)?.metadata().path.clone())).collect()
 }
 
 fn digest_file(hash: &mut Xxh3, path: &Path) -> Result<(), SweepError> {

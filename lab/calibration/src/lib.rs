@@ -43,7 +43,7 @@ pub enum CalibrationError {
     #[error(transparent)]
     Plugin(#[from] LoadError),
     /// The plugin lacks the parameters of the simulated flotor.
-    #[error("the plugin is not the simulated flotor: {0}")]
+    #[error("the plugin `simulated` is not that of this version (`flotor plugins` shows its file): {0}")]
     Setting(#[from] SettingError),
     /// The handle lost contact with the sensor.
     #[error(
@@ -60,10 +60,10 @@ pub enum CalibrationError {
          handle moves freely and that the calibration file belongs to this device"
     )]
     Oscillated,
-    /// The sensor was not moved to the requested height.
+    /// The handle did not come to rest at the requested height in time.
     #[error(
-        "the handle rests at {height_mm:.2} mm instead of {target_mm:.2} mm; move the sensor, or raise the time limit \
-         (--patience)"
+        "the handle did not come to rest at {target_mm:.2} mm within the time limit, but is at {height_mm:.2} mm; move the \
+         sensor there and hold it still, or raise the limit (--patience)"
     )]
     NotReached {
         /// Requested height, mm.
@@ -101,19 +101,24 @@ pub enum CalibrationError {
     /// The emergency-stop latch is pressed, or the watchdog process cannot be started as required.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// The device or the force sensor rejects a parameter, activation or calibration.
-    #[error("the device or the force sensor rejected the request: {0}")]
+    /// The device rejects a parameter, activation or calibration.
+    #[error("the device rejected the request: {0}")]
     Refused(Refusal),
-    /// The device was lost.
-    #[error("the device is disconnected; connect the device and start again")]
+    /// The force sensor has no parameter `port`, or rejects activation.
+    #[error("the force sensor rejected the request: {0}")]
+    SensorRefused(Refusal),
+    /// The device was lost at a deactivation.
+    #[error(
+        "the device could not be deactivated between two measurements; check its connection and start again"
+    )]
     Disconnected,
     /// The device faulted.
     #[error("device fault: {}", .0.advice())]
     Fault(Fault),
-    /// The handle did not come to rest.
+    /// The simulated handle did not come to rest.
     #[error(
-        "at {height_mm:.1} mm the handle does not come to rest: it moves by {moved_um:.0} µm; check the \
-         stand of the sensor"
+        "at {height_mm:.1} mm the simulated handle does not come to rest: it moves by {moved_um:.0} µm; plan smaller forces \
+         (--force), or correct the calibration file"
     )]
     NotAtRest {
         /// Height of the handle, mm.
@@ -125,7 +130,9 @@ pub enum CalibrationError {
     #[error("fault of the force sensor: {}", .0.advice())]
     Sensor(Fault),
     /// The readings do not determine a curve.
-    #[error("{readings} readings at {heights} heights and {forces} forces are too few: {needed}")]
+    #[error(
+        "the readings do not determine the curve (readings: {readings}, heights: {heights}, forces: {forces}): {needed}"
+    )]
     TooFew {
         /// Number of readings.
         readings: usize,

@@ -27,12 +27,14 @@ impl ForceSensor {
     /// [`CalibrationError`] if the plugin has no parameter `port`, or rejects the settings, opening or activation.
     pub fn open(plugin: &Plugin, port: &str, mut settings: Vec<Setting>) -> Result<Self, CalibrationError> {
         let setting = Setting::parse(plugin.parameters(), "port", port);
-        settings
-            .push(setting.map_err(|error| CalibrationError::Refused(Refusal::parameter(error.to_string())))?);
+        settings.push(
+            setting
+                .map_err(|error| CalibrationError::SensorRefused(Refusal::parameter(error.to_string())))?,
+        );
         let config =
             LoopConfig { period_ns: u64::try_from(LOOK_AGAIN.as_nanos()).unwrap_or(u64::MAX), seed: 0 };
         let device = plugin.open_device(&settings)?.activate(&config);
-        let device = device.map_err(|(_, refusal)| CalibrationError::Refused(refusal))?;
+        let device = device.map_err(|(_, refusal)| CalibrationError::SensorRefused(refusal))?;
         Ok(Self { device, opened: Instant::now(), tick: Tick::default() })
     }
 

@@ -105,11 +105,6 @@ impl Decades {
         *self.0.entry(bin).or_default() += 1;
     }
 
-    /// Adds the counts of another histogram.
-    pub(crate) fn add(&mut self, later: Self) {
-        self.merge(later);
-    }
-
     /// Returns lower edge, upper edge and count of every bin from the first to the last non-empty bin.
     #[must_use]
     pub fn bins(&self) -> Vec<(f64, f64, u64)> {

@@ -3,12 +3,13 @@
 //! Nothing can end such a call but the end of its process. So the watchdog thread reports it, and each measurement runs
 //! in its own process.
 
+use flotor_core::lock;
 use flotor_hal::{Input, Pose};
 use flotor_session::{Exceeded, LongCall, ThreadClock};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::io;
-use std::sync::{Arc, Mutex, MutexGuard, Weak};
+use std::sync::{Arc, Mutex, Weak};
 use std::thread;
 use std::time::Duration;
 
@@ -35,14 +36,9 @@ static CALLERS: Mutex<Vec<Weak<Caller>>> = Mutex::new(Vec::new());
 thread_local! {
     static OWN: Arc<Caller> = {
         let own = Arc::new(Caller { clock: ThreadClock::of_this_thread(), doing: Mutex::default() });
-        locked(&CALLERS).push(Arc::downgrade(&own));
+        lock(&CALLERS).push(Arc::downgrade(&own));
         own
     };
-}
-
-/// Locks a mutex; poisoning is ignored, because no invariant spans statements.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    flotor_core::lock(mutex)
 }
 
 /// Guard of a call: while it exists, its thread counts as being in a step.
@@ -54,7 +50,7 @@ pub fn enter_call(inputs: &[Input]) -> CallGuard {
     let steps = u32::try_from(inputs.len()).unwrap_or(u32::MAX);
     let at = inputs.first().map(|first| (steps, first.tick, first.pose));
     OWN.with(|own| {
-        let mut doing = locked(&own.doing);
+        let mut doing = lock(&own.doing);
         *doing = Doing { calls: doing.calls + 1, at };
     });
     CallGuard(())
@@ -62,7 +58,7 @@ pub fn enter_call(inputs: &[Input]) -> CallGuard {
 
 impl Drop for CallGuard {
     fn drop(&mut self) {
-        OWN.with(|own| locked(&own.doing).at = None);
+        OWN.with(|own| lock(&own.doing).at = None);
     }
 }
 
@@ -104,13 +100,13 @@ pub fn start(limit: Duration, on_stuck: impl FnOnce(StuckStep) + Send + 'static)
 /// Returns a step that has exceeded its limit; `None` if there is none. `seen`: call of each thread at the last poll.
 fn stuck(seen: &mut BTreeMap<usize, LongCall<u64>>, limit: Duration) -> Option<StuckStep> {
     let callers: Vec<Arc<Caller>> = {
-        let mut all = locked(&CALLERS);
+        let mut all = lock(&CALLERS);
         all.retain(|caller| caller.strong_count() > 0);
         all.iter().filter_map(Weak::upgrade).collect()
     };
     for caller in callers {
         let id = Arc::as_ptr(&caller).addr();
-        let Doing { calls, at } = *locked(&caller.doing);
+        let Doing { calls, at } = *lock(&caller.doing);
         let Some((steps, tick, pose)) = at else {
             seen.remove(&id);
             continue;

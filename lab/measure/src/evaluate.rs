@@ -160,11 +160,7 @@ impl Walker<'_> {
     ) -> Result<Vec<Answer>, EvaluateError> {
         if self.details == Details::Asked {
             // Details refer to the last step: one pose at a time.
-            let ask = |handle: &Handle| {
-                let output = self.step(handle.pose())?;
-                on_answer();
-                self.answer(*handle, &output)
-            };
+            let ask = |handle: &Handle| self.tick_at(*handle).inspect(|_| on_answer());
             return handles.iter().map(ask).collect();
         }
         let mut answers = Vec::with_capacity(handles.len());
@@ -192,8 +188,7 @@ impl Walker<'_> {
     fn walk_to(&mut self, target: Handle) -> Result<Answer, EvaluateError> {
         if !target.is_finite() {
             // A non-finite pose has no path: the model is stepped there once and returns its status.
-            let output = self.step(target.pose())?;
-            return self.answer(target, &output);
+            return self.tick_at(target);
         }
         let (from, way_m) = (self.at, target.position_m - self.at.position_m);
         let way_rad = target.rotation_rad - from.rotation_rad;

@@ -65,16 +65,16 @@ impl Poses {
 
 /// Returns the position of each pose column; the error of a missing or unknown one names the right columns.
 fn columns(header: &[String]) -> Result<[usize; 6], String> {
-    let known = || POSE_COLUMNS.iter().copied().chain([ID_COLUMN]);
+    let (known, expected) = (|| POSE_COLUMNS.iter().copied().chain([ID_COLUMN]), header_text());
     if let Some(unknown) = header.iter().find(|name| !known().any(|column| column == name.as_str())) {
         let hint = did_you_mean(unknown, known());
-        return Err(format!("unknown column `{}`{hint} (the header is {})", plain(unknown), header_text()));
+        return Err(format!("unknown column `{}`{hint} (the header must be {expected})", plain(unknown)));
     }
     let mut columns = [0; 6];
     for (column, name) in columns.iter_mut().zip(POSE_COLUMNS) {
         let found = header.iter().position(|found| found == name);
         *column =
-            found.ok_or_else(|| format!("column `{name}` is missing (the header is {})", header_text()))?;
+            found.ok_or_else(|| format!("column `{name}` is missing (the header must be {expected})"))?;
     }
     Ok(columns)
 }
@@ -102,7 +102,7 @@ mod tests {
         assert_eq!(told(&bytes), "poses.csv:3: the file is not UTF-8; save the file as UTF-8");
         assert_eq!(
             told(b"x_m\n"),
-            "poses.csv:1: column `y_m` is missing (the header is [id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad)"
+            "poses.csv:1: column `y_m` is missing (the header must be [id,]x_m,y_m,z_m,rx_rad,ry_rad,rz_rad)"
         );
     }
 }

@@ -73,7 +73,7 @@ impl std::str::FromStr for Shard {
         let parts = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
         match parts {
             Some((number, of)) if (1..=of).contains(&number) => Ok(Self { number, of }),
-            _ => Err("write K/N, such as 2/3 for the second of three parts".to_owned()),
+            _ => Err("write K/N with K from 1 to N, such as 2/3 for the second of three parts".to_owned()),
         }
     }
 }

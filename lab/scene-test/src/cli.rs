@@ -37,7 +37,8 @@ enum Command {
     flotor test models --shard 2/4 --json -\n  flotor test jelly.test.toml --bless\n\n\
     Exit codes: 0 all passed, 1 a case failed, 2 usage or configuration: nothing was judged.")]
 struct TestArguments {
-    /// Files NAME.test.toml, or folders with such files (default: this folder); folders named `target` are skipped
+    /// Files NAME.test.toml, or folders with such files (default: this folder); subfolders named `target` or `.NAME`
+    /// are skipped
     #[arg(value_name = "FOLDER|FILE")]
     paths: Vec<PathBuf>,
     /// Run only the case of this name, or the cases whose name contains this text
@@ -52,7 +53,7 @@ struct TestArguments {
     /// Run only part K of N disjoint parts of the cases
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// Longest time of one run, evaluation, validation or stress test
+    /// Longest time of one run, evaluation, replay, validation or stress test
     #[arg(long, value_parser = duration_s, value_name = "TIME", default_value = "5min")]
     timeout: f64,
     #[command(flatten)]
@@ -93,17 +94,17 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
     if let Some(folder) = &arguments.plots {
         all.iter().try_for_each(|case| remove(&picture(folder, case)))?;
     }
-    let filter = arguments.filter.as_ref().map(|text| Filter::of(text, &all));
+    let text = arguments.filter.as_deref().unwrap_or_default();
+    let is_whole_name = all.iter().any(|case| case.name() == text);
     let is_chosen = |case: &Case<'_>| {
         let name = case.name();
-        filter.as_ref().is_none_or(|filter| filter.has(&name))
-            && arguments.shard.is_none_or(|shard| shard.has(&name))
+        let is_named = if is_whole_name { name == text } else { name.contains(text) };
+        is_named && arguments.shard.is_none_or(|shard| shard.has(&name))
     };
     let cases: Vec<Case<'_>> = all.into_iter().filter(is_chosen).collect();
     if cases.is_empty() && arguments.shard.is_none() {
-        let text = arguments.filter.as_deref().unwrap_or_default();
         return Err(CommandError::Usage(format!(
-            "--filter {text}: no case matches; `flotor test --list` lists all cases"
+            "--filter {text}: no case matches; `--list` instead of `--filter` lists all cases"
         )));
     }
     if arguments.list {
@@ -131,27 +132,6 @@ fn run(arguments: &TestArguments) -> Result<(), CommandError> {
     match report.failed {
         0 => Ok(()),
         failed => Err(CommandError::Failed(format!("{failed} of {} cases failed", report.cases.len()))),
-    }
-}
-
-/// Filter of cases by name.
-enum Filter<'t> {
-    /// Exact name.
-    Whole(&'t str),
-    /// Part of a name.
-    Part(&'t str),
-}
-
-impl<'t> Filter<'t> {
-    fn of(text: &'t str, cases: &[Case<'_>]) -> Self {
-        if cases.iter().any(|case| case.name() == text) { Self::Whole(text) } else { Self::Part(text) }
-    }
-
-    fn has(&self, name: &str) -> bool {
-        match self {
-            Self::Whole(text) => name == *text,
-            Self::Part(text) => name.contains(text),
-        }
     }
 }
 

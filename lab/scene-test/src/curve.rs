@@ -80,8 +80,10 @@ impl Points {
         let mut lines = answers.lines();
         let head: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
         let place = |name: &str| head.iter().position(|known| *known == name);
+        let rows = answers.lines().count().saturating_sub(1);
         let answer = |_: &([f64; 6], [f64; 6])| {
-            let cells: Vec<&str> = lines.next().ok_or("`eval` returned too few rows")?.split(',').collect();
+            let too_few = || format!("results for {rows} of {} poses from `flotor eval`", self.rows.len());
+            let cells: Vec<&str> = lines.next().ok_or_else(too_few)?.split(',').collect();
             let cell = |name: &str| place(name).and_then(|place| cells.get(place).copied());
             let number = |name: &str| cell(name).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN);
             Ok(Answer { wrench: WRENCH.map(number), status: cell("status").unwrap_or_default().to_owned() })

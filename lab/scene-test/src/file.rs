@@ -151,7 +151,7 @@ struct WrittenGolden {
 }
 
 #[derive(Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "write short, full, or a table with `size`, and optionally `pass` and `set`")]
 enum WrittenStress {
     Size(String),
     Table(StressTable),
@@ -227,16 +227,13 @@ impl TestFile {
             let at = reference.span().start;
             let WrittenReference { set, within } = reference.into_inner();
             let set = settings(&set).map_err(|wrong| (at, wrong))?;
-            let mut numbers = Vec::new();
-            for (path, value) in &within {
-                flatten(path, value, &mut |path, value| {
-                    let number = number(value).map_err(|wrong| format!("`within.{path}`: {wrong}"))?;
-                    numbers.push((path.to_owned(), number));
-                    Ok(())
-                })
-                .map_err(|wrong| (at, wrong))?;
-            }
-            if numbers.is_empty() {
+            let number = |(path, value): (String, &Value)| match number(value) {
+                Ok(number) => Ok((path, number)),
+                Err(wrong) => Err((at, format!("`within.{path}`: {wrong}"))),
+            };
+            let written = within.iter().flat_map(|(path, value)| leaves(path, value));
+            let within = written.map(number).collect::<Result<Vec<_>, _>>()?;
+            if within.is_empty() {
                 return Err((
                     at,
                     "the reference has no number to compare; write, for example, within = \
@@ -244,7 +241,7 @@ impl TestFile {
                         .to_owned(),
                 ));
             }
-            Ok(Reference { set, within: numbers })
+            Ok(Reference { set, within })
         });
         let curve = written.curve.map(|curve| -> Result<Curve, Wrong> {
             let at = curve.span().start;
@@ -257,14 +254,11 @@ impl TestFile {
             let WrittenGolden { recording, within_n, within_nm } = golden.into_inner();
             Ok(Golden { recording: existing(&recording)?, within_n, within_nm })
         });
-        let validate = match &written.validate {
-            None => None,
-            Some(value) => match value.get_ref() {
-                Value::Boolean(true) => Some(Validate::Models),
-                Value::Boolean(false) => None,
-                Value::String(file) => Some(Validate::File(folder.join(file))),
-                _ => return Err((value.span().start, "write true, or the path of a plugin file".to_owned())),
-            },
+        let validate = match written.validate.as_ref().map(|value| (value.get_ref(), value.span().start)) {
+            None | Some((Value::Boolean(false), _)) => None,
+            Some((Value::Boolean(true), _)) => Some(Validate::Models),
+            Some((Value::String(file), _)) => Some(Validate::File(folder.join(file))),
+            Some((_, at)) => return Err((at, "write true, false or the path of a plugin file".into())),
         };
         let stress = written.stress.map(|stress| {
             let at = stress.span().start;
@@ -327,17 +321,13 @@ fn with_nearest(message: &str) -> String {
     }
 }
 
-/// Visits the leaves of nested tables, with their dotted keys: `a.b = 1` and `"a.b" = 1` are equal.
-fn flatten<'v>(
-    key: &str,
-    value: &'v Value,
-    leaf: &mut dyn FnMut(&str, &'v Value) -> Result<(), String>,
-) -> Result<(), String> {
+/// Returns the leaves of nested tables, with their dotted keys: `a.b = 1` and `"a.b" = 1` are equal.
+fn leaves<'v>(key: &str, value: &'v Value) -> Vec<(String, &'v Value)> {
     match value {
         Value::Table(table) => {
-            table.iter().try_for_each(|(below, value)| flatten(&format!("{key}.{below}"), value, leaf))
+            table.iter().flat_map(|(below, value)| leaves(&format!("{key}.{below}"), value)).collect()
         }
-        value => leaf(key, value),
+        value => vec![(key.to_owned(), value)],
     }
 }
 
@@ -350,41 +340,34 @@ fn scalar(value: &Value) -> Result<String, String> {
 }
 
 fn settings(written: &BTreeMap<String, Value>) -> Result<Vec<(String, String)>, String> {
-    let mut found = Vec::new();
-    for (key, value) in written {
-        flatten(key, value, &mut |key, value| {
-            let text = scalar(value).map_err(|wrong| format!("`{key}`: {wrong}"))?;
-            found.push((key.to_owned(), text));
-            Ok(())
-        })?;
-    }
-    Ok(found)
+    let setting = |(key, value): (String, &Value)| {
+        let text = scalar(value).map_err(|wrong| format!("`{key}`: {wrong}"))?;
+        Ok((key, text))
+    };
+    written.iter().flat_map(|(key, value)| leaves(key, value)).map(setting).collect()
 }
 
 fn settings_with_values(
     written: &BTreeMap<Spanned<String>, Value>,
 ) -> Result<Vec<(String, Vec<String>)>, Wrong> {
-    let mut found = Vec::new();
-    for (key, value) in written {
-        let wrong = |wrong| (key.span().start, wrong);
-        flatten(key.get_ref(), value, &mut |key, value| {
-            if !key.contains('.') {
-                return Err(format!("`{key}` is not PLUGIN.PARAMETER, such as spring.preset"));
-            }
-            let text = |value: &Value| scalar(value).map_err(|wrong| format!("`{key}`: {wrong}"));
-            let values = match value {
-                Value::Array(values) => values.iter().map(text).collect::<Result<Vec<_>, _>>()?,
-                one => vec![text(one)?],
-            };
-            if values.is_empty() {
-                return Err(format!("`{key}` has an empty list; write at least one value"));
-            }
-            found.push((key.to_owned(), values));
-            Ok(())
-        })
-        .map_err(wrong)?;
-    }
-    Ok(found)
+    let setting = |(at, (key, value)): (usize, (String, &Value))| {
+        if !key.contains('.') {
+            return Err((at, format!("`{key}` is not PLUGIN.PARAMETER, such as spring.preset")));
+        }
+        let text = |value: &Value| scalar(value).map_err(|wrong| (at, format!("`{key}`: {wrong}")));
+        let values = match value {
+            Value::Array(values) => values.iter().map(text).collect::<Result<Vec<_>, _>>()?,
+            one => vec![text(one)?],
+        };
+        if values.is_empty() {
+            return Err((at, format!("`{key}` has an empty list; write at least one value")));
+        }
+        Ok((key, values))
+    };
+    let written = written.iter().flat_map(|(key, value)| {
+        leaves(key.get_ref(), value).into_iter().map(move |leaf| (key.span().start, leaf))
+    });
+    written.map(setting).collect()
 }
 
 fn expectations(written: &BTreeMap<Spanned<String>, Value>) -> Result<Vec<Expectation>, Wrong> {
@@ -454,10 +437,11 @@ mod tests {
             ("[set]\nspring = 3", "F:3: `spring` is not PLUGIN.PARAMETER"),
             ("[expect]\nlate_ticks = 0\npeak_force_n = { min = 2, max = 1 }", "F:4: `peak_force_n`: min = 2"),
             ("stress = \"shrt\"\n", "F:2: unknown size `shrt`"),
+            ("stress = 3", "write short, full, or a table"),
             ("[stress]\nsize = \"short\"\npass = [\"M11\"]", "unknown measure `M11`"),
             ("[golden]\nrecording = \"no.mcap\"\nwithin_n = 1", "F:3: the file"),
             ("", "the file has no expectation"),
-            ("validate = 3", "F:2: write true, or the path"),
+            ("validate = 3", "F:2: write true, false or the path"),
             ("[expect]\nend = \"finished\"", "nothing"),
         ] {
             let told = wrong(rest);

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::ffi::OsStr;
 use std::io::{Read, Seek, SeekFrom, Write};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 /// Program that executes the commands of the checks.
@@ -51,15 +51,15 @@ impl Flotor {
         arguments: impl IntoIterator<Item = I>,
         input: &str,
     ) -> Result<ProcessResult, String> {
-        self.try_run(arguments, input).map_err(|cause| match cause {
-            Trouble::Missing(error) => error.to_string(),
-            Trouble::System(cause) => format!("cannot run flotor: {cause}"),
-            Trouble::Late => {
-                format!(
-                    "the process did not end within {} s, and was killed; raise the limit with --timeout",
-                    self.limit.as_secs_f64()
-                )
-            }
+        let mut command = Self::PROGRAM.command().map_err(|error| error.to_string())?;
+        let ran = self
+            .try_run(command.args(arguments), input)
+            .map_err(|cause| format!("cannot run flotor, or keep its output in a temporary file: {cause}"))?;
+        ran.ok_or_else(|| {
+            format!(
+                "the process did not end within {} s, and was killed; raise the limit with --timeout",
+                self.limit.as_secs_f64()
+            )
         })
     }
 
@@ -75,20 +75,17 @@ impl Flotor {
         serde_json::from_str(&ran.stdout).map_err(|_| ran.error)
     }
 
-    fn try_run<I: AsRef<OsStr>>(
-        &self,
-        arguments: impl IntoIterator<Item = I>,
-        input: &str,
-    ) -> Result<ProcessResult, Trouble> {
+    /// Runs `command`, with `input` on standard input; returns nothing if the process was killed after the time limit.
+    fn try_run(&self, command: &mut Command, input: &str) -> std::io::Result<Option<ProcessResult>> {
         // Files, not pipes: a grandchild process could hold a pipe open for ever.
         let [mut stdin, mut stdout, mut stderr] =
             [tempfile::tempfile()?, tempfile::tempfile()?, tempfile::tempfile()?];
         stdin.write_all(input.as_bytes())?;
         stdin.seek(SeekFrom::Start(0))?;
-        let mut command = Self::PROGRAM.command().map_err(Trouble::Missing)?;
-        command.args(arguments).env("NO_COLOR", "1").stdin(Stdio::from(stdin));
+        command.env("NO_COLOR", "1").stdin(Stdio::from(stdin));
         command.stdout(stdout.try_clone()?).stderr(stderr.try_clone()?);
-        let code = self.wait(&mut command)?;
+        let Some(status) = self.wait(command)? else { return Ok(None) };
+        let code = status.code();
         let stdout = text(&mut stdout)?;
         let said = text(&mut stderr)?;
         let last = said.lines().rev().find(|line| line.starts_with("error: ")).or(said.lines().last());
@@ -96,19 +93,19 @@ impl Flotor {
             || code.map_or("a signal ended the process".to_owned(), |code| format!("exit code {code}"));
         let error = last.map_or_else(silent, |line| line.trim_start_matches("error: ").to_owned());
         let error = if code.is_none() { format!("a signal killed the process: {error}") } else { error };
-        Ok(ProcessResult { code, stdout, error })
+        Ok(Some(ProcessResult { code, stdout, error }))
     }
 
-    fn wait(&self, command: &mut Command) -> Result<Option<i32>, Trouble> {
+    fn wait(&self, command: &mut Command) -> std::io::Result<Option<ExitStatus>> {
         let mut process = PluginProcess::start(command)?;
         let started = Instant::now();
         loop {
             if let Some(status) = process.try_wait()? {
-                return Ok(status.code());
+                return Ok(Some(status));
             }
             if started.elapsed() > self.limit {
                 process.kill()?;
-                return Err(Trouble::Late);
+                return Ok(None);
             }
             std::thread::sleep(Duration::from_millis(2));
         }
@@ -120,16 +117,4 @@ fn text(file: &mut std::fs::File) -> std::io::Result<String> {
     file.seek(SeekFrom::Start(0))?;
     file.read_to_end(&mut bytes)?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
-}
-
-enum Trouble {
-    Missing(CommandError),
-    System(std::io::Error),
-    Late,
-}
-
-impl From<std::io::Error> for Trouble {
-    fn from(cause: std::io::Error) -> Self {
-        Self::System(cause)
-    }
 }

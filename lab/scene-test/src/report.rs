@@ -107,7 +107,7 @@ fn is_special(path: &Path) -> bool {
 pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), CommandError> {
     if is_special(path) {
         return std::fs::write(path, text)
-            .map_err(|cause| CommandError::file(path, "cannot write the result", cause));
+            .map_err(|cause| CommandError::file(path, "cannot write the file", cause));
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let written = tempfile::NamedTempFile::new_in(folder).and_then(|mut file| {
@@ -116,7 +116,7 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), CommandError> {
         readable_by_all(file.as_file())?;
         file.persist(path).map_err(|error| error.error)
     });
-    written.map(drop).map_err(|cause| CommandError::file(path, "cannot write the result", cause))
+    written.map(drop).map_err(|cause| CommandError::file(path, "cannot write the file", cause))
 }
 
 /// Prints the results as text, unless the JSON goes to standard output, and writes them to the requested files.

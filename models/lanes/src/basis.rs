@@ -33,14 +33,8 @@ pub struct Basis<const K: usize, const Q: usize> {
 }
 
 impl<const K: usize, const Q: usize> Default for Basis<K, Q> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-impl<const K: usize, const Q: usize> Basis<K, Q> {
     /// Computes the tables. Real-time: bounded, no allocation; some microseconds.
-    pub fn new() -> Self {
+    fn default() -> Self {
         let mut basis = Self {
             weight: [0.0; Q],
             station: [0.0; Q],
@@ -131,7 +125,7 @@ mod tests {
 
     #[test]
     fn quadrature_is_exact_to_its_degree() {
-        let basis = Basis::<3, 9>::new();
+        let basis = Basis::<3, 9>::default();
         for power in 0..18 {
             let sum: f64 = (0..9).map(|i| basis.weight[i] * basis.station[i].powi(power)).sum();
             // The integral of s^n over 0..1; rounding of nine terms below one.
@@ -141,7 +135,7 @@ mod tests {
 
     #[test]
     fn slopes_are_orthonormal_and_belong_to_the_bubbles() {
-        let basis = Basis::<8, 12>::new();
+        let basis = Basis::<8, 12>::default();
         let inner =
             |a: &[f64; 12], b: &[f64; 12]| -> f64 { (0..12).map(|i| basis.weight[i] * a[i] * b[i]).sum() };
         for k in 0..8 {

@@ -38,7 +38,8 @@ impl Piece {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
     pieces: Vec<Piece>,
-    deepest_m: f64,
+    /// Compression of the last knot, the largest measured, m.
+    pub(crate) deepest_m: f64,
     /// Force, N, slope, N/m, and energy, J, at the last knot.
     end: (f64, f64, f64),
 }
@@ -77,12 +78,6 @@ impl Curve {
         }
         let (deepest_m, force_n) = knots[knots.len() - 1];
         Ok(Self { pieces, deepest_m, end: (force_n, slopes[slopes.len() - 1], energy_j) })
-    }
-
-    /// Returns the compression of the last knot, the largest measured, m.
-    #[must_use]
-    pub fn deepest_m(&self) -> f64 {
-        self.deepest_m
     }
 
     /// Returns the force against compression, N, and the stored energy, J: zero without compression, and beyond the last knot

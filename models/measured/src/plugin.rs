@@ -36,7 +36,7 @@ impl Measured {
         let (force_n, energy_j) = self.curve.at(-reached_m);
         let status = if reached_m != height_m {
             StepStatus::Clamped
-        } else if -reached_m > self.curve.deepest_m() {
+        } else if -reached_m > self.curve.deepest_m {
             StepStatus::OutOfDomain
         } else {
             StepStatus::Ok
@@ -92,11 +92,11 @@ impl ForceModel for Measured {
         };
         let metres = |id| settings.number_or_default(id) * 1.0e-3;
         let (free_length_m, coil_diameter_m) = (metres("free_length_mm"), metres("coil_diameter_mm"));
-        if curve.deepest_m() >= free_length_m {
+        if curve.deepest_m >= free_length_m {
             return Err(Refusal::parameter(format!(
                 "the curve ends at a compression of {:.3} mm, but the spring is only {:.3} mm long; set `free_length_mm` \
                  to a greater length",
-                curve.deepest_m() * 1.0e3,
+                curve.deepest_m * 1.0e3,
                 free_length_m * 1.0e3
             )));
         }

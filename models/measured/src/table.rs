@@ -40,7 +40,7 @@ pub fn parse(text: &str) -> Result<Curve, TextProblem> {
         CurveError::Count(count) => {
             let last = numbers.last().copied().unwrap_or(1);
             TextProblem::at(last, format!(
-                "the curve has {count} rows up to this line, but must have 3 to {}; add or remove rows", Curve::MOST_KNOTS))
+                "the number of rows up to this line is {count}, but must be 3 to {}; add or remove rows", Curve::MOST_KNOTS))
         }
         CurveError::Start => {
             let first = numbers.first().copied().unwrap_or(1);

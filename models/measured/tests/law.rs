@@ -66,7 +66,10 @@ fn what_is_no_curve_is_refused() {
 
     let refused = |text: &str| parse(text).unwrap_err().in_file("c");
     assert!(refused("").starts_with("c:1: the table is empty"));
-    assert!(refused("compression_mm,force_n\n0,0\n1,2\n").starts_with("c:3: the curve has 2 rows"));
+    assert!(
+        refused("compression_mm,force_n\n0,0\n1,2\n")
+            .starts_with("c:3: the number of rows up to this line is 2")
+    );
     assert!(refused("compression_mm,force_n\n1,0\n2,3\n3,4\n").starts_with("c:2: the first row"));
     assert!(refused("length_mm,force_n\n25,0\n").starts_with("c:1: the header"));
     assert!(

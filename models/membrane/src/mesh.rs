@@ -78,8 +78,8 @@ impl Mesh {
     /// their rest length. Edges of one face only are the border; their ends are fixed. The free masses are equal.
     ///
     /// # Errors
-    /// A [`TextProblem`]: a malformed line, no face, too many vertices, two edges of the border that coincide but are not joined,
-    /// a part without a fixed border, or no free mass.
+    /// A [`TextProblem`]: a malformed line, no face, too many vertices, a vertex of the border on an edge of the border that
+    /// does not end there, a part without a fixed border, or no free mass.
     pub fn from_obj(
         text: &str,
         mass_kg: f64,

@@ -28,9 +28,9 @@ const SCHEMA: &[Parameter] = &[
         3.0,
         200.0,
         17.0,
-        "Number of masses along a side of the sheet; the border is fixed",
+        "Number of masses along a side of the sheet, whose border is fixed; no effect with `file`",
     ),
-    Parameter::real("side_mm", "mm", 1.0, 1000.0, 40.0, "Length of a side of the sheet"),
+    Parameter::real("side_mm", "mm", 1.0, 1000.0, 40.0, "Side length of the sheet; no effect with `file`"),
     Parameter::real("mass_g", "g", 0.01, 1.0e5, 10.0, "Total mass of the sheet"),
     Parameter::real(
         "stiffness_n_per_m",
@@ -154,9 +154,9 @@ impl ForceModel for Membrane {
         let steps_per_ms = 1.0e-3 / network.longest_step_s();
         if steps_per_ms > MOST_STEPS_PER_MS {
             return Err(Refusal::parameter(format!(
-                "the springs are so stiff and the masses so light that a millisecond needs {steps_per_ms:.0} \
-                 steps (at most {MOST_STEPS_PER_MS}); raise `mass_g`, or lower `stiffness_n_per_m` or \
-                 `contact_n_per_m`"
+                "the springs are so stiff and the masses so light that a millisecond needs {} steps (at most \
+                 {MOST_STEPS_PER_MS}); raise `mass_g`, or lower `stiffness_n_per_m` or `contact_n_per_m`",
+                steps_per_ms.ceil()
             )));
         }
         // Under gravity the sheet sags before the first touch.

@@ -63,8 +63,8 @@ impl Topology {
         }
         match topology.crack_m() {
             Some(at_m) => Err(TextProblem::of_file(format!(
-                "at {} two edges of the border coincide but are not joined; merge the vertices there \
-                 (\"merge by distance\"), or move them apart",
+                "at {} a vertex of the border lies on an edge of the border that does not end there; merge the vertices \
+                 there (\"merge by distance\"), split the edge at the vertex, or move them apart",
                 in_mm(at_m)
             ))),
             None => Ok(topology),

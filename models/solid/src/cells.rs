@@ -74,6 +74,14 @@ impl Kind {
         }
     }
 
+    /// Returns the coordinates of all nodes in the reference element.
+    #[must_use]
+    pub fn node_places(self) -> Vec<[f64; 3]> {
+        let corners = self.corner_places();
+        let middle = |[a, b]: &[usize; 2]| [0, 1, 2].map(|k| 0.5 * (corners[*a][k] + corners[*b][k]));
+        corners.iter().copied().chain(self.edges().iter().map(middle)).collect()
+    }
+
     /// Returns the number of nodes: 10 of a tetrahedron, 20 of a brick.
     #[must_use]
     pub fn nodes(self) -> usize {

@@ -85,12 +85,7 @@ struct Gatherer {
 impl Gatherer {
     /// Adds one brick, with its new nodes; `place` maps the coordinates of its reference nodes to positions, m.
     fn brick(&mut self, place: &dyn Fn([f64; 3]) -> [f64; 3]) {
-        let corners = Kind::Brick.corner_places();
-        let mut places = corners.clone();
-        for [a, b] in Kind::Brick.edges() {
-            places.push([0, 1, 2].map(|k| 0.5 * (corners[*a][k] + corners[*b][k])));
-        }
-        let nodes = places.into_iter().map(|at| self.node(place(at))).collect();
+        let nodes = Kind::Brick.node_places().into_iter().map(|at| self.node(place(at))).collect();
         let tag = self.parts.elements.len() + 1;
         self.parts.elements.push(Element { kind: Kind::Brick, nodes, tag });
     }

@@ -2,9 +2,8 @@
 
 use crate::parameters::{BodyChoice, ToolChoice, bond, resolution};
 use crate::plate::PlateBox;
-use crate::prepare::Resolution;
 use crate::punch::{Bond, Outline};
-use crate::remainder::Size;
+use crate::remainder::{Resolution, Size};
 use flotor_hal::{Refusal, Settings};
 
 /// Touched body.
@@ -193,10 +192,10 @@ impl Description {
         let limit_m = 0.9 * least_m;
         if extent_m > limit_m {
             return Err(Refusal::parameter(format!(
-                "{what} is {:.4} mm, but may be at most {:.4} mm for this body: make the tool smaller, or \
-                 the body larger",
+                "{what} is {:.4} mm, but may be at most {:.4} mm for this body: reduce it, or increase the sizes of the \
+                 body (`size_x_mm`, `size_z_mm`, for a block also `size_y_mm`)",
                 extent_m * 1.0e3,
-                limit_m * 1.0e3
+                below_mm(limit_m)
             )));
         }
         Ok(())
@@ -233,9 +232,9 @@ impl Description {
                 }
                 Err(Refusal::parameter(format!(
                     "`tool_spacing_mm` is {:.4} mm, but may be at most {:.4} mm for this face: reduce the \
-                     spacing, or make the body larger",
+                     spacing, or increase `size_x_mm` and `size_y_mm`",
                     mm(spacing_m),
-                    mm(least_m / 0.6)
+                    below_mm(least_m / 0.6)
                 )))
             }
             Body::Cylinder { .. } | Body::File { .. } => Err(Refusal::unsupported(
@@ -243,4 +242,9 @@ impl Description {
             )),
         }
     }
+}
+
+/// Returns a limit in mm, rounded down to four digits: the stated value is permitted.
+fn below_mm(limit_m: f64) -> f64 {
+    (limit_m * 1.0e7 + 1.0e-6).floor() * 1.0e-4
 }

@@ -138,20 +138,11 @@ impl Drawing {
     /// Draws the solid under contacts, with a surface that is fine at `focus`; `tool_m`: extent of the tool from the focus.
     fn under(&mut self, contacts: &[Contact], focus: Focus, tool_m: f64) -> &Shape {
         let own;
-        let skin = match (&self.look, self.body) {
-            (Look::Sphere(Some(skin)), _) => skin,
-            (_, Body::Block(size)) => {
-                let is_above = contacts.iter().any(|contact| contact.normal.z > 0.7);
-                let steps = if is_above { STEPS } else { SIDE_STEPS };
-                own = Skin::block([size.half_x_m, size.half_y_m], size.height_m, focus, steps);
-                &own
-            }
-            (_, Body::Cylinder { radius_m, height_m }) => {
-                own = Skin::cylinder(radius_m, height_m, focus);
-                &own
-            }
+        let skin = match &self.look {
+            Look::Sphere(Some(skin)) => skin,
             _ => {
-                own = Skin::disc(HALF_SPACE_RADII * tool_m, focus);
+                let is_above = contacts.iter().any(|contact| contact.normal.z > 0.7);
+                own = skin_of(self.body, focus, if is_above { STEPS } else { SIDE_STEPS }, tool_m);
                 &own
             }
         };
@@ -166,6 +157,16 @@ impl Drawing {
             Primitive::sphere(Part::Tool, Pose::new(*centre_m, DQuat::IDENTITY), *sphere_m)
         }));
         &self.shape
+    }
+}
+
+/// Returns the surface of a body without a mesh, fine at `focus`. `steps`: numbers of steps of a block; `tool_m`: extent of the
+/// tool.
+fn skin_of(body: Body, focus: Focus, steps: [usize; 3], tool_m: f64) -> Skin {
+    match body {
+        Body::Block(size) => Skin::block([size.half_x_m, size.half_y_m], size.height_m, focus, steps),
+        Body::Cylinder { radius_m, height_m } => Skin::cylinder(radius_m, height_m, focus),
+        _ => Skin::disc(HALF_SPACE_RADII * tool_m, focus),
     }
 }
 
@@ -374,11 +375,9 @@ fn punch_modes(
     let (_, loads) = punch(&solid, None, outline, bond, FINENESS).ok()?;
     let extent_m = outline.extent_m();
     let focus = Focus { at_m: DVec3::ZERO, width_m: 0.7 * extent_m };
-    let skin = match (description.body, mesh) {
-        (Body::Block(size), _) => Skin::block([size.half_x_m, size.half_y_m], size.height_m, focus, STEPS),
-        (Body::Cylinder { radius_m, height_m }, _) => Skin::cylinder(radius_m, height_m, focus),
-        (_, Some(mesh)) => Skin::of_mesh(mesh).0,
-        (_, None) => Skin::disc(HALF_SPACE_RADII * extent_m, focus),
+    let skin = match mesh {
+        Some(mesh) => Skin::of_mesh(mesh).0,
+        None => skin_of(description.body, focus, STEPS, extent_m),
     };
     let height_m = height_m(description.body, mesh);
     let field = Loaded::new(&solid, &loads, outline, bond);
@@ -473,7 +472,8 @@ impl<'a> Loaded<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::prepare::{Resolution, sphere_on_half_space};
+    use crate::prepare::sphere_on_half_space;
+    use crate::remainder::Resolution;
     use crate::sphere::{Patch, Problem};
 
     #[test]
@@ -496,7 +496,7 @@ mod tests {
         for share in [0.05, 0.2, 0.5, 0.9] {
             let cell_m = 1.25 * contact_radius_m(1.0, share) / f64::from(rings);
             let problem = Problem { radius_m: 1.0, depth_m: share, cell_m, on_face: &[], smooth: &[] };
-            let contact = patch.solve(&problem, before.as_ref());
+            let contact = patch.solve(&problem, before.as_ref()).expect("a solution");
             let drawn = contact_radius_m(1.0, share);
             assert!((contact.reach * cell_m - drawn).abs() < 1.5 * cell_m, "{share}: {}", contact.reach);
             before = Some(contact);
@@ -505,7 +505,7 @@ mod tests {
 
     #[test]
     fn the_surface_goes_round_the_sphere_and_its_pressure_is_the_force() {
-        let atlas = sphere_on_half_space(0.3, 0.01).atlas;
+        let atlas = sphere_on_half_space(0.3, 0.01).expect("a law").atlas;
         let description = Description {
             body: Body::HalfSpace,
             tool: Tool::Sphere { radius_m: 0.01 },

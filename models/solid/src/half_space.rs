@@ -29,6 +29,13 @@ pub struct Field {
 /// Compliance between two points, m/N: first index direction of the displacement, second index direction of the force.
 pub type Block = [[f64; 3]; 3];
 
+/// Adds `share` times a block to `sum`.
+pub(crate) fn add_scaled(sum: &mut Block, block: &Block, share: f64) {
+    for (row, values) in sum.iter_mut().zip(block) {
+        row.iter_mut().zip(values).for_each(|(s, v)| *s += share * v);
+    }
+}
+
 impl HalfSpace {
     fn shear_pa(&self) -> f64 {
         self.youngs_modulus_pa / (2.0 * (1.0 + self.poisson_ratio))

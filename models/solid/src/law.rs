@@ -8,13 +8,12 @@ use crate::description::{Body, Description, Tool};
 use crate::grid::Lame;
 use crate::half_space::HalfSpace;
 use crate::mesh::Mesh;
-use crate::prepare::{
-    BodyKind, Prepared, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh,
-};
+use crate::prepare::{Prepared, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh};
 use crate::punch::{Outline, extrapolated};
 use crate::remainder::{Face, Remainder};
 use crate::rigid::{MODES, RigidPatch};
 use crate::several::{ExtraCompliance, Spheres};
+use crate::sphere::NotConverged;
 use crate::table::Table;
 use crate::tetrahedra;
 use flotor_hal::Refusal;
@@ -95,19 +94,9 @@ impl Description {
         Ok((Law::Spheres(Box::new(spheres)), mesh_error))
     }
 
-    /// Returns the kind of body under a sphere.
-    fn body_kind(&self) -> BodyKind {
-        match self.body {
-            Body::Block(size) => BodyKind::Block(size),
-            Body::Cylinder { radius_m, height_m } => BodyKind::Cylinder([radius_m, height_m]),
-            Body::File { .. } => BodyKind::Face,
-            Body::Beam { .. } | Body::HalfSpace => BodyKind::HalfSpace,
-        }
-    }
-
     fn read(&self, numbers: &[f64]) -> Option<(Law, f64)> {
         if let Tool::Sphere { radius_m } = self.tool {
-            let prepared = Prepared::from_numbers(numbers, self.poisson_ratio, radius_m, self.body_kind())?;
+            let prepared = Prepared::from_numbers(numbers, self.poisson_ratio, radius_m, self.body)?;
             return Some((Law::Sphere(Box::new(prepared.atlas)), prepared.mesh_error));
         }
         let (&mesh_error, rest) = numbers.split_first()?;
@@ -134,19 +123,15 @@ impl Description {
             (_, Tool::Spheres { .. }, _) => return self.spheres(&Self::solve, &|_, solve| solve()),
             (Body::Cylinder { radius_m, height_m }, ..) => {
                 let mesh = Mesh::cylinder(radius_m, height_m, resolution.bricks)
-                    .map_err(|problem| Refusal::parameter(format!("the cylinder: {problem}")))?;
+                    .map_err(|_| not_a_cylinder(radius_m, height_m))?;
                 return self.solve_on(&mesh);
             }
-            (Body::File { .. }, ..) => {
-                return Err(Refusal::parameter(
-                    "body = \"file\" needs a mesh: set `file` to the path of a Gmsh file (.msh)",
-                ));
-            }
+            (Body::File { .. }, ..) => return Err(no_mesh()),
             (Body::Block(size), Tool::Sphere { radius_m }, _) => {
                 return Ok(sphere(sphere_on_block(poisson_ratio, radius_m, size, resolution)?));
             }
             (Body::HalfSpace, Tool::Sphere { radius_m }, _) => {
-                return Ok(sphere(sphere_on_half_space(poisson_ratio, radius_m)));
+                return Ok(sphere(sphere_on_half_space(poisson_ratio, radius_m)?));
             }
             (Body::Block(size), Tool::Punch { outline, bond }, _) => {
                 let extent_m = outline.extent_m();
@@ -185,7 +170,7 @@ impl Description {
         }
         if let Tool::Sphere { radius_m } = self.tool {
             let rings = self.resolution.rings;
-            let prepared = sphere_on_mesh(mesh, self.body_kind(), self.poisson_ratio, radius_m, rings)?;
+            let prepared = sphere_on_mesh(mesh, self.body, self.poisson_ratio, radius_m, rings)?;
             return Ok(sphere(prepared));
         }
         let Tool::Punch { outline, bond } = self.tool else {
@@ -209,6 +194,21 @@ impl Description {
         let (patch, step) = extrapolated(&solid, Some(&table), outline, bond)?;
         Ok((Law::Bonded(Box::new(patch)), step.max(base.mesh_error(extent_m, &[[0.0; 2]]))))
     }
+}
+
+/// Returns the refusal of `body = "file"` without a mesh.
+pub(crate) fn no_mesh() -> Refusal {
+    Refusal::parameter("body = \"file\" needs a mesh: set `file` to the path of a Gmsh file (.msh)")
+}
+
+/// Returns the refusal of a cylinder without a mesh; the remedies of a mesh error are for mesh files.
+fn not_a_cylinder(radius_m: f64, height_m: f64) -> Refusal {
+    Refusal::parameter(format!(
+        "a cylinder of diameter {} mm and height {} mm cannot be meshed: set `size_x_mm` (diameter) and `size_z_mm` (height) \
+         to values above 0 and at most 10000 mm that differ less",
+        2.0e3 * radius_m,
+        1.0e3 * height_m
+    ))
 }
 
 fn sphere(prepared: Prepared) -> (Law, f64) {
@@ -235,5 +235,33 @@ impl From<NotPositive> for Refusal {
             "the stiffness matrix is not positive definite (degree of freedom {pivot}): lower `poisson_ratio`, or \
              make the sides of the body (of a mesh: of each element) more similar"
         ))
+    }
+}
+
+impl From<NotConverged> for Refusal {
+    fn from(NotConverged { depth }: NotConverged) -> Self {
+        Self::parameter(format!(
+            "the contact of the sphere at a depth of {depth:.3} radii has no solution: lower `poisson_ratio`, or choose another \
+             `resolution`"
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::remainder::Resolution;
+
+    /// The remedies were those for a mesh file: a scaling factor of Gmsh, and the order of the nodes of an element.
+    #[test]
+    fn a_cylinder_that_cannot_be_meshed_is_refused_with_its_parameters() {
+        for (radius_m, height_m) in [(6.0, 0.1), (0.1, 11.0), (0.1, -0.1)] {
+            let body = Body::Cylinder { radius_m, height_m };
+            let tool = Tool::Sphere { radius_m: 0.01 };
+            let cylinder = Description { body, tool, poisson_ratio: 0.3, resolution: Resolution::QUICK };
+            let refusal = cylinder.solve().expect_err("no mesh").to_string();
+            assert!(refusal.contains("`size_x_mm`") && refusal.contains("`size_z_mm`"), "{refusal}");
+            assert!(!refusal.contains("Mesh.") && !refusal.contains("nodes"), "{refusal}");
+        }
     }
 }

@@ -104,7 +104,7 @@ pub enum MeshError {
     Shared,
     /// The longest side is zero or above 10 m, or a coordinate is not finite.
     Extent {
-        /// Longest side, m.
+        /// Longest side, m; NaN if a coordinate is not finite.
         extent_m: f64,
     },
 }
@@ -180,8 +180,8 @@ impl fmt::Display for MeshError {
             }
             Self::Extent { extent_m } => write!(
                 f,
-                "the longest side of the mesh is {extent_m} m, but must be above 0 and at most 10 m: coordinates are in \
-                 metres (`Mesh.ScalingFactor = 0.001` turns millimetres into metres)"
+                "the longest side of the mesh is {extent_m} m, but must be above 0 and at most 10 m: coordinates are \
+                 finite numbers in metres (`Mesh.ScalingFactor = 0.001` turns millimetres into metres)"
             ),
         }
     }
@@ -222,6 +222,12 @@ impl Mesh {
         check_places(&nodes_m, &elements)?;
         for element in &elements {
             check_element(&nodes_m, element)?;
+        }
+        let faces_of = |name: &str| {
+            surfaces.get(name).into_iter().flatten().map(|face| sorted(face)).collect::<BTreeSet<_>>()
+        };
+        if !faces_of(fixed_name).is_disjoint(&faces_of(touched_name)) {
+            return Err(MeshError::Shared);
         }
         let mut border = border(&elements)?;
         let mut take = |role: &'static str, name: &str| -> Result<Vec<Facet>, MeshError> {
@@ -274,10 +280,9 @@ fn check_places(nodes_m: &[[f64; 3]], elements: &[Element]) -> Result<(), MeshEr
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), c| (low.min(c), high.max(c)));
         high - low
     };
-    let extent_m = side(0).max(side(1)).max(side(2));
-    if !(extent_m > 0.0 && extent_m <= 10.0)
-        || used.iter().any(|&node| nodes_m[node].iter().any(|c| !c.is_finite()))
-    {
+    let is_finite = used.iter().all(|&node| nodes_m[node].iter().all(|c| c.is_finite()));
+    let extent_m = if is_finite { side(0).max(side(1)).max(side(2)) } else { f64::NAN };
+    if !(extent_m > 0.0 && extent_m <= 10.0) {
         return Err(MeshError::Extent { extent_m });
     }
     // After sorting along x, nodes at one position are neighbours within a billionth of the body's size.

@@ -1,7 +1,7 @@
 //! Parameters of the solid: schema, names of the choices, and values.
 
-use crate::prepare::Resolution;
 use crate::punch::Bond;
+use crate::remainder::Resolution;
 use flotor_hal::{Choices, Parameter, Settings, choices};
 
 /// Declares the values of a choice with their names, in the order of the schema.

@@ -3,7 +3,7 @@
 use crate::description::{Description, Tool};
 use crate::drawing::Drawing;
 use crate::friction::Friction;
-use crate::law::Law;
+use crate::law::{Law, no_mesh};
 use crate::mesh::Mesh;
 use crate::parameters::{BodyChoice, SCHEMA, YOUNGS_MODULUS, resolve};
 use crate::several::{self, MAX_SPHERES};
@@ -62,11 +62,7 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
         let refusal = "`file`, `fixed_face` and `touched_face` are only for a mesh: set body = \"file\"";
         return if stray { Err(Refusal::parameter(refusal)) } else { Ok(None) };
     }
-    let Some(path) = file else {
-        return Err(Refusal::parameter(
-            "body = \"file\" needs a mesh: set `file` to the path of a Gmsh file (.msh)",
-        ));
-    };
+    let path = file.ok_or_else(no_mesh)?;
     let sizes = ["size_x_mm", "size_y_mm", "size_z_mm"];
     if let Some(id) = sizes.into_iter().find(|id| settings.number(id).is_some()) {
         return Err(Refusal::parameter(format!("`{id}`: a mesh has its own size; omit this parameter")));

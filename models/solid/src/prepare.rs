@@ -1,14 +1,16 @@
 //! Slow preparation of a law from a solid and a tool, before the loop.
 
 use crate::atlas::{Atlas, TouchedBody};
-use crate::body::{Body, outline_m};
+use crate::body::{Body as ElasticBody, outline_m};
 use crate::dense::NotPositive;
+use crate::description::Body;
 use crate::half_space::HalfSpace;
 use crate::mesh::Mesh;
-use crate::remainder::{Face, Fineness, Remainder, Size};
-use crate::sphere::{Contact, Patch, Problem};
+use crate::remainder::{Face, Fineness, Remainder, Resolution, Size};
+use crate::sphere::{Contact, NotConverged, Patch, Problem};
 use crate::spline::{Curve, End, Volume};
-use crate::table::Table;
+use crate::table::{Table, mirrored};
+use flotor_hal::Refusal;
 
 /// Largest depth, in radii, for which the law is valid: beyond it a linear solid's force falls and the contact snaps through.
 const DEEPEST: f64 = 1.2;
@@ -38,32 +40,6 @@ const FACE_PLACES: [f64; 5] = [0.0, 0.35, 0.65, 0.85, 1.0];
 const FACE_ENDS: [[End; 2]; 3] = [[End::Parabola; 2]; 3];
 const CYLINDER_ENDS: [[End; 2]; 3] = [[End::Level, End::Parabola], [End::Parabola; 2], [End::Parabola; 2]];
 
-/// Fineness of a preparation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Resolution {
-    /// Order of the elements.
-    pub order: usize,
-    /// Number of cells of a contact from its middle to its rim.
-    pub rings: i32,
-    /// Number of bricks along a side of the square in the middle of a cylinder.
-    pub bricks: usize,
-}
-
-impl Resolution {
-    /// Fastest preparation, largest error.
-    pub const QUICK: Self = Self { order: 2, rings: 5, bricks: 4 };
-    /// Default resolution.
-    pub const STANDARD: Self = Self { order: 3, rings: 6, bricks: 6 };
-    /// Slowest preparation, smallest error.
-    pub const FINE: Self = Self { order: 4, rings: 8, bricks: 8 };
-
-    /// Returns numbers and order of the elements for the remainder of a block.
-    #[must_use]
-    pub fn fineness(self) -> Fineness {
-        Fineness { across: 4, high: 5, order: self.order }
-    }
-}
-
 /// Prepared law of a sphere with its error estimate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prepared {
@@ -81,7 +57,7 @@ fn cell_m(radius_m: f64, depth_m: f64, rings: i32) -> f64 {
 }
 
 /// Solves contacts with a half-space for roots of depth, in radii of a sphere of radius one.
-fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Vec<Contact> {
+fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Result<Vec<Contact>, NotConverged> {
     let patch = Patch::new(solid, rings);
     let mut contacts: Vec<Contact> = Vec::with_capacity(roots.len());
     for root in roots {
@@ -93,10 +69,10 @@ fn unbounded(solid: &HalfSpace, rings: i32, roots: &[f64]) -> Vec<Contact> {
             on_face: &[],
             smooth: &[],
         };
-        let contact = patch.solve(&problem, contacts.last());
+        let contact = patch.solve(&problem, contacts.last())?;
         contacts.push(contact);
     }
-    contacts
+    Ok(contacts)
 }
 
 /// Returns the square roots of depth over radius at which contacts are solved.
@@ -119,18 +95,20 @@ fn column(
     let (mut start, mut solved): (Option<Contact>, f64) = (None, 1.0);
     for (root, unbounded) in roots.iter().zip(reference) {
         let depth_m = radius_m * root * root;
-        let cell_m = cell_m(radius_m, depth_m, patch.rings());
+        let cell_m = cell_m(radius_m, depth_m, patch.rings);
         let points: Vec<[f64; 2]> =
             patch.points_m(cell_m).iter().map(|at| [at[0] + place_m[0], at[1] + place_m[1]]).collect();
         let on_face: Vec<bool> = points.iter().map(|&at| on_face(at)).collect();
         let smooth = table.among(&points);
         let problem = Problem { radius_m, depth_m, cell_m, on_face: &on_face, smooth: &smooth };
-        let contact = patch.solve(&problem, start.as_ref());
-        let ratio = contact.energy_j / (unbounded.energy_j * radius_m * radius_m * radius_m);
-        let is_contact = contact.residual < 1.0e-4 && ratio.is_finite() && ratio > 0.0;
+        let ratio =
+            |contact: &Contact| contact.energy_j / (unbounded.energy_j * radius_m * radius_m * radius_m);
+        let solution = patch.solve(&problem, start.as_ref()).map(|contact| (ratio(&contact), contact));
+        let solution = solution.ok().filter(|(ratio, _)| ratio.is_finite() && *ratio > 0.0);
         // Near a corner the shallowest contact already has a ratio other than one; off the face it has none.
-        let before = ratios.last().copied().unwrap_or(if is_contact { ratio } else { 1.0 });
-        if is_contact && (ratio / before - 1.0).abs() < 0.3 {
+        let first = solution.as_ref().map_or(1.0, |(ratio, _)| *ratio);
+        let before = ratios.last().copied().unwrap_or(first);
+        if let Some((ratio, contact)) = solution.filter(|(ratio, _)| (ratio / before - 1.0).abs() < 0.3) {
             ratios.push(ratio);
             (start, solved) = (Some(contact), ratio);
         } else {
@@ -149,11 +127,11 @@ fn hertz(poisson_ratio: f64, root: f64) -> f64 {
 
 /// Returns the energy relative to Hertz's, by square root of depth. It is divided by its value at the smallest depth, where
 /// Hertz's law is exact, to remove the error of the cells.
-fn profile(solid: &HalfSpace) -> Curve {
+fn profile(solid: &HalfSpace) -> Result<Curve, NotConverged> {
     let top = DEEPEST_SOLVED.sqrt();
     let mut roots = vec![0.01];
     roots.extend((1..=PROFILE_LEVELS).map(|level| top * level as f64 / PROFILE_LEVELS as f64));
-    let contacts = unbounded(solid, PROFILE_RINGS, &roots);
+    let contacts = unbounded(solid, PROFILE_RINGS, &roots)?;
     let shares: Vec<f64> = roots
         .iter()
         .zip(&contacts)
@@ -161,7 +139,7 @@ fn profile(solid: &HalfSpace) -> Curve {
         .collect();
     let values = shares.iter().map(|share| share / shares[0]).collect();
     roots[0] = 0.0;
-    Curve::new(roots, values, [End::Parabola; 2])
+    Ok(Curve::new(roots, values, [End::Parabola; 2]))
 }
 
 /// Returns the end conditions of a face's ratios: zero slope on a mirror plane of the block.
@@ -181,33 +159,36 @@ fn atlas(solid: &HalfSpace, radius_m: f64, profile: Curve, body: TouchedBody) ->
 }
 
 /// Prepares the law of a sphere on a half-space. Not real-time.
-#[must_use]
-pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Prepared {
+///
+/// # Errors
+/// A [`Refusal`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
+pub fn sphere_on_half_space(poisson_ratio: f64, radius_m: f64) -> Result<Prepared, Refusal> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
-    Prepared { atlas: atlas(&solid, radius_m, profile(&solid), TouchedBody::HalfSpace), mesh_error: 0.0 }
+    let atlas = atlas(&solid, radius_m, profile(&solid)?, TouchedBody::HalfSpace);
+    Ok(Prepared { atlas, mesh_error: 0.0 })
 }
 
 /// Prepares the law of a sphere on a block. Not real-time: some seconds.
 ///
 /// # Errors
-/// [`NotPositive`] if the parameters do not describe an elastic solid.
+/// A [`Refusal`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
 pub fn sphere_on_block(
     poisson_ratio: f64,
     radius_m: f64,
     size: Size,
     resolution: Resolution,
-) -> Result<Prepared, NotPositive> {
+) -> Result<Prepared, Refusal> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
     let remainder = Remainder::new(size, solid, resolution.fineness())?;
     let rounding_m = rounding_m(size, radius_m);
     let builder = Builder { solid, size, radius_m, rounding_m, remainder: &remainder, resolution };
-    let top = builder.ratios(Face::Top);
-    let side_x = builder.ratios(Face::SideX);
-    let side_y = if size.half_x_m == size.half_y_m { side_x.clone() } else { builder.ratios(Face::SideY) };
+    let top = builder.ratios(Face::Top)?;
+    let side_x = builder.ratios(Face::SideX)?;
+    let side_y = if size.half_x_m == size.half_y_m { side_x.clone() } else { builder.ratios(Face::SideY)? };
     let ratios = Box::new([top, side_x, side_y]);
     let mesh_error = builder.mesh_error()?;
     let body = TouchedBody::Block { size, ratios, rounding_m };
-    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), body), mesh_error })
+    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid)?, body), mesh_error })
 }
 
 /// Positions at which contacts on a block are compared, in halves of a side from the middle.
@@ -227,10 +208,7 @@ pub fn beyond_half_space(
     let remainder = Remainder::new(size, solid, fineness)?;
     let [x, y] = [size.half_x_m, size.half_y_m].map(|half_m| BEYOND_PLACES.map(|share| share * half_m));
     let table = Table::new(&remainder, Face::Top, [&x, &y]);
-    let both = |half: &[f64]| -> Vec<f64> {
-        half.iter().skip(1).rev().map(|x| -x).chain(half.iter().copied()).collect()
-    };
-    let (x, y) = (both(&x), both(&y));
+    let (x, y) = (mirrored(&x), mirrored(&y));
     let points: Vec<[f64; 2]> = y.iter().flat_map(|&y| x.iter().map(move |&x| [x, y])).collect();
     let mut numbers = vec![x.len() as f64, y.len() as f64];
     numbers.extend(x.iter().chain(&y));
@@ -244,58 +222,44 @@ fn rounding_m(size: Size, radius_m: f64) -> f64 {
     (0.02 * least_m).min(0.25 * radius_m)
 }
 
-/// Kind of body under a sphere.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum BodyKind {
-    /// Half-space `z <= 0`.
-    HalfSpace,
-    /// Block of these dimensions.
-    Block(Size),
-    /// Round cylinder: radius and height, m.
-    Cylinder([f64; 2]),
-    /// Touched face of a mesh.
-    Face,
-}
-
 /// Returns the size of the block around a cylinder.
-fn around([radius_m, height_m]: [f64; 2]) -> Size {
+fn around(radius_m: f64, height_m: f64) -> Size {
     Size { half_x_m: radius_m, half_y_m: radius_m, height_m }
 }
 
-/// Prepares the law of a sphere on the touched face of a mesh: top of a cylinder ([`BodyKind::Cylinder`]), or any plane face.
+/// Prepares the law of a sphere on the touched face of a mesh: top of a cylinder ([`Body::Cylinder`]), or any plane face.
 /// `rings`: number of cells of a contact from its middle to its rim. Not real-time: some seconds.
 ///
 /// # Errors
-/// [`NotPositive`] if the parameters do not describe an elastic solid.
+/// A [`Refusal`] if the parameters do not describe an elastic solid, or a contact with a half-space has no solution.
 pub fn sphere_on_mesh(
     mesh: &Mesh,
-    body_kind: BodyKind,
+    body: Body,
     poisson_ratio: f64,
     radius_m: f64,
     rings: i32,
-) -> Result<Prepared, NotPositive> {
+) -> Result<Prepared, Refusal> {
     let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
-    let body = Body::new(mesh, solid)?;
+    let elastic = ElasticBody::new(mesh, solid)?;
     let patch = Patch::new(&solid, rings);
     let roots = roots();
-    let reference = unbounded(&solid, rings, &roots);
+    let reference = unbounded(&solid, rings, &roots)?;
     let outline_m = outline_m(mesh);
     let column = |table: &Table, place_m: [f64; 2]| {
-        let on_face = |at: [f64; 2]| body.is_on_face(at);
+        let on_face = |at: [f64; 2]| elastic.is_on_face(at);
         column(&patch, table, radius_m, place_m, &roots, &reference, &on_face)
     };
     let mut levels = vec![0.0];
     levels.extend(&roots);
-    let touched = if let BodyKind::Cylinder(size @ [rim_m, height_m]) = body_kind {
-        let rounding_m = rounding_m(around(size), radius_m);
-        let line = table_nodes(rim_m);
-        let line: Vec<f64> = line.iter().skip(1).rev().map(|x| -x).chain(line.iter().copied()).collect();
+    let touched = if let Body::Cylinder { radius_m: rim_m, height_m } = body {
+        let rounding_m = rounding_m(around(rim_m, height_m), radius_m);
+        let line = mirrored(&table_nodes(rim_m));
         // Move points a little inside the polygon that the elements make of the rim.
         let nearest = |at: [f64; 2]| {
             let most = 0.999 * rim_m / (at[0] * at[0] + at[1] * at[1]).sqrt().max(0.999 * rim_m);
             at.map(|c| c * most)
         };
-        let table = body.table([line.clone(), line], nearest);
+        let table = elastic.table([line.clone(), line], nearest);
         let places: Vec<f64> = PLACES.iter().map(|share| share * (rim_m - 2.0 * rounding_m)).collect();
         let mut values = vec![1.0; 3 * places.len() * levels.len()];
         for (i, &place) in places.iter().enumerate() {
@@ -309,11 +273,10 @@ pub fn sphere_on_mesh(
         let spread = |shares: &[f64], k: usize, margin: f64| -> Vec<f64> {
             let [low, high] = outline_m[k];
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low) * margin);
-            let below = shares.iter().skip(1).rev().map(|share| middle - share * half);
-            below.chain(shares.iter().map(|share| middle + share * half)).collect()
+            mirrored(shares).iter().map(|share| middle + share * half).collect()
         };
         let [x, y] = [0, 1].map(|k| spread(&FACE_TABLE, k, 0.97));
-        let table = body.table([x, y], |at| at);
+        let table = elastic.table([x, y], |at| at);
         let [x, y] = [0, 1].map(|k| spread(&FACE_PLACES, k, 0.92));
         let mut values = vec![1.0; x.len() * y.len() * levels.len()];
         for (j, &py) in y.iter().enumerate() {
@@ -326,8 +289,8 @@ pub fn sphere_on_mesh(
         TouchedBody::Face { outline_m, ratio: Box::new(Volume::new([x, y, levels], &values, FACE_ENDS)) }
     };
     // Evaluate in the middle, and at an eighth of the side from an edge.
-    let mesh_error = body.mesh_error(radius_m, &[[0.0; 2], [0.75 * outline_m[0][1], 0.0]]);
-    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid), touched), mesh_error })
+    let mesh_error = elastic.mesh_error(radius_m, &[[0.0; 2], [0.75 * outline_m[0][1], 0.0]]);
+    Ok(Prepared { atlas: atlas(&solid, radius_m, profile(&solid)?, touched), mesh_error })
 }
 
 impl Prepared {
@@ -352,40 +315,35 @@ impl Prepared {
 
     /// Restores a law from its numbers, bit for bit; `None` if they do not describe such a law. Not real-time.
     #[must_use]
-    pub fn from_numbers(
-        mut numbers: &[f64],
-        poisson_ratio: f64,
-        radius_m: f64,
-        body_kind: BodyKind,
-    ) -> Option<Self> {
+    pub fn from_numbers(mut numbers: &[f64], poisson_ratio: f64, radius_m: f64, body: Body) -> Option<Self> {
         let solid = HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio };
         let (&mesh_error, rest) = numbers.split_first()?;
         numbers = rest;
         let profile = Curve::from_numbers(&mut numbers, [End::Parabola; 2])?;
-        let body = match body_kind {
-            BodyKind::HalfSpace => TouchedBody::HalfSpace,
-            BodyKind::Block(size) => {
+        let touched = match body {
+            Body::HalfSpace | Body::Beam { .. } => TouchedBody::HalfSpace,
+            Body::Block(size) => {
                 let mut next = |face| Volume::from_numbers(&mut numbers, ends(face));
                 let ratios = Box::new([next(Face::Top)?, next(Face::SideX)?, next(Face::SideY)?]);
                 TouchedBody::Block { size, ratios, rounding_m: rounding_m(size, radius_m) }
             }
-            BodyKind::Cylinder(size @ [rim_m, height_m]) => {
+            Body::Cylinder { radius_m: rim_m, height_m } => {
                 let ratio = Box::new(Volume::from_numbers(&mut numbers, CYLINDER_ENDS)?);
                 TouchedBody::Cylinder {
                     radius_m: rim_m,
                     height_m,
                     ratio,
-                    rounding_m: rounding_m(around(size), radius_m),
+                    rounding_m: rounding_m(around(rim_m, height_m), radius_m),
                 }
             }
-            BodyKind::Face => {
+            Body::File { .. } => {
                 let ratio = Box::new(Volume::from_numbers(&mut numbers, FACE_ENDS)?);
                 let (&[a, b, c, d], rest) = numbers.split_first_chunk()?;
                 numbers = rest;
                 TouchedBody::Face { outline_m: [[a, b], [c, d]], ratio }
             }
         };
-        numbers.is_empty().then(|| Self { atlas: atlas(&solid, radius_m, profile, body), mesh_error })
+        numbers.is_empty().then(|| Self { atlas: atlas(&solid, radius_m, profile, touched), mesh_error })
     }
 }
 
@@ -441,13 +399,13 @@ impl Builder<'_> {
     }
 
     /// Computes the ratio of the block's energy to that of a half-space, by position and square root of depth over radius.
-    fn ratios(&self, face: Face) -> Volume {
+    fn ratios(&self, face: Face) -> Result<Volume, NotConverged> {
         let [p, q, _] = face.axes();
         let table = self.table(face);
         let rings = self.resolution.rings;
         let patch = Patch::new(&self.solid, rings);
         let roots = roots();
-        let reference = unbounded(&self.solid, rings, &roots);
+        let reference = unbounded(&self.solid, rings, &roots)?;
         let inside = |axis: usize, x: f64| {
             if axis < 2 { x.abs() <= self.half_along(axis) } else { -self.size.height_m <= x && x <= 0.0 }
         };
@@ -475,7 +433,7 @@ impl Builder<'_> {
         let mut levels = vec![0.0];
         levels.extend(roots);
         let [a, b] = places;
-        Volume::new([a, b, levels], &values, ends(face))
+        Ok(Volume::new([a, b, levels], &values, ends(face)))
     }
 
     /// Estimates the relative error of the stiffness under the sphere, in the middle of the top and at an eighth of the side

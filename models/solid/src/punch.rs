@@ -6,10 +6,10 @@
 //! tractions, in closed form, plus the remainder of the body, which is smooth.
 
 use crate::dense::{self, NotPositive};
-use crate::half_space::{Block, HalfSpace};
+use crate::half_space::{Block, HalfSpace, add_scaled};
 use crate::plate::symmetric;
 use crate::rigid::{MODES, RigidPatch};
-use crate::table::Table;
+use crate::table::{Table, mirrored};
 use std::f64::consts::PI;
 
 /// Outline of a punch.
@@ -95,8 +95,7 @@ impl Outline {
         let line = crowded(fineness);
         match self {
             Self::Square { half_m } => {
-                let borders: Vec<f64> =
-                    line.iter().rev().filter(|x| **x > 0.0).map(|x| -x).chain(line.iter().copied()).collect();
+                let borders = mirrored(&line);
                 let mut cells = Vec::new();
                 for y in borders.windows(2) {
                     for x in borders.windows(2) {
@@ -199,10 +198,7 @@ pub fn punch(
             cells[source].corners.iter().map(|c| [c[0] - at[0], c[1] - at[1]]).collect();
         let mut block = solid.polygon(&corners).map(|row| row.map(|u| u / cells[source].area));
         if let Some(smooth) = &smooth {
-            let extra = smooth[target * cells.len() + source];
-            for (row, more) in block.iter_mut().zip(extra) {
-                row.iter_mut().zip(more).for_each(|(u, m)| *u += m);
-            }
+            add_scaled(&mut block, &smooth[target * cells.len() + source], 1.0);
         }
         block
     };

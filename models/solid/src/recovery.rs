@@ -3,7 +3,7 @@
 //! Zienkiewicz and Zhu, *Int. J. Numer. Meth. Engng* 24 (1987) 337-357: elements have different stresses at a shared
 //! node, and the energy of the difference between the stress and its nodal mean estimates the energy of the error.
 
-use crate::cells::{Geometry, Kind};
+use crate::cells::Geometry;
 use crate::mesh::MeshStiffness;
 
 type Stress = [[f64; 3]; 3];
@@ -34,7 +34,7 @@ pub fn twice_error_j(body: &MeshStiffness<'_>, displacement: &[f64], columns: us
     for element in &mesh.elements {
         let nodes_m = places(&element.nodes);
         let geometry = Geometry { kind: element.kind, nodes_m: &nodes_m };
-        for (&node, at) in element.nodes.iter().zip(node_places(element.kind)) {
+        for (&node, at) in element.nodes.iter().zip(element.kind.node_places()) {
             let (slopes, _) = geometry.slopes(at);
             around[node] += 1.0;
             for column in 0..columns {
@@ -67,12 +67,4 @@ pub fn twice_error_j(body: &MeshStiffness<'_>, displacement: &[f64], columns: us
         }
     }
     errors
-}
-
-/// Returns the positions of all nodes in the reference element.
-fn node_places(kind: Kind) -> Vec<[f64; 3]> {
-    let corners = kind.corner_places();
-    let middles =
-        kind.edges().iter().map(|[a, b]| [0, 1, 2].map(|k| 0.5 * (corners[*a][k] + corners[*b][k])));
-    corners.iter().copied().chain(middles).collect()
 }

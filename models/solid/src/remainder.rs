@@ -78,6 +78,32 @@ pub struct Fineness {
     pub order: usize,
 }
 
+/// Fineness of a preparation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Resolution {
+    /// Order of the elements.
+    pub order: usize,
+    /// Number of cells of a contact from its middle to its rim.
+    pub rings: i32,
+    /// Number of bricks along a side of the square in the middle of a cylinder.
+    pub bricks: usize,
+}
+
+impl Resolution {
+    /// Fastest preparation, largest error.
+    pub const QUICK: Self = Self { order: 2, rings: 5, bricks: 4 };
+    /// Default resolution.
+    pub const STANDARD: Self = Self { order: 3, rings: 6, bricks: 6 };
+    /// Slowest preparation, smallest error.
+    pub const FINE: Self = Self { order: 4, rings: 8, bricks: 8 };
+
+    /// Returns numbers and order of the elements for the remainder of a block.
+    #[must_use]
+    pub fn fineness(self) -> Fineness {
+        Fineness { across: 4, high: 5, order: self.order }
+    }
+}
+
 /// Signs of x and y for the four mirror images of a quarter; also the four parities.
 const MIRRORS: [[f64; 2]; 4] = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
 /// Number of forces solved for at once.

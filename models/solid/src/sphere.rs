@@ -5,14 +5,14 @@
 //! table inversely proportional to the side of a cell, plus the remainder of the block. A solve alternates between the pressures
 //! for given normals (an active set and a Cholesky factorisation) and the normals for given pressures.
 
-use crate::dense;
-use crate::half_space::{Block, HalfSpace};
+use crate::dense::{self, NotPositive};
+use crate::half_space::{Block, HalfSpace, add_scaled};
 
 /// Cells of a round patch, with the half-space's compliance between any two cells.
 #[derive(Clone, Debug)]
 pub struct Patch {
     /// Number of cells from the middle to the rim.
-    rings: i32,
+    pub(crate) rings: i32,
     /// Positions of the cells, in units of a cell.
     cells: Vec<[i32; 2]>,
     /// Displacement under a unit force on a cell of side one, by offset of the target from the source.
@@ -44,16 +44,26 @@ pub struct Contact {
     pub force_n: [f64; 3],
     /// Distance of the farthest cell in contact from the middle, in cells.
     pub reach: f64,
-    /// Largest change of a unit normal in the last step; below 1e-8 when converged.
+    /// Largest change of a unit normal in the last step; below 1e-8, or below 1e-4 after the maximum number of iterations.
     pub residual: f64,
     normals: Vec<[f64; 3]>,
     active: Vec<bool>,
+}
+
+/// Error of a contact whose iteration has not converged, or whose compliance is not positive definite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NotConverged {
+    /// Depth of the contact, in radii of the sphere.
+    pub depth: f64,
 }
 
 /// Maximum number of iterations.
 const MOST_STEPS: usize = 300;
 /// Largest rotation of a normal at convergence, rad.
 const TOLERANCE: f64 = 1.0e-8;
+/// Largest rotation of a normal in the last of [`MOST_STEPS`] iterations, rad: with a larger one the contact alternates between
+/// sets of cells, or snaps through.
+const LARGEST_RESIDUAL: f64 = 1.0e-4;
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -86,12 +96,6 @@ impl Patch {
         Self { rings, cells, kernel }
     }
 
-    /// Returns the number of cells from the middle to the rim.
-    #[must_use]
-    pub fn rings(&self) -> i32 {
-        self.rings
-    }
-
     /// Returns the number of cells.
     #[must_use]
     pub fn count(&self) -> usize {
@@ -113,8 +117,10 @@ impl Patch {
 
     /// Solves a contact problem with a nearby solution as initial guess. Without a guess the iteration starts from the undeformed
     /// face, and does not converge for a sphere deeper than about half its radius. Not real-time.
-    #[must_use]
-    pub fn solve(&self, problem: &Problem<'_>, start: Option<&Contact>) -> Contact {
+    ///
+    /// # Errors
+    /// [`NotConverged`] if the last iteration changes a normal by 1e-4 rad or more, or has no pressures.
+    pub fn solve(&self, problem: &Problem<'_>, start: Option<&Contact>) -> Result<Contact, NotConverged> {
         let count = self.cells.len();
         let points = self.points_m(problem.cell_m);
         let height = problem.radius_m - problem.depth_m;
@@ -123,9 +129,7 @@ impl Patch {
                 let mut block =
                     self.between(pair / count, pair % count).map(|row| row.map(|u| u / problem.cell_m));
                 if let Some(extra) = problem.smooth.get(pair) {
-                    for (row, more) in block.iter_mut().zip(extra) {
-                        row.iter_mut().zip(more).for_each(|(u, m)| *u += m);
-                    }
+                    add_scaled(&mut block, extra, 1.0);
                 }
                 block
             })
@@ -151,12 +155,13 @@ impl Patch {
             normals: Vec::new(),
             active: Vec::new(),
         };
+        let mut is_solved = false;
         let mut relaxation = 1.0;
         for step in 0..MOST_STEPS {
             let forces = pressures(&compliance, count, &normals, &away, problem.radius_m, &mut active);
             for (target, u) in displaced.iter_mut().enumerate() {
                 *u = [0.0; 3];
-                for (source, force) in &forces {
+                for (source, force) in forces.iter().flatten() {
                     let part = times(&compliance[target * count + source], *force);
                     u.iter_mut().zip(part).for_each(|(sum, p)| *sum += p);
                 }
@@ -183,9 +188,10 @@ impl Patch {
             }
             contact.residual = residual;
             if joined == 0 && residual < TOLERANCE || step + 1 == MOST_STEPS {
-                contact.energy_j =
-                    0.5 * forces.iter().map(|(cell, force)| dot(*force, displaced[*cell])).sum::<f64>();
-                for (_, force) in &forces {
+                is_solved = forces.is_ok() && residual < LARGEST_RESIDUAL;
+                contact.energy_j = 0.5
+                    * forces.iter().flatten().map(|(cell, force)| dot(*force, displaced[*cell])).sum::<f64>();
+                for (_, force) in forces.iter().flatten() {
                     contact.force_n.iter_mut().zip(force).for_each(|(sum, f)| *sum -= f);
                 }
                 break;
@@ -198,11 +204,15 @@ impl Patch {
             .fold(0.0, f64::max);
         contact.normals = normals;
         contact.active = active;
-        contact
+        let depth = problem.depth_m / problem.radius_m;
+        if is_solved { Ok(contact) } else { Err(NotConverged { depth }) }
     }
 }
 
 /// Returns the forces that put each active cell onto the sphere along its normal; cells that would pull are deactivated.
+///
+/// # Errors
+/// [`NotPositive`] if the compliance of the active cells is not positive definite.
 fn pressures(
     compliance: &[Block],
     count: usize,
@@ -210,7 +220,7 @@ fn pressures(
     away: &[[f64; 3]],
     radius_m: f64,
     active: &mut [bool],
-) -> Vec<(usize, [f64; 3])> {
+) -> Result<Vec<(usize, [f64; 3])>, NotPositive> {
     loop {
         let cells: Vec<usize> = (0..count).filter(|&cell| active[cell]).collect();
         let size = cells.len();
@@ -223,9 +233,7 @@ fn pressures(
         }
         let mut pressures: Vec<f64> =
             cells.iter().map(|&cell| radius_m - dot(normals[cell], away[cell])).collect();
-        if dense::factor(&mut matrix, size, size).is_err() {
-            return Vec::new();
-        }
+        dense::factor(&mut matrix, size, size)?;
         dense::solve(&matrix, size, &mut pressures);
         let mut pulling = false;
         for (&cell, &pressure) in cells.iter().zip(&pressures) {
@@ -235,11 +243,36 @@ fn pressures(
             }
         }
         if !pulling {
-            return cells
-                .iter()
-                .zip(&pressures)
-                .map(|(&cell, &pressure)| (cell, normals[cell].map(|c| c * pressure)))
-                .collect();
+            let force = |(&cell, &pressure): (&usize, &f64)| (cell, normals[cell].map(|c| c * pressure));
+            return Ok(cells.iter().zip(&pressures).map(force).collect());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Solves a contact of radius one on a half-space with an additional normal compliance, which is equal for all pairs of cells.
+    fn solve(depth_m: f64, extra: f64) -> Result<Contact, NotConverged> {
+        let rings = 4;
+        let patch = Patch::new(&HalfSpace { youngs_modulus_pa: 1.0, poisson_ratio: 0.3 }, rings);
+        let cell_m = 1.25 * depth_m.sqrt() / (1.0 + 0.12 * depth_m) / f64::from(rings);
+        let mut block = Block::default();
+        block[2][2] = extra;
+        let smooth = vec![block; patch.count() * patch.count()];
+        patch.solve(&Problem { radius_m: 1.0, depth_m, cell_m, on_face: &[], smooth: &smooth }, None)
+    }
+
+    /// Without pressures nothing is displaced, so no normal changed: that was a contact of residual 0 and no force.
+    #[test]
+    fn a_contact_of_negative_compliance_is_an_error() {
+        assert_eq!(solve(0.5, -4.0), Err(NotConverged { depth: 0.5 }));
+    }
+
+    #[test]
+    fn a_contact_whose_normals_still_turn_is_an_error() {
+        assert_eq!(solve(0.9, -1.03), Err(NotConverged { depth: 0.9 }));
+        assert!(solve(0.9, 0.0).is_ok_and(|contact| contact.energy_j > 0.0));
     }
 }

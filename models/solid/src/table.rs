@@ -1,6 +1,6 @@
 //! Remainder of a face between any two points: values for the pairs of points of a grid, with cubic interpolation.
 
-use crate::half_space::Block;
+use crate::half_space::{Block, add_scaled};
 use crate::remainder::{Face, Remainder};
 
 /// Remainder of a face for all pairs of points of a grid.
@@ -38,7 +38,7 @@ pub fn window(nodes: &[f64], coordinate: f64) -> Window {
 }
 
 /// Returns both signs of non-negative coordinates, ascending.
-fn mirrored(half: &[f64]) -> Vec<f64> {
+pub(crate) fn mirrored(half: &[f64]) -> Vec<f64> {
     let negative = half.iter().rev().filter(|&&x| x > 0.0).map(|x| -x);
     negative.chain(half.iter().copied()).collect()
 }
@@ -158,11 +158,5 @@ impl Table {
             }
         }
         all
-    }
-}
-
-fn add_scaled(sum: &mut Block, block: &Block, share: f64) {
-    for (row, values) in sum.iter_mut().zip(block) {
-        row.iter_mut().zip(values).for_each(|(s, v)| *s += share * v);
     }
 }

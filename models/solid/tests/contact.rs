@@ -5,8 +5,7 @@ use flotor_loader::{Model, Plugin, Setting};
 use flotor_solid::atlas::Atlas;
 use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::law::Law;
-use flotor_solid::prepare::Resolution;
-use flotor_solid::remainder::Size;
+use flotor_solid::remainder::{Resolution, Size};
 use std::sync::OnceLock;
 
 /// A block of 60 x 80 x 50 mm and a sphere of 8 mm, solved once for all tests here.

@@ -6,8 +6,7 @@ use flotor_hal::DVec3;
 use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::half_space::HalfSpace;
 use flotor_solid::law::Law;
-use flotor_solid::prepare::Resolution;
-use flotor_solid::remainder::{Face, Fineness, Remainder, Size};
+use flotor_solid::remainder::{Face, Fineness, Remainder, Resolution, Size};
 use flotor_solid::sphere::{Contact, Patch, Problem};
 use flotor_solid::table::Table;
 
@@ -72,11 +71,7 @@ impl Bench {
                 on_face: &on_face,
                 smooth: &smooth,
             };
-            let contact = self.patch.solve(&problem, before.as_ref());
-            if contact.residual > 1.0e-4 {
-                return None;
-            }
-            before = Some(contact);
+            before = Some(self.patch.solve(&problem, before.as_ref()).ok()?);
         }
         let local = before?.force_n;
         let mut force = [0.0; 3];

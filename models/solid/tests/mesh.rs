@@ -11,9 +11,8 @@ use flotor_solid::gmsh;
 use flotor_solid::grid::Lame;
 use flotor_solid::law::Law;
 use flotor_solid::mesh::{Mesh, MeshStiffness};
-use flotor_solid::prepare::Resolution;
 use flotor_solid::punch::{Bond, Outline};
-use flotor_solid::remainder::Size;
+use flotor_solid::remainder::{Resolution, Size};
 use flotor_solid::rigid::RigidPatch;
 use std::fmt::Write as _;
 
@@ -441,6 +440,9 @@ fn files_that_are_no_body_are_refused() {
         let refusal = refusal.expect_err(wanted);
         assert!(refusal.contains(wanted), "{wanted}: {refusal}");
     }
+    let same_face = Mesh::new(gmsh::read(&good).expect("it is read"), "fixed", "fixed").map(|_| ());
+    let refusal = same_face.expect_err("nothing could move").to_string();
+    assert!(refusal.contains("share nodes"), "{refusal}");
     // Cut anywhere, a file is refused or read, and nothing panics.
     for end in (0..good.len()).step_by(37) {
         if let Ok(parts) = gmsh::read(&good[..end]) {

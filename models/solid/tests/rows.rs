@@ -6,9 +6,8 @@ use flotor_hal::{DQuat, DVec3, Demand, Wrench, orientation_from_rotation_vector}
 use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::half_space::HalfSpace;
 use flotor_solid::law::Law;
-use flotor_solid::prepare::Resolution;
 use flotor_solid::punch::{Bond, Outline};
-use flotor_solid::remainder::{Face, Remainder, Size};
+use flotor_solid::remainder::{Face, Remainder, Resolution, Size};
 use flotor_solid::table::Table;
 use std::f64::consts::TAU;
 

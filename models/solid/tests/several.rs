@@ -6,8 +6,7 @@ use flotor_solid::dense;
 use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::half_space::HalfSpace;
 use flotor_solid::law::Law;
-use flotor_solid::prepare::Resolution;
-use flotor_solid::remainder::{Face, Remainder, Size};
+use flotor_solid::remainder::{Face, Remainder, Resolution, Size};
 use flotor_solid::several::Spheres;
 use flotor_solid::table::Table;
 use std::sync::OnceLock;
@@ -274,7 +273,10 @@ fn any_pose_of_several_spheres_has_a_finite_answer() {
 fn settings_of_several_spheres_that_do_not_fit_are_refused() {
     assert_refused(&[
         (&[("tool_count", "2"), ("tool_spacing_mm", "20")], "at least 25.4"),
-        (&[("tool_count", "2"), ("tool_radius_mm", "5"), ("tool_spacing_mm", "90")], "mm for this face"),
+        (
+            &[("tool_count", "2"), ("tool_radius_mm", "5"), ("tool_spacing_mm", "90")],
+            "at most 66.6666 mm for this face",
+        ),
         (&[("tool_count", "3"), ("body", "cylinder")], "block or a half-space"),
         (&[("tool_count", "3"), ("tool", "punch-round")], "tool_count"),
         (&[("tool_count", "3"), ("bond", "bonded")], "not bonded"),

@@ -32,17 +32,13 @@ pub struct Batch {
 }
 
 impl Default for Batch {
+    /// Creates an evaluator with the best instruction set of this machine. Not real-time.
     fn default() -> Self {
         Self::on(Arch::new())
     }
 }
 
 impl Batch {
-    /// Creates an evaluator with the best instruction set of this machine. Not real-time.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
     /// Creates an evaluator with a given instruction set, for comparisons.
     pub fn on(instructions: Arch) -> Self {
         Self { instructions }

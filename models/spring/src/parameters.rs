@@ -90,6 +90,14 @@ const MM: f64 = 1.0e-3;
 const MPA: f64 = 1.0e6;
 const N_MM2: f64 = 1.0e-6;
 
+/// Declares a live number whose default is that of the preset; the schema has the number of `thesis-1`.
+macro_rules! own {
+    ($id:literal, $unit:literal, $least:literal, $most:literal, $default:literal, $doc:literal) => {
+        Parameter::real($id, $unit, $least, $most, $default, concat!($doc, "; default: that of the preset"))
+            .live()
+    };
+}
+
 /// Parameter schema. Defaults are those of preset `thesis-1`; other presets have their own. Choices are fixed, numbers are
 /// live.
 pub(crate) const SCHEMA: &[Parameter] = &[
@@ -162,42 +170,29 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Given quantity, from which the others follow: `gamma_n`, `alpha_n_mm2`, `beta_n`, or the wire \
          (`wire_diameter_mm` and `active_coils`); default: the mode of the preset",
     ),
-    Parameter::real(
+    own!(
         "free_length_mm",
         "mm",
         1.0,
         1000.0,
         25.0,
-        "Free length: distance between the end plates without load",
-    )
-    .live(),
-    Parameter::real("coil_diameter_mm", "mm", 0.5, 200.0, 6.07, "Diameter of the coil between wire centres")
-        .live(),
-    Parameter::real("youngs_modulus_mpa", "MPa", 1.0, 1.0e6, 203_395.0, "Young's modulus of the wire").live(),
-    Parameter::real("shear_modulus_mpa", "MPa", 1.0, 1.0e6, 75_842.0, "Shear modulus of the wire").live(),
-    Parameter::real("wire_diameter_mm", "mm", 0.05, 50.0, 0.63, "Diameter of the wire (mode physical)")
-        .live(),
-    Parameter::real("active_coils", "1", 1.0, 500.0, 11.8, "Number of active coils (mode physical)").live(),
-    Parameter::real(
+        "Free length: distance between the end plates without load"
+    ),
+    own!("coil_diameter_mm", "mm", 0.5, 200.0, 6.07, "Diameter of the coil between wire centres"),
+    own!("youngs_modulus_mpa", "MPa", 1.0, 1.0e6, 203_395.0, "Young's modulus of the wire"),
+    own!("shear_modulus_mpa", "MPa", 1.0, 1.0e6, 75_842.0, "Shear modulus of the wire"),
+    own!("wire_diameter_mm", "mm", 0.05, 50.0, 0.63, "Diameter of the wire (mode physical)"),
+    own!("active_coils", "1", 1.0, 500.0, 11.8, "Number of active coils (mode physical)"),
+    own!(
         "gamma_n",
         "N",
         0.01,
         10_000.0,
         16.97,
-        "Compression rigidity (mode gamma); the axial stiffness is gamma over the free length",
-    )
-    .live(),
-    Parameter::real(
-        "alpha_n_mm2",
-        "N mm²",
-        0.01,
-        1.0e7,
-        179.078_939_264_832_6,
-        "Bending rigidity (mode alpha)",
-    )
-    .live(),
-    Parameter::real("beta_n", "N", 0.01, 100_000.0, 45.510_576_593_444_26, "Shear rigidity (mode beta)")
-        .live(),
+        "Compression rigidity (mode gamma); the axial stiffness is gamma over the free length"
+    ),
+    own!("alpha_n_mm2", "N mm²", 0.01, 1.0e7, 179.078_939_264_832_6, "Bending rigidity (mode alpha)"),
+    own!("beta_n", "N", 0.01, 100_000.0, 45.510_576_593_444_26, "Shear rigidity (mode beta)"),
 ];
 
 /// Resolved parameter values of a spring.

@@ -26,7 +26,7 @@ restorable!(SpringModel { law, pace } without { choice, batch });
 
 impl SpringModel {
     fn new(choice: Choice) -> Self {
-        Self { law: Prepared::new(&choice), choice, pace: Pace::default(), batch: Batch::new() }
+        Self { law: Prepared::new(&choice), choice, pace: Pace::default(), batch: Batch::default() }
     }
 }
 

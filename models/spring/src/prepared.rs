@@ -127,7 +127,7 @@ impl Prepared {
                 batch.respond(&held.law, inputs, outputs);
             }
             Self::Elastic(Elastic::RodBlend(held), None) if held.is_plain() => {
-                batch.respond(held.law.energy(), inputs, outputs);
+                batch.respond(&held.law.energy, inputs, outputs);
                 blend_some(&mut held.law, pace, inputs, outputs);
             }
             _ => return false,
@@ -190,7 +190,7 @@ fn blend_some(law: &mut RodBlend, pace: &mut Pace, inputs: &[Input], outputs: &m
 fn blend_step(law: &mut RodBlend, pace: &mut Pace, input: &Input) -> Output {
     match examined(law, pace, input) {
         Some(at) => examined_step(law, pace, input, &at),
-        None => contract::step(law.energy(), input),
+        None => contract::step(&law.energy, input),
     }
 }
 

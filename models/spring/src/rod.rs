@@ -99,6 +99,10 @@ impl State {
 const SERVO: Effort =
     Effort { most_steps: 6, most_matrices: 3, matrix_life: 32, tolerance: 1e-11, renewal: 1e-6 };
 
+/// Effort of [`Accuracy::Tight`], a reference.
+const TIGHT: Effort =
+    Effort { most_steps: 8, most_matrices: 8, matrix_life: 1, tolerance: 1e-14, renewal: 1e-13 };
+
 /// Effort for equilibria to rounding, so that an answer does not depend on the history.
 const TO_ROUNDING: Effort = Effort {
     most_steps: 10,
@@ -161,16 +165,7 @@ impl Rod {
         let ratios = Ratios::new(spring, coils);
         let solver = match accuracy {
             Accuracy::Servo => Solver::Servo(Box::new(Equilibrium::new(ratios, SERVO.with(coils)))),
-            Accuracy::Tight => {
-                let effort = Effort {
-                    most_steps: 8,
-                    most_matrices: 8,
-                    matrix_life: 1,
-                    tolerance: 1e-14,
-                    renewal: 1e-13,
-                };
-                Solver::Tight(Box::new(Equilibrium::new(ratios, effort)))
-            }
+            Accuracy::Tight => Solver::Tight(Box::new(Equilibrium::new(ratios, TIGHT))),
         };
         Self::solved_by(solver, spring, coils)
     }
@@ -219,14 +214,14 @@ impl Rod {
     /// Returns the state of the last tick's equilibrium. Real-time: bounded, no allocation.
     #[must_use]
     pub fn state(&self) -> State {
-        let unstable_directions = either!(&self.solver, equilibrium => equilibrium.unstable_directions());
+        let unstable_directions = either!(&self.solver, equilibrium => equilibrium.unstable_directions);
         State { branch: self.branch, unstable_directions }
     }
 
     /// Returns the cost of the last tick. Real-time: bounded, no allocation.
     #[must_use]
     pub fn work(&self) -> Work {
-        either!(&self.solver, equilibrium => equilibrium.work())
+        either!(&self.solver, equilibrium => equilibrium.work)
     }
 
     /// Fills in the sections of the rod after the last tick, from plate to plate, evenly in arc length of the unloaded

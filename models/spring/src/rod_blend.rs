@@ -42,7 +42,8 @@ pub const TOLERANCE_N: f64 = 0.005;
 #[derive(Clone, Debug, PartialEq)]
 #[must_use]
 pub struct RodBlend {
-    energy: EnergyForm,
+    /// Law for poses that need neither remainder nor rod.
+    pub(crate) energy: EnergyForm,
     remainder: Option<Remainder>,
     rod: Rod,
     shares: RodWeight,
@@ -120,7 +121,7 @@ impl RodBlend {
     /// Returns true if a response may depend on earlier poses, because the spring can buckle.
     #[must_use]
     pub fn remembers(&self) -> bool {
-        self.shares.has_buckling()
+        self.shares.has_buckling
     }
 
     /// Returns the weight of the rod in the last response, 0 to 1.
@@ -138,11 +139,6 @@ impl RodBlend {
     /// Returns the rod if its weight is 1, else `None`.
     pub(crate) fn rod_alone(&mut self) -> Option<&mut Rod> {
         (self.share >= 1.0).then_some(&mut self.rod)
-    }
-
-    /// Returns the law for poses that need neither remainder nor rod.
-    pub(crate) fn energy(&self) -> &EnergyForm {
-        &self.energy
     }
 
     /// Returns the [`Directions`] of a pose at which the remainder or the rod may contribute. Returns `None` in the middle of the

@@ -205,7 +205,8 @@ impl Law {
 pub(crate) struct RodWeight {
     free_length_m: f64,
     load: Load,
-    has_buckling: bool,
+    /// True if the straight rod buckles at any length.
+    pub(crate) has_buckling: bool,
     law: Law,
     /// Factor from the bound of a stout spring to that of this spring in tolerances.
     per_tolerance: f64,
@@ -236,11 +237,6 @@ impl RodWeight {
         let per_tolerance = law.slenderness(total) * unit / tolerance_n;
         let middle = Middle::new(law, per_tolerance);
         Self { free_length_m, load, has_buckling, law, per_tolerance, middle }
-    }
-
-    /// Returns true if the straight rod buckles at any length.
-    pub(crate) fn has_buckling(&self) -> bool {
-        self.has_buckling
     }
 
     /// Returns the directions of a pose outside the middle of the workspace; `None` in the middle, where the law

@@ -490,13 +490,7 @@ impl Seat {
             return self.step(spring, pose, demand);
         }
         let response = self.base().answer(pose, |relative| spring.stay(relative, Demand::WrenchAndEnergy));
-        let response = Response {
-            force_n: response.force_n * self.hold,
-            torque_nm: response.torque_nm * self.hold,
-            energy_j: response.energy_j.map(|stored_j| stored_j * self.hold),
-            validity: Validity::NotConverged,
-        };
-        response.limited_to(demand)
+        self.remaining(&response).limited_to(demand)
     }
 
     /// Fades wrench and energy of a falling spring in place, by an equal part per tick: both are a fraction of the
@@ -511,13 +505,17 @@ impl Seat {
             spring.unload();
             return without_load(demand);
         }
-        let response = Response {
+        self.remaining(&response).limited_to(demand)
+    }
+
+    /// Returns the remaining fraction of a response while the spring moves.
+    fn remaining(&self, response: &Response) -> Response {
+        Response {
             force_n: response.force_n * self.hold,
             torque_nm: response.torque_nm * self.hold,
-            energy_j: Some(stored_j * self.hold),
+            energy_j: response.energy_j.map(|stored_j| stored_j * self.hold),
             validity: Validity::NotConverged,
-        };
-        response.limited_to(demand)
+        }
     }
 
     /// Returns the forces that a base lacks to stand: onto the ground, and of friction (N); negative if sufficient.

@@ -23,7 +23,7 @@ const WORKSPACES: [Workspace; 3] = [
 /// Every instruction set this machine has.
 fn batches() -> Vec<Batch> {
     #[allow(unused_mut)] // other machines than x86-64 have nothing to add
-    let mut batches = vec![Batch::new(), Batch::on(Arch::Scalar)];
+    let mut batches = vec![Batch::default(), Batch::on(Arch::Scalar)];
     #[cfg(target_arch = "x86_64")]
     if let Some(avx2) = pulp::x86::V3::try_new() {
         batches.push(Batch::on(Arch::V3(avx2)));
@@ -118,9 +118,9 @@ fn surplus_of_either_slice_is_left_alone() {
     let law = EnergyForm::new(&spring);
     let inputs = inputs(100, spring.geometry().free_length_m);
     let mut outputs = vec![Output::default(); 70];
-    Batch::new().respond(&law, &inputs, &mut outputs);
+    Batch::default().respond(&law, &inputs, &mut outputs);
     let mut all = vec![Output::default(); 130];
-    Batch::new().respond(&law, &inputs, &mut all);
+    Batch::default().respond(&law, &inputs, &mut all);
     assert_eq!(format!("{outputs:?}"), format!("{:?}", &all[..70]));
     assert!(all[100..].iter().all(|output| *output == Output::default()));
 }

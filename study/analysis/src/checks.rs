@@ -47,11 +47,7 @@ impl SubjectChecks {
             _ => None,
         });
         let squares: Vec<f64> = squares.collect();
-        let ratings = record.counted().filter_map(|event| match event.response {
-            Response::Rating(rating) => Some(rating),
-            _ => None,
-        });
-        let ratings: Vec<f64> = ratings.collect();
+        let ratings: Vec<f64> = record.counted().filter_map(|event| event.response.rating()).collect();
         let is_pair = squares.is_empty() && !twice.is_empty();
         let same = twice.iter().filter(|(first, second)| first == second).count() as f64;
         Self {

@@ -93,6 +93,18 @@ pub struct JndAnalysis {
     pub responses: Vec<ResponseRow>,
 }
 
+impl JndAnalysis {
+    /// Returns the number of tracks that the estimator omitted because they have no threshold; 0 for [`Estimator::Map`], which
+    /// counts the answers of all tracks.
+    #[must_use]
+    pub fn omitted_tracks(&self) -> usize {
+        match self.estimator {
+            Estimator::Procedure => self.unfinished_tracks,
+            Estimator::Map => 0,
+        }
+    }
+}
+
 /// Analyses the thresholds of a study.
 ///
 /// # Errors

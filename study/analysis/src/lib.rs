@@ -287,9 +287,6 @@ fn mean_responses(
 fn order_factor(subjects: &[SubjectRecord]) -> Vec<BetweenFactor> {
     let groups: Vec<usize> = subjects.iter().map(|subject| subject.first_modality as usize).collect();
     let both = groups.contains(&0) && groups.contains(&1);
-    if both && subjects.len() > 2 {
-        vec![BetweenFactor { name: "order".to_owned(), groups }]
-    } else {
-        Vec::new()
-    }
+    let order = (both && subjects.len() > 2).then(|| BetweenFactor { name: "order".to_owned(), groups });
+    order.into_iter().collect()
 }

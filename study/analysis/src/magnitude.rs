@@ -120,14 +120,16 @@ fn scaled(
             let unit = mean(&all);
             if unit.is_nan() || unit <= 0.0 {
                 return refuse(
-                    "the mean of the ratings is not above 0, so the ratings cannot be divided by the mean",
+                    "the mean of the ratings is not above 0, so the ratings cannot be divided by the mean; use --ratings raw",
                 );
             }
             unit
         }
         RatingScale::DividedByGeometricMean => {
             if all.iter().any(|rating| *rating <= 0.0) {
-                return refuse("a rating is not above 0, so there is no geometric mean");
+                return refuse(
+                    "a rating is not above 0, so there is no geometric mean; use --ratings mean or raw",
+                );
             }
             libm::exp(mean(&all.iter().map(|rating| libm::log(*rating)).collect::<Vec<_>>()))
         }

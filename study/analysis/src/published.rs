@@ -96,45 +96,18 @@ pub fn movement(task: &str, measure: &str) -> &'static [Published] {
     }
 }
 
-/// Direction of change of a movement measure with the stimulus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
-    /// Larger with a larger stimulus.
-    Rises,
-    /// Smaller with a larger stimulus.
-    Falls,
-}
-
-/// Returns the direction of change published in section 5; `None` for a measure without a published direction. Section 5 states:
-/// "velocity and acceleration are directly proportional and force is inversely proportional to the rendered gamma".
+/// Formats the direction of change with the stimulus that section 5 publishes for a movement measure, and whether `exponent`
+/// reproduces this direction: whether its confidence interval lies entirely on that side of 0. Returns `None` for a measure
+/// without a published direction. Section 5 states: "velocity and acceleration are directly proportional and force is inversely
+/// proportional to the rendered gamma".
 #[must_use]
-pub fn direction(measure: &str) -> Option<Direction> {
-    match measure {
-        "mean speed" | "mean acceleration" => Some(Direction::Rises),
-        "mean force" => Some(Direction::Falls),
-        _ => None,
-    }
-}
-
-impl Direction {
-    /// Returns true if the confidence interval of an exponent lies entirely on the published side of 0.
-    #[must_use]
-    pub fn is_reproduced(self, exponent: &MeanInterval) -> bool {
-        let [low, high] = exponent.interval;
-        match self {
-            Self::Rises => low > 0.0,
-            Self::Falls => high < 0.0,
-        }
-    }
-
-    /// Formats the published direction, and whether the confidence interval of `exponent` reproduces this direction.
-    #[must_use]
-    pub fn beside(self, exponent: &MeanInterval) -> String {
-        let way = match self {
-            Self::Rises => "rises",
-            Self::Falls => "falls",
-        };
-        let reproduced = if self.is_reproduced(exponent) { "reproduced" } else { "not reproduced" };
-        format!("{way} (section 5): {reproduced}")
-    }
+pub fn direction(measure: &str, exponent: &MeanInterval) -> Option<String> {
+    let [low, high] = exponent.interval;
+    let (way, is_reproduced) = match measure {
+        "mean speed" | "mean acceleration" => ("rises", low > 0.0),
+        "mean force" => ("falls", high < 0.0),
+        _ => return None,
+    };
+    let reproduced = if is_reproduced { "reproduced" } else { "not reproduced" };
+    Some(format!("{way} (section 5): {reproduced}"))
 }

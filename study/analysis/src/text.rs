@@ -11,7 +11,7 @@ use flotor_statistics::t_test::TTest;
 use flotor_study::trial::Modality;
 
 pub(super) fn jnd(analysis: &JndAnalysis) -> String {
-    let mut page = Page::compared_with(analysis.thesis);
+    let mut page = Page { lines: Vec::new(), thesis: analysis.thesis };
     let JndAnalysis { subjects, pairs_per_subject, .. } = analysis;
     let thesis = analysis.thesis.text(" (thesis: about 200)");
     page.line(format!("{subjects} subjects, {pairs_per_subject:.1} pairs each{thesis}"));
@@ -45,15 +45,16 @@ pub(super) fn jnd(analysis: &JndAnalysis) -> String {
         }
     }
     page.movements(analysis.task, &analysis.kinematics);
-    if analysis.unfinished_tracks > 0 {
+    let omitted = analysis.omitted_tracks();
+    if omitted > 0 {
         page.gap();
-        page.line(format!("{} tracks did not reach a threshold and are omitted", analysis.unfinished_tracks));
+        page.line(format!("{omitted} tracks did not reach a threshold and are omitted"));
     }
     page.end()
 }
 
 pub(super) fn magnitude(analysis: &MagnitudeAnalysis) -> String {
-    let mut page = Page::compared_with(analysis.thesis);
+    let mut page = Page { lines: Vec::new(), thesis: analysis.thesis };
     let MagnitudeAnalysis { subjects, trials_per_subject, repeated, .. } = analysis;
     let thesis = analysis.thesis.text(" (thesis: 72)");
     page.line(format!("{subjects} subjects, {trials_per_subject} ratings each{thesis}"));
@@ -94,10 +95,6 @@ struct Page {
 }
 
 impl Page {
-    fn compared_with(thesis: ThesisComparison) -> Self {
-        Self { lines: Vec::new(), thesis }
-    }
-
     fn line(&mut self, text: String) {
         self.lines.push(format!("  {text}"));
     }
@@ -156,8 +153,7 @@ impl Page {
         for measure in measures {
             self.effects(measure.measure, &measure.anova, published::movement(task, measure.measure));
             if let Some(exponent) = &measure.exponent {
-                let direction = published::direction(measure.measure);
-                let beside = direction.map_or_else(String::new, |direction| direction.beside(exponent));
+                let beside = published::direction(measure.measure, exponent).unwrap_or_default();
                 self.row("exponent of the stimulus", &exponent_text(exponent), &beside);
             }
         }

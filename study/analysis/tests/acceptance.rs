@@ -3,7 +3,9 @@
 
 #![allow(clippy::unwrap_used, clippy::cast_possible_truncation, clippy::cast_sign_loss)] // tests may panic
 
-use flotor_analysis::{AnalysisOptions, JndAnalysis, SubjectRecord, analyse_jnd, analyse_magnitude};
+use flotor_analysis::{
+    Analysis, AnalysisOptions, Estimator, JndAnalysis, SubjectRecord, analyse_jnd, analyse_magnitude,
+};
 use flotor_study::bias::{BiasRow, Method, rows};
 use flotor_study::log::TrialEvent;
 use flotor_study::observer::TernaryObserver;
@@ -86,6 +88,24 @@ fn simulated_studies_reproduce_the_thesis() {
     // Which modality comes first does nothing: p is even between 0 and 1, a tenth of them below 0.1.
     let order = of(|a| a.anova.iter().find(|line| line.effect == "order").unwrap().p);
     assert!(share(&order, [0.0, 0.1]) < 0.3);
+}
+
+/// The answers of a track without a threshold count for the most likely observer, and were "omitted" in its text too.
+#[test]
+fn only_the_estimate_of_the_procedure_omits_a_track_without_a_threshold() {
+    let protocol = Protocol::Jnd(JndProtocol::default());
+    let mut subjects = subjects(&protocol, &Population::default(), 0);
+    let unfinished = subjects.iter().flat_map(|subject| &subject.tracks).filter(|t| t.threshold.is_none());
+    let count = unfinished.count() + 1;
+    let track = subjects[0].tracks.iter_mut().find(|track| track.threshold.is_some()).unwrap();
+    track.threshold = None;
+    let text = |estimator| {
+        let options = AnalysisOptions { estimator, ..AnalysisOptions::default() };
+        Analysis::of(&protocol, &subjects, &options).unwrap().to_text()
+    };
+    let note = format!("{count} tracks did not reach a threshold and are omitted");
+    assert!(text(Estimator::Procedure).contains(&note), "{}", text(Estimator::Procedure));
+    assert!(!text(Estimator::Map).contains("omitted"), "{}", text(Estimator::Map));
 }
 
 #[test]

@@ -2,11 +2,9 @@
 
 use crate::conduct::{ApparatusOrFrontEndError, ConductError, Presenter, conduct};
 use crate::dataset::{Dataset, DatasetError, ExistingLogPolicy, Progress};
-use crate::log::{Begin, FORMAT, InputFile, LogWriter, Plan};
+use crate::log::{Begin, FORMAT, InputFile, Plan};
 use crate::observer::{Population, SimulatedSubject};
 use crate::protocol::{Protocol, SubjectNumber};
-use crate::sitting::Sitting;
-use crate::trial::Trial;
 use serde_json::json;
 use std::num::NonZeroUsize;
 use std::sync::Mutex;
@@ -56,25 +54,12 @@ pub enum CohortError {
 pub type PresenterFactory<'a> =
     dyn Fn(SubjectNumber) -> Result<Option<Box<dyn Presenter + 'a>>, ApparatusOrFrontEndError> + Sync + 'a;
 
-/// Sitting of one subject, ready to run.
-struct Turn {
-    subject: SubjectNumber,
-    /// Trials presented before an interruption; empty for a new sitting.
-    earlier: Vec<Trial>,
-    sitting: Sitting,
-    log: LogWriter,
-}
-
 impl Cohort {
-    /// Returns the mean of the levels, the reference stimulus of simulated ratings.
-    fn middle(&self) -> f64 {
-        flotor_statistics::describe::mean(self.protocol.levels())
-    }
-
     /// Returns the simulated subject with this number.
     pub fn subject(&self, subject: SubjectNumber) -> SimulatedSubject {
-        SimulatedSubject::new(&self.population, self.seed, subject, self.middle())
-            .about(self.protocol.stimulus())
+        // The reference stimulus of simulated ratings is the mean of the levels.
+        let middle = flotor_statistics::describe::mean(self.protocol.levels());
+        SimulatedSubject::new(&self.population, self.seed, subject, middle).about(self.protocol.stimulus())
     }
 
     fn begin(&self, subject: SubjectNumber) -> Begin {
@@ -119,8 +104,7 @@ impl Cohort {
                 if stop.load(Ordering::Relaxed) {
                     break;
                 }
-                let turn = self.turn(dataset, subject, progress)?;
-                self.sit(turn, presenter, watch, stop)?;
+                self.sit(dataset, subject, progress, presenter, watch, stop)?;
             }
             Ok(())
         };
@@ -135,31 +119,24 @@ impl Cohort {
         Ok(dataset.write_tables()?)
     }
 
-    fn turn(
+    fn sit(
         &self,
         dataset: &Dataset,
         subject: SubjectNumber,
         progress: Progress,
-    ) -> Result<Turn, CohortError> {
+        presenter: &PresenterFactory<'_>,
+        watch: &(dyn Fn() + Sync),
+        stop: &AtomicBool,
+    ) -> Result<(), CohortError> {
+        // Trials presented before an interruption.
         let mut earlier = Vec::new();
-        let (sitting, log) = match progress {
+        let (mut sitting, mut log) = match progress {
             Progress::Partial(log) => {
                 earlier.extend(log.answers().map(|(trial, _)| trial));
                 log.resume(&self.version).map_err(DatasetError::from)?
             }
             Progress::New | Progress::Complete => dataset.begin(self.begin(subject))?,
         };
-        Ok(Turn { subject, earlier, sitting, log })
-    }
-
-    fn sit(
-        &self,
-        turn: Turn,
-        presenter: &PresenterFactory<'_>,
-        watch: &(dyn Fn() + Sync),
-        stop: &AtomicBool,
-    ) -> Result<(), CohortError> {
-        let Turn { subject, earlier, mut sitting, mut log } = turn;
         let failed = |cause| CohortError::Sitting { subject, cause };
         let presenter = presenter(subject).map_err(|cause| failed(ConductError::Outside(cause)))?;
         let Some(mut presenter) = presenter else { return Ok(()) };

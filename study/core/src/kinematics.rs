@@ -53,7 +53,8 @@ pub struct KinematicsMeter {
     turning_m_per_s: f64,
     impulse_ns: f64,
     peak_force_n: f64,
-    out_of_range: bool,
+    /// True if the handle was out of its range in any sample so far.
+    pub(crate) out_of_range: bool,
     last_velocity_m_per_s: Option<f64>,
     turns: Turns,
     line: Line,
@@ -76,12 +77,6 @@ impl KinematicsMeter {
         self.peak_force_n = self.peak_force_n.max(force_n);
         self.turns.take(z_m);
         self.line.take(z_m, force_z_n);
-    }
-
-    /// Returns true if the handle was out of its range in any sample so far.
-    #[must_use]
-    pub fn out_of_range(&self) -> bool {
-        self.out_of_range
     }
 
     /// Returns the measures of the samples so far; `None` if they span no time.

@@ -191,6 +191,12 @@ impl Response {
         }
     }
 
+    /// Returns the rating; `None` for another answer.
+    #[must_use]
+    pub fn rating(self) -> Option<f64> {
+        if let Self::Rating(rating) = self { Some(rating) } else { None }
+    }
+
     /// Returns the label used in tables, without a rating's number.
     #[must_use]
     pub fn word(&self) -> &'static str {

@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
     flotor analyse data --json result.json --type II"
 )]
 pub(crate) struct AnalyseArguments {
-    /// Folder given to `study --out`
+    /// Folder of the study, written by `flotor study` (--out)
     #[arg(value_name = "DIR")]
     data: PathBuf,
     #[command(flatten)]

@@ -171,9 +171,9 @@ fn jnd_page(
     }
     tracks(page, subjects, stimulus);
     movements(page, (analysis.task, analysis.thesis), &analysis.kinematics, levels, stimulus);
-    if analysis.unfinished_tracks > 0 {
-        let count = analysis.unfinished_tracks;
-        page.paragraph(&format!("{count} tracks did not reach a threshold and are omitted."));
+    let omitted = analysis.omitted_tracks();
+    if omitted > 0 {
+        page.paragraph(&format!("{omitted} tracks did not reach a threshold and are omitted."));
     }
 }
 
@@ -236,7 +236,7 @@ fn movements(
         page.paragraph(&format!("Effects on {}:", measure.measure));
         page.effects(&measure.anova, beside.effects(published::movement(task, measure.measure)));
         if let Some(exponent) = &measure.exponent {
-            let direction = published::direction(measure.measure).map(|direction| direction.beside(exponent));
+            let direction = published::direction(measure.measure, exponent);
             let beside = direction.filter(|_| beside == ThesisComparison::Thesis);
             let beside = beside.map_or(String::new(), |text| format!("; thesis: {text}"));
             page.paragraph(&format!("Exponent of the stimulus: {}{beside}.", exponent_text(exponent)));

@@ -84,10 +84,10 @@ enum Task {
 /// Values of `--observer`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 enum ObserverOption {
-    /// Signal detection with known thresholds, a simulated hand, virtual time
+    /// A simulated observer of signal detection with known thresholds and a simulated hand, in virtual time
     #[default]
     Simulated,
-    /// A person at the device, in front of the viewer or of this terminal, in real time
+    /// A person at the device, in real time
     Human,
 }
 
@@ -100,7 +100,7 @@ struct Common {
     /// Kind of observer
     #[arg(long, value_enum, default_value_t)]
     observer: ObserverOption,
-    /// Number of subjects, who are numbered from 1
+    /// Number of simulated subjects, who are numbered from 1; in a study file also the planned number of people
     #[arg(long, default_value_t = 16, value_parser = count(1..=SubjectNumber::MOST), value_name = "N")]
     subjects: u16,
     /// Simulated subjects in parallel (default: one per core)
@@ -115,20 +115,22 @@ struct Common {
     /// Number of the person (human; default: the first free number)
     #[arg(long, value_parser = count(1..=SubjectNumber::MOST), value_name = "N")]
     subject: Option<u16>,
-    /// Scene of the stimuli in TOML (default: the model of the stimuli on the simulated flotor)
+    /// Scene of the stimuli: a scene file (TOML), or the name of one of Flotor's own scenes (default: the model of the stimuli on
+    /// the simulated flotor)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Set a parameter of a plugin of the scene (repeatable)
     #[arg(long = "set", value_name = "PLUGIN.KEY=VALUE")]
     sets: Vec<PluginKeyValue>,
-    /// Apparatus of simulated observers
+    /// Apparatus of simulated observers; with none, --feel and --kinematics have no effect
     #[arg(long, value_enum, default_value_t)]
     apparatus: PresentationOption,
     /// Time for which a simulated observer feels each stimulus
     #[arg(long, default_value = "1s", value_parser = feel_s, allow_hyphen_values = true, value_name = "TIME")]
     feel: f64,
-    /// Thresholds of simulated observers at 75 %, with vision and without, as shares of the base (default: 14.2 and 17.2 %, as the
-    /// procedure of the thesis estimates; for a force 5.9 % felt and 7 % exerted)
+    /// Thresholds of simulated observers at 75 %, with vision and without, as shares of the base; no effect on ratings (default:
+    /// 11.1 and 13.6 %, which the procedure of the thesis estimates as 14.2 and 17.2 %; for a force 5.9 % felt and 7 % exerted; for
+    /// other stimuli required)
     #[arg(long, value_parser = thresholds, value_name = "VH,H")]
     weber: Option<[f64; 2]>,
     /// Stored movement (default: full for people, summary for simulated observers)
@@ -158,7 +160,7 @@ struct Common {
     /// Key of the emergency stop in the viewer's window (human)
     #[arg(long, value_enum, default_value_t, value_name = "KEY")]
     stop_key: StopKey,
-    /// Texts of the screens in the viewer's window, in the language of the person (human; default: English)
+    /// File (TOML) with the texts of the screens in the viewer's window, in the language of the person (human; default: English)
     #[arg(long, value_name = "FILE")]
     texts: Option<PathBuf>,
     /// Minimum time for which each stimulus must be felt (human)
@@ -173,11 +175,11 @@ struct Common {
     /// White noise on headphones (human)
     #[arg(long, value_enum, default_value_t)]
     noise: NoiseOption,
-    /// Resume incomplete subjects, skip complete ones
+    /// Resume incomplete subjects, skip complete simulated ones (default: refuse subjects that have data)
     #[arg(long)]
     resume: bool,
-    /// Varied parameter: MODEL.PARAMETER (default: spring.gamma_n; in `study force`: load.force_n)
-    #[arg(long, value_name = "MODEL.KEY")]
+    /// Varied parameter of a model (default: spring.gamma_n; in `study force`: load.force_n)
+    #[arg(long, value_name = "MODEL.PARAMETER")]
     stimulus: Option<String>,
     /// Modality that comes first: vision and haptics (vh), haptics alone (h), or by the number of the subject
     #[arg(long, value_enum, default_value_t, value_name = "MODALITY")]
@@ -210,7 +212,7 @@ struct JndArguments {
     #[command(flatten)]
     common: Common,
     /// Bases, in the unit of the stimulus; each pair is a base and a comparison that differs from it (default: 17,26,35;
-    /// for a force 3,6,9)
+    /// in `study force`: 3,6,9)
     #[arg(long, value_delimiter = ',', value_parser = real, allow_hyphen_values = true, value_name = "LIST")]
     bases: Option<Vec<f64>>,
     /// Number of replications, in alternating modality
@@ -348,7 +350,7 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
 
 /// Parses one word for a table: 1 to 20 letters or digits.
 fn word(text: &str) -> Result<String, String> {
-    let is_word = !text.is_empty() && text.len() <= 20 && text.chars().all(char::is_alphanumeric);
+    let is_word = !text.is_empty() && text.chars().count() <= 20 && text.chars().all(char::is_alphanumeric);
     if is_word { Ok(text.to_owned()) } else { Err("write one word, 1 to 20 letters or digits".to_owned()) }
 }
 
@@ -584,36 +586,30 @@ fn tell(dataset: &Dataset) -> Result<(), CommandError> {
 }
 
 fn refused(error: CohortError) -> CommandError {
+    let message = error.to_string();
     match error {
         CohortError::Dataset(error) => crate::of_dataset(error),
-        CohortError::Sitting { subject, cause: ConductError::Outside(cause) } => {
-            let message = format!("{subject}: {cause}");
-            outside(cause, message)
-        }
-        CohortError::Sitting { subject, cause: ConductError::Trial { trial, cause } } => {
-            let message = format!("{subject}: trial {trial}: {cause}");
-            outside(cause, message)
-        }
-        sitting => CommandError::Failed(sitting.to_string()),
+        CohortError::Sitting {
+            cause: ConductError::Outside(cause) | ConductError::Trial { cause, .. },
+            ..
+        } => outside(cause, message),
+        _ => CommandError::Failed(message),
     }
 }
 
 /// Converts an apparatus error to a command error with the exit code of its cause. If a fault, an emergency stop, the watchdog
 /// or an oscillation ended the run, first prints `message`, which has subject and trial, as a note.
 fn outside(cause: ApparatusOrFrontEndError, message: String) -> CommandError {
-    let error = match cause.downcast_ref::<RunEnded>() {
-        Some(RunEnded(
-            end @ (RunEnd::DeviceFault(_)
-            | RunEnd::EmergencyStop(_)
-            | RunEnd::Watchdog(_)
-            | RunEnd::Oscillation
-            | RunEnd::Unguarded),
-        )) => CommandError::RunEnded(*end),
-        _ => {
-            let error = cause.downcast().map(|error| CommandError::Run(*error));
-            return error.unwrap_or(CommandError::Failed(message));
-        }
-    };
-    flotor_command::note(message);
-    error
+    if let Some(RunEnded(
+        end @ (RunEnd::DeviceFault(_)
+        | RunEnd::EmergencyStop(_)
+        | RunEnd::Watchdog(_)
+        | RunEnd::Oscillation
+        | RunEnd::Unguarded),
+    )) = cause.downcast_ref()
+    {
+        flotor_command::note(message);
+        return CommandError::RunEnded(*end);
+    }
+    cause.downcast().map_or(CommandError::Failed(message), |error| CommandError::Run(*error))
 }

@@ -1,5 +1,5 @@
-//! Distributions: tail probabilities of the normal, Student's t, Fisher's F and binomial distributions, and quantiles of the
-//! first two.
+//! Distributions: tail probabilities of the normal, Student's t, Fisher's F and binomial distributions, and the quantile of
+//! the second.
 
 use crate::special::regularised_beta;
 use std::f64::consts::{PI, SQRT_2};
@@ -17,76 +17,6 @@ pub fn normal_density(x: f64) -> f64 {
 #[must_use]
 pub fn normal_below(x: f64) -> f64 {
     0.5 * libm::erfc(-x / SQRT_2)
-}
-
-/// Returns the quantile of the standard normal distribution; infinite at probabilities 0 and 1, NaN outside this range.
-///
-/// Acklam's rational approximation (relative error 1.2e-9), refined by two steps of Halley's method.
-#[must_use]
-pub fn normal_quantile(probability: f64) -> f64 {
-    if !(0.0..=1.0).contains(&probability) {
-        return f64::NAN;
-    }
-    if probability == 0.0 {
-        return f64::NEG_INFINITY;
-    }
-    if probability > 0.5 {
-        // Exact by Sterbenz: 1 - p is representable for p in [1/2, 1].
-        return -normal_quantile(1.0 - probability);
-    }
-    let mut x = acklam_lower(probability);
-    for _ in 0..2 {
-        let error = (normal_below(x) - probability) / normal_density(x);
-        if error.is_finite() {
-            x -= error / (1.0 + 0.5 * x * error);
-        }
-    }
-    x
-}
-
-/// Returns Acklam's approximation of the normal quantile for probabilities up to 0.5.
-fn acklam_lower(probability: f64) -> f64 {
-    const TAIL: f64 = 0.024_25;
-    const CENTRE_NUMERATOR: [f64; 6] = [
-        -3.969_683_028_665_376e1,
-        2.209_460_984_245_205e2,
-        -2.759_285_104_469_687e2,
-        1.383_577_518_672_69e2,
-        -3.066_479_806_614_716e1,
-        2.506_628_277_459_239,
-    ];
-    const CENTRE_DENOMINATOR: [f64; 6] = [
-        -5.447_609_879_822_406e1,
-        1.615_858_368_580_409e2,
-        -1.556_989_798_598_866e2,
-        6.680_131_188_771_972e1,
-        -1.328_068_155_288_572e1,
-        1.0,
-    ];
-    const TAIL_NUMERATOR: [f64; 6] = [
-        -7.784_894_002_430_293e-3,
-        -3.223_964_580_411_365e-1,
-        -2.400_758_277_161_838,
-        -2.549_732_539_343_734,
-        4.374_664_141_464_968,
-        2.938_163_982_698_783,
-    ];
-    const TAIL_DENOMINATOR: [f64; 5] = [
-        7.784_695_709_041_462e-3,
-        3.224_671_290_700_398e-1,
-        2.445_134_137_142_996,
-        3.754_408_661_907_416,
-        1.0,
-    ];
-    let horner = |coefficients: &[f64], x: f64| coefficients.iter().fold(0.0, |sum, c| sum * x + c);
-    if probability < TAIL {
-        let q = (-2.0 * libm::log(probability)).sqrt();
-        horner(&TAIL_NUMERATOR, q) / horner(&TAIL_DENOMINATOR, q)
-    } else {
-        let q = probability - 0.5;
-        let r = q * q;
-        q * horner(&CENTRE_NUMERATOR, r) / horner(&CENTRE_DENOMINATOR, r)
-    }
 }
 
 /// Returns the two-sided p-value of Student's t with `df` degrees of freedom: the probability of a larger |t|.
@@ -192,14 +122,5 @@ mod tests {
         near(binomial_at_least(48, 48, 0.5), libm::exp2(-48.0), 1.0e-12);
         near(binomial_at_least(1, 3, 0.2), 1.0 - 0.8 * 0.8 * 0.8, 1.0e-13);
         assert_eq!((binomial_at_least(0, 3, 0.2), binomial_at_least(4, 3, 0.2)), (1.0, 0.0));
-    }
-
-    #[test]
-    fn normal_quantile_turns_back_in_both_tails() {
-        for x in [-37.0, -8.0, -2.5, -0.3, 0.3, 1.959_963_984_540_054, 5.0] {
-            near(normal_quantile(normal_below(x)), x, 1.0e-9);
-        }
-        assert_eq!(normal_quantile(0.5), 0.0);
-        assert!(normal_quantile(1.5).is_nan());
     }
 }

@@ -90,6 +90,13 @@ pub enum StatisticsError {
     Design(String),
 }
 
+impl Serialize for StatisticsError {
+    /// Writes the error as its text.
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
 /// Statistic, or the reason why it cannot be computed. A missing statistic does not affect others.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
@@ -99,7 +106,6 @@ pub enum Outcome<T> {
     /// No statistic.
     NotTestable {
         /// Reason for the missing statistic.
-        #[serde(serialize_with = "as_text")]
         not_testable: StatisticsError,
     },
 }
@@ -125,14 +131,6 @@ impl<T> Outcome<T> {
     pub fn to_text(&self, text: impl FnOnce(&T) -> String) -> String {
         self.result().map_or_else(not_testable_text, text)
     }
-
-    /// Converts the statistic with `of`; keeps the reason for a missing statistic.
-    pub fn map<U>(self, of: impl FnOnce(T) -> U) -> Outcome<U> {
-        match self {
-            Self::Tested(tested) => Outcome::Tested(of(tested)),
-            Self::NotTestable { not_testable } => Outcome::NotTestable { not_testable },
-        }
-    }
 }
 
 impl<T> From<Result<T, StatisticsError>> for Outcome<T> {
@@ -150,10 +148,6 @@ pub fn not_testable_text(reason: &StatisticsError) -> String {
     format!("not testable: {reason}")
 }
 
-fn as_text<S: serde::Serializer>(reason: &StatisticsError, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_str(reason)
-}
-
 /// Fraction of the sum of squared responses below which a sum of squares counts as zero. Relative rounding errors are about
 /// 1e-16, their squares about 1e-32.
 const ROUNDING: f64 = 1.0e-20;
@@ -167,6 +161,11 @@ fn check(what: &'static str, values: &[f64], needed: usize) -> Result<(), Statis
         return Err(StatisticsError::TooFew { what, unit: "values", needed, found: values.len() });
     }
     Ok(())
+}
+
+/// Checks that two paired lists have the same length.
+fn check_lengths(what: &'static str, left: usize, right: usize) -> Result<(), StatisticsError> {
+    if left == right { Ok(()) } else { Err(StatisticsError::Lengths { what, left, right }) }
 }
 
 /// Converts a count to `f64`; counts are far below 2^53.

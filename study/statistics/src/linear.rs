@@ -77,14 +77,20 @@ impl Basis {
     pub(crate) fn of(design: &Matrix) -> Self {
         let mut basis = Self { columns: Vec::new() };
         for column in 0..design.columns() {
-            let original = design.column(column);
-            let left = basis.residual(basis.residual(original.clone()));
-            let length = norm(&left);
-            if length > DEPENDENT * norm(&original) {
-                basis.columns.push(left.into_iter().map(|value| value / length).collect());
-            }
+            let column = design.column(column);
+            let least = DEPENDENT * norm(&column);
+            basis.extend(column, least);
         }
         basis
+    }
+
+    /// Adds the direction of a column's residual; ignores a residual of length `least` or less: the column is dependent.
+    fn extend(&mut self, column: Vec<f64>, least: f64) {
+        let left = self.residual(column);
+        let length = norm(&left);
+        if length > least {
+            self.columns.push(left.into_iter().map(|value| value / length).collect());
+        }
     }
 
     /// Returns the number of linearly independent columns.
@@ -92,8 +98,9 @@ impl Basis {
         self.columns.len()
     }
 
+    /// Returns the part of `values` orthogonal to the basis, by two passes of Gram-Schmidt.
     fn residual(&self, mut values: Vec<f64>) -> Vec<f64> {
-        for column in &self.columns {
+        for column in self.columns.iter().chain(&self.columns) {
             let share = dot(column, &values);
             values.iter_mut().zip(column).for_each(|(value, unit)| *value -= share * unit);
         }
@@ -102,29 +109,19 @@ impl Basis {
 
     /// Returns sums of squares and products of the residuals of each column of `responses`.
     pub(crate) fn residual_products(&self, responses: &Matrix) -> Matrix {
-        let left: Vec<Vec<f64>> = (0..responses.columns())
-            .map(|column| self.residual(self.residual(responses.column(column))))
-            .collect();
-        products(&left)
+        let left = (0..responses.columns()).map(|column| self.residual(responses.column(column)));
+        products(&left.collect::<Vec<_>>())
     }
 
     /// Returns sums of squares and products explained by this basis beyond `smaller`, which must span a subspace of this basis.
     pub(crate) fn products_beyond(&self, smaller: &Self, responses: &Matrix) -> Matrix {
         let mut extended = Self { columns: smaller.columns.clone() };
-        let mut beyond = Vec::new();
-        for column in &self.columns {
-            let left = extended.residual(extended.residual(column.clone()));
-            let length = norm(&left);
-            if length > DEPENDENT {
-                let unit: Vec<f64> = left.into_iter().map(|value| value / length).collect();
-                extended.columns.push(unit.clone());
-                beyond.push(unit);
-            }
-        }
+        self.columns.iter().for_each(|column| extended.extend(column.clone(), DEPENDENT));
+        let beyond = extended.columns.split_off(smaller.rank());
         let shares: Vec<Vec<f64>> = (0..responses.columns())
             .map(|column| {
                 // Use residuals of the smaller basis: a large mean would swamp a small effect with rounding errors.
-                let response = smaller.residual(smaller.residual(responses.column(column)));
+                let response = smaller.residual(responses.column(column));
                 beyond.iter().map(|unit| dot(unit, &response)).collect()
             })
             .collect();

@@ -2,7 +2,7 @@
 
 use crate::describe::{mean, sum_of_squares};
 use crate::distribution::{fisher_above, student_two_sided, student_two_sided_quantile};
-use crate::{StatisticsError, check, count};
+use crate::{StatisticsError, check, check_lengths, count};
 use serde::Serialize;
 
 /// Straight line fitted by least squares.
@@ -40,9 +40,7 @@ pub fn line(x: &[f64], y: &[f64]) -> Result<Line, StatisticsError> {
     const WHAT: &str = "a line";
     check(WHAT, x, 3)?;
     check(WHAT, y, 3)?;
-    if x.len() != y.len() {
-        return Err(StatisticsError::Lengths { what: WHAT, left: x.len(), right: y.len() });
-    }
+    check_lengths(WHAT, x.len(), y.len())?;
     let (x_mean, y_mean) = (mean(x), mean(y));
     let (xx, yy) = (sum_of_squares(x), sum_of_squares(y));
     if xx == 0.0 {

@@ -2,7 +2,7 @@
 
 use crate::describe::{deviation, mean, sum_of_squares};
 use crate::distribution::{student_two_sided, student_two_sided_quantile};
-use crate::{ROUNDING, StatisticsError, check, count};
+use crate::{ROUNDING, StatisticsError, check, check_lengths, count};
 use serde::Serialize;
 
 /// Result of a two-sided t-test.
@@ -49,13 +49,7 @@ pub fn one_sample(values: &[f64], expected: f64) -> Result<TTest, StatisticsErro
 /// Errors of [`one_sample`], or lists of different length; [`StatisticsError::NoDifference`] or
 /// [`StatisticsError::SameDifference`] if the differences vary by rounding errors only.
 pub fn paired(first: &[f64], second: &[f64]) -> Result<TTest, StatisticsError> {
-    if first.len() != second.len() {
-        return Err(StatisticsError::Lengths {
-            what: "a paired t-test",
-            left: first.len(),
-            right: second.len(),
-        });
-    }
+    check_lengths("a paired t-test", first.len(), second.len())?;
     let differences: Vec<f64> = first.iter().zip(second).map(|(first, second)| first - second).collect();
     let squares = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>();
     let rounding = ROUNDING * (squares(first) + squares(second));

@@ -4,7 +4,7 @@ use crate::describe::{mean, sum_of_squares};
 use crate::distribution::fisher_above;
 use crate::regression;
 use crate::t_test::one_sample;
-use crate::{Outcome, ROUNDING, StatisticsError, count};
+use crate::{Outcome, ROUNDING, StatisticsError, check_lengths, count};
 use serde::Serialize;
 
 /// Least-squares line through the means at the levels of a within-subject factor.
@@ -41,11 +41,7 @@ pub struct ContrastTest {
 /// means do not vary.
 pub fn linear(levels: &[f64], responses: &[Vec<f64>]) -> Result<LinearTrend, StatisticsError> {
     const WHAT: &str = "a linear trend";
-    for row in responses {
-        if row.len() != levels.len() {
-            return Err(StatisticsError::Lengths { what: WHAT, left: levels.len(), right: row.len() });
-        }
-    }
+    responses.iter().try_for_each(|row| check_lengths(WHAT, levels.len(), row.len()))?;
     let column =
         |level: usize| responses.iter().filter_map(|row| row.get(level).copied()).collect::<Vec<_>>();
     let means: Vec<f64> = (0..levels.len()).map(|level| mean(&column(level))).collect();
@@ -64,9 +60,10 @@ pub fn linear(levels: &[f64], responses: &[Vec<f64>]) -> Result<LinearTrend, Sta
         one_sample(&contrasts, 0.0)
     };
     let error_df = count(responses.len()) - 1.0;
-    let test = Outcome::from(test).map(|test| {
+    let test = test.map(|test| {
         let f = test.value * test.value;
         ContrastTest { f, df: 1.0, error_df, p: fisher_above(f, 1.0, error_df) }
     });
+    let test = test.into();
     Ok(LinearTrend { slope: line.slope, intercept: line.intercept, r_squared: line.r_squared, test })
 }

@@ -6,7 +6,7 @@ use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::gmsh;
 use flotor_solid::law::Law;
 use flotor_solid::mesh::Mesh;
-use flotor_solid::prepare::Resolution;
+use flotor_solid::remainder::Resolution;
 use libfuzzer_sys::fuzz_target;
 
 /// Larger bodies are read and not solved: a case takes milliseconds.

@@ -161,7 +161,7 @@ fn laws() {
     };
     let inputs: Vec<Input> = poses.iter().map(input).collect();
     let mut answers = vec![Output::default(); inputs.len()];
-    let batch = Batch::new();
+    let batch = Batch::default();
     twice(1, 1, || batch.respond(&closed, black_box(&inputs), black_box(&mut answers)));
     twice(1, 1, || batch.respond(&energy, black_box(&inputs), black_box(&mut answers)));
 }

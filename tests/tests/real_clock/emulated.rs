@@ -140,7 +140,7 @@ fn controller<L: Transport>(connect: impl FnOnce() -> L + Send + 'static) -> (Fo
         let mut emulator = Emulator::new(config, Pace::RealTime, Held(coils.clone()));
         emulator.serve(&mut link, &is_over, &mut |_| ());
         // Without a link no cycle follows.
-        if emulator.controller().mode() == Mode::Disarmed {
+        if emulator.controller.mode() == Mode::Disarmed {
             coils.push(0.0);
         }
     });

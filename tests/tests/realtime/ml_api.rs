@@ -6,8 +6,8 @@ use super::counted;
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, SampleWait, Tick, Wrench};
 use flotor_loader::{Plugin, Setting};
 use flotor_maglev_emulator::controller::Sample;
-use flotor_maglev_emulator::ml_api::server::Hub;
-use flotor_maglev_emulator::ml_api::{Controller, ControllerConfig, Machine, Server};
+use flotor_maglev_emulator::ml_api::server::{Hub, serve};
+use flotor_maglev_emulator::ml_api::{Controller, ControllerConfig, Machine};
 use flotor_maglev_emulator::port::{Port, Reach};
 use flotor_maglev_emulator::{Pace, Plant};
 use flotor_tests::TestSize;
@@ -28,60 +28,72 @@ impl Plant for Held {
     fn restart(&mut self) {}
 }
 
-/// Bytes of a force command and of its reply; an acknowledgement has as many as that.
+/// Bytes of a force command, of its reply and of a tick; an acknowledgement has as many as a reply.
 const CALL_BYTES: usize = 32;
 const REPLY_BYTES: usize = 8;
+const TICK_BYTES: usize = 36;
+const PERIOD: Duration = Duration::from_millis(1);
 /// Nagle's algorithm against delayed acknowledgements: what a frame in two pieces costs, less a margin.
 const STALL: Duration = Duration::from_millis(35);
 
-/// Connections without anything behind them: one whose other end answers a command's bytes with as many as its reply has, and
-/// one whose other end takes acknowledgements.
+/// A controller with nothing behind its two connections: one thread answers a command's bytes with as many as its reply has, one
+/// sends the bytes of a tick every millisecond and takes as many as its acknowledgement has. So the scheduler has the same threads
+/// to place, and the loop comes to each command out of the same wait.
 struct Bare {
     calls: TcpStream,
-    acknowledgements: TcpStream,
-    bytes: [u8; CALL_BYTES],
+    ticks: TcpStream,
+    bytes: [u8; TICK_BYTES],
 }
 
 impl Bare {
-    fn new() -> Self {
-        let [calls, acknowledgements] = [CALL_BYTES, REPLY_BYTES].map(|length| {
-            let listener = TcpListener::bind("127.0.0.1:0").expect("there is a free port");
-            let near = TcpStream::connect(listener.local_addr().expect("it is bound")).expect("it listens");
-            let (mut far, _) = listener.accept().expect("somebody connects");
-            for end in [&near, &far] {
-                end.set_nodelay(true).expect("it is a connection");
-            }
-            std::thread::spawn(move || {
-                let mut bytes = [0; CALL_BYTES];
-                while far.read_exact(&mut bytes[..length]).is_ok() {
-                    if length == CALL_BYTES && far.write_all(&bytes[..REPLY_BYTES]).is_err() {
-                        break;
-                    }
-                }
-            });
-            near
+    /// Sends ticks from `first` on.
+    fn new(first: Instant) -> Self {
+        let (calls, mut far) = connection();
+        std::thread::spawn(move || {
+            let mut bytes = [0; CALL_BYTES];
+            while far.read_exact(&mut bytes).is_ok() && far.write_all(&bytes[..REPLY_BYTES]).is_ok() {}
         });
-        Self { calls, acknowledgements, bytes: [0; CALL_BYTES] }
+        let (ticks, mut far) = connection();
+        std::thread::spawn(move || {
+            let mut bytes = [0; TICK_BYTES];
+            let mut deadline = first;
+            loop {
+                std::thread::sleep(deadline.saturating_duration_since(Instant::now()));
+                deadline += PERIOD;
+                if far.write_all(&bytes).is_err() || far.read_exact(&mut bytes[..REPLY_BYTES]).is_err() {
+                    break;
+                }
+            }
+        });
+        Self { calls, ticks, bytes: [0; TICK_BYTES] }
     }
 
-    /// The bytes of a command, its reply and the acknowledgement of its tick.
+    /// Waits for a tick, and returns the time of a command, its reply and the acknowledgement.
     fn round_trip(&mut self) -> Duration {
+        self.ticks.read_exact(&mut self.bytes).expect("the other end sends");
         let now = Instant::now();
-        self.calls.write_all(&self.bytes).expect("the other end listens");
+        self.calls.write_all(&self.bytes[..CALL_BYTES]).expect("the other end listens");
         self.calls.read_exact(&mut self.bytes[..REPLY_BYTES]).expect("the other end answers");
-        self.acknowledgements.write_all(&self.bytes[..REPLY_BYTES]).expect("the other end listens");
+        self.ticks.write_all(&self.bytes[..REPLY_BYTES]).expect("the other end listens");
         now.elapsed()
     }
 }
 
-/// Medians of the times in even ticks and in odd ones. In one kind it wakes a processor, in the other one it comes after what did:
-/// the median of both kinds together would be of one or the other by chance.
-fn medians(times: &[Duration]) -> [Duration; 2] {
-    [0, 1].map(|first| {
-        let mut some: Vec<Duration> = times.iter().copied().skip(first).step_by(2).collect();
-        some.sort_unstable();
-        some[some.len() / 2]
-    })
+/// Both ends of a connection over loopback.
+fn connection() -> (TcpStream, TcpStream) {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("there is a free port");
+    let near = TcpStream::connect(listener.local_addr().expect("it is bound")).expect("it listens");
+    let (far, _) = listener.accept().expect("somebody connects");
+    for end in [&near, &far] {
+        end.set_nodelay(true).expect("it is a connection");
+    }
+    (near, far)
+}
+
+fn median(times: &[Duration]) -> Duration {
+    let mut times = times.to_vec();
+    times.sort_unstable();
+    times[times.len() / 2]
 }
 
 #[test]
@@ -91,10 +103,10 @@ fn a_minute_of_ticks_comes_at_the_controllers_rate_and_allocates_nothing() {
     let port = Port::bind("127.0.0.1:0", Reach::ThisUser).expect("there is a free port");
     let address = port.address().expect("it is bound").to_string();
     let stop = Arc::new(AtomicBool::new(false));
-    let controller = Controller::new(ControllerConfig::DEFAULT);
+    let controller = Controller::new(ControllerConfig::default());
     let hub = Arc::new(Hub::new(controller, Vec::new(), false, Box::new(|_| ())));
     let mut machine = Machine::new(Arc::clone(&hub), Pace::RealTime, Held);
-    let _server = Server::start(port, hub).expect("a thread starts");
+    serve(port, hub).expect("a thread starts");
     let stopped = Arc::clone(&stop);
     let machine = std::thread::spawn(move || machine.run(&stopped));
 
@@ -112,7 +124,9 @@ fn a_minute_of_ticks_comes_at_the_controllers_rate_and_allocates_nothing() {
     let opened = plugin.open_device(&settings).expect("the controller answers");
     let mut active = opened.activate(&config).map_err(|(_, refusal)| refusal).expect("it takes off");
 
-    let mut bare = Bare::new();
+    assert!(matches!(active.wait_for_sample(8_000_000_000), SampleWait::Arrived { .. }));
+    // Half a period after the controller's ticks.
+    let mut bare = Bare::new(Instant::now() + PERIOD + PERIOD / 2);
     let (mut calls, mut trips) = (vec![Duration::ZERO; ticks], vec![Duration::ZERO; ticks]);
     let (mut unseen, mut stale) = (0, 0);
     let began = Instant::now();
@@ -126,29 +140,22 @@ fn a_minute_of_ticks_comes_at_the_controllers_rate_and_allocates_nothing() {
             let tick = Tick { index: index as u64, time_ns, dt_ns: 1_000_000 };
             let mut state = DeviceState::HOME;
             assert_eq!(active.read(&tick, &mut state), Cycle::Fresh, "tick {index}");
-            // Whoever comes first in a tick wakes a processor: that takes turns.
-            let bare_first = index % 2 == 0;
-            if bare_first {
-                *trip = bare.round_trip();
-            }
             let now = Instant::now();
             let written = active.write(&tick, &Wrench::from_force(DVec3::Z));
             *call = now.elapsed();
             assert!(!matches!(written, Cycle::Fault(_)), "{written:?} in tick {index}");
             stale += u64::from(written == Cycle::Stale);
-            if !bare_first {
-                *trip = bare.round_trip();
-            }
+            *trip = bare.round_trip();
         }
     });
     let rate_hz = ticks as f64 / began.elapsed().as_secs_f64();
     let stalls = calls.iter().filter(|call| **call >= STALL).count();
-    let (call, trip) = (medians(&calls), medians(&trips));
-    let ratio = (call[0] + call[1]).as_secs_f64() / (trip[0] + trip[1]).as_secs_f64();
+    let (call, trip) = (median(&calls), median(&trips));
+    let ratio = call.as_secs_f64() / trip.as_secs_f64();
     println!(
         "{ticks} ticks at {rate_hz:.1} Hz, {unseen} older ones unseen, {stale} commands unconfirmed in their tick, \
-         {stalls} stalls; a command and its acknowledgement {call:?} (medians: second in its tick, first), the same bytes bare {trip:?} \
-         (first, second), ratio {ratio:.2}; {allocations} allocations"
+         {stalls} stalls; a command and its acknowledgement {call:?} (median), the same bytes bare {trip:?}, \
+         ratio {ratio:.2}; {allocations} allocations"
     );
     drop(active.deactivate());
     stop.store(true, Ordering::Relaxed);

@@ -2,12 +2,19 @@
 //! limit, an error smaller than that of a force that is held, equal bits on the virtual clock, and what a thread of its
 //! own does when it breaks.
 
+use flotor_core::asynchronous::{ContactLimits, FieldTiming};
+use flotor_core::mapping::{Mapping, MappingConfig};
 use flotor_core::trace::Events;
-use flotor_servo::Clock;
-use flotor_servo::RunEnd;
+use flotor_hal::LoopConfig;
+use flotor_hal::abi::CallStatus;
+use flotor_loader::Plugin;
+use flotor_servo::engine::asynchronous::AsynchronousModel;
+use flotor_servo::engine::process::{Worker, WorkerConfig};
+use flotor_servo::{Clock, Engine, RunEnd};
 use flotor_session::scene::Scene;
 use flotor_tests::TestSize;
 use flotor_tests::field_error::{FieldError, Swing, field_error};
+use flotor_tests::library::plugin_file;
 use flotor_tests::printed::assert_chapter_prints;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -15,6 +22,7 @@ use flotor_tests::tables::{number, table};
 use flotor_tests::watched::{watch, watch_on};
 use flotor_tests::workspace_root;
 use serde_json::Value;
+use std::time::Duration;
 
 /// Into the sheet and out again, once a second, at up to 9 mm/s.
 const SLOW: Swing = Swing { frequency_hz: 1.0, amplitude_mm: 1.5 };
@@ -153,6 +161,35 @@ fn a_parameter_changes_in_the_field_too() {
     // The field after the change is held back for a period and fades in from nothing in its first tick.
     let first = differs.expect("the change shows");
     assert!((205..=212).contains(&first), "{first}");
+}
+
+/// A model in the loop gave the present value, one in a process or a thread of its own the initial one.
+#[test]
+fn the_value_of_a_parameter_is_the_present_one_wherever_the_model_runs() {
+    let plugin = Plugin::in_process(&flotor_membrane::FLOTOR_ENTRY).expect("it is a plugin");
+    let index = plugin.parameters().iter().position(|parameter| parameter.id() == "damping_per_s");
+    let (index, count) = (index.expect("it is live"), plugin.parameters().len());
+    let config = LoopConfig { period_ns: 1_000_000, seed: 0 };
+    let here = || Engine::Here(plugin.create_model(&[]).expect("the defaults are right"));
+    let asynchronous = |clock| {
+        let timing = FieldTiming { rate_hz: 200.0, latency_s: 0.005, contacts: ContactLimits::UNKNOWN };
+        let mapping = Mapping::new(&MappingConfig::default());
+        let model = AsynchronousModel::start(here(), count, (&timing, &mapping), &config, clock);
+        Engine::Asynchronous(Box::new(model.expect("it starts")))
+    };
+    let worker = Worker::start(&WorkerConfig {
+        plugin: &plugin_file("flotor-membrane"),
+        sets: Vec::new(),
+        config,
+        timeout_ns: 10_000_000_000,
+        create_timeout: Duration::from_secs(60),
+    });
+    let worker = Engine::Process(worker.expect("it starts"));
+    for mut engine in [here(), asynchronous(Clock::Virtual), asynchronous(Clock::Real), worker] {
+        assert_eq!(engine.parameter(index), 50.0);
+        assert_eq!(engine.set_parameter(index, 80.0), CallStatus::Ok);
+        assert_eq!(engine.parameter(index), 80.0);
+    }
 }
 
 #[test]

@@ -167,7 +167,7 @@ fn a_mistake_in_c_is_told_in_one_line() {
         ("ODD_KIND", "the metadata have the kind model, the entry's `kind` is 7 (unknown); make both equal"),
         (
             "WITHOUT_LAYOUTS",
-            "the plugin has no layout table; rebuild the plugin against this host's flotor-hal",
+            "the plugin has no valid layout table; rebuild the plugin against this host's flotor-hal",
         ),
         (
             "OTHER_CANDIDATE",

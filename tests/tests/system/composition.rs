@@ -186,7 +186,7 @@ fn what_is_wrong_with_places_and_mixing_is_said() {
     for (wrong, expected) in [
         (
             "[model.mapping]\ngrid = { count = [1.5, 1, 1], spacing_mm = 1 }\n",
-            "scene.toml:7: `count` must be three whole numbers of 1 or more",
+            "scene.toml:7: `count` must be a whole number of 1 or more, or three of them",
         ),
         (
             "[model.mapping]\ngrid = { count = 1000, spacing_mm = 1 }\n",

@@ -123,7 +123,7 @@ fn a_full_disk_ends_the_recording_and_not_the_run() {
     ];
     let ran = Flotor::with(arguments).through_shell(&limited).run();
     assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:?}");
-    assert!(ran.error().contains("cannot continue writing the recording"), "{ran:?}");
+    assert!(ran.error().contains("cannot write the recording"), "{ran:?}");
     let summary = std::fs::read_to_string(summary).expect("the run has its report");
     let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
     assert_eq!(summary["end"].as_str(), Some("finished"));

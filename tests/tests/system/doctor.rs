@@ -111,7 +111,7 @@ fn a_falcon_without_firmware_is_told_where_it_may_be() {
         &told,
         "bad",
         "opening",
-        "the Falcon has no firmware after power-off",
+        "the Falcon sends no reports, probably because it has no firmware after power-off",
         "give your own firmware file with `firmware`",
     );
     bad(&told, 1);

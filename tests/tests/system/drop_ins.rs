@@ -480,7 +480,7 @@ fn what_cannot_be_lent_is_said_in_one_line_with_what_helps() {
         (vec!["--api", "falcon", "--", &program], "dhd, openhaptics, chai3d"),
         (vec!["--", "no-such-program"], "there is no program `no-such-program`"),
         (vec!["--api", "dhd", "--", &linked], "--api openhaptics"),
-        (vec!["no-such-scene.toml", "--", &program], "`no-such-scene.toml` is not a scene"),
+        (vec!["no-such-scene.toml", "--", &program], "`no-such-scene.toml` is not a scene file"),
     ];
     let broken =
         scratch.file("broken.toml", "[device]\nplugin = \"simulated\"\nspeed = 3\n").display().to_string();

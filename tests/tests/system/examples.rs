@@ -107,6 +107,20 @@ fn the_workflow_of_the_examples_tests_the_files_beside_it() {
 }
 
 #[test]
+fn every_scene_of_the_examples_is_one() {
+    let mut found = 0;
+    for file in files_under("examples", "toml").expect("there are examples") {
+        let file = workspace_root().join(file);
+        let text = std::fs::read_to_string(&file).expect("a text");
+        if text.lines().any(|line| line == "[device]") {
+            let _ = Scene::load(&file).unwrap_or_else(|error| panic!("{error}"));
+            found += 1;
+        }
+    }
+    assert!(found >= 8, "{found} scenes");
+}
+
+#[test]
 fn a_scene_runs_in_a_program_of_ones_own() {
     let ran = Command::new(env!("CARGO_BIN_EXE_embed")).output().expect("it is built with the tests");
     let printed = String::from_utf8_lossy(&ran.stdout);

@@ -346,7 +346,9 @@ fn a_step_that_does_not_return_on_the_virtual_clock_is_named_and_costs_neither_r
     if !required(Tool::Cc) {
         return;
     }
-    for (how, limit) in HANGS.into_iter().zip(["0.1 s of processor time", "1 s and used no processor time"]) {
+    for (how, limit) in
+        HANGS.into_iter().zip(["0.1 s of processor time", "1 s, without measured use of a processor"])
+    {
         let hanging = Hanging::by(how);
         let run = ["run", "scene.toml", "--clock", "virtual", "--record", "run.mcap", "--json", "run.json"];
         let ran = hanging.flotor(&run).env("FLOTOR_STEP_LIMIT_S", "0.1").run();

@@ -161,11 +161,11 @@ fn a_wrong_file_is_told_with_file_and_line() {
     let wrong = [
         (
             "id,x_m,y_m,z_m,rx_rad,ry_rad,rz_deg\n".to_owned() + good,
-            format!("1: unknown column `rz_deg`; did you mean `rz_rad`? (the header is {expected})"),
+            format!("1: unknown column `rz_deg`; did you mean `rz_rad`? (the header must be {expected})"),
         ),
         (
             "x_m,y_m,z_m,rx_rad,ry_rad\n0,0,0,0,0\n".to_owned(),
-            format!("1: column `rz_rad` is missing (the header is {expected})"),
+            format!("1: column `rz_rad` is missing (the header must be {expected})"),
         ),
         (
             String::new(),

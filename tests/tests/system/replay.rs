@@ -190,7 +190,7 @@ fn what_the_run_itself_tells_is_the_cause_and_not_another_build() {
     let gap = |record: TickRecord| from_700(Events::NONE)(record).filter(|record| record.tick / 10 != 60);
     let (told, words) = why(&edited(&whole, gap));
     assert_eq!((text(&told, "cause").as_str(), number(&told, "after_tick")), ("gap", 599));
-    assert!(words.contains("10 ticks are missing after tick 599"), "{words}");
+    assert!(words.contains("ticks are missing after tick 599 (10 of them)"), "{words}");
 
     let late = |record: TickRecord| from_700(Events::NONE)(record).filter(|record| record.tick >= 300);
     let (told, words) = why(&edited(&whole, late));

@@ -224,7 +224,7 @@ fn a_name_that_cannot_be_costs_one_line_with_one_that_can() {
         ("fn", "reserved by the compiler"),
         ("test", "reserved by cargo"),
         ("flotor-hal", "reserved by Flotor, for its own crates"),
-        ("wrench", "clashes with a type of the contract"),
+        ("wrench", "clashes with a name that the template uses"),
         ("spring", "is already the id of"),
     ] {
         let ran = new(scratch.path(), &["model", name]);
@@ -241,6 +241,6 @@ fn without_the_contract_there_is_no_plugin() {
     let scratch = Scratch::default();
     let ran = new(scratch.path(), &["model", "jelly", "--hal", "/nowhere"]);
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION));
-    assert!(ran.error().contains("nor at /nowhere") && ran.error().contains("--hal PATH"), "{ran:?}");
+    assert!(ran.error().contains("not at /nowhere") && ran.error().contains("--hal PATH"), "{ran:?}");
     assert!(!scratch.path().join("jelly").exists());
 }

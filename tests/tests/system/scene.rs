@@ -106,12 +106,12 @@ fn wrong_types_and_ranges_say_what_would_be_right() {
         (
             "[30, 30, 60]",
             "[30, 30]",
-            "scene.toml:14: `limits.force_n` must be one number (the largest norm) or three numbers",
+            "scene.toml:14: `limits.force_n` must be one number (the largest norm), three numbers",
         ),
         (
             "[30, 30, 60]",
             "\"10 N\"",
-            "scene.toml:14: `limits.force_n` must be one number (the largest norm) or three numbers",
+            "scene.toml:14: `limits.force_n` must be one number (the largest norm), three numbers",
         ),
         ("[30, 30, 60]", "-1", "scene.toml:14: `limits.force_n` = -1: must be 0 or more"),
         ("[30, 30, 60]", "[30, nan, 60]", "`limits.force_n` = NaN: must be 0 or more"),

@@ -373,7 +373,7 @@ fn doctor_tells_what_keeps_a_device_from_starting() {
         (
             DHD,
             library(&DHD.broken(&scratch, "driver", &["NO_DRIVER"])),
-            "this user may not open the USB device",
+            "no driver lets this user open the USB device",
         ),
         (HD, library(&HD.broken(&scratch, "uncalibrated", &["UNCALIBRATED=0x5002"])), "is not calibrated"),
         (HD, library(&HD.drop_in()), "stand_in = true"),

@@ -28,14 +28,6 @@ pub struct Extent {
     pub width_mm: f64,
 }
 
-impl Extent {
-    /// Returns the extent of one body of this height, mm.
-    #[must_use]
-    pub const fn of_one(height_mm: f64) -> Self {
-        Self { height_mm, width_mm: 0.0 }
-    }
-}
-
 /// Direction and zoom of a view, parsed from `AZIMUTH,INCLINATION` or `AZIMUTH,INCLINATION,ZOOM` with angles in degrees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
@@ -52,7 +44,7 @@ impl std::str::FromStr for View {
             format!(
                 "`{text}` is not a view; write AZIMUTH,INCLINATION or AZIMUTH,INCLINATION,ZOOM, such as 30,15 or \
                  30,15,2: degrees to \
-                 the right and, from -2 to 88, above the horizon, and a zoom of 0.2 to 3"
+                 the right, -360 to 360, and above the horizon, -2 to 88, and a zoom, 0.2 to 3"
             )
         };
         let numbers = text.split(',').map(|part| part.trim().parse::<f64>().map_err(|_| wrong()));
@@ -221,12 +213,13 @@ mod tests {
 
     #[test]
     fn a_view_is_read_in_degrees_and_what_is_none_is_refused() {
-        let camera = Camera::of(Some("90,30,2".parse().expect("a view")), Extent::of_one(25.0), 1.6);
+        let of_one = Extent { height_mm: 25.0, width_mm: 0.0 };
+        let camera = Camera::of(Some("90,30,2".parse().expect("a view")), of_one, 1.6);
         let eye = camera.eye_mm() - camera.target_mm;
         assert!(eye.x > 0.0 && eye.y.abs() < 1.0e-9 * eye.x, "from the right: {eye}");
         assert!((eye.z / eye.length() - 0.5).abs() < 1.0e-12, "30 degrees above the horizon");
         assert!((camera.distance_mm - 0.5 * Camera::experimenter(25.0).distance_mm).abs() < 1.0e-9);
-        assert_eq!(Camera::of(None, Extent::of_one(25.0), 1.6), Camera::experimenter(25.0));
+        assert_eq!(Camera::of(None, of_one, 1.6), Camera::experimenter(25.0));
         for wrong in ["", "30", "30,95", "a,b", "30,15,9", "1,2,1,1", "NaN,0"] {
             assert!(wrong.parse::<View>().is_err(), "{wrong}");
         }

@@ -1,7 +1,7 @@
 //! Intake of new data from a running host, and the search for a run.
 
 use super::source::{Parts, connect};
-use super::{Audience, RunSelection, Source, Viewer};
+use super::{RunSelection, Source, Viewer};
 use crate::devices::Devices;
 use crate::feed::{Arrivals, FeedState, STALE_AFTER};
 use crate::panel::Panel;
@@ -93,7 +93,7 @@ impl Viewer {
 
     /// Applies a new parameter value to the drawn instance and its panels.
     fn follow(&mut self, change: &ChangeMessage) {
-        if self.audience == Audience::Subject {
+        if self.is_for_subject() {
             return; // the picture of a subject is independent of the felt force
         }
         if let Some(shape) = self.shapes.iter_mut().find(|shape| shape.name() == change.plugin) {

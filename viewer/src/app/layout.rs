@@ -8,7 +8,7 @@
 //! [`overlay`]: crate::ui::overlay
 
 use super::words::State;
-use super::{Audience, Source, VIEW_PARTS, Viewer};
+use super::{Source, VIEW_PARTS, Viewer};
 use crate::experiment::key_of;
 use crate::export::export;
 use crate::palette::Palette;
@@ -61,11 +61,11 @@ impl Viewer {
     pub(super) fn top(&mut self, ui: &mut Ui, palette: &Palette) {
         let State { words, status } = self.state();
         // The screens of a sitting show the state, in the language of the person.
-        let words = if self.audience == Audience::Subject { "" } else { words };
-        let title = match (&self.source, self.audience) {
-            (Source::Waiting(_), _) => "Flotor",
+        let words = if self.is_for_subject() { "" } else { words };
+        let title = match &self.source {
+            Source::Waiting(_) => "Flotor",
             // A subject must not see the names of parameters.
-            (_, Audience::Subject) => "",
+            _ if self.is_for_subject() => "",
             _ => self.heading.title.as_str(),
         };
         // A rehearsal shows the same bar as a sitting.
@@ -76,12 +76,12 @@ impl Viewer {
             status,
             stop: can_stop.then(|| self.stop()),
             scale: (ui.available_height() / USUAL_BAR_PT).max(1.0),
-            panel: match (self.audience, self.is_panel_shown(ui.ctx())) {
-                (Audience::Subject, _) => PanelSwitch::None,
-                (Audience::Experimenter, true) => PanelSwitch::PutAway,
-                (Audience::Experimenter, false) => PanelSwitch::BringOut,
+            panel: match self.is_panel_shown(ui.ctx()) {
+                _ if self.is_for_subject() => PanelSwitch::None,
+                true => PanelSwitch::PutAway,
+                false => PanelSwitch::BringOut,
             },
-            look: (self.audience == Audience::Experimenter).then_some(self.look),
+            look: (!self.is_for_subject()).then_some(self.look),
         };
         match bar.show(ui, palette) {
             Some(TopBarRequest::EmergencyStop) => self.ask(Ask::EmergencyStop),

@@ -127,7 +127,6 @@ pub struct Viewer {
     frame: Duration,
     pace: Pace,
     sitting: Option<Prompt>,
-    audience: Audience,
 }
 
 /// Title and subtitle of a run; empty without a run.
@@ -141,13 +140,6 @@ impl Heading {
     fn of(run: &RunDescription) -> Self {
         Self { title: readout::title_of(run), subtitle: readout::subtitle_of(run) }
     }
-}
-
-/// Kind of user in front of the window.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Audience {
-    Experimenter,
-    Subject,
 }
 
 impl Viewer {
@@ -196,7 +188,6 @@ impl Viewer {
             last_look: None,
             frame,
             pace: Pace::of(frame),
-            audience: if sitting.is_some() { Audience::Subject } else { Audience::Experimenter },
             sitting,
         };
         recorded.into_iter().for_each(|recorded| viewer.show_recording(recorded));
@@ -253,12 +244,17 @@ impl Viewer {
 
     /// Shows the screens of a sitting over a recording, as in a real sitting.
     pub fn rehearse(&mut self, prompt: Prompt) {
-        (self.sitting, self.audience) = (Some(prompt), Audience::Subject);
+        self.sitting = Some(prompt);
     }
 
     /// Returns whether screens of a sitting are shown over a recording.
     fn is_rehearsal(&self) -> bool {
-        matches!(self.source, Source::Recording) && self.audience == Audience::Subject
+        matches!(self.source, Source::Recording) && self.is_for_subject()
+    }
+
+    /// Returns whether the window is for the subject of a sitting, not for an experimenter.
+    fn is_for_subject(&self) -> bool {
+        self.sitting.is_some()
     }
 
     /// Returns the colour scheme, light or dark.

@@ -100,12 +100,9 @@ impl Viewer {
     /// Returns the message about the last action, or the reason for the end of the run.
     pub(super) fn done(&self) -> Option<String> {
         let done = self.done.as_ref().filter(|(_, since)| since.elapsed() < REMARK);
-        let end = || match &self.source {
-            Source::Live { feed, .. } => match feed.state() {
-                FeedState::Ended(reason, _) => Some(reason),
-                FeedState::Running | FeedState::Lost(_) => None,
-            },
-            Source::Waiting(_) | Source::Recording => None,
+        let end = || {
+            let Source::Live { feed, .. } = &self.source else { return None };
+            if let FeedState::Ended(reason, _) = feed.state() { Some(reason) } else { None }
         };
         done.map(|(text, _)| text.clone()).or_else(end)
     }

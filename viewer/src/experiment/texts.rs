@@ -90,14 +90,17 @@ impl Texts {
     /// # Errors
     /// A message of one line if the file cannot be read, or a key is missing or unknown, or lacks the placeholder of its number.
     pub fn read(file: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(file)
-            .map_err(|cause| format!("cannot read the texts: {cause}; check the path and its permissions"))?;
+        let text = std::fs::read_to_string(file).map_err(|cause| {
+            format!("cannot read the texts: {cause}; check the path, or save the file as UTF-8")
+        })?;
         Self::parse(&text)
     }
 
     fn parse(text: &str) -> Result<Self, String> {
-        let texts: Self =
-            toml::from_str(text).map_err(|error| error.to_string().trim().replace('\n', " "))?;
+        let texts: Self = toml::from_str(text).map_err(|error| {
+            // Without the picture of the line, whose lines contain a bar.
+            error.to_string().lines().filter(|line| !line.contains('|')).collect::<Vec<_>>().join(": ")
+        })?;
         for (key, text, place) in [
             ("count", &texts.count, "{number}"),
             ("count", &texts.count, "{of_about}"),

@@ -6,10 +6,8 @@ use egui::{Event, InputState, Key};
 /// time of the press: after a short press, they may be released again when the frame is drawn.
 #[must_use]
 pub fn pressed_alone(input: &InputState, wanted: Key) -> bool {
-    input.events.iter().any(|event| match event {
-        Event::Key { key, pressed: true, modifiers, .. } => {
-            *key == wanted && !(modifiers.ctrl || modifiers.alt || modifiers.command)
-        }
-        _ => false,
+    input.events.iter().any(|event| {
+        matches!(event, Event::Key { key, pressed: true, modifiers, .. }
+            if *key == wanted && !(modifiers.ctrl || modifiers.alt || modifiers.command))
     })
 }

@@ -64,8 +64,8 @@ pub enum PlotRequest {
 /// Error of a picture too low for its traces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "the picture is {height_px} pixels high, but {count} readable traces need {least_px} pixels; increase \
-     the height with --size, or choose fewer traces"
+    "the picture is {height_px} pixels high, but readable traces ({count}) need {least_px} pixels; increase \
+     the height (on the command line with --size), or choose fewer traces"
 )]
 pub struct TooLow {
     /// Number of traces.

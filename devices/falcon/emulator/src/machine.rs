@@ -23,7 +23,7 @@ const WORDS_PER_NM: f64 = 10_000.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Power {
     /// Power was off: the boot loader waits for a firmware, the arms are not homed.
-    #[value(help = "After power-off: the boot loader waits for a firmware and accepts any bytes")]
+    #[value(help = "After power-off: the boot loader waits for a firmware (any bytes); arms are not homed")]
     Off,
     /// Power stayed on since an earlier program: the firmware runs, the arms are homed.
     #[value(help = "The firmware runs, and the arms are homed")]
@@ -222,7 +222,6 @@ impl Machine {
                     }
                 }
                 // Stale bytes of the fault injection are behind the chip, not in it.
-                Some(Vec::new())
             }
             _ if number == Request::BaudRate as u8 => {
                 self.divisor = value;
@@ -233,16 +232,13 @@ impl Machine {
                     (self.stage, self.homed, self.homing_commands) = (Stage::Running, 0, 0);
                     self.began = None;
                 }
-                Some(Vec::new())
             }
-            _ if number == Request::LatencyTimer as u8 => {
-                self.latency_ms = value.clamp(1, 255);
-                Some(Vec::new())
-            }
+            _ if number == Request::LatencyTimer as u8 => self.latency_ms = value.clamp(1, 255),
             // No effect here: modem lines, flow control, format, event and error characters, pin mode.
-            1 | 2 | 4 | 6 | 7 | 0x0b => Some(Vec::new()),
-            _ => None,
+            1 | 2 | 4 | 6 | 7 | 0x0b => {}
+            _ => return None,
         }
+        Some(Vec::new())
     }
 
     /// Returns the reply to a read request from the host; `None` for an unknown request.

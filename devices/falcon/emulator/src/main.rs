@@ -32,15 +32,15 @@ struct Arguments {
     /// Power state at the start: with or without running firmware
     #[arg(long, value_enum, default_value = "on")]
     power: Power,
-    /// Amplitude, from the middle of the motion to its ends, in mm, 0 to 40
-    #[arg(long, default_value_t = 15.0, value_name = "MM", value_parser = amplitude_mm)]
+    /// Amplitude, from the middle of the motion to its ends, in mm, 0 to 40; no effect with --calibration-rig
+    #[arg(long, default_value_t = 15.0, value_name = "MM", value_parser = within(0.0, 40.0, "mm"))]
     amplitude_mm: f64,
-    /// Frequency of the motion, in Hz, 0 to 10
-    #[arg(long, default_value_t = 0.5, value_name = "HZ", value_parser = frequency_hz)]
+    /// Frequency of the motion, in Hz, 0 to 10; no effect with --calibration-rig
+    #[arg(long, default_value_t = 0.5, value_name = "HZ", value_parser = within(0.0, 10.0, "Hz"))]
     frequency_hz: f64,
     #[command(flatten)]
     rig: RigArguments,
-    /// End when the first host disconnects
+    /// TCP: end when the first host disconnects
     #[arg(long)]
     once: bool,
 }
@@ -64,14 +64,6 @@ enum TransportOption {
     /// USB of this machine, for every program (with the module vhci_hcd, as root)
     #[cfg(target_os = "linux")]
     Usb,
-}
-
-fn amplitude_mm(text: &str) -> Result<f64, String> {
-    within(text, 0.0, 40.0, "mm")
-}
-
-fn frequency_hz(text: &str) -> Result<f64, String> {
-    within(text, 0.0, 10.0, "Hz")
 }
 
 fn main() -> ExitCode {

@@ -39,7 +39,7 @@ fn where_nothing_answers_the_address_and_what_to_start_are_named() {
 fn firmware_that_is_missing_is_told_with_where_it_may_be() {
     let (device, address) = serve(Power::Off, CENTRE_M);
     let words = [
-        "the Falcon has no firmware after power-off",
+        "the Falcon sends no reports, probably because it has no firmware after power-off",
         "give your own firmware file with `firmware`",
         "`nvent`",
     ];

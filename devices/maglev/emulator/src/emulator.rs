@@ -63,7 +63,8 @@ const LOCKSTEP_NAP: Duration = Duration::from_micros(20);
 
 /// An emulated controller with its plant.
 pub struct Emulator<P> {
-    controller: Controller,
+    /// Controller, with mode, condition and numbers of rejected requests.
+    pub controller: Controller,
     plant: P,
     pace: Pace,
     now_us: u64,
@@ -79,20 +80,14 @@ impl<P: Plant> Emulator<P> {
         emulator
     }
 
-    /// Returns the emulated controller, with mode, condition and numbers of rejected requests.
-    #[must_use]
-    pub fn controller(&self) -> &Controller {
-        &self.controller
-    }
-
     /// Serves one host until the link is lost or `stop` is true, and passes mode changes and the end to `log`; then
     /// switches the coils off.
     pub fn serve(&mut self, link: &mut dyn Transport, stop: &AtomicBool, log: &mut dyn FnMut(Event)) {
         let before = *self.controller.intake().rejections();
-        match self.pace {
+        let (Ok(()) | Err(LinkLost)) = match self.pace {
             Pace::RealTime => self.serve_in_real_time(link, stop, log),
             Pace::Lockstep => self.serve_in_lockstep(link, stop, log),
-        }
+        };
         self.controller.link_lost(self.now_us);
         self.tell_mode(log);
         log(Event::Closed { rejections: self.controller.intake().rejections().since(&before) });
@@ -103,36 +98,33 @@ impl<P: Plant> Emulator<P> {
         link: &mut dyn Transport,
         stop: &AtomicBool,
         log: &mut dyn FnMut(Event),
-    ) {
+    ) -> Result<(), LinkLost> {
         let mut deadline = Instant::now();
         while !stop.load(Ordering::Relaxed) {
-            if self.receive_all(link).is_err() {
-                return;
-            }
-            self.run(CYCLE_US);
-            self.tell_mode(log);
+            self.cycle(link, log)?;
             deadline += Duration::from_micros(CYCLE_US);
             match deadline.checked_duration_since(Instant::now()) {
                 // Replies are sent on arrival of the request, as a controller's interrupt does.
-                Some(_) => {
-                    if self.receive_until(link, deadline).is_err() {
-                        return;
-                    }
-                }
+                Some(_) => self.receive_until(link, deadline)?,
                 // Delayed: missed cycles run in simulated time, so that the watchdog sees the silence.
                 None => {
                     let missed_us = u64::try_from(deadline.elapsed().as_micros()).unwrap_or(u64::MAX);
                     for _ in 0..(missed_us / CYCLE_US).min(1000) {
                         deadline += Duration::from_micros(CYCLE_US);
-                        if self.receive_all(link).is_err() {
-                            return;
-                        }
-                        self.run(CYCLE_US);
-                        self.tell_mode(log);
+                        self.cycle(link, log)?;
                     }
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Receives the pending packets, and runs one cycle of real time.
+    fn cycle(&mut self, link: &mut dyn Transport, log: &mut dyn FnMut(Event)) -> Result<(), LinkLost> {
+        self.receive_all(link)?;
+        self.run(CYCLE_US);
+        self.tell_mode(log);
+        Ok(())
     }
 
     fn receive_all(&mut self, link: &mut dyn Transport) -> Result<(), LinkLost> {
@@ -166,19 +158,23 @@ impl<P: Plant> Emulator<P> {
         Ok(())
     }
 
-    fn serve_in_lockstep(&mut self, link: &mut dyn Transport, stop: &AtomicBool, log: &mut dyn FnMut(Event)) {
+    fn serve_in_lockstep(
+        &mut self,
+        link: &mut dyn Transport,
+        stop: &AtomicBool,
+        log: &mut dyn FnMut(Event),
+    ) -> Result<(), LinkLost> {
         while !stop.load(Ordering::Relaxed) {
-            let packet = match link.receive() {
-                Err(LinkLost) => return,
-                Ok(Incoming::Nothing) => {
+            let packet = match link.receive()? {
+                Incoming::Nothing => {
                     std::thread::sleep(LOCKSTEP_NAP);
                     continue;
                 }
-                Ok(Incoming::Malformed) => {
+                Incoming::Malformed => {
                     self.controller.receive_malformed();
                     continue;
                 }
-                Ok(Incoming::Packet(packet)) => packet,
+                Incoming::Packet(packet) => packet,
             };
             let Some(reply) = self.controller.receive(&packet, self.now_us) else { continue };
             match (reply, self.controller.mode()) {
@@ -190,11 +186,10 @@ impl<P: Plant> Emulator<P> {
                 (Reply::Commanded(_), _) => self.run(u64::from(self.controller.period_us())),
                 _ => {}
             }
-            if self.reply(link, reply).is_err() {
-                return;
-            }
+            self.reply(link, reply)?;
             self.tell_mode(log);
         }
+        Ok(())
     }
 
     fn reply(&mut self, link: &mut dyn Transport, reply: Reply) -> Result<(), LinkLost> {

@@ -33,6 +33,17 @@ macro_rules! results {
                 })
             }
         }
+
+        $(impl TryFrom<Results> for $type {
+            type Error = Results;
+
+            fn try_from(results: Results) -> Result<Self, Results> {
+                match results {
+                    Results::$name(value) => Ok(value),
+                    other => Err(other),
+                }
+            }
+        })+
     };
 }
 

@@ -253,14 +253,14 @@ impl fmt::Display for Status {
             Self::SPEED => "speed out of range",
             Self::COMMUNICATION => "communication error",
             Self::RECEIVE_ONLY => "another client controls the device",
-            Self::NO_MATCH => "no match",
+            Self::NO_MATCH => "no connection with this token",
             Self::LANDED => "landed",
             Self::TAKEN_OFF => "taken off",
             Self::OFF_LINE => "off line",
             Self::OVERHEATED => "overheated",
             Self::TIMER => "timed out",
-            Self::REPLACED => "replaced",
-            _ => "status",
+            Self::REPLACED => "replaced by another procedure",
+            _ => "unknown status",
         };
         write!(f, "{words} ({:#x})", self.0)
     }

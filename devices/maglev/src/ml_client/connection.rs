@@ -10,32 +10,25 @@ use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
 /// Cause of a call without results.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum NoResults {
     /// The connection is lost.
+    #[error("the controller closed the connection")]
     Lost,
     /// No reply within the timeout.
+    #[error("the controller did not answer in time")]
     Silent,
     /// The received frame is no reply to the call.
+    #[error("the controller sent a malformed reply")]
     Malformed,
     /// The controller rejected the call with this status.
+    #[error("the controller rejected the request: {0}")]
     Refused(Status),
-}
-
-impl std::fmt::Display for NoResults {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Lost => f.write_str("the controller closed the connection"),
-            Self::Silent => f.write_str("the controller did not answer in time"),
-            Self::Malformed => f.write_str("the controller sent a malformed reply"),
-            Self::Refused(status) => write!(f, "the controller rejected the request: {status}"),
-        }
-    }
 }
 
 /// A connection with timed reads of whole frames.
 pub(crate) struct Line {
-    stream: TcpStream,
+    pub(crate) stream: TcpStream,
     intake: Intake,
 }
 
@@ -45,10 +38,6 @@ impl Line {
         // Reset when dropped, so that the controller detects the end of its client at once.
         reset_when_dropped(&stream);
         Ok(Self { stream, intake: Intake::default() })
-    }
-
-    pub(crate) fn stream(&self) -> &TcpStream {
-        &self.stream
     }
 
     /// Sends a frame. Real-time: bounded, no allocation; one system call.
@@ -81,17 +70,13 @@ impl Line {
 pub(crate) struct Control {
     line: Line,
     outstanding: Option<(Function, Instant)>,
-    is_lost: bool,
+    /// True after an error of the connection or a timeout of [`Self::call`]; no further call is then sent.
+    pub(crate) is_lost: bool,
 }
 
 impl Control {
     pub(crate) fn new(line: Line) -> Self {
         Self { line, outstanding: None, is_lost: false }
-    }
-
-    /// Returns true after an error of the connection or a timeout of [`Self::call`]; no further call is then sent.
-    pub(crate) fn is_lost(&self) -> bool {
-        self.is_lost
     }
 
     /// Returns the start of the outstanding call, if any.
@@ -152,10 +137,9 @@ impl Events {
     pub(crate) fn open(address: &str, patience: Duration) -> Result<(Self, i32), NoResults> {
         let line = Line::open(address).map_err(|_| NoResults::Lost)?;
         let mut asking = Control::new(line);
-        match asking.call(&Request::Plain(Function::RequestToken), patience)? {
-            Results::Token(token) => Ok((Self { line: asking.line }, token)),
-            _ => Err(NoResults::Malformed),
-        }
+        let results = asking.call(&Request::Plain(Function::RequestToken), patience)?;
+        let token = results.try_into().map_err(|_| NoResults::Malformed)?;
+        Ok((Self { line: asking.line }, token))
     }
 
     /// Reads the next event; `None` without one within the budget, and for an unknown event, which is acknowledged as

@@ -51,27 +51,18 @@ pub(crate) struct TakenOff {
 }
 
 /// Error of a session: failed call with its function, persistent faults, or missing ticks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Failed {
+    #[error("{}: {}", .0.name(), .1)]
     At(Function, NoResults),
+    #[error(
+        "the controller stays faulted ({0}); hold the handle still within the range of the sensors, and let hot coils cool"
+    )]
     Faulted(FaultBits),
+    #[error(
+        "the controller sends no ticks; end other programs that use the controller, and restart the controller"
+    )]
     NoTick,
-}
-
-impl std::fmt::Display for Failed {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::At(function, why) => write!(f, "{}: {why}", function.name()),
-            Self::Faulted(bits) => write!(
-                f,
-                "the controller stays faulted ({bits}); hold the handle within the range of the sensors"
-            ),
-            Self::NoTick => f.write_str(
-                "the controller sends no ticks; check that no firewall blocks connections from the \
-                 controller, and restart the controller",
-            ),
-        }
-    }
 }
 
 /// Session with a controller: control connection, callback connection for events, and count of unacknowledged ticks.
@@ -100,7 +91,7 @@ impl Session {
     }
 
     pub(crate) fn is_lost(&self) -> bool {
-        self.control.is_lost()
+        self.control.is_lost
     }
 
     /// Returns the number of ticks superseded by a newer tick before use.
@@ -116,22 +107,27 @@ impl Session {
         self.control.call(request, patience).map_err(|why| Failed::At(request.function(), why))
     }
 
-    fn six(&mut self, function: Function) -> Result<AxisValues, Failed> {
-        match self.call(&Request::Plain(function))? {
-            Results::AxisValues(values) => Ok(values),
-            _ => Err(Failed::At(function, NoResults::Malformed)),
-        }
+    /// Calls a function for its results.
+    fn get<T: TryFrom<Results>>(&mut self, request: &Request) -> Result<T, Failed> {
+        self.get_within(request, PATIENCE)
+    }
+
+    fn get_within<T: TryFrom<Results>>(
+        &mut self,
+        request: &Request,
+        patience: Duration,
+    ) -> Result<T, Failed> {
+        let results = self.call_within(request, patience)?;
+        results.try_into().map_err(|_| Failed::At(request.function(), NoResults::Malformed))
     }
 
     /// Requests identity and limits of the controller.
     pub(crate) fn facts(&mut self) -> Result<Facts, Failed> {
-        let version = match self.call(&Request::Plain(Function::GetVersion))? {
-            Results::Version(version) => version,
-            _ => return Err(Failed::At(Function::GetVersion, NoResults::Malformed)),
-        };
-        let (current_limits_a, speed_limits) =
-            (self.six(Function::GetCurrentLimits)?, self.six(Function::GetSpeedLimits)?);
-        Ok(Facts { version, current_limits_a, speed_limits })
+        Ok(Facts {
+            version: self.get(&Request::Plain(Function::GetVersion))?,
+            current_limits_a: self.get(&Request::Plain(Function::GetCurrentLimits))?,
+            speed_limits: self.get(&Request::Plain(Function::GetSpeedLimits))?,
+        })
     }
 
     /// Clears faults, lifts and weighs the flotor, fades the gains to a force command, registers for events, and waits for the
@@ -166,9 +162,7 @@ impl Session {
     fn take_over(&mut self) -> Result<(), Failed> {
         let reset = Request::OfSet(Function::ResetGainVecAxes, GainSet::Normal);
         self.call_within(&reset, PROCEDURE_PATIENCE)?;
-        let Results::Pose(pose) = self.call(&Request::Plain(Function::GetActualPosition))? else {
-            return Err(Failed::At(Function::GetActualPosition, NoResults::Malformed));
-        };
+        let pose = self.get(&Request::Plain(Function::GetActualPosition))?;
         self.call(&Request::Pose(Function::SetDesiredPosition, pose)).map(|_| ())
     }
 
@@ -187,10 +181,7 @@ impl Session {
                 Err(Failed::At(_, NoResults::Refused(_))) => {}
                 Err(failed) => return Err(failed),
             }
-            left = match self.call(&Request::Plain(Function::GetFault))? {
-                Results::Fault(bits) => bits,
-                _ => return Err(Failed::At(Function::GetFault, NoResults::Malformed)),
-            };
+            left = self.get(&Request::Plain(Function::GetFault))?;
             if left.is_empty() {
                 return Ok(());
             }
@@ -203,10 +194,7 @@ impl Session {
         if !plan.finds_gravity {
             return Ok([0.0; 6]);
         }
-        let found = self.call_within(&Request::Plain(Function::FindGravity), PROCEDURE_PATIENCE)?;
-        let Results::AxisValues(gravity) = found else {
-            return Err(Failed::At(Function::FindGravity, NoResults::Malformed));
-        };
+        let gravity = self.get_within(&Request::Plain(Function::FindGravity), PROCEDURE_PATIENCE)?;
         self.call(&Request::AxisValues(Function::SetGravity, gravity))?;
         self.call(&Request::Plain(Function::DefyGravity))?;
         Ok(gravity)
@@ -226,10 +214,7 @@ impl Session {
     /// zero: the force is then the same whether a command replaces the gains or adds to them.
     fn fade_to_forces(&mut self, fade: Duration, gravity: AxisValues) -> Result<(), Failed> {
         for (place, set) in FORCED.into_iter().enumerate() {
-            self.kept[place] = match self.call(&Request::OfSet(Function::GetGainVecAxes, set))? {
-                Results::Gains(gains) => gains,
-                _ => return Err(Failed::At(Function::GetGainVecAxes, NoResults::Malformed)),
-            };
+            self.kept[place] = self.get(&Request::OfSet(Function::GetGainVecAxes, set))?;
         }
         let [normal, ..] = self.kept;
         if !fade.is_zero() {
@@ -328,7 +313,7 @@ impl Session {
 impl Drop for Session {
     /// Ends the session in the two steps of the protocol; a lost connection is reset.
     fn drop(&mut self) {
-        if self.control.is_lost() {
+        if self.control.is_lost {
             return;
         }
         if self.events.is_some() {

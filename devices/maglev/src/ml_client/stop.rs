@@ -41,9 +41,9 @@ impl Stop {
     /// Clears earlier stops and discards the replies to them; a stop from now on lands the flotor. Not real-time.
     pub(crate) fn rearm(&self) {
         self.state.store(ARMED, Ordering::SeqCst);
-        if let Ok(line) = self.line.lock() {
+        if let Ok(mut line) = self.line.lock() {
             let mut replies = [0; 64];
-            while line.stream().read(&mut replies).is_ok_and(|length| length > 0) {}
+            while line.stream.read(&mut replies).is_ok_and(|length| length > 0) {}
         }
         self.send_due_frame();
     }
@@ -69,9 +69,9 @@ impl Stop {
     fn send_due_frame(&self) {
         // Checked again after unlocking: meanwhile another thread may have found the lock taken.
         while self.state.load(Ordering::SeqCst) == DUE {
-            let Ok(line) = self.line.try_lock() else { return };
+            let Ok(mut line) = self.line.try_lock() else { return };
             if self.change(DUE, SENT) {
-                let _ = line.stream().write(self.frame.bytes());
+                let _ = line.stream.write(self.frame.bytes());
             }
         }
     }
@@ -83,7 +83,7 @@ impl Stop {
 
     /// Declares the independent stop of the device: the Land frame on this connection.
     pub(crate) fn independent(&self) -> IndependentStop {
-        let descriptor = self.line.lock().map_or(-1, |line| platform::descriptor(line.stream()));
+        let descriptor = self.line.lock().map_or(-1, |line| platform::descriptor(&line.stream));
         IndependentStop::by_message(descriptor, self.frame.bytes(), StoppedState::Landed, LANDING_NS)
     }
 }
@@ -112,7 +112,7 @@ mod tests {
 
     /// Returns the bytes that the controller receives until the connection ends.
     fn received(stop: Stop, mut controller: TcpStream) -> Vec<u8> {
-        stop.line.lock().expect("the line").stream().shutdown(std::net::Shutdown::Write).expect("shut down");
+        stop.line.lock().expect("the line").stream.shutdown(std::net::Shutdown::Write).expect("shut down");
         let mut bytes = Vec::new();
         controller.read_to_end(&mut bytes).expect("the frames");
         bytes

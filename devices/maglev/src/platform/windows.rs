@@ -74,6 +74,6 @@ mod tests {
     #[test]
     fn a_device_without_winusb_needs_a_driver() {
         let remedy = super::driver_remedy(0x1209, 0xf107).expect("there is one");
-        assert!(remedy.contains("1209:f107 the driver WinUSB"), "{remedy}");
+        assert!(remedy.contains("the driver WinUSB for 1209:f107"), "{remedy}");
     }
 }

@@ -153,7 +153,7 @@ impl std::fmt::Display for Condition {
             (Condition::EXPIRED, "expired"),
         ];
         let mut words = WORDS.iter().filter(|(condition, _)| self.contains(*condition)).map(|(_, word)| word);
-        words.next().map_or(Ok(()), |word| f.write_str(word))?;
+        f.write_str(words.next().map_or("none", |word| word))?;
         words.try_for_each(|word| write!(f, ",{word}"))
     }
 }

@@ -76,10 +76,14 @@ pub trait Transport: Send {
 }
 
 /// Cause of a failure to open a link, with a remedy.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum OpenError {
     /// No device or host at the address.
+    #[error(
+        "no controller at {address} ({cause}); check that the controller is connected and switched on, \
+         and that the parameter `address` is right"
+    )]
     Missing {
         /// The address given.
         address: String,
@@ -87,11 +91,13 @@ pub enum OpenError {
         cause: String,
     },
     /// Another program uses the device.
+    #[error("{address} is in use by another program; close that program first")]
     Busy {
         /// The address given.
         address: String,
     },
     /// The user has no permission for the device.
+    #[error("no access to {address}; {remedy}")]
     Forbidden {
         /// The address given.
         address: String,
@@ -99,6 +105,7 @@ pub enum OpenError {
         remedy: String,
     },
     /// The address has the wrong format for the transport.
+    #[error("`address` = `{address}` is not valid; write {expected}")]
     Address {
         /// The address given.
         address: String,
@@ -106,16 +113,19 @@ pub enum OpenError {
         expected: &'static str,
     },
     /// The host name is unknown.
+    #[error("unknown host `{host}` (`address`); check the name or use the IP address")]
     UnknownHost {
         /// The host name given.
         host: String,
     },
     /// The transport is not available on this system.
+    #[error("{why}")]
     NotOffered {
         /// Reason and alternative.
         why: &'static str,
     },
     /// The device has no driver with access for programs.
+    #[error("{address} has no driver that programs can use; {remedy}")]
     NoDriver {
         /// The address given.
         address: String,
@@ -123,46 +133,15 @@ pub enum OpenError {
         remedy: String,
     },
     /// The plugin was built without this transport.
+    #[error(
+        "this plugin was built without the transport `{feature}`; build the plugin with `cargo build \
+         --release -p flotor-maglev --features {feature}`, or choose another `transport`"
+    )]
     NotBuilt {
         /// Cargo feature of the transport.
         feature: &'static str,
     },
 }
-
-impl std::fmt::Display for OpenError {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Missing { address, cause } => {
-                write!(
-                    f,
-                    "no controller at {address} ({cause}); check that the controller is connected and switched on, \
-                     and that the parameter `address` is right"
-                )
-            }
-            Self::Busy { address } => {
-                write!(f, "{address} is in use by another program; close that program first")
-            }
-            Self::Forbidden { address, remedy } => write!(f, "this user may not use {address}; {remedy}"),
-            Self::Address { address, expected } => {
-                write!(f, "`address` = `{address}` is not valid; write {expected}")
-            }
-            Self::UnknownHost { host } => {
-                write!(f, "unknown host `{host}` (`address`); check the name or use the IP address")
-            }
-            Self::NotOffered { why } => f.write_str(why),
-            Self::NoDriver { address, remedy } => {
-                write!(f, "{address} has no driver that programs can use; {remedy}")
-            }
-            Self::NotBuilt { feature } => write!(
-                f,
-                "this plugin was built without the transport `{feature}`; build the plugin with `cargo build \
-                 --release -p flotor-maglev --features {feature}`, or choose another `transport`"
-            ),
-        }
-    }
-}
-
-impl std::error::Error for OpenError {}
 
 /// Kind of a transport, with its address format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -23,7 +23,7 @@ fn refused(path: &str, reason: NotOpened) -> OpenError {
         NotOpened::Forbidden { remedy } => OpenError::Forbidden { address, remedy: remedy.to_owned() },
         NotOpened::InUse => OpenError::Busy { address },
         NotOpened::NoPort => {
-            OpenError::Missing { address, cause: "the file is not a serial port".to_owned() }
+            OpenError::Missing { address, cause: "the file is not a usable serial port".to_owned() }
         }
         NotOpened::Missing { cause } => OpenError::Missing { address, cause },
     }

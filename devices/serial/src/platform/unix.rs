@@ -11,11 +11,11 @@ pub(crate) type System = TTYPort;
 
 /// Help text of a parameter `port`.
 pub(crate) const PORT_HELP: &str =
-    "Path of the serial port, such as /dev/ttyACM0 or a path below /dev/serial/by-id";
+    "Path of the serial port, such as /dev/ttyACM0 or a path below /dev/serial/by-id; required";
 /// Example of a parameter `port`.
 pub(crate) const PORT_EXAMPLE: &str = "/dev/ttyACM0";
 /// Advice for listing the ports.
-pub(crate) const PORT_LIST: &str = "`ls /dev/serial/by-id` lists the ports";
+pub(crate) const PORT_LIST: &str = "`ls /dev/serial/by-id` lists the USB serial ports";
 
 /// Timeout of reads and writes: zero, so that neither blocks.
 pub(crate) const PATIENCE: Duration = Duration::ZERO;
@@ -73,7 +73,9 @@ mod tests {
         );
         let nowhere = Port::open("/dev/nowhere", 9600).expect_err("there is none").to_string();
         assert!(
-            nowhere.ends_with("; check that the device is connected; `ls /dev/serial/by-id` lists the ports"),
+            nowhere.ends_with(
+                "; check that the device is connected; `ls /dev/serial/by-id` lists the USB serial ports"
+            ),
             "{nowhere}"
         );
     }

@@ -9,7 +9,7 @@ use std::time::Duration;
 pub(crate) type System = COMPort;
 
 /// Help text of a parameter `port`.
-pub(crate) const PORT_HELP: &str = "Name of the serial port, such as COM3";
+pub(crate) const PORT_HELP: &str = "Name of the serial port, such as COM3; required";
 /// Example of a parameter `port`.
 pub(crate) const PORT_EXAMPLE: &str = "COM3";
 /// Advice for listing the ports.

@@ -117,7 +117,7 @@ impl Sample {
         let inside = position_m.abs().max_element() <= FARTHEST_M;
         let far = || {
             format!(
-                "({position_m}) m is outside the workspace of {FARTHEST_M} m; give positions in metres, not millimetres"
+                "{position_m} m is farther than {FARTHEST_M} m from home along an axis; give positions in metres, not millimetres"
             )
         };
         inside.then_some(Self { time_ns: nanoseconds(time_s), pose }).ok_or_else(far)

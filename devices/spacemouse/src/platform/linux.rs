@@ -9,8 +9,8 @@ pub(crate) const PATH_HELP: &str =
 /// Example of the parameter `path`.
 pub(crate) const PATH_EXAMPLE: &str = "/dev/hidraw2";
 /// Remedy for a missing permission.
-pub(crate) const ACCESS_REMEDY: &str = "put `KERNEL==\"hidraw*\", ATTRS{idVendor}==\"256f\", TAG+=\"uaccess\"` into \
-    /etc/udev/rules.d/70-spacemouse.rules, run `sudo udevadm control --reload` and reconnect the device";
+pub(crate) const ACCESS_REMEDY: &str = "put `KERNEL==\"hidraw*\", ATTRS{idVendor}==\"256f\", TAG+=\"uaccess\"` (for a \
+    SpaceMouse of Logitech, 046d in place of 256f) into /etc/udev/rules.d/70-spacemouse.rules, run `sudo udevadm control --reload` and reconnect the device";
 
 /// Returns whether an error is a missing permission.
 pub(crate) fn is_refused(error: &HidError) -> bool {

@@ -15,7 +15,7 @@ pub(crate) const LIBRARY_ENDING: &str = ".dll";
 
 /// Returns the remedy for a library that cannot be loaded.
 pub(crate) fn missing_remedy(path: &Path) -> String {
-    format!("a library that {} needs is missing; install the whole SDK", path.display())
+    format!("install the whole SDK, as a library that {} needs may be missing", path.display())
 }
 
 /// Returns `on_windows`, the file names of a library on Windows.

@@ -52,7 +52,7 @@ pub enum PublishError {
     #[error(transparent)]
     Directory(#[from] DirectoryError),
     /// A thread cannot be started.
-    #[error("cannot start the telemetry threads: {0}; end other programs of this user")]
+    #[error("cannot start a thread: {0}; end other programs of this user")]
     Thread(#[from] io::Error),
 }
 
@@ -112,7 +112,7 @@ impl Publication {
             demand,
             started: Instant::now(),
         });
-        let (socket, for_acceptor) = (Arc::clone(listener.socket()), Arc::clone(&shared));
+        let (socket, for_acceptor) = (Arc::clone(&listener.socket), Arc::clone(&shared));
         let acceptor = thread("flotor-live").spawn(move || accept(&socket, &for_acceptor))?;
         Ok(Self { shared, acceptor: Some(acceptor), listener })
     }
@@ -154,7 +154,7 @@ impl Publication {
 
 impl Drop for Publication {
     fn drop(&mut self) {
-        self.listener.socket().close();
+        self.listener.socket.close();
         if let Some(acceptor) = self.acceptor.take() {
             join_until(acceptor, Instant::now() + PATIENCE);
         }

@@ -42,7 +42,7 @@ fn subpaths(data: &str) -> Vec<Vec<Point>> {
 
 fn line_of(series: &Series, projection: &Projection) -> (Vec<Vec<Point>>, Vec<Vec<Point>>, bool) {
     match draw(series, Slot::new(0), projection) {
-        Some(Drawing::Line { path, dots, busy, .. }) => (subpaths(path.data()), subpaths(dots.data()), busy),
+        Some(Drawing::Line { path, dots, busy, .. }) => (subpaths(&path.data), subpaths(&dots.data), busy),
         other => panic!("not a line: {other:?}"),
     }
 }
@@ -117,7 +117,7 @@ fn bars_that_touch_share_an_outline_that_stands_on_the_axis() {
     let Some(Drawing::Bars(path)) = draw(&Series::histogram("", bins), Slot::new(0), &projection) else {
         panic!()
     };
-    let outlines = subpaths(path.data());
+    let outlines = subpaths(&path.data);
     let expect = |corners: &[Point]| -> Vec<Point> {
         corners.iter().map(|&(x, y)| (80.0 + 80.0 * x, 170.0 - 30.0 * y)).collect()
     };
@@ -138,7 +138,7 @@ fn markers_that_cover_one_another_are_drawn_once() {
     let projection = Projection { x: linear(0.0, 10.0), y: linear(0.0, 10.0), frame: FRAME };
     let count =
         |samples: &[Point]| match draw(&Series::points("", samples.to_vec()), Slot::new(0), &projection) {
-            Some(Drawing::Markers(path)) => path.data().matches('M').count(),
+            Some(Drawing::Markers(path)) => path.data.matches('M').count(),
             other => panic!("{other:?}"),
         };
     assert_eq!(count(&[(1.0, 1.0); 100_000]), 1);

@@ -64,8 +64,7 @@ impl Engine {
         each!(self, model => model.set_parameter(index, value))
     }
 
-    /// Returns the value of a parameter: the current value of a model in the loop thread, otherwise the initial value; NaN if
-    /// unknown. Not real-time.
+    /// Returns the present value of a parameter; NaN if unknown. Not real-time.
     pub fn parameter(&mut self, index: usize) -> f64 {
         each!(self, model => model.parameter(index))
     }

@@ -62,8 +62,9 @@ impl fmt::Display for Call {
 /// Error of a plugin call that did not return in time: the thread of the call is abandoned, and the process should end soon.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "`{who}` did not return from {call} within {} s, the time limit; check the plugin, or raise the limit with the environment variable `{LIMIT_VARIABLE}`",
-    limit.as_secs_f64()
+    "`{who}` did not return from {call} within {} s, the time limit; check the plugin{}",
+    limit.as_secs_f64(),
+    advice(*call)
 )]
 pub struct Unresponsive {
     /// Name of the device or model in the scene, or path of the plugin file.
@@ -72,6 +73,16 @@ pub struct Unresponsive {
     pub call: Call,
     /// Time limit of the call.
     pub limit: Duration,
+}
+
+/// Returns the advice to raise the limit of a call before a run; empty for other calls, whose limit is never above [`END_LIMIT`].
+fn advice(call: Call) -> String {
+    match call {
+        Call::Load | Call::Create | Call::Prepare | Call::Open | Call::Activate => {
+            format!(", or raise the limit with the environment variable `{LIMIT_VARIABLE}`")
+        }
+        _ => String::new(),
+    }
 }
 
 /// Reason why a call has no result.

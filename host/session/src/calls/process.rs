@@ -46,7 +46,7 @@ impl fmt::Display for Notice {
             Self::Changed { who, restored, variables } => {
                 write!(f, "`{who}` changed ")?;
                 if !restored.is_empty() {
-                    write!(f, "{} of the host, which the host restored", restored.join(", "))?;
+                    write!(f, "{} of the host, which the host restored as far as permitted", restored.join(", "))?;
                 }
                 if !variables.is_empty() {
                     let joined = if restored.is_empty() { "" } else { "; the plugin also changed " };

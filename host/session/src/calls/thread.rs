@@ -1,6 +1,6 @@
 //! Threads for plugin calls, each call with a name and a time limit.
 
-use super::call::{Call, CallError, Unresponsive};
+use super::call::{Call, CallError, Unresponsive, end_limit};
 use super::process::{Notice, abandon, notify};
 use flotor_core::lock;
 use flotor_servo::last_stop::{enter_call, exit_call, prepare_for_calls};
@@ -124,6 +124,14 @@ impl CallThread {
     ) -> Result<T, CallError> {
         let call = self.begin(limit, body).map_err(|_| CallError::NoThread)?;
         call.wait_while(is_wanted).inspect_err(|_| self.jobs = None)
+    }
+
+    /// Runs `body` as [`Self::run_while`] does, with the limit of calls at the end of a run.
+    pub(crate) fn run_to_end<T: Send + 'static>(
+        &mut self,
+        body: impl FnOnce(&Progress) -> T + Send + 'static,
+    ) -> Result<T, CallError> {
+        self.run_while(end_limit(), || true, body)
     }
 }
 

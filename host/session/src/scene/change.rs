@@ -81,7 +81,7 @@ pub(super) fn read(sections: Vec<Section<'_>>) -> Result<Vec<ChangeUse>, SceneEr
         }
         if swap.is_none() && (alone != Alternative::default() || !either.is_empty()) {
             return wrong(
-                "`change.plugin`, `change.parameters` and `change.either` belong to a `change.swap`",
+                "`change.plugin`, `change.parameters` and `change.either` belong to a `change.swap`; add `swap`, or remove them",
             );
         }
         if alone != Alternative::default() && !either.is_empty() {

@@ -74,13 +74,13 @@ fn coupling(
     if gain > 1.0 && !may_amplify {
         return Err(wrong(&format!(
             "the coupling amplifies: one hand may get {gain:.4} times the energy that the other puts in, because \
-             `force_scale` / `motion_scale` differ between its ends; make these quotients equal, or write \
-             `allow_amplification = true` if the amplified force is safe for the hand"
+             `force_scale` / `motion_scale` differ between its ends (1 at an end on another host); make these quotients \
+             equal, or write `allow_amplification = true` if the amplified force is safe for the hand"
         )));
     }
     if gain <= 1.0 && may_amplify {
         return Err(wrong(
-            "`allow_amplification = true` has no effect: `force_scale` / `motion_scale` are equal at both ends; remove the key",
+            "`allow_amplification = true` has no effect, because this coupling does not amplify; remove the key",
         ));
     }
     if limits.passivity == PassivityMode::Control {

@@ -250,7 +250,7 @@ impl Scene {
         let limits = limits.unwrap_or_default();
         let scene = Self {
             title,
-            text: source.text().to_owned(),
+            text: source.text.to_owned(),
             rate_hz,
             pacing,
             duration_s,

@@ -31,7 +31,7 @@ fn points_of(mut grid: Section<'_>) -> Result<Vec<[f64; 3]>, SceneError> {
     let count_value = grid.require("count")?;
     let too_many = count_value
         .problem(format!("the grid has more than {MAX_PLACES} points, the maximum; reduce `count`"));
-    let not_whole = count_value.problem("`count` must be three whole numbers of 1 or more");
+    let not_whole = count_value.problem("`count` must be a whole number of 1 or more, or three of them");
     let counts = count_value.three(1.0..=MAX_PLACES as f64)?;
     let spacing_mm = grid.require("spacing_mm")?.three(0.0..=FARTHEST_MM)?;
     grid.finish()?;

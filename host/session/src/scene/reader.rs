@@ -73,7 +73,7 @@ pub struct ParameterText {
 /// Text of a scene, with an index of its lines.
 pub(super) struct Source<'t> {
     file: &'t Path,
-    text: &'t str,
+    pub(super) text: &'t str,
     /// Byte offsets of the line ends, for a lookup of line numbers by binary search.
     line_ends: Vec<usize>,
     /// Name and looked-up keys of each table that was read to its end.
@@ -110,10 +110,6 @@ impl<'t> Source<'t> {
     pub(super) fn new(file: &'t Path, text: &'t str) -> Self {
         let line_ends = text.match_indices('\n').map(|(at, _)| at).collect();
         Self { file, text, line_ends, seen: RefCell::default(), above: RefCell::default() }
-    }
-
-    pub(super) fn text(&self) -> &'t str {
-        self.text
     }
 
     /// Returns the tables that were read to their end, by name, with the keys looked up in each.
@@ -246,7 +242,8 @@ impl<'t> Section<'t> {
             && let Some(mut both) = self.section(key)?
         {
             let norm = both.require("norm")?.number(range.clone())?;
-            let axes = both.require("axes")?.axes(range)?;
+            let axes = both.require("axes")?;
+            let axes = axes.each_in_range(axes.numbers()?, &range)?;
             both.finish()?;
             return Ok(Bound::ball(norm).and(Bound::box_of(axes)));
         }
@@ -305,7 +302,8 @@ impl<'t> Section<'t> {
                 DeValue::Boolean(flag) => flag.to_string(),
                 other => {
                     let (key, found) = (key.get_ref(), other.type_str());
-                    let problem = format!("`{key}` must be a number, a word or true/false; found: {found}");
+                    let problem =
+                        format!("`{key}` must be a number, text in quotes, or true or false; found: {found}");
                     return Err(location.problem(problem));
                 }
             };
@@ -430,7 +428,7 @@ impl Value<'_> {
     }
 
     fn no_bound(&self) -> SceneError {
-        self.must_be("one number (the largest norm) or three numbers (the largest along each axis)")
+        self.must_be("one number (the largest norm), three numbers (the largest along each axis), or { norm, axes } for both")
     }
 
     /// Returns a whole number in `range`.

@@ -61,7 +61,7 @@ fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: bool) -> Ve
     let [slowest, fastest] = device.rate_hz;
     if scene.rate_hz < slowest || scene.rate_hz > fastest {
         mismatches.push(format!(
-            "rate {} Hz, but the device runs at {slowest} to {fastest} Hz; change `rate_hz`",
+            "rate {} Hz, but the device runs at {slowest} to {fastest} Hz; change `rate_hz` (or `--rate`)",
             scene.rate_hz
         ));
     }
@@ -111,8 +111,9 @@ fn unfelt(wanted_n: &[f64; 3], device: &Capabilities) -> Option<String> {
     if unfelt.is_empty() {
         return None;
     }
-    let accepted_n = |(most_n, is_driven): (&f64, bool)| if is_driven { *most_n } else { 0.0 }.to_string();
-    let accepted = device.max_force_n.iter().zip(is_driven).map(accepted_n).collect::<Vec<_>>().join(", ");
+    let accepted_n =
+        |index: usize| if is_driven[index] { device.max_force_n[index].min(wanted_n[index]) } else { 0.0 };
+    let accepted = [0, 1, 2].map(|index| accepted_n(index).to_string()).join(", ");
     Some(if is_driven == [false; 3] {
         format!(
             "the device exerts no force, so the hand cannot feel a model; set `[limits] force_n = [{accepted}]` to \

@@ -179,13 +179,16 @@ impl StopReach {
 
 impl Display for StopReach {
     fn fmt(&self, formatter: &mut Formatter<'_>) -> fmt::Result {
-        match self.problem() {
-            None => formatter
-                .write_str("all runs of this machine are stopped, and none starts until `flotor release`"),
-            Some(problem) => {
-                write!(formatter, "the emergency stop is confirmed for this run only: {problem}")
-            }
-        }
+        let Some(problem) = self.problem() else {
+            return formatter
+                .write_str("all runs of this machine are stopped, and none starts until `flotor release`");
+        };
+        let extent = match &self.unconfirmed {
+            Ok(processes) if processes.is_empty() => "all runs found on this machine are stopped, but",
+            Ok(_) => "some runs of this machine may not be stopped:",
+            Err(_) => "the emergency stop is confirmed for this run only:",
+        };
+        write!(formatter, "{extent} {problem}")
     }
 }
 
@@ -271,5 +274,34 @@ mod tests {
         assert!(usual.press(EmergencySource::Key).to_string().contains("not confirmed by process"));
         assert_eq!(usual.reach(), Some(usual.press(EmergencySource::Key)));
         drop(silent);
+    }
+
+    /// A stop that every run had confirmed was "confirmed for this run only" if the latch could not be written.
+    #[test]
+    fn the_note_distinguishes_an_unwritten_latch_from_unconfirmed_and_unknown_runs() {
+        let text = |unkept: Option<&str>, unconfirmed| {
+            StopReach { unkept: unkept.map(str::to_owned), unconfirmed }.to_string()
+        };
+        let unwritten = Some("it is read-only");
+        for (text, start) in [
+            (
+                text(unwritten, Ok(Vec::new())),
+                "all runs found on this machine are stopped, but the emergency",
+            ),
+            (
+                text(unwritten, Ok(vec![7, 8])),
+                "some runs of this machine may not be stopped: not confirmed by",
+            ),
+            (
+                text(None, Ok(vec![7])),
+                "some runs of this machine may not be stopped: not confirmed by process 7",
+            ),
+            (
+                text(None, Err("denied".to_owned())),
+                "the emergency stop is confirmed for this run only: the state",
+            ),
+        ] {
+            assert!(text.starts_with(start), "{text}");
+        }
     }
 }

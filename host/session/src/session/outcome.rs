@@ -3,7 +3,7 @@
 use super::controls::Settled;
 use super::plugin_report::PluginNames;
 use super::{Controls, FaultyPlugin, PluginReport, StopTime, UnfreedPlugins};
-use crate::calls::{Call, CallError, CallThread, EndReserve, Progress, Unresponsive, end_limit};
+use crate::calls::{Call, CallError, CallThread, EndReserve, Unresponsive};
 use flotor_core::health::ModelHealth;
 use flotor_core::plausibility::ImplausibleSamples;
 use flotor_hal::{EnergyLedger, Fault};
@@ -148,7 +148,7 @@ impl Epilogue {
         let Dismantled { devices, last_stop, forces, swaps, timing } = servo.dismantle();
         let mut unresponsive = None;
         let (mut outcomes, mut closing) = (Vec::new(), Vec::new());
-        for (name, device) in names.all().iter().zip(devices) {
+        for (name, device) in names.all.iter().zip(devices) {
             let (outcome, opened) = deactivate(&mut calls, name, device, &mut unresponsive);
             outcomes.push(outcome);
             closing.extend(opened.map(|opened| (name.clone(), opened)));
@@ -168,7 +168,7 @@ impl Epilogue {
         let unfreed_plugins = UnfreedPlugins { devices: closing, models: layers, last_stop, calls };
         let wall_s = started.elapsed().as_secs_f64();
         warnings.extend(controls.warnings());
-        warnings.extend(stop_time.as_ref().and_then(|time| time.warning(names.all())));
+        warnings.extend(stop_time.as_ref().and_then(|time| time.warning(&names.all)));
         let taken = heartbeat.signals_taken();
         if !taken.is_none() {
             warnings.push(format!(
@@ -204,16 +204,12 @@ fn deactivate(
     unresponsive: &mut Option<Unresponsive>,
 ) -> (DeviceOutcome, Option<OpenedDevice>) {
     let (who, float_changes) = (name.to_owned(), device.float_changes());
-    let told = calls.run_while(
-        end_limit(),
-        || true,
-        move |progress| {
-            progress.enter(&who, Call::Deactivate);
-            let ledger = device.energy_ledger();
-            let words = device.last_message();
-            (ledger, words, device.deactivate())
-        },
-    );
+    let told = calls.run_to_end(move |progress| {
+        progress.enter(&who, Call::Deactivate);
+        let ledger = device.energy_ledger();
+        let words = device.last_message();
+        (ledger, words, device.deactivate())
+    });
     let (ledger, words, opened) = told.unwrap_or_else(|error| {
         note(error, unresponsive);
         (None, String::new(), None)
@@ -237,17 +233,13 @@ fn last_words(
     unresponsive: &mut Option<Unresponsive>,
 ) -> (Layers, Vec<LayerReport>) {
     let names = names.clone();
-    let told = calls.run_while(
-        end_limit(),
-        || true,
-        move |progress: &Progress| {
-            let on_query = |model: usize| progress.enter(&names.model(model), Call::LastMessage);
-            let mut reports: Vec<LayerReport> =
-                retired.iter_mut().map(|(model, layer)| layer.report(*model, || on_query(*model))).collect();
-            reports.extend(forces.reports(on_query));
-            (forces.into_layers().chain(retired).collect(), reports)
-        },
-    );
+    let told = calls.run_to_end(move |progress| {
+        let on_query = |model: usize| progress.enter(&names.model(model), Call::LastMessage);
+        let mut reports: Vec<LayerReport> =
+            retired.iter_mut().map(|(model, layer)| layer.report(*model, || on_query(*model))).collect();
+        reports.extend(forces.reports(on_query));
+        (forces.into_layers().chain(retired).collect(), reports)
+    });
     told.unwrap_or_else(|error| {
         note(error, unresponsive);
         (Vec::new(), Vec::new())

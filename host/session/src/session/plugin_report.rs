@@ -55,7 +55,8 @@ impl PluginReport {
 /// Names, in the scene, of the plugins of a run.
 #[derive(Clone)]
 pub(super) struct PluginNames {
-    names: Vec<String>,
+    /// All names: the devices, then the models.
+    pub(super) all: Vec<String>,
     devices: usize,
 }
 
@@ -63,22 +64,17 @@ impl PluginNames {
     pub(super) fn of(plugins: &[PluginReport]) -> Self {
         let is_device = |plugin: &&PluginReport| plugin.metadata.kind == PluginKind::Device;
         let devices = plugins.iter().filter(is_device).count();
-        Self { names: plugins.iter().map(|plugin| plugin.name.clone()).collect(), devices }
-    }
-
-    /// Returns all names: the devices, then the models.
-    pub(super) fn all(&self) -> &[String] {
-        &self.names
+        Self { all: plugins.iter().map(|plugin| plugin.name.clone()).collect(), devices }
     }
 
     /// Returns the names of the models.
     pub(super) fn models(&self) -> &[String] {
-        self.names.get(self.devices..).unwrap_or_default()
+        self.all.get(self.devices..).unwrap_or_default()
     }
 
     /// Returns the name of a plugin; `plugin N` with its index if the run has fewer plugins.
     pub(super) fn name(&self, plugin: PluginIndex) -> String {
-        self.names.get(plugin.position()).cloned().unwrap_or_else(|| plugin.to_string())
+        self.all.get(plugin.position()).cloned().unwrap_or_else(|| plugin.to_string())
     }
 
     /// Returns the name of a model.

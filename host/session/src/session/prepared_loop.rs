@@ -35,7 +35,7 @@ pub(super) fn activate_here(
 ) -> Result<Servo, RunError> {
     let names = PluginNames::of(plugins);
     let enters = |device: usize| progress.enter(&names.name(PluginIndex::at(device)), Call::Activate);
-    let activated = standby.activate(names.all().to_vec(), enters);
+    let activated = standby.activate(names.all.clone(), enters);
     progress.exit();
     activated.map_err(|(device, refusal)| match plugins.get(device) {
         Some(report) => RunError::refused(&report.metadata, refusal),

@@ -100,6 +100,13 @@ impl Stopping {
     fn device(&self) -> Option<PluginIndex> {
         self.0.load(Ordering::Relaxed).checked_sub(1).map(PluginIndex::at)
     }
+
+    /// Returns the device that is being stopped, with the time of the first poll that found this device; `earlier` is the result of
+    /// the previous poll.
+    fn poll(&self, earlier: Option<(PluginIndex, Instant)>) -> Option<(PluginIndex, Instant)> {
+        let device = self.device()?;
+        earlier.filter(|(before, _)| *before == device).or_else(|| Some((device, Instant::now())))
+    }
 }
 
 /// Energises the devices, runs the loop to its end, and stops the devices, on the loop's thread.
@@ -205,7 +212,7 @@ struct LoopWatch {
     watchdog_limit: Duration,
     progress: Progress,
     stopping: Stopping,
-    /// Device whose stop was noticed first, and the time of that poll.
+    /// Device that is being stopped, and the time of the first poll that found this device.
     stopping_since: Option<(PluginIndex, Instant)>,
     /// Place where the watchdog found the loop stuck, and the time of the poll that noticed it.
     fired: Option<(Stuck, Instant)>,
@@ -235,9 +242,7 @@ impl LoopWatch {
             self.stoppers.iter().for_each(Stopper::safe_stop);
             return Err(CallError::from(hung).into());
         }
-        let since = self.stopping_since;
-        self.stopping_since =
-            self.stopping.device().map(|device| since.unwrap_or_else(|| (device, Instant::now())));
+        self.stopping_since = self.stopping.poll(self.stopping_since);
         if let Some((device, since)) = self.stopping_since
             && since.elapsed() > end_limit()
         {
@@ -254,5 +259,27 @@ impl LoopWatch {
             return Err(RunError::hung(stuck, &self.names, Exceeded::Watchdog(self.watchdog_limit)));
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// If the second `safe_stop` hung, the error named the first device, and the time of its stop counted too.
+    #[test]
+    fn a_stop_that_hangs_is_that_of_the_device_in_safe_stop() {
+        let stopping = Stopping::default();
+        assert_eq!(stopping.poll(None), None);
+        stopping.enter(0);
+        let first = stopping.poll(None);
+        assert_eq!(first.map(|(device, _)| device), Some(PluginIndex::at(0)));
+        assert_eq!(stopping.poll(first), first, "the time of the first poll counts");
+        stopping.enter(1);
+        let second = stopping.poll(first);
+        assert_eq!(second.map(|(device, _)| device), Some(PluginIndex::at(1)));
+        assert!(second.map(|(_, since)| since) >= first.map(|(_, since)| since));
+        stopping.exit();
+        assert_eq!(stopping.poll(second), None);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Plugin code may hang or end the process. So recordings should be closed and summaries printed before the instances are freed.
 
-use crate::calls::{Call, CallError, CallThread, Unresponsive, end_limit};
+use crate::calls::{Call, CallError, CallThread, Unresponsive};
 use flotor_loader::OpenedDevice;
 use flotor_servo::{LastStop, Layer};
 
@@ -53,14 +53,10 @@ fn free<T: Send + 'static>(
     call: Call,
     what: T,
 ) -> Result<(), Unresponsive> {
-    let freed = calls.run_while(
-        end_limit(),
-        || true,
-        move |progress| {
-            progress.enter(&who, call);
-            drop(what);
-        },
-    );
+    let freed = calls.run_to_end(move |progress| {
+        progress.enter(&who, call);
+        drop(what);
+    });
     match freed {
         Err(CallError::Unresponsive(hung)) => Err(hung),
         // Without a thread the value was dropped here.

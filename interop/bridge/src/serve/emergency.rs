@@ -56,7 +56,7 @@ fn attend(latch: &Latch, waiting: &Receiver<(SendAnswer, Option<String>)>) {
             Ok(unconfirmed) => {
                 let processes: Vec<String> = unconfirmed.iter().map(u32::to_string).collect();
                 Some(format!(
-                    "not confirmed by process {}, which may still run: switch its device off",
+                    "not confirmed by process {}, so a force may continue: switch the devices off",
                     processes.join(", ")
                 ))
             }

@@ -181,8 +181,9 @@ impl RequestHandler {
         let mut inside = self.lock();
         inside.status.run = 0;
         inside.status.title.clear();
+        let words = "the run ended before the host replied, so the request may have had no effect";
         for (query, _) in inside.run.take().into_iter().flat_map(|run| run.open.into_values()) {
-            reply(&query, Some("the run ended before the host replied".to_owned()));
+            reply(&query, Some(words.to_owned()));
         }
     }
 
@@ -234,24 +235,24 @@ impl RequestHandler {
             run.open.retain(|_, (query, since)| {
                 let is_late = since.elapsed() > ANSWER_WAIT;
                 if is_late {
-                    reply(query, Some("the host does not reply".to_owned()));
+                    reply(
+                        query,
+                        Some(format!("the host has not replied for {} s; try again", ANSWER_WAIT.as_secs())),
+                    );
                 }
                 !is_late
             });
         }
         let status = self.now(&inside);
-        let has_changed = match &inside.reported {
-            None => true,
-            Some((last, since)) => {
-                since.elapsed() >= STATUS_PERIOD
-                    || Status {
-                        published: last.published,
-                        ticket: last.ticket,
-                        couplings: last.couplings.clone(),
-                        ..status.clone()
-                    } != *last
-            }
-        };
+        let has_changed = inside.reported.as_ref().is_none_or(|(last, since)| {
+            since.elapsed() >= STATUS_PERIOD
+                || Status {
+                    published: last.published,
+                    ticket: last.ticket,
+                    couplings: last.couplings.clone(),
+                    ..status.clone()
+                } != *last
+        });
         if has_changed {
             inside.reported = Some((status.clone(), Instant::now()));
             drop(inside);
@@ -361,8 +362,8 @@ impl Inside {
     fn start(&mut self) -> Result<(), String> {
         if let Some(pressed) = self.latch.state().pressed {
             return Err(format!(
-                "the emergency stop is pressed ({pressed}); its owner has to release the emergency stop first, \
-                 with `flotor release` or `flotor bridge ask NAME release`"
+                "the emergency stop is pressed ({pressed}); release the emergency stop first, with `flotor \
+                 release` on the machine of the bridge, or with `flotor bridge ask NAME release`"
             ));
         }
         if self.run.is_some() {

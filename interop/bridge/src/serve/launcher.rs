@@ -22,16 +22,16 @@ impl Launcher {
     /// Starts a process that runs the scene, without standard input and output.
     ///
     /// # Errors
-    /// The cause as text: the scene is running already, or the system refuses.
+    /// The cause as text: an earlier process still runs, or the system refuses.
     pub fn start(&mut self) -> Result<(), String> {
         if self.runs() {
-            return Err("the scene is running already; stop the run first".to_owned());
+            return Err("the process of an earlier start has not ended; try again in a few seconds".into());
         }
         let mut command = Command::new(&self.program);
         command.arg("run").arg(&self.scene).stdin(Stdio::null()).stdout(Stdio::null());
-        let child = command
-            .spawn()
-            .map_err(|cause: io::Error| format!("`{}` cannot be started: {cause}", self.program.display()))?;
+        let child = command.spawn().map_err(|cause: io::Error| {
+            format!("cannot start `{}`: {cause}; install both programs in one folder", self.program.display())
+        })?;
         self.child = Some(child);
         Ok(())
     }

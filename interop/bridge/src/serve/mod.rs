@@ -66,8 +66,8 @@ pub fn serve(
     let opened = session.stop_channel().map(|stop| stop_channel::open(stop, &name, directory)).transpose();
     let _stop_channel = opened.unwrap_or_else(|error| {
         report_line(&format!(
-            "no UDP port with the number of the TCP port, so earlier connections can delay the emergency stop of a \
-             new member: {error}"
+            "cannot open the UDP port with the number of the TCP port ({error}), so earlier connections can delay the \
+             emergency stop of a new member; end the program that uses the port, and start the bridge again"
         ));
         None
     });

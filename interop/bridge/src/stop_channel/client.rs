@@ -71,7 +71,7 @@ fn press(stop: &StopChannel, bridge: &Name) -> Result<(), String> {
 fn outcome(answers: &Receiver<Result<Option<String>, String>>) -> Result<(), String> {
     let mut until = Instant::now() + 2 * ANSWER_WAIT;
     let mut is_done = false;
-    let mut problem = "no endpoint offers a stop channel".to_owned();
+    let mut problem = format!("no endpoint has replied within {} s", 2 * ANSWER_WAIT.as_secs());
     loop {
         match answers.recv_timeout(until.saturating_duration_since(Instant::now())) {
             Ok(Ok(Some(refused))) => return Err(refused),
@@ -136,7 +136,7 @@ fn press_at(address: &str, bridge: &str, stop: &StopChannel) -> io::Result<Optio
         };
         presses.extend(challenge.map(|_| pending.nonce));
     }
-    Err(io::ErrorKind::TimedOut.into())
+    Err(io::Error::other(format!("no reply by UDP within {} s", ANSWER_WAIT.as_secs())))
 }
 
 fn receive(socket: &UdpSocket, stop: &StopChannel) -> Option<StopMessage> {

@@ -64,9 +64,7 @@ impl StopKeys {
     /// # Errors
     /// Errors of the file; `InvalidData` for a malformed or empty file.
     pub(crate) fn read(path: &Path) -> io::Result<Self> {
-        let malformed = || {
-            io::Error::new(ErrorKind::InvalidData, "not a stop key; make new keys with `flotor bridge keys`")
-        };
+        let malformed = || io::Error::new(ErrorKind::InvalidData, "not a file of stop keys");
         let text = std::fs::read_to_string(path)?;
         let keys = text.lines().map(|line| {
             let (name, digits) = line.split_once(' ')?;

@@ -1,7 +1,7 @@
 //! The single run of a process: prepared at the first access, started by the first open device, ended with the program.
 
 use crate::process::{at_end, guarded, is_copy, is_first, library, notice_copies, quietly};
-use crate::run::{LockstepRun, Prepared, is_emergency_stopped, report_line};
+use crate::run::{LockstepRun, Prepared, is_emergency_stopped, report_line, report_no_thread};
 use crate::settings::{Pace, Settings, SharedControlGroup, env_value};
 use crate::station::{Station, Turn};
 use flotor_servo::{Clock, StopSwitch, guest, monotonic_ns};
@@ -50,12 +50,15 @@ pub fn host() -> Option<&'static Host> {
 /// before [`host`]. Not real-time.
 ///
 /// # Errors
-/// One line: the reason why the scene cannot be run, or that this process already has a run.
+/// One line: the reason why the scene cannot be run, or that this process has already prepared a run.
 pub fn prepare(settings: Settings, stop: &StopSwitch) -> Result<&'static Host, String> {
+    let second = || "this process has already prepared a run, or failed to; start another process".to_owned();
+    if HOST.get().is_some() {
+        return Err(second());
+    }
     let prepared = Host::prepare(settings, stop)?;
-    HOST.get_or_init(|| Some(prepared))
-        .as_ref()
-        .ok_or_else(|| "this process already has a run; use another process".to_owned())
+    HOST.set(Some(prepared)).map_err(|_| second())?;
+    HOST.get().and_then(Option::as_ref).ok_or_else(second)
 }
 
 /// Returns the run of this process, if prepared already. Not real-time.
@@ -241,9 +244,12 @@ impl Host {
         let run = move || {
             guarded((), || prepared.run(&stop, stations_so_far()));
         };
-        let Ok(thread) = thread.spawn(run) else {
-            report_line("cannot start a thread for the run; end other programs of this user");
-            return Stage::Over;
+        let thread = match thread.spawn(run) {
+            Ok(thread) => thread,
+            Err(cause) => {
+                report_no_thread("the run", &cause);
+                return Stage::Over;
+            }
         };
         let since = Instant::now();
         while self.stations.iter().any(|station| station.ticks() == 0) {
@@ -297,7 +303,7 @@ impl Host {
     /// Waits for a tick that the caller has not seen, usually for a period and never longer than 10 ms; in lockstep executes the tick.
     /// Returns true if there was a tick. Not real-time.
     pub fn wait(&self, station: &Station) -> bool {
-        self.wait_in(station, station.turn())
+        self.wait_in(station, &station.turn)
     }
 
     /// Waits like [`Host::wait`], for one of several callers that share a device, each with its own record of seen ticks. Not real-time.
@@ -352,4 +358,22 @@ fn executable(folder: &Path) -> Option<PathBuf> {
 fn plugin_folders(folder: &Path) -> Vec<PathBuf> {
     let installed = folder.ancestors().nth(2).map(|root| root.join("plugins"));
     [folder.join("deps"), folder.to_path_buf(), folder.join("..")].into_iter().chain(installed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A second call opened all devices a second time, and returned the first run.
+    #[test]
+    fn a_second_run_of_a_process_is_refused_before_its_scene_is_read() {
+        HOST.get_or_init(|| None);
+        let settings = Settings::from_environment().expect("nothing is set");
+        let settings = Settings { scene: Some(PathBuf::from("/nosuch/scene.toml")), ..settings };
+        let refused = prepare(settings, &StopSwitch::default()).err();
+        assert_eq!(
+            refused.as_deref(),
+            Some("this process has already prepared a run, or failed to; start another process")
+        );
+    }
 }

@@ -9,7 +9,7 @@ use flotor_hal::Demand;
 use flotor_hal::terminal::escaped;
 use flotor_live::Directory;
 use flotor_record::{Note, Recorder, RunDescription, Severity};
-use flotor_servo::{Place, RunEnd, StopSwitch, Stuck};
+use flotor_servo::{Place, RunEnd, StopSwitch, Stuck, THREAD_ADVICE};
 use flotor_session::run_description::describe;
 use flotor_session::scene::Scene;
 use flotor_session::summary::RunSummary;
@@ -17,6 +17,7 @@ use flotor_session::telemetry::{ObservedRun, publish};
 use flotor_session::{
     Lockstep, Measurements, Observer, Outcome, PluginReport, RunError, RunOptions, Session,
 };
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -327,6 +328,15 @@ pub(crate) fn report_line(problem: &str) {
     tell_plainly(&format!("flotor: {problem}"));
 }
 
+/// Reports on standard error that the system has not started a thread; `purpose` is the part of the session without its thread.
+pub fn report_no_thread(purpose: &str, cause: &io::Error) {
+    report_line(&no_thread(purpose, cause));
+}
+
+fn no_thread(purpose: &str, cause: &io::Error) -> String {
+    format!("cannot start a thread for {purpose}: {cause}; {THREAD_ADVICE}")
+}
+
 /// Writes a text to standard error; ignores a closed one.
 fn tell_plainly(text: &str) {
     use std::io::Write;
@@ -335,7 +345,15 @@ fn tell_plainly(text: &str) {
 
 #[cfg(test)]
 mod tests {
-    use super::quantity;
+    use super::{no_thread, quantity};
+    use std::io;
+
+    #[test]
+    fn a_missing_thread_is_reported_with_its_purpose_and_cause() {
+        let cause = io::Error::other("no process left");
+        let text = no_thread("the run", &cause);
+        assert!(text.starts_with("cannot start a thread for the run: no process left; end other"), "{text}");
+    }
 
     #[test]
     fn a_quantity_beyond_any_hand_is_a_power_of_ten() {

@@ -128,7 +128,7 @@ impl Settings {
         let seed = match env_value("FLOTOR_SEED").map(|text| (text.parse(), text)) {
             None => 0,
             Some((Ok(seed), _)) => seed,
-            Some((Err(_), text)) => return wrong("FLOTOR_SEED", &text, "a whole number"),
+            Some((Err(_), text)) => return wrong("FLOTOR_SEED", &text, "a whole number from 0 to 2^64 - 1"),
         };
         Ok(Self {
             scene: file("FLOTOR_SCENE"),

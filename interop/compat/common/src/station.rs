@@ -46,7 +46,8 @@ pub struct Station {
     ramp_ns: u64,
     opened: AtomicU64,
     is_open: AtomicBool,
-    turn: Turn,
+    /// Wait record of a program that is the only caller.
+    pub(crate) turn: Turn,
     /// Estimated start of the loop, ns of the machine's clock; the smallest estimate so far.
     begun_ns: AtomicU64,
     rate: Mutex<Rate>,
@@ -304,11 +305,6 @@ impl Station {
             }
             std::hint::spin_loop();
         }
-    }
-
-    /// Returns the wait record of a program that is the only caller.
-    pub(crate) fn turn(&self) -> &Turn {
-        &self.turn
     }
 
     /// Returns true if there is a tick that the caller has not waited for, and marks it as waited for.

@@ -51,28 +51,24 @@ fn most(id: i8, axis: usize) -> f64 {
     }
 }
 
-fn vector(x: f64, y: f64, z: f64) -> DVec3 {
-    DVec3::new(x, y, z)
-}
-
 export! {
     /// Sets the force, N, and zero torque; waits for the next tick.
-    fn dhdSetForce(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { command(id, [vector(x, y, z), DVec3::ZERO], 0.0, true) }
+    fn dhdSetForce(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { command(id, [DVec3::new(x, y, z), DVec3::ZERO], 0.0, true) }
     /// Sets force, N, and torque, N·m; waits for the next tick.
     fn dhdSetForceAndTorque(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, id: i8) -> c_int [-1] {
-        command(id, [vector(x, y, z), vector(tx, ty, tz)], 0.0, true)
+        command(id, [DVec3::new(x, y, z), DVec3::new(tx, ty, tz)], 0.0, true)
     }
     /// Sets force and force of the gripper, N, and zero torque; waits for the next tick.
     fn dhdSetForceAndGripperForce(x: f64, y: f64, z: f64, gripper: f64, id: i8) -> c_int [-1] {
-        command(id, [vector(x, y, z), DVec3::ZERO], gripper, true)
+        command(id, [DVec3::new(x, y, z), DVec3::ZERO], gripper, true)
     }
     /// Sets force, N, torque, N·m, and force of the gripper, N; waits for the next tick.
     fn dhdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, gripper: f64, id: i8) -> c_int [-1] {
-        command(id, [vector(x, y, z), vector(tx, ty, tz)], gripper, true)
+        command(id, [DVec3::new(x, y, z), DVec3::new(tx, ty, tz)], gripper, true)
     }
     /// Sets force, N, torque, N·m, and force of the gripper, N, in addition to the regulation; returns at once.
     fn drdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, gripper: f64, id: i8) -> c_int [-1] {
-        command(id, [vector(x, y, z), vector(tx, ty, tz)], gripper, false)
+        command(id, [DVec3::new(x, y, z), DVec3::new(tx, ty, tz)], gripper, false)
     }
     /// Reads the applied force, after all limits, N.
     fn dhdGetForce(x: Out<f64>, y: Out<f64>, z: Out<f64>, id: i8) -> c_int [-1] {

@@ -1,11 +1,11 @@
 //! Entry points of regulation and motion: hold the handle, move it along a line, track targets without a planned motion.
 
-use crate::basic::{angles, put6, read, read_live, turning, with};
+use crate::basic::{angles, put6, read, read_live, turning};
 use crate::device::{FRAME, Open, Switch, live, open};
 use crate::error::{Code, DONE, failed, result};
 use crate::gripper::Gripper;
 use crate::kept::{POSITION_MOVE, ROTATION_MOVE};
-use crate::regulation::{Progress, Regulation};
+use crate::regulation::{Motion, Progress, Regulation};
 use crate::regulator::{follow, sampled, start};
 use flotor_compat::export;
 use flotor_compat::pointer::{In, Out};
@@ -14,7 +14,7 @@ use std::ffi::c_int;
 use std::time::Duration;
 
 fn begin(id: i8) -> c_int {
-    with(live(id), start)
+    result(live(id).and_then(|open| start(&open)).map(|()| DONE))
 }
 
 /// Converts angles about x, then y, then z, to a rotation vector in Flotor's axes.
@@ -68,17 +68,14 @@ fn go(id: i8, goal: Goal, way: Way) -> c_int {
         let since_ns = open.host.now_ns().max(device.faded_in_ns);
         let fastest = [POSITION_MOVE, ROTATION_MOVE]
             .map(|index| device.parameters.get(index).map_or(0.1, |[_, speed, _]| *speed));
-        let regulation = &mut device.regulation;
-        if let Some(position_m) = goal.position_m.map(|position_m| FRAME.to_flotor(position_m)) {
-            match way {
-                Way::Follow => regulation.follow_place(position_m),
-                Way::Blocking | Way::Line => regulation.move_to(position_m, fastest[0], since_ns),
-            }
-        }
-        if let Some(turned_rad) = goal.angles_rad.map(turned) {
-            match way {
-                Way::Follow => regulation.follow_turn(turned_rad),
-                Way::Blocking | Way::Line => regulation.turn_to(turned_rad, fastest[1], since_ns),
+        let Regulation { position, rotation, .. } = &mut device.regulation;
+        let goals =
+            [goal.position_m.map(|position_m| FRAME.to_flotor(position_m)), goal.angles_rad.map(turned)];
+        for ((motion, to), fastest) in [position, rotation].into_iter().zip(goals).zip(fastest) {
+            match (to, way) {
+                (None, _) => {}
+                (Some(to), Way::Follow) => *motion = Motion::at(to),
+                (Some(to), Way::Blocking | Way::Line) => motion.go_to(to, fastest, since_ns),
             }
         }
         open.send_again(&mut device);

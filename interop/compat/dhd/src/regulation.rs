@@ -39,13 +39,13 @@ pub(crate) struct Regulation {
     pub(crate) is_running: bool,
     /// Regulated axes: position, rotation, gripper.
     pub(crate) axes: [bool; 3],
-    position: Motion,
-    rotation: Motion,
+    pub(crate) position: Motion,
+    pub(crate) rotation: Motion,
 }
 
-/// Motion along a straight line, or a constant goal.
+/// Motion along a straight line, or a constant goal: a position, m, or a rotation vector, rad, in Flotor's axes.
 #[derive(Clone, Copy, Debug)]
-struct Motion {
+pub(crate) struct Motion {
     from: DVec3,
     to: DVec3,
     since_ns: u64,
@@ -57,15 +57,18 @@ impl Motion {
     const NONE: Self =
         Self { from: DVec3::ZERO, to: DVec3::ZERO, since_ns: 0, until_ns: 0, progress: Progress::Arrived };
 
-    fn at(place: DVec3) -> Self {
+    /// Returns a constant goal, which takes effect at once.
+    pub(crate) fn at(place: DVec3) -> Self {
         Self { from: place, to: place, ..Self::NONE }
     }
 
-    fn new(from: DVec3, to: DVec3, fastest: f64, since_ns: u64) -> Self {
+    /// Plans a minimum-jerk motion along a line from `since_ns` on, with peak speed `fastest`, m/s or rad/s.
+    pub(crate) fn go_to(&mut self, to: DVec3, fastest: f64, since_ns: u64) {
+        let from = self.place(since_ns);
         let time_s = (PEAK * (to - from).length() / fastest.max(1.0e-3)).clamp(SHORTEST_S, 60.0);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a minute
         let time_ns = (time_s * 1.0e9) as u64;
-        Self { from, to, since_ns, until_ns: since_ns + time_ns, progress: Progress::Moving }
+        *self = Self { from, to, since_ns, until_ns: since_ns + time_ns, progress: Progress::Moving };
     }
 
     /// Updates the progress; `is_at_end` is true while the handle is at the end of the motion.
@@ -107,26 +110,6 @@ impl Regulation {
     pub(crate) fn hold(&mut self, state: &State) {
         self.position = Motion::at(state.position_m);
         self.rotation = Motion::at(rotation_vector(state.orientation));
-    }
-
-    /// Plans a minimum-jerk motion along a line to a position in Flotor's axes, m, from `since_ns` on, with peak speed `fastest`, m/s.
-    pub(crate) fn move_to(&mut self, place_m: DVec3, fastest: f64, since_ns: u64) {
-        self.position = Motion::new(self.position.place(since_ns), place_m, fastest, since_ns);
-    }
-
-    /// Plans a minimum-jerk rotation to a rotation vector in Flotor's axes, rad, from `since_ns` on, with peak speed `fastest`, rad/s.
-    pub(crate) fn turn_to(&mut self, turned_rad: DVec3, fastest: f64, since_ns: u64) {
-        self.rotation = Motion::new(self.rotation.place(since_ns), turned_rad, fastest, since_ns);
-    }
-
-    /// Sets the target position in Flotor's axes, m; takes effect at once, without a planned motion.
-    pub(crate) fn follow_place(&mut self, place_m: DVec3) {
-        self.position = Motion::at(place_m);
-    }
-
-    /// Sets the target orientation, a rotation vector in Flotor's axes, rad; takes effect at once, without a planned motion.
-    pub(crate) fn follow_turn(&mut self, turned_rad: DVec3) {
-        self.rotation = Motion::at(turned_rad);
     }
 
     /// Updates the progress of the position and of the rotation from the state of a handle with these axes.

@@ -3,14 +3,17 @@
 use crate::device::{Open, Switch, count, live};
 use crate::error::Code;
 use crate::regulation::Regulation;
-use flotor_compat::{Pace, quietly};
+use flotor_compat::{Pace, quietly, report_no_thread};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// True while the regulation thread runs.
 static HAS_THREAD: AtomicBool = AtomicBool::new(false);
 
 /// Starts the regulation of a device at its current pose and enables its force; in real time also starts the regulation thread.
-pub(crate) fn start(open: &Open) {
+///
+/// # Errors
+/// [`Code::NoRegulation`], with the force disabled, if the system cannot start the thread; the cause is reported on standard error.
+pub(crate) fn start(open: &Open) -> Result<(), Code> {
     let state = open.station.state();
     {
         let mut device = open.device();
@@ -19,12 +22,16 @@ pub(crate) fn start(open: &Open) {
         open.send_again(&mut device);
     }
     if open.host.pace() == Pace::Lockstep || HAS_THREAD.swap(true, Ordering::AcqRel) {
-        return;
+        return Ok(());
     }
     let thread = std::thread::Builder::new().name("flotor-drd".to_owned());
-    if quietly(|| thread.spawn(regulate_all)).is_err() {
+    if let Err(cause) = quietly(|| thread.spawn(regulate_all)) {
         HAS_THREAD.store(false, Ordering::Release);
+        open.set_switch(&mut open.device(), Switch::Off);
+        report_no_thread("the regulation", &cause);
+        return Err(Code::NoRegulation);
     }
+    Ok(())
 }
 
 /// Sends the commands of all regulated devices once per period, until no device is regulated.

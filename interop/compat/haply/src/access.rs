@@ -26,9 +26,9 @@ enum Hosts {
 /// Reason for a refused connection.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Forbidden {
-    #[error("pages of `{0}` may not connect; allow the connection with `--allow-origin {0}`")]
+    #[error("pages of `{0}` may not connect; use `flotor emulate haply-service --allow-origin {0}`")]
     Origin(String),
-    #[error("`{0}` is not a name of this machine; connect to 127.0.0.1 or localhost")]
+    #[error("`{0}` is not a name of the loopback interface; connect to 127.0.0.1 or localhost")]
     Host(String),
 }
 

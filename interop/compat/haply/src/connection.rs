@@ -87,13 +87,7 @@ pub(crate) fn prepared(
     stream.set_nodelay(true)?;
     stream.set_write_timeout(Some(PATIENCE))?;
     let mut bytes = Vec::new();
-    let mut buffer = [0; 2048];
-    while bytes.len() < LONGEST_HEAD {
-        let count = read_before(stream, deadline, &mut buffer)?;
-        if count == 0 {
-            return Ok(None);
-        }
-        bytes.extend_from_slice(buffer.get(..count).unwrap_or_default());
+    while bytes.len() < LONGEST_HEAD && read_more(stream, deadline, &mut bytes)? > 0 {
         if let Some(end) = bytes.windows(4).position(|window| window == b"\r\n\r\n") {
             let rest = bytes.split_off(end + 4);
             let Some(head) = Head::read(&String::from_utf8_lossy(&bytes), rest) else { return Ok(None) };
@@ -109,14 +103,17 @@ pub(crate) fn prepared(
     Ok(None)
 }
 
-/// Waits for bytes until a deadline, and reads them; 0 bytes at the end of the connection.
-fn read_before(stream: &mut TcpStream, deadline: Instant, buffer: &mut [u8]) -> io::Result<usize> {
+/// Waits for bytes until a deadline, and appends them; returns their number, 0 at the end of the connection.
+fn read_more(stream: &mut TcpStream, deadline: Instant, bytes: &mut Vec<u8>) -> io::Result<usize> {
     let remaining = deadline.saturating_duration_since(Instant::now());
     if remaining.is_zero() {
         return Err(io::ErrorKind::TimedOut.into());
     }
     stream.set_read_timeout(Some(remaining))?;
-    stream.read(buffer)
+    let mut buffer = [0; 2048];
+    let count = stream.read(&mut buffer)?;
+    bytes.extend_from_slice(buffer.get(..count).unwrap_or_default());
+    Ok(count)
 }
 
 /// Completes a WebSocket upgrade; returns false if the client requested no upgrade.
@@ -135,14 +132,7 @@ pub(crate) fn upgraded(stream: &mut TcpStream, head: &Head) -> io::Result<bool> 
 pub(crate) fn read_body(stream: &mut TcpStream, head: &mut Head, deadline: Instant) -> io::Result<()> {
     let length = head.length.min(LONGEST_BODY);
     let mut body = std::mem::take(&mut head.rest);
-    let mut buffer = [0; 2048];
-    while body.len() < length {
-        let count = read_before(stream, deadline, &mut buffer)?;
-        if count == 0 {
-            break;
-        }
-        body.extend_from_slice(buffer.get(..count).unwrap_or_default());
-    }
+    while body.len() < length && read_more(stream, deadline, &mut body)? > 0 {}
     body.truncate(length);
     head.request.body = String::from_utf8_lossy(&body).into_owned();
     Ok(())

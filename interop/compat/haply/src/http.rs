@@ -2,10 +2,10 @@
 
 use crate::connection::{Answer, Request, failed};
 use crate::device::{grip_id, inverse_id, kept_at_first};
-use crate::message::set;
-use crate::service::{Service, Session, Shared};
+use crate::message::{NO_TRANSFORM, set};
+use crate::service::{MOST_SETTINGS_BYTES, Service, Session, Shared};
 use crate::state::{Extent, damping, force_gate, session_json, write};
-use crate::view::View;
+use crate::view::{Transform, View};
 use serde_json::{Value, json};
 
 /// Emulated version of the service.
@@ -56,13 +56,19 @@ fn route(service: &Service, method: &str, parts: &[&str], query: &str, body: &Va
         (_, [kind, device, "state", "transform"]) => {
             configured(service, method, [kind, device], "transform", query, body)
         }
-        _ => failed(404, "unknown route"),
+        _ => unknown_route(method, parts),
     }
+}
+
+fn unknown_route(method: &str, parts: &[&str]) -> Answer {
+    let path = parts.join("/");
+    failed(404, &format!("unknown route `{method} /{path}`; see the documentation of the service"))
 }
 
 /// Returns the reply to a request to store a setting: success, or status 507 if there was no room.
 fn stored(had_room: bool) -> Answer {
-    if had_room { ok() } else { failed(507, "too many settings; delete some settings") }
+    let full = format!("the settings need more than {MOST_SETTINGS_BYTES} bytes; shorten or delete some");
+    if had_room { ok() } else { failed(507, &full) }
 }
 
 fn sessions(service: &Service) -> Vec<Value> {
@@ -86,7 +92,7 @@ fn devices(service: &Service) -> Value {
 fn session(service: &Service, method: &str, id: &str, rest: &[&str], body: &Value) -> Answer {
     let mut shared = service.shared();
     let own = id.parse().ok().and_then(|id| shared.session_mut(id));
-    let Some(own) = own else { return failed(404, "unknown session") };
+    let Some(own) = own else { return unknown_session(id) };
     match (method, rest) {
         ("GET", []) => done(session_json(own)),
         ("GET", ["profile"]) => done(json!({ "name": own.profile })),
@@ -95,14 +101,18 @@ fn session(service: &Service, method: &str, id: &str, rest: &[&str], body: &Valu
                 name.clone_into(&mut own.profile);
                 done(json!({ "name": name }))
             }
-            None => failed(400, "the profile needs a name"),
+            None => failed(400, "the profile needs a text `name`"),
         },
         ("DELETE", ["profile"]) => {
             "default".clone_into(&mut own.profile);
             ok()
         }
-        _ => failed(404, "unknown route"),
+        _ => unknown_route(method, &[&["sessions", id][..], rest].concat()),
     }
+}
+
+fn unknown_session(which: &str) -> Answer {
+    failed(404, &format!("`{which}` selects no session; `GET /sessions` lists the sessions"))
 }
 
 fn setting(service: &Service, method: &str, key: &str, body: &Value) -> Answer {
@@ -212,7 +222,8 @@ fn configured(
     body: &Value,
 ) -> Answer {
     let Some((numbers, part)) = selected(service, device) else {
-        return failed(404, "unknown device");
+        let device = device.join("/");
+        return failed(404, &format!("unknown device `{device}`; `GET /devices` lists the devices"));
     };
     if method == "GET" && (numbers.len() > 1 || device[1] == "*") {
         return failed(400, "a wildcard cannot be read; give one device");
@@ -235,7 +246,7 @@ fn configured(
     }
     let sessions = of_query(&shared, query);
     if sessions.is_empty() {
-        return failed(404, "unknown session");
+        return unknown_session(query);
     }
     let mut last = Value::Null;
     for id in sessions {
@@ -253,32 +264,22 @@ fn configured(
     done(last)
 }
 
+/// Settings and their methods.
+const METHODS: &str = "basis, damping, force_gate, mount, preset and transform have GET, POST and DELETE, mount and transform also \
+PATCH; an arm has GET, POST and DELETE of gravity_compensation, handedness, home_return and torque_scaling, too";
+
 /// Reads or changes a setting of a view; returns its value after the change.
 fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Value, Answer> {
     let plain = View::default();
     let short = name.strip_prefix("filters/").unwrap_or(name);
+    let patched = |before: &Transform| {
+        before.patched(body.get("transform").unwrap_or(body)).ok_or_else(|| failed(400, NO_TRANSFORM))
+    };
     match (method, short) {
         ("GET", _) => {}
-        ("POST" | "PATCH", "transform") => {
-            let patch = body.get("transform").unwrap_or(body);
-            view.workspace = view.workspace.patched(patch).ok_or_else(|| {
-                failed(
-                    400,
-                    "the value is not a transform; send position, rotation or scale with their components",
-                )
-            })?;
-        }
+        ("POST" | "PATCH", "transform") => view.workspace = patched(&view.workspace)?,
         ("POST", _) => set(view, short, body).map_err(|why| failed(400, &why))?,
-        ("PATCH", "mount") => {
-            let patch = body.get("transform").unwrap_or(body);
-            let mount = view.mount.patched(patch).ok_or_else(|| {
-                failed(
-                    400,
-                    "the value is not a transform; send position, rotation or scale with their components",
-                )
-            })?;
-            view.set_mount(mount);
-        }
+        ("PATCH", "mount") => view.set_mount(patched(&view.mount)?),
         ("DELETE", "basis") => view.basis = plain.basis,
         ("DELETE", "mount" | "preset") => {
             view.set_preset("defaults");
@@ -286,12 +287,7 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         ("DELETE", "damping") => view.damping = plain.damping,
         ("DELETE", "force_gate") => view.force_gate = plain.force_gate,
         ("DELETE", "transform") => view.workspace = plain.workspace,
-        _ => {
-            return Err(failed(
-                405,
-                &format!("the setting `{name}` does not support {method}; use another method"),
-            ));
-        }
+        _ => return Err(failed(405, &format!("no {method} of the setting `{name}`; {METHODS}"))),
     }
     match short {
         "basis" => Ok(json!({ "permutation": view.basis.name() })),
@@ -300,10 +296,7 @@ fn change(view: &mut View, method: &str, name: &str, body: &Value) -> Result<Val
         "damping" => Ok(damping(view)),
         "force_gate" => Ok(force_gate(view)),
         "transform" => Ok(json!({ "transform": view.workspace.to_json() })),
-        _ => Err(failed(
-            404,
-            &format!("unknown setting `{name}`; the documentation of the service lists the settings"),
-        )),
+        _ => Err(failed(404, &format!("unknown setting `{name}`; {METHODS}"))),
     }
 }
 

@@ -48,12 +48,15 @@ use std::time::Duration;
 /// Serve Haply's Inverse Service with any Flotor device.
 #[derive(Parser)]
 #[command(name = "flotor emulate haply-service", version, max_term_width = 110)]
-#[command(after_help = "The first line on standard output has the addresses.\n\nExamples:\n  \
+#[command(
+    after_help = "The first line on standard output has the addresses. FLOTOR_RECORD and FLOTOR_JSON replace a missing \
+    --record and --json,\nFLOTOR_REPORT names a file for the text of the summary (default: standard error).\n\nExamples:\n  \
     flotor emulate haply-service                            a simulated flotor, held by a hand\n  \
     flotor emulate haply-service proxy.toml --record run.mcap   the device of a scene, within the scene's limits\n  \
-    flotor lend --api haply -- python3 my_program.py        the same for one program")]
+    flotor lend --api haply -- python3 my_program.py        the same for one program"
+)]
 struct Arguments {
-    /// Scene file in TOML (default: a simulated flotor held by a hand)
+    /// Scene file (TOML), or name of one of Flotor's own scenes (default: FLOTOR_SCENE, else a simulated flotor held by a hand)
     scene: Option<PathBuf>,
     /// Address of the simulation channel and HTTP (port 0: any free port)
     #[arg(long, default_value = "127.0.0.1:10001", value_name = "HOST:PORT")]
@@ -160,7 +163,8 @@ fn listen(option: &str, at: &str, reach: Reach) -> Result<(Port, SocketAddr), Co
     });
     bound.map_err(|cause| {
         let is_in_use = cause.kind() == std::io::ErrorKind::AddrInUse;
-        let advice = if is_in_use { "; end Haply's own service, or choose another port" } else { "" };
+        let advice =
+            if is_in_use { "; end the program that uses the port, such as Haply's own service" } else { "" };
         CommandError::Usage(format!("{option}: {cause}{advice}"))
     })
 }

@@ -3,7 +3,7 @@
 use crate::device::{ARM_M, grip_id, inverse_id};
 use crate::force::{Domain, SessionCommand};
 use crate::service::{Service, Session, Shared};
-use crate::view::{Basis, Transform, View, numbers, vector};
+use crate::view::{Basis, PRESETS, Transform, View, numbers, vector};
 use flotor_hal::DVec3;
 use serde_json::Value;
 
@@ -74,7 +74,7 @@ fn number(service: &Service, entry: &Value, name: fn(usize) -> String) -> Option
     let id = entry.get("device_id").and_then(Value::as_str).unwrap_or_default();
     let number = (0..service.host.stations().len()).find(|number| name(*number).eq_ignore_ascii_case(id));
     if number.is_none() {
-        service.refuse("device_id", "unknown device", &entry.to_string());
+        service.refuse("device_id", "unknown device; `GET /devices` lists the ids", &entry.to_string());
     }
     number
 }
@@ -103,8 +103,8 @@ fn configure_session(service: &Service, session: &mut Session, configure: &Value
 }
 
 const NO_BASIS: &str = "the basis must be a permutation of X, Y and Z with signs, such as XZY or X-YZ";
-const NO_TRANSFORM: &str =
-    "position and scale need x, y, z, the rotation needs w, x, y, z, and no scale may be 0";
+pub(crate) const NO_TRANSFORM: &str = "position and scale need x, y, z, the rotation needs w, x, y, z, and no scale and no rotation \
+may be 0";
 
 pub(crate) fn read_basis(basis: &Value) -> Option<Basis> {
     basis.get("permutation").and_then(Value::as_str).and_then(Basis::parse)
@@ -132,9 +132,8 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
         "preset" => {
             let preset = value.get("preset").or(Some(value)).and_then(Value::as_str).unwrap_or_default();
             if !view.set_preset(preset) {
-                return Err(format!(
-                    "unknown preset `{preset}`; the documentation of the service lists the presets"
-                ));
+                let names = PRESETS.map(|(name, _)| name).join(", ");
+                return Err(format!("unknown preset `{preset}`; use one of {names}"));
             }
         }
         "mount" => {
@@ -146,18 +145,22 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
             let along =
                 value.get("vector").filter(|vector| !vector.is_null()).map_or(Some(DVec3::ZERO), vector);
             let damping = along.map(|along| along + scalar).filter(|damping| damping.min_element() >= 0.0);
-            view.damping = damping.ok_or("the damping must be 0 N·s/m or more")?;
+            view.damping = damping.ok_or("`scalar` and the x, y, z of `vector` must be 0 N·s/m or more")?;
         }
         "force_gate" => {
             let gain = value.get("gain").and_then(Value::as_f64).filter(|gain| (0.0..=1.0).contains(gain));
-            view.force_gate = gain.ok_or("the gain must be 0 to 1")?;
+            view.force_gate = gain.ok_or("the force gate needs a `gain` of 0 to 1")?;
         }
         "filters" => {
             for (name, value) in value.as_object().into_iter().flatten() {
                 set(view, name, value)?;
             }
         }
-        other => return Err(format!("the setting `{other}` is not supported")),
+        other => {
+            return Err(format!(
+                "unknown setting `{other}`; use basis, damping, force_gate, mount or preset"
+            ));
+        }
     }
     Ok(())
 }
@@ -201,13 +204,17 @@ fn command(service: &Service, shared: &mut Shared, session: u64, device: usize, 
                 continue;
             }
             other => {
-                service.refuse(other, "this command has no effect here", &command.to_string());
+                service.refuse(other, "unknown command, without effect", &command.to_string());
                 continue;
             }
         };
         commands_it = true;
         let Some(value) = value else {
-            service.refuse(name, "the command needs three finite numbers", &command.to_string());
+            service.refuse(
+                name,
+                "the command needs finite x, y, z (joints: a0, a1, a2)",
+                &command.to_string(),
+            );
             continue;
         };
         if !is_executed(command) {

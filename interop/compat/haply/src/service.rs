@@ -49,7 +49,7 @@ pub(crate) struct Shared {
 }
 
 /// Limit on the settings of the service, bytes of keys and values as JSON.
-const MOST_SETTINGS_BYTES: usize = 1 << 20;
+pub(crate) const MOST_SETTINGS_BYTES: usize = 1 << 20;
 
 impl Shared {
     /// Stores a setting of the service; returns false, and stores nothing, without room for the setting.

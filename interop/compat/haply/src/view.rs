@@ -2,7 +2,7 @@
 //! user, z up.
 
 use flotor_hal::{DQuat, DVec3};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 /// Centre of the device's range for a session whose origin is the base of the device, m.
 const CENTRE_M: DVec3 = DVec3::new(0.0, -0.12, 0.15);
@@ -41,13 +41,10 @@ impl Basis {
     }
 
     pub(crate) fn name(&self) -> String {
-        let letter = |(axis, sign): (usize, f64)| {
-            [
-                if sign < 0.0 { "-" } else { "" }.to_owned(),
-                AXES.get(axis).map(char::to_string).unwrap_or_default(),
-            ]
+        let letters = |(axis, sign): (usize, f64)| {
+            (sign < 0.0).then_some('-').into_iter().chain(AXES.get(axis).copied())
         };
-        self.axes.into_iter().zip(self.signs).flat_map(letter).collect()
+        self.axes.into_iter().zip(self.signs).flat_map(letters).collect()
     }
 
     fn of_device(&self, vector: DVec3) -> DVec3 {
@@ -108,20 +105,18 @@ impl Transform {
 
     /// Encodes the transform like the service, without parts at their defaults.
     pub(crate) fn to_json(self) -> Value {
-        let mut encoded = json!({});
-        if let Value::Object(parts) = &mut encoded {
-            if self.position_m != DVec3::ZERO {
-                parts.insert("position".to_owned(), of_vector(self.position_m));
-            }
-            if self.rotation != DQuat::IDENTITY {
-                let DQuat { x, y, z, w } = self.rotation;
-                parts.insert("rotation".to_owned(), json!({ "w": w, "x": x, "y": y, "z": z }));
-            }
-            if self.scale != DVec3::ONE {
-                parts.insert("scale".to_owned(), of_vector(self.scale));
-            }
+        let mut parts = Map::new();
+        if self.position_m != DVec3::ZERO {
+            parts.insert("position".to_owned(), of_vector(self.position_m));
         }
-        encoded
+        if self.rotation != DQuat::IDENTITY {
+            let DQuat { x, y, z, w } = self.rotation;
+            parts.insert("rotation".to_owned(), json!({ "w": w, "x": x, "y": y, "z": z }));
+        }
+        if self.scale != DVec3::ONE {
+            parts.insert("scale".to_owned(), of_vector(self.scale));
+        }
+        Value::Object(parts)
     }
 
     fn point(&self, place: DVec3) -> DVec3 {
@@ -149,7 +144,7 @@ pub(crate) fn of_vector(vector: DVec3) -> Value {
 }
 
 /// Presets by name; true for an origin at the centre of the range.
-const PRESETS: [(&str, bool); 6] = [
+pub(crate) const PRESETS: [(&str, bool); 6] = [
     ("defaults", false),
     ("arm_front", false),
     ("arm_front_centered", true),

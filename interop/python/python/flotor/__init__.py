@@ -72,7 +72,7 @@ def _text(value: object) -> str:
 
 
 class RunFailed(FlotorError):
-    """Error of a run that ended by a fault, or in which a model failed; ``flotor run`` has an exit code other than 0."""
+    """Error of a run that ended early, or in which a model failed; ``flotor run`` has an exit code other than 0."""
 
     def __init__(self, problem: str, summary: dict[str, object]) -> None:
         super().__init__(problem)
@@ -245,13 +245,15 @@ def run(
     settings: dict[str, object] | None = None,
     record: str | os.PathLike[str] | None = None,
 ) -> dict[str, object]:
-    """Runs a scene (the demo if None) in virtual time; returns the summary, with the keys of ``flotor run --json``.
+    """Runs a scene in virtual time; returns the summary, with the keys of ``flotor run --json``.
+
+    ``scene`` is a scene file (TOML), or the name of one of Flotor's own scenes; None runs the demo.
 
     ``settings`` are parameters by plugin and id: ``{"spring.variant": "closed-form", "device.preset": "full"}``, or
     ``{"spring": {"variant": "closed-form"}}``. Equal arguments give an equal ``trace_digest``.
 
     Raises :class:`FlotorError` for an invalid scene or argument, and :class:`RunFailed`, which has the summary, if a model failed
-    or the run ended by a fault.
+    or the run ended early.
     """
     summary = _flotor.run_scene(
         None if scene is None else Path(scene),
@@ -279,12 +281,12 @@ def _by_plugin_and_id(settings: Mapping[str, object]) -> Iterator[tuple[str, obj
 
 
 def _problem(summary: dict[str, object]) -> str | None:
-    """Returns the first failure of a model in a run, or the fault that ended the run; None without a failure."""
+    """Returns the first failure of a model in a run, or the cause of an early end; None without either."""
     for plugin in summary["plugins"]:
         if plugin["kind"] == "model" and plugin["health"] != "ok":
             return f"`{plugin['name']}` {plugin['health']}"
     end = summary["end"]
-    return None if end in ("finished", "stopped") else f"the run ended by a fault: {end}"
+    return None if end in ("finished", "stopped") else f"the run ended early: {end}; the `summary` of this error has the details"
 
 
 class Recording:

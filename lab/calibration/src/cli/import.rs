@@ -22,7 +22,7 @@ use std::path::PathBuf;
     flotor calibrate import --excess 0.19,-0.026,-0.0045 --at 10 --device maglev --out mine.toml"
 )]
 pub(super) struct ImportArguments {
-    /// Polynomial of the excess force over the height z in mm: coefficients of 1, z, z² ... in N, N/mm, N/mm² ...
+    /// Polynomial of the excess force over the height z in mm: up to 8 coefficients, of 1, z, z² ... in N, N/mm, N/mm² ...
     /// (default: the polynomial of the thesis)
     #[arg(long, value_name = "C0,C1,...", value_delimiter = ',', value_parser = real, allow_hyphen_values = true)]
     excess: Vec<f64>,
@@ -35,9 +35,9 @@ pub(super) struct ImportArguments {
     /// Id of the device's plugin
     #[arg(long, default_value = "simulated", value_name = "ID")]
     device: String,
-    /// Serial number of the device (default: valid for all)
-    #[arg(long, default_value = "", value_name = "TEXT")]
-    serial: String,
+    /// Serial number of the device (default: the file is valid for every serial number)
+    #[arg(long, value_name = "TEXT")]
+    serial: Option<String>,
     /// Calibration file to write
     #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     out: PathBuf,
@@ -66,7 +66,11 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<(), CommandError> {
                 )
             }
             InvalidCalibration::Count(_) => format!("--excess: {invalid}"),
-            InvalidCalibration::Share { .. } => format!("{invalid}; correct --excess, --at or --range-mm"),
+            InvalidCalibration::Share { height_m, share } => format!(
+                "the ratio of delivered to commanded force is {share} at {:.3} mm, but must be between 0.5 and 2; correct \
+                 --excess, --at or --range-mm",
+                height_m * 1.0e3
+            ),
         })
     })?;
     let note = if from_report {
@@ -76,7 +80,7 @@ pub(super) fn run(arguments: &ImportArguments) -> Result<(), CommandError> {
     };
     let file = CalibrationFile {
         format: FORMAT,
-        device: CalibratedDevice { plugin: device.clone(), serial: serial.clone() },
+        device: CalibratedDevice { plugin: device.clone(), serial: serial.clone().unwrap_or_default() },
         vertical,
         quality: Quality::default(),
         provenance: provenance(Source::Imported, Some(note)),

@@ -74,9 +74,10 @@ fn refused(error: CalibrationError) -> CommandError {
         CalibrationError::Plugin(error) => error.into(),
         CalibrationError::Run(error) => error.into(),
         CalibrationError::Fault(fault) => CommandError::DeviceFault(fault),
-        CalibrationError::Setting(_) | CalibrationError::Refused(_) | CalibrationError::Disconnected => {
-            CommandError::PluginRefused(error.to_string())
-        }
+        CalibrationError::Setting(_)
+        | CalibrationError::Refused(_)
+        | CalibrationError::SensorRefused(_)
+        | CalibrationError::Disconnected => CommandError::PluginRefused(error.to_string()),
         CalibrationError::TooFew { .. }
         | CalibrationError::TooStrong { .. }
         | CalibrationError::Saturated { .. } => CommandError::Usage(error.to_string()),
@@ -119,7 +120,7 @@ mod tests {
     fn an_illegal_value_is_told_what_is_legal() {
         for (arguments, words) in [
             ("vertical --simulated --step-mm 0", "the range is 0.01 to 22 mm"),
-            ("vertical --simulated --steps 0", "write a whole number from 1 to 200"),
+            ("vertical --simulated --steps 0", "write a whole number from 7 to 200"),
             ("vertical --simulated --force -10,12", "the range is 1 to 50 N"),
             ("vertical --simulated --out nosuch/c.toml", "no folder `nosuch`; create it first"),
             ("import --out c.toml --excess x", "write a number such as 0.75"),

@@ -51,7 +51,7 @@ pub(super) struct RigArguments {
     /// Time limit for moving the sensor to the next height
     #[arg(long, value_name = "TIME", default_value = "10min", conflicts_with = "simulated", value_parser = duration_s, allow_hyphen_values = true)]
     patience: f64,
-    /// Seed of the simulated sensor's noise
+    /// Seed of the noise in the simulated rig
     #[arg(long, value_parser = seed, default_value_t = 1, value_name = "N", conflicts_with = "device")]
     pub(super) seed: u64,
     #[command(flatten)]

@@ -36,8 +36,8 @@ pub(super) struct VerticalArguments {
     /// Number of sweeps over all heights for each force
     #[arg(long, default_value_t = 2, value_name = "N", value_parser = count(1..=100_u32))]
     runs: u32,
-    /// Number of steps down from the top
-    #[arg(long, default_value_t = 14, value_name = "N", value_parser = count(1..=200_u32))]
+    /// Number of steps down from the top, at least 7
+    #[arg(long, default_value_t = 14, value_name = "N", value_parser = count(7..=200_u32))]
     steps: u32,
     /// Length of a step in mm
     #[arg(long, default_value_t = 1.0, value_name = "MM", value_parser = number("mm", "length", 0.01..=22.0))]
@@ -131,13 +131,6 @@ fn plan(arguments: &VerticalArguments) -> Result<Plan, CommandError> {
 /// Number of corrections that are compared in the simulated rig.
 const CORRECTIONS: u64 = 4;
 
-/// Correction of the force by the device, by the command, or none.
-struct Correction<'a> {
-    name: &'static str,
-    calibration: Option<VerticalCalibration>,
-    command_n: &'a dyn Fn(f64) -> f64,
-}
-
 /// Calibrates the simulated rig. Its error is known without sensor noise, and a sweep is cheap, so the thesis's two
 /// corrections are compared as well.
 fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, CommandError> {
@@ -149,17 +142,18 @@ fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, Com
     let (fit, report) = (fit(&readings).map_err(refused)?, report(plan)?);
     let uncorrected = |_: f64| PROBE_N;
     let as_report = |height_m: f64| thesis::command_n(PROBE_N, height_m);
-    let corrections = [
-        Correction { name: UNCORRECTED, calibration: None, command_n: &uncorrected },
-        Correction { name: "thesis, spring force only", calibration: None, command_n: &as_report },
-        Correction { name: "thesis, total command", calibration: Some(report), command_n: &uncorrected },
-        Correction { name: FITTED, calibration: Some(fit.calibration), command_n: &uncorrected },
-    ];
-    let mut curves = Vec::new();
-    for Correction { name, calibration, command_n } in corrections {
+    // The device corrects the force, or the command does, or neither.
+    let mut curve = |name, calibration, command_n: &dyn Fn(f64) -> f64| {
         rig.calibrate(calibration);
-        curves.push((name, ErrorCurve::measure(&mut rig, command_n, || progress.inc(1)).map_err(refused)?));
-    }
+        let curve = ErrorCurve::measure(&mut rig, command_n, || progress.inc(1)).map_err(refused)?;
+        Ok::<_, CommandError>((name, curve))
+    };
+    let curves = vec![
+        curve(UNCORRECTED, None, &uncorrected)?,
+        curve("thesis, spring force only", None, &as_report)?,
+        curve("thesis, total command", Some(report), &uncorrected)?,
+        curve(FITTED, Some(fit.calibration), &uncorrected)?,
+    ];
     progress.finish_and_clear();
     Ok(Measured { serial, readings, fit, report, curves })
 }

@@ -131,8 +131,8 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
     /// # Errors
     /// [`CalibrationError`] if the device does not support calibration, or was lost.
     pub fn calibrate(&mut self, calibration: &VerticalCalibration) -> Result<(), CalibrationError> {
-        if let Some(holder) = self.holder.take() {
-            self.opened = holder.end();
+        if let Some(mut holder) = self.holder.take() {
+            self.opened = holder.stop();
         }
         let opened = self.opened.as_mut().ok_or(CalibrationError::Disconnected)?;
         opened.calibrate_vertical(calibration).map_err(CalibrationError::Refused)

@@ -202,11 +202,7 @@ impl Holder {
 
     /// Removes the force, ends the thread and deactivates the device; returns the device, `None` if it must be
     /// reopened.
-    pub(super) fn end(mut self) -> Option<OpenedDevice> {
-        self.stop().and_then(ActiveDevice::deactivate)
-    }
-
-    fn stop(&mut self) -> Option<ActiveDevice> {
+    pub(super) fn stop(&mut self) -> Option<OpenedDevice> {
         self.commands.publish(&Command::End);
         let thread = self.thread.take()?;
         while !thread.is_finished() {
@@ -216,14 +212,14 @@ impl Holder {
             }
             std::thread::sleep(LOOK_FOR_END);
         }
-        thread.join().ok()
+        thread.join().ok()?.deactivate()
     }
 }
 
 /// Removes the force and deactivates the device however the procedure ends.
 impl Drop for Holder {
     fn drop(&mut self) {
-        let _ = self.stop().and_then(ActiveDevice::deactivate);
+        let _ = self.stop();
     }
 }
 

@@ -8,6 +8,7 @@
 //!
 //! The length of a piece is that of the motion with angles as lengths at the device's lever arm ([`super::LEVER_M`]).
 
+use super::jacobian::size_n;
 use super::measure::{Measure, NO_ANSWER, Verdict};
 use super::poses::Reach;
 use super::sweep::sweep;
@@ -202,7 +203,7 @@ pub(super) fn standing_out(changes: &[Option<Change>], index: usize) -> f64 {
     let around = index.checked_sub(1).and_then(|from| changes.get(from..=index + 1));
     let Some([Some(before), Some(here), Some(after)]) = around else { return 0.0 };
     let second = before.beyond + here.beyond * -2.0 + after.beyond;
-    second.force().length() + second.torque().length() / LEVER_M
+    size_n(&second)
 }
 
 /// Returns the most irregular pieces, no two of them neighbours.

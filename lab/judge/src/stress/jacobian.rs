@@ -21,7 +21,7 @@ const SAME: f64 = 1.0e-6;
 const COLUMNS: f64 = 6.0;
 
 /// Returns the magnitude of a wrench with its torque at the lever arm, N.
-fn size_n(wrench: &Wrench) -> f64 {
+pub(super) fn size_n(wrench: &Wrench) -> f64 {
     wrench.force().length() + wrench.torque().length() / LEVER_M
 }
 

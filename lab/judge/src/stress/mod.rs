@@ -119,9 +119,11 @@ fn part_of(size: Size, memory: Memory) -> u64 {
 
 #[cfg(test)]
 fn measure_all(setup: &Setup<'_>) -> Result<StressReport, LoadError> {
+    use crate::tally::Merge;
+
     let mut found = parts::Found::default();
     for part in Part::all(&setup.options) {
-        found.add(parts::measure(setup, part)?);
+        found.merge(parts::measure(setup, part)?);
     }
     Ok(StressReport::new(setup, found.measures, found.spread))
 }

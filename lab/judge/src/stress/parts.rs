@@ -11,6 +11,7 @@ use super::{
     symmetry, totality,
 };
 use crate::platform::{anonymous_file, end_at_once, ending_signal, standard_input};
+use crate::tally::{Merge, tally};
 use crate::{Progress, watch};
 use flotor_loader::{LoadError, Plugin, Setting};
 use flotor_session::PluginProcess;
@@ -93,26 +94,19 @@ impl Part {
     }
 }
 
-/// Results of a part.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(super) struct Found {
-    pub(super) measures: Vec<Measure>,
-    /// Distributions measured by the part; all other distributions are empty.
-    pub(super) spread: Distributions,
+tally! {
+    /// Results of a part.
+    #[derive(Clone, Debug, Serialize, Deserialize)]
+    pub(super) struct Found {
+        pub(super) measures: Vec<Measure>,
+        /// Distributions measured by the part; all other distributions are empty.
+        pub(super) spread: Distributions,
+    }
 }
 
 impl Found {
     fn of(measure: Measure) -> Self {
         Self { measures: vec![measure], ..Self::default() }
-    }
-
-    pub(super) fn add(&mut self, later: Self) {
-        self.measures.extend(later.measures);
-        let Distributions { jumps, gains_n_per_m, loop_energies, calls_ns } = later.spread;
-        self.spread.jumps.extend(jumps);
-        self.spread.gains_n_per_m.add(gains_n_per_m);
-        self.spread.loop_energies.add(loop_energies);
-        self.spread.calls_ns.add(calls_ns);
     }
 }
 
@@ -209,7 +203,7 @@ pub fn score_in_processes(
     let (mut found, mut stuck) = (Found::default(), None);
     for part in Part::all(options).filter(|part| only.is_empty() || only.contains(part)) {
         let delivered = in_own_process(program(part));
-        found.add(match delivered {
+        found.merge(match delivered {
             Ok(Ok(Delivery::Found(found))) => found,
             Ok(Ok(Delivery::Stuck(pose, step))) => {
                 let found = part.broken(Some(pose), &step);

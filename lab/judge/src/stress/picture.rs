@@ -1,10 +1,8 @@
 //! Picture of the score: jumps over piece length, gains over the workspace, loop energies, call times.
 
+use super::lap::CONSERVATIVE;
 use super::{DAMPINGS_NS_PER_M, Decades, PERIOD_S, StressReport};
 use flotor_plot::{Axis, Bin, Figure, Mark, Panel, Series};
-
-/// Largest relative loop energy that passes, for the mark.
-const CONSERVATIVE: f64 = 1.0e-9;
 
 impl StressReport {
     /// Draws the score as SVG. Not real-time.

@@ -4,6 +4,7 @@ use super::continuity::Jump;
 use super::measure::{Measure, PoseRecord, Verdict};
 use super::poses::Reach;
 use super::{Decades, Setup, Size};
+use crate::tally::tally;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -33,18 +34,20 @@ pub struct StressReport {
     pub stuck: Option<String>,
 }
 
-/// Distributions of measured quantities.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Distributions {
-    /// M1: largest change of wrench over pieces of each length.
-    pub jumps: Vec<Jump>,
-    /// M2: largest gain at each pose, N/m.
-    pub gains_n_per_m: Decades,
-    /// M4: energy generated on a lap, less its uncertainty, divided by the absolute work exchanged with the hand; a lap without
-    /// generated energy counts as 1e-18.
-    pub loop_energies: Decades,
-    /// M7: shortest time of each repeated call, ns.
-    pub calls_ns: Decades,
+tally! {
+    /// Distributions of measured quantities.
+    #[derive(Clone, Debug, Serialize, Deserialize)]
+    pub struct Distributions {
+        /// M1: largest change of wrench over pieces of each length.
+        pub jumps: Vec<Jump>,
+        /// M2: largest gain at each pose, N/m.
+        pub gains_n_per_m: Decades,
+        /// M4: energy generated on a lap, less its uncertainty, divided by the absolute work exchanged with the hand; a lap without
+        /// generated energy counts as 1e-18.
+        pub loop_energies: Decades,
+        /// M7: shortest time of each repeated call, ns.
+        pub calls_ns: Decades,
+    }
 }
 
 impl StressReport {

@@ -20,6 +20,7 @@
 
 use super::continuity::{FELT_N, FELT_NM, HARMLESS, Jumps, Line, PIECES_MM, changes, close_in, standing_out};
 use super::energy::samples;
+use super::jacobian::size_n;
 use super::lap::{CONSERVATIVE, Dissipation, Lap};
 use super::measure::{Measure, PoseRecord, Verdict};
 use super::motion::Triangle;
@@ -257,7 +258,7 @@ impl Opponent<'_, '_> {
         let (best, size_n) = self.climb(None, |own, point| {
             let pose = own.pose(point);
             match own.subject.answer_at(pose) {
-                Ok(output) => output.wrench.force().length() + output.wrench.torque().length() / LEVER_M,
+                Ok(output) => size_n(&output.wrench),
                 Err(trouble) => {
                     own.tally.troubles += 1;
                     own.tally.trouble_at.get_or_insert(trouble.pose);
@@ -300,31 +301,17 @@ fn judge(total: &Tally) -> Measure {
     let (force, torque) = (total.jumps.force[last], total.jumps.torque[last]);
     // Judge each value by its own bound, and report the most severe.
     let graded = [
-        (force, FELT_N * HARMLESS, Verdict::of(force.value, FELT_N * HARMLESS, FELT_N), "step of force"),
-        (
-            torque,
-            FELT_NM * HARMLESS,
-            Verdict::of(torque.value, FELT_NM * HARMLESS, FELT_NM),
-            "step of torque",
-        ),
-        (
-            total.energy,
-            CONSERVATIVE,
-            Verdict::of(total.energy.value, CONSERVATIVE, CONSERVATIVE),
-            "energy of a lap",
-        ),
-        (
-            total.energy_in_motion,
-            CONSERVATIVE,
-            Verdict::of(total.energy_in_motion.value, CONSERVATIVE, CONSERVATIVE),
-            "energy of a lap in motion",
-        ),
+        (force, FELT_N * HARMLESS, FELT_N, "step of force"),
+        (torque, FELT_NM * HARMLESS, FELT_NM, "step of torque"),
+        (total.energy, CONSERVATIVE, CONSERVATIVE, "energy of a lap"),
+        (total.energy_in_motion, CONSERVATIVE, CONSERVATIVE, "energy of a lap in motion"),
     ];
     let (worst, bound, _, what) = graded
         .into_iter()
         .max_by(|(a, of_a, ..), (b, of_b, ..)| (a.value / of_a).total_cmp(&(b.value / of_b)))
         .unwrap_or(graded[0]);
-    let mut verdict = graded.iter().map(|(.., verdict, _)| *verdict).max().unwrap_or(Verdict::Pass);
+    let verdicts = graded.map(|(worst, bound, limit, _)| Verdict::of(worst.value, bound, limit));
+    let mut verdict = verdicts.into_iter().max().unwrap_or(Verdict::Pass);
     let mut comment = format!("{what}, relative to its bound, after {} tries", total.tries);
     let mut pose = worst.pose;
     if total.troubles > 0 {

@@ -4,9 +4,10 @@
 //! pose must be the image of the answer: a mirror maps a force like a position, and a torque like a rotation, with the
 //! opposite sign.
 
+use super::jacobian::size_n;
 use super::measure::{Measure, NO_ANSWER, Verdict};
 use super::sweep::sweep;
-use super::{LEVER_M, Setup, WIDER};
+use super::{Setup, WIDER};
 use crate::sampling::{Random, Sobol};
 use crate::subject::Subject;
 use crate::tally::{Worst, tally};
@@ -102,10 +103,6 @@ fn answer(subject: &mut Subject<'_>, pose: Pose) -> Option<Wrench> {
     subject.answer_at(pose).ok().map(|output| output.wrench)
 }
 
-fn size_n(wrench: Wrench) -> f64 {
-    wrench.force().length() + wrench.torque().length() / LEVER_M
-}
-
 /// Compares evenly spread poses with their images.
 pub(super) fn measure(setup: &Setup<'_>, symmetry: Symmetry) -> Result<Measure, LoadError> {
     let sobol = Sobol::new(setup.options.seed);
@@ -120,9 +117,9 @@ pub(super) fn measure(setup: &Setup<'_>, symmetry: Symmetry) -> Result<Measure, 
                 tally.unanswered += 1;
                 continue;
             };
-            let largest_n = size_n(here).max(size_n(there)).max(NOTHING_N);
+            let largest_n = size_n(&here).max(size_n(&there)).max(NOTHING_N);
             tally.comparable += u64::from(largest_n > NOTHING_N);
-            tally.difference.offer(size_n(there + map.wrench(here) * -1.0) / largest_n, pose);
+            tally.difference.offer(size_n(&(there + map.wrench(here) * -1.0)) / largest_n, pose);
         }
         tally
     })?;

@@ -1,6 +1,7 @@
 //! Small laws with one known flaw each: the measures meant for it fail, and no other.
 
 use super::{Measure, Part, Setup, Size, StressOptions, StressReport, Verdict, measure_all};
+use crate::tally::Merge;
 use flotor_hal::abi::model_entry;
 use flotor_hal::{
     DVec3, Demand, ForceModel, Input, Memory, ModelInfo, Output, Pose, Refusal, Settings, Wrench,
@@ -66,7 +67,7 @@ fn stress_with<M: ForceModel>(options: StressOptions, parts: &[Part]) -> StressR
     let setup = Setup { plugin: &plugin, settings: &[], options, part, progress: &() };
     let mut found = super::parts::Found::default();
     for part in parts {
-        found.add(super::parts::measure(&setup, *part).unwrap());
+        found.merge(super::parts::measure(&setup, *part).unwrap());
     }
     StressReport::new(&setup, found.measures, found.spread)
 }

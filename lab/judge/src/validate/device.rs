@@ -301,7 +301,7 @@ impl Running {
     fn push_on(&mut self, push: &Wrench) -> Result<(), String> {
         match self.turn(push) {
             Err(Trouble { fault: Some(Fault::EmergencyStop), .. }) | Ok(_) => {}
-            Err(trouble) => return Err(format!("during safe_stop, {}", trouble.words)),
+            Err(trouble) => return Err(format!("shortly before or during safe_stop, {}", trouble.words)),
         }
         std::thread::sleep(TICK);
         Ok(())

@@ -29,7 +29,7 @@ pub(super) fn live(subject: &Subject, after: After<'_>) -> Result<(), Outcome> {
     if subject.is_device() {
         return device(subject.device()?, after);
     }
-    let mut model = subject.plugin.create_model(subject.settings())?;
+    let mut model = subject.plugin.create_model(&subject.settings)?;
     after("create", model.float_changes())?;
     model.prepare(&CONFIG).map_err(|refusal| format!("prepare refused: {refusal}"))?;
     after("prepare", model.float_changes())?;

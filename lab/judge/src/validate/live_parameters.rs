@@ -86,7 +86,7 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
     let is_told = read_back.is_finite() && expected.is_finite();
     if is_told && (read_back - expected).abs() > 1.0e-9 * read_back.abs().max(expected.abs()) {
         return Err(format!(
-            "`{id}` = {value} was set (status `{}`), but then `{id}` is {read_back} instead of {expected}",
+            "`set_parameter` of `{id}` to {value} returned `{}`, but then `{id}` is {read_back} instead of {expected}",
             wording::status(last)
         ));
     }

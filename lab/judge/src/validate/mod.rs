@@ -117,7 +117,7 @@ pub fn validate(
                 Verdict { seen: Some(Outcome::Missing(late)), figures: None }
             }
             Ok(None) => Verdict::violated(format!(
-                "the step did not return within {}; the later rules were not checked (raise the limit with `--timeout`)",
+                "the check did not end within {}; the later rules were not checked (raise the limit with `--timeout`)",
                 wording::time(own_patience)
             )),
             Err(error) => Verdict::violated(format!("cannot be checked: {error}")),

@@ -144,7 +144,7 @@ pub(super) fn time_budget(model: &mut Model) -> Result<(), String> {
         return Ok(());
     }
     let [usual, limit] = [usual, limit].map(wording::time);
-    Err(format!("the 99th percentile of a step is {usual} of processor time, above the limit of {limit}"))
+    Err(format!("the 99th percentile of the duration of a step is {usual}, above the limit of {limit}"))
 }
 
 /// Returns the wrenches of a walk of each model, stepped alternately.

@@ -21,10 +21,6 @@ impl Subject {
         self.plugin.metadata().kind == PluginKind::Device
     }
 
-    pub(super) fn settings(&self) -> &[Setting] {
-        &self.settings
-    }
-
     pub(super) fn device(&self) -> Result<OpenedDevice, LoadError> {
         self.plugin.open_device(&self.settings)
     }

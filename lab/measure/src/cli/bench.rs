@@ -40,31 +40,32 @@ pub(crate) struct BenchArguments {
     /// `solid`, else the defaults of the model)
     #[arg(long = "case", value_name = "KEY=VALUE,...")]
     cases: Vec<String>,
-    /// Settings common to all cases (repeatable)
+    /// Settings common to all cases but those with `model=ID` (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
     /// Reference case for the errors, of high accuracy (default without --case: that of `spring` or `solid`, else none)
     #[arg(long, value_name = "KEY=VALUE,...")]
     reference: Option<String>,
-    /// Baseline case for the times (default: the first case)
+    /// Baseline for the times, one of the cases (default: the first case)
     #[arg(long, value_name = "KEY=VALUE,...")]
     yardstick: Option<String>,
     /// Depth of the middle of the motion below home, in mm
     #[arg(long, value_name = "MM", default_value_t = 4.0, value_parser = number("mm", "depth", 0.0..=100.0))]
     depth_mm: f64,
-    /// Radius of the workspace about home, in mm (default: 12, as the device; for a spring scaled by its free length
-    /// over 15 mm)
+    /// Radius of the workspace about home, in mm; no effect without a reference or --apart (default: 12, as the device; for a
+    /// spring scaled by its free length over 15 mm)
     #[arg(long, value_name = "MM", value_parser = number("mm", "radius", 0.001..=1000.0))]
     workspace_mm: Option<f64>,
-    /// Largest rotation in the workspace, in degrees
+    /// Largest rotation in the workspace, in degrees; no effect without a reference or --apart
     #[arg(long, value_name = "DEGREES", default_value_t = 7.0, value_parser = number("degrees", "rotation", 0.0..=180.0))]
     workspace_deg: f64,
-    /// Report separately the calls that return more than zero for this detail (a column of `eval --details`)
+    /// Report separately the calls that return more than zero for this detail, a column of `eval --details` (default without
+    /// --case: `rod_share` of `spring`, else none)
     #[arg(long, value_name = "DETAIL")]
     apart: Option<String>,
     /// Measure the whole tick with the model: on a scripted device, on the simulated flotor, and with the model in a process
     /// of its own
-    #[arg(long, conflicts_with_all = ["cases", "sets", "reference", "yardstick", "apart", "csv", "plot"])]
+    #[arg(long, conflicts_with_all = ["cases", "sets", "reference", "yardstick", "depth_mm", "workspace_mm", "workspace_deg", "apart", "csv", "plot"])]
     tick: bool,
     /// Extent of the measurement
     #[arg(long, value_enum, default_value = "short")]
@@ -218,7 +219,7 @@ fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
             let name = case(text)?.name;
             cases.iter().position(|case| case.name == name).ok_or_else(|| {
                 CommandError::Usage(format!(
-                    "the baseline `{text}` is not among the cases; add --case {text}"
+                    "--yardstick {text}: this is none of the cases; choose one of them, or add --case {text}"
                 ))
             })?
         }

@@ -37,7 +37,7 @@ pub(crate) struct EvalArguments {
     /// CSV file for the wrenches (- for standard output)
     #[arg(long, value_name = "OUT.csv", default_value = "-", value_parser = new_file)]
     out: PathBuf,
-    /// Rows are successive poses of one handle (default: each pose is reached from home)
+    /// Rows are successive poses of one handle; no effect on a model without a history (default: each pose is reached from home)
     #[arg(long)]
     path: bool,
     /// Rows are the ticks of a loop: exactly one step per row, without intermediate steps and without settling
@@ -87,10 +87,9 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
 /// Reads the poses from a file or from standard input.
 fn read_poses(path: &Path) -> Result<Poses, CommandError> {
     let problem = |cause| {
+        let path = path.display();
         CommandError::Usage(format!(
-            "{}: {}",
-            path.display(),
-            format_args!("cannot read the poses: {cause}; check the path and its permissions")
+            "{path}: cannot read the poses: {cause}; check the path and its permissions"
         ))
     };
     let bytes = read(path).map_err(problem)?;

@@ -20,7 +20,7 @@ use std::path::PathBuf;
     Example:\n  flotor jitter --duration 20s --plot jitter.svg"
 )]
 pub(crate) struct JitterArguments {
-    /// Duration of the whole measurement
+    /// Duration of the whole measurement, rounded up to an even number of seconds
     #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME", default_value = "20s")]
     duration: f64,
     /// Loop rate in Hz, 100 to 10000

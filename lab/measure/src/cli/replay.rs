@@ -103,6 +103,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     }
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let progress = progress_bar((replay.run().duration_s * 1.0e3) as u64, "{percent:>3} %  replaying");
+    let names: Vec<String> = replay.plugins().iter().map(|plugin| plugin.name.clone()).collect();
     let started = Instant::now();
     let mut picture = arguments.plot.as_ref().map(|_| ReplayPicture::new());
     let mut end_ns = 0;
@@ -137,8 +138,9 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     write_text(arguments.plot.as_deref(), || {
         picture.map_or_else(String::new, |picture| picture.into_svg(&arguments.text()))
     })?;
-    if let Some((_, words)) = health.iter().find(|(health, _)| health.panicked_at.is_some()) {
-        return Err(CommandError::PluginRefused(format!("a model of the recording failed: {words}")));
+    let mut named = names.iter().zip(&health);
+    if let Some((name, (_, words))) = named.find(|(_, (health, _))| health.panicked_at.is_some()) {
+        return Err(CommandError::PluginRefused(format!("the model `{name}` failed in the replay: {words}")));
     }
     if !bit_exact && !arguments.changes_anything() {
         let why = report.why_apart.unwrap_or(DivergenceCause::OtherBuild);

@@ -38,10 +38,11 @@ pub(crate) struct StressArguments {
     /// Symmetry that the model should have; M10 checks it
     #[arg(long, value_enum)]
     symmetry: Option<Symmetry>,
-    /// Compute only this measure (repeatable)
+    /// Compute only this measure, M0 to M9, or with --symmetry M10 (repeatable; default: all)
     #[arg(long, value_parser = measure, value_name = "M0")]
     only: Vec<Part>,
-    /// Limit of the processor time of one step, ten times as long for a step that waits: 5s, 500ms (default: 1s)
+    /// Limit of the processor time of one step, such as 5s or 500ms; ten times as long for a step that waits
+    /// (default: FLOTOR_STEP_LIMIT_S in seconds, or 1s)
     #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]
     timeout: Option<f64>,
     /// Compute one measure in this process, and write the result into the file of standard input
@@ -55,7 +56,8 @@ pub(crate) struct StressArguments {
 }
 
 fn measure(id: &str) -> Result<Part, String> {
-    Part::of_measure(id).ok_or_else(|| format!("unknown measure `{id}`; use M0 to M10"))
+    Part::of_measure(id)
+        .ok_or_else(|| format!("unknown measure `{id}`; use M0 to M9, or with --symmetry M10"))
 }
 
 fn part(word: &str) -> Result<Part, String> {
@@ -75,7 +77,7 @@ pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
         return delivered.map_err(|error| CommandError::Failed(error.to_string()));
     }
     let program = std::env::current_exe()
-        .map_err(|cause| CommandError::file(Path::new("flotor"), "cannot find this program", cause))?;
+        .map_err(|cause| CommandError::file(Path::new("flotor-lab"), "cannot find this program", cause))?;
     let one_part = |part: Part| {
         let mut command = Command::new(&program);
         command.args(["stress", "--deliver", part.word(), "--size", size.word()]);

@@ -25,10 +25,11 @@ pub(crate) struct ValidateArguments {
     sets: Vec<KeyValue>,
     #[command(flatten)]
     json: JsonOption,
-    /// Check only this rule of the contract (repeatable)
+    /// Check only this rule, by its name in the output, and `metadata` (repeatable; default: all rules)
     #[arg(long, value_parser = rule, value_name = "RULE")]
     only: Vec<Check>,
-    /// Limit of the processor time and of the waiting time of each rule, six times as long for the first instance: 10s, 500ms
+    /// Limit of the processor time and of the waiting time of each rule, such as 10s or 500ms; six times as long for the first
+    /// instance
     #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME", default_value = "10s")]
     timeout: f64,
     /// Check one rule in this process, and print the verdict as JSON
@@ -66,7 +67,7 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
         )));
     }
     let program = std::env::current_exe()
-        .map_err(|cause| CommandError::file(Path::new("flotor"), "cannot find this program", cause))?;
+        .map_err(|cause| CommandError::file(Path::new("flotor-lab"), "cannot find this program", cause))?;
     let one_rule = |rule: Check| {
         let mut command = Command::new(&program);
         command.arg("validate").args(["--rule", rule.id(), "--deliver"]).arg(&arguments.plugin);

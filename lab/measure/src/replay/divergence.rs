@@ -88,7 +88,7 @@ pub enum DivergenceCause {
     },
     /// Ticks are missing; before them the wrench is equal bit for bit.
     #[error(
-        "{ticks} ticks are missing after tick {after_tick}, so the states of models and couplings are unknown"
+        "ticks are missing after tick {after_tick} ({ticks} of them), so the states of models and couplings are unknown"
     )]
     Gap {
         /// Last tick before the missing ones.
@@ -116,21 +116,22 @@ pub enum DivergenceCause {
 #[derive(Default)]
 pub(super) struct Evidence {
     pub(super) coverage: Coverage,
-    /// Model with a field of unknown arrival times.
-    field: Option<String>,
+    /// Cause by a model with a field of unknown arrival times.
+    field: Option<DivergenceCause>,
     /// Last gap: tick before it, and number of missing ticks.
     gap: Option<(u64, u64)>,
     /// First tick in which a model was disabled in the run only.
     disabled_at: Option<u64>,
-    /// Cause of the first differing tick.
-    cause: Option<DivergenceCause>,
+    /// Cause of the first differing tick; `None` if no tick differs.
+    pub(super) cause: Option<DivergenceCause>,
 }
 
 impl Evidence {
     pub(super) fn of(run: &RunDescription) -> Self {
         let is_timed = run.clock == Clock::Real;
         let beside = run.plugins.iter().find(|plugin| is_timed && plugin.field.is_some());
-        Self { field: beside.map(|plugin| plugin.name.clone()), ..Self::default() }
+        let field = beside.map(|plugin| DivergenceCause::FieldOnRealClock { model: plugin.name.clone() });
+        Self { field, ..Self::default() }
     }
 
     /// Records the evidence of a tick before its comparison: one record and one port for each device.
@@ -152,8 +153,8 @@ impl Evidence {
             return;
         }
         let first_tick = self.coverage.begins_at_tick.filter(|_| self.coverage.is_joined_late());
-        let cause = if let Some(model) = &self.field {
-            DivergenceCause::FieldOnRealClock { model: model.clone() }
+        let cause = if let Some(field) = &self.field {
+            field.clone()
         } else if happened_then(Events::MODEL_FAULT, records, ports) {
             DivergenceCause::ModelDisabled { tick }
         } else if happened_then(Events::MODEL_OVERRUN, records, ports) {
@@ -168,18 +169,10 @@ impl Evidence {
         self.cause = Some(cause);
     }
 
-    /// Returns the cause of a difference in an unchanged replay; `None` if no tick differs.
-    pub(super) fn cause(&self) -> Option<DivergenceCause> {
-        self.cause.clone()
-    }
-
     /// Returns a cause of a difference besides the change; `None` if no tick differs or the recording shows no such cause.
     pub(super) fn other_cause(&self) -> Option<DivergenceCause> {
-        let field =
-            self.field.as_ref().map(|model| DivergenceCause::FieldOnRealClock { model: model.clone() });
-        field
-            .or_else(|| self.disabled_at.map(|tick| DivergenceCause::ModelDisabled { tick }))
-            .filter(|_| self.cause.is_some())
+        let disabled = self.disabled_at.map(|tick| DivergenceCause::ModelDisabled { tick });
+        self.field.clone().or(disabled).filter(|_| self.cause.is_some())
     }
 }
 

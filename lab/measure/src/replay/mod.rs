@@ -257,7 +257,7 @@ impl<'r> Replay<'r> {
             return Err(ReplayError::NoSuchTick { tick });
         }
         difference.finish();
-        let why = if self.held.is_nothing() { evidence.cause() } else { evidence.other_cause() };
+        let why = if self.held.is_nothing() { evidence.cause } else { evidence.other_cause() };
         // The state replaces what was before its tick.
         let why = why.map(|cause| match cause {
             DivergenceCause::JoinedLate { .. } if starts_from_state => DivergenceCause::OtherBuild,
@@ -410,11 +410,9 @@ fn any_device(period_ns: u64) -> PlausibilityCheck {
 
 /// Checks a sample if it was new in the run: otherwise the record contains the last pose.
 fn look_at_sample(check: &mut PlausibilityCheck, record: &TickRecord) {
-    let mut without = Events::STALE_SAMPLE;
-    for event in [Events::NOT_FINITE, Events::IMPLAUSIBLE_SAMPLE, Events::DEVICE_FAULT] {
-        without.insert(event);
-    }
-    if record.events.intersects(without) {
+    let without =
+        [Events::STALE_SAMPLE, Events::NOT_FINITE, Events::IMPLAUSIBLE_SAMPLE, Events::DEVICE_FAULT];
+    if without.into_iter().any(|event| record.events.intersects(event)) {
         return;
     }
     let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };

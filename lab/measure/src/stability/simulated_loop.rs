@@ -38,7 +38,7 @@ pub enum LoopError {
     #[error(transparent)]
     Plugin(#[from] LoadError),
     /// The plugin lacks a parameter of the simulated flotor.
-    #[error("the plugin is not the simulated flotor: {0}")]
+    #[error("the plugin `simulated` is not that of this version (`flotor plugins` shows its file): {0}")]
     Setting(#[from] SettingError),
     /// The device rejects activation.
     #[error("the device cannot be activated: {0}")]

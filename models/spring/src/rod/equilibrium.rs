@@ -114,8 +114,10 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     matrix: CachedMatrix<N>,
     damping: f64,
     stride: Stride,
-    unstable_directions: usize,
-    work: Work,
+    /// Morse index at the last computation of the matrix: zero if the shape is stable.
+    pub(crate) unstable_directions: usize,
+    /// Cost of the last tick.
+    pub(crate) work: Work,
 }
 
 restorable!([const K: usize, const N: usize, const Q: usize] Equilibrium<K, N, Q>
@@ -236,19 +238,9 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.matrix.steps_left = 0;
     }
 
-    /// Returns the Morse index at the last computation of the matrix: zero if the shape is stable.
-    pub(crate) fn unstable_directions(&self) -> usize {
-        self.unstable_directions
-    }
-
     /// Returns the accepted error of a shape.
     pub(crate) fn tolerance(&self) -> f64 {
         self.effort.tolerance
-    }
-
-    /// Returns the cost of the last tick.
-    pub(crate) fn work(&self) -> Work {
-        self.work
     }
 
     /// Returns the present curve of the rod. Real-time: bounded, no allocation.
@@ -301,7 +293,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         self.reset();
         self.stride = Stride::UNFELT;
         self.work = Work::default();
-        if let Some(start) = start::linear(self.functional.basis(), spring, pose) {
+        if let Some(start) = start::linear(&self.functional.basis, spring, pose) {
             let [swayed, bowed] = start.map(|[x, y]| joined(&x, &y));
             self.shape = self.bowed(&swayed, &bowed, plate);
         }

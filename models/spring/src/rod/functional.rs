@@ -65,7 +65,8 @@ impl Ratios {
 /// Energy with `K` bubbles in each direction, summed at `Q` stations.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Functional<const K: usize, const N: usize, const Q: usize> {
-    basis: Basis<K, Q>,
+    /// Polynomial basis of the shapes.
+    pub(crate) basis: Basis<K, Q>,
     pub(super) ratios: Ratios,
 }
 
@@ -121,12 +122,7 @@ impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
 
     pub(crate) fn new(ratios: Ratios) -> Self {
         let () = Self::TWO_COMPONENTS;
-        Self { basis: Basis::new(), ratios }
-    }
-
-    /// Returns the polynomial basis of the shapes.
-    pub(crate) fn basis(&self) -> &Basis<K, Q> {
-        &self.basis
+        Self { basis: Basis::default(), ratios }
     }
 
     /// Sets the rigidity ratios of the rod. Real-time: bounded, no allocation.

@@ -149,7 +149,7 @@ impl<S: Simd> Sections<S> {
 
 impl SearchEnergy {
     pub(super) fn new() -> Self {
-        let basis = Basis::<BUBBLES, STATIONS>::new();
+        let basis = Basis::<BUBBLES, STATIONS>::default();
         let lower = |along: &[f64; STATIONS], group: usize| -> Four {
             std::array::from_fn(|lane| along[4 * group + lane])
         };

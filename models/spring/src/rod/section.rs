@@ -26,6 +26,9 @@ use flotor_lanes::matrix::dot;
 /// Array of one number per section, for `Q` sections.
 pub(crate) type Along<const Q: usize> = [f64; Q];
 
+/// Unit antisymmetric matrix, of the area that `p_c` and `p'_e` span.
+const TURN: [[f64; 2]; 2] = [[0.0, 1.0], [-1.0, 0.0]];
+
 /// Normals of the sections and their rates, with derived quantities of the energy.
 #[derive(Clone, Debug)]
 pub(crate) struct Sections<const Q: usize> {
@@ -202,16 +205,9 @@ impl<const Q: usize> Sections<Q> {
                     let height = self.level_curvature(load, &potential, c, e, i);
                     all.by_lean_twice[c][e][i] =
                         a * (bending - t * winding - stress * height - load.softening * slope[c] * slope[e]);
-                    // p_c p'_e: the unit antisymmetric matrix has +1 at (0, 1).
-                    let turn = if c == e {
-                        0.0
-                    } else if c == 0 {
-                        1.0
-                    } else {
-                        -1.0
-                    };
-                    all.by_lean_and_rate[c][e][i] =
-                        a * (-2.0 * w3 * p[c] * rate[e] - t * (scale_slope[c] * area_by_rate[e] + w * turn));
+                    all.by_lean_and_rate[c][e][i] = a
+                        * (-2.0 * w3 * p[c] * rate[e]
+                            - t * (scale_slope[c] * area_by_rate[e] + w * TURN[c][e]));
                 }
                 all.winding_by_lean[c][i] = a * (w * area_by_lean[c] + area * scale_slope[c]);
                 all.winding_by_rate[c][i] = a * (w * area_by_rate[c]);

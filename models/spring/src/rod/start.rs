@@ -75,7 +75,7 @@ mod tests {
     #[test]
     fn the_start_is_the_linear_column() {
         let spring = Preset::Thesis1.spring();
-        let basis = Basis::<10, 14>::new();
+        let basis = Basis::<10, 14>::default();
         // Small enough for squares of the angles not to count.
         let (shear_m, tilt_rad) = (2.5e-6, 2e-4);
         let pose =

@@ -84,25 +84,21 @@ pub fn attend(
     front: &mut dyn FrontEnd,
     least: MinimumExploration,
 ) -> Result<Ending, ApparatusOrFrontEndError> {
-    let mut parties = Parties { attended, log, rig, front };
-    let result = sit(&mut parties, least);
+    let result = sit(attended, log, rig, front, least);
     if let Err(error) = &result {
         // Return the error of the sitting: a failure to log this error matters less.
-        let _ = parties.log.write(&Event::Incident(parties.rig.incident_of(error.as_ref())));
+        let _ = log.write(&Event::Incident(rig.incident_of(error.as_ref())));
     }
     result
 }
 
-/// Components of a sitting: state machine, log, apparatus and front end.
-struct Parties<'a, 'r> {
-    attended: &'a mut ScreenStateMachine,
-    log: &'a mut LogWriter,
-    rig: &'a mut RealTimeRig<'r>,
-    front: &'a mut dyn FrontEnd,
-}
-
-fn sit(parties: &mut Parties<'_, '_>, least: MinimumExploration) -> Result<Ending, ApparatusOrFrontEndError> {
-    let Parties { attended, log, rig, front } = parties;
+fn sit(
+    attended: &mut ScreenStateMachine,
+    log: &mut LogWriter,
+    rig: &mut RealTimeRig<'_>,
+    front: &mut dyn FrontEnd,
+    least: MinimumExploration,
+) -> Result<Ending, ApparatusOrFrontEndError> {
     loop {
         let screen = attended.screen();
         if screen == Screen::Over {
@@ -123,7 +119,7 @@ fn sit(parties: &mut Parties<'_, '_>, least: MinimumExploration) -> Result<Endin
         front.show(&screen)?;
         let shown = Instant::now();
         let step = loop {
-            let input = match wait_for_input(rig, &mut **front, &screen, felt.as_ref(), log)? {
+            let input = match wait_for_input(rig, front, &screen, felt.as_ref(), log)? {
                 Ok(input) => input,
                 Err(incident) => {
                     log.write(&Event::Incident(incident))?;

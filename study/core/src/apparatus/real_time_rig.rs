@@ -70,14 +70,14 @@ impl<'a> RealTimeRig<'a> {
         stop: &StopSwitch,
     ) -> Result<Self, ApparatusOrFrontEndError> {
         let options = RunOptions { clock: Clock::Real, seed: 0 };
-        let session = Session::prepare(apparatus.scene(), apparatus.registry(), &options)?;
-        let session = session.with_strength(apparatus.strength());
+        let session = Session::prepare(&apparatus.scene, &apparatus.registry, &options)?;
+        let session = session.with_strength(apparatus.strength);
         let (controls, warnings) = (session.controls(), session.warnings().to_vec());
         apparatus.show(&controls, false)?;
         let (shared, stop) = (Shared::default(), stop.clone());
-        let run = apparatus.describe(apparatus.scene(), Clock::Real, 0);
+        let run = apparatus.describe(&apparatus.scene, Clock::Real, 0);
         let host = Arc::new(OnlyStop { stop: stop.clone(), latch: session.latch().cloned() });
-        let publication = announce(&Directory::of_this_user(), apparatus.scene(), &run, &session, host);
+        let publication = announce(&Directory::of_this_user(), &apparatus.scene, &run, &session, host);
         let viewer_error = publication.as_ref().err().map(ToString::to_string);
         let observers = ObservedRun { observer: shared.clone(), publication: publication.ok() };
         let run = spawn_run(session, observers, stop.clone(), "the sitting has ended")?;
@@ -136,7 +136,7 @@ impl<'a> RealTimeRig<'a> {
         }
         let is_of_sitting = trial.number > 0;
         if let (Some(files), false, true) = (&self.files, watch.recording.is_on(), is_of_sitting) {
-            let run = self.apparatus.describe(self.apparatus.scene(), Clock::Real, 0);
+            let run = self.apparatus.describe(&self.apparatus.scene, Clock::Real, 0);
             // Keep the recording of a trial that was interrupted earlier.
             match Recorder::create(&files.next_of(trial), &run) {
                 Ok(recorder) => watch.recording = RunRecording::new(Some(recorder)),
@@ -168,7 +168,7 @@ impl<'a> RealTimeRig<'a> {
         self.apparatus.show(&self.controls, false)?;
         self.wait_for_fade();
         let kinematics = (self.kinematics != Kinematics::None).then(|| meter.finish()).flatten();
-        Ok(StimulusExploration { kinematics, boundary_hit: meter.out_of_range(), missed_ticks })
+        Ok(StimulusExploration { kinematics, boundary_hit: meter.out_of_range, missed_ticks })
     }
 
     /// Closes the recording of an answered trial; does nothing without a recording.
@@ -204,15 +204,12 @@ impl<'a> RealTimeRig<'a> {
     /// Converts an error that ended the sitting to an incident: an emergency stop, or the end of the run.
     #[must_use]
     pub fn incident_of(&self, error: &(dyn std::error::Error + Send + Sync + 'static)) -> Incident {
-        match error.downcast_ref::<RunEnded>().map(|ended| ended.0).or(self.ended) {
+        let ended = error.downcast_ref::<RunEnded>().map(|ended| ended.0);
+        match ended.or(self.ended) {
             Some(RunEnd::EmergencyStop(source)) => {
                 Incident::EmergencyStop { source: source.word().to_owned() }
             }
-            _ => {
-                let ended = error.downcast_ref::<RunEnded>();
-                let reason = ended.map_or_else(|| error.to_string(), |RunEnded(end)| end.cause());
-                Incident::RunEnded { reason }
-            }
+            _ => Incident::RunEnded { reason: ended.map_or_else(|| error.to_string(), |end| end.cause()) },
         }
     }
 
@@ -226,11 +223,7 @@ impl<'a> RealTimeRig<'a> {
             return Ok(ending);
         }
         self.stop.stop();
-        if let Some(run) = self.run.take() {
-            let outcome = run.join().map_err(|_| RunError::Thread("panicked"))?;
-            self.ended = Some(outcome?.end);
-        }
-        match self.ended {
+        match self.join()? {
             Some(end) if !end.is_in_order() => Err(RunEnded(end).into()),
             None | Some(_) => Ok(ending),
         }
@@ -248,7 +241,7 @@ impl<'a> RealTimeRig<'a> {
     }
 
     fn wait_for_fade(&self) {
-        std::thread::sleep(Duration::from_secs_f64(self.apparatus.fade_s()) + SETTLE);
+        std::thread::sleep(Duration::from_secs_f64(self.apparatus.fade_s) + SETTLE);
     }
 
     /// Waits until the loop has sampled the stimulus at least once, at most 5 s: on a busy machine the time of a fade may pass
@@ -269,24 +262,26 @@ impl<'a> RealTimeRig<'a> {
 
     /// Returns an error if the run has ended.
     fn check(&mut self) -> Result<(), ApparatusOrFrontEndError> {
-        match (&self.run, self.ended) {
-            (Some(run), _) if !run.is_finished() => return Ok(()),
-            (None, Some(end)) => return Err(RunEnded(end).into()),
-            _ => {}
+        if self.run.as_ref().is_some_and(|run| !run.is_finished()) {
+            return Ok(());
         }
-        let outcome = self.run.take().map(RunThread::join).transpose();
-        let outcome = outcome.ok().flatten().ok_or(RunError::Thread("panicked"))?;
-        let end = outcome?.end;
-        self.ended = Some(end);
+        let end = self.join()?.ok_or(RunError::Thread("panicked"))?;
         Err(RunEnded(end).into())
+    }
+
+    /// Waits for the end of the run, and returns its kind; `None` after a panic of the run that was already reported.
+    fn join(&mut self) -> Result<Option<RunEnd>, RunError> {
+        if let Some(run) = self.run.take() {
+            let outcome = run.join().map_err(|_| RunError::Thread("panicked"))?;
+            self.ended = Some(outcome?.end);
+        }
+        Ok(self.ended)
     }
 }
 
 impl Drop for RealTimeRig<'_> {
     fn drop(&mut self) {
         self.stop.stop();
-        if let Some(run) = self.run.take() {
-            let _ = run.join();
-        }
+        let _ = self.join();
     }
 }

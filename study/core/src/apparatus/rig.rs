@@ -10,6 +10,7 @@
 use super::watch::Watch;
 use super::{Apparatus, Kinematics};
 use crate::conduct::{ApparatusOrFrontEndError, Presenter};
+use crate::dataset::{DatasetError, make_folder};
 use crate::kinematics::KinematicsMeter;
 use crate::protocol::SubjectNumber;
 use crate::trial::{Exploration, Trial};
@@ -45,8 +46,8 @@ impl TrialFiles {
     ///
     /// # Errors
     /// If the folder cannot be created.
-    pub fn make(folder: PathBuf, prefix: String) -> std::io::Result<Self> {
-        std::fs::create_dir_all(&folder)?;
+    pub fn make(folder: PathBuf, prefix: String) -> Result<Self, DatasetError> {
+        make_folder(&folder)?;
         Ok(Self { folder, prefix })
     }
 
@@ -99,13 +100,13 @@ impl<'a> Rig<'a> {
         let scene = apparatus.scene_with_hand(seed, subject);
         // A different seed for each subject, so that the tremor differs, too.
         let seed = seed.wrapping_mul(u64::from(SubjectNumber::MOST) + 1).wrapping_add(subject.get().into());
-        let steps = Steps::prepare(&scene, apparatus.registry(), seed, stop)?;
+        let steps = Steps::prepare(&scene, &apparatus.registry, seed, stop)?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // minutes at most
         let ticks = |seconds: f64| (seconds * scene.rate_hz).ceil() as u64;
         Ok(Self {
             feel_ticks: ticks(feel_s),
             // One tick more: the loop applies a change at the next tick.
-            fade_ticks: ticks(apparatus.fade_s()) + 1,
+            fade_ticks: ticks(apparatus.fade_s) + 1,
             apparatus,
             seed,
             steps,
@@ -136,7 +137,7 @@ impl<'a> Rig<'a> {
             self.watch.meter = Some(KinematicsMeter::default());
             self.advance(self.feel_ticks, also)?;
             if let Some(meter) = self.watch.meter.take() {
-                exploration.boundary_hit |= meter.out_of_range();
+                exploration.boundary_hit |= meter.out_of_range;
                 if self.kinematics != Kinematics::None {
                     exploration.kinematics.extend(meter.finish());
                 }

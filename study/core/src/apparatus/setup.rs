@@ -39,7 +39,7 @@ pub enum ApparatusError {
     #[error(
         "stimulus {stimulus}: the scene has no model `{}`{} (its models: {})",
         stimulus.model, nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")),
-        models.join(", ")
+        listed(models)
     )]
     NoModel {
         /// The stimulus as requested.
@@ -53,7 +53,7 @@ pub enum ApparatusError {
     #[error(
         "stimulus {stimulus}: `{}` has no numeric parameter `{}`{} (numeric parameters: {})",
         stimulus.model, stimulus.parameter,
-        nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")), numbers.join(", ")
+        nearest.as_ref().map_or(String::new(), |near| format!("; did you mean `{near}`?")), listed(numbers)
     )]
     NoParameter {
         /// The stimulus as requested.
@@ -107,26 +107,24 @@ pub enum ApparatusError {
     },
 }
 
-/// Way to change the stimulus in a running model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Route {
-    /// Live parameter.
-    Parameter,
-    /// Model replacement (hot swap), for a parameter that is read at creation.
-    Swap,
+/// Joins names for an error.
+fn listed(names: &[String]) -> String {
+    if names.is_empty() { "none".to_owned() } else { names.join(", ") }
 }
 
 /// Checked scene with its varied stimulus.
 pub struct Apparatus {
-    scene: Scene,
-    registry: Registry,
+    pub(super) scene: Scene,
+    pub(super) registry: Registry,
     stimulus: Stimulus,
-    route: Route,
+    /// Mutability of the varied parameter: a fixed one changes by model replacement (hot swap).
+    mutability: Mutability,
     /// Blend weight of the model while it is felt, 0 to 1; below, its fade time, s.
     weight: f64,
-    fade_s: f64,
+    pub(super) fade_s: f64,
     plugins: Vec<PluginReport>,
-    strength: Strength,
+    /// Permission for devices with limits above the host's force ceiling.
+    pub(super) strength: Strength,
     notices: Vec<String>,
 }
 
@@ -170,8 +168,8 @@ impl Apparatus {
         let stimulus = protocol.stimulus().clone();
         let model = find_model(&scene, &stimulus)?;
         let (weight, fade_s, name) = (model.blend.weight, model.blend.fade_s, model.name.clone());
-        let session =
-            Session::prepare(&scene, &registry, &options(Clock::Virtual, 0))?.with_strength(strength);
+        let options = RunOptions { clock: Clock::Virtual, seed: 0 };
+        let session = Session::prepare(&scene, &registry, &options)?.with_strength(strength);
         if let Some(device) = session.held_back().first() {
             return Err(ApparatusError::ExceedsForceCeiling { device: device.clone() });
         }
@@ -180,12 +178,10 @@ impl Apparatus {
         let schema = plugins.iter().skip(1).find(|plugin| plugin.name == name);
         let parameter = find_number(schema.map_or(&[], |plugin| plugin.schema), &stimulus)?;
         protocol.check_range(parameter.min(), parameter.max())?;
-        let route = match parameter.mutability() {
-            Mutability::Live => Route::Parameter,
-            Mutability::Fixed => Route::Swap,
-        };
+        let mutability = parameter.mutability();
         let stimulus = Stimulus { model: name, ..stimulus };
-        let apparatus = Self { scene, registry, stimulus, route, weight, fade_s, plugins, strength, notices };
+        let apparatus =
+            Self { scene, registry, stimulus, mutability, weight, fade_s, plugins, strength, notices };
         for value in protocol.extremes() {
             let scene = apparatus.with_stimulus(value);
             let refused = |cause| ApparatusError::Refused {
@@ -193,7 +189,7 @@ impl Apparatus {
                 value,
                 cause: Box::new(cause),
             };
-            let prepared = Session::prepare(&scene, &apparatus.registry, &options(Clock::Virtual, 0));
+            let prepared = Session::prepare(&scene, &apparatus.registry, &options);
             drop(prepared.map_err(refused)?);
         }
         Ok(apparatus)
@@ -203,11 +199,6 @@ impl Apparatus {
     #[must_use]
     pub fn notices(&self) -> &[String] {
         &self.notices
-    }
-
-    /// Returns whether devices with limits above the host's force ceiling are permitted.
-    pub(super) fn strength(&self) -> Strength {
-        self.strength
     }
 
     /// Checks that the first device has all parameters of a simulated hand.
@@ -277,15 +268,7 @@ impl Apparatus {
     /// Returns true if stimuli change by model replacement instead of live parameters.
     #[must_use]
     pub fn swaps_models(&self) -> bool {
-        self.route == Route::Swap
-    }
-
-    pub(super) fn registry(&self) -> &Registry {
-        &self.registry
-    }
-
-    pub(super) fn scene(&self) -> &Scene {
-        &self.scene
+        self.mutability == Mutability::Fixed
     }
 
     /// Returns the scene with the hand parameters of a simulated subject.
@@ -302,12 +285,7 @@ impl Apparatus {
 
     /// Returns the description of the run for a recording.
     pub(super) fn describe(&self, scene: &Scene, clock: Clock, seed: u64) -> RunDescription {
-        describe(scene, &options(clock, seed), &self.plugins)
-    }
-
-    /// Returns the fade time of the object, s.
-    pub(super) fn fade_s(&self) -> f64 {
-        self.fade_s
+        describe(scene, &RunOptions { clock, seed }, &self.plugins)
     }
 
     /// Starts to fade the object in (`shown`) or out.
@@ -319,11 +297,11 @@ impl Apparatus {
     pub(super) fn set(&self, controls: &Controls, value: f64) -> Result<(), ControlError> {
         let Stimulus { model, parameter } = &self.stimulus;
         let value = value.to_string();
-        match self.route {
-            Route::Parameter => {
+        match self.mutability {
+            Mutability::Live => {
                 controls.set_parameters_at_once(&[NewValue { plugin: model, parameter, value: &value }])
             }
-            Route::Swap => controls.swap(&self.registry, model, None, &[(parameter, &value)]),
+            Mutability::Fixed => controls.swap(&self.registry, model, None, &[(parameter, &value)]),
         }
     }
 
@@ -341,10 +319,6 @@ fn input(used_as: String, path: &Path) -> Result<InputFile, ApparatusError> {
     let file = NamedFile::read(path).map_err(unreadable)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     Ok(InputFile { used_as, name, hash: file.hash_text() })
-}
-
-fn options(clock: Clock, seed: u64) -> RunOptions {
-    RunOptions { clock, seed }
 }
 
 fn text(key: &str, value: f64) -> ParameterText {

@@ -12,7 +12,7 @@ pub enum Unmergeable {
     #[error("the first column is not `{0}`; write `{0}` first, and separate the columns with tabs")]
     NoKey(&'static str),
     /// The number of cells in a line differs from the number of columns.
-    #[error("line {line} has {cells} cells instead of {columns}, one for each column")]
+    #[error("line {line}: the number of cells is {cells}, but the number of columns is {columns}")]
     Ragged {
         /// Line, from 1.
         line: usize,
@@ -21,6 +21,9 @@ pub enum Unmergeable {
         /// Number of columns in the table.
         columns: usize,
     },
+    /// The file is not a text in UTF-8.
+    #[error("the file is not saved as UTF-8")]
+    NotUtf8,
     /// The text is not a JSON object.
     #[error("the text is not a JSON object ({0})")]
     NotAnObject(String),
@@ -110,24 +113,19 @@ pub(super) fn object(
     let earlier: Map<String, Value> =
         serde_json::from_str(text).map_err(|error| Unmergeable::NotAnObject(error.to_string()))?;
     let mut merged = earlier.clone();
-    for (key, value) in generated {
-        match merged.get_mut(&key) {
-            Some(kept) if owned.contains(&key.as_str()) => *kept = value,
-            Some(kept) => complete(kept, value),
-            None => drop(merged.insert(key, value)),
-        }
-    }
+    complete(&mut merged, generated, owned);
     Ok((merged != earlier).then_some(merged))
 }
 
-/// Adds the keys of `more` that an object lacks, recursively; does not change other values.
-fn complete(kept: &mut Value, more: Value) {
-    if let (Value::Object(kept), Value::Object(more)) = (kept, more) {
-        for (key, value) in more {
-            match kept.get_mut(&key) {
-                Some(kept) => complete(kept, value),
-                None => drop(kept.insert(key, value)),
-            }
+/// Adds the keys of `more` that an object lacks, recursively, and replaces the values of the `owned` keys; does not change other
+/// values.
+fn complete(kept: &mut Map<String, Value>, more: Map<String, Value>, owned: &[&str]) {
+    for (key, value) in more {
+        match (kept.get_mut(&key), value) {
+            (Some(known), value) if owned.contains(&key.as_str()) => *known = value,
+            (Some(Value::Object(known)), Value::Object(more)) => complete(known, more, &[]),
+            (Some(_), _) => {}
+            (None, value) => drop(kept.insert(key, value)),
         }
     }
 }

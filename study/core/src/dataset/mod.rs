@@ -76,7 +76,7 @@ pub enum DatasetError {
         problem: Unmergeable,
     },
     /// The folder has no study.
-    #[error("{}: not the folder of a study (no logs under sourcedata/); give the folder of `study --out`", .0.display())]
+    #[error("{}: not the folder of a study (no logs under sourcedata/); give the folder that `flotor study` has written (--out)", .0.display())]
     NoStudy(PathBuf),
     /// The folder has logs of different studies.
     #[error("{}: {what}, unlike {}; delete the file that does not belong to the study, or use another folder", path.display(), other.display())]
@@ -130,7 +130,7 @@ pub enum DatasetError {
         root: PathBuf,
     },
     /// The subject has begun, but is not complete.
-    #[error("{subject} is incomplete after {trials} trials in {}; add --resume to continue", root.display())]
+    #[error("{subject} in {} is incomplete (answered trials: {trials}); add --resume to continue", root.display())]
     Unfinished {
         /// Number of the subject.
         subject: SubjectNumber,
@@ -181,21 +181,13 @@ impl Dataset {
     /// # Errors
     /// If a log is invalid or misplaced, there is no log, or logs belong to different studies.
     pub fn logs(&self) -> Result<Vec<SittingLog>, DatasetError> {
-        let mut logs = Vec::new();
-        self.each_log(|log| {
-            logs.push(log);
-            Ok(())
-        })?;
-        Ok(logs)
+        self.each_log()?.collect()
     }
 
     /// Reads and verifies the logs one by one, so that only one is in memory.
-    fn each_log(
-        &self,
-        mut take: impl FnMut(SittingLog) -> Result<(), DatasetError>,
-    ) -> Result<(), DatasetError> {
+    fn each_log(&self) -> Result<impl Iterator<Item = Result<SittingLog, DatasetError>>, DatasetError> {
         let mut first: Option<(Begin, PathBuf)> = None;
-        for path in self.log_paths()? {
+        let read = move |path: PathBuf| {
             let log = SittingLog::read(&path)?;
             let (subject, task) = (log.begin.subject, log.begin.protocol.task());
             let place = self.log_path(subject, task);
@@ -206,15 +198,18 @@ impl Dataset {
             if let Some(what) = begin.differs(&log.begin) {
                 return Err(DatasetError::Mixed { path, other: other.clone(), what });
             }
-            take(log)?;
-        }
-        Ok(())
+            Ok(log)
+        };
+        Ok(self.log_paths()?.into_iter().map(read))
     }
 
     fn log_paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
         let mut paths: Vec<PathBuf> = Vec::new();
         let source = self.root.join("sourcedata");
-        let folders = std::fs::read_dir(&source).map_err(|_| DatasetError::NoStudy(self.root.clone()))?;
+        let folders = std::fs::read_dir(&source).map_err(|cause| match cause.kind() {
+            ErrorKind::PermissionDenied => DatasetError::file(&source, "cannot read the folder", cause),
+            _ => DatasetError::NoStudy(self.root.clone()),
+        })?;
         for folder in folders.flatten().filter(|entry| entry.path().is_dir()) {
             let files =
                 std::fs::read_dir(folder.path()).into_iter().flatten().flatten().map(|file| file.path());
@@ -281,7 +276,8 @@ impl Dataset {
     pub fn write_tables(&self) -> Result<(), DatasetError> {
         let mut participants = table::PARTICIPANTS_HEAD.to_owned();
         let mut first = None;
-        self.each_log(|log| {
+        for log in self.each_log()? {
+            let log = log?;
             participants += &table::participant(&log);
             if log.complete {
                 let path = self.table_path(log.begin.subject, log.begin.protocol.task());
@@ -293,8 +289,7 @@ impl Dataset {
                 }
             }
             first.get_or_insert(log.begin);
-            Ok(())
-        })?;
+        }
         let Some(begin) = first else { return Ok(()) };
         complete_table(&self.root.join("participants.tsv"), &participants, table::PARTICIPANT)?;
         let task = format!("task-{}_beh.json", begin.protocol.task());
@@ -333,7 +328,10 @@ fn read_earlier(path: &Path) -> Result<Option<String>, DatasetError> {
     match std::fs::read_to_string(path) {
         Ok(text) => Ok(Some(text)),
         Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
-        Err(cause) => Err(DatasetError::file(path, "cannot read the file as UTF-8 text", cause)),
+        Err(cause) if cause.kind() == ErrorKind::InvalidData => {
+            Err(DatasetError::Unmergeable { path: path.into(), problem: Unmergeable::NotUtf8 })
+        }
+        Err(cause) => Err(DatasetError::file(path, "cannot read the file", cause)),
     }
 }
 
@@ -346,10 +344,10 @@ fn replace(path: &Path, text: &str) -> Result<(), DatasetError> {
     std::fs::write(&aside, text)
         .map_err(|cause| DatasetError::file(&aside, "cannot write the file", cause))?;
     std::fs::rename(&aside, path)
-        .map_err(|cause| DatasetError::file(path, "cannot replace the earlier file", cause))
+        .map_err(|cause| DatasetError::file(path, "cannot rename the new file to this name", cause))
 }
 
-fn make_folder(folder: &Path) -> Result<(), DatasetError> {
+pub(crate) fn make_folder(folder: &Path) -> Result<(), DatasetError> {
     std::fs::create_dir_all(folder)
         .map_err(|cause| DatasetError::file(folder, "cannot make the folder", cause))
 }

@@ -6,7 +6,7 @@ use crate::kinematics::StimulusKinematics;
 use crate::log::{Begin, SittingLog, TrialRecord};
 use crate::protocol::Protocol;
 use crate::sitting::Verdict;
-use crate::trial::{Judgement, Presented, Response};
+use crate::trial::{Judgement, Presented};
 use serde_json::{Map, Value, json};
 
 /// Text for a missing value in BIDS.
@@ -114,10 +114,6 @@ fn row(record: &TrialRecord, codes: &Codes, log: &SittingLog) -> Vec<String> {
         Verdict::Judged { judgement, reversal } => (Some(judgement), reversal),
         Verdict::Taken | Verdict::Repeated => (None, false),
     };
-    let rating = match event.response {
-        Response::Rating(rating) => Some(rating),
-        _ => None,
-    };
     let felt = &event.exploration.kinematics;
     let mean = |value: fn(&StimulusKinematics) -> f64| {
         let total: f64 = felt.iter().map(|one| one.duration_s).sum();
@@ -139,7 +135,7 @@ fn row(record: &TrialRecord, codes: &Codes, log: &SittingLog) -> Vec<String> {
         number(pair.map(|pair| pair.delta)),
         word(pair.map(|pair| pair.comparison_at.word())),
         event.response.word().to_owned(),
-        number(rating),
+        number(event.response.rating()),
         word(judgement.map(Judgement::word)),
         flag(reversal),
         flag(event.verdict == Verdict::Repeated),
@@ -183,7 +179,7 @@ pub(super) fn description(begin: &Begin) -> (Map<String, Value>, &'static [&'sta
         "Observer": begin.observer,
         "Apparatus": begin.apparatus,
     });
-    (members(description), &["Seed", "ConfigHash", "Observer", "Apparatus"])
+    (members(&description), &["Seed", "ConfigHash", "Observer", "Apparatus"])
 }
 
 /// First column of the list of scans.
@@ -228,12 +224,9 @@ pub(super) fn participant_columns() -> (Map<String, Value>, &'static [&'static s
         "handedness": { "Description": "Preferred hand, if it was given" },
         "incidents": { "Description": "Interruptions and disturbances in the event log" },
     });
-    (members(columns), &[])
+    (members(&columns), &[])
 }
 
-fn members(object: Value) -> Map<String, Value> {
-    match object {
-        Value::Object(members) => members,
-        _ => Map::new(),
-    }
+fn members(object: &Value) -> Map<String, Value> {
+    object.as_object().cloned().unwrap_or_default()
 }

@@ -36,8 +36,8 @@ impl ExclusionRules {
             |[shortest, longest]: [f64; 2]| 0.0 <= shortest && shortest < longest && longest.is_finite();
         if let Some([shortest, longest]) = self.response_time_s.filter(|times| !are_times(*times)) {
             return Err(format!(
-                "exclusion.response_time_s is [{shortest}, {longest}]; write the shortest and the longest time in s, both finite, \
-                 the shortest first"
+                "exclusion.response_time_s is [{shortest}, {longest}]; write the shortest and the longest time in s, both finite \
+                 and 0 or more, the shorter one first"
             ));
         }
         let has_trial_rule = self.least_movement_mm.is_some() || self.response_time_s.is_some();
@@ -69,7 +69,7 @@ impl ExclusionRules {
             ("most_dont_know", self.most_dont_know, is_jnd, "", PAIRS),
         ] {
             if said.is_some() && !is_had {
-                return Err(format!("exclusion.{rule} needs {needs}{of}"));
+                return Err(format!("exclusion.{rule} needs {needs}{of}; otherwise remove the rule"));
             }
         }
         Ok(())

@@ -42,6 +42,9 @@ pub enum LogProblem {
     /// A line has invalid syntax.
     #[error("the line does not belong to an event log: {0}; use an unchanged copy")]
     Text(String),
+    /// The chain is intact, but this version cannot parse the event or its time.
+    #[error("this version cannot read the line: {0}; use the version that wrote the log")]
+    Unknown(String),
     /// The hash chain is broken.
     #[error(
         "the hash chain is broken: this line or an earlier one was changed, removed or exchanged; use an unchanged \
@@ -58,7 +61,7 @@ pub enum LogProblem {
         found: u32,
     },
     /// An event is out of sequence; the text names the event.
-    #[error("{0}")]
+    #[error("{0}; use an unchanged copy")]
     Order(&'static str),
     /// The replayed experiment presents another trial or reaches another verdict.
     #[error(
@@ -81,10 +84,10 @@ pub enum LogProblem {
 
 impl LogError {
     pub(crate) fn file(path: &Path, action: &'static str, cause: std::io::Error) -> Self {
-        Self { path: path.into(), line: 0, problem: LogProblem::File { action, cause } }
+        Self::of_file(path, LogProblem::File { action, cause })
     }
 
-    pub(super) fn in_use(path: &Path) -> Self {
-        Self { path: path.into(), line: 0, problem: LogProblem::InUse }
+    pub(super) fn of_file(path: &Path, problem: LogProblem) -> Self {
+        Self { path: path.into(), line: 0, problem }
     }
 }

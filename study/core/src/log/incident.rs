@@ -67,7 +67,7 @@ impl fmt::Display for Incident {
         match self {
             Self::EmergencyStop { source } => write!(f, "emergency stop ({source})"),
             Self::RunEnded { reason } => write!(f, "the run ended: {reason}"),
-            Self::WindowClosed => f.write_str("the window was closed"),
+            Self::WindowClosed => f.write_str("the window or standard input was closed"),
             Self::Stopped => f.write_str("stopped at the keyboard"),
             Self::Signal => f.write_str("ended by a signal or a client"),
             Self::OutOfRange => f.write_str("the handle left its range"),

@@ -71,13 +71,13 @@ impl SittingLog {
             // Windows programs or git may have changed the line ends to CRLF.
             let text = text.strip_suffix('\r').unwrap_or(text);
             let (found, event) = parts(text).ok_or_else(|| {
-                at(number, LogProblem::Text("the line has no `chain` and `event`".to_owned()))
+                at(number, LogProblem::Text("the line does not consist of `chain` and `event`".to_owned()))
             })?;
             before = chain(&before, event);
             if found != before {
                 return Err(at(number, LogProblem::Chain));
             }
-            let not_read = |error: &dyn std::fmt::Display| at(number, LogProblem::Text(error.to_string()));
+            let not_read = |error: &dyn std::fmt::Display| at(number, LogProblem::Unknown(error.to_string()));
             let (event, time) = unstamped(event);
             let time: Option<TimeOfDay> =
                 time.map(str::parse).transpose().map_err(|error| not_read(&error))?;
@@ -90,10 +90,7 @@ impl SittingLog {
                     log = Some(Self { began: time, ..Self::new(*begin, path) });
                 }
                 (None, _) => {
-                    return Err(at(
-                        number,
-                        LogProblem::Order("the log does not start with `begin`; use an unchanged copy"),
-                    ));
+                    return Err(at(number, LogProblem::Order("the log does not start with `begin`")));
                 }
                 (Some(log), event) => log.take_in(event, time).map_err(|problem| at(number, problem))?,
             }
@@ -126,41 +123,29 @@ impl SittingLog {
 
     fn take_in(&mut self, event: Event, time: Option<TimeOfDay>) -> Result<(), LogProblem> {
         if self.complete && !matches!(event, Event::Note { .. }) {
-            return Err(LogProblem::Order("an event other than a note follows `end`; use an unchanged copy"));
+            return Err(LogProblem::Order("an event other than a note follows `end`"));
         }
         if !matches!(event, Event::Note { .. }) {
             self.has_reason_to_end =
                 matches!(&event, Event::Incident(incident) if incident.ends_the_sitting());
         }
+        let presented = self.sitting.presented();
         match event {
-            Event::Begin(_) => {
-                Err(LogProblem::Order("a second `begin` is in the log; use an unchanged copy"))
+            Event::Begin(_) => return Err(LogProblem::Order("a second `begin` is in the log")),
+            Event::Trial(event) => self.replay(*event)?,
+            Event::Withdrawn { trial } => self.withdraw(trial)?,
+            Event::Resume { trials, .. } if trials != presented => {
+                return Err(LogProblem::Order("`resume` has another number of trials than the log"));
             }
-            Event::Trial(event) => self.replay(*event),
-            Event::Withdrawn { trial } => self.withdraw(trial),
-            Event::Resume { trials, .. } if trials != self.sitting.presented() => Err(LogProblem::Order(
-                "`resume` has another number of trials than the log; use an unchanged copy",
-            )),
-            Event::Resume { .. } => {
-                self.resumed += 1;
-                Ok(())
+            Event::Resume { .. } => self.resumed += 1,
+            Event::Note { text } => self.notes.push((presented, text)),
+            Event::Incident(incident) => self.incidents.push((presented, time, incident)),
+            Event::End { trials } if !self.sitting.is_over() || trials != presented => {
+                return Err(LogProblem::Order("`end` does not follow the last trial"));
             }
-            Event::Note { text } => {
-                self.notes.push((self.sitting.presented(), text));
-                Ok(())
-            }
-            Event::Incident(incident) => {
-                self.incidents.push((self.sitting.presented(), time, incident));
-                Ok(())
-            }
-            Event::End { trials } if !self.sitting.is_over() || trials != self.sitting.presented() => Err(
-                LogProblem::Order("`end` is in the log before the experiment is over; use an unchanged copy"),
-            ),
-            Event::End { .. } => {
-                self.complete = true;
-                Ok(())
-            }
+            Event::End { .. } => self.complete = true,
         }
+        Ok(())
     }
 
     fn replay(&mut self, event: TrialEvent) -> Result<(), LogProblem> {
@@ -182,7 +167,7 @@ impl SittingLog {
 
     /// Restores the state before the last trial by a replay of all earlier answers.
     fn withdraw(&mut self, number: u32) -> Result<(), LogProblem> {
-        const LAST: &str = "`withdrawn` names another trial than the last; use an unchanged copy";
+        const LAST: &str = "`withdrawn` names another trial than the last";
         let is_last = |last: &TrialRecord| last.event.trial.number == number;
         let last = self.trials.pop_if(|last| is_last(last)).ok_or(LogProblem::Order(LAST))?;
         self.withdrawn.push(last.event);

@@ -12,14 +12,8 @@ pub struct LogWriter {
     file: File,
     path: PathBuf,
     chain: String,
-    stamps: Stamps,
-}
-
-/// Time stamps of the lines.
-#[derive(Clone, Copy, Debug)]
-enum Stamps {
-    None,
-    Of(SittingClock),
+    /// Clock of the time stamps; `None` without time stamps.
+    clock: Option<SittingClock>,
 }
 
 impl LogWriter {
@@ -31,7 +25,7 @@ impl LogWriter {
         let failed = |cause| LogError::file(path, "cannot create the log", cause);
         let mut options = OpenOptions::new();
         let options = options.read(true).write(true).create(true).truncate(false);
-        let mut file = open_alone(options, path).map_err(failed)?.ok_or_else(|| LogError::in_use(path))?;
+        let mut file = open(options, path, "cannot create the log")?;
         let mut written = Vec::new();
         file.read_to_end(&mut written).map_err(failed)?;
         if written.contains(&b'\n') {
@@ -42,7 +36,7 @@ impl LogWriter {
         if let Some(folder) = path.parent().and_then(|folder| File::open(folder).ok()) {
             let _ = folder.sync_all();
         }
-        Ok(Self { file, path: path.into(), chain: CHAIN_START.to_owned(), stamps: Stamps::None })
+        Ok(Self { file, path: path.into(), chain: CHAIN_START.to_owned(), clock: None })
     }
 
     /// Opens a log of `read_bytes` to continue it after its complete lines, `complete_bytes` long, whose last `chain` is given.
@@ -56,13 +50,12 @@ impl LogWriter {
         chain: String,
     ) -> Result<Self, LogError> {
         let failed = |cause| LogError::file(path, "cannot continue the log", cause);
-        let opened = open_alone(OpenOptions::new().write(true), path).map_err(failed)?;
-        let mut file = opened.ok_or_else(|| LogError::in_use(path))?;
+        let mut file = open(OpenOptions::new().write(true), path, "cannot continue the log")?;
         if file.metadata().map_err(failed)?.len() != read_bytes {
-            return Err(LogError::in_use(path));
+            return Err(LogError::of_file(path, LogProblem::InUse));
         }
         cut(&mut file, complete_bytes).map_err(failed)?;
-        Ok(Self { file, path: path.into(), chain, stamps: Stamps::None })
+        Ok(Self { file, path: path.into(), chain, clock: None })
     }
 
     /// Checks that no other process writes to a log.
@@ -70,26 +63,19 @@ impl LogWriter {
     /// # Errors
     /// [`LogProblem::InUse`], or errors of the file system.
     pub(crate) fn check_free(path: &Path) -> Result<(), LogError> {
-        let opened = open_alone(OpenOptions::new().write(true), path);
-        match opened.map_err(|cause| LogError::file(path, "cannot open the log", cause))? {
-            Some(_) => Ok(()),
-            None => Err(LogError::in_use(path)),
-        }
+        open(OpenOptions::new().write(true), path, "cannot open the log").map(drop)
     }
 
     /// Enables time stamps: from now on every line has the time of day.
     #[must_use]
     pub fn stamped(self) -> Self {
-        Self { stamps: Stamps::Of(SittingClock::start()), ..self }
+        Self { clock: Some(SittingClock::start()), ..self }
     }
 
     /// Returns the time of day by the log's clock; `None` without time stamps.
     #[must_use]
     pub fn now(&self) -> Option<TimeOfDay> {
-        match self.stamps {
-            Stamps::None => None,
-            Stamps::Of(clock) => Some(clock.now()),
-        }
+        self.clock.map(|clock| clock.now())
     }
 
     /// Writes an event. With time stamps, first writes an incident if the system's time of day was set. Returns once the event is
@@ -98,22 +84,16 @@ impl LogWriter {
     /// # Errors
     /// If the file cannot be written.
     pub fn write(&mut self, event: &Event) -> Result<(), LogError> {
-        let jump = match &mut self.stamps {
-            Stamps::Of(clock) if !matches!(event, Event::Begin(_)) => clock.take_jump_ms(),
-            _ => None,
-        };
-        if let Some(by_ms) = jump {
+        let clock = self.clock.as_mut().filter(|_| !matches!(event, Event::Begin(_)));
+        if let Some(by_ms) = clock.and_then(SittingClock::take_jump_ms) {
             self.write_line(&Event::Incident(Incident::TimeOfDaySet { by_ms }))?;
         }
         self.write_line(event)
     }
 
     fn write_line(&mut self, event: &Event) -> Result<(), LogError> {
-        let text = serde_json::to_string(event).map_err(|error| LogError {
-            path: self.path.clone(),
-            line: 0,
-            problem: LogProblem::Text(error.to_string()),
-        })?;
+        let text = serde_json::to_string(event)
+            .map_err(|error| LogError::of_file(&self.path, LogProblem::Text(error.to_string())))?;
         let text = match self.now() {
             None => text,
             Some(time) => stamped(&text, time),
@@ -131,6 +111,12 @@ impl LogWriter {
         self.chain = next;
         Ok(())
     }
+}
+
+/// Opens a log that no other process writes to; `action` is the failed operation in an error of the file system.
+fn open(options: &OpenOptions, path: &Path, action: &'static str) -> Result<File, LogError> {
+    let file = open_alone(options, path).map_err(|cause| LogError::file(path, action, cause))?;
+    file.ok_or_else(|| LogError::of_file(path, LogProblem::InUse))
 }
 
 /// Truncates a file to a length and seeks to its end.

@@ -123,10 +123,12 @@ impl WeightedUpDownRule {
         )?;
         if !(self.floor > 0.0 && self.floor < self.ceiling) {
             let legal = "must be above 0 (equal stimuli have no correct answer) and below --ceiling";
+            let legal = format!("{legal} ({})", self.ceiling);
             return Err(InvalidRule::new("--floor", self.floor, legal));
         }
         if !(self.initial_delta > self.floor && self.initial_delta <= self.ceiling) {
-            let legal = "must be above --floor and up to --ceiling";
+            let legal =
+                format!("must be above --floor ({}) and up to --ceiling ({})", self.floor, self.ceiling);
             return Err(InvalidRule::new("--initial", self.initial_delta, legal));
         }
         if self.stop_after == 0 {
@@ -195,24 +197,6 @@ impl WeightedUpDown {
     #[must_use]
     pub fn delta(&self) -> f64 {
         self.delta
-    }
-
-    /// Returns the current step D1, as a fraction of the base.
-    #[must_use]
-    pub fn step(&self) -> f64 {
-        self.step
-    }
-
-    /// Returns the number of reversals so far.
-    #[must_use]
-    pub fn reversals(&self) -> u32 {
-        self.reversals
-    }
-
-    /// Returns the number of trials so far.
-    #[must_use]
-    pub fn trials(&self) -> u32 {
-        self.trials
     }
 
     /// Processes an answer. Returns true for a reversal; ignores answers after the end of the track.

@@ -5,7 +5,7 @@ use super::{
     AtBoundary, Checks, FirstModality, ProtocolError, Stimulus, at_least_one, extremes,
     positive_and_different,
 };
-use crate::procedure::Procedure;
+use crate::procedure::{InvalidRule, Procedure};
 use serde::{Deserialize, Serialize};
 
 /// Side of the base on which the comparison lies.
@@ -120,9 +120,8 @@ impl JndProtocol {
             at_least_one("--obvious-pairs", pairs.count)?;
             let (least, most) = (Self::LARGE_DELTA, self.procedure.largest_delta());
             if !(least..=most).contains(&pairs.delta) {
-                let what = "--obvious-difference";
-                let legal = "must be 0.4 to the largest difference of a track";
-                return Err(ProtocolError::Value { what, value: pairs.delta, legal });
+                let legal = format!("must be {least} to {most}, the largest difference of a track");
+                return Err(InvalidRule::new("--obvious-difference", pairs.delta, legal).into());
             }
         }
         for (what, value) in [("close", self.demo.close), ("nearly equal", self.demo.nearly_equal)] {

@@ -234,8 +234,8 @@ pub enum ProtocolError {
     Rule(#[from] InvalidRule),
     /// A stimulus is outside the range of the model's parameter.
     #[error(
-        "stimulus {stimulus} = {value} is outside its range {least} to {most}; choose other stimuli, or a \
-         smaller largest difference"
+        "stimulus {stimulus} = {value} is outside its range {least} to {most}; choose other --bases or a \
+         smaller --ceiling (weighted up-down), or, for ratings, another --range"
     )]
     Range {
         /// The varied parameter.

@@ -206,7 +206,7 @@ impl ScreenStateMachine {
                 Input::Stop => Ok(Step::Stopped),
                 Input::Continue => Ok(Step::Read(self.texts.pop_front().unwrap_or_default())),
                 Input::Again | Input::Withdraw | Input::Practise | Input::Answer { .. } => {
-                    Err(InputError::NotNow("no question is open yet; continue until the question appears"))
+                    Err(InputError::NotNow("this input has no effect while a text is shown; continue first"))
                 }
             };
         }
@@ -217,9 +217,9 @@ impl ScreenStateMachine {
                 self.practice = std::mem::take(&mut self.offered).into();
                 self.go_to(Stage::Ready(Pause::PhaseChanges))
             }
-            (_, Input::Practise) => {
-                Err(InputError::NotNow("practice is not offered now, only at the start of a resumed sitting"))
-            }
+            (_, Input::Practise) => Err(InputError::NotNow(
+                "practice is not offered now, only at the start of a sitting that resumes after its practice",
+            )),
             (_, Input::Withdraw) => self.withdraw(),
             (Stage::Ready(_), Input::Continue) => self.go_to(Stage::Feel(0)),
             (Stage::Feel(index), Input::Continue) => {
@@ -246,7 +246,9 @@ impl ScreenStateMachine {
             (_, Input::Answer { .. }) => {
                 Err(InputError::NotNow("no question is open yet; continue until the question appears"))
             }
-            (_, Input::Again) => Err(InputError::NotNow("the stimulus can be repeated after its end")),
+            (_, Input::Again) => {
+                Err(InputError::NotNow("a trial can be repeated only while its question is open"))
+            }
         }
     }
 

@@ -9,13 +9,13 @@ use serde::Deserialize;
 /// Options of `flotor analyse` that affect its results.
 #[derive(Args, Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Choices {
-    /// Threshold estimator
+    /// Threshold estimator; no effect on ratings
     #[arg(long, value_enum, default_value_t)]
     pub(crate) estimator: Estimator,
     /// Sums of squares of the analysis of variance
     #[arg(long = "type", value_enum, default_value_t)]
     sums: Sums,
-    /// Normalisation of the ratings between subjects
+    /// Normalisation of the ratings between subjects; no effect on thresholds
     #[arg(long, value_enum, default_value_t)]
     ratings: RatingScale,
 }

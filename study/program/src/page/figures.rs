@@ -4,9 +4,11 @@
 mod psychometric;
 mod tracks;
 
-use flotor_analysis::{JndAnalysis, KinematicMeasure, MagnitudeAnalysis, ThresholdCell, published};
+use flotor_analysis::{
+    JndAnalysis, KinematicMeasure, MagnitudeAnalysis, ResponseRow, ThresholdCell, published,
+};
 use flotor_plot::{Axis, Bin, ErrorBar, Figure, Panel, Quantity, Series};
-use flotor_statistics::describe::MeanInterval;
+use flotor_statistics::describe::{MeanInterval, mean};
 use flotor_study::protocol::Stimulus;
 use flotor_study::trial::Modality;
 
@@ -67,18 +69,13 @@ pub(super) fn thresholds(analysis: &JndAnalysis, stimulus: &Stimulus) -> Figure 
 
 /// Plots each subject's Weber fraction with haptics alone over the fraction with vision and haptics.
 pub(super) fn subjects(analysis: &JndAnalysis) -> Figure {
-    let mut points: Vec<(String, [Vec<f64>; 2])> = Vec::new();
-    for row in &analysis.responses {
-        if points.last().is_none_or(|(subject, _)| *subject != row.subject) {
-            points.push((row.subject.clone(), Default::default()));
-        }
-        if let Some((_, [vh, h])) = points.last_mut() {
-            let list = if row.modality == Modality::Vh { vh } else { h };
-            list.push(row.response / row.stimulus * 100.0);
-        }
-    }
-    let mean = flotor_statistics::describe::mean;
-    let points: Vec<(f64, f64)> = points.iter().map(|(_, [vh, h])| (mean(vh), mean(h))).collect();
+    let weber_percent = |rows: &[ResponseRow], modality: Modality| {
+        let here = rows.iter().filter(|row| row.modality == modality);
+        mean(&here.map(|row| row.response / row.stimulus * 100.0).collect::<Vec<_>>())
+    };
+    let of_subjects = analysis.responses.chunk_by(|one, next| one.subject == next.subject);
+    let point = |rows| (weber_percent(rows, Modality::Vh), weber_percent(rows, Modality::H));
+    let points: Vec<(f64, f64)> = of_subjects.map(point).collect();
     let most = points.iter().flat_map(|(vh, h)| [*vh, *h]).fold(1.0, f64::max).ceil();
     let mut panel = Panel::new(Axis::linear("Weber fraction, haptics alone", "%").range(0.0, most))
         .series(Series::points("a subject", points).slot(0))

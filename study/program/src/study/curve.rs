@@ -66,13 +66,8 @@ const PARTS: u32 = 64;
 #[non_exhaustive]
 pub(super) enum CurveError {
     /// A line is invalid.
-    #[error("line {line}: {problem}")]
-    Line {
-        /// Line number, from 1.
-        line: usize,
-        /// Description of the problem.
-        problem: String,
-    },
+    #[error("line {}: {}", .0.line, .0.problem)]
+    Line(TextProblem),
     /// The free length is unknown.
     #[error("the table has compressions only; give the length without load (--free-length-mm)")]
     NoFreeLength,
@@ -81,7 +76,8 @@ pub(super) enum CurveError {
     Statistics(#[from] StatisticsError),
     /// The force decreases with compression; holds the slope, N/m.
     #[error(
-        "the force falls as the spring is compressed ({0:.1} N/m); check whether length and compression are interchanged"
+        "the force does not rise as the spring is compressed (slope {0:.1} N/m); check the sign of the forces, and whether length \
+         and compression are interchanged"
     )]
     Falling(f64),
     /// The points have too few different compressions for a curve; holds their number, zero compression included.
@@ -90,8 +86,8 @@ pub(super) enum CurveError {
 }
 
 impl From<TextProblem> for CurveError {
-    fn from(TextProblem { line, problem }: TextProblem) -> Self {
-        Self::Line { line, problem }
+    fn from(problem: TextProblem) -> Self {
+        Self::Line(problem)
     }
 }
 
@@ -113,7 +109,7 @@ impl MeasuredCurve {
             "length_mm,force_n" => Abscissa::Length,
             "compression_mm,force_n" => Abscissa::Compression,
             _ => {
-                let problem = "the header is `length_mm,force_n` or `compression_mm,force_n`";
+                let problem = "the header must be `length_mm,force_n` or `compression_mm,force_n`";
                 return Err(table.header_problem(problem).into());
             }
         };

@@ -19,7 +19,7 @@ use flotor_session::{ControlError, Controls, NewValue, RunError, RunOptions, Ses
 use flotor_study::apparatus::watch::{RunThread, Shared, spawn_run};
 use flotor_study::kinematics::{KinematicsMeter, StimulusKinematics};
 use std::io::{BufReader, stdin};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
@@ -43,7 +43,8 @@ const MATERIALS: [(&str, [&str; 2]); 4] = [
     flotor study explore\n  \
     flotor study explore --set spring.preset=thesis-3 --set spring.variant=rod")]
 pub(super) struct ExploreArguments {
-    /// Scene to explore in TOML (default: a spring of wire on the simulated flotor)
+    /// Scene to explore: a scene file (TOML), or the name of one of Flotor's own scenes (default: a spring of wire on the simulated
+    /// flotor)
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
     /// Set a parameter of a plugin of the scene (repeatable)
@@ -63,11 +64,11 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let session = session.with_strength(arguments.options.strength());
     session.notices().into_iter().for_each(note);
     session.warnings().iter().for_each(note);
-    let model = scene.models.first().map(|model| model.name.clone()).ok_or_else(|| {
-        CommandError::Usage(format!("{}: the scene has no model to explore; add a `[[model]]`", scene.title))
+    let model = scene.models.first().ok_or_else(|| {
+        let file = arguments.scene.as_deref().unwrap_or(Path::new("built-in study")).display();
+        CommandError::Usage(format!("{file}: the scene has no model to explore; add a `[[model]]`"))
     })?;
-    let mapping =
-        scene.models.first().map_or(1.0, |model| model.mapping.motion_scale * model.mapping.force_scale);
+    let mapping = model.mapping.motion_scale * model.mapping.force_scale;
     let watch = Shared::default();
     watch.lock().meter = Some(KinematicsMeter::default());
     let description = describe(&scene, &options, session.plugins());
@@ -76,7 +77,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let mut prompt = Prompt {
         controls: session.controls(),
         registry,
-        model,
+        model: model.name.clone(),
         settings: Vec::new(),
         watch: watch.clone(),
         mapping,
@@ -86,7 +87,7 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     let run = run.map_err(|_| RunError::NoThread("the exploration"))?;
     say!("{}", style::title(&scene.title));
     say!("  type a parameter and its value; ? lists the parameters, q ends{hint}");
-    let lines = lines_of(BufReader::new(stdin())).map_err(|error| CommandError::Failed(error.to_string()))?;
+    let lines = lines_of(BufReader::new(stdin()))?;
     while !(stop.is_stop_requested() || run.is_finished()) {
         match lines.recv_timeout(Duration::from_millis(50)) {
             Ok(line) if line.trim() == "q" => break,
@@ -110,7 +111,7 @@ fn scene(arguments: &ExploreArguments) -> Result<Scene, CommandError> {
     let scene = match &arguments.scene {
         Some(path) => Scene::load(path),
         None => Scene::parse(
-            std::path::Path::new("built-in study"),
+            Path::new("built-in study"),
             &flotor_session::scene::STUDY
                 .replace("mode = \"gamma\"", "mode = \"physical\"")
                 .replace("A spring to be judged", "A spring to explore"),

@@ -24,7 +24,8 @@ pub(super) struct WhiteNoise {
     player: Child,
     /// Thread that writes samples to the player; ends with the player.
     feeder: Option<JoinHandle<()>>,
-    name: &'static str,
+    /// Program name of the player.
+    pub(super) name: &'static str,
 }
 
 impl WhiteNoise {
@@ -45,12 +46,6 @@ impl WhiteNoise {
             std::thread::sleep(std::time::Duration::from_millis(200));
             started.is_playing().then_some(started)
         })
-    }
-
-    /// Returns the program name of the player.
-    #[must_use]
-    pub(super) fn player(&self) -> &'static str {
-        self.name
     }
 
     fn is_playing(&mut self) -> bool {

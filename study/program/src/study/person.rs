@@ -59,11 +59,10 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
     if kinematics == Kinematics::Full {
         let folder = dataset.source_folder(subject).join("motion");
         let files = TrialFiles::make(folder, format!("{subject}_task-{}", protocol.task()));
-        rig.record_into(
-            files.map_err(|cause| CommandError::file(&common.out, "cannot make the folder", cause))?,
-        );
+        rig.record_into(files.map_err(of_dataset)?);
     }
-    note_conditions(&mut log, common, noise.as_ref(), screen_texts.as_deref()).map_err(failed)?;
+    note_conditions(&mut log, common, noise.as_ref(), screen_texts.as_deref())
+        .map_err(|error| CommandError::Failed(error.to_string()))?;
     let mut attended = ScreenStateMachine::new(sitting, protocol, common.rest_every).after_reading(texts);
     if presented > 0 {
         attended = attended.with_practice_offered();
@@ -123,12 +122,14 @@ fn begin(
 /// sitting resumes.
 fn texts(common: &Common, presented: usize) -> Result<Vec<String>, CommandError> {
     let consent = common.consent.iter().filter(|_| presented == 0);
-    consent.chain(&common.instructions).map(|path| text_of(path)).collect()
+    let remedy = "write a title in its first line, and then the text";
+    consent.chain(&common.instructions).map(|path| text_of(path, remedy)).collect()
 }
 
 /// Returns the content of the file with the texts of the window's screens; `None` without a file.
 fn screen_texts(common: &Common) -> Result<Option<String>, CommandError> {
-    let texts = common.texts.as_deref().map(text_of).transpose()?;
+    let remedy = "start from a copy of `viewer/texts/english.toml`, or omit --texts";
+    let texts = common.texts.as_deref().map(|path| text_of(path, remedy)).transpose()?;
     if texts.is_some() && common.screen != ScreenOption::Viewer {
         let why = "--texts is for the viewer's window; omit --texts or --screen";
         return Err(CommandError::Usage(why.to_owned()));
@@ -148,7 +149,7 @@ fn note_conditions(
     screen_texts: Option<&str>,
 ) -> Result<(), LogError> {
     let notes = [
-        Some(format!("white noise: {}", noise.map_or("none", WhiteNoise::player))),
+        Some(format!("white noise: {}", noise.map_or("none", |noise| noise.name))),
         screen_texts.map(|texts| format!("texts of the screens: SHA-256 {}", digest(texts))),
         Some(format!("least time {} s, least movement {} mm", common.least_time, common.least_movement_mm)),
         common.feel_again.map(|times| format!("at most {times} repetitions of a trial")),
@@ -156,17 +157,13 @@ fn note_conditions(
     notes.into_iter().flatten().try_for_each(|text| log.write(&Event::Note { text }))
 }
 
-/// Reads a text file; an empty one is an error.
-fn text_of(path: &Path) -> Result<String, CommandError> {
+/// Reads a text file; an empty one is an error with this remedy.
+fn text_of(path: &Path, remedy: &str) -> Result<String, CommandError> {
     let text =
         read_text(path, "the text").map_err(|wrong| CommandError::Usage(wrong.in_file(path.display())))?;
     let text = text.trim().to_owned();
     if text.is_empty() {
-        return Err(CommandError::Usage(format!(
-            "{}: the file is empty; write a title in its first line, and then \
-        the text",
-            path.display()
-        )));
+        return Err(CommandError::Usage(format!("{}: the file is empty; {remedy}", path.display())));
     }
     Ok(text)
 }
@@ -202,10 +199,9 @@ impl Front {
                     "the viewer cannot show the session: {why}; use --screen terminal"
                 ))),
             },
-            ScreenOption::Terminal => Terminal::listen().map(Self::Terminal).map_err(failed),
+            ScreenOption::Terminal => Terminal::listen().map(Self::Terminal),
             ScreenOption::Json => {
-                let lines = lines_of(BufReader::new(stdin())).map_err(failed)?;
-                Ok(Self::Json(JsonLines::new(lines, stdout())))
+                Ok(Self::Json(JsonLines::new(lines_of(BufReader::new(stdin()))?, stdout())))
             }
         }
     }
@@ -217,10 +213,6 @@ impl Front {
             Self::Json(lines) => lines,
         }
     }
-}
-
-fn failed(error: impl std::fmt::Display) -> CommandError {
-    CommandError::Failed(error.to_string())
 }
 
 /// Returns the requested subject number, else the first one without a log.
@@ -241,16 +233,15 @@ fn noise(common: &Common) -> Result<Option<WhiteNoise>, CommandError> {
         return Ok(None);
     }
     let noise = WhiteNoise::start();
-    match (&noise, common.noise) {
-        (None, NoiseOption::On) => Err(CommandError::Usage(
+    if noise.is_none() && common.noise == NoiseOption::On {
+        return Err(CommandError::Usage(
             "--noise on: no sound player works here (tried pw-cat, paplay, aplay); play white noise on headphones by other \
              means and use --noise off"
                 .to_owned(),
-        )),
-        (None, _) => {
-            note("no sound player works here: play white noise on headphones by other means");
-            Ok(noise)
-        }
-        _ => Ok(noise),
+        ));
     }
+    if noise.is_none() {
+        note("no sound player works here: play white noise on headphones by other means");
+    }
+    Ok(noise)
 }

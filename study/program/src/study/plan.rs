@@ -94,10 +94,10 @@ impl StudyFile {
         toml::from_str(text).map_err(|error| {
             let start = error.span().map_or(0, |span| span.start);
             let line = 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
-            let message = error.message().replace('\n', " ");
-            let is_large = message.contains("too large");
-            let message =
-                if is_large { format!("{message}; the largest seed is {LARGEST_SEED}") } else { message };
+            let mut message = error.message().replace('\n', " ");
+            if message.contains("too large") {
+                message += &format!("; write numbers below 2^63, and a seed up to {LARGEST_SEED}");
+            }
             CommandError::Usage(format!("{}:{line}: {message}", file.display()))
         })
     }
@@ -150,7 +150,8 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let (file, further) = arguments.file_and_options();
     let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
     let text = read_text(&file, "the study file").map_err(|wrong| {
-        CommandError::Usage(format!("{}; name a study file", wrong.in_file(file.display())))
+        let advice = if wrong.line == 0 { "; name a study file" } else { "" };
+        CommandError::Usage(wrong.in_file(file.display()) + advice)
     })?;
     let (words, exclusion) = words(&file, &text, further)?;
     let command = clap::Command::new("study").no_binary_name(true);

@@ -28,7 +28,7 @@ pub(super) struct PowerArguments {
     /// Share of trials answered without attention, 0 to 0.5
     #[arg(long, default_value_t = 0.0, value_parser = real, value_name = "SHARE")]
     lapse: f64,
-    /// Bases, in the unit of the stimulus
+    /// Bases, in N
     #[arg(long, value_delimiter = ',', default_value = "17,26,35", value_parser = real, value_name = "LIST")]
     bases: Vec<f64>,
     /// Number of replications, in alternating modality

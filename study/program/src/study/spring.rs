@@ -32,10 +32,10 @@ pub(super) struct SpringArguments {
     /// Plot the measurement and the fitted spring
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Write a scene with the fitted spring, for `study jnd --scene` and `run`
+    /// Write a scene with the fitted spring, for `flotor study jnd --scene` and `flotor run`
     #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     scene: Option<PathBuf>,
-    /// Write a scene with the measured curve, and the table of the curve
+    /// Write a scene with the measured curve, and beside it the table of the curve, FILE.csv
     #[arg(long, value_parser = new_file, value_name = "FILE.toml")]
     curve_scene: Option<PathBuf>,
     #[command(flatten)]
@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
         read_text(path, "the table").map_err(|wrong| CommandError::Usage(wrong.in_file(path.display())))?;
     let refused = |error| {
         let wrong = match error {
-            CurveError::Line { line, problem } => TextProblem::at(line, problem),
+            CurveError::Line(problem) => problem,
             other => TextProblem::of_file(other.to_string()),
         };
         CommandError::Usage(wrong.in_file(path.display()))
@@ -57,16 +57,12 @@ pub(super) fn run(arguments: &SpringArguments) -> Result<(), CommandError> {
         MeasuredCurve::parse(&text, arguments.free_length_mm.map(|mm| mm * 1.0e-3)).map_err(refused)?;
     let fit = curve.fit().map_err(refused)?;
     let served = curve.served().map_err(refused)?;
-    let fitted = match &arguments.scene {
-        Some(path) => Some((path, scene(&fit, arguments.coil_diameter_mm).map_err(refused)?)),
-        None => None,
-    };
+    let fitted = arguments.scene.as_ref().map(|_| scene(&fit, arguments.coil_diameter_mm));
+    let fitted = fitted.transpose().map_err(refused)?;
     let title = style::title(&path.display().to_string());
     print_result(arguments.json.file(), &fit, || format!("{title}\n{}", to_text(&fit, &served)))?;
     write_text(arguments.plot.as_deref(), || picture(&curve, &fit, &served))?;
-    if let Some((path, text)) = fitted {
-        write_text(Some(path), || text)?;
-    }
+    write_text(arguments.scene.as_deref(), || fitted.unwrap_or_default())?;
     if let Some(path) = &arguments.curve_scene {
         let table = path.with_extension("csv");
         if is_same_file(&table, &arguments.curve) {

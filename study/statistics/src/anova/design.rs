@@ -27,7 +27,7 @@ pub struct WithinFactor {
 pub struct Design {
     between: Vec<BetweenFactor>,
     within: Vec<WithinFactor>,
-    responses: Matrix,
+    pub(super) responses: Matrix,
 }
 
 /// Set of factors by their indices in the design: an effect within or between subjects.
@@ -138,10 +138,6 @@ impl Design {
     #[must_use]
     pub fn subjects(&self) -> usize {
         self.responses.rows()
-    }
-
-    pub(super) fn responses(&self) -> &Matrix {
-        &self.responses
     }
 
     pub(super) fn between_terms(&self) -> Vec<Term> {

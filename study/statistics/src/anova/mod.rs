@@ -59,7 +59,7 @@ pub struct Effect {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub partial_omega_squared: Option<EffectSize>,
     /// Reason for a missing F.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "reason")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub not_testable: Option<StatisticsError>,
     /// Generalised eta squared: fraction of the effect in the sum of squares of effect and all errors (Olejnik and Algina 2003,
     /// all factors manipulated).
@@ -75,11 +75,6 @@ impl Effect {
     pub fn is_testable(&self) -> bool {
         self.not_testable.is_none()
     }
-}
-
-#[allow(clippy::ref_option)] // signature required by serde
-fn reason<S: serde::Serializer>(reason: &Option<StatisticsError>, serializer: S) -> Result<S::Ok, S::Error> {
-    reason.as_ref().map(ToString::to_string).serialize(serializer)
 }
 
 /// Lower limit of the denominator of the Huynh-Feldt epsilon; a smaller difference is rounding error.
@@ -107,11 +102,11 @@ pub struct Sphericity {
 pub fn analyse(design: &Design, kind: SumOfSquares) -> Vec<Effect> {
     let between = design.between_terms();
     let full = Basis::of(&columns(design, between.iter()));
-    let rounding = ROUNDING * design.responses().trace_of_square();
+    let rounding = ROUNDING * design.responses.trace_of_square();
     let mut effects = Vec::new();
     let mut error_total = 0.0;
     for within in design.within_terms() {
-        let contrasts = design.responses().times(&design.contrasts(&within));
+        let contrasts = design.responses.times(&design.contrasts(&within));
         let error = full.residual_products(&contrasts);
         error_total += error.trace();
         for term in &between {

@@ -34,7 +34,7 @@ pub(super) struct Attachment(u64);
 pub(super) struct Detached;
 
 pub(super) struct Bus {
-    personality: Personality,
+    pub(super) personality: Personality,
     serial: String,
     state: Mutex<State>,
     changed: Condvar,
@@ -70,10 +70,6 @@ impl Bus {
             to_controller: VecDeque::new(),
         };
         Self { personality, serial: serial.to_owned(), state: Mutex::new(state), changed: Condvar::new() }
-    }
-
-    pub(super) fn personality(&self) -> Personality {
-        self.personality
     }
 
     /// Replies to the host controller until the device is unplugged.

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 /// Returns the link to the host that uses the device.
 pub(super) fn open(bus: Arc<Bus>, attachment: Attachment) -> Box<dyn Transport> {
-    match bus.personality() {
+    match bus.personality {
         Personality::Serial => {
             let port = GadgetPort { bus: Arc::clone(&bus), attachment, rest: Vec::new(), taken: 0 };
             Box::new(SerialLink { bus, attachment, stream: StreamLink::new(port) })

@@ -3,7 +3,6 @@
 
 use super::controller::Flight;
 use flotor_maglev::ml_api::{FaultBits, Status};
-use std::fmt;
 use std::str::FromStr;
 
 /// Duration of an injected fault of the machine, s.
@@ -66,22 +65,13 @@ pub struct InjectedFault {
 }
 
 /// Error: text that describes no fault.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "`{0}` is not a fault: write KIND[@STATE][+MS]; kinds: silence, half-frame, close, reset, stall, wrong-length, \
+     status=CODE/N (CODE decimal), late-tick, out-of-range, over-temperature, over-current, over-speed; states: landed, \
+     taking-off, flying, ticking, landing"
+)]
 pub struct Unknown(String);
-
-impl fmt::Display for Unknown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "`{}` is not a fault: write KIND[@STATE][+MS]; kinds: silence, half-frame, close, reset, stall, wrong-length, \
-             status=CODE/N, late-tick, out-of-range, over-temperature, over-current, over-speed; states: landed, \
-             taking-off, flying, ticking, landing",
-            self.0
-        )
-    }
-}
-
-impl std::error::Error for Unknown {}
 
 impl FromStr for InjectedFault {
     type Err = Unknown;
@@ -89,7 +79,10 @@ impl FromStr for InjectedFault {
     fn from_str(text: &str) -> Result<Self, Unknown> {
         let unknown = || Unknown(text.to_owned());
         let (rest, after_s) = match text.split_once('+') {
-            Some((rest, ms)) => (rest, ms.parse::<f64>().map_err(|_| unknown())? * 1.0e-3),
+            Some((rest, ms)) => {
+                let delay_ms = ms.parse().ok().filter(|delay_ms: &f64| delay_ms.is_finite());
+                (rest, delay_ms.ok_or_else(unknown)? * 1.0e-3)
+            }
             None => (text, 0.0),
         };
         let (kind, when) = match rest.split_once('@') {
@@ -241,7 +234,9 @@ mod tests {
         };
         assert_eq!(read("status=5/10@flying+200"), Ok(expected));
         assert_eq!(read("reset").map(|one| one.when), Ok(When::Anytime));
-        for wrong in ["", "rest", "status=5/0", "reset@up", "reset+soon", "status=x/1"] {
+        for wrong in
+            ["", "rest", "status=5/0", "reset@up", "reset+soon", "reset+nan", "reset+inf", "status=x/1"]
+        {
             assert!(read(wrong).is_err(), "{wrong}");
         }
     }

@@ -18,4 +18,3 @@ pub mod server;
 pub use controller::{Commanders, Controller, ControllerConfig, ForceCommand, Silence};
 pub use injected_fault::{InjectedFault, InjectedFaultKind, When};
 pub use run::Machine;
-pub use server::Server;

@@ -5,7 +5,7 @@
 //! next tick on.
 
 use super::controller::{Commanders, Controller, ControllerConfig, ForceCommand, Silence};
-use super::server::{Hub, Server};
+use super::server::{Hub, serve};
 use crate::controller::Sample;
 use flotor_emulation::port::{Port, Reach};
 use flotor_hal::{
@@ -29,7 +29,7 @@ const SCHEMA: &[Parameter] = &[
         "reach",
         REACHES,
         0,
-        "Programs that may connect: those of this user, of every user of this machine, or of every machine \
+        "Programs that may connect: those of this user and of root, of every user of this machine, or of every machine \
          that reaches the address",
     ),
     Parameter::choice(
@@ -73,7 +73,7 @@ pub struct MlApiModel {
     hub: Arc<Hub>,
     listen: Option<String>,
     reach: Reach,
-    server: Option<Server>,
+    is_serving: bool,
     values: Vec<f64>,
     period_s: f64,
     /// Last output, repeated while a client's call holds the lock: a step never waits.
@@ -98,7 +98,7 @@ impl ForceModel for MlApiModel {
             commanders: settings.one_of("commanders", [Commanders::One, Commanders::All]),
             silence: settings.one_of("on_silence", [Silence::Lands, Silence::Ignored]),
             watchdog_s: settings.number_or_default("watchdog_ms") * 1.0e-3,
-            ..ControllerConfig::DEFAULT
+            ..ControllerConfig::default()
         };
         let reaches = [Reach::ThisUser, Reach::ThisMachine, Reach::AnyMachine];
         Ok(Self {
@@ -106,7 +106,7 @@ impl ForceModel for MlApiModel {
             hub: Arc::new(Hub::new(Controller::new(config), Vec::new(), false, Box::new(|_| ()))),
             listen: settings.text("listen").map(str::to_owned),
             reach: settings.one_of("reach", reaches),
-            server: None,
+            is_serving: false,
             values: settings.values(),
             period_s: 1.0e-3,
             wrench: Wrench::ZERO,
@@ -117,7 +117,7 @@ impl ForceModel for MlApiModel {
 
     fn prepare(&mut self, config: &LoopConfig) -> Result<(), Refusal> {
         self.period_s = config.period_ns as f64 * 1.0e-9;
-        let (Some(listen), None) = (&self.listen, &self.server) else { return Ok(()) };
+        let (Some(listen), false) = (&self.listen, self.is_serving) else { return Ok(()) };
         let refused = |error| {
             Refusal::resource(format!(
                 "cannot start the server at {listen}: {error}; end other programs of this user, or raise the limit of \
@@ -129,7 +129,8 @@ impl ForceModel for MlApiModel {
             _ => Refusal::resource(error.to_string()),
         })?;
         let address = port.address().map_err(refused)?;
-        self.server = Some(Server::start(port, Arc::clone(&self.hub)).map_err(refused)?);
+        serve(port, Arc::clone(&self.hub)).map_err(refused)?;
+        self.is_serving = true;
         println!("listening tcp {address}");
         Ok(())
     }

@@ -74,30 +74,22 @@ fn try_claim(
 /// Returns the best pair of endpoints: interrupt before bulk, alternate settings before setting 0.
 fn endpoints(device: &Device<Context>) -> Result<Option<Endpoints>, Error> {
     let configuration = device.active_config_descriptor()?;
-    let mut found = Vec::new();
-    for interface in configuration.interfaces() {
-        for setting in interface.descriptors() {
-            for transfer in [TransferType::Interrupt, TransferType::Bulk] {
-                let first = |direction| {
-                    let mut all = setting.endpoint_descriptors();
-                    all.find(|endpoint| {
-                        endpoint.direction() == direction
-                            && endpoint.transfer_type() == transfer
-                            && usize::from(endpoint.max_packet_size()) >= FRAME_BYTES
-                    })
-                };
-                if let (Some(input), Some(output)) = (first(Direction::In), first(Direction::Out)) {
-                    found.push(Endpoints {
-                        interface: interface.number(),
-                        alternate: setting.setting_number(),
-                        input: input.address(),
-                        output: output.address(),
-                        transfer,
-                    });
-                }
-            }
-        }
-    }
-    found.sort_by_key(|pair| (pair.transfer != TransferType::Interrupt, pair.alternate == 0));
-    Ok(found.first().copied())
+    let settings = configuration.interfaces().flat_map(|interface| interface.descriptors());
+    let pairs = settings.flat_map(|setting| {
+        [TransferType::Interrupt, TransferType::Bulk].into_iter().filter_map(move |transfer| {
+            let address = |direction| {
+                let mut all = setting.endpoint_descriptors();
+                let found = all.find(|endpoint| {
+                    endpoint.direction() == direction
+                        && endpoint.transfer_type() == transfer
+                        && usize::from(endpoint.max_packet_size()) >= FRAME_BYTES
+                });
+                found.map(|endpoint| endpoint.address())
+            };
+            let (input, output) = (address(Direction::In)?, address(Direction::Out)?);
+            let (interface, alternate) = (setting.interface_number(), setting.setting_number());
+            Some(Endpoints { interface, alternate, input, output, transfer })
+        })
+    });
+    Ok(pairs.min_by_key(|pair| (pair.transfer != TransferType::Interrupt, pair.alternate == 0)))
 }

@@ -28,7 +28,7 @@ use std::ffi::c_int;
 use std::ptr::NonNull;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TryRecvError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -134,18 +134,12 @@ impl Queue {
 
     /// Returns the oldest packet; [`Incoming::Nothing`] if there is none. Real-time: bounded, no allocation.
     pub(super) fn receive(&self) -> Result<Incoming, LinkLost> {
-        match self.packets.try_recv() {
-            Ok(incoming) => Ok(incoming),
-            Err(TryRecvError::Empty | TryRecvError::Disconnected) => self.nothing(),
-        }
+        self.packets.try_recv().or_else(|_| self.nothing())
     }
 
     /// Waits for the oldest packet; returns [`Incoming::Nothing`] after the timeout `patience`. Not real-time.
     pub(super) fn wait(&self, patience: Duration) -> Result<Incoming, LinkLost> {
-        match self.packets.recv_timeout(patience) {
-            Ok(incoming) => Ok(incoming),
-            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => self.nothing(),
-        }
+        self.packets.recv_timeout(patience).or_else(|_| self.nothing())
     }
 
     fn nothing(&self) -> Result<Incoming, LinkLost> {

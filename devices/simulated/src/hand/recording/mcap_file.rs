@@ -58,7 +58,7 @@ enum Topic {
 /// Reads the poses of a recording; an error if a single tick is missing.
 pub(super) fn read(file: impl Read + Seek) -> Result<Vec<Sample>, String> {
     let mut messages = MessageReader::open(file, topic_of).map_err(|error| match error {
-        OpenError::Io(cause) => format!("the file cannot be read: {cause}"),
+        OpenError::Io(cause) => format!("the file cannot be read: {cause}; record again"),
         _ => format!("the file is not an MCAP file; {HOW_TO_MAKE_ONE}"),
     })?;
     if messages.ending() == Ending::CutOff {
@@ -90,9 +90,9 @@ pub(super) fn read(file: impl Read + Seek) -> Result<Vec<Sample>, String> {
                 sample.and_then(|sample| sample.append_to(&mut samples)).map_err(place)?;
             }
             Topic::Tick => {
-                let missing = message.sequence.wrapping_sub(tick);
-                if missing != 0 {
-                    return Err(damaged(format!("{missing} ticks are missing"), &samples));
+                if message.sequence != tick {
+                    let cause = "the tick numbers do not continue (ticks are missing, or another recording is appended)";
+                    return Err(damaged(cause.to_owned(), &samples));
                 }
                 tick = tick.wrapping_add(1);
             }

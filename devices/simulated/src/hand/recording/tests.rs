@@ -37,7 +37,7 @@ fn complaints_name_the_line_and_the_column() {
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n1,0,up,0\n", "t:3: `y_m` must be a number, not `up`"),
         ("time_s,x_m,y_m,z_m\n0,0,0,0\n0,0,0,0\n", "t:3: the time 0 s after the first pose is not above 0 s"),
         ("time_s,x_m,y_m,z_m\n0,0,0,nan\n", "t:2: `z_m` must be finite"),
-        ("time_s,x_m,y_m,z_m\n0,0,0,4\n", "t:2: ([0, 0, 4]) m is outside the workspace of"),
+        ("time_s,x_m,y_m,z_m\n0,0,0,4\n", "t:2: [0, 0, 4] m is farther than 0.12 m from home"),
         ("time_s,x_m,y_m,z_m\n0,0,0\n", "t:2: the line has 3 cells for 4 columns"),
     ] {
         let problem = table(text).expect_err("refused");

@@ -43,7 +43,7 @@ pub struct AsynchronousModel {
     oldest_ns: u64,
     serves: Demand,
     memory: Memory,
-    /// Initial value of each parameter.
+    /// Present value of each parameter.
     parameters: Vec<f64>,
 }
 
@@ -151,16 +151,19 @@ impl AsynchronousModel {
         self.contacts.felt_stiffness()
     }
 
-    /// Changes a live parameter before the next answer; unsupported if the thread's command queue is full. Real-time: bounded, no
-    /// allocation.
+    /// Changes a live parameter before the next answer; unsupported if the thread's queue is full. Real-time: bounded, no allocation.
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
-        match &mut self.computing {
+        let status = match &mut self.computing {
             Computing::Inline(inline) => inline.source.model.set_parameter(index, value),
             Computing::Thread(thread) => thread.set_parameter(index, value),
+        };
+        if let (CallStatus::Ok, Some(present)) = (status, self.parameters.get_mut(index)) {
+            *present = value;
         }
+        status
     }
 
-    /// Returns the initial value of a parameter; NaN for an unknown one.
+    /// Returns the value of a parameter: the last one set, or the initial one; NaN for an unknown one.
     pub fn parameter(&self, index: usize) -> f64 {
         self.parameters.get(index).copied().unwrap_or(f64::NAN)
     }

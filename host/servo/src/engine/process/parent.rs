@@ -106,8 +106,8 @@ impl Worker {
                 if is_late {
                     let create_timeout_s = config.create_timeout.as_secs_f64();
                     return Err(Refusal::broken(format!(
-                        "`create` or `prepare` did not return within {create_timeout_s} s in the worker \
-                         process; check the plugin with `flotor validate`"
+                        "loading, `create` or `prepare` did not return within {create_timeout_s} s in the worker process; \
+                         check the plugin with `flotor validate`, or raise the limit with `FLOTOR_CALL_LIMIT_S`"
                     )));
                 }
                 Err(Refusal::broken(format!(
@@ -129,7 +129,7 @@ impl Worker {
         text
     }
 
-    /// Returns the initial value of a parameter; NaN for a parameter without one.
+    /// Returns the value of a parameter: the last one that the model has confirmed, or the initial one; NaN without either.
     pub fn parameter(&self, index: usize) -> f64 {
         self.parameters.get(index).copied().flatten().unwrap_or(f64::NAN)
     }
@@ -175,15 +175,18 @@ impl Worker {
         self.memory.bounds()
     }
 
-    /// Changes a live parameter at a tick boundary; unsupported without a reply in time. Real-time: bounded by the reply timeout,
-    /// no allocation.
+    /// Changes a live parameter at a tick boundary; unsupported without a reply in time. Real-time: as [`Self::step`].
     pub fn set_parameter(&mut self, index: usize, value: f64) -> CallStatus {
         let put = |memory: &SharedMemory| {
             memory.parameter.store(index as u64, Ordering::Relaxed);
             memory.value.store(value.to_bits(), Ordering::Relaxed);
         };
         // The next step reports a late or ended worker.
-        self.request(Operation::SetParameter, put, |_| ()).unwrap_or(CallStatus::Unsupported)
+        let status = self.request(Operation::SetParameter, put, |_| ()).unwrap_or(CallStatus::Unsupported);
+        if let (CallStatus::Ok, Some(present)) = (status, self.parameters.get_mut(index)) {
+            *present = Some(value);
+        }
+        status
     }
 
     /// Clears the history of the model; [`CallStatus::Ok`] also without a reply. Real-time: bounded by the reply timeout, no

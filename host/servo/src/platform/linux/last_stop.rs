@@ -235,7 +235,7 @@ impl std::fmt::Display for SignalName {
 /// Signals with their names and, where known, causes.
 const NAMES: [(c_int, &str, &str); 23] = [
     (SIGSEGV, "SIGSEGV", "invalid memory access, or stack overflow"),
-    (SIGBUS, "SIGBUS", "memory access error"),
+    (SIGBUS, "SIGBUS", "unreadable memory, as of a mapped file that was truncated"),
     (SIGFPE, "SIGFPE", "arithmetic error"),
     (SIGILL, "SIGILL", "illegal instruction"),
     (SIGABRT, "SIGABRT", "abort, as after an uncaught exception"),

@@ -135,7 +135,7 @@ impl std::fmt::Display for SignalName {
         let Self(code) = *self;
         let words = match code {
             EXCEPTION_ACCESS_VIOLATION => "invalid memory access",
-            EXCEPTION_IN_PAGE_ERROR => "memory access error",
+            EXCEPTION_IN_PAGE_ERROR => "a page of memory could not be read from disk or network",
             EXCEPTION_STACK_OVERFLOW => "stack overflow",
             EXCEPTION_INT_DIVIDE_BY_ZERO | EXCEPTION_FLT_DIVIDE_BY_ZERO => "arithmetic error",
             EXCEPTION_ILLEGAL_INSTRUCTION | EXCEPTION_PRIV_INSTRUCTION => "illegal instruction",

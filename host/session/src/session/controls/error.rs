@@ -63,7 +63,7 @@ pub enum ControlError {
 
 fn live_words(live: &[String]) -> String {
     match live {
-        [] => "no parameter of this plugin can change then".to_owned(),
+        [] => "set it in the scene: no parameter of this plugin can change then".to_owned(),
         live => format!("parameters that can change then: {}", live.join(", ")),
     }
 }

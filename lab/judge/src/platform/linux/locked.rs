@@ -95,7 +95,7 @@ pub(crate) fn system_calls(model: Model) -> Result<(), Outcome> {
     }
     match (before, transfers(&folder)) {
         (Some(before), Some(after)) if after > before => Err(Outcome::Violation(format!(
-            "the model made {} read or write system calls in {STEPS} steps; move file access and printing out of `step`",
+            "the number of read or write system calls in {STEPS} steps of the model is {}; move file access and printing out of `step`",
             after - before
         ))),
         _ => Ok(()),

@@ -56,8 +56,9 @@ pub(crate) fn is_loaded_first(library: &str) -> Result<(), Outcome> {
     let mapped = fs::read_to_string("/proc/self/maps").unwrap_or_default();
     match mapped.contains(library) {
         true => Ok(()),
+        false if mapped.is_empty() => Err(no_files()),
         false => Err(Outcome::Missing(format!(
-            "{library} is not in the folder of this program; build the library, or reinstall Flotor"
+            "{library} is not loaded; build the library (package `flotor-guard`), or reinstall Flotor"
         ))),
     }
 }

@@ -34,9 +34,9 @@ fn a_track_by_hand() {
     for (index, (judgement, percent, reversals)) in script.into_iter().enumerate() {
         assert!((track.delta() * 100.0 - percent).abs() < 1.0e-9, "trial {index}: {}", track.delta());
         assert!(!track.is_done());
-        let before = track.reversals();
+        let before = track.reversals;
         assert_eq!(track.answer(judgement), reversals > before, "trial {index}");
-        assert_eq!(track.reversals(), reversals, "trial {index}");
+        assert_eq!(track.reversals, reversals, "trial {index}");
     }
     assert!(track.is_done());
     let mean = (45.0 + 42.5 + 40.0 + 42.5 + 40.0 + 47.5) / 600.0;
@@ -72,7 +72,7 @@ fn the_difference_stays_between_floor_and_ceiling_and_an_endless_track_ends() {
         track.answer(Correct);
         assert!(track.delta() >= 0.01, "no pair without a difference is judged");
     }
-    assert_eq!((track.trials(), track.threshold()), (200, None));
+    assert_eq!((track.trials, track.threshold()), (200, None));
     let mut track = WeightedUpDown::new(&WeightedUpDownRule::default());
     (0..50).for_each(|_| {
         track.answer(Wrong);
@@ -92,11 +92,11 @@ fn impossible_settings_are_refused() {
     assert_eq!(refused(|rule| rule.first_step = f64::NAN), "--step NaN: must be above 0 and below 1");
     assert_eq!(
         refused(|rule| rule.initial_delta = 0.0),
-        "--initial 0: must be above --floor and up to --ceiling"
+        "--initial 0: must be above --floor (0.01) and up to --ceiling (0.95)"
     );
     for floor in [0.0, -0.1] {
         let said = refused(|rule| rule.floor = floor);
-        let legal = "must be above 0 (equal stimuli have no correct answer) and below --ceiling";
+        let legal = "must be above 0 (equal stimuli have no correct answer) and below --ceiling (0.95)";
         assert_eq!(said, format!("--floor {floor}: {legal}"));
     }
     assert_eq!(refused(|rule| rule.average_from = 9), "--average-from 9: must be 1 to --stop-after (8)");

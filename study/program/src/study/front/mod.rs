@@ -9,6 +9,8 @@ pub(super) use terminal::Terminal;
 pub(super) use window::Window;
 
 use clap::ValueEnum;
+use flotor_command::CommandError;
+use flotor_servo::THREAD_ADVICE;
 use flotor_study::apparatus::attend::PollResult;
 use std::io::BufRead;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
@@ -44,16 +46,20 @@ fn next_input(
 }
 
 /// Starts a background thread that reads lines, and returns the channel of the lines.
-pub(super) fn lines_of(reader: impl BufRead + Send + 'static) -> std::io::Result<Receiver<String>> {
+pub(super) fn lines_of(reader: impl BufRead + Send + 'static) -> Result<Receiver<String>, CommandError> {
     let (sender, lines) = channel();
     // The thread is detached, because a blocking read cannot be interrupted; it ends with the input, the receiver or the
     // process.
-    std::thread::Builder::new().name("flotor-answers".to_owned()).spawn(move || {
+    let thread = std::thread::Builder::new().name("flotor-answers".to_owned()).spawn(move || {
         for line in reader.lines().map_while(Result::ok) {
             if sender.send(line).is_err() {
                 break;
             }
         }
-    })?;
-    Ok(lines)
+    });
+    thread.map(|_| lines).map_err(|cause| {
+        CommandError::Failed(format!(
+            "cannot start the thread that reads the input: {cause}; {THREAD_ADVICE}"
+        ))
+    })
 }

@@ -1,8 +1,7 @@
 //! Front end on a terminal, with answers by keyboard.
 
 use super::{lines_of, next_input};
-use flotor_command::say;
-use flotor_command::style;
+use flotor_command::{CommandError, say, style};
 use flotor_study::apparatus::attend::{FrontEnd, PollResult};
 use flotor_study::conduct::ApparatusOrFrontEndError;
 use flotor_study::protocol::Quality;
@@ -18,7 +17,7 @@ pub(in crate::study) struct Terminal {
 
 impl Terminal {
     /// Creates the front end and starts a thread that reads standard input.
-    pub(in crate::study) fn listen() -> std::io::Result<Self> {
+    pub(in crate::study) fn listen() -> Result<Self, CommandError> {
         Ok(Self { lines: lines_of(BufReader::new(std::io::stdin()))? })
     }
 }

@@ -44,7 +44,7 @@ impl Window {
                 "cannot open the pipes of the viewer; use --screen terminal".to_owned(),
             ));
         };
-        let heard = lines_of(BufReader::new(output)).map_err(failed)?;
+        let heard = lines_of(BufReader::new(output))?;
         // The first message reports the open window; without a window, the stream ends.
         if heard.recv().is_err() {
             let why = "the viewer opened no window (its message is above); use --screen terminal";

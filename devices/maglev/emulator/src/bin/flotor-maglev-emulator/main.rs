@@ -46,7 +46,7 @@ struct Arguments {
     /// Transport to the host
     #[arg(long, value_enum, default_value = "tcp")]
     transport: TransportOption,
-    /// TCP: address to listen at (port 0: any free port; default 127.0.0.1, port 5679, with the ML API 5678)
+    /// TCP: address to listen at (port 0: any free port; default 127.0.0.1:5679, with the ML API 127.0.0.1:5678)
     #[arg(long, value_name = "HOST:PORT")]
     listen: Option<String>,
     #[command(flatten)]
@@ -57,7 +57,7 @@ struct Arguments {
     /// Clock of the controller's cycles
     #[arg(long, value_enum, default_value = "real")]
     pace: Pace,
-    /// Set a parameter of the simulated flotor (repeatable)
+    /// Set a parameter of the simulated flotor, or of the plugin of --plant or --device (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<String>,
     #[command(flatten)]
@@ -65,13 +65,13 @@ struct Arguments {
     /// Seed of all random numbers
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
-    /// Serial number of the controller
+    /// Serial number of the controller; no effect with the ML API, which has none
     #[arg(long, default_value = "emulated", value_name = "TEXT")]
     serial: String,
     /// Plugin file of the plant (default: the simulated flotor beside this program)
     #[arg(long, value_name = "FILE")]
     plant: Option<PathBuf>,
-    /// End when the first host disconnects
+    /// End when the first host disconnects (not with the ML API)
     #[arg(long)]
     once: bool,
     #[command(flatten)]
@@ -98,10 +98,10 @@ enum TransportOption {
     /// A USB device with bulk endpoints (with the module vhci_hcd, as root)
     #[cfg(target_os = "linux")]
     UsbBulk,
-    /// A USB HID device
+    /// A USB HID device (with the module vhci_hcd, as root)
     #[cfg(target_os = "linux")]
     Hid,
-    /// A USB serial port
+    /// A USB serial port (with the module vhci_hcd, as root)
     #[cfg(target_os = "linux")]
     Cdc,
 }
@@ -123,9 +123,9 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     }
     let pace = arguments.pace;
     let plugin = plant::load(arguments.plant.as_deref())?;
-    let parse = |key: &str, value: &str| {
+    let parse = |source: &str, key: &str, value: &str| {
         Setting::parse(plugin.parameters(), key, value)
-            .map_err(|error| Refusal::parameter(format!("--set {key}={value}: {error}")))
+            .map_err(|error| Refusal::parameter(format!("{source} {key}={value}: {error}")))
     };
     let mut settings = Vec::new();
     let defaults = match arguments.protocol {
@@ -135,16 +135,16 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let is_set =
         |key: &str| arguments.sets.iter().any(|text| text.split('=').next().map(str::trim) == Some(key));
     for (key, value) in defaults.iter().filter(|(key, _)| !is_set(key)) {
-        settings.push(parse(key, value)?);
+        settings.push(parse("--hand none sets", key, value)?);
     }
     if let Some((link, stand)) = arguments.rig.rig() {
         for (key, value) in rig::settings(link, stand)? {
-            settings.push(parse(key, &value)?);
+            settings.push(parse("--calibration-rig sets", key, &value)?);
         }
     }
     for text in &arguments.sets {
         let (key, value) = key_value(text)?;
-        settings.push(parse(key, value)?);
+        settings.push(parse("--set", key, value)?);
     }
     let (mut plant, capabilities) = LoadedPlant::open(plugin, settings, arguments.seed)?;
     if let Some((link, _)) = arguments.rig.rig() {

@@ -7,9 +7,9 @@ use clap::{Args, ValueEnum};
 use flotor_emulation::command_line::{say, within};
 use flotor_hal::Refusal;
 use flotor_maglev::ml_api::PORT;
-use flotor_maglev_emulator::ml_api::server::Hub;
+use flotor_maglev_emulator::ml_api::server::{self, Hub};
 use flotor_maglev_emulator::ml_api::{
-    Commanders, Controller, ControllerConfig, ForceCommand, InjectedFault, Machine, Server, Silence,
+    Commanders, Controller, ControllerConfig, ForceCommand, InjectedFault, Machine, Silence,
 };
 use flotor_maglev_emulator::{Pace, Plant};
 use std::error::Error;
@@ -24,19 +24,20 @@ const ON_STATOR: &[(&str, &str)] =
 #[command(next_help_heading = "ML API")]
 pub(crate) struct MlApiArguments {
     /// Serve this device, by the id of its plugin, instead of the emulated device: `--set` sets its parameters; the host's
-    /// envelope and watchdog stay active
+    /// envelope and watchdog stay active; no effect then: --transport, --link, --pace, --seed, --serial, --once, --hand
     #[arg(long, value_name = "ID", conflicts_with_all = ["faults", "presses", "plant", "calibration_rig"])]
     pub(crate) device: Option<String>,
     /// Recording file of the run with `--device`
     #[arg(long, default_value = "ml-api.mcap", value_name = "FILE")]
     pub(crate) record: std::path::PathBuf,
-    /// With --device: watchdog limit of a tick of the host, in ms, 1 to 60000 (default: as in a scene without `watchdog_ms`)
-    #[arg(long, requires = "device", value_name = "MS", value_parser = watchdog_ms)]
+    /// With --device: watchdog limit of a tick of the host, in ms, 3 to 60000 (default: 100)
+    // At least three periods of the host's loop at 1 kHz.
+    #[arg(long, requires = "device", value_name = "MS", value_parser = within(3.0, 60_000.0, "ms"))]
     pub(crate) host_watchdog_ms: Option<f64>,
     /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device
     #[arg(long, requires = "device")]
     pub(crate) accept_shared_control_group: bool,
-    /// Hand on the flotor at the start
+    /// Hand that holds the flotor; no effect with --device or --calibration-rig
     #[arg(long, value_enum, default_value = "none", value_name = "WHO")]
     hand: HandOption,
     /// Effect of a force command on the gains
@@ -50,14 +51,14 @@ pub(crate) struct MlApiArguments {
     on_silence: Silence,
     /// Longest time without an acknowledged tick while a client commands forces and is registered for ticks, in ms,
     /// 1 to 60000
-    #[arg(long, default_value_t = 500.0, value_name = "MS", value_parser = watchdog_ms)]
+    #[arg(long, default_value_t = 500.0, value_name = "MS", value_parser = within(1.0, 60_000.0, "ms"))]
     watchdog_ms: f64,
     /// Fault to inject, as KIND[@STATE][+MS], like reset@flying+200 (repeatable): silence, half-frame, close, reset, stall,
-    /// wrong-length, status=CODE/N (every Nth call), late-tick, out-of-range, over-temperature, over-current, over-speed;
-    /// states landed, taking-off, flying, ticking, landing
+    /// wrong-length, status=CODE/N (CODE decimal, every Nth call), late-tick, out-of-range, over-temperature, over-current,
+    /// over-speed; states landed, taking-off, flying, ticking, landing
     #[arg(long = "fault", value_name = "FAULT")]
     faults: Vec<InjectedFault>,
-    /// Button press, as left@1.5-2, in s from the start (repeatable)
+    /// Press of the left or right button, as left@1.5-2, in s from the start (repeatable)
     #[arg(long = "press", value_name = "BUTTON@FROM-TO")]
     presses: Vec<Press>,
 }
@@ -73,10 +74,6 @@ enum HandOption {
 /// Returns the name of a value on the command line.
 fn name(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
-}
-
-fn watchdog_ms(text: &str) -> Result<f64, String> {
-    within(text, 1.0, 60_000.0, "ms")
 }
 
 impl MlApiArguments {
@@ -105,7 +102,7 @@ impl MlApiArguments {
             commanders: self.commanders,
             silence: self.on_silence,
             watchdog_s: self.watchdog_ms * 1.0e-3,
-            ..ControllerConfig::DEFAULT
+            ..ControllerConfig::default()
         }
     }
 }
@@ -138,7 +135,7 @@ fn run(
         Box::new(|line| say(&line.to_string())),
     ));
     let mut machine = Machine::new(Arc::clone(&hub), pace, plant);
-    let _server = Server::start(listen(arguments, PORT)?, hub)?;
+    server::serve(listen(arguments, PORT)?, hub)?;
     machine.run(&AtomicBool::new(false));
     Ok(())
 }

@@ -41,7 +41,7 @@ pub(crate) fn load_device(id: &str) -> Result<Plugin, Box<dyn Error>> {
         }
     }
     let folder = own.display();
-    Err(format!("no plugin `{id}` in or beside {folder}; build the plugin with `cargo build -p flotor-{id}`")
+    Err(format!("no plugin `{id}` in or beside {folder}; name its file with --plant, or build the plugin with `cargo build -p flotor-{id}` (`--release` for target/release)")
         .into())
 }
 

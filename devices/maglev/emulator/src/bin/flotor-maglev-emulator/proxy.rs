@@ -24,7 +24,7 @@ const RESTING: &[(&str, &str)] =
 /// Replaces this process by `flotor run`; returns only on failure.
 pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     if arguments.protocol != ProtocolOption::MlApi {
-        return Err(Refusal::parameter("--device needs --protocol ml-api; add this option").into());
+        return Err(Refusal::parameter("--device serves the ML API only; add --protocol ml-api").into());
     }
     let scene = anonymous_file(&scene(device, arguments)?)?;
     // The descriptor stays open across `exec`: only this process can use its path.
@@ -33,7 +33,7 @@ pub(crate) fn become_host(device: &str, arguments: &Arguments) -> Result<(), Box
     let record = &arguments.ml_api.record;
     let error = Command::new(&host).arg("run").arg(&file).arg("--record").arg(record).exec();
     Err(format!(
-        "cannot start the host {}: {error}; build the host with `cargo build --release`",
+        "cannot start the host {}: {error}; build this program and the host with `cargo build --release`",
         host.display()
     )
     .into())
@@ -52,11 +52,7 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
     let mut sets = arguments.sets.iter().map(|text| key_value(text)).collect::<Result<Vec<_>, _>>()?;
     sets.splice(0..0, resting(device, &sets));
     for (key, value) in &sets {
-        // Numbers are written as numbers, other values as strings.
-        match value.parse::<f64>() {
-            Ok(number) => writeln!(scene, "{key} = {number:?}")?,
-            Err(_) => writeln!(scene, "{key} = {value:?}")?,
-        }
+        writeln!(scene, "{key} = {}", toml_value(value))?;
     }
     scene.push_str("[limits]\n");
     if let Some(felt) = capabilities(device, &sets).as_ref().and_then(felt) {
@@ -82,6 +78,15 @@ fn scene(device: &str, arguments: &Arguments) -> Result<String, Box<dyn Error>> 
     Ok(scene)
 }
 
+/// Returns a value in TOML: a finite number as a number, any other value as a string. The host refuses `nan` for a number with its
+/// key and range; as a number of Rust, `NaN`, it is not TOML.
+fn toml_value(value: &str) -> String {
+    match value.parse::<f64>() {
+        Ok(number) if number.is_finite() => format!("{number:?}"),
+        _ => format!("{value:?}"),
+    }
+}
+
 /// Returns default settings of the simulated flotor for keys not given; none if the command line configures a hand.
 fn resting(device: &str, sets: &[(&str, &str)]) -> Vec<(&'static str, &'static str)> {
     if device != SIMULATED || sets.iter().any(|(key, _)| key.starts_with("hand")) {
@@ -103,9 +108,16 @@ fn capabilities(device: &str, sets: &[(&str, &str)]) -> Option<Capabilities> {
 /// of 0 on the axes without actuators, as the controller model commands all six axes.
 fn felt(device: &Capabilities) -> Option<[f64; 3]> {
     let is_driven = [Axes::X, Axes::Y, Axes::Z].map(|axis| device.actuated.contains(axis));
-    let mut felt_n = device.max_force_n;
-    for (most_n, is_driven) in felt_n.iter_mut().zip(is_driven) {
-        *most_n = if is_driven { *most_n } else { 0.0 };
-    }
+    let felt_n = std::array::from_fn(|axis| if is_driven[axis] { device.max_force_n[axis] } else { 0.0 });
     (is_driven != [true; 3]).then_some(felt_n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_that_is_no_finite_number_is_a_string() {
+        assert_eq!(["2.5", "hold", "nan"].map(toml_value), ["2.5", "\"hold\"", "\"nan\""]);
+    }
 }

@@ -30,7 +30,9 @@ impl SensedForce {
 /// Returns the settings of the simulated flotor in the rig; writes the stand's steps to a file beside the link.
 pub(crate) fn settings(link: &Path, stand: Stand) -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
     let script = link.with_extension("stand.toml");
-    std::fs::write(&script, stand.script()).map_err(|error| format!("{}: {error}", script.display()))?;
+    std::fs::write(&script, stand.script()).map_err(|error| {
+        format!("cannot write {}: {error}; name another --calibration-rig", script.display())
+    })?;
     Ok(vec![
         ("preset", "full".to_owned()),
         ("mass_kg", MASS_KG.to_string()),

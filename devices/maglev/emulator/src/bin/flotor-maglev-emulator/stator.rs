@@ -88,7 +88,8 @@ impl FromStr for Press {
                 "right" => 2,
                 _ => return None,
             };
-            Some(Self { bit, from_s: from.trim().parse().ok()?, to_s: to.trim().parse().ok()? })
+            let time_s = |text: &str| text.trim().parse().ok().filter(|time_s: &f64| time_s.is_finite());
+            Some(Self { bit, from_s: time_s(from)?, to_s: time_s(to)? })
         };
         parse().ok_or_else(|| {
             format!("`{text}` is not a button press: write left@1.5-2 or right@0-10, times in s")
@@ -130,7 +131,7 @@ mod tests {
     #[test]
     fn a_press_is_read_as_it_is_written() {
         assert_eq!("left@1.5-2".parse(), Ok(Press { bit: 1, from_s: 1.5, to_s: 2.0 }));
-        for wrong in ["middle@0-1", "left", "left@1", "left@a-b"] {
+        for wrong in ["middle@0-1", "left", "left@1", "left@a-b", "left@nan-1", "left@0-inf"] {
             assert!(wrong.parse::<Press>().is_err(), "{wrong}");
         }
     }

@@ -175,14 +175,7 @@ impl Controller {
     }
 
     fn set(&mut self, request: &Request) -> Status {
-        let moves = matches!(
-            request.function(),
-            Function::SetCurrents
-                | Function::SetDesiredPosition
-                | Function::SetForceAxis
-                | Function::SetForces
-                | Function::SetVelocity
-        );
+        let moves = is_command(request.function());
         let drives =
             moves && !matches!(request.function(), Function::SetDesiredPosition | Function::SetVelocity);
         match self.flight {
@@ -312,4 +305,16 @@ impl Controller {
         }
         Status::OK
     }
+}
+
+/// Returns true for a function that only sets the target or the wrench of the next servo interval.
+pub(in crate::ml_api) fn is_command(function: Function) -> bool {
+    matches!(
+        function,
+        Function::SetForces
+            | Function::SetForceAxis
+            | Function::SetCurrents
+            | Function::SetDesiredPosition
+            | Function::SetVelocity
+    )
 }

@@ -64,13 +64,9 @@ impl CoilSet {
     /// Clips currents, A, to the limits; returns true if a current was clipped.
     pub(super) fn clipped(&self, asked_a: &AxisValues) -> (AxisValues, bool) {
         #[allow(clippy::cast_possible_truncation)] // an f32 or a limit
-        let clip = |(coil, current): (usize, &f32)| {
-            f64::from(*current).clamp(-self.limit_a(coil), self.limit_a(coil)) as f32
-        };
-        let mut within = [0.0; COILS];
-        for (place, asked) in within.iter_mut().zip(asked_a.iter().enumerate()) {
-            *place = clip(asked);
-        }
+        let within = std::array::from_fn(|coil| {
+            f64::from(asked_a[coil]).clamp(-self.limit_a(coil), self.limit_a(coil)) as f32
+        });
         (within, within != *asked_a)
     }
 

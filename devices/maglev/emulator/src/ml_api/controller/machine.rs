@@ -60,20 +60,14 @@ pub struct ControllerConfig {
 
 impl Default for ControllerConfig {
     fn default() -> Self {
-        Self::DEFAULT
+        Self {
+            force_command: ForceCommand::Replaces,
+            silence: Silence::Lands,
+            commanders: Commanders::One,
+            watchdog_s: 0.5,
+            floor_m: -9.5e-3,
+        }
     }
-}
-
-impl ControllerConfig {
-    /// Default configuration: a force command replaces the gains, the flotor lands after the loss of a client, one client
-    /// commands, the watchdog timeout is 0.5 s, and the stator is 9.5 mm below home.
-    pub const DEFAULT: Self = Self {
-        force_command: ForceCommand::Replaces,
-        silence: Silence::Lands,
-        commanders: Commanders::One,
-        watchdog_s: 0.5,
-        floor_m: -9.5e-3,
-    };
 }
 
 /// State of the flotor.
@@ -100,10 +94,6 @@ pub(super) enum Command {
     Currents(AxisValues),
 }
 
-/// Fault bits injected for a test.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Injected(pub FaultBits);
-
 /// Hysteresis of a boundary, m or rad: the resolution of the sensors.
 const INSIDE_M: f64 = 2.0e-6;
 
@@ -116,10 +106,10 @@ type Sides = [i32; 7];
 /// Emulated controller of a Maglev 200.
 #[derive(Clone, Debug, Default)]
 pub struct Controller {
-    pub(super) config: ControllerConfig,
+    pub(in crate::ml_api) config: ControllerConfig,
     pub(super) gains: Gains,
     pub(super) coils: CoilSet,
-    pub(super) flight: Flight,
+    pub(in crate::ml_api) flight: Flight,
     pub(super) procedure: Option<(ProcedureId, Procedure)>,
     /// Gains on the way to their defaults, at most one entry per set.
     pub(super) resets: Vec<GainReset>,
@@ -137,8 +127,11 @@ pub struct Controller {
     pub(super) trim: [f64; 6],
     /// Gains for the landing, and the fraction not yet faded.
     pub(super) landing: ([Pid; 6], f64),
-    pub(super) faults: FaultBits,
-    pub(super) injected: Injected,
+    /// Fault bits; a fault stays set until a client resets the faults after the end of its cause, or restarts the
+    /// controller.
+    pub(in crate::ml_api) faults: FaultBits,
+    /// Fault bits injected for a test.
+    pub(super) injected: FaultBits,
     pub(super) sample: Sample,
     /// Position, m, and angles, rad, in the default frame.
     pub(super) at: [f64; 6],
@@ -181,24 +174,6 @@ impl Controller {
         }
     }
 
-    /// Returns the configuration passed to [`Self::new`].
-    #[must_use]
-    pub fn config(&self) -> &ControllerConfig {
-        &self.config
-    }
-
-    /// Returns the state of the flotor.
-    #[must_use]
-    pub fn flight(&self) -> Flight {
-        self.flight
-    }
-
-    /// Returns the fault bits; a fault stays set until a client resets the faults after the end of its cause, or restarts the
-    /// controller.
-    pub fn faults(&self) -> FaultBits {
-        self.faults
-    }
-
     /// Returns the servo rate, Hz.
     #[must_use]
     pub fn servo_hz(&self) -> f64 {
@@ -227,7 +202,7 @@ impl Controller {
     }
 
     /// Sets the injected faults, until the next call.
-    pub fn inject(&mut self, injected: Injected) {
+    pub fn inject(&mut self, injected: FaultBits) {
         self.injected = injected;
     }
 
@@ -283,7 +258,7 @@ impl Controller {
     fn is_in_range(&self) -> bool {
         self.sample.in_range
             && self.sample.pose.is_finite()
-            && !self.injected.0.contains(FaultBits::SENSOR_RANGE)
+            && !self.injected.contains(FaultBits::SENSOR_RANGE)
     }
 
     /// Returns the faults with a present cause.
@@ -294,7 +269,6 @@ impl Controller {
         });
         let when = |is: bool, fault| if is { fault } else { FaultBits::NONE };
         self.injected
-            .0
             .with(when(!self.is_in_range(), FaultBits::SENSOR_RANGE))
             .with(when(self.is_too_hot(), FaultBits::OVER_TEMPERATURE))
             .with(when(self.coils.is_overloaded(), FaultBits::OVER_CURRENT))
@@ -302,9 +276,7 @@ impl Controller {
     }
 
     fn is_too_hot(&self) -> bool {
-        self.coils.is_too_hot()
-            || self.sample.too_hot
-            || self.injected.0.contains(FaultBits::OVER_TEMPERATURE)
+        self.coils.is_too_hot() || self.sample.too_hot || self.injected.contains(FaultBits::OVER_TEMPERATURE)
     }
 
     /// Checks for faults, and queues events for changes.

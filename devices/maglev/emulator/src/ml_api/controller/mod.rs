@@ -14,5 +14,6 @@ mod progress;
 mod tests;
 
 pub use answer::Answer;
-pub use machine::{Commanders, Controller, ControllerConfig, Flight, ForceCommand, Injected, Silence};
+pub(super) use answer::is_command;
+pub use machine::{Commanders, Controller, ControllerConfig, Flight, ForceCommand, Silence};
 pub use procedure::ProcedureId;

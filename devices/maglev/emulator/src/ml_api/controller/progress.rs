@@ -213,10 +213,9 @@ impl Controller {
         if !is_found && search.rounds < ROUNDS {
             return None;
         }
-        let mut found = [0.0; 6];
-        for (index, pid) in acting.iter().enumerate() {
-            found[index] = f64::from(pid.ff) + self.trim[index] + self.integral_n[index];
-        }
+        let found = std::array::from_fn(|index| {
+            f64::from(acting[index].ff) + self.trim[index] + self.integral_n[index]
+        });
         self.trim = [0.0; 6];
         let status = if is_found { Status::OK } else { Status::TIMER };
         Some(Reply { status, results: Results::AxisValues(narrow(vector(&found, 0), vector(&found, 3))) })

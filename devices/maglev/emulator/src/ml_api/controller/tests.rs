@@ -21,7 +21,7 @@ struct Rig {
 
 impl Rig {
     fn new(force_command: ForceCommand) -> Self {
-        let controller = Controller::new(ControllerConfig { force_command, ..ControllerConfig::DEFAULT });
+        let controller = Controller::new(ControllerConfig { force_command, ..ControllerConfig::default() });
         Self { controller, position: DVec3::Z * FLOOR_M, velocity: DVec3::ZERO }
     }
 
@@ -108,7 +108,7 @@ fn landing_ends_on_the_floor_without_force() {
     let mut rig = Rig::flying(ForceCommand::Replaces);
     assert_eq!(rig.plain(Function::Takeoff).status, Status::TAKEN_OFF);
     assert_eq!(rig.plain(Function::Land).status, Status::OK);
-    assert_eq!((rig.controller.flight(), rig.position.z), (Flight::Landed, FLOOR_M));
+    assert_eq!((rig.controller.flight, rig.position.z), (Flight::Landed, FLOOR_M));
     assert_eq!(rig.step(), Wrench::ZERO);
     assert_eq!(rig.plain(Function::Land).status, Status::LANDED);
     assert_eq!(rig.status(Request::AxisValues(Function::SetForces, [9.0; 6])), Status::LANDED);
@@ -228,7 +228,7 @@ fn gains_that_are_reset_end_no_landing_and_a_second_landing_waits_for_the_first(
         procedure_id(rig.controller.answer(&Request::OfSet(Function::ResetGainVecAxes, GainSet::Locked)));
     let second = procedure_id(rig.controller.answer(&Request::Plain(Function::Land)));
     assert_eq!(rig.finish(second).status, Status::OK);
-    assert_eq!((rig.controller.flight(), rig.position.z), (Flight::Landed, FLOOR_M));
+    assert_eq!((rig.controller.flight, rig.position.z), (Flight::Landed, FLOOR_M));
     assert_eq!(rig.finish(landing).status, Status::OK);
     assert_eq!(rig.finish(reset).status, Status::OK);
 }
@@ -271,7 +271,7 @@ fn a_fault_switches_off_and_stays_until_its_cause_is_gone() {
     assert_eq!(rig.status(Request::AxisValues(Function::SetSpeedLimits, limits)), Status::OK);
     rig.velocity.x = 1.0e-3;
     rig.step();
-    assert_eq!((rig.controller.faults(), rig.step()), (FaultBits::OVER_SPEED, Wrench::ZERO));
+    assert_eq!((rig.controller.faults, rig.step()), (FaultBits::OVER_SPEED, Wrench::ZERO));
     assert_eq!(rig.plain(Function::Takeoff).status, Status::SPEED);
     assert_eq!(rig.plain(Function::ResetFault).status, Status::SPEED, "it is falling");
     rig.run(1000);

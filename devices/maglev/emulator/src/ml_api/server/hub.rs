@@ -2,10 +2,10 @@
 
 use super::state::{Callback, CallbackEnd, Client, EVENTS, Id, Log, Next, State};
 use crate::controller::Sample;
-use crate::ml_api::controller::{Answer, Controller, Flight, ProcedureId, Silence};
+use crate::ml_api::controller::{Answer, Controller, Flight, ProcedureId, Silence, is_command};
 use crate::ml_api::injected_fault::{Deed, InjectedFault, Plan};
 use flotor_hal::Wrench;
-use flotor_maglev::ml_api::{EventKind, Function, InvalidRequest, Reply, Request};
+use flotor_maglev::ml_api::{EventKind, InvalidRequest, Reply, Request};
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -146,8 +146,8 @@ impl Hub {
         }
         if state.commander == Some(id) {
             state.commander = None;
-            let lands = state.controller.config().silence == Silence::Lands;
-            if lands && matches!(state.controller.flight(), Flight::TakingOff | Flight::Flying) {
+            let lands = state.controller.config.silence == Silence::Lands;
+            if lands && matches!(state.controller.flight, Flight::TakingOff | Flight::Flying) {
                 (self.log)(format_args!("landing why=client-lost client={id}"));
                 state.controller.land();
             }
@@ -249,18 +249,6 @@ impl Hub {
     }
 }
 
-/// Returns true for a function that only sets the target or the wrench of the next servo interval.
-fn is_command(function: Function) -> bool {
-    matches!(
-        function,
-        Function::SetForces
-            | Function::SetForceAxis
-            | Function::SetCurrents
-            | Function::SetDesiredPosition
-            | Function::SetVelocity
-    )
-}
-
 /// Result of a wait for acknowledgements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TickWait {
@@ -281,7 +269,7 @@ mod tests {
 
     #[test]
     fn a_tick_that_nobody_answers_is_waited_for_for_a_while() {
-        let controller = Controller::new(ControllerConfig::DEFAULT);
+        let controller = Controller::new(ControllerConfig::default());
         let hub = Hub::new(controller, Vec::new(), false, Box::new(|_| ()));
         let client = hub.connect("here");
         let token = hub.becomes_callback(hub.connect("here"));

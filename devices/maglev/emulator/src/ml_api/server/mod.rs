@@ -19,7 +19,6 @@ use flotor_emulation::port::Port;
 use std::io;
 use std::net::TcpStream;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// Maximum number of connections; further connections are reset.
@@ -29,47 +28,33 @@ const PAUSE: Duration = Duration::from_millis(10);
 /// Write timeout: the longest time for a client to read a reply.
 const WRITE_PATIENCE: Duration = Duration::from_secs(2);
 
-/// Server of the ML API with its own accept thread, which runs until the process ends.
-pub struct Server {
-    hub: Arc<Hub>,
-}
-
-impl Server {
-    /// Starts to accept connections of a port, until the process ends.
-    ///
-    /// # Errors
-    /// Errors of the system when starting the thread.
-    pub fn start(port: Port, hub: Arc<Hub>) -> io::Result<Self> {
-        let shared = Arc::clone(&hub);
-        let open = Arc::new(AtomicUsize::new(0));
-        std::thread::Builder::new().name("ml-api".to_owned()).spawn(move || {
-            loop {
-                let Ok(stream) = port.accept().and_then(prepared) else {
-                    std::thread::sleep(PAUSE);
-                    continue;
-                };
-                if open.load(Ordering::Acquire) >= CONNECTIONS {
-                    continue;
-                }
-                open.fetch_add(1, Ordering::AcqRel);
-                let (hub, counter) = (Arc::clone(&shared), Arc::clone(&open));
-                let started = std::thread::Builder::new().name("ml-api-client".to_owned()).spawn(move || {
-                    control::serve(stream, &hub);
-                    counter.fetch_sub(1, Ordering::AcqRel);
-                });
-                if started.is_err() {
-                    open.fetch_sub(1, Ordering::AcqRel);
-                }
+/// Starts to accept connections of a port, in a thread of its own until the process ends.
+///
+/// # Errors
+/// Errors of the system when starting the thread.
+pub fn serve(port: Port, hub: Arc<Hub>) -> io::Result<()> {
+    let accept = move || {
+        // Its references count the connections.
+        let served = Arc::new(());
+        loop {
+            let Ok(stream) = port.accept().and_then(prepared) else {
+                std::thread::sleep(PAUSE);
+                continue;
+            };
+            if Arc::strong_count(&served) > CONNECTIONS {
+                continue;
             }
-        })?;
-        Ok(Self { hub })
-    }
-
-    /// Returns the state shared by the connections.
-    #[must_use]
-    pub fn hub(&self) -> &Hub {
-        &self.hub
-    }
+            let (hub, place) = (Arc::clone(&hub), Arc::clone(&served));
+            let thread = std::thread::Builder::new().name("ml-api-client".to_owned());
+            // A connection without a thread is dropped, and with it its place.
+            let _ = thread.spawn(move || {
+                let _place = place;
+                control::serve(stream, &hub);
+            });
+        }
+    };
+    std::thread::Builder::new().name("ml-api".to_owned()).spawn(accept)?;
+    Ok(())
 }
 
 /// Configures a connection to send small frames at once, and to reset when it is dropped or the process dies.

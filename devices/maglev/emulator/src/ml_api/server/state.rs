@@ -1,7 +1,7 @@
 //! Shared state of clients and callback connections, with their pending events.
 
 use crate::controller::Sample;
-use crate::ml_api::controller::{Answer, Commanders, Controller, Flight, Injected, Silence};
+use crate::ml_api::controller::{Answer, Commanders, Controller, Flight, Silence};
 use crate::ml_api::injected_fault::Plan;
 use flotor_maglev::ml_api::{
     Event, EventKind, FaultBits, Function, Reply, Request, Results, Status, WirePose,
@@ -96,8 +96,8 @@ impl State {
 
     pub(super) fn begin(&mut self, sample: &Sample, dt_s: f64, log: &Log) {
         let is_ticking = self.clients.iter().any(|client| client.wants(EventKind::Tick));
-        let injected = self.plan.advance(self.controller.flight(), is_ticking, dt_s);
-        self.controller.inject(Injected(injected));
+        let injected = self.plan.advance(self.controller.flight, is_ticking, dt_s);
+        self.controller.inject(injected);
         self.controller.sense(sample, dt_s);
         self.now_s += dt_s;
         self.tell_events();
@@ -116,7 +116,7 @@ impl State {
 
     pub(super) fn execute(&mut self, id: Id, request: &Request) -> Answer {
         let function = request.function();
-        if function.commands() && self.controller.config().commanders == Commanders::One {
+        if function.commands() && self.controller.config.commanders == Commanders::One {
             let commander = *self.commander.get_or_insert(id);
             if commander != id {
                 return Answer::Now(Reply::failed(Some(function), Status::RECEIVE_ONLY));
@@ -219,7 +219,7 @@ impl State {
         opened.chain(lost).for_each(|silent_s| *silent_s += dt_s);
         let commander = self.commander.and_then(|id| self.client(id));
         let (token, lost_s) = commander.map_or((None, None), |client| (client.callback, client.ticks_lost_s));
-        let config = *self.controller.config();
+        let config = self.controller.config;
         let open_s = self.callback(token).and_then(|callback| callback.tick_open_s).or(lost_s).unwrap_or(0.0);
         let is_silent = open_s > config.watchdog_s && self.controller.is_driven_by_forces();
         if is_silent && config.silence == Silence::Lands {
@@ -229,7 +229,7 @@ impl State {
     }
 
     pub(super) fn log_changes(&mut self, log: &Log) {
-        let now = (self.controller.flight(), self.controller.faults());
+        let now = (self.controller.flight, self.controller.faults);
         if now != self.reported {
             self.reported = now;
             log(format_args!("flight {:?} faults={} at_ms={:.0}", now.0, now.1, self.now_s * 1.0e3));
