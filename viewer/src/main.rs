@@ -1,5 +1,4 @@
-//! `flotor-viewer`: shows a running host or a recording in a window, or writes a picture. Started by `flotor view`, which finds
-//! the plugins.
+//! `flotor-viewer`, which `flotor view` starts with the plugins: shows a session or a recording, or writes a picture.
 
 use clap::Parser;
 use flotor_drawing::camera::View;
@@ -34,7 +33,7 @@ use std::sync::mpsc::channel;
 #[derive(Parser)]
 #[command(name = "flotor-viewer", version, about, max_term_width = 110)]
 struct Arguments {
-    /// Recording to show; in a window or its picture also a second recording over the first, dashed (default: the newest run)
+    /// Recording to show; in a window or its picture also a second recording over the first, dashed (default: the newest session)
     #[arg(value_name = "FILE.mcap", num_args = 0..=2)]
     recording: Vec<PathBuf>,
     /// File of a plugin, for drawing its model in a recording; without the file the model is not drawn (repeatable)
@@ -43,7 +42,7 @@ struct Arguments {
     /// Write a picture instead of opening a window; needs no display and no GPU
     #[arg(long, value_name = "OUT.png", requires = "recording")]
     screenshot: Option<PathBuf>,
-    /// Show the run of this process (default: the newest run)
+    /// Show the session of this process (default: the newest session)
     #[arg(long, value_name = "PID", conflicts_with = "recording")]
     run: Option<u32>,
     /// Show the screens of an experiment, controlled by lines of JSON on standard input and output
@@ -83,7 +82,7 @@ struct Arguments {
     /// Plot force over position along this axis, beside the traces
     #[arg(long, value_name = "x|y|z", value_parser = axis, conflicts_with = "sitting")]
     force_position: Option<usize>,
-    /// Force of an arrow of full length, N; set this force for comparable pictures (default: the largest force of the run)
+    /// Force of an arrow of full length, 0.001 to 10000 N, for comparable pictures (default: the largest force of the run)
     #[arg(long, value_name = "NEWTONS", value_parser = arrow_force, conflicts_with_all = ["sitting", "export"])]
     arrow_force: Option<f64>,
     /// With --export: title of the plot (default: the title of the scene)
@@ -314,9 +313,7 @@ fn screenshot(
     }
     let (mut shapes, missing) =
         history.first().map(|first| shapes_of(first.run(), &arguments.plugins)).unwrap_or_default();
-    for reason in missing {
-        eprintln!("note: {}", escaped(&reason.to_string()));
-    }
+    missing.iter().for_each(|reason| eprintln!("note: {}", escaped(&reason.to_string())));
     let options = PictureOptions { size_px, scale, look, view: arguments.view, chosen, at_s: arguments.at };
     let image = picture(history, &mut shapes, &options).map_err(Failure::usage)?;
     write_png(out, &image).map_err(Failure::file)

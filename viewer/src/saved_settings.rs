@@ -7,6 +7,7 @@
 use crate::palette::Look;
 use crate::platform::settings_folder;
 use crate::ui::plot_stack::FIRST_TRACES;
+use flotor_hal::read_text;
 use flotor_history::quantity::{Quantity, Units};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -61,7 +62,7 @@ impl SavedSettings {
     /// Reads the settings and limits size and zoom to usable values; returns the defaults if the file is missing or invalid.
     #[must_use]
     pub fn load(file: &Path) -> Self {
-        let text = std::fs::read_to_string(file).unwrap_or_default();
+        let text = read_text(file, "the settings").unwrap_or_default();
         let mut found: Self = toml::from_str(&text).unwrap_or_default();
         // The window must have a usable size, and the text must fit into it.
         found.size_pt =

@@ -32,7 +32,10 @@ its lamp is red, push the handle in as far as possible and pull the handle out a
 const HOMING_NAP: Duration = Duration::from_millis(2);
 
 const SCHEMA: &[Parameter] = &[
-    Parameter::text("address", "Address: usb (the default), usb:SERIAL, or tcp:HOST:PORT of an emulator"),
+    Parameter::text(
+        "address",
+        "Address: usb (the default: the first Falcon that can be opened), usb:SERIAL, or tcp:HOST:PORT of an emulator",
+    ),
     Parameter::file(
         "firmware",
         choices![],

@@ -62,6 +62,9 @@ fn refused(address: &str, failed: Failed) -> Refusal {
             "; check its power and the network; without hardware start the emulator with `flotor emulate maglev --protocol ml-api` (on Linux)"
         }
         Failed::At(_, NoResults::Refused(Status::RECEIVE_ONLY)) => "; end the other program first",
+        Failed::At(_, NoResults::Refused(Status::REPLACED)) => {
+            "; end other programs that use the controller, and start again"
+        }
         Failed::At(_, NoResults::Malformed) => "; use a controller with the ML API 1.5b, and check `address`",
         Failed::At(_, NoResults::Refused(_)) => {
             "; remove this cause, correct the parameters of the device that this request transfers, or restart the controller"

@@ -109,7 +109,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "walls",
         WALLS,
         0,
-        "Additional walls, inside the walls of the scene: off (the parameters of walls, angles and yaw have no effect), maker (the maker's boundary mode), or thesis",
+        "Additional walls, inside the walls of the scene: off (the parameters of walls, angles and yaw have no effect), maker (the maker's boundary mode), or thesis (as maker, but with a stiffness from `gamma_n` beyond the angle limit, and damping of rotation at every angle)",
     ),
     Parameter::real("wall_radius_mm", "mm", 1.0, 12.0, 11.0, "Radius of the spherical wall about home")
         .live(),

@@ -224,6 +224,25 @@ pub struct PluginResultOptions {
     pub plugin_path: PluginPathOption,
 }
 
+/// Model of a command: the first argument, or `--model`.
+#[derive(Args, Clone, Debug)]
+pub struct ModelOption {
+    /// Id of the model, or path to its plugin file
+    #[arg(value_name = "ID", required_unless_present = "named_model")]
+    model: Option<String>,
+    /// The model, in place of the first argument
+    #[arg(long = "model", value_name = "ID", conflicts_with = "model")]
+    named_model: Option<String>,
+}
+
+impl ModelOption {
+    /// Returns the id of the model, or the path to its plugin file.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.model.as_ref().or(self.named_model.as_ref()).map_or("", String::as_str)
+    }
+}
+
 /// Parses a duration such as `10`, `10s`, `500ms`, `2min` or `1h`, and returns it in seconds; a number without unit is in seconds.
 ///
 /// # Errors

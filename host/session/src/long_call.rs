@@ -31,7 +31,7 @@ const REMEDY: &str = "set `FLOTOR_STEP_LIMIT_S` to raise the limit";
 pub enum Exceeded {
     /// Watchdog timeout; the watchdog has stopped the devices.
     #[error(
-        "; the watchdog stopped the device after {} ms (`[limits] watchdog_ms` sets the limit)",
+        "; the watchdog stopped all devices after {} ms (`[limits] watchdog_ms` sets the limit)",
         .0.as_millis()
     )]
     Watchdog(Duration),

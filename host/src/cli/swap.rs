@@ -5,6 +5,7 @@ use flotor_command::CommandError;
 use flotor_command::options::KeyValue;
 use flotor_command::say;
 use flotor_live::{Answer, Ask, ChangeMessage, Client, Directory, Event, LiveError, RefusalCause, Subject};
+use flotor_session::registry::Registry;
 use flotor_session::scene::is_named;
 use std::time::{Duration, Instant};
 
@@ -67,7 +68,7 @@ pub(crate) fn run(arguments: &SwapArguments) -> Result<(), CommandError> {
 
 /// Converts a plugin's path to an absolute path for the host, which may have another working directory; an id stays unchanged.
 fn for_host(plugin: &str) -> Result<String, CommandError> {
-    if !plugin.contains(std::path::is_separator) {
+    if !Registry::search(&[]).is_path(plugin) {
         return Ok(plugin.to_owned());
     }
     let whole = std::path::absolute(plugin).map_err(|cause| {
@@ -78,7 +79,7 @@ fn for_host(plugin: &str) -> Result<String, CommandError> {
     // The given path is UTF-8, so the current folder is not.
     whole.into_os_string().into_string().map_err(|path| {
         CommandError::Usage(format!(
-            "`{}`: the path of the current folder is not valid UTF-8; move the plugin to another folder",
+            "`{}`: the path of the current folder is not valid UTF-8; move the plugin to a folder whose path is, and give its absolute path",
             path.display()
         ))
     })
@@ -125,4 +126,19 @@ fn swapped(client: &mut Client, ask: Ask, model: &str) -> Result<Option<ChangeMe
          you try again",
         CREATION_LIMIT.as_secs()
     )))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    #[test]
+    fn a_file_of_this_folder_is_named_by_its_whole_path() {
+        // Tests run in the folder of their crate.
+        let file = for_host("Cargo.toml").unwrap_or_else(|error| panic!("{error}"));
+        assert!(Path::new(&file).is_absolute(), "{file}");
+        let id = for_host("spring").unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(id, "spring");
+    }
 }

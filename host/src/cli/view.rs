@@ -9,7 +9,7 @@ use flotor_record::{Ending, Recording};
 use flotor_session::registry::Registry;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
 /// Show a running session or a recording: the model in 3D, and plots over time.
 #[derive(Args)]
@@ -71,8 +71,8 @@ pub(crate) struct ViewArguments {
     /// Colours: dark or light (default: dark, with --export light; in a window: the look of the last window)
     #[arg(long, value_name = "dark|light")]
     look: Option<String>,
-    /// Width and height of picture or window, 64 to 8192 pixels each (default: 1280x800, with --export 1800x1000; in a window:
-    /// the size of the last window)
+    /// Width and height of picture or window, 64 to 8192 pixels each (default: 1280x800, with --export 1800x1000, higher if the
+    /// traces need it; in a window: the size of the last window)
     #[arg(long, value_name = "WxH")]
     size: Option<String>,
     /// Size of text and lines, 1 to 3 (default: 1; in a window: the scale of the last window)
@@ -155,13 +155,15 @@ pub(crate) fn run(arguments: &ViewArguments) -> Result<(), CommandError> {
 /// reconnection on the terminal.
 fn view_remote(for_bridge: &[OsString], mut for_viewer: Vec<OsString>) -> Result<(), CommandError> {
     let (mut viewer, mut bridge) = (SeparateProgram::VIEWER.command()?, BRIDGE.command()?);
-    let cannot = |program: &str, cause| CommandError::file(program.as_ref(), "cannot be started", cause);
-    let bridge = bridge.args(for_bridge).stdin(Stdio::null()).spawn();
-    let bridge = Running(bridge.map_err(|cause| cannot(BRIDGE.program, cause))?);
-    for_viewer.extend(["--run".into(), bridge.0.id().to_string().into()]);
-    let shown =
-        viewer.args(&for_viewer).status().map_err(|cause| cannot(SeparateProgram::VIEWER.program, cause))?;
-    drop(bridge);
+    let cannot = |command: &Command, cause| {
+        CommandError::file(command.get_program().as_ref(), "cannot be started", cause)
+    };
+    let spawned = bridge.args(for_bridge).stdin(Stdio::null()).spawn();
+    let running = Running(spawned.map_err(|cause| cannot(&bridge, cause))?);
+    for_viewer.extend(["--run".into(), running.0.id().to_string().into()]);
+    let shown = viewer.args(&for_viewer).status();
+    let shown = shown.map_err(|cause| cannot(&viewer, cause))?;
+    drop(running);
     if shown.success() {
         return Ok(());
     }

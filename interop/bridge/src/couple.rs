@@ -43,13 +43,18 @@ pub enum Side {
 }
 
 impl Side {
-    /// Returns the key of a coupling on which this side publishes, and the key that this side subscribes to.
-    fn keys(self, name: &Name, coupling: &str) -> (String, Option<String>) {
-        let [news, couple] = ["news", "couple"].map(|part| name.key(&format!("{part}/{coupling}")));
+    fn tells(self, name: &Name, coupling: &str) -> String {
         match self {
-            Side::Serving => (news, Some(couple)),
-            Side::ServingReadOnly => (news, None),
-            Side::Visiting => (couple, Some(news)),
+            Side::Serving | Side::ServingReadOnly => name.key(&format!("news/{coupling}")),
+            Side::Visiting => name.key(&format!("couple/{coupling}")),
+        }
+    }
+
+    fn incoming_key(self, name: &Name, coupling: &str) -> Option<String> {
+        match self {
+            Side::Serving => Some(name.key(&format!("couple/{coupling}"))),
+            Side::ServingReadOnly => None,
+            Side::Visiting => Some(name.key(&format!("news/{coupling}"))),
         }
     }
 }
@@ -248,12 +253,12 @@ impl Coupler {
                 }
             }
         };
-        let (outgoing, incoming) = side.keys(name, &found.name);
+        let key = side.incoming_key(name, &found.name);
         let subscriber =
-            incoming.map(|key| session.declare_subscriber(key).callback(receive).wait_now()).transpose()?;
+            key.map(|key| session.declare_subscriber(key).callback(receive).wait_now()).transpose()?;
         // Highest priority. Not express: on a slow network messages share a batch instead of being dropped.
         let tells = session
-            .declare_publisher(outgoing)
+            .declare_publisher(side.tells(name, &found.name))
             .congestion_control(CongestionControl::Drop)
             .priority(Priority::RealTime)
             .wait_now()?;

@@ -5,6 +5,7 @@ use crate::keys::Name;
 use crate::stop_channel::{StopChannel, StopKeys};
 use crate::wall_clock::since_1970;
 use clap::Args;
+use flotor_hal::read_text;
 use flotor_live::Directory;
 use serde_json::{Value, json};
 use std::net::IpAddr;
@@ -305,7 +306,7 @@ fn member_of(metadata: &Value) -> Name {
 fn config_of(options: &LinkOptions) -> Result<Config, LinkError> {
     let mut config = Config::default();
     if let Some(path) = &options.config {
-        let text = std::fs::read_to_string(path).map_err(zenoh::Error::from);
+        let text = read_text(path, "the file").map_err(|wrong| zenoh::Error::from(wrong.problem));
         config = text
             .and_then(|text| Config::from_json5(&text))
             .map_err(|error| LinkError::Config { file: path.clone(), reason: words(&error) })?;
@@ -385,6 +386,13 @@ mod tests {
         let connect = vec!["tcp/192.0.2.1:7447".to_owned()];
         let options = LinkOptions { connect, ..LinkOptions::default() };
         assert!(matches!(open(&options, End::Serving), Err(LinkError::WithoutKeys { .. })));
+    }
+
+    #[test]
+    fn a_configuration_without_an_end_is_not_read() {
+        let options = LinkOptions { config: Some("/dev/zero".into()), ..LinkOptions::default() };
+        let refused = open(&options, End::Serving).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(refused.contains("/dev/zero") && refused.contains("a pipe or a device"), "{refused}");
     }
 
     #[test]

@@ -48,7 +48,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Publish each run of this machine on the network
+    /// Publish your runs on this machine on the network, one at a time: the newest, until it ends
     Serve(ServeArguments),
     /// Republish a remote run on this machine, for `flotor view`
     Attach {

@@ -2,30 +2,36 @@
 
 use crate::api::Api;
 use flotor_command::CommandError;
-use std::os::unix::fs::{DirBuilderExt, symlink};
+use std::fs::Permissions;
+use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 /// Private folder with links to the libraries, removed when dropped.
-pub(crate) struct Folder(pub(crate) PathBuf);
+pub(crate) struct Folder(TempDir);
 
 impl Folder {
+    /// Creates the folder under a random name, which no other user can predict and occupy.
     pub(crate) fn new() -> Result<Self, CommandError> {
-        let path = std::env::temp_dir().join(format!("flotor-lend-{}", std::process::id()));
-        // Left by a killed process with the same id.
-        let _ = std::fs::remove_dir_all(&path);
-        let made = std::fs::DirBuilder::new().mode(0o700).create(&path);
-        made.map_err(|cause| CommandError::file(&path, "cannot create the temporary folder", cause))?;
-        Ok(Self(path))
+        let private = Permissions::from_mode(0o700);
+        let made = tempfile::Builder::new().prefix("flotor-lend-").permissions(private).tempdir();
+        made.map(Self).map_err(|cause| {
+            CommandError::file(&std::env::temp_dir(), "cannot create the temporary folder", cause)
+        })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        self.0.path()
     }
 
     /// Links a library under the file names of its interface, in the folders that the loader and the clients of an SDK search.
     pub(crate) fn put(&self, api: Api, library: &Path) -> Result<(), CommandError> {
         let library = library.canonicalize().unwrap_or_else(|_| library.to_path_buf());
-        let sdk = self.0.join(format!("lib/release/lin-{}-gcc", std::env::consts::ARCH));
+        let sdk = self.path().join(format!("lib/release/lin-{}-gcc", std::env::consts::ARCH));
         // An old client searches the folder `lib` inside the folder of the libraries.
         let folders = match api {
-            Api::Dhd => vec![self.0.clone(), sdk.clone(), sdk.join("lib")],
-            Api::Openhaptics | Api::Chai3d => vec![self.0.clone()],
+            Api::Dhd => vec![self.path().to_path_buf(), sdk.clone(), sdk.join("lib")],
+            Api::Openhaptics | Api::Chai3d => vec![self.path().to_path_buf()],
         };
         for folder in folders {
             let linked = std::fs::create_dir_all(&folder).and_then(|()| {
@@ -38,12 +44,22 @@ impl Folder {
 
     /// Returns the path of the file to which the guard writes the end of the program.
     pub(crate) fn program_end(&self) -> PathBuf {
-        self.0.join("program-end.json")
+        self.path().join("program-end.json")
     }
 }
 
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_dir_all(&self.0);
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stranger_can_neither_predict_nor_enter_the_folder() {
+        let (one, other) = (Folder::new().expect("a folder"), Folder::new().expect("a folder"));
+        assert_ne!(one.path(), other.path(), "the number of the process is not the name");
+        let mode = one.path().metadata().expect("it exists").permissions().mode();
+        assert_eq!(mode & 0o777, 0o700);
+        let path = one.path().to_path_buf();
+        drop(one);
+        assert!(!path.exists() && other.path().exists());
     }
 }

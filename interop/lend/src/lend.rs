@@ -104,9 +104,9 @@ impl Lending<'_> {
         program.check(api)?;
         let folder = folder_of_libraries(api, program, own)?;
         let mut command = self.guarded(&folder);
-        self.set_environment(&mut command, &folder.0)?;
+        self.set_environment(&mut command, folder.path())?;
         let end = self.carry_out(&mut command, &folder)?;
-        let runs = Runs::read(&folder.0, &end);
+        let runs = Runs::read(folder.path(), &end);
         if !runs.tell(&program.path, arguments.options.record.as_deref()) {
             let which = api.map_or_else(
                 || "none of dhd, openhaptics and chai3d".to_owned(),
@@ -131,7 +131,7 @@ impl Lending<'_> {
         let served = service.start(arguments, &folder, flotor, stop)?;
         let end = self.carry_out(&mut self.guarded(&folder), &folder)?;
         let served = served.finish();
-        let runs = Runs::read(&folder.0, &end);
+        let runs = Runs::read(folder.path(), &end);
         runs.tell(&program.path, arguments.options.record.as_deref());
         if let Some(json) = &arguments.options.json {
             match served {
@@ -201,11 +201,11 @@ fn folder_of_libraries(api: Option<Api>, program: &Program, own: &Path) -> Resul
         }
     }
     // CHAI3D searches for this file first, but calls none of its functions.
-    let (beside, phantom) = (folder.0.join("libHD.so"), folder.0.join("libhdPhantom.so"));
+    let (beside, phantom) = (folder.path().join("libHD.so"), folder.path().join("libhdPhantom.so"));
     if !beside.exists() && phantom.exists() {
         let _ = symlink(&phantom, &beside);
     }
-    if !folder.0.join("lib").exists() && !beside.exists() {
+    if !folder.path().join("lib").exists() && !beside.exists() {
         let missing = Api::Dhd.find(own).err();
         return Err(missing.unwrap_or_else(|| {
             let missing = "no drop-in library was found; build the libraries or reinstall Flotor";

@@ -64,7 +64,7 @@ impl Service {
                     build: "cargo build --release -p flotor-haply-service",
                 };
                 let mut command = program.command()?;
-                arguments.set_environment(&mut command, &folder.0, flotor)?;
+                arguments.set_environment(&mut command, folder.path(), flotor)?;
                 command.arg("--lent");
                 if let Some(listen) = &arguments.listen {
                     command.args(["--listen", listen, "--events", "127.0.0.1:0"]);
@@ -95,7 +95,7 @@ fn run_with_ml_api(
                 .to_owned(),
         ));
     }
-    let built_in = folder.0.join("ml-api.toml");
+    let built_in = folder.path().join("ml-api.toml");
     let scene = match &arguments.scene {
         Some(scene) => scene,
         None => {

@@ -6,7 +6,7 @@ use flotor_hal::Demand;
 use flotor_session::registry::Registry;
 use flotor_session::scene::{PluginKeyValue, Scene};
 use pyo3::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Returns id, kind, version and file of every plugin found; opens none.
 #[pyfunction]
@@ -18,13 +18,14 @@ pub(crate) fn plugins(folders: Vec<PathBuf>) -> Vec<(String, &'static str, Strin
         .collect()
 }
 
-/// Runs a scene (the demo if `None`) in virtual time; returns the summary of `flotor run --json` as JSON text.
+/// Runs a scene (from its file or its text; the demo without both) in virtual time; returns the summary of `flotor run --json` as JSON text.
 #[pyfunction]
-#[pyo3(signature = (scene, *, folders, duration_s, rate_hz, seed, settings, recording))]
+#[pyo3(signature = (scene, *, text, folders, duration_s, rate_hz, seed, settings, recording))]
 #[allow(clippy::too_many_arguments)] // keyword arguments of Python
 pub(crate) fn run_scene(
     py: Python<'_>,
     scene: Option<PathBuf>,
+    text: Option<String>,
     folders: Vec<PathBuf>,
     duration_s: Option<f64>,
     rate_hz: Option<f64>,
@@ -32,9 +33,10 @@ pub(crate) fn run_scene(
     settings: Vec<String>,
     recording: Option<PathBuf>,
 ) -> PyResult<String> {
-    let mut scene = match scene {
-        Some(path) => Scene::load(&path),
-        None => Scene::demo(),
+    let mut scene = match (scene, text) {
+        (Some(path), _) => Scene::load(&path),
+        (None, Some(text)) => Scene::parse(Path::new("scene"), &text),
+        (None, None) => Scene::demo(),
     }
     .map_err(refuse)?;
     if let Some(duration_s) = duration_s {

@@ -24,6 +24,26 @@ def test_settings_may_be_grouped_by_plugin():
     assert grouped["trace_digest"] == flat["trace_digest"]
 
 
+def test_a_scene_may_be_a_mapping(tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(
+        'title = "a \\"b\\""\n[device]\nplugin = "simulated"\n[device.parameters]\nhand = "press"\n'
+        '[[model]]\nplugin = "wall"\n[model.parameters]\nstiffness_n_per_m = 1500\n[limits]\nforce_n = [2.5, 2.5, 2]\n'
+    )
+    scene = {
+        "title": 'a "b"',
+        "device": {"plugin": "simulated", "parameters": {"hand": "press"}},
+        "model": [{"plugin": "wall", "parameters": {"stiffness_n_per_m": np.float64(1500)}}],
+        "limits": {"force_n": (2.5, 2.5, 2)},
+    }
+    of_file, of_mapping = (flotor.run(each, duration_s=0.5) for each in (file, scene))
+    assert of_mapping["trace_digest"] == of_file["trace_digest"] and of_mapping["peak_force_n"] == of_file["peak_force_n"]
+    with pytest.raises(flotor.FlotorError, match="scene:2: unknown key"):
+        flotor.run({"title": "x", "devize": 1})
+    with pytest.raises(flotor.FlotorError, match="no place in a scene"):
+        flotor.run({"title": None})
+
+
 def scene_of(tmp_path, habit):
     """A scene with a model in C that does something else in a step."""
     compiler = shutil.which("cc") or pytest.skip("no C compiler")

@@ -1,7 +1,7 @@
 //! Execution and judgement of cases.
 
 use crate::bound::Bound;
-use crate::case::{Case, Check, combinations};
+use crate::case::{Case, Check};
 use crate::curve::POSE;
 use crate::file::{Expectation, MeasureDemand, TestFile, Validate};
 use crate::minimise::shortest;
@@ -114,10 +114,8 @@ pub(crate) fn check(
         took: Duration::ZERO,
     };
     let begun = Instant::now();
-    // A check of a plugin has no picture of its own: draw the scene with the plugin.
-    let settings = combinations(&case.file.set).swap_remove(0);
-    let scene = run_arguments(case.file, case.file.seeds[0], &settings, case.file.duration.as_deref());
-    let mut plotted = Some(scene);
+    // None for a rule of `validate`, which no curve of a run shows.
+    let mut plotted = None;
     match (&case.check, models) {
         (Check::Run { seed, set }, _) => {
             let judged = run(flotor, case, *seed, set, case.file.duration.as_deref());
@@ -143,7 +141,6 @@ pub(crate) fn check(
         (Check::Curve, Ok(models)) => {
             let picture = plots.map(|folder| picture(folder, case));
             curve(flotor, case.file, models, picture.as_deref(), &mut outcome);
-            plotted = None;
         }
         (Check::Golden, Ok(models)) => plotted = golden(flotor, case.file, models, &mut outcome),
         (Check::Validate, Ok(models)) => validate(flotor, case.file, models, &mut outcome),

@@ -197,10 +197,13 @@ impl TestFile {
         let folder = path.parent().unwrap_or(Path::new(""));
         let existing = |file: &Spanned<PathBuf>| {
             let found = folder.join(file.get_ref());
-            let missing = || {
-                (file.span().start, format!("the file {} does not exist; correct the path", found.display()))
+            let what = if found.exists() {
+                "is not a regular file; name a file"
+            } else {
+                "does not exist; correct the path"
             };
-            if found.is_file() { Ok(found.clone()) } else { Err(missing()) }
+            let wrong = || (file.span().start, format!("the file {} {what}", found.display()));
+            if found.is_file() { Ok(found.clone()) } else { Err(wrong()) }
         };
         let scene = existing(&written.scene)?;
         let seeds = match &written.seeds {
@@ -440,6 +443,10 @@ mod tests {
             ("stress = 3", "write short, full, or a table"),
             ("[stress]\nsize = \"short\"\npass = [\"M11\"]", "unknown measure `M11`"),
             ("[golden]\nrecording = \"no.mcap\"\nwithin_n = 1", "F:3: the file"),
+            (
+                "[golden]\nrecording = \"/\"\nwithin_n = 1",
+                "F:3: the file / is not a regular file; name a file",
+            ),
             ("", "the file has no expectation"),
             ("validate = 3", "F:2: write true, false or the path"),
             ("[expect]\nend = \"finished\"", "nothing"),

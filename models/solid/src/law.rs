@@ -205,7 +205,7 @@ pub(crate) fn no_mesh() -> Refusal {
 fn not_a_cylinder(radius_m: f64, height_m: f64) -> Refusal {
     Refusal::parameter(format!(
         "a cylinder of diameter {} mm and height {} mm cannot be meshed: set `size_x_mm` (diameter) and `size_z_mm` (height) \
-         to values above 0 and at most 10000 mm that differ less",
+         to 1 to 2000 mm, with a smaller ratio between them",
         2.0e3 * radius_m,
         1.0e3 * height_m
     ))

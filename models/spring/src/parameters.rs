@@ -111,7 +111,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "variant",
         VARIANTS,
         3,
-        "Law: code of the thesis, its law without jumps, its corrected law, a conservative law in 3D, or the exact rod",
+        "Force law: thesis (the code of the thesis, with its jumps), closed-form (the law of the thesis without jumps), current-length (that law with rigidities of the current length), energy (a conservative law in 3D), or rod (the exact rod)",
     ),
     Parameter::choice(
         "precision",

@@ -5,6 +5,7 @@ use crate::large::wrong_at_large;
 use crate::text::p_text;
 use crate::{SubjectChecks, SubjectRecord, conditions};
 use flotor_core::quantile;
+use flotor_statistics::distribution::binomial_at_least;
 use flotor_study::estimate::{Prior, Psychometric, psychometric};
 use flotor_study::kinematics::StimulusKinematics;
 use flotor_study::log::Incident;
@@ -15,8 +16,8 @@ use serde::Serialize;
 
 /// Exploration time below which a presentation is suspicious, s.
 const SHORT_S: f64 = 0.5;
-/// Significance level, over all conditions of a subject, of each kind of test: worse than chance, and misfit of the
-/// psychometric function.
+/// Significance level of each kind of test, over all conditions of a subject: worse than chance, misfit of the psychometric
+/// function, and preference for a place in the pair.
 const LEVEL: f64 = 0.05;
 
 /// Psychometric function of one subject in one condition.
@@ -82,11 +83,10 @@ impl SubjectQuality {
         let mut times: Vec<f64> =
             counted.iter().filter_map(|event| event.exploration.response_time_s).collect();
         let quartiles = [0.25, 0.5, 0.75].map(|share| quantile(&mut times, share));
-        let named =
-            |response: Response| counted.iter().filter(|event| event.response == response).count() as f64;
+        let named = |response: Response| counted.iter().filter(|event| event.response == response).count();
         let [first, second, unsure] = [Response::First, Response::Second, Response::DontKnow].map(named);
         let is_jnd = matches!(protocol, Protocol::Jnd(_));
-        let share = |part: f64, whole: f64| (is_jnd && whole > 0.0).then(|| part / whole);
+        let share = |part: usize, whole: usize| (is_jnd && whole > 0).then(|| part as f64 / whole as f64);
         let mut quality = Self {
             subject: record.subject.to_string(),
             answers: counted.len(),
@@ -98,11 +98,11 @@ impl SubjectQuality {
             flags: Vec::new(),
             conditions: functions(protocol, record),
         };
-        quality.flags = quality.suspicions(record, first + second, incidents);
+        quality.flags = quality.suspicions(record, [first, second], incidents);
         quality
     }
 
-    fn suspicions(&self, record: &SubjectRecord, named: f64, incidents: &[Incident]) -> Vec<String> {
+    fn suspicions(&self, record: &SubjectRecord, named: [usize; 2], incidents: &[Incident]) -> Vec<String> {
         let mut flags = Vec::new();
         let any = |has: fn(&StimulusKinematics) -> bool| {
             record.counted().filter(|event| event.exploration.kinematics.iter().any(has)).count()
@@ -128,9 +128,7 @@ impl SubjectQuality {
         let level = LEVEL / self.conditions.len().max(1) as f64;
         flags.extend(self.conditions.iter().flat_map(|condition| condition.suspicions(level)));
         if let Some(first) = self.first
-            && named >= 20.0
-            // Two standard deviations of a binomial fraction of one half.
-            && (first - 0.5).abs() > 1.0 / named.sqrt()
+            && is_preference(named)
         {
             flags.push(format!("a preference: {:.0} % of the answers named the first", first * 100.0));
         }
@@ -202,6 +200,12 @@ impl SubjectQuality {
     }
 }
 
+/// Returns true if the numbers of answers that named the first and the second stimulus differ significantly: two-sided binomial
+/// test at [`LEVEL`], which six equal answers are enough for.
+fn is_preference([first, second]: [usize; 2]) -> bool {
+    2.0 * binomial_at_least(first.max(second), first + second, 0.5) < LEVEL
+}
+
 /// Counts answers that name a stimulus of a pair of equal stimuli. Such an answer is correct or wrong by chance and affects the
 /// track; equal pairs occur in a track with a floor of 0.
 fn without_difference(record: &SubjectRecord) -> usize {
@@ -220,4 +224,32 @@ fn functions(protocol: &Protocol, record: &SubjectRecord) -> Vec<SubjectConditio
         Some(SubjectCondition { modality, base, function })
     };
     conditions(&jnd.bases).filter_map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_subject_who_always_says_the_first_has_a_preference() {
+        assert!(is_preference([15, 0]) && is_preference([0, 6]));
+        assert!(!is_preference([5, 0]) && !is_preference([12, 12]) && !is_preference([0, 0]));
+    }
+
+    /// Of the sequences of answers by a coin, at most one in twenty shows a preference, however short they are.
+    #[test]
+    fn a_coin_rarely_has_a_preference() {
+        for answers in 0..=60_usize {
+            // Number of sequences with each count of "the first": a row of Pascal's triangle, exact in `f64`.
+            let mut ways = vec![1.0_f64];
+            for _ in 0..answers {
+                let next =
+                    |at: usize| ways.get(at).unwrap_or(&0.0) + at.checked_sub(1).map_or(0.0, |at| ways[at]);
+                ways = (0..=ways.len()).map(next).collect();
+            }
+            let shown = ways.iter().enumerate().filter(|(first, _)| is_preference([*first, answers - first]));
+            let share = shown.map(|(_, ways)| ways).sum::<f64>() / ways.iter().sum::<f64>();
+            assert!(share <= LEVEL, "{answers} answers: {share}");
+        }
+    }
 }

@@ -160,7 +160,8 @@ struct Common {
     /// Key of the emergency stop in the viewer's window (human)
     #[arg(long, value_enum, default_value_t, value_name = "KEY")]
     stop_key: StopKey,
-    /// File (TOML) with the texts of the screens in the viewer's window, in the language of the person (human; default: English)
+    /// File (TOML) with the texts of the screens in the viewer's window, in the language of the person: a translated copy of
+    /// viewer/texts/english.toml, with all its keys (human; default: English)
     #[arg(long, value_name = "FILE")]
     texts: Option<PathBuf>,
     /// Minimum time for which each stimulus must be felt (human)

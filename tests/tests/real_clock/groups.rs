@@ -317,7 +317,7 @@ fn a_suspended_host_loses_its_force_and_ends_when_it_goes_on() {
         ran.stderr.contains("flotor watchdog: the host is suspended or hangs; stopped `device`"),
         "{ran:?}"
     );
-    assert!(ran.stderr.contains("the watchdog stopped the device"), "{ran:?}");
+    assert!(ran.stderr.contains("the watchdog stopped all devices"), "{ran:?}");
     let _ = board.assert_stopped("the end");
     // A command that the host was about to send when it was suspended goes out.
     let commands = board.log().iter().skip(before).filter(|(_, force_n)| *force_n > 0.0).count();

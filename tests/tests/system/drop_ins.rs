@@ -490,6 +490,9 @@ fn what_cannot_be_lent_is_said_in_one_line_with_what_helps() {
         vec![&unknown, "--", &program],
         "unknown.toml:2: no device plugin `simulatd`; did you mean `simulated`?",
     ));
+    let setting = "[device]\nplugin = \"simulated\"\n[device.parameters]\nhnad = \"press\"\n";
+    let setting = scratch.file("setting.toml", setting).display().to_string();
+    cases.push((vec![&setting, "--", &program], "setting.toml:4: [device] no parameter `hnad`"));
     let small = scratch.path().join("small");
     std::fs::write(&small, b"\x7fELF\x01\x01\x01").expect("there is room");
     std::fs::set_permissions(&small, std::fs::Permissions::from_mode(0o755)).expect("it is ours");

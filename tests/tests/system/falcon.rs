@@ -3,7 +3,7 @@
 
 use flotor_falcon_emulator::rig::{ERROR_PERCENT, WEIGHT_N};
 use flotor_tests::TestSize;
-use flotor_tests::library::build_folder;
+use flotor_tests::library::{build_folder, plugin_file};
 use flotor_tests::process::Owned;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -75,8 +75,13 @@ fn the_demo_runs_on_it_with_two_changed_lines_and_ends_when_it_is_gone() {
 
 /// `flotor calibrate` with this device, its force sensor, and patience for a delayed test machine.
 fn calibrate(emulator: &Emulator, sensor: &Path, arguments: &[&str]) -> Ran {
+    calibrate_with("falcon", emulator, sensor, arguments)
+}
+
+/// The same with the plugin of this id or file.
+fn calibrate_with(plugin: &str, emulator: &Emulator, sensor: &Path, arguments: &[&str]) -> Ran {
     let (address, sensor) = (format!("address={}", emulator.address), sensor.display().to_string());
-    let device = ["--device", "falcon", "--set", &address, "--set", "timeout_ms=9000", "--sensor", &sensor];
+    let device = ["--device", plugin, "--set", &address, "--set", "timeout_ms=9000", "--sensor", &sensor];
     Flotor::with(["calibrate"].iter().chain(arguments).chain(&device)).run()
 }
 
@@ -118,6 +123,23 @@ fn it_is_calibrated_with_a_force_sensor_on_a_serial_port() {
     println!("verify: {without:.3} % to {with:.3} %");
     assert!((without - ERROR_PERCENT).abs() < 0.1, "{without}");
     assert!(with <= 0.1, "{with}");
+}
+
+/// A calibration file names the id of the plugin, also if the command line names its file.
+#[test]
+fn a_calibration_is_for_a_plugin_and_not_for_its_file() {
+    let scratch = Scratch::default();
+    let (sensor, file) = (scratch.path().join("force"), scratch.path().join("other.toml"));
+    let (sensor_name, file_name) = (sensor.display().to_string(), file.display().to_string());
+    let emulator = Emulator::start(&["--calibration-rig", &sensor_name]);
+    let other = ["calibrate", "import", "--device", "falcon", "--serial", "other", "--out", &file_name];
+    let ran = Flotor::with(other).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:#?}");
+    let plugin = plugin_file("flotor-falcon").display().to_string();
+    let ran = calibrate_with(&plugin, &emulator, &sensor, &["verify", &file_name]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+    let expected = "the file is for `falcon` other, the device is `falcon`";
+    assert!(ran.error().contains(expected), "{}", ran.error());
 }
 
 /// What the motors cut off would be fitted as a loss.

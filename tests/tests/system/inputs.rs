@@ -5,12 +5,16 @@ use flotor_tests::scratch::Scratch;
 use rayon::prelude::*;
 use std::process::Command;
 
-/// Every command that reads a file, with `FILE` in its place; `PLUGIN` and `CALIBRATION` are scenes that name it.
-const DOORS: [&[&str]; 18] = [
+/// Every command that reads a file, with `FILE` in its place; `PLUGIN` and `CALIBRATION` are scenes that
+/// name it, and `TEST` is a test of it.
+const DOORS: [&[&str]; 26] = [
     &["run", "FILE"],
     &["run", "PLUGIN"],
     &["replay", "FILE"],
     &["test", "FILE"],
+    &["test", "TEST"],
+    &["repair", "FILE", "--out", "whole.mcap"],
+    &["view", "FILE"],
     &["validate", "FILE"],
     &["plugins", "FILE"],
     &["eval", "--model", "spring", "--poses", "FILE"],
@@ -25,6 +29,11 @@ const DOORS: [&[&str]; 18] = [
     &["study", "run", "FILE"],
     &["analyse", "FILE"],
     &["study", "spring", "FILE"],
+    &["study", "jnd", "--scene", "FILE", "--out", "scene"],
+    &["study", "explore", "--scene", "FILE"],
+    &["study", "jnd", "--observer", "human", "--out", "texts", "--texts", "FILE"],
+    &["study", "jnd", "--observer", "human", "--out", "consent", "--consent", "FILE"],
+    &["study", "jnd", "--observer", "human", "--out", "how", "--instructions", "FILE"],
 ];
 
 #[test]
@@ -53,6 +62,7 @@ fn a_pipe_or_a_device_file_is_refused_in_place_of_every_input() {
                         "[device]\nplugin = \"simulated\"\ncalibration = \"{file}\"\n[[model]]\nplugin = \"spring\"\n"
                     ),
                 ),
+                "TEST" => scene("named.test.toml", format!("scene = \"{file}\"\n")),
                 word => word.replace("FILE", file).replace("POSES", &poses),
             });
             let arguments: Vec<String> = arguments.collect();

@@ -3,7 +3,7 @@
 //! `tests/fixtures/defective-model` has each defect as small as a reviewer once hid it; the book's page prints the table.
 
 use flotor_tests::library::plugin_file;
-use flotor_tests::program::Flotor;
+use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::{TestSize, workspace_root};
 use serde_json::Value;
 
@@ -119,7 +119,7 @@ fn a_call_that_does_not_return_is_named_and_the_score_goes_on() {
     }
     let measures = measures(
         &library(),
-        &["--set", "defect=endless-slab", "--timeout", "1s", "--only", "M0", "--only", "M8", "--only", "M10"],
+        &["--set", "defect=endless-slab", "--timeout", "1s", "--only", "M0", "--only", "M8"],
     );
     let stuck = &measures[0];
     assert_eq!(stuck["verdict"], "fail");
@@ -128,8 +128,17 @@ fn a_call_that_does_not_return_is_named_and_the_score_goes_on() {
     assert!(remark.contains(" within 1 s of processor time"), "{remark}");
     let x_m = stuck["pose"]["position_m"][0].as_f64().expect("a pose");
     assert!((7.0e-3..7.1e-3).contains(&x_m), "{x_m}");
-    // No symmetry is declared: none is asked for.
     assert_eq!(measures.len(), 2);
+}
+
+/// A score of no measures is no score.
+#[test]
+fn the_measure_of_a_symmetry_needs_its_name() {
+    for only in [&["--only", "M10"][..], &["--only", "M0", "--only", "M10"]] {
+        let ran = Flotor::with(["stress", "--model", "wall"].iter().chain(only)).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
+        assert!(ran.stderr.contains("--symmetry <"), "{ran:#?}");
+    }
 }
 
 /// A hole in a flat field is found by chance alone. The page states the smallest one that a short run finds.

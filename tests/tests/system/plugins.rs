@@ -57,6 +57,49 @@ fn every_command_searches_the_folders_of_plugin_path_first() {
 }
 
 #[test]
+fn every_command_takes_an_id_a_path_or_a_file_of_this_folder() {
+    let scratch = Scratch::default();
+    let library = plugin_file("flotor-wall");
+    let bare = library.file_name().expect("a file has a name").to_string_lossy().into_owned();
+    let _ = scratch.file(&bare, std::fs::read(&library).expect("it is built"));
+    // An id wins over a file.
+    let _ = scratch.file("wall", "I am no library.\n");
+    let _ = scratch.file("poses.csv", "x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,-0.005,0,0,0\n");
+    let scene = |plugin: &str| {
+        let models = format!("[[model]]\nname = \"wall\"\nplugin = \"{plugin}\"\n");
+        let _ = scratch.file("scene.toml", format!("[device]\nplugin = \"simulated\"\n{models}"));
+    };
+    let ran = |command: &str, name: &str| {
+        let arguments = command.split(' ').map(|word| word.replace("NAME", name));
+        Flotor::with(arguments).inside(scratch.path()).run()
+    };
+    scene("wall");
+    let recorded = ran("run scene.toml --clock virtual --duration 10ms --record run.mcap", "wall");
+    assert_eq!(recorded.code, Some(exit_code::OK), "{recorded:#?}");
+    let whole = library.display().to_string();
+    for name in ["wall", &format!("./{bare}"), &whole, &bare] {
+        scene(name);
+        for command in [
+            "run scene.toml --clock virtual --duration 10ms",
+            "replay run.mcap --model wall=NAME",
+            "plugins NAME",
+            "validate NAME --only metadata",
+            "eval NAME --poses poses.csv",
+            "eval --model NAME --poses poses.csv",
+            "stress NAME --only M0",
+            "stress --model NAME --only M0",
+            "bench NAME",
+            "bench --model NAME",
+        ] {
+            let ran = ran(command, name);
+            assert_eq!(ran.code, Some(exit_code::OK), "{command}, {name}: {ran:#?}");
+        }
+        let ran = ran("doctor --device NAME", name);
+        assert!(ran.error().contains("is a model"), "{name}: {ran:#?}");
+    }
+}
+
+#[test]
 fn json_goes_to_standard_output_or_to_a_file_but_never_over_the_next_argument() {
     let scratch = Scratch::default();
     let at = |arguments: &[&str]| Flotor::with(arguments).inside(scratch.path()).run();

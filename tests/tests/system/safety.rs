@@ -348,7 +348,7 @@ fn a_model_that_hangs_costs_the_run_and_is_named_and_the_device_is_stopped() {
     let hangs = scene("", "fault = \"hangs\"\nat_tick = 400", "[limits]\nwatchdog_ms = 500");
     let ran = run_alone(&scratch, &hangs);
     assert_eq!(ran.code, Some(exit_code::PLUGIN_REFUSED), "{ran:?}");
-    let told = "error: `block` did not return from `step` in tick 400; the watchdog stopped the device after 500 ms (`[limits] watchdog_ms` sets the limit)";
+    let told = "error: `block` did not return from `step` in tick 400; the watchdog stopped all devices after 500 ms (`[limits] watchdog_ms` sets the limit)";
     // A tick that was missed earlier moves the number of the tick.
     assert!(
         last_line(&ran).starts_with("error: `block` did not return from `step` in tick 4"),

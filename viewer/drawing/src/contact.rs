@@ -15,7 +15,7 @@ const LENGTH: f64 = 0.3;
 const ON_SURFACE_M: f64 = 1.0e-9;
 
 /// Returns the contact of a handle inside a primitive body, with the depth of the handle; inside several bodies, the deepest
-/// contact; `None` outside of all bodies, or inside a cylinder alone.
+/// contact; `None` outside of all bodies.
 ///
 /// The point of contact is the proxy, if the model draws a proxy on the surface: with friction the proxy lags behind the handle,
 /// and at a box the proxy is on the face through which the handle entered. Without a proxy, the point of contact is the closest

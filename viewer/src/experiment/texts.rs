@@ -3,6 +3,7 @@
 //! The file has one text for each key (`viewer/texts/english.toml`). A key that is missing or unknown is an error, so that no
 //! screen is partly in another language.
 
+use flotor_hal::read_text;
 use serde::Deserialize;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -90,9 +91,7 @@ impl Texts {
     /// # Errors
     /// A message of one line if the file cannot be read, or a key is missing or unknown, or lacks the placeholder of its number.
     pub fn read(file: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(file).map_err(|cause| {
-            format!("cannot read the texts: {cause}; check the path, or save the file as UTF-8")
-        })?;
+        let text = read_text(file, "the texts").map_err(|wrong| wrong.problem)?;
         Self::parse(&text)
     }
 
@@ -134,5 +133,12 @@ mod tests {
         assert!(unknown.contains("next"), "{unknown}");
         let number = Texts::parse(&ENGLISH.replace("{left} times", "some")).expect_err("without its number");
         assert!(number.contains("again_left") && number.contains("{left}"), "{number}");
+    }
+
+    #[test]
+    fn a_file_without_an_end_is_not_read() {
+        // Where there is no such file it cannot be read either.
+        let refused = Texts::read(Path::new("/dev/zero")).expect_err("a device file");
+        assert!(refused.starts_with("cannot read the texts: "), "{refused}");
     }
 }

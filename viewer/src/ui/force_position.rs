@@ -4,7 +4,7 @@ use crate::palette::Palette;
 use crate::ui::overlay::shortened;
 use crate::ui::plots::{marks, plain, short, y_axis};
 use egui::{Color32, RichText, TextStyle, Ui, Vec2};
-use egui_plot::{AxisHints, Line, Plot, PlotPoints, Points};
+use egui_plot::{AxisHints, Line, LineStyle, Plot, PlotPoints, Points};
 use flotor_history::History;
 use flotor_history::derived::ForcePosition;
 use flotor_history::quantity::{Quantity, Units};
@@ -16,13 +16,13 @@ const LEAST_PLOT_PT: f32 = 90.0;
 /// Largest number of points drawn.
 const MOST_POINTS: usize = 2000;
 
-/// Curve of force over position along an axis, cached from frame to frame.
+/// Curves of force over position along an axis, cached from frame to frame.
 #[derive(Clone, Debug, Default)]
 pub struct ForcePositionPlot {
     /// Axis, 0 to 2 (x, y, z); `None`: not shown.
     pub axis: Option<usize>,
-    made_of: Option<(usize, [u64; 2])>,
-    curve: ForcePosition,
+    made_of: Option<(usize, Vec<[u64; 2]>)>,
+    curves: Vec<ForcePosition>,
 }
 
 impl ForcePositionPlot {
@@ -31,28 +31,28 @@ impl ForcePositionPlot {
         self.axis = if self.axis.is_some() { None } else { Some(2) };
     }
 
-    /// Returns the curve of the chosen axis between two times, s; `None` if not shown.
-    pub fn curve(&mut self, history: &History, span_s: [f64; 2]) -> Option<&ForcePosition> {
-        let axis = self.axis?;
-        let made_of =
-            (axis, [history.number_at(span_s[0]), history.number_at(span_s[1].min(history.span_s()[1]))]);
-        if self.made_of != Some(made_of) {
-            self.curve = ForcePosition::of(history.between(span_s[0], span_s[1]), axis);
-            self.made_of = Some(made_of);
+    /// Returns the curve of each history along an axis between two times, s.
+    fn curves(&mut self, histories: &[&History], [from_s, to_s]: [f64; 2], axis: usize) -> &[ForcePosition] {
+        let numbers = |history: &&History| [from_s, to_s].map(|at_s| history.number_at(at_s));
+        let made_of = Some((axis, histories.iter().map(numbers).collect::<Vec<_>>()));
+        if self.made_of != made_of {
+            let curve = |history: &&History| ForcePosition::of(history.between(from_s, to_s), axis);
+            self.curves = histories.iter().map(curve).collect();
+            self.made_of = made_of;
         }
-        Some(&self.curve)
+        &self.curves
     }
 
-    /// Discards the cached curve, for another run or device.
+    /// Discards the cached curves, for another run or device, or another second recording.
     pub fn start_over(&mut self) {
         self.made_of = None;
     }
 
-    /// Shows the curve in the available area, with the sample at the cursor as a dot.
+    /// Shows the curve in the available area, with the sample at the cursor as a dot, and that of a second recording dashed beneath.
     pub fn show(
         &mut self,
         ui: &mut Ui,
-        (history, cursor_s): (&History, f64),
+        (history, compared, cursor_s): (&History, Option<&History>, f64),
         span_s: [f64; 2],
         units: Units,
         palette: &Palette,
@@ -74,10 +74,13 @@ impl ForcePositionPlot {
             }
         });
         self.axis = Some(axis);
-        let Some(curve) = self.curve(history, span_s) else { return };
-        let said = said(curve, units);
+        let histories: Vec<&History> = [history].into_iter().chain(compared).collect();
+        let curves = self.curves(&histories, span_s, axis);
+        let said = curves.iter().map(|curve| said(curve, units)).collect::<Vec<_>>().join("  ·  dashed: ");
         text_above(ui, &said);
-        let points: Vec<[f64; 2]> = curve.thinned(MOST_POINTS).map(|[x, force]| [x * per_m, force]).collect();
+        let in_units = |[x, force]: [f64; 2]| [x * per_m, force];
+        let mut all = curves.iter().map(|curve| curve.thinned(MOST_POINTS).map(in_units).collect::<Vec<_>>());
+        let (points, compared) = (all.next().unwrap_or_default(), all.next().unwrap_or_default());
         let name = Quantity::Position.components()[axis];
         let x_axis =
             AxisHints::new_x().formatter(|mark, _| short(mark.value)).label(format!("{name}, {length}"));
@@ -92,6 +95,9 @@ impl ForcePositionPlot {
         let plot = along.into_iter().fold(plain(plot, palette), Plot::include_x);
         let plot = across.into_iter().fold(plot, Plot::include_y);
         let shown = plot.show(ui, |plot| {
+            let dashed = Line::new("compared", PlotPoints::from(compared)).allow_band(false);
+            let pale = palette.components[axis].gamma_multiply(0.6);
+            plot.line(dashed.color(pale).width(2.8).style(LineStyle::dashed_dense()));
             let line = Line::new("curve", PlotPoints::from(points)).allow_band(false);
             plot.line(line.color(palette.components[axis]).width(1.4));
             if let Some(sample) = history.seen_at(cursor_s) {
@@ -105,8 +111,7 @@ impl ForcePositionPlot {
     }
 }
 
-/// Returns, for each axis of some points, the ends of a range about the middle of the points, as wide as the smallest range of the axis:
-/// smaller differences are rounding.
+/// Returns for each axis a range about the middle of some points, as wide as the least range of the axis: less is rounding.
 fn least_ranges(points: &[[f64; 2]], least: [f64; 2]) -> [[f64; 2]; 2] {
     std::array::from_fn(|axis| {
         let values = points.iter().map(|point| point[axis]);

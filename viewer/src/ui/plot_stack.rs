@@ -214,17 +214,17 @@ impl PlotStack {
         self.values.clear();
     }
 
-    /// Clears all traces, the marks and the curve of force over position, for a newly chosen device of the same run.
+    /// Clears all traces, the marks and the curves of force over position, for a newly chosen device of the same run.
     pub fn look_at_another(&mut self) {
         self.traces.clear();
         self.forget_compared();
         self.marks = Marks::default();
-        self.force_position.start_over();
     }
 
-    /// Clears the traces of the second recording.
+    /// Clears the traces of the second recording, and the curves of force over position.
     pub fn forget_compared(&mut self) {
         self.compared.clear();
+        self.force_position.start_over();
     }
 
     /// Returns the chosen quantities from the top, or only the maximised quantity.
@@ -322,7 +322,8 @@ impl PlotStack {
         self.choices(ui, palette, &mut requests);
         let (span_s, cursor_s) = (self.span_of_both_s(seen), self.hover_s.unwrap_or(now_s));
         if self.force_position.axis.is_some() && ui.available_width() < ROOM_BESIDE_PT {
-            self.force_position.show(ui, (seen.history, cursor_s), span_s, self.units, palette);
+            let both = (seen.history, seen.compared, cursor_s);
+            self.force_position.show(ui, both, span_s, self.units, palette);
         } else if self.force_position.axis.is_some() {
             let left = self.show_beside(ui, seen, (cursor_s, 12.0), palette);
             let mut left = ui.new_child(UiBuilder::new().max_rect(left).id_salt("over time"));
@@ -345,9 +346,9 @@ impl PlotStack {
         const PART: f32 = 0.36;
         let all = ui.available_rect_before_wrap();
         let beside = all.with_min_x(all.right() - (PART * all.width()).round());
-        let span_s = self.span_of_both_s(seen);
+        let (both, span_s) = ((seen.history, seen.compared, cursor_s), self.span_of_both_s(seen));
         let mut right = ui.new_child(UiBuilder::new().max_rect(beside).id_salt("force over position"));
-        self.force_position.show(&mut right, (seen.history, cursor_s), span_s, self.units, palette);
+        self.force_position.show(&mut right, both, span_s, self.units, palette);
         all.with_max_x(beside.left() - gap_pt)
     }
 

@@ -62,10 +62,15 @@ fn a_recording_dropped_on_an_empty_window_is_opened_and_offered_by_the_next_wind
     let compared = window.state().compared().and_then(|compared| compared.history(0));
     assert_eq!(compared.map(History::len), Some(500));
     window.get_by_label_contains("Dashed: run.mcap, 1000 Hz, 0.499 s");
+    // Its curve of force over position too, with numbers of its own.
+    window.get_by_role_and_label(Role::Button, "F(x)").click();
+    window.run_steps(2);
+    let dashed = |window: &Window<'_>| window.query_all_by_label_contains("  ·  dashed: ").next().is_some();
+    assert!(dashed(&window));
     assert_eq!(window.state().history().len(), 500);
     window.key_press(Key::Escape);
     window.run_steps(2);
-    assert!(window.state().compared().is_none());
+    assert!(window.state().compared().is_none() && !dashed(&window));
     let saved_settings = window.state().settings();
     assert_eq!(saved_settings.latest, [file]);
     let mut next = empty(folder.path());

@@ -259,7 +259,9 @@ impl fmt::Display for Status {
             Self::OFF_LINE => "off line",
             Self::OVERHEATED => "overheated",
             Self::TIMER => "timed out",
-            Self::REPLACED => "replaced by another procedure",
+            Self::REPLACED => {
+                "interrupted by another procedure, such as a landing by the emergency stop or by another program"
+            }
             _ => "unknown status",
         };
         write!(f, "{words} ({:#x})", self.0)

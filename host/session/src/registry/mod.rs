@@ -14,7 +14,7 @@ use flotor_core::lock;
 use flotor_hal::abi::{Entry, PluginKind};
 use flotor_loader::{LoadError, Metadata, Plugin, read_metadata};
 use flotor_record::NamedFile;
-use std::path::{MAIN_SEPARATOR, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// Environment variable with further plugin folders, separated like `PATH`.
@@ -223,6 +223,27 @@ impl Registry {
         }
     }
 
+    /// Returns the file of the plugin with an id (or the path itself), without running its code. Not real-time.
+    ///
+    /// # Errors
+    /// [`LookupError`] if the id is unknown or ambiguous, or belongs to a plugin that is linked into this program.
+    pub fn file(&self, id: &str) -> Result<PathBuf, LookupError> {
+        match self.locate(id, None)? {
+            Located::Linked(_) => Err(self.unknown(id, None)),
+            Located::Found(found) => Ok(found.path.clone()),
+            Located::Given(path) => Ok(path.into()),
+        }
+    }
+
+    /// Returns true if a command or a scene names a plugin by the path of its file: the name contains a separator, or is no id but
+    /// the name of a file in the current folder. Not real-time.
+    #[must_use]
+    pub fn is_path(&self, name: &str) -> bool {
+        let mut known = self.linked.iter().map(Plugin::metadata).chain(self.found());
+        name.contains(std::path::is_separator)
+            || (known.all(|plugin| plugin.id != name) && Path::new(name).is_file())
+    }
+
     fn find(&self, id: &str, kind: Option<PluginKind>) -> Result<Plugin, LookupError> {
         match self.locate(id, kind)? {
             Located::Linked(linked) => Ok(linked.clone()),
@@ -236,7 +257,7 @@ impl Registry {
     }
 
     fn locate<'a>(&'a self, id: &'a str, kind: Option<PluginKind>) -> Result<Located<'a>, LookupError> {
-        if id.contains(std::path::is_separator) {
+        if self.is_path(id) {
             return Ok(Located::Given(Path::new(id)));
         }
         let fits = |plugin: &Metadata| plugin.id == id && kind.is_none_or(|kind| plugin.kind == kind);
@@ -256,15 +277,12 @@ impl Registry {
     fn unknown(&self, id: &str, kind: Option<PluginKind>) -> LookupError {
         let candidates = self.found().iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
         let unknown_program = || installation_is_unknown().map(str::to_owned);
-        let here = Path::new(id)
-            .is_file()
-            .then(|| format!("for the file of this name write `.{MAIN_SEPARATOR}{id}`"));
         let broken = || self.findings.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
         LookupError::Unknown {
             id: id.to_owned(),
             kind,
             nearest: nearest(id, candidates.map(|known| known.id.as_str())).map(str::to_owned),
-            hint: here.or_else(broken).or_else(|| self.unbuilt()).or_else(unknown_program),
+            hint: broken().or_else(|| self.unbuilt()).or_else(unknown_program),
         }
     }
 

@@ -30,15 +30,21 @@ fn load(registry: &Registry, plugin: &PluginUse, kind: PluginKind) -> Result<Plu
     registry.load(&plugin.plugin, kind).map_err(|error| not_found(plugin, error))
 }
 
-/// Checks that the plugins of a scene exist, without running their code. Not real-time.
+/// Checks that the plugins of a scene exist, and the settings of the plugins of this installation, whose files it loads. Runs no code of
+/// other plugins. Not real-time.
 ///
 /// # Errors
-/// [`RunError`] for the first plugin that is unknown, of the wrong kind or unreadable, with the line of the scene.
+/// [`RunError`] for the first plugin that is unknown, of the wrong kind or unreadable, or for the first wrong setting, with the line
+/// of the scene.
 pub fn check_plugins(scene: &Scene, registry: &Registry) -> Result<(), RunError> {
-    let devices = scene.devices.iter().map(|device| (&device.plugin, PluginKind::Device));
-    let models = scene.models.iter().map(|model| (&model.plugin, PluginKind::Model));
-    devices.chain(models).try_for_each(|(plugin, kind)| {
-        registry.check(&plugin.plugin, kind).map_err(|error| not_found(plugin, error))
+    let devices = scene.devices.iter().map(|device| (&device.name, &device.plugin, PluginKind::Device));
+    let models = scene.models.iter().map(|model| (&model.name, &model.plugin, PluginKind::Model));
+    devices.chain(models).try_for_each(|(name, used, kind)| {
+        registry.check(&used.plugin, kind).map_err(|error| not_found(used, error))?;
+        if registry.file(&used.plugin).is_ok_and(|file| is_installed(&file)) {
+            settings(&load(registry, used, kind)?, name, &used.parameters)?;
+        }
+        Ok(())
     })
 }
 

@@ -30,7 +30,7 @@ impl Launcher {
         let mut command = Command::new(&self.program);
         command.arg("run").arg(&self.scene).stdin(Stdio::null()).stdout(Stdio::null());
         let child = command.spawn().map_err(|cause: io::Error| {
-            format!("cannot start `{}`: {cause}; install both programs in one folder", self.program.display())
+            format!("the bridge cannot start `{}`: {cause}; on its machine, install `flotor` in the folder of `flotor-bridge`", self.program.display())
         })?;
         self.child = Some(child);
         Ok(())

@@ -17,6 +17,7 @@ pub use client::press_both_ways;
 
 use crate::keys::Name;
 use crate::wall_clock::since_1970;
+use flotor_hal::read_file;
 use ring::hmac;
 use ring::rand::{SecureRandom, SystemRandom};
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,8 @@ use std::path::Path;
 pub(crate) const MOST_BYTES: usize = 2048;
 /// Limit on the reason for a refusal, characters.
 const MOST_REASON: usize = 200;
+/// Maximum size of a file of stop keys, bytes: ten thousand members.
+const MOST_KEY_BYTES: u64 = 1 << 20;
 /// Length of a key and of an HMAC, bytes.
 const KEY_BYTES: usize = 32;
 
@@ -62,10 +65,10 @@ impl StopKeys {
     /// Reads a file with one line per member: name and key in hexadecimal digits.
     ///
     /// # Errors
-    /// Errors of the file; `InvalidData` for a malformed or empty file.
+    /// Errors of [`read_file`]; `InvalidData` for a malformed or empty file.
     pub(crate) fn read(path: &Path) -> io::Result<Self> {
         let malformed = || io::Error::new(ErrorKind::InvalidData, "not a file of stop keys");
-        let text = std::fs::read_to_string(path)?;
+        let text = String::from_utf8(read_file(path, MOST_KEY_BYTES)?).map_err(|_| malformed())?;
         let keys = text.lines().map(|line| {
             let (name, digits) = line.split_once(' ')?;
             Some((name.to_owned(), hmac::Key::new(hmac::HMAC_SHA256, &bytes_of(digits)?)))
@@ -225,5 +228,7 @@ mod tests {
             std::fs::write(&file, text).unwrap();
             assert_eq!(StopKeys::read(&file).unwrap_err().kind(), ErrorKind::InvalidData, "{text}");
         }
+        // A pipe or a device file, which may have no end, is not read.
+        assert_eq!(StopKeys::read("/dev/zero".as_ref()).unwrap_err().kind(), ErrorKind::InvalidInput);
     }
 }

@@ -237,7 +237,7 @@ def plugins() -> list[PluginInfo]:
 
 
 def run(
-    scene: str | os.PathLike[str] | None = None,
+    scene: str | os.PathLike[str] | Mapping[str, object] | None = None,
     *,
     duration_s: float | None = None,
     rate_hz: float | None = None,
@@ -247,7 +247,8 @@ def run(
 ) -> dict[str, object]:
     """Runs a scene in virtual time; returns the summary, with the keys of ``flotor run --json``.
 
-    ``scene`` is a scene file (TOML), or the name of one of Flotor's own scenes; None runs the demo.
+    ``scene`` is a scene file (TOML), the name of one of Flotor's own scenes, or a mapping with the keys of a scene file, such as
+    ``tomllib.loads`` returns; None runs the demo.
 
     ``settings`` are parameters by plugin and id: ``{"spring.variant": "closed-form", "device.preset": "full"}``, or
     ``{"spring": {"variant": "closed-form"}}``. Equal arguments give an equal ``trace_digest``.
@@ -255,8 +256,10 @@ def run(
     Raises :class:`FlotorError` for an invalid scene or argument, and :class:`RunFailed`, which has the summary, if a model failed
     or the run ended early.
     """
+    text = _scene_text(scene) if isinstance(scene, Mapping) else None
     summary = _flotor.run_scene(
-        None if scene is None else Path(scene),
+        None if scene is None or text is not None else Path(scene),
+        text=text,
         folders=_folders(),
         duration_s=duration_s,
         rate_hz=rate_hz,
@@ -269,6 +272,28 @@ def run(
     if problem is not None:
         raise RunFailed(problem, summary)
     return summary
+
+
+def _scene_text(scene: Mapping[str, object]) -> str:
+    """Formats a scene as TOML, one line for each key of the scene."""
+    return "".join(f"{_quoted(key)} = {_toml(value)}\n" for key, value in scene.items())
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_quoted(key)} = {_toml(each)}" for key, each in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, str | os.PathLike):
+        return _quoted(os.fspath(value))
+    if isinstance(value, bool | int | float | np.number | np.bool_):
+        value = value.item() if isinstance(value, np.generic) else value
+        return repr(value).lower()
+    raise FlotorError(f"{value!r} has no place in a scene; write numbers, texts, lists and mappings")
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def _by_plugin_and_id(settings: Mapping[str, object]) -> Iterator[tuple[str, object]]:

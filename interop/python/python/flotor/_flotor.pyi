@@ -47,6 +47,7 @@ def plugins(folders: list[Path]) -> list[tuple[str, str, str, str]]: ...
 def run_scene(
     scene: Path | None,
     *,
+    text: str | None,
     folders: list[Path],
     duration_s: float | None,
     rate_hz: float | None,

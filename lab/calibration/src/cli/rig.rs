@@ -18,7 +18,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 /// Device plugin of the simulated rig.
-pub(super) const SIMULATED: &str = "simulated";
+const SIMULATED: &str = "simulated";
 
 /// Redraw period of the progress bar and the line below it.
 const REDRAWN: Duration = Duration::from_millis(100);
@@ -64,11 +64,6 @@ pub(super) struct RigArguments {
 pub(super) type Guide = Box<dyn FnMut(Option<Waiting>) -> ControlFlow<()>>;
 
 impl RigArguments {
-    /// Returns the id of the device's plugin.
-    pub(super) fn plugin(&self) -> &str {
-        self.device.as_deref().unwrap_or(SIMULATED)
-    }
-
     pub(super) fn simulated_rig(&self) -> Result<SimulatedRig, CommandError> {
         let registry = self.plugin_path.registry();
         Ok(SimulatedRig::new(registry.load(SIMULATED, PluginKind::Device)?, self.seed))
@@ -80,7 +75,7 @@ impl RigArguments {
         // Handle signals before a plugin is loaded: a thread that a plugin starts earlier would still receive Ctrl-C.
         let stop = stop_on_signals()?;
         let registry = self.plugin_path.registry();
-        let plugin = registry.load(self.plugin(), PluginKind::Device)?;
+        let plugin = registry.load(self.device.as_deref().unwrap_or_default(), PluginKind::Device)?;
         let sensor_plugin = registry.load(&self.sensor_plugin, PluginKind::Device)?;
         let device_settings = settings(&plugin, "--set", &self.sets)?;
         if self.sensor_sets.iter().any(|set| set.parameter().key == "port") {

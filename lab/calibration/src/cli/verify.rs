@@ -8,7 +8,7 @@ use clap::Args;
 use flotor_command::options::{JsonOption, number};
 use flotor_command::{CommandError, print_result, progress_bar, style};
 use flotor_hal::VerticalCalibration;
-use flotor_session::calibration_file::{CalibrationFile, CalibrationFileError};
+use flotor_session::calibration_file::{CalibratedDevice, CalibrationFile, CalibrationFileError};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -53,9 +53,13 @@ fn usage(error: CalibrationFileError) -> CommandError {
 }
 
 /// Checks that the file belongs to the device, before anything moves.
-fn check(arguments: &VerifyArguments, file: &CalibrationFile, serial: &str) -> Result<(), CommandError> {
+fn check(
+    arguments: &VerifyArguments,
+    file: &CalibrationFile,
+    device: &CalibratedDevice,
+) -> Result<(), CommandError> {
     let path = arguments.file.display().to_string();
-    file.check_device(&path, arguments.rig.plugin(), serial).map_err(usage)
+    file.check_device(&path, &device.plugin, &device.serial).map_err(usage)
 }
 
 fn simulated(
@@ -64,7 +68,7 @@ fn simulated(
     calibration: VerticalCalibration,
 ) -> Result<[f64; 2], CommandError> {
     let mut rig = arguments.rig.simulated_rig()?;
-    check(arguments, file, &rig.serial().map_err(refused)?)?;
+    check(arguments, file, &rig.device().map_err(refused)?)?;
     let progress = progress_bar(2 * ErrorCurve::HEIGHTS, "{percent:>3} %  {wide_bar}");
     let mut error = |calibration| {
         rig.calibrate(calibration);
@@ -83,7 +87,7 @@ fn device(
 ) -> Result<[f64; 2], CommandError> {
     let plan = Plan { forces_n: vec![arguments.force], runs: 1, ..Plan::thesis() };
     let (mut rig, progress) = arguments.rig.device_rig(2 * plan.stops())?;
-    check(arguments, file, rig.serial())?;
+    check(arguments, file, rig.device())?;
     rig.check(&plan).map_err(refused)?;
     let mut errors = [0.0; 2];
     for (error, calibration) in errors.iter_mut().zip([&VerticalCalibration::NONE, calibration]) {

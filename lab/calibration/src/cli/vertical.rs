@@ -85,7 +85,7 @@ struct ErrorRow {
 
 /// Readings with their fit, and the errors of the corrections under comparison.
 struct Measured {
-    serial: String,
+    device: CalibratedDevice,
     readings: Vec<Reading>,
     fit: Fit,
     /// Polynomial of the thesis.
@@ -135,7 +135,7 @@ const CORRECTIONS: u64 = 4;
 /// corrections are compared as well.
 fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, CommandError> {
     let mut rig = arguments.rig.simulated_rig()?;
-    let serial = rig.serial().map_err(refused)?;
+    let device = rig.device().map_err(refused)?;
     let length = plan.stops() + CORRECTIONS * ErrorCurve::HEIGHTS;
     let progress = progress_bar(length, "{percent:>3} %  {wide_bar}");
     let readings = measure(&mut rig, plan, || progress.inc(1)).map_err(refused)?;
@@ -155,7 +155,7 @@ fn simulated(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, Com
         curve(FITTED, Some(fit.calibration), &uncorrected)?,
     ];
     progress.finish_and_clear();
-    Ok(Measured { serial, readings, fit, report, curves })
+    Ok(Measured { device, readings, fit, report, curves })
 }
 
 /// Calibrates a device. The error is read from the force sensor: without correction in the readings of the fit, with
@@ -164,7 +164,7 @@ fn device(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, Comman
     let check = Plan { forces_n: plan.forces_n.iter().copied().take(1).collect(), runs: 1, ..plan.clone() };
     let (mut rig, progress) = arguments.rig.device_rig(plan.stops() + check.stops())?;
     rig.check(plan).map_err(refused)?;
-    let serial = rig.serial().to_owned();
+    let device = rig.device().clone();
     let readings = measure(&mut rig, plan, || progress.inc(1)).map_err(refused)?;
     let (fit, report) = (fit(&readings).map_err(refused)?, report(plan)?);
     rig.calibrate(&fit.calibration).map_err(refused)?;
@@ -175,7 +175,7 @@ fn device(arguments: &VerticalArguments, plan: &Plan) -> Result<Measured, Comman
         (UNCORRECTED, ErrorCurve::of_readings(&readings, weight_n)),
         (FITTED, ErrorCurve::of_readings(&after, weight_n)),
     ];
-    Ok(Measured { serial, readings, fit, report, curves })
+    Ok(Measured { device, readings, fit, report, curves })
 }
 
 fn report(plan: &Plan) -> Result<VerticalCalibration, CommandError> {
@@ -184,20 +184,19 @@ fn report(plan: &Plan) -> Result<VerticalCalibration, CommandError> {
 }
 
 fn report_on(arguments: &VerticalArguments, measured: &Measured) -> Result<(), CommandError> {
-    let Measured { serial, readings, fit, report, curves } = measured;
+    let Measured { device, readings, fit, report, curves } = measured;
     let rows: Vec<ErrorRow> = curves
         .iter()
         .map(|(correction, curve)| ErrorRow { correction, error_percent: curve.error_percent() })
         .collect();
     let error = |row: Option<&ErrorRow>| row.map_or(f64::NAN, |row| row.error_percent);
     let (before, after) = (error(rows.first()), error(rows.last()));
-    let device = arguments.rig.plugin();
     let seed = arguments.rig.simulated.then_some(arguments.rig.seed);
 
     let curve = VerticalCurve::of(&fit.calibration);
     let for_machines = VerticalReport {
-        device,
-        serial,
+        device: &device.plugin,
+        serial: &device.serial,
         error_before_percent: before,
         error_after_percent: after,
         rows: &rows,
@@ -218,7 +217,7 @@ fn report_on(arguments: &VerticalArguments, measured: &Measured) -> Result<(), C
     if let Some(path) = &arguments.out {
         let file = CalibrationFile {
             format: FORMAT,
-            device: CalibratedDevice { plugin: device.to_owned(), serial: serial.clone() },
+            device: device.clone(),
             vertical: curve,
             quality: Quality {
                 readings: u32::try_from(readings.len()).ok(),

@@ -11,6 +11,7 @@ use flotor_hal::{Embodiment, Fault, LoopConfig, VerticalCalibration};
 use flotor_loader::{OpenedDevice, Plugin, Setting};
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{Envelope, StopSwitch};
+use flotor_session::calibration_file::CalibratedDevice;
 use flotor_session::{Guardian, StopWithoutHost, WatchdogStart, start_watchdog_process};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -52,7 +53,7 @@ pub struct DeviceRig<W> {
     sensor: ForceSensor,
     /// Value of `Report::restless` when the measured rest began.
     restless: u64,
-    serial: String,
+    device: CalibratedDevice,
     options: RigOptions,
     waiting: W,
     /// Watchdog process, which stops the device if this process ends; dropped after the device.
@@ -78,10 +79,10 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         waiting: W,
     ) -> Result<Self, CalibrationError> {
         let mut opened = plugin.open_device(settings)?;
-        let serial = opened.serial();
+        let device = CalibratedDevice { plugin: plugin.metadata().id.clone(), serial: opened.serial() };
         let capabilities = opened.capabilities().map_err(CalibrationError::Refused)?;
         let embodiment = plugin.device_info().map_or(Embodiment::Physical, |info| info.embodiment());
-        let independent = StopWithoutHost::of(&plugin.metadata().id, embodiment, &capabilities, &mut opened);
+        let independent = StopWithoutHost::of(&device.plugin, embodiment, &capabilities, &mut opened);
         let independent = independent.map_err(CalibrationError::Refused)?;
         let WatchdogStart { process, warnings } = start_watchdog_process(&[&independent], &options.limits)?;
         let watchdog_process = process.map(Arc::new);
@@ -94,7 +95,7 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
             stop,
             sensor,
             restless: 0,
-            serial,
+            device,
             options,
             waiting,
             watchdog_process,
@@ -109,10 +110,10 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> DeviceRig<W> {
         &self.warnings
     }
 
-    /// Returns the serial number of the device.
+    /// Returns plugin and serial number of the device.
     #[must_use]
-    pub fn serial(&self) -> &str {
-        &self.serial
+    pub fn device(&self) -> &CalibratedDevice {
+        &self.device
     }
 
     /// Checks that no force of a plan is too strong, before the first measurement.

@@ -4,6 +4,7 @@ use super::{AVERAGED_TICKS, Mean, PERIOD_NS, Rest, Rig, locked};
 use crate::CalibrationError;
 use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration, math};
 use flotor_loader::{ActiveDevice, Plugin, Setting};
+use flotor_session::calibration_file::CalibratedDevice;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
@@ -48,12 +49,13 @@ impl SimulatedRig {
         self.calibration = calibration;
     }
 
-    /// Returns the serial number of the device.
+    /// Returns plugin and serial number of the device.
     ///
     /// # Errors
     /// [`CalibrationError`] if the plugin is not the simulated flotor, or the device cannot be opened.
-    pub fn serial(&mut self) -> Result<String, CalibrationError> {
-        Ok(self.plugin.open_device(&self.settings(0.0)?)?.serial())
+    pub fn device(&mut self) -> Result<CalibratedDevice, CalibrationError> {
+        let serial = self.plugin.open_device(&self.settings(0.0)?)?.serial();
+        Ok(CalibratedDevice { plugin: self.plugin.metadata().id.clone(), serial })
     }
 
     /// Returns the settings of the flotor in the rig, with the sensor at a height. The command alone compensates gravity.

@@ -27,15 +27,18 @@ use std::path::PathBuf;
     Examples:\n  \
     flotor bench --csv bench.csv --plot bench.svg\n  \
     flotor bench --case variant=energy --case variant=rod,accuracy=servo --size full\n  \
-    flotor bench --model solid --set body=beam --set tool=plate --plot beam.svg\n  \
+    flotor bench solid --set body=beam --set tool=plate --plot beam.svg\n  \
     flotor bench --model ./libmy_model.so --case steps=8 --case steps=64 --reference steps=1024\n  \
     flotor bench --set preset=slender --case variant=energy --apart rod_share\n  \
     flotor bench --tick"
 )]
 pub(crate) struct BenchArguments {
     /// Id of the model, or path to its plugin file
-    #[arg(long, value_name = "ID", default_value = "spring")]
+    #[arg(value_name = "ID", default_value = "spring")]
     model: String,
+    /// The model, in place of the first argument
+    #[arg(long = "model", value_name = "ID", conflicts_with = "model")]
+    named_model: Option<String>,
     /// Settings of a case; the setting `model=ID` selects another model (repeatable; default: the cases of `spring` or
     /// `solid`, else the defaults of the model)
     #[arg(long = "case", value_name = "KEY=VALUE,...")]
@@ -78,6 +81,12 @@ pub(crate) struct BenchArguments {
     plot: Option<PathBuf>,
     #[command(flatten)]
     options: PluginResultOptions,
+}
+
+impl BenchArguments {
+    fn model(&self) -> &str {
+        self.named_model.as_ref().unwrap_or(&self.model)
+    }
 }
 
 /// Default cases of the spring that ships with Flotor: every variant and setting.
@@ -156,7 +165,7 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
     };
     let row = |device: BenchDevice| {
         let batches = if device == BenchDevice::Isolated { batches / SLOWER } else { batches };
-        let cost = WholeTick::prepare(device, arguments.options.plugin_path.registry(), &arguments.model)?
+        let cost = WholeTick::prepare(device, arguments.options.plugin_path.registry(), arguments.model())?
             .time(batches);
         Ok(TickRow { device, cost })
     };
@@ -166,7 +175,7 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
     })?;
     let report = TickReport::new(rows, round_trips);
     let text = || {
-        let title = format!("a tick with `{}`, trace on, virtual clock: ns", arguments.model);
+        let title = format!("a tick with `{}`, trace on, virtual clock: ns", arguments.model());
         let cells = |name: &str, cost: &TickCost| {
             let TickCost { median_ns, p99_ns, fastest_ns } = cost;
             let [median, p99, fastest] = [median_ns, p99_ns, fastest_ns].map(|ns| format!("{ns:.0}"));
@@ -187,7 +196,7 @@ fn time_ticks(arguments: &BenchArguments) -> Result<(), CommandError> {
 
 fn compare_cases(arguments: &BenchArguments) -> Result<(), CommandError> {
     let registry = arguments.options.plugin_path.registry();
-    let plugin = registry.load(&arguments.model, PluginKind::Model)?;
+    let plugin = registry.load(arguments.model(), PluginKind::Model)?;
     let is_spring = plugin.metadata().id == "spring" && arguments.cases.is_empty();
     let is_under_plate = arguments.sets.iter().any(|set| set.parameter().value == "plate");
     let (own_cases, own_reference): (&[&str], _) = match &*plugin.metadata().id {

@@ -3,7 +3,7 @@
 use crate::evaluate::{Answer, Details, EvaluateError, Evaluation, Travel};
 use crate::poses::Poses;
 use clap::Args;
-use flotor_command::options::{KeyValue, PluginPathOption, new_file, settings};
+use flotor_command::options::{KeyValue, ModelOption, PluginPathOption, new_file, settings};
 use flotor_command::tables::to_csv;
 use flotor_command::{CommandError, note, progress_bar, while_preparing, write_text};
 use flotor_hal::abi::PluginKind;
@@ -25,9 +25,8 @@ use std::path::{Path, PathBuf};
     echo 'x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,-0.005,0,0,0' | flotor eval --model spring --poses -"
 )]
 pub(crate) struct EvalArguments {
-    /// Id of the model, or path to its plugin file
-    #[arg(long, value_name = "ID")]
-    model: String,
+    #[command(flatten)]
+    model: ModelOption,
     /// Set a parameter of the model (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
@@ -57,7 +56,7 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
             "--out {out}: this is the file of the poses; choose another file"
         )));
     }
-    let plugin = arguments.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
+    let plugin = arguments.plugin_path.registry().load(arguments.model.name(), PluginKind::Model)?;
     let settings = settings(&plugin, "--set", &arguments.sets)?;
     // Report a rejected setting before a long file is read.
     let first = while_preparing(&plugin.metadata().id, || plugin.create_model(&settings))?;
@@ -87,10 +86,8 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
 /// Reads the poses from a file or from standard input.
 fn read_poses(path: &Path) -> Result<Poses, CommandError> {
     let problem = |cause| {
-        let path = path.display();
-        CommandError::Usage(format!(
-            "{path}: cannot read the poses: {cause}; check the path and its permissions"
-        ))
+        let file = if path.as_os_str() == "-" { "standard input".into() } else { path.display().to_string() };
+        CommandError::Usage(format!("{file}: cannot read the poses: {cause}"))
     };
     let bytes = read(path).map_err(problem)?;
     Poses::parse(&path.display().to_string(), bytes).map_err(|error| CommandError::Usage(error.to_string()))

@@ -3,7 +3,9 @@
 use super::ProgressLine;
 use crate::Size;
 use clap::{Args, ValueEnum};
-use flotor_command::options::{KeyValue, PluginResultOptions, duration_s, seed, settings, svg_file};
+use flotor_command::options::{
+    KeyValue, ModelOption, PluginResultOptions, duration_s, seed, settings, svg_file,
+};
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::abi::PluginKind;
 use flotor_judge::stress::{Part, Reach, StressOptions, Symmetry, deliver, score_in_processes};
@@ -19,13 +21,12 @@ use std::time::Duration;
     with --symmetry also M10. Each measure runs in its own process, so a call that does not return fails only \
     one measure. `score` is the share of measures that passed; the chapter \"Stability of a model\" of the book has the criterion of each.\n\n\
     Examples:\n  \
-    flotor stress --model spring\n  \
+    flotor stress spring\n  \
     flotor stress --model spring --set variant=closed-form --json score.json --plot score.svg\n  \
     flotor stress --model ./target/release/libmy_model.so --size full --seed 7")]
 pub(crate) struct StressArguments {
-    /// Id of the model, or path to its plugin file
-    #[arg(long, value_name = "ID")]
-    model: String,
+    #[command(flatten)]
+    model: ModelOption,
     /// Set a parameter of the model (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
@@ -39,7 +40,7 @@ pub(crate) struct StressArguments {
     #[arg(long, value_enum)]
     symmetry: Option<Symmetry>,
     /// Compute only this measure, M0 to M9, or with --symmetry M10 (repeatable; default: all)
-    #[arg(long, value_parser = measure, value_name = "M0")]
+    #[arg(long, value_parser = measure, value_name = "M0", requires_if("M10", "symmetry"))]
     only: Vec<Part>,
     /// Limit of the processor time of one step, such as 5s or 500ms; ten times as long for a step that waits
     /// (default: FLOTOR_STEP_LIMIT_S in seconds, or 1s)
@@ -65,7 +66,7 @@ fn part(word: &str) -> Result<Part, String> {
 }
 
 pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
-    let plugin = arguments.options.plugin_path.registry().load(&arguments.model, PluginKind::Model)?;
+    let plugin = arguments.options.plugin_path.registry().load(arguments.model.name(), PluginKind::Model)?;
     let settings = settings(&plugin, "--set", &arguments.sets)?;
     let StressArguments { size, seed, symmetry, .. } = *arguments;
     let options = StressOptions { size, seed, reach: Reach::default(), symmetry };
@@ -82,7 +83,7 @@ pub(crate) fn run(arguments: &StressArguments) -> Result<(), CommandError> {
         let mut command = Command::new(&program);
         command.args(["stress", "--deliver", part.word(), "--size", size.word()]);
         command.arg(format!("--seed={seed}")).arg(format!("--timeout={}", limit.as_secs_f64()));
-        command.arg("--model").arg(&arguments.model).args(arguments.options.plugin_path.arguments());
+        command.arg("--model").arg(arguments.model.name()).args(arguments.options.plugin_path.arguments());
         command.args(arguments.sets.iter().flat_map(|set| ["--set".to_owned(), set.to_string()]));
         if let Some(symmetry) = symmetry.and_then(|symmetry| symmetry.to_possible_value()) {
             command.arg("--symmetry").arg(symmetry.get_name());

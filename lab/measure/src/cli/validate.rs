@@ -1,7 +1,7 @@
 //! `flotor validate`: check of a plugin file against the rules of the contract.
 
 use clap::Args;
-use flotor_command::options::{JsonOption, KeyValue, duration_s};
+use flotor_command::options::{KeyValue, PluginResultOptions, duration_s};
 use flotor_command::say;
 use flotor_command::{CommandError, style};
 use flotor_judge::validate::{Check, Figures, Finding, Verdict, check, deliver, validate};
@@ -14,17 +14,20 @@ use std::time::Duration;
 
 /// Check a plugin file against the rules of the contract.
 #[derive(Args)]
-#[command(after_help = "Examples:\n  flotor validate target/release/libmy_model.so\n  \
+#[command(
+    after_help = "Examples:\n  flotor validate spring\n  flotor validate target/release/libmy_model.so\n  \
     flotor validate target/release/libmy_device.so --set port=/dev/ttyACM0\n\n\
-    The command runs the plugin's code, each rule in its own process: validate only files that you would load.")]
+    The command runs the plugin's code, each rule in its own process: validate only files that you would load."
+)]
 pub(crate) struct ValidateArguments {
-    /// The plugin's shared library
+    /// Id of the plugin, or path to its file
+    #[arg(value_name = "ID")]
     plugin: PathBuf,
     /// Set a parameter of the checked instances, such as the port of a device (repeatable)
     #[arg(long = "set", value_name = "KEY=VALUE")]
     sets: Vec<KeyValue>,
     #[command(flatten)]
-    json: JsonOption,
+    options: PluginResultOptions,
     /// Check only this rule, by its name in the output, and `metadata` (repeatable; default: all rules)
     #[arg(long, value_parser = rule, value_name = "RULE")]
     only: Vec<Check>,
@@ -59,26 +62,29 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
         );
         return Ok(());
     }
-    if !arguments.plugin.is_file() {
-        let what = if arguments.plugin.exists() { "is not a file" } else { "does not exist" };
+    let plugin = match arguments.plugin.to_str() {
+        Some(name) => arguments.options.plugin_path.registry().file(name)?,
+        None => arguments.plugin.clone(),
+    };
+    if !plugin.is_file() {
+        let what = if plugin.exists() { "is not a file" } else { "does not exist" };
         return Err(CommandError::Usage(format!(
             "`{}` {what}; `flotor plugins` lists the file of each id",
-            arguments.plugin.display()
+            plugin.display()
         )));
     }
     let program = std::env::current_exe()
         .map_err(|cause| CommandError::file(Path::new("flotor-lab"), "cannot find this program", cause))?;
     let one_rule = |rule: Check| {
         let mut command = Command::new(&program);
-        command.arg("validate").args(["--rule", rule.id(), "--deliver"]).arg(&arguments.plugin);
+        command.arg("validate").args(["--rule", rule.id(), "--deliver"]).arg(&plugin);
         command.args(arguments.sets.iter().flat_map(|set| ["--set".to_owned(), set.to_string()]));
         command
     };
-    let findings =
-        validate(&arguments.plugin, &arguments.only, Duration::from_secs_f64(arguments.timeout), one_rule);
+    let findings = validate(&plugin, &arguments.only, Duration::from_secs_f64(arguments.timeout), one_rule);
     let violated = findings.iter().filter(|finding| finding.violation.is_some()).count();
-    if arguments.json.write(&findings)? {
-        say!("{}", style::title(&arguments.plugin.display().to_string()));
+    if arguments.options.json.write(&findings)? {
+        say!("{}", style::title(&plugin.display().to_string()));
         findings.iter().for_each(print);
         let judged = findings.iter().filter(|finding| !finding.has_nothing_to_judge());
         let unchecked: Vec<&str> = judged.filter_map(|finding| finding.unchecked.as_deref()).collect();
@@ -91,7 +97,7 @@ pub(crate) fn run(arguments: &ValidateArguments) -> Result<(), CommandError> {
     if violated == 0 {
         return Ok(());
     }
-    let problem = format!("{}: {violated} of {} rules violated", arguments.plugin.display(), findings.len());
+    let problem = format!("{}: {violated} of {} rules violated", plugin.display(), findings.len());
     Err(CommandError::PluginRefused(problem))
 }
 

@@ -21,9 +21,13 @@ pub use table::trials_csv;
 use crate::log::{Begin, Event, InputFile, LogError, LogProblem, LogWriter, SittingLog};
 use crate::protocol::SubjectNumber;
 use crate::sitting::Sitting;
+use flotor_hal::read_file;
 use serde_json::{Map, Value};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+
+/// Maximum size of a file that people may have extended, bytes: a list of a million participants.
+const MOST_BYTES: u64 = 256 << 20;
 
 /// Folder with the data of a study.
 #[derive(Clone, Debug)]
@@ -89,8 +93,8 @@ pub enum DatasetError {
         what: String,
     },
     /// A log is at the path of another subject or task, where its subject could count twice or under another number.
-    #[error("{}: the log is of {subject}, task {task}, and is in the wrong folder; remove the log, or move it to \
-    {}", path.display(), place.display())]
+    #[error("{}: the log is of {subject}, task {task}, and belongs at {}; move the log there, or remove the log if \
+    that file exists already", path.display(), place.display())]
     Misplaced {
         /// Path of the log.
         path: PathBuf,
@@ -325,12 +329,10 @@ fn complete_table(path: &Path, generated: &str, key: &'static str) -> Result<(),
 
 /// Reads an existing file; returns `None` if there is none.
 fn read_earlier(path: &Path) -> Result<Option<String>, DatasetError> {
-    match std::fs::read_to_string(path) {
-        Ok(text) => Ok(Some(text)),
+    let not_utf8 = |_| DatasetError::Unmergeable { path: path.into(), problem: Unmergeable::NotUtf8 };
+    match read_file(path, MOST_BYTES) {
+        Ok(bytes) => String::from_utf8(bytes).map(Some).map_err(not_utf8),
         Err(cause) if cause.kind() == ErrorKind::NotFound => Ok(None),
-        Err(cause) if cause.kind() == ErrorKind::InvalidData => {
-            Err(DatasetError::Unmergeable { path: path.into(), problem: Unmergeable::NotUtf8 })
-        }
         Err(cause) => Err(DatasetError::file(path, "cannot read the file", cause)),
     }
 }
@@ -375,4 +377,17 @@ fn same_study(begin: &Begin, log: &SittingLog) -> Result<(), DatasetError> {
 fn is_log(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.ends_with("_log.jsonl") && !name.starts_with('.')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_without_an_end_is_not_read() {
+        let endless = Path::new("/dev/zero");
+        if endless.exists() {
+            complete(endless, "", |_| Ok(None)).expect_err("a device file");
+        }
+    }
 }

@@ -11,6 +11,7 @@ use flotor_command::CommandError;
 use flotor_core::LARGEST_SEED;
 use flotor_hal::read_text;
 use flotor_loader::nearest;
+use flotor_session::scene::OwnScene;
 use flotor_study::exclusion::ExclusionRules;
 use flotor_study::log::{Plan, digest};
 use serde::Deserialize;
@@ -19,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 /// Suffix of a study file's name.
 const ENDING: &str = ".study.toml";
-/// Options whose values are paths, relative to the folder of the study file.
+/// Options whose values are paths, relative to the folder of the study file; the name of one of Flotor's own scenes is no path.
 const PATHS: [&str; 6] = ["out", "scene", "consent", "instructions", "texts", "plugin-path"];
 /// Options that are only valid on the command line of `study run`.
 const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
@@ -238,7 +239,12 @@ fn words(
             refuse(format!("`flotor study {task}` has no such option{near}"))
         })?;
         let value_of = |value: &toml::Value| match plain(value) {
-            Some(text) if PATHS.contains(&name.as_str()) => Ok(folder.join(text).into_os_string()),
+            Some(text) if PATHS.contains(&name.as_str()) => {
+                let path = folder.join(&text);
+                let is_own =
+                    name == "scene" && !path.is_file() && OwnScene::named(Path::new(&text)).is_some();
+                Ok(if is_own { text.into() } else { path.into_os_string() })
+            }
             Some(text) => Ok(OsString::from(text)),
             None => Err(refuse(format!(
                 "the option accepts no value of type {}; write a number or a text",
@@ -390,6 +396,17 @@ mod tests {
         let text = "task = \"jnd\"\n[options]\nplugin_path = [\"mine\", \"/yours\"]\n";
         let words = said(text, &["--plugin-path", "first"]).join(" ");
         assert_eq!(words, "jnd --plugin-path first --plugin-path here/mine --plugin-path /yours --resume");
+    }
+
+    /// The name of one of Flotor's own scenes is valid in every folder; any other scene is a file beside the study file.
+    #[test]
+    fn a_scene_of_flotor_has_no_folder() {
+        for (scene, expected) in
+            [("falcon", "falcon"), ("falcon.toml", "here/falcon.toml"), ("mine", "here/mine")]
+        {
+            let words = said(&format!("task = \"jnd\"\n[options]\nscene = \"{scene}\"\n"), &[]).join(" ");
+            assert_eq!(words, format!("jnd --scene {expected} --resume"));
+        }
     }
 
     #[test]

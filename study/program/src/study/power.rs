@@ -20,7 +20,7 @@ pub(super) struct PowerArguments {
     #[arg(long, default_value = "8..32", value_parser = sizes, value_name = "FEWEST..MOST")]
     subjects: (u16, u16),
     /// Number of simulated studies of each size
-    #[arg(long, default_value_t = 200, value_parser = count(10..=100_000_u32), value_name = "N")]
+    #[arg(long, default_value_t = 2000, value_parser = count(10..=100_000_u32), value_name = "N")]
     runs: u32,
     /// Ratio of the threshold without vision to the threshold with vision, 0.1 to 10
     #[arg(long, default_value_t = 1.21, value_parser = real, value_name = "RATIO")]
@@ -108,4 +108,21 @@ fn to_text(rows: &[Power]) -> String {
         format!("  {:>8}{power:>9}{error:>16}{:>20}", row.subjects, format!("{vh}, {h}"))
     };
     [head].into_iter().chain(rows.iter().map(line)).collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::FromArgMatches;
+
+    /// From 8 to 16 people the power rises by 6 points or more from size to size (noncentral t at the thesis's effect: 52, 64, 74, 81
+    /// and 87 %); three standard errors of a difference between two rows are less.
+    #[test]
+    fn the_default_number_of_studies_tells_neighbouring_sizes_apart() {
+        let command = PowerArguments::augment_args(clap::Command::new("power"));
+        let arguments =
+            PowerArguments::from_arg_matches(&command.get_matches_from(["power"])).expect("defaults");
+        let largest_variance = 0.25 / f64::from(arguments.runs);
+        assert!(3.0 * (2.0 * largest_variance).sqrt() < 0.06, "{} studies", arguments.runs);
+    }
 }

@@ -14,8 +14,9 @@ pub struct SurfacePoint {
     pub depth_m: f64,
 }
 
-/// Returns the point of a primitive's surface that is closest to a point, m. A plane is infinite here, as in a model. `None` for a
-/// cylinder and for forms of a later contract, and at the centre of a ball, where all points of the surface are equally close.
+/// Returns the point of a primitive's surface that is closest to a point, m. A plane is infinite here, as in a model. `None` for
+/// forms of a later contract, at the centre of a ball and on the axis of a cylinder, where many points of the surface are equally
+/// close.
 #[must_use]
 pub fn closest_surface_point(primitive: &Primitive, to_m: DVec3) -> Option<SurfacePoint> {
     let frame = Frame::at(&primitive.pose());
@@ -30,7 +31,14 @@ pub fn closest_surface_point(primitive: &Primitive, to_m: DVec3) -> Option<Surfa
             (normal * half_m.x, normal, half_m.x - local_m.length())
         }
         Form::Box => closest_of_box(half_m, local_m)?,
-        Form::Cylinder => return None,
+        Form::Cylinder => {
+            // In the plane through the axis and the point, a cylinder is a rectangle.
+            let radial = local_m.with_z(0.0).try_normalize()?;
+            let in_plane_m = DVec3::new(local_m.dot(radial), 0.0, local_m.z);
+            let (position_m, normal, depth_m) = closest_of_box(half_m.with_y(f64::INFINITY), in_plane_m)?;
+            let turned = |vector: DVec3| radial * vector.x + DVec3::Z * vector.z;
+            (turned(position_m), turned(normal), depth_m)
+        }
     };
     let turned = |vector: DVec3| frame.x * vector.x + frame.y * vector.y + frame.z * vector.z;
     Some(SurfacePoint { position_m: frame.origin_m + turned(position_m), normal: turned(normal), depth_m })
@@ -58,11 +66,15 @@ mod tests {
     use flotor_hal::{Part, Pose};
 
     /// Forms of a known surface, turned and moved.
-    fn turned() -> (Pose, [Primitive; 3]) {
+    fn turned() -> (Pose, [Primitive; 4]) {
         let turn = DQuat::from_rotation_y(0.4) * DQuat::from_rotation_x(-0.9);
         let pose = Pose::new(DVec3::new(0.01, -0.02, 0.003), turn);
-        let forms =
-            [(Form::Plane, [0.03, 0.03, 0.0]), (Form::Sphere, [0.01; 3]), (Form::Box, [0.01, 0.006, 0.004])];
+        let forms = [
+            (Form::Plane, [0.03, 0.03, 0.0]),
+            (Form::Sphere, [0.01; 3]),
+            (Form::Box, [0.01, 0.006, 0.004]),
+            (Form::Cylinder, [0.01, 0.01, 0.004]),
+        ];
         (pose, forms.map(|(form, half_sides_m)| Primitive::new(form, Part::Body, pose, half_sides_m)))
     }
 
@@ -100,7 +112,26 @@ mod tests {
     }
 
     #[test]
-    fn a_cylinder_and_the_middle_of_a_ball_have_none() {
+    fn inside_a_cylinder_the_shell_or_an_end_counts_and_outside_the_rim_does() {
+        let primitive = Primitive::new(Form::Cylinder, Part::Body, Pose::HOME, [0.01, 0.01, 0.004]);
+        let at = |point_m| closest_surface_point(&primitive, point_m).expect("off the axis");
+        let out = DVec3::new(0.6, 0.8, 0.0);
+        let (shell, end, rim) =
+            (at(out * 0.009), at(out * 0.002 - DVec3::Z * 0.003), at(out * 0.013 + DVec3::Z * 0.008));
+        assert!(
+            (shell.normal - out).length() < 1.0e-12 && (shell.depth_m - 0.001).abs() < 1.0e-15,
+            "{shell:?}"
+        );
+        assert!(
+            (end.normal + DVec3::Z).length() < 1.0e-12 && (end.depth_m - 0.001).abs() < 1.0e-15,
+            "{end:?}"
+        );
+        assert!((rim.normal - (out * 0.6 + DVec3::Z * 0.8)).length() < 1.0e-12, "{rim:?}");
+        assert!((rim.depth_m + 0.005).abs() < 1.0e-12, "{rim:?}");
+    }
+
+    #[test]
+    fn the_axis_of_a_cylinder_and_the_middle_of_a_ball_have_none() {
         let of = |form| Primitive::new(form, Part::Body, Pose::HOME, [0.01; 3]);
         assert_eq!(
             [Form::Cylinder, Form::Sphere].map(|form| closest_surface_point(&of(form), DVec3::ZERO)),

@@ -93,7 +93,7 @@ impl PlotStack {
                 Units::Si => "SI",
             };
             let switch = ui.button(RichText::new(units).size(SMALL_PT + 0.5));
-            if switch.on_hover_text("Units: millimetres and degrees, or SI (U)").clicked() {
+            if switch.on_hover_text("Units of numbers and traces: millimetres and degrees, or SI (U); a parameter has the unit of its key").clicked() {
                 self.switch_units();
             }
             let shown = match self.window {

@@ -84,8 +84,12 @@ static uint32_t step(FlotorInstance instance, const FlotorInput *input, FlotorOu
     return FlotorCallStatus_Ok;
 }
 
-/* Between two steps: the new value of a live parameter, inside its range. */
+/* Between two steps: the new value of a live parameter. A value that the model cannot use is refused, and the old
+ * one stays. */
 static uint32_t set_parameter(FlotorInstance instance, uint32_t index, double value) {
+    if (!(value >= parameters[index].min && value <= parameters[index].max)) {
+        return FlotorCallStatus_OutOfRange;
+    }
     ((YourName *)instance)->values[index] = value;
     return FlotorCallStatus_Ok;
 }

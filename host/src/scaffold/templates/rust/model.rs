@@ -43,8 +43,10 @@ impl ForceModel for YourName {
         Wrench::from_force(DVec3::Z * stiffness_n_per_m * depth_m).into()
     }
 
-    // Between two steps: the new value of a live parameter, inside its range.
+    // Between two steps: the new value of a live parameter. A value that the model cannot use is refused, and the old
+    // one stays.
     fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
+        Self::PARAMETERS[index].check(value)?; // `SetParameterError::OutOfRange`
         self.values[index] = value;
         Ok(())
     }
@@ -71,6 +73,14 @@ mod tests {
     fn below_home_it_pushes_up_and_above_there_is_nothing() {
         assert_eq!(force_n_at_height(-0.004), DVec3::Z * 2.0); // 500 N/m times 4 mm
         assert_eq!(force_n_at_height(0.004), DVec3::ZERO);
+    }
+
+    #[test]
+    fn a_value_outside_its_range_is_refused() {
+        let mut model = YourName { values: [500.0, 0.0, 50.0], shape: Shape::default() };
+        let refused = model.set_parameter(0, -1.0);
+        assert_eq!(refused, Err(OutOfRange { min: 0.0, max: 5000.0, value: -1.0 }.into()));
+        assert_eq!(model.parameter(0), 500.0);
     }
 
     #[test]

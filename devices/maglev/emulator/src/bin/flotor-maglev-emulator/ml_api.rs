@@ -34,7 +34,8 @@ pub(crate) struct MlApiArguments {
     // At least three periods of the host's loop at 1 kHz.
     #[arg(long, requires = "device", value_name = "MS", value_parser = within(3.0, 60_000.0, "ms"))]
     pub(crate) host_watchdog_ms: Option<f64>,
-    /// Accept that a kill of this program's control group also ends the watchdog process, so that no process stops the device
+    /// With --device: accept a device without a watchdog of its own, although a kill of this program's control group also ends the
+    /// watchdog process, so that no process stops the device (default: refuse)
     #[arg(long, requires = "device")]
     pub(crate) accept_shared_control_group: bool,
     /// Hand that holds the flotor; no effect with --device or --calibration-rig

@@ -1,6 +1,6 @@
 //! Controller over a free body: results of procedures against closed forms, and settings read back.
 
-use super::{Answer, Controller, ControllerConfig, Flight, ForceCommand, Injected, ProcedureId};
+use super::{Answer, Controller, ControllerConfig, Flight, ForceCommand, ProcedureId};
 use crate::controller::Sample;
 use flotor_hal::{DVec3, Pose, Twist, Wrench};
 use flotor_maglev::ml_api::*;
@@ -343,7 +343,7 @@ fn a_grasp_carries_its_current_within_its_limit_while_the_flotor_levitates() {
     assert_eq!(rig.controller.grasp_a(), -2.0);
     assert_eq!(rig.status(Request::Number(Function::SetGraspCurrentLimit, 1.5)), Status::OK);
     assert_eq!(rig.controller.grasp_a(), -1.5);
-    rig.controller.inject(Injected(FaultBits::OVER_TEMPERATURE));
+    rig.controller.inject(FaultBits::OVER_TEMPERATURE);
     rig.step();
     assert_eq!(rig.controller.grasp_a(), 0.0, "a fault takes it away with the levitation");
 }

@@ -65,8 +65,8 @@ impl Hub {
         self.changed.notify_all();
     }
 
-    /// Runs a whole servo interval of `dt_s` without waiting for the lock, and returns the wrench over the interval; returns wrench and current of the grasp, A; `None` if a
-    /// connection holds the lock. Real-time: bounded, no allocation; one system call.
+    /// Runs a whole servo interval of `dt_s` without waiting for the lock, and returns the wrench over the interval and the current of
+    /// the grasp, A; `None` if a connection holds the lock. Real-time: bounded, no allocation; one system call.
     #[must_use]
     pub fn try_cycle(&self, sample: &Sample, dt_s: f64) -> Option<(Wrench, f64)> {
         let mut state = self.state.try_lock().ok()?;
