@@ -18,7 +18,7 @@ pub fn arguments<T: Parser>() -> T {
 
 /// Returns the parser of an option whose number has these limits.
 ///
-/// The parser returns a message if the text is no number, or the number is outside the limits.
+/// The parser returns a message if the text is not a number within the limits.
 pub fn within(
     least: f64,
     most: f64,

@@ -167,7 +167,7 @@ fn ended(end: RunEnd) -> String {
             source.word()
         ),
         RunEnd::Watchdog(stuck) => format!(
-            "tick {} exceeded the time limit, and the watchdog stopped the device; check the machine with \
+            "tick {} exceeded the time limit, and the watchdog stopped all devices; check the machine with \
              `flotor doctor`, or raise `[limits] watchdog_ms`",
             stuck.tick
         ),

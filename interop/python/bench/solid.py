@@ -265,7 +265,7 @@ def main():
     rows = measure()
     print(f"{'':12} {'':50} {'too stiff':>10} {'step':>10}")
     for task, who, error, step_s in rows:
-        print(f"{task:12} {who:50} {error:+10.1%} {step_s * 1e6:8.2f} us")
+        print(f"{task:12} {who:50} {error:+10.1%} {step_s * 1e6:8.2f} µs")
     for task in ("beam", "indentation"):
         own = [row for row in rows if row[0] == task and row[1].startswith("Flotor")]
         peers = [row for row in rows if row[0] == task and not row[1].startswith("Flotor")]

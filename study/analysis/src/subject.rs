@@ -201,7 +201,7 @@ impl SubjectQuality {
 }
 
 /// Returns true if the numbers of answers that named the first and the second stimulus differ significantly: two-sided binomial
-/// test at [`LEVEL`], which six equal answers are enough for.
+/// test at [`LEVEL`], for which six equal answers suffice.
 fn is_preference([first, second]: [usize; 2]) -> bool {
     2.0 * binomial_at_least(first.max(second), first + second, 0.5) < LEVEL
 }

@@ -67,7 +67,7 @@ fn an_option_of_many_commands_is_the_same_in_each() {
         (
             "--plugin-path",
             "| `--plugin-path FOLDER` |  | Folder to search for plugins before all others (repeatable) |",
-            "run, replay, view, eval, plugins, test, jitter, stability, bench, stress, study jnd, \
+            "run, replay, view, eval, plugins, validate, test, jitter, stability, bench, stress, study jnd, \
              study magnitude, study force, study explore, calibrate vertical, calibrate verify, lend, doctor",
         ),
         (

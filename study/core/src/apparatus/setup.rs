@@ -117,7 +117,7 @@ pub struct Apparatus {
     pub(super) scene: Scene,
     pub(super) registry: Registry,
     stimulus: Stimulus,
-    /// Mutability of the varied parameter: a fixed one changes by model replacement (hot swap).
+    /// Mutability of the varied parameter: a fixed parameter changes by replacement of its model (hot swap).
     mutability: Mutability,
     /// Blend weight of the model while it is felt, 0 to 1; below, its fade time, s.
     weight: f64,

@@ -7,7 +7,7 @@ use std::process::{ChildStdout, Command, Stdio};
 use std::sync::mpsc::channel;
 use std::time::Duration;
 
-/// Time after which a process is taken for one that never ends.
+/// Timeout for the end of a process.
 const FOR_EVER: Duration = Duration::from_secs(120);
 
 /// A shell that starts a process which ignores every request to end, prints its number, and goes on with `then`.
