@@ -8,7 +8,11 @@ use flotor_core::mapping::Blend;
 use flotor_hal::Demand;
 
 const CONTACTS: ContactLimits = ContactLimits {
-    cap: Some(StiffnessCap { stiffness_n_per_m: 900.0, per_damping_1_per_s: 250.0 }),
+    cap: Some(StiffnessCap {
+        stiffness_n_per_m: 900.0,
+        by_device_n_per_m: 120.0,
+        per_damping_1_per_s: 250.0,
+    }),
     surface_power_w: 0.5,
     force_n: 3.0,
     torque_nm: f64::INFINITY,

@@ -116,6 +116,6 @@ mod solver;
 pub use contact::{Contact, ContactSet, ContactSetError, Fault, Validity};
 pub use coupling::{Coupling, Limits, NotPositive};
 pub use cross_fade::CrossFade;
-pub use published::{FeltStiffness, PublishedContacts, Shortcoming, Touch};
+pub use published::{FeltStiffness, PublishedContacts, Shortcoming, StableStiffness, Touch};
 pub use replacement::Replacement;
 pub use solver::{Outcome, Solution, Solver};

@@ -4,13 +4,37 @@ use crate::contact::{Contact, ContactSet, ContactSetError};
 use crate::solver::{Outcome, Solver};
 use flotor_hal::{Input, Wrench};
 
+/// Stiffness of contacts that damping keeps stable: that of the device's damping, and more for each contact with a damper of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StableStiffness {
+    /// Stiffness that the damping of the device keeps stable, N/m, of all contacts in one direction together; 0: its damping is not
+    /// known, and contacts without damping keep their stiffness.
+    pub by_device_n_per_m: f64,
+    /// Additional stiffness for the damping of a contact, 1/s.
+    pub per_damping_1_per_s: f64,
+}
+
+impl StableStiffness {
+    /// No contact is reduced.
+    pub const UNLIMITED: Self = Self { by_device_n_per_m: 0.0, per_damping_1_per_s: f64::INFINITY };
+
+    /// Returns the largest stable stiffness of a contact that has this share of the device's damping, N/m; `None` if no damping
+    /// is known.
+    fn most_n_per_m(&self, damping_ns_per_m: f64, share: f64) -> Option<f64> {
+        let own_n_per_m =
+            if damping_ns_per_m > 0.0 { self.per_damping_1_per_s * damping_ns_per_m } else { 0.0 };
+        let is_known = damping_ns_per_m > 0.0 || self.by_device_n_per_m > 0.0;
+        is_known.then_some((own_n_per_m + self.by_device_n_per_m * share).max(f64::MIN_POSITIVE))
+    }
+}
+
 /// Stiffness of published contacts, as far as the loop has to reduce it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeltStiffness {
     /// Stiffness that a contact asked for, N/m, and the stiffness that it got, where they differ most; `None` without
     /// a reduction.
     pub reduced_n_per_m: Option<[f64; 2]>,
-    /// Largest stiffness of a contact without damping, N/m; 0 if all are damped.
+    /// Largest stiffness of a contact for which no damping is known, N/m; 0 without such a contact.
     pub undamped_n_per_m: f64,
 }
 
@@ -39,19 +63,18 @@ pub struct PublishedContacts {
     solver: Solver,
     /// Age at which a set without a validity of its own begins to fade, s.
     valid_s: f64,
-    /// Largest ratio of stiffness to damping, 1/s; infinite: no contact is reduced.
-    most_per_damping: f64,
+    stable: StableStiffness,
     felt: FeltStiffness,
     /// Time of the newest set, ns; `None` before the first contact.
     published_ns: Option<u64>,
 }
 
 impl PublishedContacts {
-    /// Creates the state before the first contact. A contact with damping gets at most `most_per_damping` (1/s) times its damping
-    /// as stiffness; a set without a validity of its own is valid for `valid_s`. Not real-time.
+    /// Creates the state before the first contact. A contact is at most as stiff as known damping keeps `stable`; a set without a
+    /// validity of its own is valid for `valid_s`. Not real-time.
     #[must_use]
-    pub fn new(solver: Solver, most_per_damping: f64, valid_s: f64) -> Self {
-        Self { solver, valid_s, most_per_damping, felt: FeltStiffness::default(), published_ns: None }
+    pub fn new(solver: Solver, stable: StableStiffness, valid_s: f64) -> Self {
+        Self { solver, valid_s, stable, felt: FeltStiffness::default(), published_ns: None }
     }
 
     /// Checks a set, which the next tick uses; a set that is refused changes nothing. Real-time: bounded, no allocation.
@@ -61,21 +84,21 @@ impl PublishedContacts {
     pub fn publish(&mut self, set: &flotor_hal::ContactSet) -> Result<(), ContactSetError> {
         let checked = ContactSet::published(set, self.valid_s)?;
         if self.published_ns.is_some() || !checked.contacts().is_empty() {
-            let checked = checked.map(|contact| self.reduced(contact));
+            let all = checked;
+            let checked = checked.map(|contact| self.reduced(contact, share(&contact, all.contacts())));
             self.solver.replace(&checked);
             self.published_ns = Some(set.time_ns);
         }
         Ok(())
     }
 
-    /// Returns a contact with as much stiffness as its damping keeps stable.
-    fn reduced(&mut self, contact: Contact) -> Contact {
+    /// Returns a contact with as much stiffness as its damping, and its share of the device's, keep stable.
+    fn reduced(&mut self, contact: Contact, share: f64) -> Contact {
         let Contact { stiffness_n_per_m, damping_ns_per_m, .. } = contact;
-        if damping_ns_per_m <= 0.0 {
+        let Some(most_n_per_m) = self.stable.most_n_per_m(damping_ns_per_m, share) else {
             self.felt.undamped_n_per_m = self.felt.undamped_n_per_m.max(stiffness_n_per_m);
             return contact;
-        }
-        let most_n_per_m = (self.most_per_damping * damping_ns_per_m).max(f64::MIN_POSITIVE);
+        };
         if stiffness_n_per_m <= most_n_per_m {
             return contact;
         }
@@ -119,6 +142,13 @@ impl PublishedContacts {
         self.solver.clear();
         self.published_ns = None;
     }
+}
+
+/// Returns the share of the device's damping for one of the contacts of a set: 1 for a contact alone or across all others, `1/m` for
+/// one of `m` parallel ones. With normals `n` and shares `w_i = 1 / sum_j |n_i n_j|` the matrix `sum_i w_i n_i n_i^T` has no
+/// eigenvalue above 1 (Gershgorin), so together the contacts use the damping at most once in every direction.
+fn share(contact: &Contact, all: &[Contact]) -> f64 {
+    1.0 / all.iter().map(|other| contact.normal.dot(other.normal).abs()).sum::<f64>().max(1.0)
 }
 
 impl FeltStiffness {

@@ -20,21 +20,26 @@ pub struct FieldTiming {
 pub struct StiffnessCap {
     /// Stiffness that the device declares, N/m; infinite if it declares none.
     pub stiffness_n_per_m: f64,
-    /// Largest ratio of stiffness to damping of a contact, 1/s. A contact without damping is not reduced.
+    /// Stiffness that the damping of the device keeps stable, N/m; 0: its damping is not known, and contacts without damping are not
+    /// reduced.
+    pub by_device_n_per_m: f64,
+    /// Additional stiffness for the damping of a contact, 1/s.
     pub per_damping_1_per_s: f64,
 }
 
 impl StiffnessCap {
     /// Cap of an unknown device: no reduction.
-    pub const UNKNOWN: Self = Self { stiffness_n_per_m: f64::INFINITY, per_damping_1_per_s: f64::INFINITY };
+    pub const UNKNOWN: Self =
+        Self { stiffness_n_per_m: f64::INFINITY, by_device_n_per_m: 0.0, per_damping_1_per_s: f64::INFINITY };
 
-    /// Returns the cap on a device. Its damping is not known and counts as zero. Not real-time.
+    /// Returns the cap on a device with the damping `damping_ns_per_m`, 0 if it is not known. Not real-time.
     #[must_use]
-    pub fn on(device: &Capabilities, period_s: f64) -> Self {
+    pub fn on(device: &Capabilities, damping_ns_per_m: f64, period_s: f64) -> Self {
         let declared = device.max_stiffness_n_per_m;
         let sampled = SampledLoop { period_s, latency_s: device.latency_s };
         Self {
             stiffness_n_per_m: if declared > 0.0 { declared } else { f64::INFINITY },
+            by_device_n_per_m: sampled.largest_stiffness(damping_ns_per_m, Damper::OneWay(0.0)),
             per_damping_1_per_s: sampled.largest_stiffness(0.0, Damper::OneWay(1.0)),
         }
     }
@@ -62,9 +67,10 @@ impl ContactLimits {
         torque_nm: f64::INFINITY,
     };
 
-    /// Returns the limits on a device with the limits of a scene. Not real-time.
+    /// Returns the limits on a device whose damping is `damping_ns_per_m`, 0 if it is not known, with the limits of a scene. Not
+    /// real-time.
     #[must_use]
-    pub fn on(self, device: &Capabilities, limits: &Limits, period_s: f64) -> Self {
+    pub fn on(self, device: &Capabilities, damping_ns_per_m: f64, limits: &Limits, period_s: f64) -> Self {
         // The envelope shortens a wrench too. Here the largest magnitude counts that it never shortens.
         let least = |limit: Bound, axes: [f64; 3]| {
             let driven = axes.into_iter().filter(|most| *most > 0.0).fold(f64::INFINITY, f64::min);
@@ -73,7 +79,7 @@ impl ContactLimits {
         let has = |axes: [f64; 3]| axes.iter().any(|most| *most > 0.0);
         let Capabilities { max_force_n, max_torque_nm, .. } = *device;
         Self {
-            cap: self.cap.map(|_| StiffnessCap::on(device, period_s)),
+            cap: self.cap.map(|_| StiffnessCap::on(device, damping_ns_per_m, period_s)),
             force_n: least(limits.force_n, max_force_n),
             torque_nm: if has(max_torque_nm) { least(limits.torque_nm, max_torque_nm) } else { 0.0 },
             ..self
@@ -95,17 +101,24 @@ mod tests {
 
     #[test]
     fn the_cap_is_the_one_rule_and_what_the_device_declares() {
-        let limits = ContactLimits::UNKNOWN.on(&DEVICE, &Limits::default(), 1.0e-3);
-        // Half of b / 2 over half a period and the latency.
-        assert_eq!(limits.cap, Some(StiffnessCap { stiffness_n_per_m: 900.0, per_damping_1_per_s: 250.0 }));
+        let limits = ContactLimits::UNKNOWN.on(&DEVICE, 2.0, &Limits::default(), 1.0e-3);
+        // Half of b over half a period and the latency, where of a wall's damper half counts.
+        assert_eq!(
+            limits.cap,
+            Some(StiffnessCap {
+                stiffness_n_per_m: 900.0,
+                by_device_n_per_m: 1000.0,
+                per_damping_1_per_s: 250.0
+            })
+        );
         assert_eq!((limits.force_n, limits.torque_nm), (3.0, 0.0));
         let off = ContactLimits { cap: None, ..ContactLimits::UNKNOWN };
-        assert_eq!(off.on(&DEVICE, &Limits::default(), 1.0e-3).cap, None);
+        assert_eq!(off.on(&DEVICE, 2.0, &Limits::default(), 1.0e-3).cap, None);
     }
 
     #[test]
     fn the_limit_of_a_scene_counts_where_it_is_less() {
         let scene = Limits { force_n: Bound::ball(2.0), ..Limits::default() };
-        assert_eq!(ContactLimits::UNKNOWN.on(&DEVICE, &scene, 1.0e-3).force_n, 2.0);
+        assert_eq!(ContactLimits::UNKNOWN.on(&DEVICE, 0.0, &scene, 1.0e-3).force_n, 2.0);
     }
 }

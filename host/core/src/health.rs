@@ -44,7 +44,7 @@ pub struct ContactHealth {
     /// Stiffness of a contact and the smaller stiffness that the hand felt, N/m at the hand, where they differ most; `None` without a
     /// reduction.
     pub reduced_n_per_m: Option<[f64; 2]>,
-    /// Largest stiffness of a contact without damping, N/m at the hand; 0 without such a contact.
+    /// Largest stiffness of a contact for which no damping is known, N/m at the hand; 0 without such a contact.
     pub undamped_n_per_m: f64,
 }
 
@@ -131,7 +131,8 @@ impl ModelHealth {
         });
         let undamped = (undamped_n_per_m > 0.0).then(|| {
             format!(
-                "have no damping up to {undamped_n_per_m:.0} N/m, so only hand and device keep them stable"
+                "have no damping up to {undamped_n_per_m:.0} N/m, so only hand and device keep them stable \
+                 (`damping_ns_per_m` in `[device]` limits them to what the device keeps stable)"
             )
         });
         let aged = aged.map(|ticks, first| {

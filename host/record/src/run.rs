@@ -266,6 +266,7 @@ impl From<ContactLimits> for schema::ContactLimits {
             surface_power_w: Some(limits.surface_power_w),
             force_n: Some(limits.force_n),
             torque_nm: Some(limits.torque_nm),
+            by_device_n_per_m: limits.cap.map(|cap| cap.by_device_n_per_m),
         }
     }
 }
@@ -276,6 +277,7 @@ impl From<schema::ContactLimits> for ContactLimits {
         Self {
             cap: cap.map(|(stiffness_n_per_m, per_damping_1_per_s)| StiffnessCap {
                 stiffness_n_per_m,
+                by_device_n_per_m: limits.by_device_n_per_m(),
                 per_damping_1_per_s,
             }),
             surface_power_w: limits.surface_power_w(),

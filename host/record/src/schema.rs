@@ -219,6 +219,7 @@ messages! {
         surface_power_w: Option<f64> = 3 [double, optional],
         force_n: Option<f64> = 4 [double, optional],
         torque_nm: Option<f64> = 5 [double, optional],
+        by_device_n_per_m: Option<f64> = 6 [double, optional],
     }
 
     Blend: Copy {

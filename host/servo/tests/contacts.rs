@@ -180,7 +180,7 @@ fn a_mapping_scales_contacts_as_it_scales_the_wall() {
 
 #[test]
 fn the_stiffness_is_what_damping_and_device_keep_stable_and_what_is_reduced_is_said() {
-    let cap = StiffnessCap { stiffness_n_per_m: 800.0, per_damping_1_per_s: 100.0 };
+    let cap = StiffnessCap { stiffness_n_per_m: 800.0, by_device_n_per_m: 0.0, per_damping_1_per_s: 100.0 };
     let contacts = ContactLimits { cap: Some(cap), ..ContactLimits::UNKNOWN };
     let soft = [("stiffness_n_per_m", "800")];
     let in_loop = Scene { wall: &soft, rate_hz: None, ..Scene::default() }.run();
@@ -197,6 +197,14 @@ fn the_stiffness_is_what_damping_and_device_keep_stable_and_what_is_reduced_is_s
     let exact = Scene { wall: &exact, rate_hz: None, ..Scene::default() }.run();
     assert_eq!(by_damping.health.contacts.reduced_n_per_m, Some([2000.0, 500.0]));
     assert!((by_damping.peak_n() / exact.peak_n() - 1.0).abs() < 0.02, "{} N", by_damping.peak_n());
+    // By the known damping of the device, which keeps 300 N/m stable by itself.
+    let known = StiffnessCap { by_device_n_per_m: 300.0, ..cap };
+    let known = ContactLimits { cap: Some(known), ..contacts };
+    let by_both = Scene { wall: &damped, contacts: known, ..Scene::default() }.run();
+    assert_eq!(by_both.health.contacts.reduced_n_per_m, Some([2000.0, 800.0]));
+    let undamped = Scene { wall: &stiff, contacts: known, ..Scene::default() }.run();
+    let contacts_felt = undamped.health.contacts;
+    assert_eq!((contacts_felt.reduced_n_per_m, contacts_felt.undamped_n_per_m), (Some([2000.0, 300.0]), 0.0));
     // Not at all with `cap = false`.
     let off = ContactLimits { cap: None, ..contacts };
     let off = Scene { wall: &damped, contacts: off, ..Scene::default() }.run();

@@ -299,6 +299,7 @@ fn expected_run() -> Vec<String> {
         "surface_power_w = 0.5",
         "force_n = 3.0",
         "torque_nm = inf",
+        "by_device_n_per_m = 120.0",
     ];
     lines.extend(contacts.map(|line| format!("plugins[2].field.contacts.{line}")));
     let coupling = [

@@ -95,7 +95,7 @@ pub(super) fn open_devices(
 }
 
 fn open_device(registry: &Registry, device: &DeviceUse) -> Result<(Opened, PluginReport), RunError> {
-    let DeviceUse { name, plugin: used, calibration } = device;
+    let DeviceUse { name, plugin: used, calibration, .. } = device;
     let signals = SignalGuard::take();
     let plugin = load(registry, used, PluginKind::Device)?;
     let settings = settings(&plugin, name, &used.parameters)?;
@@ -176,8 +176,11 @@ pub(super) fn prepare_model_while(
 /// clock and on simulated devices.
 pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
     let mut scene = scene.clone();
+    let period_s = 1.0 / scene.rate_hz;
     for model in &mut scene.models {
-        let device = opened.get(usize::from(model.device));
+        let number = usize::from(model.device);
+        let device = opened.get(number);
+        let damping_ns_per_m = scene.devices.get(number).map_or(0.0, |used| used.damping_ns_per_m);
         let is_simulated = device.is_some_and(|device| device.embodiment == Embodiment::Simulated);
         if model.isolation == Isolation::ByOrigin && (clock == Clock::Virtual || is_simulated) {
             model.isolation = Isolation::None;
@@ -185,7 +188,7 @@ pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
         let Some(Opened { capabilities, .. }) = device else { continue };
         model.latency_s = capabilities.latency_s;
         if let Some(field) = &mut model.field {
-            field.contacts = field.contacts.on(capabilities, &scene.limits, 1.0 / scene.rate_hz);
+            field.contacts = field.contacts.on(capabilities, damping_ns_per_m, &scene.limits, period_s);
         }
     }
     scene
