@@ -26,8 +26,16 @@ const MOST_HOLDS: usize = 2000;
 /// # Errors
 /// [`LoadError`] if the plugin is no model, or rejects the settings or the loop.
 pub fn prepared(plugin: &Plugin, settings: &[Setting], seed: u64) -> Result<Model, LoadError> {
+    prepared_for(plugin, settings, &LoopConfig { period_ns: PERIOD_NS, seed })
+}
+
+/// Creates and prepares an instance for a loop.
+///
+/// # Errors
+/// As [`prepared`].
+pub fn prepared_for(plugin: &Plugin, settings: &[Setting], config: &LoopConfig) -> Result<Model, LoadError> {
     let mut model = plugin.create_model(settings)?;
-    model.prepare(&LoopConfig { period_ns: PERIOD_NS, seed }).map_err(|refusal| {
+    model.prepare(config).map_err(|refusal| {
         let metadata = plugin.metadata();
         LoadError::Refused { path: metadata.path.clone(), id: metadata.id.clone(), refusal }
     })?;

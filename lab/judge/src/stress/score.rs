@@ -25,7 +25,7 @@ pub struct StressReport {
     pub reach: Reach,
     /// Fraction of the measures that passed.
     pub score: f64,
-    /// Measures, M0 to M10.
+    /// Measures, M0 to M11.
     pub measures: Vec<Measure>,
     /// Distributions for pictures.
     pub distributions: Distributions,
