@@ -55,7 +55,7 @@ tally! {
         felt: u64,
         /// Answers with a bilateral part.
         bilateral: u64,
-        /// Answers of whatever kind, and calls without one.
+        /// Answers that the loop has used, and calls without an answer.
         answers: u64,
         unanswered: u64,
         refused: u64,
@@ -234,7 +234,7 @@ pub(super) fn measure(setup: &Setup<'_>) -> Result<Measure, LoadError> {
     }
 }
 
-/// Moves the hand of a run with the model in the loop's place and beside, each from its own instance.
+/// Moves the hand of a run; the asynchronous model and the model in the loop get the same poses.
 fn follow(mut model: Asynchronous, in_loop: &mut Subject<'_>, run: Run) -> Tally {
     let mut total = Tally { runs: 1, ..Tally::default() };
     let (mut felt, mut direct, mut has_direct) = (Felt::default(), Felt::default(), true);
