@@ -2,8 +2,8 @@
 //!
 //! The end of this file lists the documents whose Rust code is compiled and run as doctests.
 
+pub mod asynchronous_error;
 pub mod commands;
-pub mod field_error;
 pub mod library;
 pub mod printed;
 pub mod process;

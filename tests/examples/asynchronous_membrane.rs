@@ -1,15 +1,14 @@
-//! What computing the membrane asynchronously costs: error and delay of its local linear model by its rate, table and
-//! picture.
+//! What computing the membrane asynchronously costs: error and delay of its contact by its rate, table and picture.
 //!
 //! The hand swings into the sheet and out again; the membrane itself is led along the same poses at each tick. All of it
 //! runs on the virtual clock, so that nothing here depends on the machine.
 //!
 //! ```text
-//! cargo run --release -p flotor-tests --features measurements --example linear_field -- field.svg > field.csv
+//! cargo run --release -p flotor-tests --features measurements --example asynchronous_membrane -- membrane.svg > membrane.csv
 //! ```
 
 use flotor_plot::{Axis, Figure, Panel, Series};
-use flotor_tests::field_error::{FieldError, Swing, field_error};
+use flotor_tests::asynchronous_error::{AsynchronousError, Swing, asynchronous_error};
 use std::error::Error;
 
 const SWING: Swing = Swing { frequency_hz: 3.0, amplitude_mm: 1.5 };
@@ -27,7 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut forces = Panel::new(Axis::linear("Force up", "N"));
     let mut errors = Panel::new(Axis::linear("Error", "N"));
     for rate_hz in RATES_HZ {
-        let seen = field_error(rate_hz, SWING, NO_LIMIT_N_PER_S, DURATION_S);
+        let seen = asynchronous_error(rate_hz, SWING, NO_LIMIT_N_PER_S, DURATION_S);
         let percent = |force_n: f64| 100.0 * force_n / seen.peak_n;
         println!(
             "{rate_hz},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2},{:.2}",
@@ -40,9 +39,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             percent(seen.rms_delayed_n)
         );
         if rate_hz == 50.0 || rate_hz == 200.0 {
-            let name = format!("field at {rate_hz} Hz");
-            forces = forces.series(Series::line(&name, shown(&seen, |_, field| field)));
-            errors = errors.series(Series::line(&name, shown(&seen, |direct, field| field - direct)));
+            let name = format!("contact at {rate_hz} Hz");
+            forces = forces.series(Series::line(&name, shown(&seen, |_, contact| contact)));
+            errors = errors.series(Series::line(&name, shown(&seen, |direct, contact| contact - direct)));
             if rate_hz == 200.0 {
                 forces = forces.series(Series::line("membrane at 1 kHz", shown(&seen, |direct, _| direct)));
             }
@@ -59,7 +58,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// A number of each tick that is shown, from the vertical forces of membrane and field.
-fn shown(seen: &FieldError, number: impl Fn(f64, f64) -> f64) -> Vec<(f64, f64)> {
+fn shown(seen: &AsynchronousError, number: impl Fn(f64, f64) -> f64) -> Vec<(f64, f64)> {
     let ticks = seen.records.iter().zip(&seen.direct_n);
     let points = ticks.map(|(record, direct_n)| {
         (record.time_ns as f64 * 1.0e-9, number(direct_n.z, record.model.force().z))

@@ -1,5 +1,4 @@
-//! Error of an asynchronous membrane: forces of its local linear model against forces of the membrane itself, at the poses of
-//! one run.
+//! Error of an asynchronous membrane: forces of its contact against forces of the membrane itself, at the poses of one run.
 
 use crate::watched::watch;
 use flotor_core::trace::{Events, TickRecord};
@@ -7,36 +6,36 @@ use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, Demand, Input, LoopConfig, Output};
 use flotor_loader::Plugin;
 
-/// Result of a run with an asynchronous membrane (`field`), and of the membrane itself stepped at each tick (`direct`).
+/// Result of a run with an asynchronous membrane, and of the membrane itself stepped at each tick (`direct`).
 #[derive(Clone, Debug)]
-pub struct FieldError {
+pub struct AsynchronousError {
     /// Records of the run, one per tick.
     pub records: Vec<TickRecord>,
     /// Force of the membrane itself at each tick, at the poses of the run, N.
     pub direct_n: Vec<DVec3>,
     /// Largest force of the membrane itself, N.
     pub peak_n: f64,
-    /// Largest change of the field's force from one tick to the next, N.
+    /// Largest change of the contact's force from one tick to the next, N.
     pub largest_step_n: f64,
     /// Largest change of the membrane's own force from one tick to the next, N.
     pub direct_step_n: f64,
-    /// Largest change of the membrane's own force over one period of the field, N: the step of a zero-order hold.
+    /// Largest change of the membrane's own force over one period of the model, N: the step of a zero-order hold.
     pub held_step_n: f64,
     /// Root mean square difference between the membrane and a zero-order hold of the membrane's force that is one period late, N.
     pub held_rms_n: f64,
     /// Number of ticks in which the slew limit acted.
     pub slewed_ticks: usize,
-    /// Root mean square difference between field and membrane, N.
+    /// Root mean square difference between contact and membrane, N.
     pub rms_n: f64,
-    /// Largest difference between field and membrane, N.
+    /// Largest difference between contact and membrane, N.
     pub worst_n: f64,
-    /// Delay of the field against the membrane, s: the delay with the smallest difference.
+    /// Delay of the contact against the membrane, s: the delay with the smallest difference.
     pub delay_s: f64,
-    /// Root mean square difference between field and membrane after compensation of the delay in whole ticks, N.
+    /// Root mean square difference between contact and membrane after compensation of the delay in whole ticks, N.
     pub rms_delayed_n: f64,
 }
 
-/// Oscillation of the hand in the scene of [`field_error`].
+/// Oscillation of the hand in the scene of [`asynchronous_error`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Swing {
     /// Frequency, Hz.
@@ -55,7 +54,7 @@ const LONGEST_DELAY: usize = 40;
 /// If the plugins are not built, or the run fails.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand ticks
-pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f64) -> FieldError {
+pub fn asynchronous_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f64) -> AsynchronousError {
     let Swing { frequency_hz, amplitude_mm } = swing;
     let run = watch(&format!(
         "duration_s = {duration_s}\n[limits]\nforce_slew_n_per_s = {slew_n_per_s}\n\
@@ -65,17 +64,17 @@ pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f6
     ));
     let records = run.records;
     let direct_n = direct(&records);
-    let field_n: Vec<DVec3> = records.iter().map(|record| record.model.force()).collect();
+    let contact_n: Vec<DVec3> = records.iter().map(|record| record.model.force()).collect();
     let held = ((1000.0 / rate_hz).round() as usize).max(1);
     let steps = |forces: &[DVec3], apart: usize| {
         let apart = forces.iter().zip(forces.iter().skip(apart));
         apart.map(|(a, b)| (*b - *a).length()).fold(0.0, f64::max)
     };
-    // In the first two periods the field is not complete.
+    // In the first two periods of the model there is no contact.
     let begun = 2 * held;
     let difference = |delay: usize| {
-        let pairs = field_n.iter().skip(begun + delay).zip(direct_n.iter().skip(begun));
-        pairs.map(|(field, direct)| (*field - *direct).length())
+        let pairs = contact_n.iter().skip(begun + delay).zip(direct_n.iter().skip(begun));
+        pairs.map(|(contact, direct)| (*contact - *direct).length())
     };
     let rms = |delay: usize| {
         let (sum, count) = difference(delay).fold((0.0, 0.0), |(sum, count), e| (sum + e * e, count + 1.0));
@@ -87,9 +86,9 @@ pub fn field_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f6
         held_back.fold((0.0, 0.0), |(sum, count), off| (sum + off.length_squared(), count + 1.0));
     let rms_of: Vec<f64> = (0..LONGEST_DELAY).map(rms).collect();
     let best = (0..LONGEST_DELAY).min_by(|a, b| rms_of[*a].total_cmp(&rms_of[*b])).unwrap_or(0);
-    FieldError {
+    AsynchronousError {
         peak_n: direct_n.iter().map(|force| force.length()).fold(0.0, f64::max),
-        largest_step_n: steps(&field_n, 1),
+        largest_step_n: steps(&contact_n, 1),
         direct_step_n: steps(&direct_n, 1),
         held_step_n: steps(&direct_n, held),
         held_rms_n: (held_sum / held_count).sqrt(),
