@@ -225,6 +225,15 @@ fn expected_tick(record: &TickRecord) -> Vec<String> {
         format!("port_energy_j = {:?}", record.port_energy_j),
         format!("device = {}", record.device),
     ]);
+    let grip = [
+        "opening = 97.5",
+        "velocity = 96.5",
+        "delivered = 95.5",
+        "model = 94.5",
+        "commanded = 93.5",
+        "kind = 2",
+    ];
+    lines.extend(grip.map(|line| format!("grip.{line}")));
     lines
 }
 
