@@ -163,7 +163,8 @@ fn a_ball_near_the_network_has_the_plane_at_the_nearest_mass() {
         touch.measure_plane(at, 5.0e-3, 3.0e-4)
     };
     let plane = above(1.0e-3).expect("a millimetre is near");
-    assert!((plane.gap_m - 1.0e-3).abs() < 1.0e-15 && plane.normal == DVec3::Z, "{plane:?}");
+    // The mass in the middle lies there to rounding.
+    assert!((plane.gap_m - 1.0e-3).abs() < 1.0e-15 && plane.normal.distance(DVec3::Z) < 1.0e-12, "{plane:?}");
     // A ball that is pressed in meets at least one mass, and never more than the masses at their full contact stiffness.
     assert!(plane.stiffness_n_per_m > 10.0 && plane.stiffness_n_per_m < 4000.0, "{plane:?}");
     assert_eq!(above(1.5 * RADIUS_M), None);
