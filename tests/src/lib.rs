@@ -163,6 +163,9 @@ mod documents {
     #[doc = include_str!("../../docs/src/write-a-device.md")]
     struct WriteADevice;
 
+    #[doc = include_str!("../../docs/src/bring-your-solver.md")]
+    struct BringYourSolver;
+
     #[doc = include_str!("../../docs/src/slow-model.md")]
     struct AsynchronousModel;
 

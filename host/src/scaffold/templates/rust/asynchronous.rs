@@ -56,8 +56,8 @@ fn solve(depth_m: f64) -> [f64; 2] {
     let mut answer = [0.0; 2];
     for _ in 0..50 {
         let [force_n, _] = answer;
-        let yielded_m: f64 = HALF_N.iter().map(|half_n| LAYER_M * force_n / (half_n + force_n)).sum();
-        let slope: f64 = HALF_N.iter().map(|half_n| LAYER_M * half_n / (half_n + force_n).powi(2)).sum();
+        let yielded_m: f64 = HALF_N.iter().map(|s_n| LAYER_M * force_n / (s_n + force_n)).sum();
+        let slope: f64 = HALF_N.iter().map(|s_n| LAYER_M / (s_n + force_n) / (1.0 + force_n / s_n)).sum();
         answer = [force_n + (depth_m - yielded_m) / slope, 1.0 / slope];
     }
     answer
