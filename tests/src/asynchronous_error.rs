@@ -54,7 +54,12 @@ const LONGEST_DELAY: usize = 40;
 /// If the plugins are not built, or the run fails.
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a few thousand ticks
-pub fn asynchronous_error(rate_hz: f64, swing: Swing, slew_n_per_s: f64, duration_s: f64) -> AsynchronousError {
+pub fn asynchronous_error(
+    rate_hz: f64,
+    swing: Swing,
+    slew_n_per_s: f64,
+    duration_s: f64,
+) -> AsynchronousError {
     let Swing { frequency_hz, amplitude_mm } = swing;
     let run = watch(&format!(
         "duration_s = {duration_s}\n[limits]\nforce_slew_n_per_s = {slew_n_per_s}\n\
