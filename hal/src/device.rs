@@ -220,6 +220,12 @@ impl Axes {
     /// All six axes.
     pub const ALL: Axes = Axes { bits: 0b11_1111 };
 
+    /// Returns the bits of the set, x first; a foreign plugin may have set bits above the sixth.
+    #[must_use]
+    pub const fn bits(self) -> u32 {
+        self.bits
+    }
+
     /// Returns the union of both sets: `Axes::X.union(Axes::Z)` in constants, `Axes::X | Axes::Z` elsewhere.
     #[must_use]
     pub const fn union(self, other: Axes) -> Axes {

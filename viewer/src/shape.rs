@@ -7,8 +7,8 @@
 use flotor_core::mapping::Mapping;
 use flotor_drawing::geometry::{Body, Curve, Strain};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting, read_metadata};
 use flotor_hal::{DVec3, Form, Input, Pose};
+use flotor_loader::{LoadError, Model, Plugin, Setting, read_metadata};
 use flotor_record::{PluginDescription, Role, RunDescription};
 use std::path::{Path, PathBuf};
 

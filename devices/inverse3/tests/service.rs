@@ -1,7 +1,7 @@
 //! Plugin with a faulty service, called through the device contract as by a host.
 
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Axes, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, UsbAccess, Wrench};
+use flotor_loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use stand_in::{ARM, GRIP, OTHER_ARM, Said, StandIn, configured, frame, state};
 use std::time::{Duration, Instant};
 

@@ -7,11 +7,8 @@
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader::Model;
 use crate::abi::{Instance, ModelAdapter, Str};
 use crate::{DVec3, ForceModel, Input, Pose};
-#[cfg(feature = "loader")]
 use std::ptr::null;
 
 /// Form of a [`Primitive`]. In C, a `uint32_t` with these values.
@@ -288,17 +285,20 @@ layout! {
 }
 
 impl ShapeView {
-    #[cfg(feature = "loader")]
-    const EMPTY: Self = Self {
-        primitives: null(),
-        vertices: null(),
-        triangles: null(),
-        primitive_count: 0,
-        vertex_count: 0,
-        triangle_count: 0,
-        sides: Sides::Outer as u32,
-        field: ScalarField::NONE,
-    };
+    /// Returns the view of a shape without any part.
+    #[must_use]
+    pub const fn empty() -> Self {
+        Self {
+            primitives: null(),
+            vertices: null(),
+            triangles: null(),
+            primitive_count: 0,
+            vertex_count: 0,
+            triangle_count: 0,
+            sides: Sides::Outer as u32,
+            field: ScalarField::NONE,
+        }
+    }
 
     /// Returns the view of a shape, valid as long as the shape is not changed.
     fn of(shape: &Shape) -> Self {
@@ -315,6 +315,46 @@ impl ShapeView {
             sides: *sides as u32,
             field: *field,
         }
+    }
+
+    /// Copies the shape of a plugin, without [`Shape::check`]. Not real-time.
+    ///
+    /// # Errors
+    /// [`InvalidShape`] if a list is too long, or null or misaligned although its length is not 0, or if a text of the
+    /// field is too long.
+    ///
+    /// # Safety
+    /// Each list is null or has the declared number of initialised values, and stays valid during the call.
+    pub unsafe fn copied(&self) -> Result<Shape, InvalidShape> {
+        if [self.field.name, self.field.unit].iter().any(|text| text.bytes() > MOST_TEXT_BYTES) {
+            return Err(InvalidShape::Text);
+        }
+        // SAFETY: by the contract of this function.
+        unsafe {
+            Ok(Shape {
+                primitives: list("primitives", self.primitives, self.primitive_count)?,
+                surface: Surface {
+                    vertices: list("vertices", self.vertices, self.vertex_count)?,
+                    triangles: list("triangles", self.triangles, self.triangle_count)?,
+                    sides: if self.sides == Sides::Both as u32 { Sides::Both } else { Sides::Outer },
+                    field: self.field,
+                },
+            })
+        }
+    }
+}
+
+/// Copies a plugin's list.
+///
+/// # Safety
+/// `first` is null or points at `count` initialised values.
+unsafe fn list<T: Copy>(name: &'static str, first: *const T, count: u32) -> Result<Vec<T>, InvalidShape> {
+    match count {
+        0 => Ok(Vec::new()),
+        MOST.. => Err(InvalidShape::TooLarge(name)),
+        _ if first.is_null() || !first.is_aligned() => Err(InvalidShape::Missing(name)),
+        // SAFETY: by the contract of this function; not null and aligned, as was seen above.
+        _ => Ok(unsafe { std::slice::from_raw_parts(first, count as usize) }.to_vec()),
     }
 }
 
@@ -373,10 +413,8 @@ impl std::fmt::Display for InvalidShape {
 impl std::error::Error for InvalidShape {}
 
 /// Exclusive limit on the number of vertices, triangles or primitives.
-#[cfg(feature = "loader")]
 const MOST: u32 = 1 << 20;
 /// Maximum length of a name or unit, bytes.
-#[cfg(feature = "loader")]
 const MOST_TEXT_BYTES: usize = 64;
 
 impl Shape {
@@ -401,61 +439,6 @@ impl Shape {
         let corner = triangles.as_flattened().iter().position(|corner| *corner as usize >= vertices.len());
         let wrong = primitive.map(InvalidShape::Primitive).or(vertex.map(InvalidShape::Vertex));
         wrong.or(corner.map(|corner| InvalidShape::Corner(corner / 3))).map_or(Ok(()), Err)
-    }
-}
-
-#[cfg(feature = "loader")]
-impl Model {
-    /// Returns true if the model has a shape.
-    #[must_use]
-    pub fn has_shape(&self) -> bool {
-        self.extensions.shape.is_some_and(|table| table.shape.is_some())
-    }
-
-    /// Returns the model's shape at an input, copied and checked. Not real-time: for observers with their own instance.
-    ///
-    /// # Errors
-    /// [`InvalidShape`]; for a model without a shape, [`InvalidShape::Failed`].
-    pub fn shape(&mut self, input: &Input) -> Result<Shape, InvalidShape> {
-        let ask = self.extensions.shape.and_then(|table| table.shape).ok_or(InvalidShape::Failed)?;
-        let mut view = ShapeView::EMPTY;
-        // SAFETY: a live instance used by this thread only (`&mut`), pointers valid for the call.
-        let code = self.calls.call(|instance| unsafe { ask(instance, input, &raw mut view) });
-        if code != crate::abi::CallStatus::Ok as u32 {
-            return Err(InvalidShape::Failed);
-        }
-        if [view.field.name, view.field.unit].iter().any(|text| text.bytes() > MOST_TEXT_BYTES) {
-            return Err(InvalidShape::Text);
-        }
-        // SAFETY: the plugin's lists are of the checked layout and valid until its next call, which `&mut` keeps away.
-        let shape = unsafe {
-            Shape {
-                primitives: list("primitives", view.primitives, view.primitive_count)?,
-                surface: Surface {
-                    vertices: list("vertices", view.vertices, view.vertex_count)?,
-                    triangles: list("triangles", view.triangles, view.triangle_count)?,
-                    sides: if view.sides == Sides::Both as u32 { Sides::Both } else { Sides::Outer },
-                    field: view.field,
-                },
-            }
-        };
-        shape.check()?;
-        Ok(shape)
-    }
-}
-
-/// Copies a plugin's list.
-///
-/// # Safety
-/// `first` is null or points at `count` initialised values.
-#[cfg(feature = "loader")]
-unsafe fn list<T: Copy>(name: &'static str, first: *const T, count: u32) -> Result<Vec<T>, InvalidShape> {
-    match count {
-        0 => Ok(Vec::new()),
-        MOST.. => Err(InvalidShape::TooLarge(name)),
-        _ if first.is_null() || !first.is_aligned() => Err(InvalidShape::Missing(name)),
-        // SAFETY: by the contract of this function; not null and aligned, as was seen above.
-        _ => Ok(unsafe { std::slice::from_raw_parts(first, count as usize) }.to_vec()),
     }
 }
 
@@ -512,7 +495,6 @@ mod tests {
         assert_eq!((later.form(), later.part()), (None, Part::Body));
     }
 
-    #[cfg(feature = "loader")]
     #[test]
     fn a_list_that_is_not_there_is_not_read() {
         // SAFETY: null, or a list of its length.

@@ -10,7 +10,7 @@
 //! - 130 ([`INTERRUPTED`](crate::INTERRUPTED), on Windows another code): forced end, see [`stopping`](crate::stopping)
 
 use flotor_hal::Fault;
-use flotor_hal::abi::loader::LoadError;
+use flotor_loader::LoadError;
 use flotor_record::RecordError;
 use flotor_servo::{Place, RunEnd};
 use flotor_session::registry::LookupError;

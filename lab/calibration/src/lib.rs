@@ -31,8 +31,8 @@ pub mod verify;
 #[cfg(test)]
 mod tests;
 
-use flotor_hal::abi::loader::{LoadError, SettingError};
 use flotor_hal::{Fault, InvalidCalibration, Refusal};
+use flotor_loader::{LoadError, SettingError};
 use flotor_session::{RunError, THREAD_ADVICE};
 
 /// Failure of a calibration.

@@ -6,10 +6,10 @@
 
 use super::PERIOD_NS;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
 use flotor_hal::{DVec3, Demand, Input, Memory, Output, Pose, StepStatus, Twist, Wrench};
 use flotor_judge::subject::{Subject, call, steps, walk};
 use flotor_judge::trajectory::at;
+use flotor_loader::{LoadError, Plugin, Setting};
 use rayon::prelude::*;
 
 /// Position and rotation vector of a handle in the model frame, m and rad.

@@ -388,7 +388,7 @@ fn a_model_that_rounds_otherwise_changes_no_other_number_and_is_named() {
         }
         let told = run(habit, "");
         let health = told.outcome.models[1].1;
-        assert_eq!(health.first_float_change, Some(0), "{habit}: {health:?}");
+        assert_eq!(health.float_changes.first, Some(0), "{habit}: {health:?}");
         assert!(told.outcome.models[0].1.is_good(), "the spring is not blamed");
     }
 }

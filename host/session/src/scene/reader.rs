@@ -4,7 +4,7 @@
 //! remain at the end are unknown.
 
 use flotor_core::limits::Bound;
-pub use flotor_hal::abi::loader::nearest;
+pub use flotor_loader::nearest;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::fmt::Display;

@@ -6,8 +6,8 @@ use crate::long_call::Exceeded;
 use crate::registry::LookupError;
 use crate::scene::SceneError;
 use flotor_hal::Refusal;
-use flotor_hal::abi::loader::{LoadError, Metadata};
 use flotor_live::Pressed;
+use flotor_loader::{LoadError, Metadata};
 use flotor_servo::{Stuck, THREAD_ADVICE};
 
 /// Reason why a run did not start, or failed.

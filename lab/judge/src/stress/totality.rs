@@ -13,8 +13,8 @@ use crate::PERIOD_NS;
 use crate::sampling::{Random, Sobol};
 use crate::subject::{Subject, Trouble, TroubleKind};
 use crate::tally::{Worst, tally};
-use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Input, Memory, Pose, StepStatus, Twist};
+use flotor_loader::LoadError;
 
 const NAME: &str = "totality";
 /// Poses per block.

@@ -4,8 +4,8 @@ use super::outcome::Outcome;
 use super::path::CONFIG;
 use crate::wording;
 use flotor_core::plausibility::{PoseBounds, is_rotation};
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Axes, Capabilities, Conditions, Cycle, DVec3, DeviceState, Fault, Tick, Wrench};
+use flotor_loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_session::LatchGuard;
 use std::time::{Duration, Instant};
 

@@ -4,13 +4,16 @@
 use super::device::Running;
 use super::outcome::Outcome;
 use super::path::{CONFIG, finite, walk};
+use super::restore;
 use super::subject::Subject;
 use crate::watch::enter_call;
 use crate::wording;
+use flotor_core::grip_guard::GripGuard;
+use flotor_core::limits::Limits;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{Model, OpenedDevice};
 use flotor_hal::extension::linear_field::LinearField;
-use flotor_hal::{Input, Mutability, Output, Parameter, Pose, Wrench};
+use flotor_hal::{ContactSet, GripKind, GripState, Input, Mutability, Output, Parameter, Pose, Wrench};
+use flotor_loader::{Model, OpenedDevice};
 
 /// Number of steps of a model, and of ticks of a device.
 const STEPS: u64 = 300;
@@ -108,6 +111,28 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
                 ));
             }
         }
+        for kind in [GripKind::Linear, GripKind::Angular] {
+            let effort = model.grip(&input, &GripState::new(kind, 0.01, -0.1));
+            works(model, "grip")?;
+            if !effort.is_finite() {
+                return Err(format!("grip returned the effort {effort}"));
+            }
+        }
+        if model.has_contact_set() {
+            let mut set = Box::new(ContactSet::NONE);
+            let answer = model.contact_set(&input, &mut set);
+            works(model, "contact-set")?;
+            if answer != CallStatus::Ok || !set.bilateral().is_finite() {
+                return Err(format!(
+                    "contact-set returned `{}`; its bilateral part: {}",
+                    wording::status(answer),
+                    wording::linear_field(&set.bilateral())
+                ));
+            }
+            // Any period: how long a set is valid does not make it right or wrong.
+            flotor_contact::ContactSet::published(&set, 1.0)
+                .map_err(|error| format!("contact-set: {error}"))?;
+        }
         let drawn = model.centerline().map(|mut line| (line.info(), line.points(&input, POINTS)));
         works(model, "centerline")?;
         if let Some((info, points)) = drawn {
@@ -132,6 +157,8 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
         if !matches!(answer, CallStatus::Ok | CallStatus::Unsupported) {
             return Err(format!("details answered `{}`", answer.name()));
         }
+        restore::saved_and_restored(model.state())?;
+        works(model, "snapshot")?;
     }
     after("an extension", model.float_changes())
 }
@@ -150,6 +177,7 @@ fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Outcome> {
         let _ = device.parameter(index);
     }
     drop(device.serial());
+    let grip = device.grip_axis().map_err(|refusal| refusal.to_string())?;
     after("an extension", 0)?;
     let stopper = device.stopper();
     let mut running = Running::start(device)?;
@@ -159,6 +187,14 @@ fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Outcome> {
     }
     after("read and write", running.device.float_changes())?;
     let _ = running.device.energy_ledger();
+    if let Some(axis) = grip {
+        let is_taken = running.device.write_grip(0.0);
+        let sample = running.device.read_grip(axis.kind());
+        if !is_taken || GripGuard::new(axis, &Limits::default()).check(sample).is_err() {
+            return Err("the grip takes no effort, or returns no plausible sample".to_owned().into());
+        }
+    }
+    restore::saved_and_restored(running.device.state())?;
     drop(running.device.last_message());
     after("an extension", running.device.float_changes())?;
     stopper.safe_stop();

@@ -6,8 +6,8 @@ use super::subject::Subject;
 use crate::platform::processor_time;
 use crate::wording;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{Mutability, Parameter};
+use flotor_loader::Model;
 use std::time::Duration;
 
 /// Number of repetitions of a change, for its duration.

@@ -7,10 +7,10 @@ use crate::platform::{processor_time, state};
 use crate::subject::input_of;
 use crate::wording;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{
     ActiveRegion, DQuat, DVec3, Demand, Input, Memory, Output, Pose, RegionShape, StepStatus, Twist, Wrench,
 };
+use flotor_loader::Model;
 use std::time::Duration;
 
 fn finite_at(model: &mut Model, pose: Pose) -> Result<(), String> {

@@ -4,8 +4,8 @@ use crate::subject::{call, input_of};
 use crate::trajectory::{Series, Trajectory};
 use crate::wording;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{DQuat, DVec3, Input, LoopConfig, Output, Pose, Twist};
+use flotor_loader::Model;
 
 /// Loop configuration of the checks.
 pub(super) const CONFIG: LoopConfig = LoopConfig { period_ns: 1_000_000, seed: 1 };

@@ -4,14 +4,15 @@ use super::Greeting;
 use super::child::WHOLE;
 use super::memory::{SharedMemory, create_file};
 use super::shared_words::{Operation, wait_for_change};
-use crate::engine::records::demand_of;
 use crate::engine::stepped::Stepped;
 use crate::platform::{process_group, processes};
 use crate::{THREAD_ADVICE, monotonic_ns};
+use flotor_core::grip::GripRecord;
 use flotor_core::lock;
+use flotor_core::sent::demand_of;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind,
+    ActiveRegion, ContactSet, Demand, Input, LoopConfig, Memory, Output, Refusal, RefusalKind,
     WorkspaceBounds,
 };
 use std::io;
@@ -50,7 +51,7 @@ pub struct Worker {
     parameters: Vec<Option<f64>>,
     serves: Demand,
     remembers: Memory,
-    has_field: bool,
+    has_local_model: bool,
 }
 
 impl Worker {
@@ -83,12 +84,12 @@ impl Worker {
             parameters: Vec::new(),
             serves: Demand::FORCE,
             remembers: Memory::PathDependent,
-            has_field: false,
+            has_local_model: false,
         };
         let greeting = worker.greeting(config.create_timeout);
         match serde_json::from_str(&greeting) {
-            Ok(Greeting::Ready { parameters, serves, remembers, has_field }) => {
-                worker.has_field = has_field;
+            Ok(Greeting::Ready { parameters, serves, remembers, has_local_model }) => {
+                worker.has_local_model = has_local_model;
                 worker.remembers = if remembers { Memory::PathDependent } else { Memory::Stateless };
                 worker.parameters = parameters;
                 worker.serves = demand_of(serves);
@@ -138,24 +139,29 @@ impl Worker {
         self.serves
     }
 
-    /// Steps the model; `output` is only valid for [`Stepped::Answered`]. Real-time: bounded by the reply timeout, no allocation.
+    /// Steps the model, also at a grip; the results are only valid for [`Stepped::Answered`]. Real-time: bounded by the timeout.
     #[inline]
-    pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
-        let put = |memory: &SharedMemory| memory.put_input(input);
-        let reply = self.request(Operation::Step, put, |memory| *output = memory.output());
+    pub fn step(&mut self, input: &Input, output: &mut Output, grip: &mut Option<GripRecord>) -> Stepped {
+        let asked = *grip;
+        let put = |memory: &SharedMemory| {
+            memory.put_input(input);
+            memory.put_grip(asked);
+        };
+        let reply =
+            self.request(Operation::Step, put, |memory| (*output, *grip) = (memory.output(), memory.grip()));
         reply.map_or_else(|missing| missing, Stepped::from)
     }
 
-    /// Returns true if the model has a linear field.
-    pub fn has_linear_field(&self) -> bool {
-        self.has_field
+    /// Returns true if the model can run asynchronously.
+    pub fn has_local_model(&self) -> bool {
+        self.has_local_model
     }
 
-    /// Computes the linear field at an input; `field` is only valid for [`Stepped::Answered`]. Not real-time: bounded by the reply
-    /// timeout.
-    pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
+    /// Computes the contacts or the linear field at an input; `set` is only valid for [`Stepped::Answered`]. Not real-time: bounded by
+    /// the reply timeout.
+    pub fn local_model(&mut self, input: &Input, set: &mut ContactSet) -> Stepped {
         let put = |memory: &SharedMemory| memory.put_input(input);
-        let reply = self.request(Operation::Field, put, |memory| *field = memory.field());
+        let reply = self.request(Operation::LocalModel, put, |memory| *set = memory.contact_set());
         reply.map_or_else(|missing| missing, Stepped::from)
     }
 

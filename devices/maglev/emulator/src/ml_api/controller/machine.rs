@@ -192,6 +192,15 @@ impl Controller {
         self.flight == Flight::Flying && matches!(self.command, Command::Forces(_) | Command::Currents(_))
     }
 
+    /// Returns the current of the grasp that the clients command, A: within the limit that they have set, and none unless the
+    /// flotor levitates.
+    #[must_use]
+    pub fn grasp_a(&self) -> f64 {
+        let Grasp { current_a, limit_a, .. } = self.grasp;
+        let most_a = if limit_a > 0.0 { limit_a } else { f32::MAX };
+        if self.flight == Flight::Flying { f64::from(current_a.clamp(-most_a, most_a)) } else { 0.0 }
+    }
+
     /// Sets the injected faults, until the next call.
     pub fn inject(&mut self, injected: FaultBits) {
         self.injected = injected;

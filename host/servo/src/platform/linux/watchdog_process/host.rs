@@ -2,7 +2,7 @@
 
 use super::{PACKET_BYTES, Packet, bytes_of};
 use crate::engine::process::parent::{cannot_start, program};
-use flotor_hal::Independence;
+use flotor_loader::Independence;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::{
     AddressFamily, RecvFlags, SendAncillaryBuffer, SendAncillaryMessage, SendFlags, SocketFlags, SocketType,
