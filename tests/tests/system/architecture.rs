@@ -65,6 +65,8 @@ enum Role {
     Calibration,
     /// Judges runs from outside.
     SceneTest,
+    /// Designs of experiments, without input and output.
+    StudyDesign,
     Study,
     /// Results from logs.
     Analysis,
@@ -79,7 +81,8 @@ enum Role {
 use Role::{
     Analysis, Calibration, Command, Compat, Container, Contract, Core, Coupling, Drawing, DropIn, Emulator,
     Fixture, Guard, History, Host, Judge, Lab, Lend, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin,
-    Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
+    Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyDesign, StudyProgram, Sync, Tests,
+    Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -118,12 +121,27 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ("lab/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
     // Neither the session nor the loader: everything it runs is a process of its own.
     ("lab/scene-test", SceneTest, &[Contract, Core, Plot, Command]),
-    ("study/core", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics]),
-    ("study/analysis", Analysis, &[Core, Statistics, Study]),
+    ("study/design", StudyDesign, &[Statistics]),
+    ("study/core", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics, StudyDesign]),
+    ("study/analysis", Analysis, &[Core, Statistics, StudyDesign, Study]),
     (
         "study/program",
         StudyProgram,
-        &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command, Study, Analysis],
+        &[
+            Contract,
+            Sync,
+            Core,
+            Servo,
+            Record,
+            Live,
+            Session,
+            Plot,
+            Statistics,
+            Command,
+            StudyDesign,
+            Study,
+            Analysis,
+        ],
     ),
     // The plugins only as paths, so that one `cargo run` builds them; no line of the host names them.
     ("host", Host, &[Contract, Sync, Core, Coupling, Servo, Record, Live, Session, Plot, Command, Plugin]),
@@ -509,6 +527,7 @@ const PORTED: &[&str] = &[
     "study/analysis/src/",
     "study/program/src/",
     "study/core/src/",
+    "study/design/src/",
     "host/sync/src/",
     "models/",
     "viewer/drawing/src/",

@@ -25,7 +25,7 @@ use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::Verdict;
 use crate::time_of_day::TimeOfDay;
 use crate::trial::{Exploration, Response, Trial};
-use crate::word::words;
+use flotor_study_design::words;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};

@@ -4,7 +4,7 @@
 //! is determined first: the range in which the posterior exceeds `e^-28` of its maximum.
 
 use super::{Observation, Prior, unit_threshold};
-use crate::trial::Judgement;
+use crate::answer::Judgement;
 use flotor_statistics::distribution::normal_below;
 use flotor_statistics::quadrature::{Density, Node, gauss_legendre};
 

@@ -1,7 +1,7 @@
 //! Signal detection with three answers: indecision model of García-Pérez and Alcalá-Quintana.
 
+use crate::answer::Position;
 use crate::random::Stream;
-use crate::trial::Response;
 use flotor_statistics::distribution::normal_below;
 
 /// Observer who compares two stimuli. The evidence is the noisy difference (second minus first) in standard deviations of the
@@ -63,19 +63,20 @@ impl TernaryObserver {
         high
     }
 
-    /// Draws the answer to a pair with the given difference, a fraction of the base, positive if the second stimulus is larger.
-    pub(crate) fn respond(&self, second_minus_first: f64, stream: &mut Stream) -> Response {
+    /// Draws the position named in a pair with the given difference, a fraction of the base, positive if the second stimulus is
+    /// larger; `None` for "I don't know".
+    pub fn respond(&self, second_minus_first: f64, stream: &mut Stream) -> Option<Position> {
         let (lapse, guess, noise) = (stream.uniform(), stream.coin(), stream.normal());
         if lapse < self.lapse {
-            return if guess { Response::First } else { Response::Second };
+            return Some(if guess { Position::First } else { Position::Second });
         }
         let evidence = second_minus_first / self.sigma + self.bias + noise;
         if evidence > self.criterion {
-            Response::Second
+            Some(Position::Second)
         } else if evidence < -self.criterion {
-            Response::First
+            Some(Position::First)
         } else {
-            Response::DontKnow
+            None
         }
     }
 }

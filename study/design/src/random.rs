@@ -3,7 +3,7 @@
 //! A sitting resumed after a crash therefore needs no generator state: trial 57 of subject 3 draws the same numbers on every
 //! machine, regardless of other draws.
 
-use crate::protocol::SubjectNumber;
+use crate::subject::SubjectNumber;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
@@ -11,7 +11,7 @@ use xxhash_rust::xxh3::xxh3_64;
 
 /// Purpose of a random stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Purpose {
+pub enum Purpose {
     /// Order of blocks, demos and stimuli.
     Schedule = 1,
     /// Order within a pair, and side of the comparison.
@@ -34,27 +34,31 @@ pub(crate) enum Purpose {
 
 /// Streams of a subject in an experiment.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Draws {
-    pub(crate) seed: u64,
-    pub(crate) subject: SubjectNumber,
+pub struct Draws {
+    /// Seed of the study.
+    pub seed: u64,
+    /// Number of the subject.
+    pub subject: SubjectNumber,
 }
 
 impl Draws {
     /// Creates the stream for a purpose and index.
-    pub(crate) fn stream(self, purpose: Purpose, index: u32) -> Stream {
+    #[must_use]
+    pub fn stream(self, purpose: Purpose, index: u32) -> Stream {
         Stream::new(self.seed, purpose, self.subject.get(), index)
     }
 }
 
 /// Stream of random numbers.
 #[derive(Clone, Debug)]
-pub(crate) struct Stream {
+pub struct Stream {
     generator: Pcg64Mcg,
 }
 
 impl Stream {
     /// Creates the stream for a seed, purpose, subject and index (for instance the number of a trial).
-    pub(crate) fn new(seed: u64, purpose: Purpose, subject: u16, index: u32) -> Self {
+    #[must_use]
+    pub fn new(seed: u64, purpose: Purpose, subject: u16, index: u32) -> Self {
         let mut name = [0_u8; 15];
         let parts = [&seed.to_le_bytes()[..], &[purpose as u8], &subject.to_le_bytes(), &index.to_le_bytes()];
         name.iter_mut().zip(parts.concat()).for_each(|(byte, part)| *byte = part);
@@ -62,7 +66,7 @@ impl Stream {
     }
 
     /// Draws a number uniformly distributed over [0, 1).
-    pub(crate) fn uniform(&mut self) -> f64 {
+    pub fn uniform(&mut self) -> f64 {
         /// 2^-53: the 53 highest bits fill the mantissa.
         const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
         let bits = (self.generator.next_u64() >> 11) as f64;
@@ -70,19 +74,19 @@ impl Stream {
     }
 
     /// Draws a sample of the standard normal distribution (Box and Muller 1958), bit-identical on every machine.
-    pub(crate) fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         // 1 - u is never zero, so the logarithm is finite.
         let radius = (-2.0 * libm::log(1.0 - self.uniform())).sqrt();
         radius * libm::cos(TAU * self.uniform())
     }
 
     /// Draws true or false with equal probability.
-    pub(crate) fn coin(&mut self) -> bool {
+    pub fn coin(&mut self) -> bool {
         self.uniform() < 0.5
     }
 
     /// Draws an integer uniformly from `0..n`; returns 0 for `n` = 0.
-    pub(crate) fn below(&mut self, n: usize) -> usize {
+    pub fn below(&mut self, n: usize) -> usize {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         // n is the length of a list of trials
         let index = (self.uniform() * n as f64) as usize;
@@ -90,7 +94,7 @@ impl Stream {
     }
 
     /// Shuffles a list; all orders are equally likely (Fisher and Yates).
-    pub(crate) fn shuffle<T>(&mut self, list: &mut [T]) {
+    pub fn shuffle<T>(&mut self, list: &mut [T]) {
         for last in (1..list.len()).rev() {
             let other = self.below(last + 1);
             list.swap(last, other);

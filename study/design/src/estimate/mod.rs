@@ -17,8 +17,8 @@ pub use posterior::{Posterior, PosteriorGrid};
 pub(crate) use posterior_mean::posterior_mean;
 pub use psychometric::{NotBounded, Psychometric, psychometric};
 
+use crate::answer::Judgement;
 use crate::observer::TernaryObserver;
-use crate::trial::Judgement;
 use flotor_statistics::distribution::{normal_below, normal_density};
 use serde::{Deserialize, Serialize};
 

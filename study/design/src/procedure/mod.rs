@@ -8,8 +8,8 @@ mod weighted_up_down;
 pub use quest_plus::{QuestPlus, QuestPlusRule};
 pub use weighted_up_down::{Averaging, InvalidRule, StepAtReversal, WeightedUpDown, WeightedUpDownRule};
 
+use crate::answer::Judgement;
 use crate::estimate::NotBounded;
-use crate::trial::Judgement;
 use serde::{Deserialize, Serialize};
 
 /// Adaptive procedure with its settings.

@@ -25,7 +25,7 @@ fn answers_follow_the_probabilities() {
             for index in 0..TRIALS {
                 let mut stream = Stream::new(3, Purpose::Answer, 1, index);
                 let sign = if index % 2 == 0 { 1.0 } else { -1.0 };
-                let right = if sign > 0.0 { Response::Second } else { Response::First };
+                let right = Some(if sign > 0.0 { Position::Second } else { Position::First });
                 correct += f64::from(u8::from(observer.respond(sign * delta, &mut stream) == right));
             }
             let expected = observer.correct_and_wrong(delta)[0];

@@ -1,8 +1,8 @@
 //! QUEST+ (Watson 2017) with three answers: each trial is at the difference with the largest expected information.
 
 use super::InvalidRule;
+use crate::answer::Judgement;
 use crate::estimate::{Estimate, NotBounded, Observation, Posterior, PosteriorGrid, Prior, posterior_mean};
-use crate::trial::Judgement;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

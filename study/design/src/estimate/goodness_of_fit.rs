@@ -2,9 +2,9 @@
 //! few answers at each difference for the chi-square distribution.
 
 use super::{Observation, probability};
+use crate::answer::Judgement;
 use crate::observer::TernaryObserver;
 use crate::random::{Purpose, Stream};
-use crate::trial::Judgement;
 use serde::Serialize;
 
 /// Number of simulated answer sets.

@@ -1,6 +1,7 @@
 //! Words of enumerations: the labels used in tables and on command lines.
 
 /// Implements `word` for an enumeration without fields.
+#[macro_export]
 macro_rules! words {
     ($name:ident { $($value:ident = $word:literal),+ $(,)? }) => {
         impl $name {
@@ -14,5 +15,3 @@ macro_rules! words {
         }
     };
 }
-
-pub(crate) use words;

@@ -5,8 +5,8 @@
 //! observer.
 
 use super::{Observation, Prior, probability};
+use crate::answer::Judgement;
 use crate::observer::TernaryObserver;
-use crate::trial::Judgement;
 
 /// Number of thresholds in the grid of observers, evenly spaced in their logarithm; below, number of criteria, evenly spaced
 /// from 0.

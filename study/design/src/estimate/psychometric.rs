@@ -7,7 +7,7 @@
 use super::goodness_of_fit::{self, GoodnessOfFit};
 use super::posterior_density::{LapsePrior, Nodes, PosteriorDensity};
 use super::{Observation, Prior};
-use crate::trial::Judgement;
+use crate::answer::Judgement;
 use flotor_statistics::distribution::binomial_at_least;
 use serde::Serialize;
 

@@ -7,7 +7,7 @@
 //! Points left open by CMU-RI-TR-07-21 (section 4.2) are options here; their defaults reproduce the published distribution of
 //! simulated estimates.
 
-use crate::trial::Judgement;
+use crate::answer::Judgement;
 use serde::{Deserialize, Serialize};
 
 /// Number of alternatives of a comparison: first or second.

@@ -1,0 +1,5 @@
+//! Simulated observers with known sensitivity.
+
+mod ternary;
+
+pub use ternary::TernaryObserver;

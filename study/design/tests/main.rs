@@ -1,0 +1,1 @@
+//! Properties of designs, procedures and observers.
