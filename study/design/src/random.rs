@@ -30,6 +30,12 @@ pub enum Purpose {
     CheckTrial = 8,
     /// Simulated answers of a fitted observer.
     GoodnessOfFit = 9,
+    /// Assignment of a level to a subject.
+    Assignment = 10,
+    /// Choice among interleaved tracks.
+    Interleaving = 11,
+    /// Simulated answers to a questionnaire.
+    Questionnaire = 12,
 }
 
 /// Streams of a subject in an experiment.

@@ -1,1 +1,7 @@
-//! Properties of designs, procedures and observers.
+//! Properties of designs, orders, methods, courses and observers.
+
+mod balance;
+mod courses;
+mod drafts;
+mod methods;
+mod support;

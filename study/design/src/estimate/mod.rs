@@ -37,6 +37,7 @@ pub struct Observation {
 /// trials. The prior is on the threshold, not on sigma, because the threshold is the quantity of interest: an observer without
 /// "I don't know" has another sigma at the same threshold, and a prior on sigma would separate the two.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Prior {
     /// Median of the threshold, as a fraction of the base.
     pub threshold_median: f64,

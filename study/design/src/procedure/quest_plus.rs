@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 /// Settings of QUEST+.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct QuestPlusRule {
     /// Number of trials of a track.
     pub trials: u32,

@@ -39,6 +39,7 @@ pub enum Averaging {
 
 /// Settings of the weighted up-down rule.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct WeightedUpDownRule {
     /// First difference, as a fraction of the base.
     pub initial_delta: f64,
