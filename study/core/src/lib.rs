@@ -17,6 +17,7 @@
 //! - [`screen`]: screens of a person's sitting, for any front end; [`blinding`]: codes that replace conditions.
 //! - [`conduct`]: runs a sitting with presenter, simulated subject and log.
 //! - [`cohort`]: studies of many simulated subjects in parallel.
+//! - [`designed`]: logs, data sets and cohorts of studies of one's own design.
 //! - [`exclusion`]: exclusion rules, fixed before data collection.
 //!
 //! `flotor-analysis` computes thresholds, tests and effects from the logs.
@@ -34,6 +35,7 @@ pub mod blinding;
 pub mod cohort;
 pub mod conduct;
 pub mod dataset;
+pub mod designed;
 pub mod exclusion;
 pub mod kinematics;
 pub mod log;

@@ -12,6 +12,8 @@ pub enum Order {
     /// Rows of a cyclic Latin square: after n subjects each condition was at each place once.
     #[default]
     Latin,
+    /// Rows of a cyclic Latin square, the same row in each repetition: blocks alternate.
+    Alternate,
     /// Rows of a Williams square (Williams, Aust. J. Sci. Res. A 2:149, 1949): a Latin square in which each condition also follows each
     /// other one equally often; n rows for an even number of conditions, 2n for an odd one.
     Williams,
@@ -30,7 +32,7 @@ impl Order {
     pub fn rows(self, count: usize) -> Option<usize> {
         match self {
             Self::Fixed | Self::Random => None,
-            Self::Latin => Some(count),
+            Self::Latin | Self::Alternate => Some(count),
             Self::Williams if count.is_multiple_of(2) => Some(count),
             Self::Williams => Some(2 * count),
             Self::Balanced => Some((1..=count).product()),
@@ -48,7 +50,7 @@ impl Order {
                 Stream::new(seed, Purpose::Schedule, draw.0, draw.1).shuffle(&mut labels);
                 return labels;
             }
-            Self::Latin | Self::Williams | Self::Balanced => {
+            Self::Latin | Self::Alternate | Self::Williams | Self::Balanced => {
                 // Subject 0 does not exist: the stream is that of the study.
                 Stream::new(seed, Purpose::Schedule, 0, 0).shuffle(&mut labels);
             }

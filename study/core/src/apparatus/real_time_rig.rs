@@ -70,14 +70,14 @@ impl<'a> RealTimeRig<'a> {
         stop: &StopSwitch,
     ) -> Result<Self, ApparatusOrFrontEndError> {
         let options = RunOptions { clock: Clock::Real, seed: 0 };
-        let session = Session::prepare(&apparatus.scene, &apparatus.registry, &options)?;
-        let session = session.with_strength(apparatus.strength);
+        let session = Session::prepare(&apparatus.stage.scene, &apparatus.stage.registry, &options)?;
+        let session = session.with_strength(apparatus.stage.strength);
         let (controls, warnings) = (session.controls(), session.warnings().to_vec());
         apparatus.show(&controls, false)?;
         let (shared, stop) = (Shared::default(), stop.clone());
-        let run = apparatus.describe(&apparatus.scene, Clock::Real, 0);
+        let run = apparatus.stage.describe(&apparatus.stage.scene, Clock::Real, 0);
         let host = Arc::new(OnlyStop { stop: stop.clone(), latch: session.latch().cloned() });
-        let publication = announce(&Directory::of_this_user(), &apparatus.scene, &run, &session, host);
+        let publication = announce(&Directory::of_this_user(), &apparatus.stage.scene, &run, &session, host);
         let viewer_error = publication.as_ref().err().map(ToString::to_string);
         let observers = ObservedRun { observer: shared.clone(), publication: publication.ok() };
         let run = spawn_run(session, observers, stop.clone(), "the sitting has ended")?;
@@ -136,7 +136,7 @@ impl<'a> RealTimeRig<'a> {
         }
         let is_of_sitting = trial.number > 0;
         if let (Some(files), false, true) = (&self.files, watch.recording.is_on(), is_of_sitting) {
-            let run = self.apparatus.describe(&self.apparatus.scene, Clock::Real, 0);
+            let run = self.apparatus.stage.describe(&self.apparatus.stage.scene, Clock::Real, 0);
             // Keep the recording of a trial that was interrupted earlier.
             match Recorder::create(&files.next_of(trial), &run) {
                 Ok(recorder) => watch.recording = RunRecording::new(Some(recorder)),

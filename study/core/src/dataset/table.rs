@@ -10,7 +10,7 @@ use crate::trial::{Judgement, Presented};
 use serde_json::{Map, Value, json};
 
 /// Text for a missing value in BIDS.
-pub(super) const MISSING: &str = "n/a";
+pub(crate) const MISSING: &str = "n/a";
 
 /// Name and description of each column.
 const COLUMNS: [(&str, &str); 30] = [
@@ -183,7 +183,7 @@ pub(super) fn description(begin: &Begin) -> (Map<String, Value>, &'static [&'sta
 }
 
 /// First column of the list of scans.
-pub(super) const SCAN: &str = "filename";
+pub(crate) const SCAN: &str = "filename";
 
 /// Returns the list of scans of a subject: the sitting's table with the start time; `None` if the time is unknown.
 pub(super) fn scans(log: &SittingLog) -> Option<String> {
@@ -193,7 +193,7 @@ pub(super) fn scans(log: &SittingLog) -> Option<String> {
 }
 
 /// First column of the list of participants.
-pub(super) const PARTICIPANT: &str = "participant_id";
+pub(crate) const PARTICIPANT: &str = "participant_id";
 
 /// Header of the list of participants.
 pub(super) const PARTICIPANTS_HEAD: &str = "participant_id\tobserver\tfirst_modality\tcomplete\tpresentations\tresumed\tincidents\tage\tsex\thandedness\n";
@@ -212,7 +212,7 @@ pub(super) fn participant(log: &SittingLog) -> String {
 }
 
 /// Returns the descriptions of the participant columns; the program overwrites none of them.
-pub(super) fn participant_columns() -> (Map<String, Value>, &'static [&'static str]) {
+pub(crate) fn participant_columns() -> (Map<String, Value>, &'static [&'static str]) {
     let columns = json!({
         "observer": { "Description": "human, or simulated: no person was tested" },
         "first_modality": { "Description": "Modality the subject started with: vh (vision and haptics) or h (haptics alone)" },
@@ -227,6 +227,6 @@ pub(super) fn participant_columns() -> (Map<String, Value>, &'static [&'static s
     (members(&columns), &[])
 }
 
-fn members(object: &Value) -> Map<String, Value> {
+pub(crate) fn members(object: &Value) -> Map<String, Value> {
     object.as_object().cloned().unwrap_or_default()
 }

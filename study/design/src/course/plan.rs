@@ -6,6 +6,7 @@ use crate::design::{Condition, Design, TrackOrder};
 use crate::factor::{between_levels, groups};
 use crate::form::At;
 use crate::method::{Method, Track};
+use crate::order::Order;
 use crate::random::Purpose;
 use crate::task::Ask;
 use std::collections::VecDeque;
@@ -94,7 +95,12 @@ fn block_order(design: &Design, session: Session) -> Vec<Condition> {
     let in_group = (usize::from(session.subject.get()) - 1) / groups(design.factors()).max(1);
     let earlier = session.session.saturating_sub(1) * blocks.repetitions;
     let row = |repetition: u32| {
-        let row = in_group + (earlier + repetition) as usize;
+        let before = if blocks.order == Order::Alternate {
+            session.session.saturating_sub(1)
+        } else {
+            earlier + repetition
+        };
+        let row = in_group + before as usize;
         let draw = (session.subject.get(), earlier + repetition + 1);
         blocks.order.row(conditions.len(), row, session.seed, draw)
     };

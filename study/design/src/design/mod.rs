@@ -82,7 +82,7 @@ impl Design {
     }
 
     /// Returns all combinations of the levels of the chosen factors, the last one varying fastest.
-    pub(crate) fn conditions(&self, is_chosen: impl Fn(&Factor) -> bool) -> Vec<Condition> {
+    fn conditions(&self, is_chosen: impl Fn(&Factor) -> bool) -> Vec<Condition> {
         let chosen: Vec<&Factor> = self.0.factors.iter().filter(|factor| is_chosen(factor)).collect();
         let counts: Vec<usize> = chosen.iter().map(|factor| factor.values.len()).collect();
         let condition = |levels: Vec<usize>| {
@@ -105,6 +105,12 @@ impl Design {
     pub fn mixed_conditions(&self) -> Vec<Condition> {
         let by = &self.0.blocks.by;
         self.conditions(|factor| factor.vary == Vary::Within && !by.contains(&factor.name))
+    }
+
+    /// Returns all combinations of the factors within subjects, the last one varying fastest.
+    #[must_use]
+    pub fn within_conditions(&self) -> Vec<Condition> {
+        self.conditions(|factor| factor.vary == Vary::Within)
     }
 
     /// Returns the value of the stimulus's setting at a level in a condition, in the unit of the setting.

@@ -4,7 +4,8 @@
 //! analysis, which are fixed before data collection. Every log contains text and SHA-256 of the file, so that the version of
 //! the plan is documented.
 
-use super::{StudyArguments, Task};
+use super::design_file::DesignFile;
+use super::{StudyArguments, Task, designed, shipped};
 use crate::analyse::choices::{Choices, PlannedTable};
 use clap::{Args, FromArgMatches};
 use flotor_command::CommandError;
@@ -15,6 +16,7 @@ use flotor_session::scene::OwnScene;
 use flotor_study::exclusion::ExclusionRules;
 use flotor_study::log::{Plan, digest};
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 
@@ -92,16 +94,21 @@ enum TaskName {
 
 impl StudyFile {
     fn read(file: &Path, text: &str) -> Result<Self, CommandError> {
-        toml::from_str(text).map_err(|error| {
-            let start = error.span().map_or(0, |span| span.start);
-            let line = 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
-            let mut message = error.message().replace('\n', " ");
-            if message.contains("too large") {
-                message += &format!("; write numbers below 2^63, and a seed up to {LARGEST_SEED}");
-            }
-            CommandError::Usage(format!("{}:{line}: {message}", file.display()))
-        })
+        read_table(file, text)
     }
+}
+
+/// Parses a table of a study file.
+pub(super) fn read_table<T: DeserializeOwned>(file: &Path, text: &str) -> Result<T, CommandError> {
+    toml::from_str(text).map_err(|error| {
+        let start = error.span().map_or(0, |span| span.start);
+        let line = 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
+        let mut message = error.message().replace('\n', " ");
+        if message.contains("too large") {
+            message += &format!("; write numbers below 2^63, and a seed up to {LARGEST_SEED}");
+        }
+        CommandError::Usage(format!("{}:{line}: {message}", file.display()))
+    })
 }
 
 /// Analysis plan of a study file.
@@ -149,19 +156,26 @@ impl RunArguments {
 /// Runs the study of a study file: begins or resumes it, and skips complete subjects.
 pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let (file, further) = arguments.file_and_options();
-    let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
-    let text = read_text(&file, "the study file").map_err(|wrong| {
-        let advice = if wrong.line == 0 { "; name a study file" } else { "" };
-        CommandError::Usage(wrong.in_file(file.display()) + advice)
-    })?;
+    let (file, text) = file_and_text(file)?;
+    if DesignFile::is_in(&text) {
+        let study = DesignFile::read(&file, &text)?;
+        return match shipped::task_of(&study.design) {
+            Some((task, words)) => run_words(&file, text, study.words(&file, task, words, further)?),
+            None => designed::run(&file, text, study, further),
+        };
+    }
     let (words, exclusion) = words(&file, &text, further)?;
-    let command = clap::Command::new("study").no_binary_name(true);
-    let mut study = StudyArguments::augment_args(command)
-        .try_get_matches_from(words)
-        .and_then(|matches| StudyArguments::from_arg_matches(&matches))
-        .map_err(|error| CommandError::Usage(of_file(&file, &error.to_string())))?;
-    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let plan = Plan { file: name, sha256: digest(&text), text, exclusion };
+    run_words(&file, text, (words, exclusion))
+}
+
+/// Runs a task from command-line arguments of a study file.
+fn run_words(
+    file: &Path,
+    text: String,
+    (words, exclusion): (Vec<OsString>, ExclusionRules),
+) -> Result<(), CommandError> {
+    let mut study = parsed::<StudyArguments>(file, words)?;
+    let plan = plan(file, text, exclusion);
     match &mut study.task {
         Task::Jnd(task) => task.common.plan = Some(plan),
         Task::Magnitude(task) => task.common.plan = Some(plan),
@@ -171,8 +185,36 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     super::run(&study)
 }
 
+/// Parses command-line arguments of a study file.
+pub(super) fn parsed<T: Args + FromArgMatches>(file: &Path, words: Vec<OsString>) -> Result<T, CommandError> {
+    let command = clap::Command::new("study").no_binary_name(true);
+    let matches = T::augment_args(command).try_get_matches_from(words);
+    matches
+        .and_then(|matches| T::from_arg_matches(&matches))
+        .map_err(|error| CommandError::Usage(of_file(file, &error.to_string())))
+}
+
+/// Returns what the logs say of a study file.
+pub(super) fn plan(file: &Path, text: String, exclusion: ExclusionRules) -> Plan {
+    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Plan { file: name, sha256: digest(&text), text, exclusion }
+}
+
+/// Returns name and text of a study file: the named one, one of Flotor's own studies, or the only one of this folder.
+pub(super) fn file_and_text(file: Option<PathBuf>) -> Result<(PathBuf, String), CommandError> {
+    let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
+    if let Some(text) = shipped::text_of(&file).filter(|_| !file.exists()) {
+        return Ok((file, text.to_owned()));
+    }
+    let text = read_text(&file, "the study file").map_err(|wrong| {
+        let advice = if wrong.line == 0 { "; name a study file" } else { "" };
+        CommandError::Usage(wrong.in_file(file.display()) + advice)
+    })?;
+    Ok((file, text))
+}
+
 /// Returns the only study file of a folder; an error if there is none, or more than one.
-fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
+pub(super) fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
     let entries = std::fs::read_dir(folder).map_err(|cause| {
         CommandError::Usage(format!(
             "{}: cannot read the folder: {cause}; name a study file",
@@ -217,12 +259,26 @@ fn words(
     let study_command = StudyArguments::augment_args(clap::Command::new("study"));
     let known: Vec<&clap::Arg> =
         study_command.find_subcommand(task).into_iter().flat_map(|task| task.get_arguments()).collect();
+    let mut words: Vec<OsString> = vec![task.into()];
+    words.extend(option_words(file, task, &known, &study.options, further)?);
+    Ok((words, study.exclusion))
+}
+
+/// Converts the table `[options]` of a study file and the `further` options to command-line arguments; `known` are the options of the
+/// command `flotor study` with the name `task`.
+pub(super) fn option_words(
+    file: &Path,
+    task: &str,
+    known: &[&clap::Arg],
+    options: &toml::Table,
+    further: Vec<OsString>,
+) -> Result<Vec<OsString>, CommandError> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let said = Said(&further);
-    let mut words: Vec<OsString> = vec![task.into()];
+    let mut words: Vec<OsString> = Vec::new();
     // Plugin folders of the file, which are searched after the plugin folders of the command line.
     let mut last: Vec<OsString> = Vec::new();
-    for (key, value) in &study.options {
+    for (key, value) in options {
         let name = key.replace('_', "-");
         let refuse = |why: String| CommandError::Usage(format!("{}: options.{key}: {why}", file.display()));
         if OF_THE_COMMAND_LINE.contains(&name.as_str()) {
@@ -286,7 +342,7 @@ fn words(
     if !said.has("resume") {
         words.push("--resume".into());
     }
-    Ok((words, study.exclusion))
+    Ok(words)
 }
 
 /// Options on the command line, which override the options of the file.

@@ -1,0 +1,36 @@
+//! Scripts in R and Python that repeat the rows of an analysis from the table of trials.
+
+use super::measure::MeasureKind;
+use flotor_study_design::design::Design;
+use flotor_study_design::factor::Vary;
+
+/// Scripts, with places for the table's name, the factors and the measure.
+const PYTHON: &str = include_str!("../scripts/designed.py");
+const R: &str = include_str!("../scripts/designed.R");
+
+/// Language of a script.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Language {
+    /// Python, with numpy, scipy and pandas.
+    Python,
+    /// R without packages.
+    R,
+}
+
+/// Returns the script for a design and its table of trials, a file beside the script.
+#[must_use]
+pub fn script(design: &Design, language: Language, table_name: &str) -> String {
+    let names = |is_within: bool| {
+        let all = design.factors().iter().filter(|factor| (factor.vary == Vary::Within) == is_within);
+        all.map(|factor| format!("\"{}\"", factor.name)).collect::<Vec<_>>().join(", ")
+    };
+    let text = match language {
+        Language::Python => PYTHON,
+        Language::R => R,
+    };
+    let table = table_name.replace('\\', "\\\\").replace('"', "\\\"");
+    text.replace("@TABLE@", &table)
+        .replace("@WITHIN@", &names(true))
+        .replace("@BETWEEN@", &names(false))
+        .replace("@MEASURE@", MeasureKind::of(design).word())
+}
