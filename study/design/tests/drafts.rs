@@ -47,7 +47,11 @@ fn each_error_names_its_key_and_the_remedy() {
         ("/task", json!({ "ask": "magnitude" }), ""),
         ("/method/levels", json!([]), "method.levels: no levels; write at least one"),
         ("/method/levels", json!([0.1, 0.1]), "method.levels: 0.1: write finite levels, each once"),
-        ("/method/levels", json!([-1.5, 0.1]), "method.levels: a share of -1 or below"),
+        (
+            "/method/levels",
+            json!([-1.5, 0.1]),
+            "method.levels: a value of 0 or on the other side of 0; write shares",
+        ),
         ("/method/repetitions", json!(0), "method.repetitions: 0 repetitions: write 1 or more"),
         (
             "/method",

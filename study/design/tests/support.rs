@@ -8,13 +8,13 @@ use flotor_study_design::subject::SubjectNumber;
 use serde_json::{Value, json};
 
 /// Returns a design from the table of a study file, as JSON.
-pub fn design(table: Value) -> Design {
+pub(crate) fn design(table: Value) -> Design {
     let draft: Draft = serde_json::from_value(table).expect("a draft");
     Design::try_from(draft).expect("a design")
 }
 
 /// Returns the error of a table that is no design.
-pub fn error(table: Value) -> String {
+pub(crate) fn error(table: Value) -> String {
     match serde_json::from_value::<Draft>(table) {
         Err(error) => error.to_string(),
         Ok(draft) => Design::try_from(draft).expect_err("an error").to_string(),
@@ -22,7 +22,7 @@ pub fn error(table: Value) -> String {
 }
 
 /// Delay and stiffness by constant stimuli, as in the issue: a factor of blocks, a factor that is mixed, a questionnaire.
-pub fn delay() -> Value {
+pub(crate) fn delay() -> Value {
     json!({
         "study": "delay",
         "factor": [
@@ -38,7 +38,7 @@ pub fn delay() -> Value {
 }
 
 /// Designs of every method and question.
-pub fn all() -> Vec<Design> {
+pub(crate) fn all() -> Vec<Design> {
     let up_down = json!({ "initial_delta": 0.4, "first_step": 0.1 });
     let with = |task: Value, method: Value, stimulus: Value| {
         let mut table = delay();
@@ -95,12 +95,16 @@ pub fn all() -> Vec<Design> {
 }
 
 /// Returns the session of a subject.
-pub fn session(seed: u64, subject: u16, session: u32) -> Session {
+pub(crate) fn session(seed: u64, subject: u16, session: u32) -> Session {
     Session { seed, subject: SubjectNumber::new(subject).expect("a number"), session }
 }
 
 /// Answers a course to its end; returns its steps with the answers.
-pub fn sit(design: &Design, population: &Population, session: Session) -> (Vec<(Step, Reply)>, Course) {
+pub(crate) fn sit(
+    design: &Design,
+    population: &Population,
+    session: Session,
+) -> (Vec<(Step, Reply)>, Course) {
     let mut course = Course::new(design, session);
     let observer = SimulatedObserver::new(population, session);
     let mut steps = Vec::new();

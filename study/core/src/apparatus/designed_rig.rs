@@ -267,6 +267,7 @@ impl<'a> DesignedRig<'a> {
         let (live, replaced) = (self.of(settings, Change::Live), self.of(settings, Change::Replacement));
         let mut parts: Vec<String> =
             live.keys().chain(replaced.keys()).map(|(part, _)| part.clone()).collect();
+        parts.sort();
         parts.dedup();
         self.show(&parts, false)?;
         for part in &parts {

@@ -20,6 +20,7 @@ pub(super) const COLUMNS: [(&str, &str); 14] = [
     ("answer", "first, second, unsure, present, absent, or a number"),
     ("positive", "1 if the comparison was named or the signal reported, 0 if not, 0.5 for `unsure`"),
     ("confidence", "Confidence in the answer"),
+    ("threshold", "Threshold of the track on the scale of the levels, on its last trial"),
     (
         "counts",
         "1 if the trial counts: not practice, and the handle stayed in its range or the trial was not repeated",

@@ -1,7 +1,7 @@
 //! Designed studies: kills and resumptions, changed logs, one program on one session, tables.
 
 use super::*;
-use crate::conduct::NoApparatus;
+use crate::conduct::{ApparatusOrFrontEndError, NoApparatus};
 use crate::dataset::{DatasetError, ExistingLogPolicy};
 use crate::exclusion::ExclusionRules;
 use crate::log::{LogProblem, Plan, digest};
@@ -93,9 +93,8 @@ fn run(cohort: &DesignedCohort, data: &DesignedData, steps: u32) -> Result<(), D
             stop.store(true, Ordering::Relaxed);
         }
     };
-    let presenter = |_: Session| {
-        let none: Box<dyn DesignedPresenter> = Box::new(NoApparatus);
-        Ok(Some(none))
+    let presenter = |_: Session| -> Result<Option<Box<dyn DesignedPresenter>>, ApparatusOrFrontEndError> {
+        Ok(Some(Box::new(NoApparatus)))
     };
     cohort.run(data, NonZeroUsize::MIN, &presenter, &watch, &stop)
 }

@@ -5,8 +5,8 @@ use crate::error::DesignError;
 use crate::factor::{Factor, Vary};
 use crate::method::Method;
 use crate::order::Order;
-use crate::stimulus::{Scale, Standard, Stimulus};
-use crate::task::Ask;
+use crate::stimulus::{Scale, Side, Standard, Stimulus};
+use crate::task::{AnswerScale, Ask};
 use crate::value::{Setting, Value};
 
 /// Checks a draft; returns the first error.
@@ -162,11 +162,8 @@ fn check_blocks(draft: &Draft) -> Result<(), DesignError> {
 fn check_task(draft: &Draft) -> Result<(), DesignError> {
     let Draft { task, method, .. } = draft;
     let (asked, used) = (task.word(), method.word());
-    let scales = [Some(&task.confidence), None];
-    for scale in scales.into_iter().flatten().flatten() {
-        if let Some(defect) = scale.defect() {
-            return Err(DesignError::new("task.confidence", &defect));
-        }
+    if let Some(defect) = task.confidence.as_ref().and_then(AnswerScale::defect) {
+        return Err(DesignError::new("task.confidence", &defect));
     }
     if let Ask::Rating { scale } = &task.ask
         && let Some(defect) = scale.defect()
@@ -227,15 +224,17 @@ fn check_stimulus(draft: &Draft) -> Result<(), DesignError> {
             }
             Ok(())
         }
-        Some(Stimulus::Graded { standard, scale, .. }) => {
+        Some(Stimulus::Graded { standard, scale, side, .. }) => {
             let Some([least, most]) = levels else {
                 return Err(DesignError::new("method.levels", "no levels; write at least one"));
             };
-            if *scale == Scale::Share && (least <= -1.0 || most.abs() >= 1.0 && least < 0.0) {
-                return Err(DesignError::new(
-                    "method.levels",
-                    "a share of -1 or below; write shares above -1",
-                ));
+            let lowest = match side {
+                Side::Above => least,
+                Side::Below => -most,
+            };
+            if *scale == Scale::Share && lowest <= -1.0 {
+                let problem = "a value of 0 or on the other side of 0; write shares above -1, and below 1 with side = \"below\"";
+                return Err(DesignError::new("method.levels", problem));
             }
             if let (Scale::Share, Standard::Number(number)) = (scale, standard)
                 && *number == 0.0
