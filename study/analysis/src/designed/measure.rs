@@ -39,7 +39,6 @@ pub struct CellMeasure {
     /// Number of counted trials.
     pub trials: usize,
     /// Further results of the condition.
-    #[serde(flatten)]
     pub detail: Detail,
 }
 
