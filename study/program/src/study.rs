@@ -9,6 +9,7 @@ mod designed;
 mod explore;
 mod front;
 mod noise;
+mod options_table;
 mod person;
 pub(crate) mod plan;
 mod power;

@@ -70,6 +70,7 @@ mod stop_delivery;
 mod stop_time;
 mod study;
 mod study_claims;
+mod study_design;
 mod study_file;
 mod study_scripts;
 mod supply;

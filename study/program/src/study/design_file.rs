@@ -1,8 +1,7 @@
 //! Study file with a design of one's own.
 
-use super::plan::{option_words, parsed, read_table};
+use super::options_table::{option_words, parsed, read_table};
 use super::{Common, StudyArguments};
-use crate::analyse::choices::PlannedTable;
 use clap::Args;
 use flotor_command::CommandError;
 use flotor_study::exclusion::ExclusionRules;
@@ -26,6 +25,8 @@ pub(super) struct DesignFile {
     pub(super) population: Population,
     /// Title for tables and pictures; the study's name without one.
     pub(super) title: String,
+    /// Planned analysis as text.
+    pub(super) analysis: String,
     exclusion: ExclusionRules,
     options: toml::Table,
 }
@@ -38,8 +39,8 @@ struct Content {
     #[serde(default)]
     title: String,
     /// Planned analysis as text, fixed before data collection.
-    #[serde(default, rename = "analysis")]
-    _analysis: String,
+    #[serde(default)]
+    analysis: String,
     #[serde(default, rename = "factor")]
     factors: Vec<Factor>,
     stimulus: Option<Stimulus>,
@@ -53,8 +54,6 @@ struct Content {
     simulated: Population,
     #[serde(default)]
     exclusion: ExclusionRules,
-    #[serde(default, rename = "analyse")]
-    _analyse: PlannedTable,
     #[serde(default)]
     options: toml::Table,
 }
@@ -83,7 +82,6 @@ impl DesignFile {
         let Content {
             study,
             title,
-            _analysis,
             factors,
             stimulus,
             task,
@@ -92,8 +90,8 @@ impl DesignFile {
             questionnaires,
             simulated: population,
             exclusion,
-            _analyse,
             options,
+            analysis,
         } = read_table(file, text)?;
         let wrong =
             |error: &dyn std::fmt::Display| CommandError::Usage(format!("{}: {error}", file.display()));
@@ -101,7 +99,7 @@ impl DesignFile {
         let design = Design::try_from(draft).map_err(|error| wrong(&error))?;
         population.check(&design).map_err(|error| wrong(&error))?;
         let title = if title.is_empty() { design.study().to_owned() } else { title };
-        Ok(Self { design, population, title, exclusion, options })
+        Ok(Self { design, population, title, analysis, exclusion, options })
     }
 
     /// Returns a whole number among the options; `None` if the file does not set it.

@@ -1,7 +1,7 @@
 //! `flotor study run` for a study of one's own design.
 
 use super::design_file::DesignFile;
-use super::plan::plan;
+use super::options_table::plan;
 use super::{Common, ObserverOption, PresentationOption, outside};
 use crate::of_dataset;
 use flotor_command::stopping::stop_on_signals;
@@ -88,7 +88,7 @@ fn apparatus(common: &Common, design: &Design) -> Result<DesignedApparatus, Comm
 }
 
 /// Returns the number of steps of a session of a simulated subject.
-pub(super) fn steps_of(design: &Design, population: &Population, session: Session) -> u64 {
+fn steps_of(design: &Design, population: &Population, session: Session) -> u64 {
     let mut course = Course::new(design, session);
     let observer = SimulatedObserver::new(population, session);
     let mut steps = 0;

@@ -160,7 +160,7 @@ fn numbers(values: &[Value]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::study::design_file::DesignFile;
-    use crate::study::plan::parsed;
+    use crate::study::options_table::parsed;
     use crate::study::{FORCE, STIFFNESS, StudyArguments, Task};
     use flotor_study::protocol::{JndProtocol, MagnitudeProtocol};
 
