@@ -47,7 +47,7 @@ fn scripts_print_the_same_rows() {
     let book = include_str!("../../../docs/src/experiments.md");
     let start = book.find("study = \"delay\"").unwrap();
     let text = &book[start..start + book[start..].find("```").unwrap()];
-    assert!(text.lines().count() <= 45, "{} lines", text.lines().count());
+    assert!(text.lines().count() <= 40, "{} lines", text.lines().count());
     let _ = scratch.file("delay.study.toml", text.to_owned());
     let ran = flotor(scratch.path(), &["study", "run", "delay.study.toml", "--subjects", "8"]);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");

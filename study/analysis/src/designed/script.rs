@@ -3,6 +3,7 @@
 use super::measure::MeasureKind;
 use flotor_study_design::design::Design;
 use flotor_study_design::factor::Vary;
+use flotor_study_design::value::Value;
 
 /// Scripts, with places for the table's name, the factors and the measure.
 const PYTHON: &str = include_str!("../scripts/designed.py");
@@ -24,6 +25,15 @@ pub fn script(design: &Design, language: Language, table_name: &str) -> String {
         let all = design.factors().iter().filter(|factor| (factor.vary == Vary::Within) == is_within);
         all.map(|factor| format!("\"{}\"", factor.name)).collect::<Vec<_>>().join(", ")
     };
+    let levels = design.factors().iter().map(|factor| {
+        let values: Vec<String> = factor.values.iter().map(literal).collect();
+        let (name, values) = (&factor.name, values.join(", "));
+        match language {
+            Language::Python => format!("\"{name}\": [{values}]"),
+            Language::R => format!("{name} = c({values})"),
+        }
+    });
+    let levels = levels.collect::<Vec<_>>().join(", ");
     let text = match language {
         Language::Python => PYTHON,
         Language::R => R,
@@ -32,5 +42,14 @@ pub fn script(design: &Design, language: Language, table_name: &str) -> String {
     text.replace("@TABLE@", &table)
         .replace("@WITHIN@", &names(true))
         .replace("@BETWEEN@", &names(false))
+        .replace("@LEVELS@", &levels)
         .replace("@MEASURE@", MeasureKind::of(design).word())
+}
+
+/// Returns a level as both languages write it.
+fn literal(value: &Value) -> String {
+    match value {
+        Value::Number(number) => number.to_string(),
+        Value::Choice(word) => format!("\"{}\"", word.replace('\\', "\\\\").replace('"', "\\\"")),
+    }
 }

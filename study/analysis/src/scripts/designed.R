@@ -7,13 +7,14 @@ arguments <- commandArgs(trailingOnly = TRUE)
 path <- if (length(arguments) > 0) arguments[1] else "@TABLE@"
 within <- c(@WITHIN@)
 between <- c(@BETWEEN@)
+levels_of <- list(@LEVELS@)
 kind <- "@MEASURE@"
 
 trials <- read.csv(path, na.strings = "n/a", stringsAsFactors = FALSE, check.names = FALSE)
 counted <- trials[trials$counts == 1, ]
 four <- function(x) sprintf("%.4f", x)
 p_text <- function(p) ifelse(p < 0.001, "p < 0.001", sprintf("p = %.3f", p))
-row <- function(name, text) cat(sprintf("  %-38s%s\n", name, text))
+line <- function(name, text) cat(sprintf("  %-38s%s\n", name, text))
 
 # The measure of a subject in a condition.
 measure <- function(cell) {
@@ -25,58 +26,61 @@ measure <- function(cell) {
     positive <- tapply(cell$positive, cell$level, sum)
     all <- tapply(cell$positive, cell$level, length)
     level <- as.numeric(names(positive))
+    some <- level[positive > 0]
+    others <- level[all > positive]
+    # Answers that do not rise with the level, or change from none to all at once, have no function.
+    if (length(some) == 0 || length(others) == 0 || max(some) <= min(others) || max(others) <= min(some)) return(NA)
     # Half counts of "I don't know" are no error here.
     fit <- suppressWarnings(glm(cbind(positive, all - positive) ~ level, family = binomial(probit),
       control = glm.control(epsilon = 1e-14, maxit = 100)))
-    return(qnorm(0.75) / coef(fit)[[2]])
+    return(if (coef(fit)[[2]] > 0) qnorm(0.75) / coef(fit)[[2]] else NA)
   }
   switch(kind, share = mean(cell$positive), threshold = mean(cell$threshold, na.rm = TRUE),
     rating = mean(as.numeric(cell$answer)), "log-magnitude" = mean(log(as.numeric(cell$answer))))
 }
 
-# The last factor runs fastest, and levels keep the order of their numbers.
 factors <- c(within, between)
-key <- counted[c("subject", factors)]
-cells <- unique(key)
-cells$value <- apply(cells, 1, function(one) {
-  here <- Reduce(`&`, lapply(names(key), function(name) trimws(as.character(key[[name]])) == trimws(one[[name]])))
-  measure(counted[here, ])
-})
-levels_of <- lapply(setNames(factors, factors), function(factor) sort(unique(cells[[factor]])))
+cells <- unique(counted[c("subject", factors)])
+in_cell <- function(table, cell, names) {
+  here <- rep(TRUE, nrow(table))
+  for (name in names) here <- here & table[[name]] == cell[[name]]
+  here
+}
+cells$value <- sapply(seq_len(nrow(cells)), function(index)
+  measure(counted[in_cell(counted, cells[index, , drop = FALSE], c("subject", factors)), ]))
 
 # Means over subjects with their intervals.
 conditions <- if (length(factors)) unique(cells[factors]) else data.frame(all = 1)
 for (index in seq_len(nrow(conditions))) {
-  here <- rep(TRUE, nrow(cells))
-  for (factor in factors) here <- here & cells[[factor]] == conditions[[factor]][index]
-  values <- cells$value[here]
+  values <- cells$value[in_cell(cells, conditions[index, , drop = FALSE], factors)]
+  values <- values[!is.na(values)]
+  if (length(values) < 2) next
   half <- sd(values) / sqrt(length(values)) * qt(0.975, length(values) - 1)
   name <- if (length(factors)) paste(sapply(sort(factors), function(factor) paste(factor, conditions[[factor]][index])), collapse = ", ") else "all"
-  row(name, sprintf("%s  (95 %%: %s to %s), n = %d", four(mean(values)), four(mean(values) - half), four(mean(values) + half), length(values)))
+  line(name, sprintf("%s  (95 %%: %s to %s), n = %d", four(mean(values)), four(mean(values) - half), four(mean(values) + half), length(values)))
 }
 
 # Analysis of variance, sums of squares of type III: contrasts within subjects, explained by the groups.
+cells <- cells[!cells$subject %in% cells$subject[is.na(cells$value)], ]
 subjects <- unique(cells$subject)
-within <- within[sapply(within, function(factor) length(levels_of[[factor]]) > 1)]
-between <- between[sapply(between, function(factor) length(levels_of[[factor]]) > 1)]
+within <- Filter(function(factor) length(levels_of[[factor]]) > 1, within)
+between <- Filter(function(factor) length(levels_of[[factor]]) > 1, between)
+# The last factor runs fastest.
 grid <- if (length(within)) rev(expand.grid(rev(levels_of[within]), stringsAsFactors = FALSE)) else data.frame(all = 1)
-response <- t(sapply(subjects, function(subject) apply(grid, 1, function(cell) {
-  here <- cells$subject == subject
-  for (factor in within) here <- here & trimws(as.character(cells[[factor]])) == trimws(cell[[factor]])
-  mean(cells$value[here])
-})))
-if (nrow(grid) == 1) response <- t(response)
+response <- matrix(0, length(subjects), nrow(grid))
+for (row in seq_along(subjects)) for (column in seq_len(nrow(grid)))
+  response[row, column] <- mean(cells$value[cells$subject == subjects[row] & in_cell(cells, grid[column, , drop = FALSE], within)])
 contrast <- function(n) qr.Q(qr(cbind(1, diag(n)[, -n])))[, -1, drop = FALSE]
 terms <- function(names) {
   all <- list(character(0))
   for (name in names) all <- c(all, lapply(all, c, name))
   all[order(sapply(all, length))]
 }
-groups <- sapply(between, function(factor) sapply(subjects, function(subject) cells[[factor]][cells$subject == subject][1]))
+groups <- lapply(setNames(between, between), function(factor) cells[[factor]][match(subjects, cells$subject)])
 coded <- function(term) {
   columns <- matrix(1, length(subjects), 1)
   for (factor in term) {
-    own <- contr.sum(length(levels_of[[factor]]))[match(groups[, factor], levels_of[[factor]]), , drop = FALSE]
+    own <- contr.sum(length(levels_of[[factor]]))[match(groups[[factor]], levels_of[[factor]]), , drop = FALSE]
     columns <- do.call(cbind, lapply(seq_len(ncol(own)), function(column) columns * own[, column]))
   }
   columns
@@ -102,7 +106,7 @@ if (length(c(within, between)) > 0 && length(subjects) > 1) {
       df <- ncol(of_groups[[index]]) * ncol(weights)
       error_df <- (length(subjects) - qr(full)$rank) * ncol(weights)
       f <- effect / df / (error / error_df)
-      row(paste(c(term, inside), collapse = ":"), sprintf("F(%d, %d) = %.2f, %s", df, error_df, f, p_text(pf(f, df, error_df, lower.tail = FALSE))))
+      line(paste(c(term, inside), collapse = ":"), sprintf("F(%d, %d) = %.2f, %s", df, error_df, f, p_text(pf(f, df, error_df, lower.tail = FALSE))))
     }
   }
 }
@@ -111,13 +115,13 @@ if (length(c(within, between)) > 0 && length(subjects) > 1) {
 for (factor in within) {
   wide <- tapply(cells$value, list(cells$subject, factor(cells[[factor]], levels_of[[factor]])), mean)
   test <- friedman.test(wide)
-  row(factor, sprintf("chi-square(%d) = %.2f, %s", test$parameter, test$statistic, p_text(test$p.value)))
+  line(factor, sprintf("chi-square(%d) = %.2f, %s", test$parameter, test$statistic, p_text(test$p.value)))
 }
 for (factor in between) {
   means <- tapply(cells$value, cells$subject, mean)
-  group <- sapply(names(means), function(subject) cells[[factor]][cells$subject == subject][1])
+  group <- cells[[factor]][match(names(means), cells$subject)]
   test <- kruskal.test(means, factor(group))
-  row(factor, sprintf("chi-square(%d) = %.2f, %s", test$parameter, test$statistic, p_text(test$p.value)))
+  line(factor, sprintf("chi-square(%d) = %.2f, %s", test$parameter, test$statistic, p_text(test$p.value)))
 }
 for (factor in within) {
   wide <- tapply(cells$value, list(cells$subject, factor(cells[[factor]], levels_of[[factor]])), mean)
@@ -127,6 +131,6 @@ for (factor in within) {
   holm <- p.adjust(sapply(tests, function(test) test$p.value), "holm")
   for (index in seq_along(tests)) {
     name <- paste0(factor, " ", colnames(wide)[pairs[2, index]], " - ", colnames(wide)[pairs[1, index]])
-    row(name, sprintf("V = %g, %s, Holm %s", tests[[index]]$statistic, p_text(tests[[index]]$p.value), p_text(holm[index])))
+    line(name, sprintf("V = %g, %s, Holm %s", tests[[index]]$statistic, p_text(tests[[index]]$p.value), p_text(holm[index])))
   }
 }

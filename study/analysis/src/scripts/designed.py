@@ -17,6 +17,7 @@ from scipy import optimize, stats
 path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_name("@TABLE@")
 within = [@WITHIN@]
 between = [@BETWEEN@]
+levels = {@LEVELS@}
 KIND = "@MEASURE@"
 
 trials = pd.read_csv(path, na_values="n/a")
@@ -40,6 +41,10 @@ def difference(cell):
     """Half of the distance from 25 to 75 % of a cumulative normal of maximum likelihood."""
     counts = cell.groupby("level").positive.agg(["sum", "count"])
     level, positive, rest = counts.index.to_numpy(), counts["sum"].to_numpy(), (counts["count"] - counts["sum"]).to_numpy()
+    some, others = level[positive > 0], level[rest > 0]
+    # Answers that do not rise with the level, or change from none to all at once, have no function.
+    if not (len(some) and len(others) and some.max() > others.min() and others.max() > some.min()):
+        return np.nan
     unit = level.max() - level.min()
     x = (level - level.min()) / unit
 
@@ -54,7 +59,7 @@ def difference(cell):
         return -np.array([score.sum(), score @ x])
 
     found = optimize.minimize(loss, [-1.0, 2.0], jac=slope, method="BFGS", options={"gtol": 1e-10})
-    return stats.norm.ppf(0.75) * unit / found.x[1]
+    return stats.norm.ppf(0.75) * unit / found.x[1] if found.x[1] > 0 else np.nan
 
 
 def measure(cell):
@@ -75,16 +80,20 @@ cells = pd.DataFrame(
     [(*key, measure(cell)) for key, cell in counted.groupby(["subject", *factors], sort=False)],
     columns=["subject", *factors, "value"],
 )
-levels = {factor: sorted(cells[factor].unique()) for factor in factors}
 
 # Means over subjects with their intervals.
 for key, cell in cells.groupby(factors, sort=False) if factors else [((), cells)]:
-    n, mean = len(cell), cell.value.mean()
-    half = cell.value.std() / np.sqrt(n) * stats.t.ppf(0.975, n - 1)
+    key = key if isinstance(key, tuple) else (key,)
+    values = cell.value.dropna()
+    n, mean = len(values), values.mean()
+    if n < 2:
+        continue
+    half = values.std() / np.sqrt(n) * stats.t.ppf(0.975, n - 1)
     name = ", ".join(f"{factor} {shortest(level)}" for factor, level in sorted(zip(factors, key))) or "all"
     row(name, f"{mean:.4f}  (95 %: {mean - half:.4f} to {mean + half:.4f}), n = {n}")
 
 # Analysis of variance, sums of squares of type III: contrasts within subjects, explained by the groups.
+cells = cells[~cells.subject.isin(cells.subject[cells.value.isna()])]
 within = [factor for factor in within if len(levels[factor]) > 1]
 between = [factor for factor in between if len(levels[factor]) > 1]
 grid = list(itertools.product(*(levels[factor] for factor in within)))
