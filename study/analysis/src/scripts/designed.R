@@ -33,7 +33,8 @@ measure <- function(cell) {
     # Half counts of "I don't know" are no error here.
     fit <- suppressWarnings(glm(cbind(positive, all - positive) ~ level, family = binomial(probit),
       control = glm.control(epsilon = 1e-14, maxit = 100)))
-    return(if (coef(fit)[[2]] > 0) qnorm(0.75) / coef(fit)[[2]] else NA)
+    slope <- coef(fit)[[2]]
+    return(if (slope * diff(range(level)) > 1e-9) qnorm(0.75) / slope else NA)
   }
   switch(kind, share = mean(cell$positive), threshold = mean(cell$threshold, na.rm = TRUE),
     rating = mean(as.numeric(cell$answer)), "log-magnitude" = mean(log(as.numeric(cell$answer))))

@@ -59,7 +59,7 @@ def difference(cell):
         return -np.array([score.sum(), score @ x])
 
     found = optimize.minimize(loss, [-1.0, 2.0], jac=slope, method="BFGS", options={"gtol": 1e-10})
-    return stats.norm.ppf(0.75) * unit / found.x[1] if found.x[1] > 0 else np.nan
+    return stats.norm.ppf(0.75) * unit / found.x[1] if found.x[1] > 1e-6 else np.nan
 
 
 def measure(cell):

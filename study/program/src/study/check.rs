@@ -1,22 +1,25 @@
 //! `flotor study check`: what a study file does, without a person.
 
+mod report;
+mod rows;
+mod tally;
+
 use super::design_file::DesignFile;
 use super::plan::file_and_text;
 use clap::Args;
 use flotor_analysis::designed::{EffectPower, power_of, study_of};
 use flotor_command::options::{JsonOption, count, duration_s};
-use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
-use flotor_plot::{Axis, Figure, Panel, Series};
+use flotor_command::{CommandError, print_result, progress_bar, write_text};
 use flotor_study::protocol::SubjectNumber;
-use flotor_study_design::answer::Position;
 use flotor_study_design::course::{Course, Handle, Phase, Session, Step, Trial};
-use flotor_study_design::design::{Condition, Design};
+use flotor_study_design::design::Design;
 use flotor_study_design::observer::SimulatedObserver;
 use flotor_study_design::value::Setting;
 use rayon::prelude::*;
-use serde::Serialize;
-use std::collections::BTreeMap;
+use report::{Check, picture, to_text};
+use rows::{BlockRow, SessionRow};
 use std::path::PathBuf;
+use tally::Tally;
 
 #[derive(Args)]
 #[command(
@@ -52,55 +55,6 @@ pub(super) struct CheckArguments {
     plot: Option<PathBuf>,
     #[command(flatten)]
     json: JsonOption,
-}
-
-/// What a study file does.
-#[derive(Serialize)]
-struct Check {
-    study: String,
-    title: String,
-    subjects: u16,
-    /// Sessions in the order of subjects.
-    sessions: Vec<SessionRow>,
-    balance: Balance,
-    /// First steps of the first subject.
-    sees: Vec<String>,
-    power: Vec<EffectPower>,
-}
-
-/// One session of a subject.
-#[derive(Serialize)]
-struct SessionRow {
-    subject: String,
-    session: u32,
-    /// Blocks in order.
-    blocks: Vec<BlockRow>,
-    practice: u32,
-    trials: u32,
-    rests: u32,
-    questionnaires: u32,
-    minutes: f64,
-}
-
-/// One block of a session.
-#[derive(Clone, Serialize)]
-struct BlockRow {
-    condition: String,
-    from_minute: f64,
-    to_minute: f64,
-}
-
-/// Balance of a study over all its subjects; each range is the smallest and the largest count.
-#[derive(Serialize)]
-struct Balance {
-    /// How often each block condition is at each place.
-    at_each_place: [usize; 2],
-    /// How often each block condition follows each other one.
-    after_each_other: [usize; 2],
-    /// How many subjects each combination of levels between subjects has.
-    subjects_in_each_group: [usize; 2],
-    /// Share of the pairs whose comparison is first; `None` without pairs.
-    comparison_first: Option<f64>,
 }
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<(), CommandError> {
@@ -209,70 +163,6 @@ fn walk(
     row
 }
 
-/// Counts for the balance.
-#[derive(Default)]
-struct Tally {
-    places: BTreeMap<(usize, String), usize>,
-    transitions: BTreeMap<(String, String), usize>,
-    groups: BTreeMap<u16, String>,
-    first: usize,
-    pairs: usize,
-}
-
-impl Tally {
-    fn pair(&mut self, comparison_at: Option<Position>) {
-        self.pairs += usize::from(comparison_at.is_some());
-        self.first += usize::from(comparison_at == Some(Position::First));
-    }
-
-    fn group(&mut self, session: Session, design: &Design, condition: &Condition) {
-        use flotor_study_design::factor::Vary;
-        let between = design.factors().iter().filter(|factor| factor.vary != Vary::Within);
-        let levels: Vec<String> =
-            between.filter_map(|factor| condition.get(&factor.name).map(ToString::to_string)).collect();
-        self.groups.entry(session.subject.get()).or_insert_with(|| levels.join(" "));
-    }
-
-    fn blocks(&mut self, blocks: &[BlockRow]) {
-        for (place, block) in blocks.iter().enumerate() {
-            *self.places.entry((place, block.condition.clone())).or_default() += 1;
-        }
-        for two in blocks.windows(2) {
-            if let [before, after] = two {
-                *self.transitions.entry((before.condition.clone(), after.condition.clone())).or_default() +=
-                    1;
-            }
-        }
-    }
-
-    fn balance(&self, design: &Design) -> Balance {
-        let blocks = design.block_conditions().len();
-        let places = blocks * self.places.keys().map(|(place, _)| place + 1).max().unwrap_or(0);
-        let mut groups: BTreeMap<&String, usize> = BTreeMap::new();
-        self.groups.values().for_each(|group| *groups.entry(group).or_default() += 1);
-        Balance {
-            at_each_place: range(self.places.values(), places),
-            after_each_other: range(
-                self.transitions
-                    .iter()
-                    .filter(|((before, after), _)| before != after)
-                    .map(|(_, count)| count),
-                blocks * blocks.saturating_sub(1),
-            ),
-            subjects_in_each_group: range(groups.values(), groups.len()),
-            comparison_first: (self.pairs > 0).then(|| self.first as f64 / self.pairs as f64),
-        }
-    }
-}
-
-/// Returns the smallest and the largest of the counts of `cells` cells; a cell without a count has 0.
-fn range<'a>(counts: impl Iterator<Item = &'a usize>, cells: usize) -> [usize; 2] {
-    let counts: Vec<usize> = counts.copied().collect();
-    let most = counts.iter().copied().max().unwrap_or(0);
-    let least = if counts.len() < cells { 0 } else { counts.iter().copied().min().unwrap_or(0) };
-    [least, most]
-}
-
 fn power(arguments: &CheckArguments, study: &DesignFile, subjects: u16, seed: u64) -> Vec<EffectPower> {
     if arguments.runs == 0 {
         return Vec::new();
@@ -321,97 +211,4 @@ fn block_text(design: &Design, trial: &Trial) -> String {
     let levels = trial.condition.iter().filter(|(name, _)| by.contains(name));
     let text: Vec<String> = levels.map(|(name, value)| format!("{name} {value}")).collect();
     if text.is_empty() { "all".to_owned() } else { text.join(", ") }
-}
-
-fn to_text(check: &Check) -> String {
-    let mut lines =
-        vec![style::title(&format!("{}: {} subjects", check.title, check.subjects)), String::new()];
-    lines.push(format!(
-        "  {:<8}{:>8}{:>10}{:>8}{:>7}{:>7}{:>9}  blocks",
-        "subject", "session", "practice", "trials", "rests", "forms", "minutes"
-    ));
-    for row in &check.sessions {
-        let blocks: Vec<&str> = row.blocks.iter().map(|block| block.condition.as_str()).collect();
-        lines.push(format!(
-            "  {:<8}{:>8}{:>10}{:>8}{:>7}{:>7}{:>9.1}  {}",
-            row.subject,
-            row.session,
-            row.practice,
-            row.trials,
-            row.rests,
-            row.questionnaires,
-            row.minutes,
-            blocks.join(" | ")
-        ));
-    }
-    let minutes = || check.sessions.iter().map(|row| row.minutes);
-    let (least, most) = (minutes().fold(f64::INFINITY, f64::min), minutes().fold(0.0, f64::max));
-    let mean = minutes().sum::<f64>() / check.sessions.len().max(1) as f64;
-    lines.push(String::new());
-    lines.push(format!("  Length of a session      {mean:.1} min ({least:.1} to {most:.1})"));
-    let Balance { at_each_place, after_each_other, subjects_in_each_group, comparison_first } =
-        &check.balance;
-    let counts = |[least, most]: &[usize; 2]| {
-        if least == most {
-            format!("{least} times each")
-        } else {
-            format!("{least} to {most} times each: not balanced")
-        }
-    };
-    lines.push(format!("  Block at each place      {}", counts(at_each_place)));
-    lines.push(format!("  Block after each other   {}", counts(after_each_other)));
-    lines.push(format!("  Subjects in each group   {}", counts(subjects_in_each_group)));
-    if let Some(share) = comparison_first {
-        lines.push(format!("  Comparison first         {:.1} % of the pairs", share * 100.0));
-    }
-    if let Some(first) = check.sessions.first() {
-        lines.push(String::new());
-        lines.push(format!("  What {} does first", first.subject));
-        lines.extend(check.sees.iter().zip(1..).map(|(step, number)| format!("  {number:>4}  {step}")));
-    }
-    if !check.power.is_empty() {
-        lines.push(String::new());
-        lines.push("  Power at 5 %, simulated observers".to_owned());
-        lines.extend(check.power.iter().map(|effect| {
-            let EffectPower { effect, share, standard_error, studies } = effect;
-            format!(
-                "  {effect:<25}{:.1} % (standard error {:.1} %, {studies} studies)",
-                share * 100.0,
-                standard_error * 100.0
-            )
-        }));
-    }
-    lines.join("\n")
-}
-
-/// Largest number of block conditions that a picture has colours for.
-const MOST_SERIES: usize = 8;
-
-/// Draws the blocks of every session over time: one series for each condition.
-fn picture(check: &Check, design: &Design) -> Figure {
-    let mut conditions: Vec<&str> = Vec::new();
-    for block in check.sessions.iter().flat_map(|row| &row.blocks) {
-        if !conditions.contains(&block.condition.as_str()) {
-            conditions.push(&block.condition);
-        }
-    }
-    conditions.sort_unstable();
-    let figure = Figure::new(check.title.clone(), Axis::linear("Time from the start of the session", "min"));
-    let figure = figure.subtitle(format!("Blocks of {} sessions, each at its middle", check.sessions.len()));
-    if conditions.len() > MOST_SERIES {
-        let count = design.block_conditions().len();
-        return figure.panel_or_note(Err(format!(
-            "{count} conditions of blocks: too many for a picture; the table has them"
-        )));
-    }
-    let mut panel = Panel::new(Axis::linear("Session, in the order of subjects", ""));
-    for condition in conditions {
-        let places = check.sessions.iter().zip(1_u32..).flat_map(|(row, number)| {
-            let own = row.blocks.iter().filter(|block| block.condition == condition);
-            own.map(move |block| (0.5 * (block.from_minute + block.to_minute), f64::from(number)))
-                .collect::<Vec<_>>()
-        });
-        panel = panel.series(Series::points(condition, places));
-    }
-    figure.panel(panel)
 }
