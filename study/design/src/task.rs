@@ -80,7 +80,7 @@ impl AnswerScale {
         let Self { least, most, step, .. } = self;
         let steps = (most - least) / step;
         let is_right =
-            *step > 0.0 && steps >= 1.0 && steps <= 1000.0 && (steps - steps.round()).abs() < 1.0e-9;
+            *step > 0.0 && (1.0..=1000.0).contains(&steps) && (steps - steps.round()).abs() < 1.0e-9;
         (!is_right).then(|| {
             format!("a scale from {least} to {most} by {step}: write least < most, and a step that divides the range (at most 1000 times)")
         })
