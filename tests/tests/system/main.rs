@@ -67,6 +67,7 @@ mod scene_test;
 #[cfg(feature = "drop-ins")]
 mod services;
 mod simulated;
+mod slow_contacts;
 mod snapshot;
 mod stop_delivery;
 mod stop_time;

@@ -1,4 +1,4 @@
-//! Host side of `flotor.contact-set/1`: contacts of the tool, from a model computed beside the loop.
+//! Host side of `flotor.contact-set/1`: contacts of the tool, from an asynchronous model.
 
 use crate::Model;
 use flotor_hal::abi::CallStatus;
