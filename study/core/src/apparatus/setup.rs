@@ -205,10 +205,10 @@ impl Apparatus {
         Ok(self.stage.plugin_files()?)
     }
 
-    /// Estimates the disk space of a full recording, bytes per second (measured: 466 bytes per tick with one device).
+    /// Estimates the disk space of a full recording, bytes per second.
     #[must_use]
     pub fn recording_bytes_per_s(&self) -> f64 {
-        470.0 * self.stage.scene.rate_hz * self.stage.scene.devices.len() as f64
+        self.stage.recording_bytes_per_s()
     }
 
     /// Returns the varied parameter.

@@ -109,6 +109,11 @@ impl Stage {
         scene
     }
 
+    /// Estimates the disk space of a full recording, bytes per second (measured: 466 bytes per tick with one device).
+    pub(super) fn recording_bytes_per_s(&self) -> f64 {
+        470.0 * self.scene.rate_hz * self.scene.devices.len() as f64
+    }
+
     /// Returns the description of the run for a recording.
     pub(super) fn describe(&self, scene: &Scene, clock: Clock, seed: u64) -> RunDescription {
         describe(scene, &RunOptions { clock, seed }, &self.plugins)

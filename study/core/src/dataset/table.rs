@@ -3,7 +3,7 @@
 use crate::blinding::Codes;
 use crate::exclusion::Exclusion;
 use crate::kinematics::StimulusKinematics;
-use crate::log::{Begin, SittingLog, TrialRecord};
+use crate::log::{Begin, Person, SittingLog, TrialRecord};
 use crate::protocol::Protocol;
 use crate::sitting::Verdict;
 use crate::trial::{Judgement, Presented};
@@ -205,10 +205,14 @@ pub(super) fn participant(log: &SittingLog) -> String {
     let first = log.begin.protocol.first_modality().of(subject).word();
     let complete = u8::from(log.complete);
     let counts = [log.trials.len(), log.resumed as usize, log.incidents.len()].map(|count| count.to_string());
-    let person = log.begin.person.clone().unwrap_or_default();
-    let age = person.age.map(|age| age.to_string());
-    let person = [age, person.sex, person.handedness].map(|known| known.unwrap_or(MISSING.to_owned()));
-    format!("{subject}\t{observer}\t{first}\t{complete}\t{}\t{}\n", counts.join("\t"), person.join("\t"))
+    let person = person_cells(log.begin.person.as_ref()).join("\t");
+    format!("{subject}\t{observer}\t{first}\t{complete}\t{}\t{person}\n", counts.join("\t"))
+}
+
+/// Returns age, sex and handedness for the list of participants.
+pub(crate) fn person_cells(person: Option<&Person>) -> [String; 3] {
+    let Person { age, sex, handedness } = person.cloned().unwrap_or_default();
+    [age.map(|age| age.to_string()), sex, handedness].map(|known| known.unwrap_or(MISSING.to_owned()))
 }
 
 /// Returns the descriptions of the participant columns; the program overwrites none of them.
@@ -219,12 +223,19 @@ pub(crate) fn participant_columns() -> (Map<String, Value>, &'static [&'static s
         "complete": { "Description": "1 if the sitting is complete" },
         "presentations": { "Description": "Presentations, practice and repeats included" },
         "resumed": { "Description": "Number of times the sitting was resumed" },
+        "incidents": { "Description": "Interruptions and disturbances in the event log" },
+    });
+    let columns = members(&columns).into_iter().chain(person_columns()).collect();
+    (columns, &[])
+}
+
+/// Returns the descriptions of the columns of [`person_cells`].
+pub(crate) fn person_columns() -> Map<String, Value> {
+    members(&json!({
         "age": { "Description": "Age, if it was given", "Units": "year" },
         "sex": { "Description": "Sex, if it was given" },
         "handedness": { "Description": "Preferred hand, if it was given" },
-        "incidents": { "Description": "Interruptions and disturbances in the event log" },
-    });
-    (members(&columns), &[])
+    }))
 }
 
 pub(crate) fn members(object: &Value) -> Map<String, Value> {

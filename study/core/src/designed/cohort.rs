@@ -103,6 +103,7 @@ impl DesignedCohort {
             session,
             plan: self.plan.clone(),
             design: self.design.clone(),
+            person: None,
             observer: json!({ "simulated": self.population }),
             apparatus: self.apparatus.clone(),
             inputs: self.inputs.clone(),

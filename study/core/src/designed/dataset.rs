@@ -2,7 +2,7 @@
 
 use super::log::{Begin, DesignedLog, Event};
 use super::table::{self, forms_tsv, trials_tsv};
-use crate::dataset::table::{PARTICIPANT, members};
+use crate::dataset::table::{PARTICIPANT, members, person_cells, person_columns};
 use crate::dataset::{
     Dataset, DatasetError, ExistingLogPolicy, complete, complete_table, kept, make_folder, pretty, replace,
 };
@@ -19,7 +19,7 @@ pub struct DesignedData {
 }
 
 /// Progress of a session.
-pub(super) enum Progress {
+pub enum Progress {
     /// No log yet.
     New,
     /// The session began and is not complete.
@@ -109,11 +109,10 @@ impl DesignedData {
     }
 
     /// Returns the progress of the session of `begin`, after checking that it may begin or resume.
-    pub(super) fn progress(
-        &self,
-        begin: &Begin,
-        policy: ExistingLogPolicy,
-    ) -> Result<Progress, DatasetError> {
+    ///
+    /// # Errors
+    /// If the log is invalid, in use or of another study, or `policy` refuses it.
+    pub fn progress(&self, begin: &Begin, policy: ExistingLogPolicy) -> Result<Progress, DatasetError> {
         let path = self.log_path(&begin.design, begin.session);
         let log = match DesignedLog::read(&path) {
             _ if !path.exists() => None,
@@ -144,11 +143,15 @@ impl DesignedData {
     }
 
     /// Begins a session: creates its log and writes `begin` as the first line.
-    pub(super) fn begin(&self, begin: Begin) -> Result<(Course, LogWriter), DatasetError> {
+    ///
+    /// # Errors
+    /// If the log exists or cannot be written.
+    pub fn begin(&self, begin: Begin) -> Result<(Course, LogWriter), DatasetError> {
         let path = self.log_path(&begin.design, begin.session);
         make_folder(&self.data.source_folder(begin.session.subject))?;
         let course = Course::new(&begin.design, begin.session);
-        let mut writer = LogWriter::create(&path)?;
+        let writer = LogWriter::create(&path)?;
+        let mut writer = if begin.is_of_a_person() { writer.stamped() } else { writer };
         writer.write(&Event::Begin(Box::new(begin)))?;
         Ok((course, writer))
     }
@@ -161,7 +164,8 @@ impl DesignedData {
         let logs = self.logs()?;
         let Some(begin) = logs.first().map(|log| log.begin.clone()) else { return Ok(()) };
         let design = &begin.design;
-        let mut participants = "participant_id\tobserver\tsessions_complete\n".to_owned();
+        let mut participants =
+            "participant_id\tobserver\tsessions_complete\tage\tsex\thandedness\n".to_owned();
         let mut listed = Vec::new();
         for log in &logs {
             let session = log.begin.session;
@@ -170,7 +174,8 @@ impl DesignedData {
                 let own = logs.iter().filter(|other| other.begin.session.subject == session.subject);
                 let complete = own.filter(|other| other.complete).count();
                 let observer = log.begin.observer_kind().word();
-                participants += &format!("{}\t{observer}\t{complete}\n", session.subject);
+                let person = person_cells(log.begin.person.as_ref()).join("\t");
+                participants += &format!("{}\t{observer}\t{complete}\t{person}\n", session.subject);
             }
             if !log.complete {
                 continue;
@@ -268,5 +273,7 @@ fn description(begin: &Begin) -> Map<String, Value> {
 }
 
 fn participant_columns() -> Map<String, Value> {
-    described(&[table::OBSERVER, ("sessions_complete", "Number of complete sessions")])
+    let mut columns = described(&[table::OBSERVER, ("sessions_complete", "Number of complete sessions")]);
+    columns.extend(person_columns());
+    columns
 }

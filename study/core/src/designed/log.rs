@@ -2,7 +2,7 @@
 
 use crate::log::lines::{LogEnd, read_lines};
 use crate::log::{
-    Incident, InputFile, LogError, LogProblem, LogWriter, LoggedEvent, ObserverKind, Plan, another,
+    Incident, InputFile, LogError, LogProblem, LogWriter, LoggedEvent, ObserverKind, Person, Plan, another,
 };
 use crate::time_of_day::TimeOfDay;
 use crate::trial::Exploration;
@@ -63,6 +63,9 @@ pub struct Begin {
     pub plan: Plan,
     /// Design of the study.
     pub design: Design,
+    /// Optional data on the person.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub person: Option<Person>,
     /// Observer with all parameters that affect the answers, as JSON; `"human"` for a person.
     pub observer: serde_json::Value,
     /// Apparatus with all settings that affect the stimuli, as JSON.
@@ -73,8 +76,8 @@ pub struct Begin {
 }
 
 impl Begin {
-    /// Describes the first difference from an earlier session's configuration; `None` if they are equal. Subject, session, version and
-    /// input files may differ.
+    /// Describes the first difference from an earlier session's configuration; `None` if they are equal. Subject, person, session,
+    /// version and input files may differ.
     #[must_use]
     pub fn differs(&self, earlier: &Self) -> Option<String> {
         let seeds = (self.session.seed, earlier.session.seed);
@@ -89,11 +92,13 @@ impl Begin {
     /// Returns the origin of the answers.
     #[must_use]
     pub fn observer_kind(&self) -> ObserverKind {
-        if self.observer == serde_json::json!("human") {
-            ObserverKind::Human
-        } else {
-            ObserverKind::Simulated
-        }
+        if self.is_of_a_person() { ObserverKind::Human } else { ObserverKind::Simulated }
+    }
+
+    /// Returns true for the session of a person; its events have times of day.
+    #[must_use]
+    pub fn is_of_a_person(&self) -> bool {
+        self.observer == serde_json::json!("human")
     }
 }
 
@@ -136,6 +141,8 @@ pub struct DesignedLog {
     pub complete: bool,
     /// Number of times the session was resumed.
     pub resumed: u32,
+    /// True if the last event, notes aside, explains the end or interruption of the session.
+    has_reason_to_end: bool,
     course: Course,
     path: PathBuf,
     end: LogEnd,
@@ -175,6 +182,7 @@ impl DesignedLog {
             began,
             complete: false,
             resumed: 0,
+            has_reason_to_end: false,
             course,
             path: path.into(),
             end: LogEnd::default(),
@@ -184,6 +192,10 @@ impl DesignedLog {
     fn take_in(&mut self, event: Event) -> Result<(), LogProblem> {
         if self.complete && !matches!(event, Event::Note { .. }) {
             return Err(LogProblem::Order("an event other than a note follows `end`"));
+        }
+        if !matches!(event, Event::Note { .. }) {
+            self.has_reason_to_end =
+                matches!(&event, Event::Incident(incident) if incident.ends_the_sitting());
         }
         let before = self.count();
         match event {
@@ -231,12 +243,19 @@ impl DesignedLog {
         &self.course
     }
 
-    /// Returns the course at its next step, and the log open for writing. Truncates an incomplete last line and logs the resumption.
+    /// Returns the course at its next step, and the log open for writing. Truncates an incomplete last line and logs the
+    /// resumption. If a person's session was interrupted without a logged reason, logs [`Incident::Killed`].
     ///
     /// # Errors
     /// If the log is in use or cannot be written.
     pub fn resume(self, version: &str) -> Result<(Course, LogWriter), LogError> {
         let mut writer = LogWriter::append(&self.path, &self.end)?;
+        if self.begin.is_of_a_person() {
+            writer = writer.stamped();
+            if !self.has_reason_to_end {
+                writer.write(&Event::Incident(Incident::Killed))?;
+            }
+        }
         writer.write(&Event::Resume { steps: self.count(), version: version.to_owned() })?;
         Ok((self.course, writer))
     }

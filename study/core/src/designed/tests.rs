@@ -39,6 +39,8 @@ impl Drop for Folder {
 /// Designs of each kind of method, small.
 fn designs() -> Vec<Design> {
     let levels = json!([0.1, 0.2, 0.3]);
+    let target =
+        json!({ "target": 4, "initial": 0.2, "gain": -0.1, "trials": 5, "floor": 0.05, "ceiling": 0.9 });
     let methods = [
         (json!({ "ask": "choice" }), json!({ "kind": "constant", "levels": levels, "repetitions": 2 })),
         (json!({ "ask": "detection" }), json!({ "kind": "limits", "levels": levels, "series": 3 })),
@@ -47,6 +49,10 @@ fn designs() -> Vec<Design> {
         (
             json!({ "ask": "choice", "unsure": true }),
             json!({ "kind": "quest-plus", "rule": { "trials": 4 } }),
+        ),
+        (
+            json!({ "ask": "rating", "scale": { "least": 1, "most": 7 }, "confidence": { "least": 1, "most": 5 } }),
+            json!({ "kind": "target-rating", "rule": target }),
         ),
     ];
     let design = |(index, (task, method)): (usize, (serde_json::Value, serde_json::Value))| {
@@ -103,7 +109,7 @@ fn steps(data: &DesignedData) -> Vec<Vec<StepEvent>> {
     data.logs().unwrap().into_iter().map(|log| log.steps).collect()
 }
 
-/// 200 kills at random bytes over all methods: whatever a killed process leaves, at most the step under way is lost, and the rest is that
+/// 240 kills at random bytes over all methods: whatever a killed process leaves, at most the step under way is lost, and the rest is that
 /// of a study that was never broken off.
 #[test]
 fn kills_lose_at_most_the_step_under_way() {

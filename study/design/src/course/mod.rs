@@ -137,6 +137,16 @@ impl Course {
         self.trial().map(Step::Trial)
     }
 
+    /// Returns the next trial, which may come after questionnaires or a rest; `None` if no trial follows.
+    #[must_use]
+    pub fn upcoming(&self) -> Option<Trial> {
+        let mut after = self.clone();
+        while let Some(Item::Form { .. }) = after.items.front() {
+            after.items.pop_front();
+        }
+        after.trial()
+    }
+
     /// Returns the settings of each interval of a trial, in the order of presentation: those of the condition, then the stimulus.
     #[must_use]
     pub fn settings(&self, trial: &Trial) -> Vec<Vec<(Setting, Value)>> {
