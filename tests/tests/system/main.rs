@@ -75,6 +75,7 @@ mod study;
 mod study_claims;
 mod study_design;
 mod study_file;
+mod study_keyboard;
 mod study_scripts;
 mod supply;
 mod swap;

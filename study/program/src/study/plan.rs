@@ -40,10 +40,13 @@ const ENDING: &str = ".study.toml";
     least_movement_mm; an excluded trial of an adaptive track excludes the whole track, unless the estimator is \
     map.\n\n\
     Planned options of `flotor analyse`, which reports each deviation from the plan: estimator, type, ratings.\n\n\
+    A file may have a design of one's own instead of a task: factors, a question, a method, questionnaires \
+    (chapter \"Experiments\" of the book). People answer the questions of a design on the terminal.\n\n\
     Examples:\n  \
     flotor study run weber.study.toml\n  \
     flotor study run weber.study.toml --observer human --subject 3\n  \
     flotor study run --observer human weber.study.toml\n  \
+    flotor study run delay.study.toml --observer human --screen terminal\n  \
     flotor study run                              the only study file of this folder: begins or resumes"
 )]
 pub(super) struct RunArguments {
