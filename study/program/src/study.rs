@@ -1,14 +1,19 @@
 //! `flotor study`: perception experiments.
 
 mod bias;
+mod check;
 mod choices;
 mod curve;
+mod design_file;
+mod designed;
 mod explore;
 mod front;
 mod noise;
+mod options_table;
 mod person;
 pub(crate) mod plan;
 mod power;
+mod shipped;
 mod space;
 mod spring;
 
@@ -69,6 +74,8 @@ enum Task {
     Force(ForceArguments),
     /// Run a study file: begin, or resume an interrupted study
     Run(plan::RunArguments),
+    /// Show what a study file does, without a person: schedule, balance, length, power
+    Check(check::CheckArguments),
     /// Explore a spring by hand while its dimensions and material change, without trials
     Explore(explore::ExploreArguments),
     /// Fit a spring model to the measured curve of a real spring
@@ -333,6 +340,7 @@ const FORCE: Subject = Subject { stimulus: "load.force_n", bases: [3.0, 6.0, 9.0
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     match &arguments.task {
         Task::Run(arguments) => plan::run(arguments),
+        Task::Check(arguments) => check::run(arguments),
         Task::Note(arguments) => note(arguments),
         Task::Power(arguments) => power::run(arguments),
         Task::Bias(arguments) => bias::run(arguments),

@@ -69,6 +69,8 @@ enum Role {
     Calibration,
     /// Judges runs from outside.
     SceneTest,
+    /// Designs of experiments, without input and output.
+    StudyDesign,
     Study,
     /// Results from logs.
     Analysis,
@@ -83,8 +85,8 @@ enum Role {
 use Role::{
     Analysis, Calibration, Command, Compat, Contact, Container, Contract, Core, Coupling, Drawing, DropIn,
     Emulator, Fixture, Guard, History, Host, Judge, Lab, Lend, Live, Loader, OfDevices, OfEmulators,
-    OfModels, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram,
-    Sync, Tests, Viewer,
+    OfModels, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyDesign,
+    StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -130,13 +132,26 @@ const CRATES: &[(&str, Role, &[Role])] = &[
     ),
     // Neither the session nor the loader: everything it runs is a process of its own.
     ("lab/scene-test", SceneTest, &[Contract, Core, Plot, Command]),
-    ("study/core", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics]),
-    ("study/analysis", Analysis, &[Core, Statistics, Study]),
+    ("study/design", StudyDesign, &[Statistics]),
+    ("study/core", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics, StudyDesign]),
+    ("study/analysis", Analysis, &[Core, Statistics, StudyDesign, Study]),
     (
         "study/program",
         StudyProgram,
         &[
-            Contract, Loader, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command, Study,
+            Contract,
+            Loader,
+            Sync,
+            Core,
+            Servo,
+            Record,
+            Live,
+            Session,
+            Plot,
+            Statistics,
+            Command,
+            StudyDesign,
+            Study,
             Analysis,
         ],
     ),
@@ -528,6 +543,7 @@ const PORTED: &[&str] = &[
     "study/analysis/src/",
     "study/program/src/",
     "study/core/src/",
+    "study/design/src/",
     "host/sync/src/",
     "models/",
     "viewer/drawing/src/",
