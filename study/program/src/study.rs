@@ -9,6 +9,7 @@ mod designed;
 mod explore;
 mod front;
 mod noise;
+mod note;
 mod options_table;
 mod person;
 pub(crate) mod plan;
@@ -81,7 +82,7 @@ enum Task {
     /// Fit a spring model to the measured curve of a real spring
     Spring(spring::SpringArguments),
     /// Add a note of the experimenter to a subject's log
-    Note(NoteArguments),
+    Note(note::NoteArguments),
     /// Sample size of a difference experiment, by simulated studies
     Power(power::PowerArguments),
     /// Bias and error of each threshold estimator, on observers with a known threshold
@@ -200,19 +201,6 @@ struct Common {
     plan: Option<Plan>,
     #[command(flatten)]
     options: SceneOptions,
-}
-
-#[derive(Args)]
-struct NoteArguments {
-    /// Folder of the study
-    #[arg(value_name = "DIR")]
-    data: PathBuf,
-    /// Number of the subject
-    #[arg(value_name = "SUBJECT", value_parser = count(1..=SubjectNumber::MOST))]
-    subject: u16,
-    /// Text of the note, without names
-    #[arg(value_name = "TEXT")]
-    text: String,
 }
 
 #[derive(Args)]
@@ -341,7 +329,7 @@ pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     match &arguments.task {
         Task::Run(arguments) => plan::run(arguments),
         Task::Check(arguments) => check::run(arguments),
-        Task::Note(arguments) => note(arguments),
+        Task::Note(arguments) => note::run(arguments),
         Task::Power(arguments) => power::run(arguments),
         Task::Bias(arguments) => bias::run(arguments),
         Task::Explore(arguments) => explore::run(arguments),
@@ -567,18 +555,6 @@ fn unfit(error: ApparatusError) -> CommandError {
         ApparatusError::Run(error) => error.into(),
         other => CommandError::Usage(other.to_string()),
     }
-}
-
-fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
-    let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
-    let subjects: Vec<String> = logs.iter().map(|log| log.begin.subject.get().to_string()).collect();
-    let log = logs.into_iter().find(|log| log.begin.subject.get() == arguments.subject);
-    let log = log.ok_or_else(|| {
-        let (data, subject) = (arguments.data.display(), arguments.subject);
-        let subjects = subjects.join(", ");
-        CommandError::Usage(format!("{data}: the study has no subject {subject}; choose one of: {subjects}"))
-    })?;
-    log.annotate(&arguments.text).map_err(|error| CommandError::Failed(error.to_string()))
 }
 
 fn tell(dataset: &Dataset) -> Result<(), CommandError> {

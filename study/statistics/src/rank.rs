@@ -76,7 +76,9 @@ pub fn signed_rank(first: &[f64], second: &[f64]) -> Result<SignedRank, Statisti
     }
     let magnitudes: Vec<f64> = differences.iter().map(|difference| difference.abs()).collect();
     let (ranks, ties) = ranks(&magnitudes);
-    let v: f64 = ranks.iter().zip(&differences).filter(|(_, one)| **one > 0.0).map(|(rank, _)| rank).sum();
+    let positive = ranks.iter().zip(&differences).filter(|(_, one)| **one > 0.0);
+    // A fold from 0, because the sum of no numbers is -0.
+    let v = positive.fold(0.0, |sum, (rank, _)| sum + rank);
     let n = differences.len();
     let is_counted = ties == 0.0 && n == first.len() && n <= COUNTED_MOST;
     let p = if is_counted { counted_tail(v, n) } else { normal_tail(v, count(n), ties) };
@@ -191,6 +193,8 @@ mod tests {
             near(found.v, f64::from(n * (n + 1)) / 2.0);
         }
         assert_eq!(signed_rank(&[1.0, 2.0], &[1.0, 2.0]), Err(StatisticsError::NoDifference));
+        let none = signed_rank(&[0.0, 1.0], &[1.0, 3.0]).expect("pairs").v;
+        assert!(none == 0.0 && none.is_sign_positive(), "{none}");
     }
 
     /// Many differences: counting and the normal approximation agree to a percent.

@@ -74,6 +74,7 @@ mod stop_time;
 mod study;
 mod study_claims;
 mod study_design;
+mod study_designs_in_r;
 mod study_file;
 mod study_keyboard;
 mod study_scripts;

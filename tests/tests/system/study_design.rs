@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used)] // tests may panic
 
+use crate::study_scripts::science_python;
 use flotor_study::log::SittingLog;
 use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::tools::{Tool, required};
 use serde_json::Value;
 use std::path::Path;
 use std::process::Command;
@@ -62,15 +64,10 @@ fn scripts_print_the_same_rows() {
     };
     let expected = rows(&ran.stdout);
     assert!(expected.len() > 15, "{expected:?}");
-    for (program, script) in [("Rscript", "delayed.R"), ("python3", "delayed.py")] {
-        let Ok(printed) = Command::new(program).arg(script).current_dir(scratch.path()).output() else {
-            println!("skipped: {program}");
-            continue;
-        };
-        if !printed.status.success() && String::from_utf8_lossy(&printed.stderr).contains("No module named") {
-            println!("skipped: science-python");
-            continue;
-        }
+    let of_r = required(Tool::R).then(|| ("Rscript".to_owned(), "delayed.R"));
+    let of_python = science_python().map(|python| (python, "delayed.py"));
+    for (program, script) in of_r.into_iter().chain(of_python) {
+        let printed = Command::new(&program).arg(script).current_dir(scratch.path()).output().unwrap();
         let text = String::from_utf8_lossy(&printed.stdout).into_owned();
         assert_eq!(rows(&text), expected, "{program}: {}", String::from_utf8_lossy(&printed.stderr));
     }

@@ -17,7 +17,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// A person at the keyboard of a scene whose device waits for a busy machine.
+/// A person at the keyboard of a scene whose device waits for a busy machine, with a hand that stays in its range.
 struct Keyboard<'a> {
     folder: &'a Scratch,
     scene: String,
@@ -44,6 +44,10 @@ impl<'a> Keyboard<'a> {
             "--least-movement-mm=0",
             "--scene",
             &self.scene,
+            "--set",
+            "device.hand_amplitude_mm=3",
+            "--set",
+            "device.hand_centre_mm=-2",
             "--subject",
             &subject,
         ];
@@ -177,7 +181,12 @@ fn a_person_goes_through_a_study_of_delay_and_stiffness() {
     }
     let result = analysed(scratch.path(), "delayed");
     assert_eq!(result["cells"].as_array().map(Vec::len), Some(8), "{result}");
-    // A second program on a complete or open sitting is refused.
+    let noted =
+        Flotor::with(["study", "note", "delayed", "1", "wrote down later"]).inside(scratch.path()).run();
+    assert_eq!(noted.code, Some(exit_code::OK), "{noted:?}");
+    let log = DesignedLog::read(&keyboard.log_path("delayed", "delay", 1)).unwrap();
+    assert!(log.complete && log.notes.iter().any(|(_, text)| text == "wrote down later"), "{:?}", log.notes);
+    // A complete sitting is not begun again.
     let again = keyboard.program(1).reading("").run();
     assert_eq!(again.code, Some(exit_code::CONFIGURATION), "{again:?}");
 }

@@ -112,26 +112,34 @@ if (length(c(within, between)) > 0 && length(subjects) > 1) {
   }
 }
 
-# By ranks, over the mean of each subject at each level.
+# By ranks, over the mean of each subject at each level; a test of values that are all tied has no result.
 for (factor in within) {
+  if (length(subjects) < 2) break
   wide <- tapply(cells$value, list(cells$subject, factor(cells[[factor]], levels_of[[factor]])), mean)
   test <- friedman.test(wide)
+  if (is.nan(test$p.value)) next
   line(factor, sprintf("chi-square(%d) = %.2f, %s", test$parameter, test$statistic, p_text(test$p.value)))
 }
 for (factor in between) {
+  if (length(subjects) < 2) break
   means <- tapply(cells$value, cells$subject, mean)
   group <- cells[[factor]][match(names(means), cells$subject)]
+  if (length(unique(group)) < length(levels_of[[factor]])) next
   test <- kruskal.test(means, factor(group))
+  if (is.nan(test$p.value)) next
   line(factor, sprintf("chi-square(%d) = %.2f, %s", test$parameter, test$statistic, p_text(test$p.value)))
 }
 for (factor in within) {
+  if (length(subjects) < 1) break
   wide <- tapply(cells$value, list(cells$subject, factor(cells[[factor]], levels_of[[factor]])), mean)
   pairs <- combn(ncol(wide), 2)
   tests <- lapply(seq_len(ncol(pairs)), function(index)
     suppressWarnings(wilcox.test(wide[, pairs[2, index]], wide[, pairs[1, index]], paired = TRUE)))
-  holm <- p.adjust(sapply(tests, function(test) test$p.value), "holm")
-  for (index in seq_along(tests)) {
+  p <- sapply(tests, function(test) test$p.value)
+  # A comparison without any difference counts with 1.
+  holm <- p.adjust(ifelse(is.nan(p), 1, p), "holm")
+  for (index in which(!is.nan(p))) {
     name <- paste0(factor, " ", colnames(wide)[pairs[2, index]], " - ", colnames(wide)[pairs[1, index]])
-    line(name, sprintf("V = %g, %s, Holm %s", tests[[index]]$statistic, p_text(tests[[index]]$p.value), p_text(holm[index])))
+    line(name, sprintf("V = %g, %s, Holm %s", tests[[index]]$statistic, p_text(p[index]), p_text(holm[index])))
   }
 }

@@ -143,9 +143,11 @@ if within + between and len(subjects) > 1:
             f = (rest(products, smaller) - error) / df / (error / error_df)
             row(":".join(term + inside), f"F({df}, {error_df}) = {f:.2f}, {p_text(stats.f.sf(f, df, error_df))}")
 
-# By ranks, over the mean of each subject at each level.
-by_level = {factor: cells.groupby(["subject", factor]).value.mean().unstack()[levels[factor]] for factor in within}
-for factor in within:
+# By ranks, over the mean of each subject at each level; a test of values that are all tied has no result.
+by_level = {
+    factor: cells.groupby(["subject", factor]).value.mean().unstack()[levels[factor]] for factor in within if len(subjects) > 0
+}
+for factor in within if len(subjects) > 1 else []:
     columns = by_level[factor].to_numpy().T
     if len(columns) > 2:
         test = stats.friedmanchisquare(*columns)
@@ -154,29 +156,37 @@ for factor in within:
         # scipy refuses two conditions.
         ranks = stats.rankdata(columns, axis=0).sum(axis=1)
         n, ties = columns.shape[1], sum(6.0 for one, other in columns.T if one == other)
-        chi = 12 * np.sum((ranks - 1.5 * n) ** 2) / (n * 6 - ties)
+        chi = 12 * np.sum((ranks - 1.5 * n) ** 2) / (n * 6 - ties) if n * 6 > ties else np.nan
         p = stats.chi2.sf(chi, 1)
-    row(factor, f"chi-square({len(columns) - 1}) = {chi:.2f}, {p_text(p)}")
-for factor in between:
+    if not np.isnan(p):
+        row(factor, f"chi-square({len(columns) - 1}) = {chi:.2f}, {p_text(p)}")
+for factor in between if len(subjects) > 1 else []:
     means = cells.groupby("subject").value.mean().loc[subjects]
     split = [means[(group[factor] == level).to_numpy()] for level in levels[factor]]
+    if min(len(one) for one in split) == 0 or means.nunique() < 2:
+        continue
     test = stats.kruskal(*split)
     row(factor, f"chi-square({len(split) - 1}) = {test.statistic:.2f}, {p_text(test.pvalue)}")
-for factor in within:
+for factor in by_level:
     columns, names = by_level[factor].to_numpy().T, levels[factor]
     pairs = list(itertools.combinations(range(len(names)), 2))
     tests = []
     for low, high in pairs:
         change = columns[high] - columns[low]
         nonzero = change[change != 0]
+        if len(nonzero) == 0:
+            tests.append((0.0, np.nan))
+            continue
         exact = len(nonzero) == len(change) < 50 and len(set(np.abs(nonzero))) == len(nonzero)
         v = stats.rankdata(np.abs(nonzero))[nonzero > 0].sum()
         test = stats.wilcoxon(nonzero, correction=True, method="exact" if exact else "approx")
         tests.append((v, test.pvalue))
-    p = np.array([p for _, p in tests])
+    # A comparison without any difference counts with 1.
+    p = np.array([1.0 if np.isnan(p) else p for _, p in tests])
     ranked = np.argsort(p, kind="stable")
     holm = np.empty(len(p))
     holm[ranked] = np.minimum(np.maximum.accumulate(p[ranked] * np.arange(len(p), 0, -1)), 1)
     for (low, high), (v, p), corrected in zip(pairs, tests, holm):
         name = f"{factor} {shortest(names[high])} - {shortest(names[low])}"
-        row(name, f"V = {shortest(v)}, {p_text(p)}, Holm {p_text(corrected)}")
+        if not np.isnan(p):
+            row(name, f"V = {shortest(v)}, {p_text(p)}, Holm {p_text(corrected)}")

@@ -243,18 +243,29 @@ impl DesignedLog {
         &self.course
     }
 
+    /// Adds a note of the experimenter, also to a complete session.
+    ///
+    /// # Errors
+    /// If the log is in use or cannot be written.
+    pub fn annotate(self, text: &str) -> Result<(), LogError> {
+        self.writer()?.write(&Event::Note { text: text.to_owned() })
+    }
+
+    /// Opens the log for writing, with times of day for a person.
+    fn writer(&self) -> Result<LogWriter, LogError> {
+        let writer = LogWriter::append(&self.path, &self.end)?;
+        Ok(if self.begin.is_of_a_person() { writer.stamped() } else { writer })
+    }
+
     /// Returns the course at its next step, and the log open for writing. Truncates an incomplete last line and logs the
     /// resumption. If a person's session was interrupted without a logged reason, logs [`Incident::Killed`].
     ///
     /// # Errors
     /// If the log is in use or cannot be written.
     pub fn resume(self, version: &str) -> Result<(Course, LogWriter), LogError> {
-        let mut writer = LogWriter::append(&self.path, &self.end)?;
-        if self.begin.is_of_a_person() {
-            writer = writer.stamped();
-            if !self.has_reason_to_end {
-                writer.write(&Event::Incident(Incident::Killed))?;
-            }
+        let mut writer = self.writer()?;
+        if self.begin.is_of_a_person() && !self.has_reason_to_end {
+            writer.write(&Event::Incident(Incident::Killed))?;
         }
         writer.write(&Event::Resume { steps: self.count(), version: version.to_owned() })?;
         Ok((self.course, writer))

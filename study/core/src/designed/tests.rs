@@ -40,7 +40,7 @@ impl Drop for Folder {
 fn designs() -> Vec<Design> {
     let levels = json!([0.1, 0.2, 0.3]);
     let target =
-        json!({ "target": 4, "initial": 0.2, "gain": -0.1, "trials": 5, "floor": 0.05, "ceiling": 0.9 });
+        json!({ "target": 4, "initial": 0.2, "gain": 0.1, "trials": 5, "floor": 0.05, "ceiling": 0.9 });
     let methods = [
         (json!({ "ask": "choice" }), json!({ "kind": "constant", "levels": levels, "repetitions": 2 })),
         (json!({ "ask": "detection" }), json!({ "kind": "limits", "levels": levels, "series": 3 })),
