@@ -63,6 +63,8 @@ enum Role {
     /// An allocator for one process of the lab.
     Guard,
     Calibration,
+    /// Finds the law of a real thing.
+    Identify,
     /// Judges runs from outside.
     SceneTest,
     Study,
@@ -78,8 +80,8 @@ enum Role {
 
 use Role::{
     Analysis, Calibration, Command, Compat, Container, Contract, Core, Coupling, Drawing, DropIn, Emulator,
-    Fixture, Guard, History, Host, Judge, Lab, Lend, Live, OfDevices, OfEmulators, OfModels, Plot, Plugin,
-    Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
+    Fixture, Guard, History, Host, Identify, Judge, Lab, Lend, Live, OfDevices, OfEmulators, OfModels, Plot,
+    Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -116,6 +118,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
         &[Contract, Sync, Core, Coupling, Servo, Record, Live, Session, Plot, Command, Judge],
     ),
     ("lab/calibration", Calibration, &[Contract, Sync, Core, Servo, Record, Live, Session, Plot, Command]),
+    ("lab/identify", Identify, &[Contract, Record, Plot, Command]),
     // Neither the session nor the loader: everything it runs is a process of its own.
     ("lab/scene-test", SceneTest, &[Contract, Core, Plot, Command]),
     ("study/core", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics]),
@@ -496,6 +499,7 @@ const PORTED: &[&str] = &[
     "host/command/src/",
     "host/core/src/",
     "host/coupling/src/",
+    "lab/identify/src/",
     "lab/judge/src/",
     "lab/measure/src/",
     "host/live/src/",
