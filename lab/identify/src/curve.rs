@@ -1,7 +1,7 @@
 //! Curve of an identified law for the force model `measured`, and a scene that renders it.
 
 use crate::identification::Identification;
-use crate::law::{Connection, Law, Scales};
+use crate::law::{Connection, Law, Motion, Scales};
 use crate::measurement::Measurement;
 
 /// Rows of the curve, the first without force.
@@ -27,7 +27,8 @@ pub(crate) fn at_rest(identification: &Identification, measurement: &Measurement
         .collect();
     // So much time between the places that nothing is left of the motion.
     let times: Vec<f64> = (0..ROWS).map(|row| f64::from(row) * 1.0e9).collect();
-    let level_n = law.respond(&values, Connection::Presses, &scales, &times, &places).level_n;
+    let motion = Motion { time_s: &times, displacement_m: &places, smooth_m: &places };
+    let level_n = law.respond(&values, Connection::Presses, &scales, motion).level_n;
     let mut most_n = 0.0_f64;
     let rows = places.iter().zip(level_n).enumerate().map(|(row, (place_m, level_n))| {
         most_n = if row == 0 { 0.0 } else { most_n.max(level_n) };

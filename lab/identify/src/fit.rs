@@ -222,9 +222,8 @@ impl<'a> Problem<'a> {
         let forms = self.forms();
         let parameters: Vec<f64> =
             forms.iter().zip(coordinates).map(|(form, at)| self.scales.parameter(form, *at)).collect();
-        let displacement_m = self.cells.smooth_m();
-        let response =
-            self.law.respond(&parameters, self.connection, &self.scales, self.cells.time_s(), displacement_m);
+        let motion = self.cells.motion();
+        let response = self.law.respond(&parameters, self.connection, &self.scales, motion);
         let device = coordinates.iter().skip(forms.len()).copied();
         let delay_s = if self.has_delay() { device.clone().next().map_or(0.0, delay_s) } else { 0.0 };
         (response, delay_s, device.skip(usize::from(self.has_delay())).collect())

@@ -22,7 +22,8 @@ fn runs() -> u64 {
 fn identified(plant: &Plant) -> Vec<(Run, Identification)> {
     let one = |seed| {
         let run = plant.measure(seed);
-        let identified = identify(&run.measurement, &Law::ALL, Device::default()).unwrap();
+        let identified =
+            identify(&run.measurement, &Law::ALL, Device::default()).expect("a law can be fitted");
         (run, identified)
     };
     (0..runs()).into_par_iter().map(one).collect()

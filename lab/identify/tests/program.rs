@@ -24,12 +24,12 @@ fn table(folder: &Path, header: &str, factor: f64, force_n: impl Fn(f64, f64) ->
         let noise_n = 0.005 * (f64::from(index) * f64::from(index) * 0.7).sin();
         text += &format!("{time_s},{},{}\n", x * factor, force_n((x - 0.5e-3).max(0.0), v) + noise_n);
     }
-    std::fs::write(folder.join("thing.csv"), text).unwrap();
+    std::fs::write(folder.join("thing.csv"), text).expect("the table can be written");
 }
 
 fn json(output: &Output) -> Value {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap()
+    serde_json::from_slice(&output.stdout).expect("the output is JSON")
 }
 
 #[test]

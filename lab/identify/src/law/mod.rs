@@ -75,6 +75,17 @@ impl Unit {
     }
 }
 
+/// Motion of a probe.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Motion<'a> {
+    /// Times of the samples, s.
+    pub(crate) time_s: &'a [f64],
+    /// Displacements, m.
+    pub(crate) displacement_m: &'a [f64],
+    /// Displacements without most of their noise, m, for an element that each change of direction works on.
+    pub(crate) smooth_m: &'a [f64],
+}
+
 /// Scales of a measurement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scales {
@@ -236,21 +247,20 @@ impl Law {
         }
     }
 
-    /// Returns the response to displacements, m, at times, s, with the parameters in the order of [`Self::forms`].
+    /// Returns the response to a motion, with the parameters in the order of [`Self::forms`].
     pub(crate) fn respond(
         self,
         parameters: &[f64],
         connection: Connection,
         scales: &Scales,
-        time_s: &[f64],
-        displacement_m: &[f64],
+        motion: Motion<'_>,
     ) -> Response {
-        let depths = |contact_m: f64| {
-            displacement_m.iter().map(move |x| match connection {
-                Connection::Presses => (x - contact_m).max(0.0),
-                Connection::Attached => x - contact_m,
-            })
+        let Motion { time_s, displacement_m, smooth_m } = motion;
+        let depth = move |x: &f64, contact_m: f64| match connection {
+            Connection::Presses => (x - contact_m).max(0.0),
+            Connection::Attached => x - contact_m,
         };
+        let depths = |contact_m: f64| displacement_m.iter().map(move |x| depth(x, contact_m));
         match (self, parameters) {
             (Self::Linear, &[k, contact]) => Response::level(depths(contact).map(|d| k * d).collect()),
             (Self::Hertz, &[k, contact]) => {
@@ -267,7 +277,13 @@ impl Law {
                 Response::level(connection.limited(level_n))
             }
             (Self::Hysteresis, &[k, sticking, friction, contact]) => {
-                let level_n = hysteresis::force_n(k, sticking, friction, depths(contact));
+                let level_n = hysteresis::force_n(
+                    k,
+                    sticking,
+                    friction,
+                    depths(contact),
+                    smooth_m.iter().map(|x| depth(x, contact)),
+                );
                 Response::level(connection.limited(level_n))
             }
             (Self::Table, knots) => Response::level(table::force_n(knots, scales, displacement_m)),

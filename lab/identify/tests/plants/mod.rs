@@ -1,6 +1,6 @@
 //! Simulated things behind a simulated rig: the truth against which identifications are judged.
 //!
-//! The things are integrated in steps of a tenth of a sample, by code that shares nothing with the laws under test.
+//! The things are integrated in steps of a hundredth of a sample, by code that shares nothing with the laws under test.
 
 use flotor_identify::Measurement;
 use rand_core::{Rng, SeedableRng};
@@ -9,8 +9,8 @@ use std::f64::consts::TAU;
 
 /// Period of the samples, s.
 const PERIOD_S: f64 = 1.0e-3;
-/// Steps of the simulation in a sample.
-const STEPS: usize = 10;
+/// Steps of the simulation in a sample: the velocity of a step is that of its middle, half a step early.
+const STEPS: usize = 100;
 /// Delay of the force, in samples.
 const DELAY_SAMPLES: usize = 1;
 /// Standard deviation of the noise of force, N, and displacement, m.
@@ -19,7 +19,7 @@ const NOISE_M: f64 = 2.0e-6;
 
 /// Motion of the probe, m over s, and its depth, m.
 #[derive(Clone, Copy)]
-pub enum Motion {
+pub(crate) enum Motion {
     /// Ramps of several rates with holds, then a chirp.
     RampsAndChirp,
     /// Ramps of several rates with holds.
@@ -29,27 +29,27 @@ pub enum Motion {
 }
 
 /// Thing under test.
-pub struct Plant {
-    pub name: &'static str,
+pub(crate) struct Plant {
+    pub(crate) name: &'static str,
     /// Id of the law; `none of these` outside the ladder.
-    pub law: &'static str,
+    pub(crate) law: &'static str,
     /// Parameters of the law; the contact is drawn for each run.
-    pub parameters: &'static [(&'static str, f64)],
-    pub depth_m: f64,
-    pub motion: Motion,
+    pub(crate) parameters: &'static [(&'static str, f64)],
+    pub(crate) depth_m: f64,
+    pub(crate) motion: Motion,
     /// Force, N, for a depth, m, its velocity, m/s, the step, s, and the state of the thing.
-    pub force: fn(f64, f64, f64, &mut [f64; 2]) -> f64,
+    pub(crate) force: fn(f64, f64, f64, &mut [f64; 2]) -> f64,
 }
 
 /// Measurement of a plant with its truth.
-pub struct Run {
-    pub measurement: Measurement,
-    pub truth: Vec<(&'static str, f64)>,
+pub(crate) struct Run {
+    pub(crate) measurement: Measurement,
+    pub(crate) truth: Vec<(&'static str, f64)>,
 }
 
 impl Plant {
     /// Measures the thing in a run of its own: contact, rates, times and noise are drawn anew.
-    pub fn measure(&self, seed: u64) -> Run {
+    pub(crate) fn measure(&self, seed: u64) -> Run {
         let mut noise =
             Noise(Pcg64Mcg::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ self.name.len() as u64));
         let contact_m = 1.0e-3 * (0.2 + 0.8 * noise.uniform());
@@ -75,7 +75,10 @@ impl Plant {
         let (force_n, times) =
             (force_n.collect(), (0..x.len()).map(|index| index as f64 * PERIOD_S).collect());
         let truth = self.parameters.iter().copied().chain([("contact_m", contact_m)]).collect();
-        Run { measurement: Measurement::new(Some(times), x, force_n).unwrap(), truth }
+        Run {
+            measurement: Measurement::new(Some(times), x, force_n).expect("the samples are a measurement"),
+            truth,
+        }
     }
 }
 
@@ -128,7 +131,7 @@ fn maxwell(state: &mut f64, stiffness: f64, relaxation_s: f64, velocity: f64, st
 }
 
 /// Returns all plants.
-pub fn all() -> Vec<Plant> {
+pub(crate) fn all() -> Vec<Plant> {
     use Motion::{Chirp, Ramps, RampsAndChirp};
     let plant = |name, law, parameters, depth_m, motion, force| Plant {
         name,
