@@ -64,7 +64,7 @@ impl Plant {
             let [from, to] = [before_m, at_m].map(|x| (x - contact_m).max(0.0));
             let force_n = (self.force)(to, (to - from) / step_s, step_s, &mut state).max(0.0);
             before_m = at_m;
-            if index % STEPS == 0 {
+            if index.is_multiple_of(STEPS) {
                 x.push(at_m + NOISE_M * noise.normal());
                 true_n.push(force_n);
             }
