@@ -1,17 +1,16 @@
 //! `flotor new`: creates the folder of a plugin.
 
-use crate::scaffold::{Contract, Language, PluginName, Scaffold, ScaffoldError, scaffold};
+use crate::scaffold::{Contract, Language, PluginName, Scaffold, ScaffoldError, Template, scaffold};
 use clap::{Args, ValueEnum};
 use flotor_command::say;
 use flotor_command::{CommandError, command_line, quoted, style};
-use flotor_hal::abi::PluginKind;
 use flotor_session::registry::Registry;
 use std::path::{Path, PathBuf};
 
 /// Create a plugin: a folder that builds, passes `validate` and runs.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  flotor new model jelly\n  flotor new device crank\n  \
-    flotor new model jelly --language c\n  flotor new model jelly --vendor\n\nCreates the folder ./NAME with a plugin that builds, passes \
+    flotor new model jelly --language c\n  flotor new model jelly --beside\n  flotor new model jelly --vendor\n\nCreates the folder ./NAME with a plugin that builds, passes \
     `flotor validate` and runs in the scene of the same folder.\nIt overwrites no file.")]
 pub(crate) struct NewArguments {
     /// Kind of plugin
@@ -19,6 +18,9 @@ pub(crate) struct NewArguments {
     kind: Kind,
     /// Id of the plugin: at most 32 lower-case letters, digits and single hyphens, a letter first
     name: String,
+    /// A model too slow for the loop: it computes asynchronously and publishes contacts
+    #[arg(long)]
+    beside: bool,
     /// Programming language
     #[arg(long, value_enum, default_value = "rust")]
     language: Language,
@@ -40,15 +42,21 @@ enum Kind {
 }
 
 pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
-    let kind = match arguments.kind {
-        Kind::Model => PluginKind::Model,
-        Kind::Device => PluginKind::Device,
+    let template = match (arguments.kind, arguments.beside) {
+        (Kind::Model, false) => Template::Model,
+        (Kind::Model, true) => Template::AsynchronousModel,
+        (Kind::Device, false) => Template::Device,
+        (Kind::Device, true) => {
+            let problem =
+                "`--beside` is for models: the loop reads and writes a device in every tick; omit it";
+            return Err(CommandError::Usage(problem.to_owned()));
+        }
     };
     let name = PluginName::new(&arguments.name).map_err(ScaffoldError::from)?;
     refuse_an_id_in_use(&name)?;
     let sources = if arguments.vendor { Contract::copied } else { Contract::of_installation };
     let contract = sources(arguments.hal.as_deref())?;
-    let made = scaffold(Path::new("."), &name, kind, arguments.language, &contract)?;
+    let made = scaffold(Path::new("."), &name, template, arguments.language, &contract)?;
     report(&name, &made);
     Ok(())
 }
