@@ -14,8 +14,7 @@ const LONGEST_S: f64 = 0.02;
 /// Fewest cells, if there are as many samples.
 const LEAST_CELLS: usize = 240;
 /// Largest share of the displacement's span that a cell covers, exceeded by 2 % of the cells only.
-const WIDEST: f64 = 0.04;
-
+const WIDEST: f64 = 0.08;
 /// Smallest noise, as a share of the largest force: differences of laws below it do not count.
 pub(crate) const LEAST_NOISE: f64 = 1.0e-4;
 
@@ -87,6 +86,11 @@ impl<'a> Cells<'a> {
             displacement_m: self.measurement.displacement_m(),
             smooth_m: &self.smooth_m,
         }
+    }
+
+    /// Returns the number of samples in each cell.
+    pub(crate) fn size(&self) -> usize {
+        self.size
     }
 
     pub(crate) fn count(&self) -> usize {
@@ -191,7 +195,7 @@ impl<'a> Delayed<'a> {
 }
 
 /// Returns the mean around each value over about so many values, an odd number, and over fewer at the ends.
-fn moving_mean(values: &[f64], size: usize) -> Vec<f64> {
+pub(crate) fn moving_mean(values: &[f64], size: usize) -> Vec<f64> {
     let mut sum = 0.0;
     let sums: Vec<f64> = std::iter::once(0.0)
         .chain(values.iter().map(|value| {

@@ -1,10 +1,11 @@
 //! Correction of the bias from noise of the displacement.
 //!
-//! Noise of the displacement reduces the estimated dependence of the force on the velocity, however many samples there are. A fit of
-//! the same measurement with as much noise again has that bias twice, and the difference is the correction (simulation and
-//! extrapolation, Cook and Stefanski 1994). Pairs of opposite noise remove what is linear in it.
+//! Noise of the displacement reduces the estimated dependence of the force on the velocity, and works a dry friction to and fro, however
+//! many samples there are. The correction is that of a parametric bootstrap (Efron and Tibshirani 1993, section 10.6): for a smooth motion
+//! like the measured one, the fitted law gives the force; the motion with as much noise as the measured one has is fitted to this force,
+//! and the step from the known coordinates is the bias. Pairs of opposite noise remove what is linear in it.
 
-use crate::cells::Cells;
+use crate::cells::{Cells, moving_mean};
 use crate::fit::{Device, Fit, Problem};
 use flotor_hal::math;
 use nalgebra::DVector;
@@ -14,24 +15,46 @@ use std::f64::consts::TAU;
 
 /// Pairs of opposite noise.
 const PAIRS: u64 = 2;
+/// Cells over which the motion like the measured one is averaged.
+const LIKENESS: usize = 4;
+/// Noise of this mean that is no motion, in standard deviations.
+const PLAY: f64 = 2.0;
 
 /// Returns the coordinates of a fit without the bias from noise of the displacement.
 pub(crate) fn corrected(fit: &Fit, cells: &Cells<'_>, device: Device) -> Option<DVector<f64>> {
-    let deviation_m = noise_of_displacement(cells.measurement().displacement_m());
-    let rest = Problem::of(fit, cells, device, cells.scales()).step()?;
+    let (measurement, scales) = (cells.measurement(), cells.scales());
+    let deviation_m = noise_of_displacement(measurement.displacement_m());
+    let motion_m = likeness(measurement.displacement_m(), LIKENESS * cells.size(), deviation_m);
+    let motion = measurement.replaced(motion_m.clone(), measurement.force_n().to_vec());
+    let single = Cells::single(&motion);
+    let force_n = Problem::of(fit, &single, device, scales).prediction_n(&fit.coordinates);
+    let exact = measurement.replaced(motion_m, force_n);
     let mut bias = DVector::zeros(fit.coordinates.len());
     for pair in 0..PAIRS {
         let mut generator = Pcg64Mcg::seed_from_u64(pair);
         let noise_m: Vec<f64> =
             (0..cells.time_s().len()).map(|_| deviation_m * normal(&mut generator)).collect();
         for sign in [1.0, -1.0] {
-            let noisy = cells.measurement().displaced(noise_m.iter().map(|noise_m| sign * noise_m));
+            let noisy = exact.displaced(noise_m.iter().map(|noise_m| sign * noise_m));
             let noisy = cells.of_same_size(&noisy)?;
-            let problem = Problem::of(fit, &noisy, device, cells.scales());
-            bias += (problem.step()? - &rest) / (2 * PAIRS) as f64;
+            bias += Problem::of(fit, &noisy, device, scales).step_of_data()? / (2 * PAIRS) as f64;
         }
     }
+    let rest = Problem::of(fit, cells, device, scales).step()?;
     Some(&fit.coordinates + rest - bias)
+}
+
+/// Returns a motion like the measured one without its noise: means over so many samples, which move only by more than most of their noise. A place
+/// where the probe rests has one displacement; else a dry friction would be worked to and fro here, too.
+fn likeness(displacement_m: &[f64], size: usize, deviation_m: f64) -> Vec<f64> {
+    let means_m = moving_mean(displacement_m, size);
+    let play_m = PLAY * deviation_m / (size as f64).sqrt();
+    let mut at_m = means_m.first().copied().unwrap_or(0.0);
+    let follow = |mean_m: f64| {
+        at_m = at_m.clamp(mean_m - play_m, mean_m + play_m);
+        at_m
+    };
+    means_m.into_iter().map(follow).collect()
 }
 
 /// Estimates the standard deviation of the displacement's noise: from third, fourth and fifth differences, the smallest, because a fast
@@ -66,6 +89,20 @@ fn normal(generator: &mut Pcg64Mcg) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_motion_like_the_measured_one_rests_where_the_probe_rests() {
+        let mut generator = Pcg64Mcg::seed_from_u64(5);
+        let motion_m = |index: u32| 1.0e-6 * f64::from(index.min(1000));
+        let x: Vec<f64> = (0..3000).map(|index| motion_m(index) + 2.0e-6 * normal(&mut generator)).collect();
+        let found = likeness(&x, 25, 2.0e-6);
+        let path_m =
+            |places_m: &[f64]| places_m.windows(2).map(|pair| (pair[1] - pair[0]).abs()).sum::<f64>();
+        let (rest, means_m) = (1100..2900, moving_mean(&x, 25));
+        // The means leave a band of two deviations to each side in one of twenty places, and cross it in fewer.
+        assert!(path_m(&found[rest.clone()]) < 0.1 * path_m(&means_m[rest]));
+        assert!((found[500] - x[500]).abs() < 1.0e-5, "{}", found[500]);
+    }
 
     #[test]
     fn noise_is_found_under_a_motion() {

@@ -188,8 +188,19 @@ impl<'a> Problem<'a> {
 
     /// Returns the step of Gauss and Newton from the coordinates; `None` if they are not determined.
     pub(crate) fn step(&self) -> Option<DVector<f64>> {
+        self.step_along(&self.residuals()?)
+    }
+
+    /// Returns the same step without the pull of the priors.
+    pub(crate) fn step_of_data(&self) -> Option<DVector<f64>> {
+        let mut residuals = self.residuals()?;
+        residuals.iter_mut().skip(self.cells.count()).for_each(|of_prior| *of_prior = 0.0);
+        self.step_along(&residuals)
+    }
+
+    fn step_along(&self, residuals: &DVector<f64>) -> Option<DVector<f64>> {
         let jacobian = self.jacobian()?;
-        solve(jacobian.tr_mul(&jacobian), &-jacobian.tr_mul(&self.residuals()?))
+        solve(jacobian.tr_mul(&jacobian), &-jacobian.tr_mul(residuals))
     }
 
     fn forms(&self) -> &'static [Form] {
@@ -230,7 +241,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Returns the force that the device measures in each cell, N.
-    fn prediction_n(&self, coordinates: &DVector<f64>) -> Vec<f64> {
+    pub(crate) fn prediction_n(&self, coordinates: &DVector<f64>) -> Vec<f64> {
         let (response, delay_s, mut errors) = self.response(coordinates);
         let friction_n = match self.device.friction_n {
             deviation_n if deviation_n > 0.0 => deviation_n * errors.remove(0),

@@ -112,6 +112,11 @@ impl Measurement {
         Self { displacement_m, ..self.clone() }
     }
 
+    /// Returns a measurement of another motion and force at the same times. Not real-time.
+    pub(crate) fn replaced(&self, displacement_m: Vec<f64>, force_n: Vec<f64>) -> Self {
+        Self { time_s: self.time_s.clone(), displacement_m, force_n }
+    }
+
     /// Returns the means of groups of successive samples, at most `most` of them. Not real-time.
     pub(crate) fn coarse(&self, most: usize) -> Self {
         let size = self.force_n.len().div_ceil(most.max(1)).max(1);

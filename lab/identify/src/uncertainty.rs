@@ -1,16 +1,21 @@
 //! Errors of fitted parameters, and structure of residuals.
 //!
-//! The residuals of successive cells are correlated where the law is not exact or the noise is filtered. The covariance of the
-//! coordinates is `A⁻¹ B A⁻¹` with the normal matrix `A`, and with `B` from the residuals themselves: products over neighbouring cells
-//! with falling weights (Newey and West 1987), as many as the first autocorrelation asks for (Andrews 1991).
+//! The residuals of successive cells are correlated: the cells are means over overlapping windows, and the noise of the device may be
+//! filtered. Their size differs, too: noise of the displacement counts where the thing is stiff. The variance of a coordinate is thus
+//! that of the sum of its influences, the rows of `A⁻¹ Jᵀ r` with the normal matrix `A`, as a correlated series: its first-order
+//! autoregression is removed, the rest is summed over neighbours with falling weights (Newey and West 1987), as many as the
+//! autocorrelation of the rest asks for (Andrews 1991), and the autoregression is put back (Andrews and Monahan 1992). Without the first
+//! step the weights lose a part of the correlation, and the intervals are too narrow. Each residual is divided by one less its leverage,
+//! as in a jackknife (MacKinnon and White 1985): a contact is determined by few cells, which the fit follows.
 
 use crate::fit::Fit;
 use crate::linear_system::invert;
-use crate::measurement::mean;
 use nalgebra::DMatrix;
 
 /// Quantile of the normal distribution for a two-sided interval of 95 %.
 const QUANTILE_95: f64 = 1.959_963_985;
+/// Largest autocorrelation of influences that is put back: above it the sum is that of a random walk.
+const MOST_CORRELATION: f64 = 0.97;
 
 /// Returns the half width of the 95 % interval of each coordinate of the fit; `None` if the measurement does not determine them.
 pub(crate) fn half_widths(fit: &Fit, noise_n: f64) -> Option<Vec<f64>> {
@@ -18,21 +23,37 @@ pub(crate) fn half_widths(fit: &Fit, noise_n: f64) -> Option<Vec<f64>> {
     let weight = 1.0 / (noise_n * noise_n);
     let normal = fit.jacobian_n.tr_mul(&fit.jacobian_n) * weight + DMatrix::from_diagonal(&fit.precisions);
     let inverse = invert(normal)?;
-    let scores = DMatrix::from_fn(count, width, |cell, column| {
-        fit.jacobian_n[(cell, column)] * fit.residuals_n[cell] * weight
+    let gains = &fit.jacobian_n * &inverse * weight;
+    let influences = DMatrix::from_fn(count, width, |cell, column| {
+        let leverage = gains.row(cell).dot(&fit.jacobian_n.row(cell));
+        gains[(cell, column)] * fit.residuals_n[cell] / (1.0 - leverage).max(0.1)
     });
-    let mut middle = scores.tr_mul(&scores);
-    let lags = bandwidth(&fit.residuals_n).min(count / 4);
-    for lag in 1..=lags {
+    let of_priors = &inverse * DMatrix::from_diagonal(&fit.precisions) * &inverse;
+    let widths = influences.column_iter().enumerate().map(|(column, influence)| {
+        let Sum { variance, lags } = variance_of_sum(influence.as_slice());
+        let free = (count as f64 - width as f64).max(1.0);
+        quantile_95(free / (1.0 + lags as f64)) * (variance + of_priors[(column, column)]).max(0.0).sqrt()
+    });
+    Some(widths.collect())
+}
+
+/// Variance of the sum of a correlated series, and the number of neighbours that it comes from.
+struct Sum {
+    variance: f64,
+    lags: usize,
+}
+
+fn variance_of_sum(values: &[f64]) -> Sum {
+    let correlation = correlation(values);
+    let rest: Vec<f64> = values.windows(2).map(|pair| pair[1] - correlation * pair[0]).collect();
+    let lags = bandwidth(&rest).min(values.len() / 4);
+    let covariances = (1..=lags).map(|lag| {
         let share = 1.0 - lag as f64 / (lags as f64 + 1.0);
-        let product = scores.rows(lag, count - lag).tr_mul(&scores.rows(0, count - lag));
-        middle += (&product + product.transpose()) * share;
-    }
-    let free = (count as f64 - width as f64).max(1.0);
-    let middle = middle * (count as f64 / free) + DMatrix::from_diagonal(&fit.precisions);
-    let covariance = &inverse * middle * &inverse;
-    let quantile = quantile_95(free / (1.0 + lags as f64));
-    Some(covariance.diagonal().iter().map(|variance| quantile * variance.max(0.0).sqrt()).collect())
+        2.0 * share * autocovariance(&rest, lag)
+    });
+    let density = autocovariance(&rest, 0) + covariances.sum::<f64>();
+    let kept = 1.0 - correlation;
+    Sum { variance: density * values.len() as f64 / (kept * kept), lags }
 }
 
 /// Structure of residuals, which noise does not have.
@@ -62,16 +83,19 @@ fn autocovariance(values: &[f64], lag: usize) -> f64 {
     products / values.len() as f64
 }
 
+/// Returns the first autocorrelation.
+fn correlation(values: &[f64]) -> f64 {
+    let square = autocovariance(values, 0);
+    let ratio = if square > 0.0 { autocovariance(values, 1) / square } else { 0.0 };
+    ratio.clamp(-MOST_CORRELATION, MOST_CORRELATION)
+}
+
 /// Returns the number of neighbours for a first-order autocorrelation (Andrews 1991, equations 5.3 and 6.4).
-fn bandwidth(residuals: &[f64]) -> usize {
-    let centre = mean(residuals);
-    let centred: Vec<f64> = residuals.iter().map(|residual| residual - centre).collect();
-    let square = autocovariance(&centred, 0);
-    let correlation =
-        if square > 0.0 { (autocovariance(&centred, 1) / square).clamp(-0.97, 0.97) } else { 0.0 };
+fn bandwidth(values: &[f64]) -> usize {
+    let correlation = correlation(values);
     let (minus, plus) = (1.0 - correlation, 1.0 + correlation);
     let alpha = 4.0 * correlation * correlation / (minus * minus * plus * plus);
-    let lags = 1.1447 * flotor_hal::math::cbrt(alpha * residuals.len() as f64);
+    let lags = 1.1447 * flotor_hal::math::cbrt(alpha * values.len() as f64);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // below the number of cells
     let lags = lags.floor() as usize;
     lags

@@ -84,10 +84,9 @@ enum Role {
 
 use Role::{
     Analysis, Calibration, Command, Compat, Contact, Container, Contract, Core, Coupling, Drawing, DropIn,
-    Emulator, Fixture, Guard, History, Host, Identify, Judge, Lab, Lend, Live, Loader, OfDevices, OfEmulators,
-    OfModels, Plot,
-    Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram,
-    Sync, Tests, Viewer,
+    Emulator, Fixture, Guard, History, Host, Identify, Judge, Lab, Lend, Live, Loader, OfDevices,
+    OfEmulators, OfModels, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study,
+    StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
