@@ -67,6 +67,8 @@ enum Role {
     /// An allocator for one process of the lab.
     Guard,
     Calibration,
+    /// Finds the law of a real thing.
+    Identify,
     /// Judges runs from outside.
     SceneTest,
     /// Designs of experiments, without input and output.
@@ -84,9 +86,9 @@ enum Role {
 
 use Role::{
     Analysis, Calibration, Command, Compat, Contact, Container, Contract, Core, Coupling, Drawing, DropIn,
-    Emulator, Fixture, Guard, History, Host, Judge, Lab, Lend, Live, Loader, OfDevices, OfEmulators,
-    OfModels, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyDesign,
-    StudyProgram, Sync, Tests, Viewer,
+    Emulator, Fixture, Guard, History, Host, Identify, Judge, Lab, Lend, Live, Loader, OfDevices,
+    OfEmulators, OfModels, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study,
+    StudyDesign, StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -130,6 +132,7 @@ const CRATES: &[(&str, Role, &[Role])] = &[
         Calibration,
         &[Contract, Loader, Sync, Core, Servo, Record, Live, Session, Plot, Command],
     ),
+    ("lab/identify", Identify, &[Contract, Record, Plot, Command]),
     // Neither the session nor the loader: everything it runs is a process of its own.
     ("lab/scene-test", SceneTest, &[Contract, Core, Plot, Command]),
     ("study/design", StudyDesign, &[Statistics]),
@@ -530,6 +533,7 @@ const PORTED: &[&str] = &[
     "host/contact/src/",
     "host/core/src/",
     "host/coupling/src/",
+    "lab/identify/src/",
     "lab/judge/src/",
     "lab/measure/src/",
     "host/live/src/",

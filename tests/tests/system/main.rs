@@ -32,6 +32,7 @@ mod grip;
 mod hand_recording;
 mod hanging_device;
 mod haply;
+mod identify;
 mod inputs;
 mod installation;
 #[cfg(feature = "drop-ins")]
