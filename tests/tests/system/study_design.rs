@@ -27,7 +27,7 @@ const DETECTION: &str = "study = \"seat\"\n\
 #[test]
 fn a_choice_of_the_scene_is_detected() {
     let scratch = Scratch::default();
-    let _ = scratch.file("seat.study.toml", DETECTION.to_owned());
+    let _ = scratch.file("seat.study.toml", DETECTION);
     let ran = flotor(scratch.path(), &["study", "run", "seat.study.toml"]);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let table =
@@ -50,7 +50,7 @@ fn scripts_print_the_same_rows() {
     let start = book.find("study = \"delay\"").unwrap();
     let text = &book[start..start + book[start..].find("```").unwrap()];
     assert!(text.lines().count() <= 40, "{} lines", text.lines().count());
-    let _ = scratch.file("delay.study.toml", text.to_owned());
+    let _ = scratch.file("delay.study.toml", text);
     let ran = flotor(scratch.path(), &["study", "run", "delay.study.toml", "--subjects", "8"]);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let ran = flotor(scratch.path(), &["analyse", "delayed", "--trials", "delayed.csv"]);
@@ -103,7 +103,7 @@ fn own_studies_are_those_of_the_commands() {
 #[test]
 fn a_file_is_checked_without_a_person() {
     let scratch = Scratch::default();
-    let _ = scratch.file("seat.study.toml", DETECTION.to_owned());
+    let _ = scratch.file("seat.study.toml", DETECTION);
     let ran = flotor(
         scratch.path(),
         &["study", "check", "seat.study.toml", "--runs", "10", "--json", "check.json", "--plot", "plan.svg"],

@@ -26,7 +26,7 @@ struct Keyboard<'a> {
 
 impl<'a> Keyboard<'a> {
     fn new(folder: &'a Scratch, file: &'a str, text: &str) -> Self {
-        let _ = folder.file(file, text.to_owned());
+        let _ = folder.file(file, text);
         let scene = folder.patient_scene(flotor_session::scene::STUDY).display().to_string();
         Self { folder, scene, file }
     }
@@ -101,7 +101,7 @@ fn typed(person: &AttendedCourse) -> (String, Input) {
 
 /// Returns the answer of a person who is wrong in every fourth trial.
 fn answer(trial: &Trial) -> Answer {
-    let is_right = trial.number % 4 != 0;
+    let is_right = !trial.number.is_multiple_of(4);
     match (trial.comparison_at, trial.signal, trial.level) {
         (Some(position), _, level) => {
             let is_more = level.is_some_and(|level| level > 0.0);

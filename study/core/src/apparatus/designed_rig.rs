@@ -51,7 +51,7 @@ impl Changeable for Run {
         if let Some(end) = end {
             return Err(RunEnded(end).into());
         }
-        self.watch.refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change).into()))
+        self.watch.refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change.into()).into()))
     }
 }
 

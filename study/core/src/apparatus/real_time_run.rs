@@ -132,7 +132,7 @@ impl RealTimeRun {
     /// # Errors
     /// [`StimulusRefused`].
     pub(super) fn check_changes(&self) -> Result<(), StimulusRefused> {
-        self.shared.lock().refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change)))
+        self.shared.lock().refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change.into())))
     }
 
     /// Starts a recording of the movement unless one is in progress. Returns the reason if it cannot start.

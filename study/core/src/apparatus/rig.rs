@@ -32,7 +32,7 @@ pub struct RunEnded(pub RunEnd);
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the model rejected {}.{} = {}; choose stimuli within the range of the model", .0.plugin, .0.parameter, .0.value)]
-pub struct StimulusRefused(pub Change);
+pub struct StimulusRefused(pub Box<Change>);
 
 /// Paths of the trial recordings, one file per trial.
 #[derive(Clone, Debug)]
@@ -170,7 +170,7 @@ impl<'a> Rig<'a> {
         busy?;
         apparatus.show(self.steps.controls(), true)?;
         self.advance(self.fade_ticks, also)?;
-        self.watch.refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change).into()))
+        self.watch.refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change.into()).into()))
     }
 
     fn advance(&mut self, ticks: u64, also: &mut dyn Observer) -> Result<(), ApparatusOrFrontEndError> {

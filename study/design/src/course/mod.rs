@@ -35,12 +35,13 @@ pub enum Handle {
 #[non_exhaustive]
 pub enum ReplyError {
     /// The answer does not fit the question.
-    #[error("{0:?} is no answer to this step; give one of the offered answers")]
+    #[error("the answer is not one of those offered at this step; give one of these")]
     Answer(Answer),
     /// The confidence is missing, is not on its scale, or is no part of the question.
-    #[error(
-        "confidence {0:?} does not fit the question; give a point of its scale, where the question has one"
-    )]
+    #[error("{}; give a point of the scale of confidence, where the question has one", match .0 {
+        Some(given) => format!("the confidence {given} is not expected here"),
+        None => "the confidence is missing".to_owned(),
+    })]
     Confidence(Option<f64>),
     /// All steps were answered.
     #[error("the session is complete; no further answer is accepted")]
