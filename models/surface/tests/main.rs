@@ -1,0 +1,5 @@
+//! The surface against closed forms and exhaustive searches.
+#![allow(missing_docs, clippy::cast_possible_truncation)]
+
+mod shapes;
+mod smooth;
