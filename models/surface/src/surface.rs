@@ -94,6 +94,12 @@ impl Surface {
         self.patches.len()
     }
 
+    /// Returns true if a part of the surface is open.
+    #[must_use]
+    pub fn has_borders(&self) -> bool {
+        self.traits.iter().any(|one| !one.is_closed)
+    }
+
     /// Returns the patches.
     #[must_use]
     pub fn patches(&self) -> &[Patch] {
@@ -124,6 +130,12 @@ impl Surface {
     #[must_use]
     pub(crate) fn is_closed(&self, place: &Place) -> bool {
         self.traits[place.patch].is_closed
+    }
+
+    /// Returns the number of the group of a place.
+    #[must_use]
+    pub(crate) fn group(&self, place: &Place) -> u16 {
+        self.traits[place.patch].group
     }
 
     /// Returns true for a place on the rim of an open surface.

@@ -1,5 +1,6 @@
 //! The surface against closed forms and exhaustive searches.
 #![allow(missing_docs, clippy::cast_possible_truncation)]
 
+mod contact;
 mod shapes;
 mod smooth;
