@@ -6,6 +6,7 @@ mod bridge;
 mod doctor;
 mod emulate;
 mod new;
+mod object;
 mod plugins;
 mod record;
 mod release;

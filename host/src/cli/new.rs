@@ -1,24 +1,31 @@
-//! `flotor new`: creates the folder of a plugin.
+//! `flotor new`: creates the folder of a plugin, or the scene of a mesh file.
 
+use crate::cli::object::object_scene;
 use crate::scaffold::{Contract, Language, PluginName, Scaffold, ScaffoldError, scaffold};
 use clap::{Args, ValueEnum};
 use flotor_command::say;
 use flotor_command::{CommandError, command_line, quoted, style};
 use flotor_hal::abi::PluginKind;
 use flotor_session::registry::Registry;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Create a plugin: a folder that builds, passes `validate` and runs.
+/// Create a plugin: a folder that builds, passes `validate` and runs; or the scene of a mesh file.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  flotor new model jelly\n  flotor new device crank\n  \
-    flotor new model jelly --language c\n  flotor new model jelly --vendor\n\nCreates the folder ./NAME with a plugin that builds, passes \
-    `flotor validate` and runs in the scene of the same folder.\nIt overwrites no file.")]
+    flotor new model jelly --language c\n  flotor new model jelly --vendor\n  \
+    flotor new scene duck --object duck.stl\n\nCreates the folder ./NAME with a plugin that builds, passes \
+    `flotor validate` and runs in the scene of the same folder; of a scene, the file \
+    ./NAME.toml.\nIt overwrites no file.")]
 pub(crate) struct NewArguments {
-    /// Kind of plugin
+    /// Kind of plugin, or a scene
     #[arg(value_enum)]
     kind: Kind,
-    /// Id of the plugin: at most 32 lower-case letters, digits and single hyphens, a letter first
+    /// Id of the plugin or name of the scene: at most 32 lower-case letters, digits and single hyphens, a letter first
     name: String,
+    /// With `scene`: mesh file (STL, OBJ, PLY, GLB) that the scene touches
+    #[arg(long, value_name = "FILE")]
+    object: Option<PathBuf>,
     /// Programming language
     #[arg(long, value_enum, default_value = "rust")]
     language: Language,
@@ -37,19 +44,39 @@ enum Kind {
     Model,
     /// Measures the pose and exerts a wrench
     Device,
+    /// Touches the object of a mesh file
+    Scene,
 }
 
 pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
-    let kind = match arguments.kind {
-        Kind::Model => PluginKind::Model,
-        Kind::Device => PluginKind::Device,
-    };
     let name = PluginName::new(&arguments.name).map_err(ScaffoldError::from)?;
+    let kind = match (arguments.kind, &arguments.object) {
+        (Kind::Model, None) => PluginKind::Model,
+        (Kind::Device, None) => PluginKind::Device,
+        (Kind::Scene, Some(file)) => return new_scene(&name, file),
+        (Kind::Scene, None) => {
+            return Err(CommandError::Usage("`flotor new scene` needs a mesh file: add `--object FILE`".to_owned()));
+        }
+        (_, Some(_)) => {
+            return Err(CommandError::Usage("only a scene has an object: omit `--object`, or use `flotor new scene`".to_owned()));
+        }
+    };
     refuse_an_id_in_use(&name)?;
     let sources = if arguments.vendor { Contract::copied } else { Contract::of_installation };
     let contract = sources(arguments.hal.as_deref())?;
     let made = scaffold(Path::new("."), &name, kind, arguments.language, &contract)?;
     report(&name, &made);
+    Ok(())
+}
+
+/// Writes the scene of a mesh file.
+fn new_scene(name: &PluginName, object: &Path) -> Result<(), CommandError> {
+    let scene = object_scene(object, &[], &Registry::search(&[]))?;
+    let file = PathBuf::from(format!("{}.toml", name.id()));
+    let created = std::fs::File::create_new(&file).and_then(|mut created| created.write_all(scene.text.as_bytes()));
+    created.map_err(|cause| CommandError::file(&file, "cannot write", cause))?;
+    let file = file.display().to_string();
+    say!("{file}\n\nNext:\n  {}", command_line(["run", file.as_str(), "--plot", "run.svg"]));
     Ok(())
 }
 

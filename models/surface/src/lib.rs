@@ -2,12 +2,14 @@
 #![allow(clippy::needless_range_loop)] // coordinates and corners have numbers, in several arrays at once
 
 mod built_in;
+pub mod check;
 pub mod closest;
 mod drawing;
 pub mod files;
 pub mod material;
 pub mod normals;
 pub mod object;
+mod parallel;
 mod parameters;
 pub mod patch;
 mod planes;

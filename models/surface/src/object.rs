@@ -1,5 +1,6 @@
 //! From a file to a surface: unit, healing, and refusal of what cannot be felt safely.
 
+use crate::check::{Crossings, crossings};
 use crate::files::{self, Problem};
 use crate::normals::Normals;
 use crate::soup::Soup;
@@ -123,7 +124,16 @@ pub fn build(mut soup: Soup, reading: &Reading) -> Result<Object, Unfit> {
     let open = topology.components.iter().filter(|component| !component.is_closed).count();
     count(open, "open parts, touched from both sides");
     let normals = Normals::new(&mesh, &topology, reading.edge_angle_rad);
-    Ok(Object { surface: Surface::new(&mesh, &topology, &normals), names, remarks })
+    let surface = Surface::new(&mesh, &topology, &normals);
+    let Crossings { count, first_m } = crossings(&surface);
+    if let Some(at) = first_m {
+        remarks.push(format!(
+            "{count} pairs of faces run through each other, the first at ({:.6} {:.6} {:.6}) m: a ball may be held on the \
+             wrong face there; repair the mesh",
+            at.x, at.y, at.z
+        ));
+    }
+    Ok(Object { surface, names, remarks })
 }
 
 fn tell(welded: &Welded, remarks: &mut Vec<String>) {

@@ -23,6 +23,8 @@ const MOST_STEPS: usize = 40;
 const MOST_ROUNDS: usize = 12;
 /// Part of the radius that the centre moves between two searches of the ball: nothing fits through.
 const SAFE_SHARE: f64 = 0.9;
+/// Height of a lifted way from which the ways up and down are tested too, m.
+const HIGH_M: f64 = 1.0e-6;
 /// Gap at which a contact ends, m.
 const SKIN_M: f64 = 1.0e-7;
 
@@ -221,7 +223,13 @@ impl Ball {
             // Over a curved surface the chord runs through it: lift the way by more than its sagitta.
             let lift_m = way_m.length() * ((here - there).length() * 0.25).min(0.25) + 1.0e-9;
             let (from_m, to_m) = (self.centre_m + here * lift_m, next.centre_m + there * lift_m);
-            if let Some(crossing) = surface.first_crossing(from_m, to_m) {
+            let skin = 1.0e-9;
+            let up = (self.centre_m + here * skin, from_m);
+            let down = (to_m, next.centre_m + there * skin);
+            let is_high = lift_m > HIGH_M;
+            let segments = [Some((from_m, to_m)), is_high.then_some(up), is_high.then_some(down)];
+            for (from_m, to_m) in segments.into_iter().flatten() {
+                let Some(crossing) = surface.first_crossing(from_m, to_m) else { continue };
                 let place = surface.place(crossing.patch, crossing.at);
                 let side = match surface.is_closed(&place) {
                     true => Side::Front,

@@ -2,6 +2,7 @@
 
 use crate::closest::{Foot, closest_of_triangle};
 use crate::normals::Normals;
+use crate::parallel::fill;
 use crate::patch::{Barycentric, Patch};
 use crate::topology::{EdgeRef, Topology};
 use crate::tree::{Tree, hilbert_order};
@@ -66,8 +67,8 @@ impl Surface {
         drop(middles);
         let mut new_number = vec![0_u32; count];
         order.iter().enumerate().for_each(|(new, old)| new_number[*old as usize] = new as u32);
-        let patches: Vec<Patch> =
-            order.iter().map(|old| Patch::new(&normals.frame(mesh, topology, *old as usize))).collect();
+        let mut patches = vec![Patch::flat([DVec3::ZERO; 3]); count];
+        fill(&mut patches, |new| Patch::new(&normals.frame(mesh, topology, order[new] as usize)));
         let renumber = |edge: EdgeRef| match edge.get() {
             Some((t, e)) => EdgeRef::new(new_number[t] as usize, e),
             None => EdgeRef::NONE,
@@ -173,6 +174,11 @@ impl Surface {
             bound_m
         });
         best
+    }
+
+    /// Visits the patches whose boxes overlap a box. Real-time: bounded, no allocation.
+    pub(crate) fn near_box(&self, low_m: DVec3, high_m: DVec3, visit: impl FnMut(usize)) {
+        self.tree.along(low_m, high_m, visit);
     }
 
     /// Follows the surface downhill to a local closest point to `c_m`, from a place in `patch`. Real-time: bounded, no allocation.
@@ -331,6 +337,13 @@ impl Patch {
         let inside = |at: &Barycentric, share: f64, slack: f64| {
             at.iter().all(|x| *x >= -slack) && (-slack..=1.0 + slack).contains(&share)
         };
+        let (normal, bulge_m) = ((p - r).cross(q - r), f64::from(self.bulge_m));
+        let height = (from_m - r).dot(normal);
+        let (low, high) = (height.min(height + way_m.dot(normal)), height.max(height + way_m.dot(normal)));
+        let reach = bulge_m * normal.length();
+        if low > reach || high < -reach {
+            return None;
+        }
         // Solves columns (a, b, -way) for (x, y, share).
         let solve = |a: DVec3, b: DVec3, right: DVec3| {
             let normal = a.cross(b);

@@ -2,5 +2,6 @@
 #![allow(missing_docs, clippy::cast_possible_truncation)]
 
 mod contact;
+mod files;
 mod shapes;
 mod smooth;
