@@ -55,10 +55,14 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
         (Kind::Device, None) => PluginKind::Device,
         (Kind::Scene, Some(file)) => return new_scene(&name, file),
         (Kind::Scene, None) => {
-            return Err(CommandError::Usage("`flotor new scene` needs a mesh file: add `--object FILE`".to_owned()));
+            return Err(CommandError::Usage(
+                "`flotor new scene` needs a mesh file: add `--object FILE`".to_owned(),
+            ));
         }
         (_, Some(_)) => {
-            return Err(CommandError::Usage("only a scene has an object: omit `--object`, or use `flotor new scene`".to_owned()));
+            return Err(CommandError::Usage(
+                "only a scene has an object: omit `--object`, or use `flotor new scene`".to_owned(),
+            ));
         }
     };
     refuse_an_id_in_use(&name)?;
@@ -73,7 +77,8 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
 fn new_scene(name: &PluginName, object: &Path) -> Result<(), CommandError> {
     let scene = object_scene(object, &[], &Registry::search(&[]))?;
     let file = PathBuf::from(format!("{}.toml", name.id()));
-    let created = std::fs::File::create_new(&file).and_then(|mut created| created.write_all(scene.text.as_bytes()));
+    let created =
+        std::fs::File::create_new(&file).and_then(|mut created| created.write_all(scene.text.as_bytes()));
     created.map_err(|cause| CommandError::file(&file, "cannot write", cause))?;
     let file = file.display().to_string();
     say!("{file}\n\nNext:\n  {}", command_line(["run", file.as_str(), "--plot", "run.svg"]));

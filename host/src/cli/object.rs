@@ -1,6 +1,6 @@
 //! Scene around a mesh file, for `flotor run --object` and `flotor new scene`.
 
-use flotor_command::options::{PluginKeyValue, KeyValue, settings};
+use flotor_command::options::{KeyValue, PluginKeyValue, settings};
 use flotor_command::{CommandError, while_preparing};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::abi::loader::Model;
@@ -32,9 +32,13 @@ pub(crate) fn object_scene(
     sets: &[PluginKeyValue],
     registry: &Registry,
 ) -> Result<ObjectScene, CommandError> {
-    let absolute = std::path::absolute(file).map_err(|cause| CommandError::file(file, "cannot read", cause))?;
+    let absolute =
+        std::path::absolute(file).map_err(|cause| CommandError::file(file, "cannot read", cause))?;
     let path = absolute.to_str().ok_or_else(|| {
-        CommandError::Usage(format!("`{}`: the path is not UTF-8, as a scene requires; rename the file", file.display()))
+        CommandError::Usage(format!(
+            "`{}`: the path is not UTF-8, as a scene requires; rename the file",
+            file.display()
+        ))
     })?;
     let plugin = registry.load(SURFACE, PluginKind::Model)?;
     let of_surface = |set: &PluginKeyValue| {
@@ -47,11 +51,13 @@ pub(crate) fn object_scene(
     let settings = settings(&plugin, "--set", &values)?;
     let mut model = while_preparing(SURFACE, || plugin.create_model(&settings))?;
     let far = Input::at_rest(Pose::new(DVec3::splat(FAR_M), DQuat::IDENTITY));
-    let shape = model.shape(&far).map_err(|error| CommandError::PluginRefused(format!("`{SURFACE}`: {error}")))?;
-    let ends = shape.surface.vertices.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], vertex| {
-        let p = DVec3::from_array(vertex.position_m);
-        [low.min(p), high.max(p)]
-    });
+    let shape =
+        model.shape(&far).map_err(|error| CommandError::PluginRefused(format!("`{SURFACE}`: {error}")))?;
+    let ends =
+        shape.surface.vertices.iter().fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], vertex| {
+            let p = DVec3::from_array(vertex.position_m);
+            [low.min(p), high.max(p)]
+        });
     let middle_mm = (ends[0] + ends[1]) * 500.0;
     let place_mm = [-middle_mm.x, -middle_mm.y, -BELOW_MM - ends[1].z * 1.0e3];
     let name = file.file_name().unwrap_or_default().to_string_lossy();
@@ -98,7 +104,8 @@ mod tests {
     fn the_scene_of_any_name_is_read() {
         for name in ["duck.stl", "a \"b\".ply", "c\\d.obj", "é.glb"] {
             let text = text(name, name, [1.0, -2.5, -0.0]);
-            let scene = Scene::parse(Path::new("object.toml"), &text).unwrap_or_else(|error| panic!("{error}"));
+            let scene =
+                Scene::parse(Path::new("object.toml"), &text).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!((scene.title.as_str(), scene.models.len()), (name, 1));
         }
     }

@@ -13,7 +13,11 @@ fn bumpy(rings: u32, meridians: u32) -> Vec<u8> {
     let point = |i: u32, j: u32| {
         let (s, c) = math::sin_cos(f64::from(i) / f64::from(rings) * PI);
         let (sp, cp) = math::sin_cos(f64::from(j % meridians) / f64::from(meridians) * TAU);
-        let d = DVec3::new(if i % rings == 0 { 0.0 } else { s * cp }, if i % rings == 0 { 0.0 } else { s * sp }, c);
+        let d = DVec3::new(
+            if i % rings == 0 { 0.0 } else { s * cp },
+            if i % rings == 0 { 0.0 } else { s * sp },
+            c,
+        );
         let bump = 0.6 * math::sin(12.0 * d.x) * math::sin(12.0 * d.y) * math::sin(12.0 * d.z);
         (d * (20.0 + bump)).to_array()
     };
@@ -62,7 +66,9 @@ fn main() {
             },
             own: Vec::new(),
         };
-        for (what, speed, friction) in [("60 mm/s", 6.0e-5, 0.0), ("200 mm/s", 2.0e-4, 0.0), ("60 mm/s, friction", 6.0e-5, 0.3)] {
+        for (what, speed, friction) in
+            [("60 mm/s", 6.0e-5, 0.0), ("200 mm/s", 2.0e-4, 0.0), ("60 mm/s, friction", 6.0e-5, 0.3)]
+        {
             let mut materials = materials.clone();
             (materials.common.static_friction, materials.common.kinetic_friction) = (friction, friction);
             let mut touch = Touch::new(5.0e-4);
@@ -74,7 +80,11 @@ fn main() {
             for i in 0..count {
                 // Round the sphere on a rosette, 1 mm deep and less.
                 let t = i as f64 * speed / 0.02;
-                let d = DVec3::new(math::cos(t) * math::cos(0.31 * t), math::sin(t) * math::cos(0.31 * t), math::sin(0.31 * t));
+                let d = DVec3::new(
+                    math::cos(t) * math::cos(0.31 * t),
+                    math::sin(t) * math::cos(0.31 * t),
+                    math::sin(0.31 * t),
+                );
                 let bump = 0.6e-3 * math::sin(12.0 * d.x) * math::sin(12.0 * d.y) * math::sin(12.0 * d.z);
                 let depth_m = 1.0e-3 * (0.55 + 0.45 * math::sin(0.01 * i as f64));
                 let tool_m = d * (0.02 + bump + 5.0e-4 - depth_m);

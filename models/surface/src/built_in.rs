@@ -18,15 +18,16 @@ pub(crate) fn soup(name: &str) -> Option<Soup> {
     }
 }
 
-/// Returns the radius of the bumpy sphere in a direction, m: 20 mm with bumps of 0.6 mm.
+/// Returns the radius of the bumpy sphere in a direction, m: 20 mm with bumps of 0.4 mm.
 fn bumpy_radius_m(d: DVec3) -> f64 {
-    0.02 + 6.0e-4 * math::sin(12.0 * d.x) * math::sin(12.0 * d.y) * math::sin(12.0 * d.z)
+    0.02 + 4.0e-4 * math::sin(6.0 * d.x) * math::sin(6.0 * d.y) * math::sin(6.0 * d.z)
 }
 
 #[allow(clippy::cast_possible_truncation)] // a few thousand points
 fn globe(rings: u32, meridians: u32, radius_m: impl Fn(DVec3) -> f64) -> Soup {
     let mut soup = Soup { metres: Some(1.0), ..Soup::default() };
-    let mut push = |d: DVec3| soup.points.push((d * radius_m(d) - DVec3::Z * (radius_m(DVec3::Z) + BELOW_M)).to_array());
+    let mut push =
+        |d: DVec3| soup.points.push((d * radius_m(d) - DVec3::Z * (radius_m(DVec3::Z) + BELOW_M)).to_array());
     push(DVec3::Z);
     push(-DVec3::Z);
     for i in 1..rings {

@@ -30,7 +30,9 @@ pub fn crossings(surface: &Surface) -> Crossings {
                 if other <= t || is_neighbour {
                     return;
                 }
-                if let Some(place_m) = crossing_m(&corners_m, &theirs).or_else(|| crossing_m(&theirs, &corners_m)) {
+                if let Some(place_m) =
+                    crossing_m(&corners_m, &theirs).or_else(|| crossing_m(&theirs, &corners_m))
+                {
                     found.count += 1;
                     found.first_m = found.first_m.or(Some(place_m));
                 }

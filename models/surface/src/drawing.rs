@@ -65,5 +65,10 @@ pub(crate) fn tool(shape: &mut Shape, tool: Pose, radius_m: f64, proxy_m: Option
     let thick_m = if answer.friction == Friction::Sticks { 2.0 * LINE_M } else { LINE_M };
     let turn = DQuat::from_rotation_arc(DVec3::Z, normal);
     let middle = Pose::new(point_m + normal * (0.5 * NORMAL_M), turn);
-    shape.primitives.push(Primitive::new(Form::Cylinder, Part::Tool, middle, [thick_m, thick_m, 0.5 * NORMAL_M]));
+    shape.primitives.push(Primitive::new(
+        Form::Cylinder,
+        Part::Tool,
+        middle,
+        [thick_m, thick_m, 0.5 * NORMAL_M],
+    ));
 }

@@ -2,6 +2,7 @@
 #![allow(clippy::needless_range_loop)] // coordinates and corners have numbers, in several arrays at once
 
 mod built_in;
+mod cache;
 pub mod check;
 pub mod closest;
 mod drawing;

@@ -34,7 +34,8 @@ pub(crate) const KEYS: [(&str, f64); 5] = [
 impl Material {
     /// Builds a material from values in the order of the parameters.
     pub(crate) fn from_values(values: [f64; 5]) -> Self {
-        let [stiffness_n_per_m, damping_ns_per_m, static_friction, kinetic_friction, viscous_ns_per_m] = values;
+        let [stiffness_n_per_m, damping_ns_per_m, static_friction, kinetic_friction, viscous_ns_per_m] =
+            values;
         Self { stiffness_n_per_m, damping_ns_per_m, static_friction, kinetic_friction, viscous_ns_per_m }
     }
 
@@ -67,20 +68,26 @@ pub fn parse(text: &str, names: &[String]) -> Result<Vec<Own>, TextProblem> {
     })?;
     let mut all = vec![Own::default(); names.len().max(1)];
     for (group, values) in &table {
-        let line = text.lines().position(|line| line.trim_start().starts_with('[') && line.contains(group.as_str()));
+        let line =
+            text.lines().position(|line| line.trim_start().starts_with('[') && line.contains(group.as_str()));
         let wrong = |problem: String| TextProblem::at(line.map_or(0, |line| line + 1), problem);
         let number = names.iter().position(|name| name == group).ok_or_else(|| {
             let known: Vec<String> = names.iter().take(12).map(|name| format!("`{name}`")).collect();
             let known = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
             wrong(format!("the mesh has no group `{group}`; its groups are {known}"))
         })?;
-        let values = values.as_table().ok_or_else(|| wrong(format!("`{group}` must be a table: [{group}]")))?;
+        let values =
+            values.as_table().ok_or_else(|| wrong(format!("`{group}` must be a table: [{group}]")))?;
         for (key, value) in values {
             let place = KEYS.iter().position(|(name, _)| name == key).ok_or_else(|| {
-                wrong(format!("a material has no `{key}`; its keys are {}", KEYS.map(|(name, _)| name).join(", ")))
+                wrong(format!(
+                    "a material has no `{key}`; its keys are {}",
+                    KEYS.map(|(name, _)| name).join(", ")
+                ))
             })?;
             #[allow(clippy::cast_precision_loss)] // small whole numbers
-            let number_of = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|x| x as f64));
+            let number_of =
+                |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|x| x as f64));
             let most = KEYS[place].1;
             let x = number_of(value).filter(|x| (0.0..=most).contains(x));
             all[number].0[place] =
@@ -101,9 +108,12 @@ mod tests {
         let material = Material::from_values([1.0, 2.0, 3.0, 4.0, 5.0]);
         assert_eq!(material.with(&own[0]), material);
         assert_eq!(material.with(&own[1]).stiffness_n_per_m, 3000.0);
-        for (text, line) in
-            [("[wood]\n[iron]\n", 2), ("[wood]\nhard = 1\n", 1), ("[wood]\nstatic_friction = -1\n", 1), ("[wood\n", 1)]
-        {
+        for (text, line) in [
+            ("[wood]\n[iron]\n", 2),
+            ("[wood]\nhard = 1\n", 1),
+            ("[wood]\nstatic_friction = -1\n", 1),
+            ("[wood\n", 1),
+        ] {
             assert_eq!(parse(text, &names).unwrap_err().line, line, "{text}");
         }
     }

@@ -1,8 +1,9 @@
 //! Normals at corners, real edges, and tangents of the curves between corners.
 //!
 //! Normals are weighted means of the normals of faces about a corner, with the weights of Max (1999, J. Graphics Tools 4(2), 1-6),
-//! which are exact on a sphere and on a cylinder. Only faces between two real edges are averaged. A flat region (many faces in one
-//! plane, or faces much larger than their curved neighbours) keeps its own normal up to its rim, so that planes stay planes.
+//! which are exact on a sphere and on a cylinder. Only faces between two real edges are averaged. A plane much larger than
+//! its curved neighbours has its own normal up to its rim, so that planes stay planes; the strips of a cylinder are as large as their
+//! neighbours.
 
 use crate::patch::Frame;
 use crate::topology::Topology;
@@ -11,8 +12,6 @@ use flotor_hal::{DVec3, math};
 
 /// Angle between two faces of one plane, rad: the rounding of binary32 on faces of a thousandth of the object.
 const FLAT_RAD: f64 = 2.0e-5;
-/// Faces of a plane that are a flat region whatever their size.
-const FLAT_FACES: u32 = 12;
 /// Ratio of the area of a plane to that of a curved neighbour from which the plane is a flat region.
 const FLAT_AREA: f64 = 6.0;
 /// Sine between two normals below which they give no direction of their intersection.
@@ -54,40 +53,43 @@ fn root(parent: &mut [u32], mut i: u32) -> u32 {
     i
 }
 
-/// Returns for each face the number of its plane if this is a flat region.
+/// Returns for each face the number of its plane, if the plane has several faces and is much larger than those over its edges.
 #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 faces
-fn flat_regions(mesh: &Mesh, topology: &Topology, faces: &[DVec3]) -> Vec<Option<u32>> {
+fn flat_regions(mesh: &Mesh, topology: &Topology, faces: &[DVec3], sharp: &[[bool; 3]]) -> Vec<Option<u32>> {
     let count = faces.len();
     let mut parent: Vec<u32> = (0..count as u32).collect();
-    let pairs = |t: usize| (0..3).filter_map(move |e| topology.neighbours[t][e].get().map(|(other, _)| other));
+    let smooth = |t: usize| {
+        let edges = (0..3).filter(move |e| !sharp[t][*e]);
+        edges.filter_map(move |e| topology.neighbours[t][e].get().map(|(other, _)| other))
+    };
     for t in 0..count {
-        for other in pairs(t) {
-            if other > t && faces[t].dot(faces[other]) > 0.0 && faces[t].cross(faces[other]).length() <= FLAT_RAD {
+        for other in smooth(t).filter(|other| *other > t) {
+            if faces[t].dot(faces[other]) > 0.0 && faces[t].cross(faces[other]).length() <= FLAT_RAD {
                 let (a, b) = (root(&mut parent, t as u32), root(&mut parent, other as u32));
                 parent[a.max(b) as usize] = a.min(b);
             }
         }
     }
-    let area = |t: usize| {
-        let [p, q, r] = mesh.corners_m(t);
-        (q - p).cross(r - p).length()
-    };
-    let (mut size, mut areas) = (vec![0_u32; count], vec![0.0_f64; count]);
+    let (mut sizes, mut areas) = (vec![0_u32; count], vec![0.0_f64; count]);
     for t in 0..count {
         let plane = root(&mut parent, t as u32) as usize;
-        size[plane] += 1;
-        areas[plane] += area(t);
+        let [p, q, r] = mesh.corners_m(t);
+        sizes[plane] += 1;
+        areas[plane] += (q - p).cross(r - p).length();
     }
     (0..count)
         .map(|t| {
             let plane = root(&mut parent, t as u32);
-            let faces = size[plane as usize];
-            let is_much_larger = |parent: &mut [u32]| {
-                let others = pairs(t).map(|other| root(parent, other as u32)).filter(|other| *other != plane);
-                let largest = others.map(|other| areas[other as usize]).fold(0.0, f64::max);
-                largest > 0.0 && areas[plane as usize] >= FLAT_AREA * largest
-            };
-            (faces >= FLAT_FACES || (faces >= 2 && is_much_larger(&mut parent))).then_some(plane)
+            let mut largest = 0.0_f64;
+            for other in smooth(t) {
+                let theirs = root(&mut parent, other as u32);
+                if theirs != plane {
+                    largest = largest.max(areas[theirs as usize]);
+                }
+            }
+            let is_flat =
+                sizes[plane as usize] > 1 && largest > 0.0 && areas[plane as usize] >= FLAT_AREA * largest;
+            is_flat.then_some(plane)
         })
         .collect()
 }
@@ -97,20 +99,19 @@ impl Normals {
     #[must_use]
     pub fn new(mesh: &Mesh, topology: &Topology, edge_angle_rad: f64) -> Self {
         let faces = face_normals(mesh);
-        let flat = flat_regions(mesh, topology, &faces);
         let cosine = math::cos(edge_angle_rad);
-        let sharp = (0..faces.len())
+        let sharp: Vec<[bool; 3]> = (0..faces.len())
             .map(|t| {
                 topology.neighbours[t].map(|edge| {
                     edge.get().is_some_and(|(other, _)| {
                         // Near the limit the cosine rounds; the angle decides.
-                        let by_cosine = faces[t].dot(faces[other]) < cosine + 1.0e-6;
-                        let two_planes = flat[t].zip(flat[other]).is_some_and(|(a, b)| a != b);
-                        two_planes || (by_cosine && angle_rad(faces[t], faces[other]) > edge_angle_rad)
+                        faces[t].dot(faces[other]) < cosine + 1.0e-6
+                            && angle_rad(faces[t], faces[other]) > edge_angle_rad
                     })
                 })
             })
             .collect();
+        let flat = flat_regions(mesh, topology, &faces, &sharp);
         let mut normals = Self { corners: vec![[DVec3::ZERO; 3]; faces.len()], sharp };
         let mut sector = Vec::new();
         for t in 0..faces.len() {
@@ -154,8 +155,11 @@ impl Normals {
 
 /// Returns the normal of a sector.
 fn mean(mesh: &Mesh, faces: &[DVec3], flat: &[Option<u32>], sector: &[(usize, usize)]) -> DVec3 {
-    if let Some((t, _)) = sector.iter().find(|(t, _)| flat[*t].is_some()) {
-        return faces[*t];
+    let mut planes = sector.iter().filter_map(|(t, _)| flat[*t].map(|plane| (plane, *t)));
+    if let Some((plane, t)) = planes.next()
+        && planes.all(|(other, _)| other == plane)
+    {
+        return faces[t];
     }
     let weighted: DVec3 = sector
         .iter()
@@ -178,12 +182,12 @@ fn tangents_m(mesh: &Mesh, topology: &Topology, normals: &Normals, t: usize, edg
     let own = [normals.corners[t][edge], normals.corners[t][next]];
     // The neighbour's edge runs the other way.
     let other = match topology.neighbours[t][edge].get() {
-        Some((t, edge)) if normals.sharp_at(t, edge) => {
+        Some((t, edge)) if normals.sharp[t][edge] => {
             [normals.corners[t][(edge + 1) % 3], normals.corners[t][edge]]
         }
         _ => own,
     };
-    let tangents = [0, 1].map(|end| {
+    [0, 1].map(|end| {
         let line = own[end].cross(other[end]);
         let direction = if line.length() > CREASE {
             line.normalize() * line.dot(chord_m).signum()
@@ -198,15 +202,10 @@ fn tangents_m(mesh: &Mesh, topology: &Topology, normals: &Normals, t: usize, edg
         // The derivative of the cubic that meets a circle at its middle.
         let tangent = direction * (2.0 * length_m / (1.0 + cosine));
         if (tangent - chord_m).length() <= STRAIGHT * length_m { chord_m } else { tangent }
-    });
-    tangents
+    })
 }
 
 impl Normals {
-    fn sharp_at(&self, t: usize, edge: usize) -> bool {
-        self.sharp[t][edge]
-    }
-
     /// Returns the frame of the patch over a face. Not real-time.
     #[must_use]
     pub fn frame(&self, mesh: &Mesh, topology: &Topology, t: usize) -> Frame {

@@ -113,14 +113,14 @@ pub fn build(mut soup: Soup, reading: &Reading) -> Result<Object, Unfit> {
         return Err(Unfit::TooLarge(size_m));
     }
     let topology = connect(&mut mesh).map_err(|OneSided(at_m)| Unfit::OneSided(at_m))?;
-    tell(&welded, &mut remarks);
+    describe(&welded, &mut remarks);
     let mut count = |number: usize, what: &str| {
         if number > 0 {
             remarks.push(format!("{number} {what}"));
         }
     };
     count(topology.turned, "faces turned to the side of the others");
-    count(topology.crowded_edges, "edges of three or more faces, left without a smooth transition");
+    count(topology.crowded_edges, "edges of three or more faces, joined by the body between two");
     let open = topology.components.iter().filter(|component| !component.is_closed).count();
     count(open, "open parts, touched from both sides");
     let normals = Normals::new(&mesh, &topology, reading.edge_angle_rad);
@@ -136,12 +136,13 @@ pub fn build(mut soup: Soup, reading: &Reading) -> Result<Object, Unfit> {
     Ok(Object { surface, names, remarks })
 }
 
-fn tell(welded: &Welded, remarks: &mut Vec<String>) {
+fn describe(welded: &Welded, remarks: &mut Vec<String>) {
     for (number, what) in [
         (welded.collapsed, "faces removed because two corners are one point"),
         (welded.doubled, "faces removed because they were there twice"),
         (welded.flipped, "faces without area removed"),
         (welded.closed, "points of borders joined over gaps of rounding"),
+        (welded.unresolved, "points merged because binary32 does not resolve their edge"),
     ] {
         if number > 0 {
             remarks.push(format!("{number} {what}"));
@@ -168,7 +169,9 @@ fn metres(points: &[[f64; 3]], of_format: Option<f64>, unit: Unit) -> (f64, Opti
             }
             let size = (0..3).map(|axis| ends[1][axis] - ends[0][axis]).fold(0.0, f64::max);
             let (metres, word) = if size > METRES_UP_TO { (1.0e-3, "mm") } else { (1.0, "m") };
-            let remark = format!("the file has no unit and is {size:.6} long: taken as {word}; set `unit` if this is wrong");
+            let remark = format!(
+                "the file has no unit and is {size:.6} long: taken as {word}; set `unit` if this is wrong"
+            );
             (metres, Some(remark))
         }
     }

@@ -13,9 +13,17 @@ pub(crate) const FIRST_LIVE: usize = 0;
 /// Parameters of the surface.
 pub(crate) const SCHEMA: &[Parameter] = &[
     Parameter::real("stiffness_n_per_m", "N/m", 0.0, 1.0e6, 1000.0, "Stiffness of the surface").live(),
-    Parameter::real("damping_ns_per_m", "N s/m", 0.0, 1000.0, 0.0, "Damping along the normal, in contact").live(),
-    Parameter::real("static_friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction at which a resting ball slides")
+    Parameter::real("damping_ns_per_m", "N s/m", 0.0, 1000.0, 0.0, "Damping along the normal, in contact")
         .live(),
+    Parameter::real(
+        "static_friction",
+        "1",
+        0.0,
+        10.0,
+        0.0,
+        "Coefficient of friction at which a resting ball slides",
+    )
+    .live(),
     Parameter::real(
         "kinetic_friction",
         "1",
@@ -25,8 +33,15 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Coefficient of friction of a sliding ball, at most the static one; that one if this is not set",
     )
     .live(),
-    Parameter::real("viscous_ns_per_m", "N s/m", 0.0, 1000.0, 0.0, "Viscous friction along the surface, in contact")
-        .live(),
+    Parameter::real(
+        "viscous_ns_per_m",
+        "N s/m",
+        0.0,
+        1000.0,
+        0.0,
+        "Viscous friction along the surface, in contact",
+    )
+    .live(),
     Parameter::file(
         "file",
         BUILT_IN,
@@ -44,7 +59,11 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         30.0,
         "Angle between two faces above which their edge stays an edge; below it the surface is smooth",
     ),
-    Parameter::file("materials", choices![], "Materials by group of the mesh: a TOML file with a table for each"),
+    Parameter::file(
+        "materials",
+        choices![],
+        "Materials by group of the mesh: a TOML file with a table for each",
+    ),
 ];
 
 /// Returns the choices for reading the file.

@@ -187,6 +187,32 @@ impl Patch {
         Self { corners_m, edges, inner, bulge_m }
     }
 
+    /// Length of [`Self::write`], bytes.
+    pub(crate) const BYTES: usize = 9 * 8 + 36 * 4 + 4;
+
+    /// Appends the numbers of the patch.
+    pub(crate) fn write(&self, bytes: &mut Vec<u8>) {
+        self.corners_m.iter().flat_map(|p| p.to_array()).for_each(|x| bytes.extend(x.to_le_bytes()));
+        let stored = self.edges.as_flattened().iter().chain(self.inner.as_flattened());
+        stored.flatten().chain([&self.bulge_m]).for_each(|x| bytes.extend(x.to_le_bytes()));
+    }
+
+    /// Builds the patch from the numbers of [`Self::write`].
+    pub(crate) fn read(bytes: &[u8; Self::BYTES]) -> Self {
+        let (long, short) = bytes.split_at(9 * 8);
+        let mut long = long.as_chunks().0.iter().map(|x| f64::from_le_bytes(*x));
+        let mut short = short.as_chunks().0.iter().map(|x| f32::from_le_bytes(*x));
+        let mut one = || long.next().unwrap_or_default();
+        let corners_m = std::array::from_fn(|_| DVec3::new(one(), one(), one()));
+        let mut stored = || {
+            std::array::from_fn(|_| {
+                std::array::from_fn(|_| std::array::from_fn(|_| short.next().unwrap_or_default()))
+            })
+        };
+        let (edges, inner) = (stored(), stored());
+        Self { corners_m, edges, inner, bulge_m: short.next().unwrap_or_default() }
+    }
+
     /// Returns the corners, m.
     #[must_use]
     pub fn corners(&self) -> &[DVec3; 3] {

@@ -1,7 +1,7 @@
 //! Plugin of the surface: the contract.
 
 use crate::material::{self, Material, Own};
-use crate::object::{self, Object};
+use crate::object::Object;
 use crate::parameters::{FIRST_LIVE, SCHEMA, reading};
 use crate::touch::{Answer, Materials, Touch};
 use crate::{built_in, drawing, store};
@@ -52,14 +52,15 @@ fn object(settings: &Settings<'_>) -> Result<Arc<Object>, Refusal> {
     let reading = reading(settings);
     let name = settings.text("file").unwrap_or(DEFAULT);
     if let Some(soup) = built_in::soup(name) {
-        return store::shared(name, &[], &reading, || object::build(soup, &reading))
+        return store::of_soup(name, soup, &reading)
             .map_err(|unfit| Refusal::parameter(format!("{name}: {unfit}")));
     }
     let bytes = read_file(Path::new(name), MOST_BYTES).map_err(|error| {
-        Refusal::resource(format!("{name}: cannot read the mesh: {error}; check the path and its permissions"))
+        Refusal::resource(format!(
+            "{name}: cannot read the mesh: {error}; check the path and its permissions"
+        ))
     })?;
-    let key = bytes;
-    store::shared_file(name, key, &reading).map_err(|unfit| Refusal::resource(format!("{name}: {unfit}")))
+    store::of_file(name, bytes, &reading).map_err(|unfit| Refusal::resource(format!("{name}: {unfit}")))
 }
 
 fn own_materials(settings: &Settings<'_>, names: &[String]) -> Result<Vec<Own>, Refusal> {
@@ -142,7 +143,8 @@ impl ForceModel for Touched {
 
 impl Touched {
     fn renew_material(&mut self) {
-        self.materials.common = Material::from_values(std::array::from_fn(|i| self.parameters[FIRST_LIVE + i]));
+        self.materials.common =
+            Material::from_values(std::array::from_fn(|i| self.parameters[FIRST_LIVE + i]));
     }
 }
 

@@ -20,7 +20,7 @@ const SETTLED_M: f64 = 1.0e-12;
 /// Most Newton steps for several contacts.
 const MOST_STEPS: usize = 40;
 /// Most attempts to reach a goal, with a new contact or half the way each.
-const MOST_ROUNDS: usize = 12;
+const MOST_ROUNDS: usize = 24;
 /// Part of the radius that the centre moves between two searches of the ball: nothing fits through.
 const SAFE_SHARE: f64 = 0.9;
 /// Height of a lifted way from which the ways up and down are tested too, m.
@@ -246,7 +246,10 @@ impl Ball {
             !surface.is_closed(place)
                 || (next.centre_m - place.foot.point_m).dot(surface.outward(place)) > 0.0
         };
-        let place = surface.nearest(next.centre_m, self.radius_m - TOLERANCE_M, in_front)?;
+        // What the ball touches is as far as its radius.
+        let is_touched = |patch| next.contacts.iter().any(|contact| contact.place.patch == patch);
+        let bound_m = self.radius_m - TOLERANCE_M;
+        let place = surface.nearest_besides(next.centre_m, bound_m, is_touched, in_front)?;
         let side = self.side(surface, &place, Side::Rim);
         Some(Obstacle::Inside(Contact { place, side }))
     }
@@ -254,7 +257,7 @@ impl Ball {
     /// Moves the ball towards `goal_m` as far as the surface permits; returns false if the attempts are used up before the ball
     /// is at rest, at a place that is free all the same. Real-time: bounded, no allocation.
     pub(crate) fn settle(&mut self, surface: &Surface, goal_m: DVec3) -> bool {
-        let mut share = 1.0;
+        let (mut share, mut blocked) = (1.0, 0);
         for _ in 0..MOST_ROUNDS {
             let to_m = self.centre_m + (goal_m - self.centre_m) * share;
             let next = self.target(surface, if share == 1.0 { goal_m } else { to_m });
@@ -264,7 +267,7 @@ impl Ball {
                     if share == 1.0 {
                         return true;
                     }
-                    share = 1.0;
+                    (share, blocked) = (1.0, 0);
                     continue;
                 }
                 Some(Obstacle::Inside(contact)) => contact,
@@ -275,12 +278,16 @@ impl Ball {
                     contact
                 }
             };
-            if !self.contacts.add(contact) {
+            let mut is_new = self.contacts.add(contact);
+            if !is_new {
                 // A contact that touches nothing makes room.
                 self.drop_idle(surface);
-                if !self.contacts.add(contact) {
-                    share *= 0.5;
-                }
+                is_new = self.contacts.add(contact);
+            }
+            // A new contact changes the way; if it does not, a shorter way does.
+            blocked += 1;
+            if !is_new || blocked > 2 {
+                share *= 0.5;
             }
         }
         false

@@ -62,7 +62,8 @@ impl Surface {
     #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 faces
     pub fn new(mesh: &Mesh, topology: &Topology, normals: &Normals) -> Self {
         let count = mesh.triangles.len();
-        let middles: Vec<DVec3> = (0..count).map(|t| mesh.corners_m(t).into_iter().sum::<DVec3>() / 3.0).collect();
+        let middles: Vec<DVec3> =
+            (0..count).map(|t| mesh.corners_m(t).into_iter().sum::<DVec3>() / 3.0).collect();
         let order = hilbert_order(&middles);
         drop(middles);
         let mut new_number = vec![0_u32; count];
@@ -123,7 +124,8 @@ impl Surface {
     /// Returns the memory of the surface, bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        self.count() * (size_of::<Patch>() + size_of::<[EdgeRef; 3]>() + size_of::<Trait>()) + self.tree.bytes()
+        self.count() * (size_of::<Patch>() + size_of::<[EdgeRef; 3]>() + size_of::<Trait>())
+            + self.tree.bytes()
     }
 
     /// Returns true for a place on a closed body.
@@ -157,13 +159,24 @@ impl Surface {
     /// Finds the place nearest to `c_m` within `bound_m` that `is_wanted` accepts. Real-time: bounded, no allocation.
     #[must_use]
     pub fn nearest(&self, c_m: DVec3, bound_m: f64, is_wanted: impl Fn(&Place) -> bool) -> Option<Place> {
+        self.nearest_besides(c_m, bound_m, |_| false, is_wanted)
+    }
+
+    /// Finds the place that [`Self::nearest`] finds, on patches that `is_known` does not name.
+    pub(crate) fn nearest_besides(
+        &self,
+        c_m: DVec3,
+        bound_m: f64,
+        is_known: impl Fn(usize) -> bool,
+        is_wanted: impl Fn(&Place) -> bool,
+    ) -> Option<Place> {
         let mut best: Option<Place> = None;
         let mut bound_m = bound_m;
         self.tree.nearest(c_m, bound_m, |number| {
             let patch = &self.patches[number];
             let (start, square) = closest_of_triangle(&patch.corners_m, c_m);
             // No point of the patch is farther from the triangle than its bulge.
-            if square.sqrt() - f64::from(patch.bulge_m) > bound_m {
+            if square.sqrt() - f64::from(patch.bulge_m) > bound_m || is_known(number) {
                 return bound_m;
             }
             let place = Place { patch: number, foot: patch.closest(c_m, start) };
@@ -310,8 +323,7 @@ impl Surface {
         let way_m = to_m - from_m;
         self.tree.along(from_m, to_m, |number| {
             let Some((at, share)) = self.patches[number].crossing(from_m, way_m) else { return };
-            let is_entry =
-                !self.traits[number].is_closed || self.patches[number].normal(at).dot(way_m) < 0.0;
+            let is_entry = !self.traits[number].is_closed || self.patches[number].normal(at).dot(way_m) < 0.0;
             if is_entry && first.is_none_or(|first| share < first.share) {
                 first = Some(Crossing { patch: number, at, share });
             }

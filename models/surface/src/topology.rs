@@ -1,7 +1,8 @@
 //! Neighbours, sides and closed bodies of a mesh.
 
 use crate::weld::{Mesh, Numbers, mix};
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, math};
+use std::collections::BTreeMap;
 
 /// Reference to an edge of a triangle, or to none: three times the triangle plus the edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +18,16 @@ impl EdgeRef {
     #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 edges
     pub fn new(triangle: usize, edge: usize) -> Self {
         Self((3 * triangle + edge) as u32)
+    }
+
+    /// Returns the number that [`Self::from_code`] takes.
+    pub(crate) fn code(self) -> u32 {
+        self.0
+    }
+
+    /// Builds a reference from the number of another.
+    pub(crate) fn from_code(code: u32) -> Self {
+        Self(code)
     }
 
     /// Returns triangle and edge; `None` on a border.
@@ -57,18 +68,28 @@ pub struct Topology {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OneSided(pub DVec3);
 
-/// Pairs the edges of two faces each; edges of more faces stay without neighbour. Returns the neighbours and the number of these.
+/// Angle between two faces below which they lie on each other, rad.
+const FOLDED_RAD: f64 = 1.0e-6;
+
+/// Pairs the edges of two faces each, and those of more faces by the body between them. Returns the neighbours and the number of edges
+/// of more faces.
 #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 edges
 fn pair_edges(mesh: &Mesh) -> (Vec<[EdgeRef; 3]>, usize) {
     let triangles = &mesh.triangles;
     let mut neighbours = vec![[EdgeRef::NONE; 3]; triangles.len()];
+    let place = |number: u32| (number as usize / 3, number as usize % 3);
     let ends = |number: u32| {
-        let (t, e) = (number as usize / 3, number as usize % 3);
+        let (t, e) = place(number);
         let (a, b) = (triangles[t][e], triangles[t][(e + 1) % 3]);
         (a.min(b), a.max(b))
     };
+    let join = |neighbours: &mut Vec<[EdgeRef; 3]>, one: u32, other: u32| {
+        let (a, b) = (place(one), place(other));
+        neighbours[a.0][a.1] = EdgeRef::new(b.0, b.1);
+        neighbours[b.0][b.1] = EdgeRef::new(a.0, a.1);
+    };
     let mut numbers = Numbers::new(3 * triangles.len() / 2 + 16);
-    let mut crowded = std::collections::BTreeSet::new();
+    let mut crowded: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for number in 0..3 * triangles.len() as u32 {
         let key = ends(number);
         let hash = mix(&[u64::from(key.0) << 32 | u64::from(key.1)]);
@@ -76,22 +97,60 @@ fn pair_edges(mesh: &Mesh) -> (Vec<[EdgeRef; 3]>, usize) {
         if first == number {
             continue;
         }
-        let (a, b) = ((first as usize / 3, first as usize % 3), (number as usize / 3, number as usize % 3));
-        if crowded.contains(&first) || neighbours[a.0][a.1] != EdgeRef::NONE {
-            if let Some((t, e)) = neighbours[a.0][a.1].get() {
-                neighbours[t][e] = EdgeRef::NONE;
-                neighbours[a.0][a.1] = EdgeRef::NONE;
-            }
-            crowded.insert(first);
-            continue;
+        let (t, e) = place(first);
+        if let Some(all) = crowded.get_mut(&first) {
+            all.push(number);
+        } else if let Some((other, edge)) = neighbours[t][e].get() {
+            (neighbours[t][e], neighbours[other][edge]) = (EdgeRef::NONE, EdgeRef::NONE);
+            crowded.insert(first, vec![first, (3 * other + edge) as u32, number]);
+        } else {
+            join(&mut neighbours, first, number);
         }
-        neighbours[a.0][a.1] = EdgeRef::new(b.0, b.1);
-        neighbours[b.0][b.1] = EdgeRef::new(a.0, a.1);
+    }
+    for all in crowded.values() {
+        for (one, other) in bodies_about(mesh, all) {
+            join(&mut neighbours, one, other);
+        }
     }
     (neighbours, crowded.len())
 }
 
-/// Finds neighbours, makes sides consistent, and turns closed bodies to the outside; a body inside another one, a hole, keeps the
+/// Pairs the faces about an edge of several: those with a body between them, the smallest angles first.
+fn bodies_about(mesh: &Mesh, all: &[u32]) -> Vec<(u32, u32)> {
+    // Direction of each face away from the edge, and whether the face runs along the edge or against it.
+    let corners = |number: u32| {
+        let (p, e) = (mesh.corners_m(number as usize / 3), number as usize % 3);
+        (p[e], p[(e + 1) % 3], p[(e + 2) % 3])
+    };
+    let (from, to, _) = corners(all[0]);
+    let along = (to - from).normalize_or_zero();
+    let faces = all.iter().map(|&number| {
+        let (start, end, apex) = corners(number);
+        let away = apex - start;
+        (number, (end - start).dot(along) > 0.0, (away - along * away.dot(along)).normalize_or_zero())
+    });
+    let faces: Vec<(u32, bool, DVec3)> = faces.collect();
+    let mut pairs: Vec<(f64, u32, u32)> = Vec::new();
+    for (one, _, d) in faces.iter().filter(|face| face.1) {
+        for (other, _, e) in faces.iter().filter(|face| !face.1) {
+            // The body of a face along the edge lies clockwise of it; two faces on each other enclose none.
+            let angle_rad = math::atan2(e.cross(*d).dot(along), e.dot(*d));
+            let angle_rad =
+                if angle_rad < FOLDED_RAD { angle_rad + std::f64::consts::TAU } else { angle_rad };
+            pairs.push((angle_rad, *one, *other));
+        }
+    }
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut chosen: Vec<(u32, u32)> = Vec::new();
+    for (_, one, other) in pairs {
+        if !chosen.iter().any(|pair| pair.0 == one || pair.1 == other) {
+            chosen.push((one, other));
+        }
+    }
+    chosen
+}
+
+/// Finds neighbours, makes sides consistent, and turns closed bodies to the outside; a body inside another one, a hole, has the
 /// side of the file. Not real-time.
 ///
 /// # Errors
@@ -100,7 +159,8 @@ fn pair_edges(mesh: &Mesh) -> (Vec<[EdgeRef; 3]>, usize) {
 pub fn connect(mesh: &mut Mesh) -> Result<Topology, OneSided> {
     let (neighbours, crowded_edges) = pair_edges(mesh);
     let count = mesh.triangles.len();
-    let mut topology = Topology { neighbours, component: vec![u32::MAX; count], crowded_edges, ..Topology::default() };
+    let mut topology =
+        Topology { neighbours, component: vec![u32::MAX; count], crowded_edges, ..Topology::default() };
     let mut is_turned = vec![false; count];
     let mut members: Vec<Vec<u32>> = Vec::new();
     for seed in 0..count {
@@ -139,7 +199,7 @@ impl Topology {
     fn finish(&mut self, mesh: &mut Mesh, is_turned: &[bool], members: &[Vec<u32>]) {
         let mut turned: Vec<bool> = is_turned.to_vec();
         for found in members {
-            // The side of most faces is meant.
+            // The side of most faces is the right one.
             let count = found.iter().filter(|t| is_turned[**t as usize]).count();
             let mostly = 2 * count > found.len();
             let is_closed = self.is_closed(mesh, found);
@@ -157,7 +217,10 @@ impl Topology {
         }
         for (number, found) in members.iter().enumerate() {
             let component = self.components[number];
-            if component.is_closed && component.volume_m3 < 0.0 && !self.is_inside_another(mesh, members, number) {
+            if component.is_closed
+                && component.volume_m3 < 0.0
+                && !self.is_inside_another(mesh, members, number)
+            {
                 self.components[number].volume_m3 = -component.volume_m3;
                 found.iter().for_each(|t| turned[*t as usize] = !turned[*t as usize]);
             }
@@ -165,7 +228,7 @@ impl Topology {
         self.turn(mesh, &turned);
     }
 
-    /// Turns triangles round; edge 0 keeps its place, the other two change theirs.
+    /// Turns triangles round; edge 0 has the same place, the other two swap.
     fn turn(&mut self, mesh: &mut Mesh, turned: &[bool]) {
         self.turned = turned.iter().filter(|t| **t).count();
         if self.turned == 0 {
@@ -211,7 +274,8 @@ impl Topology {
     fn is_inside_another(&self, mesh: &Mesh, members: &[Vec<u32>], number: usize) -> bool {
         let from = self.components[number].place_m;
         (0..members.len()).filter(|&other| other != number && self.components[other].is_closed).any(|other| {
-            let crossings = members[other].iter().filter(|t| is_above(mesh.corners_m(**t as usize), from)).count();
+            let crossings =
+                members[other].iter().filter(|t| is_above(mesh.corners_m(**t as usize), from)).count();
             crossings % 2 == 1
         })
     }

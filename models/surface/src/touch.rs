@@ -114,10 +114,10 @@ impl Touch {
     }
 
     /// Returns true if the whole ball at `tool_m` is outside, and the distance of its centre from the surface, at most `bound_m`.
-    fn look(&self, surface: &Surface, tool_m: DVec3, bound_m: f64) -> (bool, f64) {
+    fn clearance(&self, surface: &Surface, tool_m: DVec3, bound_m: f64) -> (bool, f64) {
         let Some(place) = surface.nearest(tool_m, bound_m, |_| true) else { return (true, bound_m) };
-        let is_outside = !surface.is_closed(&place)
-            || (tool_m - place.foot.point_m).dot(surface.outward(&place)) >= 0.0;
+        let is_outside =
+            !surface.is_closed(&place) || (tool_m - place.foot.point_m).dot(surface.outward(&place)) >= 0.0;
         (is_outside && place.foot.distance_m >= self.radius_m, place.foot.distance_m)
     }
 
@@ -139,7 +139,7 @@ impl Touch {
                     }
                     _ => f64::INFINITY,
                 };
-                let (is_free, distance_m) = self.look(surface, tool_m, bound_m);
+                let (is_free, distance_m) = self.clearance(surface, tool_m, bound_m);
                 if !is_free {
                     self.state = State::Overlapping { tool_m, distance_m };
                     return Answer { is_overlapping: true, ..Answer::NOTHING };

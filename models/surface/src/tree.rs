@@ -124,9 +124,7 @@ fn hilbert_key(mut x: [u32; 3], bits: u32) -> u64 {
         q >>= 1;
     }
     x = x.map(|x| x ^ t);
-    (0..bits).rev().fold(0, |key, bit| {
-        x.iter().fold(key, |key, x| (key << 1) | u64::from((x >> bit) & 1))
-    })
+    (0..bits).rev().fold(0, |key, bit| x.iter().fold(key, |key, x| (key << 1) | u64::from((x >> bit) & 1)))
 }
 
 impl Tree {
@@ -150,7 +148,8 @@ impl Tree {
             let mut up = vec![Node::EMPTY; level.len().div_ceil(WIDTH)];
             for (i, node) in level.iter().enumerate() {
                 for axis in 0..3 {
-                    up[i / WIDTH].low[axis][i % WIDTH] = node.low[axis].iter().copied().fold(f32::INFINITY, f32::min);
+                    up[i / WIDTH].low[axis][i % WIDTH] =
+                        node.low[axis].iter().copied().fold(f32::INFINITY, f32::min);
                     up[i / WIDTH].high[axis][i % WIDTH] =
                         node.high[axis].iter().copied().fold(f32::NEG_INFINITY, f32::max);
                 }

@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 const GAP: f64 = 1.0e-6;
 /// Height of a triangle below which the triangle has no area, relative to the diagonal of the box: the rounding of binary32.
 const SLIVER: f64 = 1.0e-9;
+/// Shortest edge whose direction is known to a thousandth, relative to the rounding of a coordinate.
+const RESOLVED: f64 = 1000.0;
 /// Most passes over slivers: a chain of them needs one each.
 const MOST_PASSES: usize = 16;
 
@@ -33,6 +35,8 @@ pub struct Welded {
     pub doubled: usize,
     /// Points of borders merged over a gap of rounding.
     pub closed: usize,
+    /// Points merged because the rounding of binary32 hides the direction of their edge.
+    pub unresolved: usize,
 }
 
 /// Open-addressed table from keys to numbers: a hash map of the standard library takes five times as long on a million points.
@@ -87,6 +91,7 @@ pub(crate) fn diagonal_m(points_m: &[DVec3]) -> f64 {
 #[must_use]
 #[allow(clippy::cast_possible_truncation)] // a soup has fewer than 2^32 points
 pub fn weld(soup: Soup, metres: f64) -> (Mesh, Welded) {
+    let rounding_m = rounding(&soup.points) * metres;
     let mut points_m: Vec<DVec3> = Vec::with_capacity(soup.points.len() / 2);
     let mut numbers = Numbers::new(soup.points.len());
     let mut new_number = Vec::with_capacity(soup.points.len());
@@ -112,9 +117,18 @@ pub fn weld(soup: Soup, metres: f64) -> (Mesh, Welded) {
     welded.doubled += mesh.remove_doubled();
     welded.closed = mesh.close_gaps();
     welded.collapsed += mesh.remove_collapsed();
+    welded.unresolved = mesh.merge_unresolved(RESOLVED * rounding_m);
     welded.flipped = mesh.flip_slivers();
     mesh.drop_unused();
     (mesh, welded)
+}
+
+/// Returns the rounding of the coordinates if all are numbers of binary32; zero for finer ones.
+#[allow(clippy::cast_possible_truncation)] // the question
+fn rounding(points: &[[f64; 3]]) -> f64 {
+    let largest = points.as_flattened().iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let are_rounded = points.as_flattened().iter().all(|x| f64::from(*x as f32) == *x);
+    if are_rounded { largest * f64::from(f32::EPSILON) * 0.5 } else { 0.0 }
 }
 
 fn is_collapsed(t: &[u32; 3]) -> bool {
@@ -202,7 +216,7 @@ impl Mesh {
             let [x, y, z] = cell(p);
             let near = (-1..=1).flat_map(|i| (-1..=1).flat_map(move |j| (-1..=1).map(move |k| [i, j, k])));
             let other = near
-                .filter_map(|[i, j, k]| cells.get(&[x + i, y + j, z + k]))
+                .filter_map(|[i, j, k]| cells.get(&[x.wrapping_add(i), y.wrapping_add(j), z.wrapping_add(k)]))
                 .flatten()
                 .find(|other| self.points_m[**other as usize].distance(p) <= gap_m)
                 .copied();
@@ -219,6 +233,59 @@ impl Mesh {
         merged.len()
     }
 
+    /// Merges the ends of edges shorter than `least_m`; removes faces that this folds onto each other. Returns the number of points.
+    fn merge_unresolved(&mut self, least_m: f64) -> usize {
+        let mut merged = 0;
+        for _ in 0..MOST_PASSES {
+            let mut target: BTreeMap<u32, u32> = BTreeMap::new();
+            let mut is_taken = vec![false; self.points_m.len()];
+            for t in &self.triangles {
+                for i in 0..3 {
+                    let (a, b) = (t[i].min(t[(i + 1) % 3]), t[i].max(t[(i + 1) % 3]));
+                    let is_short = self.points_m[a as usize].distance_squared(self.points_m[b as usize])
+                        < least_m * least_m;
+                    if is_short && !is_taken[a as usize] && !is_taken[b as usize] {
+                        (is_taken[a as usize], is_taken[b as usize]) = (true, true);
+                        target.insert(b, a);
+                    }
+                }
+            }
+            if target.is_empty() {
+                break;
+            }
+            merged += target.len();
+            for corner in self.triangles.as_flattened_mut() {
+                *corner = target.get(corner).copied().unwrap_or(*corner);
+            }
+            self.remove_collapsed();
+            self.remove_folded(&is_taken);
+        }
+        merged
+    }
+
+    /// Removes pairs of faces with the same corners and opposite sides, at a point of `at`: a fold without inside.
+    #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 faces
+    fn remove_folded(&mut self, at: &[bool]) {
+        let sorted = |mut t: [u32; 3]| {
+            t.sort_unstable();
+            t
+        };
+        let mut numbers = Numbers::new(self.triangles.len());
+        let mut is_folded = vec![false; self.triangles.len()];
+        for i in 0..self.triangles.len() {
+            let key = sorted(self.triangles[i]);
+            if !key.iter().any(|corner| at[*corner as usize]) {
+                continue;
+            }
+            let same = |other: u32| sorted(self.triangles[other as usize]) == key;
+            let first = numbers.find_or_insert(mix(&key.map(u64::from)), i as u32, same) as usize;
+            if first != i && !is_folded[first] {
+                (is_folded[first], is_folded[i]) = (true, true);
+            }
+        }
+        self.retain(|i, _| !is_folded[i]);
+    }
+
     /// Removes triangles without area: the neighbour over the longest edge is split at the middle corner instead.
     #[allow(clippy::cast_possible_truncation)] // fewer than 2^32 faces
     fn flip_slivers(&mut self) -> usize {
@@ -232,9 +299,8 @@ impl Mesh {
                 let height_m = (q - p).cross(r - p).length() / lengths[edge].max(f64::MIN_POSITIVE);
                 (height_m <= least_m).then_some(edge)
             };
-            let slivers: Vec<(usize, usize)> = (0..self.triangles.len())
-                .filter_map(|i| longest(self, i).map(|edge| (i, edge)))
-                .collect();
+            let slivers: Vec<(usize, usize)> =
+                (0..self.triangles.len()).filter_map(|i| longest(self, i).map(|edge| (i, edge))).collect();
             if slivers.is_empty() {
                 break;
             }

@@ -105,7 +105,11 @@ fn a_step_of_the_force_is_no_larger_than_the_stiffness_allows() {
             // Stays near the surface: back to a depth of a quarter.
             let proxy_m = hand.proxy_m();
             if (proxy_m - next_m).length() > 0.5 * deepest_m || answer.contacts == 0 {
-                let inwards = if answer.contacts == 0 { -next_m.normalize() * 1.0e-3 } else { (proxy_m - next_m) * 0.5 };
+                let inwards = if answer.contacts == 0 {
+                    -next_m.normalize() * 1.0e-3
+                } else {
+                    (proxy_m - next_m) * 0.5
+                };
                 last = hand.slowly_to(next_m + inwards);
             }
         }
@@ -114,10 +118,12 @@ fn a_step_of_the_force_is_no_larger_than_the_stiffness_allows() {
     }
 }
 
-/// Returns the depth by a search of all patches that face the tool's side, as the issue defines it.
-fn exhaustive_m(surface: &Surface, tool_m: DVec3, near_m: DVec3) -> f64 {
-    let reach = |p: DVec3| (p - near_m).length() < 2.0e-3;
-    let feet = surface.patches().iter().map(|patch| patch.nearest(tool_m)).filter(|foot| reach(foot.point_m));
+/// Returns the distance from the nearest point of all patches on the side of the path: near the contact, and not turned away from it.
+fn exhaustive_m(surface: &Surface, tool_m: DVec3, (near_m, normal): (DVec3, DVec3)) -> f64 {
+    let reach = |foot: &flotor_surface::closest::Foot| {
+        (foot.point_m - near_m).length() < 2.0e-3 && foot.normal.dot(normal) > 0.5
+    };
+    let feet = surface.patches().iter().map(|patch| patch.nearest(tool_m)).filter(reach);
     feet.map(|foot| foot.distance_m).fold(f64::INFINITY, f64::min)
 }
 
@@ -147,7 +153,7 @@ fn the_depth_is_that_of_a_search_of_all_patches() {
             let deep_m = hand.at_m - met.contact.expect("contact").1 * (8.0e-4 * numbers.next());
             let answer = hand.slowly_to(deep_m);
             let Some((point_m, normal)) = answer.contact else { continue };
-            let near_m = exhaustive_m(surface, deep_m, point_m);
+            let near_m = exhaustive_m(surface, deep_m, (point_m, normal));
             let is_outside = (deep_m - point_m).dot(normal) > 0.0;
             let depth_m = if is_outside { radius_m - near_m } else { radius_m + near_m };
             worst = worst.max((answer.depth_m - depth_m).abs());
@@ -161,22 +167,35 @@ fn the_depth_is_that_of_a_search_of_all_patches() {
 fn a_groove_holds_a_ball_on_both_walls() {
     // V of 90 degrees along y, open upwards.
     let points = [
-        [-0.01, -0.02, 0.01], [0.0, -0.02, 0.0], [0.01, -0.02, 0.01],
-        [-0.01, 0.02, 0.01], [0.0, 0.02, 0.0], [0.01, 0.02, 0.01],
-    ].map(DVec3::from_array);
+        [-0.01, -0.02, 0.01],
+        [0.0, -0.02, 0.0],
+        [0.01, -0.02, 0.01],
+        [-0.01, 0.02, 0.01],
+        [0.0, 0.02, 0.0],
+        [0.01, 0.02, 0.01],
+    ]
+    .map(DVec3::from_array);
     let surface = surface(soup(&points, vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]), 30.0);
     for radius_m in [0.0, 1.0e-4, 1.0e-3] {
         let rest_m = DVec3::Z * radius_m * 2.0_f64.sqrt();
         let mut hand = Hand::new(&surface, material(0.0, 0.0), radius_m, DVec3::Z * 8.0e-3);
-        for tool in [[0.0, 0.0, -1.0e-3], [3.0e-4, 1.0e-3, -1.0e-3], [-2.0e-4, 2.0e-3, -5.0e-4]].map(DVec3::from_array) {
+        for tool in [[0.0, 0.0, -1.0e-3], [3.0e-4, 1.0e-3, -1.0e-3], [-2.0e-4, 2.0e-3, -5.0e-4]]
+            .map(DVec3::from_array)
+        {
             let answer = hand.slowly_to(tool);
             let expected_n = (rest_m.with_y(tool.y) - tool) * STIFF;
-            assert!((answer.force_n - expected_n).length() < 1.0e-9, "{radius_m} {tool}: {} {expected_n}", answer.force_n);
+            assert!(
+                (answer.force_n - expected_n).length() < 1.0e-9,
+                "{radius_m} {tool}: {} {expected_n}",
+                answer.force_n
+            );
         }
         // Up one wall and out.
         let answer = hand.slowly_to(DVec3::new(4.0e-3, 0.0, 3.0e-3));
         let depth_m = radius_m + 1.0e-3 / 2.0_f64.sqrt();
-        assert!((answer.force_n - DVec3::new(-1.0, 0.0, 1.0).normalize() * depth_m * STIFF).length() < 1.0e-9);
+        assert!(
+            (answer.force_n - DVec3::new(-1.0, 0.0, 1.0).normalize() * depth_m * STIFF).length() < 1.0e-9
+        );
         assert_eq!(hand.slowly_to(DVec3::Z * 8.0e-3).force_n, DVec3::ZERO);
     }
 }
@@ -193,7 +212,11 @@ fn an_edge_and_a_corner_are_rounded_by_the_ball() {
         let away = away.normalize();
         let mut hand = Hand::new(&surface, material(0.0, 0.0), radius_m, nearest + away * 5.0e-3);
         let answer = hand.slowly_to(nearest + away * 4.0e-4);
-        assert!((answer.force_n - away * (6.0e-4 * STIFF)).length() < 1.0e-9, "{nearest}: {}", answer.force_n);
+        assert!(
+            (answer.force_n - away * (6.0e-4 * STIFF)).length() < 1.0e-9,
+            "{nearest}: {}",
+            answer.force_n
+        );
     }
 }
 
@@ -207,10 +230,13 @@ fn no_wall_is_passed() {
     let plate = [DVec3::new(-0.01, -0.01, -1.0e-4), DVec3::new(0.01, 0.01, 1.0e-4)];
     let surface = surface(cuboid(plate[0], plate[1], 4), 30.0);
     let mut numbers = Numbers(23);
-    let count = if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") { 100_000 } else { 3_000 };
+    let count =
+        if std::env::var("FLOTOR_TEST_SIZE").is_ok_and(|size| size == "full") { 100_000 } else { 3_000 };
     for _ in 0..count {
         let radius_m = [0.0, 2.0e-5, 5.0e-4][(numbers.next() * 3.0) as usize];
-        let spread = |numbers: &mut Numbers| DVec3::new(numbers.next(), numbers.next(), 0.0) * 0.014 - DVec3::new(0.007, 0.007, 0.0);
+        let spread = |numbers: &mut Numbers| {
+            DVec3::new(numbers.next(), numbers.next(), 0.0) * 0.014 - DVec3::new(0.007, 0.007, 0.0)
+        };
         let from_m = spread(&mut numbers) + DVec3::Z * (0.001 + 0.002 * numbers.next());
         let way_m = (spread(&mut numbers) - DVec3::Z * (0.001 + 0.002 * numbers.next()) - from_m).normalize()
             * (0.004 + 0.016 * numbers.next());
@@ -226,7 +252,10 @@ fn no_wall_is_passed() {
             }
             hand.to(tool_m);
             let proxy_m = hand.proxy_m();
-            assert!(proxy_m.z >= 1.0e-4 + radius_m - 1.0e-9, "{radius_m} {from_m} {way_m} {step_m} {tool_m}: {proxy_m}");
+            assert!(
+                proxy_m.z >= 1.0e-4 + radius_m - 1.0e-9,
+                "{radius_m} {from_m} {way_m} {step_m} {tool_m}: {proxy_m}"
+            );
             assert!(!is_in_box(proxy_m, plate[0], plate[1], radius_m - 1.0e-9) || radius_m == 0.0);
             step += 1.0;
         }
@@ -276,7 +305,8 @@ fn a_lap_generates_no_energy() {
         DVec3::new(0.02 + 0.004 * c, 0.003 * s, 0.0075 + 0.0004 * s)
     };
     let lap = |statics: f64, steps| {
-        let mut hand = Hand::new(&surface, material(statics, 0.8 * statics), 5.0e-4, DVec3::new(0.02, 0.0, 0.012));
+        let mut hand =
+            Hand::new(&surface, material(statics, 0.8 * statics), 5.0e-4, DVec3::new(0.02, 0.0, 0.012));
         lap_j(&mut hand, steps, path);
         lap_j(&mut hand, steps, path)
     };
@@ -336,17 +366,27 @@ fn a_sphere_has_the_cone_of_a_sphere() {
 #[test]
 fn a_sheet_has_two_sides_and_a_rim() {
     let n = 8;
-    let points: Vec<DVec3> =
-        (0..=n).flat_map(|i| (0..=n).map(move |j| DVec3::new(f64::from(i), f64::from(j), 0.0) * 2.5e-3 - DVec3::new(0.01, 0.01, 0.0))).collect();
+    let points: Vec<DVec3> = (0..=n)
+        .flat_map(|i| {
+            (0..=n).map(move |j| {
+                DVec3::new(f64::from(i), f64::from(j), 0.0) * 2.5e-3 - DVec3::new(0.01, 0.01, 0.0)
+            })
+        })
+        .collect();
     let at = |i: i32, j: i32| (i * (n + 1) + j) as u32;
     let triangles = (0..n)
-        .flat_map(|i| (0..n).flat_map(move |j| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]))
+        .flat_map(|i| {
+            (0..n).flat_map(move |j| {
+                [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]]
+            })
+        })
         .collect();
     let sheet: Soup = soup(&points, triangles);
     let surface = surface(sheet, 30.0);
     for side in [1.0, -1.0] {
         for radius_m in [0.0, 5.0e-4] {
-            let mut hand = Hand::new(&surface, material(0.0, 0.0), radius_m, DVec3::new(1.0e-3, 1.0e-3, 4.0e-3 * side));
+            let mut hand =
+                Hand::new(&surface, material(0.0, 0.0), radius_m, DVec3::new(1.0e-3, 1.0e-3, 4.0e-3 * side));
             let answer = hand.slowly_to(DVec3::new(1.0e-3, 1.0e-3, -1.0e-3 * side));
             let expected_n = DVec3::Z * side * STIFF * (1.0e-3 + radius_m);
             assert!((answer.force_n - expected_n).length() < 1.0e-9, "{side} {radius_m}: {}", answer.force_n);

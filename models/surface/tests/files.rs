@@ -45,7 +45,14 @@ fn obj(soup: &Soup) -> Vec<u8> {
             writeln!(text, "f {}/1/1 {}//2 {}", a + 1, b + 1, c + 1).unwrap();
         } else {
             let count = soup.points.len() as i64;
-            writeln!(text, "f {} {} \\\n{}", i64::from(*a) - count, i64::from(*b) - count, i64::from(*c) - count).unwrap();
+            writeln!(
+                text,
+                "f {} {} \\\n{}",
+                i64::from(*a) - count,
+                i64::from(*b) - count,
+                i64::from(*c) - count
+            )
+            .unwrap();
         }
     }
     text.into_bytes()
@@ -166,51 +173,109 @@ fn defects() -> Vec<(&'static str, Soup, Told)> {
         rows.push((what, soup, told));
     };
     with("a face twice", ball(), &|s| s.triangles.push(s.triangles[5]), Told::Healed("twice"));
-    with("a face twice, turned in its corners", ball(), &|s| {
-        let [a, b, c] = s.triangles[5];
-        s.triangles.push([b, c, a]);
-    }, Told::Healed("twice"));
+    with(
+        "a face twice, turned in its corners",
+        ball(),
+        &|s| {
+            let [a, b, c] = s.triangles[5];
+            s.triangles.push([b, c, a]);
+        },
+        Told::Healed("twice"),
+    );
     with("two corners of one point", ball(), &|s| s.triangles.push([3, 3, 7]), Told::Healed("one point"));
     with("three corners of one point", ball(), &|s| s.triangles.push([3, 3, 3]), Told::Healed("one point"));
     with("a hole", ball(), &|s| drop(s.triangles.pop()), Told::Healed("open"));
     with("a face the wrong way round", ball(), &|s| s.triangles[9].swap(0, 1), Told::Healed("turned"));
-    with("all faces the wrong way round", ball(), &|s| s.triangles.iter_mut().for_each(|t| t.swap(0, 1)), Told::Healed("turned"));
-    with("half of the faces the wrong way round", cube(), &|s| s.triangles.iter_mut().step_by(2).for_each(|t| t.swap(0, 1)), Told::Healed("turned"));
-    with("loose faces", ball(), &|s| {
-        let loose: Vec<[f64; 3]> = s.triangles.as_flattened().iter().map(|c| s.points[*c as usize]).collect();
-        s.triangles = (0..s.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        s.points = loose;
-    }, Told::Felt);
-    with("gaps of rounding", cube(), &|s| {
-        let loose: Vec<[f64; 3]> = s.triangles.as_flattened().iter().enumerate()
-            .map(|(i, c)| s.points[*c as usize].map(|x| x + 1.0e-9 * (i % 7) as f64)).collect();
-        s.triangles = (0..s.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
-        s.points = loose;
-    }, Told::Healed("joined"));
+    with(
+        "all faces the wrong way round",
+        ball(),
+        &|s| s.triangles.iter_mut().for_each(|t| t.swap(0, 1)),
+        Told::Healed("turned"),
+    );
+    with(
+        "half of the faces the wrong way round",
+        cube(),
+        &|s| s.triangles.iter_mut().step_by(2).for_each(|t| t.swap(0, 1)),
+        Told::Healed("turned"),
+    );
+    with(
+        "loose faces",
+        ball(),
+        &|s| {
+            let loose: Vec<[f64; 3]> =
+                s.triangles.as_flattened().iter().map(|c| s.points[*c as usize]).collect();
+            s.triangles = (0..s.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            s.points = loose;
+        },
+        Told::Felt,
+    );
+    with(
+        "gaps of rounding",
+        cube(),
+        &|s| {
+            let loose: Vec<[f64; 3]> = s
+                .triangles
+                .as_flattened()
+                .iter()
+                .enumerate()
+                .map(|(i, c)| s.points[*c as usize].map(|x| x + 1.0e-9 * (i % 7) as f64))
+                .collect();
+            s.triangles = (0..s.triangles.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            s.points = loose;
+        },
+        Told::Healed("joined"),
+    );
     with("points of no face", ball(), &|s| s.points.push([9.0, 9.0, 9.0]), Told::Felt);
-    with("a second ball inside", ball(), &|s| {
-        let (inner, first) = (icosphere(0.01, 1), s.points.len() as u32);
-        s.points.extend(inner.points);
-        s.triangles.extend(inner.triangles.iter().map(|t| t.map(|c| c + first)));
-    }, Told::Felt);
-    with("an edge of three faces", cube(), &|s| {
-        let [a, b, _] = s.triangles[0];
-        s.points.push([0.05, 0.05, 0.05]);
-        s.triangles.push([a, b, s.points.len() as u32 - 1]);
-    }, Told::Healed("three or more"));
-    rows.push(("a sheet", soup_of(&[[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]], &[[0, 1, 2]]), Told::Healed("open")));
-    rows.push(("a face without area", soup_of(&[[0.0; 3], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]], &[[0, 1, 2]]), Told::Refused("no face")));
-    rows.push(("a sliver on an edge", soup_of(
-        &[[0.0; 3], [0.2, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, -0.1, 0.0], [0.05, 0.1, 0.0]],
-        &[[0, 1, 2], [1, 0, 3], [0, 2, 4]],
-    ), Told::Healed("without area")));
+    with(
+        "a second ball inside",
+        ball(),
+        &|s| {
+            let (inner, first) = (icosphere(0.01, 1), s.points.len() as u32);
+            s.points.extend(inner.points);
+            s.triangles.extend(inner.triangles.iter().map(|t| t.map(|c| c + first)));
+        },
+        Told::Felt,
+    );
+    with(
+        "an edge of three faces",
+        cube(),
+        &|s| {
+            let [a, b, _] = s.triangles[0];
+            s.points.push([0.05, 0.05, 0.05]);
+            s.triangles.push([a, b, s.points.len() as u32 - 1]);
+        },
+        Told::Healed("three or more"),
+    );
+    rows.push((
+        "a sheet",
+        soup_of(&[[0.0; 3], [0.1, 0.0, 0.0], [0.0, 0.1, 0.0]], &[[0, 1, 2]]),
+        Told::Healed("open"),
+    ));
+    rows.push((
+        "a face without area",
+        soup_of(&[[0.0; 3], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]], &[[0, 1, 2]]),
+        Told::Refused("no face"),
+    ));
+    rows.push((
+        "a sliver on an edge",
+        soup_of(
+            &[[0.0; 3], [0.2, 0.0, 0.0], [0.1, 0.0, 0.0], [0.1, -0.1, 0.0], [0.05, 0.1, 0.0]],
+            &[[0, 1, 2], [1, 0, 3], [0, 2, 4]],
+        ),
+        Told::Healed("without area"),
+    ));
     rows.push(("a strip of one side", moebius(), Told::Refused("only one side")));
     let mut crossed = cube();
-    let (other, first) = (cuboid(DVec3::splat(0.005), DVec3::new(0.012, 0.011, 0.03), 1), crossed.points.len() as u32);
+    let (other, first) =
+        (cuboid(DVec3::splat(0.005), DVec3::new(0.012, 0.011, 0.03), 1), crossed.points.len() as u32);
     crossed.points.extend(other.points);
     crossed.triangles.extend(other.triangles.iter().map(|t| t.map(|c| c + first)));
     rows.push(("two bodies through each other", crossed, Told::Healed("through each other, the first at")));
-    rows.push(("too large", soup_of(&[[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]], &[[0, 1, 2]]), Told::Refused("at most 4")));
+    rows.push((
+        "too large",
+        soup_of(&[[0.0; 3], [9.0, 0.0, 0.0], [0.0, 9.0, 0.0]], &[[0, 1, 2]]),
+        Told::Refused("at most 4"),
+    ));
     rows
 }
 
@@ -224,9 +289,8 @@ fn moebius() -> Soup {
         })
     });
     let at = |i: u32, side: u32| if i < n as u32 { 2 * i + side } else { 1 - side };
-    let triangles = (0..n as u32).flat_map(|i| {
-        [[at(i, 0), at(i + 1, 0), at(i + 1, 1)], [at(i, 0), at(i + 1, 1), at(i, 1)]]
-    });
+    let triangles = (0..n as u32)
+        .flat_map(|i| [[at(i, 0), at(i + 1, 0), at(i + 1, 1)], [at(i, 0), at(i + 1, 1), at(i, 1)]]);
     Soup { points: points.collect(), triangles: triangles.collect(), ..Soup::default() }
 }
 
@@ -239,14 +303,22 @@ fn a_defect_is_healed_or_refused_as_the_table_says() {
     let mut count = 0;
     for (what, soup, told) in defects() {
         // As binary STL, OBJ, and binary PLY: with loose and with shared points, in binary32 and in binary64.
-        for (name, bytes) in [("m.stl", stl(&soup)), ("m.obj", obj(&soup)), ("m.ply", ply(&soup, "binary_little_endian"))] {
+        for (name, bytes) in
+            [("m.stl", stl(&soup)), ("m.obj", obj(&soup)), ("m.ply", ply(&soup, "binary_little_endian"))]
+        {
             count += 1;
             match (outcome(name, bytes), &told) {
                 (Ok(object), Told::Healed(words)) => {
-                    assert!(object.remarks.iter().any(|remark| remark.contains(words)), "{what}, {name}: {:?}", object.remarks);
+                    assert!(
+                        object.remarks.iter().any(|remark| remark.contains(words)),
+                        "{what}, {name}: {:?}",
+                        object.remarks
+                    );
                 }
                 (Ok(object), Told::Felt) => assert!(object.surface.count() > 0, "{what}"),
-                (Err(error), Told::Refused(words)) => assert!(error.contains(words), "{what}, {name}: {error}"),
+                (Err(error), Told::Refused(words)) => {
+                    assert!(error.contains(words), "{what}, {name}: {error}")
+                }
                 (Ok(_), Told::Refused(_)) => panic!("{what}, {name}: not refused"),
                 (Err(error), _) => panic!("{what}, {name}: {error}"),
             }
@@ -266,7 +338,11 @@ fn a_refusal_names_the_place() {
         ("m.obj", b"v 0 nan 0\n".to_vec(), "line 1"),
         ("m.obj", b"v 0 1\n".to_vec(), "line 1"),
         ("m.obj", b"".to_vec(), "no triangle"),
-        ("m.ply", b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n".to_vec(), "x, y and z"),
+        (
+            "m.ply",
+            b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n".to_vec(),
+            "x, y and z",
+        ),
         ("m.ply", b"ply\nformat ascii 1.0\nelement vertex x\n".to_vec(), "line 3"),
         ("m.ply", ply(&ball, "ascii")[..400].to_vec(), "line"),
         ("m.ply", ply(&ball, "binary_big_endian")[..400].to_vec(), "byte 400"),

@@ -34,15 +34,42 @@ pub fn as_stl(mut soup: Soup) -> Soup {
 pub fn icosphere(radius_m: f64, level: u32) -> Soup {
     let g = (1.0 + 5.0_f64.sqrt()) * 0.5;
     let mut points: Vec<DVec3> = [
-        [-1.0, g, 0.0], [1.0, g, 0.0], [-1.0, -g, 0.0], [1.0, -g, 0.0], [0.0, -1.0, g], [0.0, 1.0, g],
-        [0.0, -1.0, -g], [0.0, 1.0, -g], [g, 0.0, -1.0], [g, 0.0, 1.0], [-g, 0.0, -1.0], [-g, 0.0, 1.0],
+        [-1.0, g, 0.0],
+        [1.0, g, 0.0],
+        [-1.0, -g, 0.0],
+        [1.0, -g, 0.0],
+        [0.0, -1.0, g],
+        [0.0, 1.0, g],
+        [0.0, -1.0, -g],
+        [0.0, 1.0, -g],
+        [g, 0.0, -1.0],
+        [g, 0.0, 1.0],
+        [-g, 0.0, -1.0],
+        [-g, 0.0, 1.0],
     ]
     .iter()
     .map(|p| DVec3::from_array(*p).normalize())
     .collect();
     let mut triangles: Vec<[u32; 3]> = vec![
-        [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6],
-        [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7],
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
         [9, 8, 1],
     ];
     for _ in 0..level {
@@ -66,9 +93,8 @@ pub fn icosphere(radius_m: f64, level: u32) -> Soup {
 
 /// Closed grid over two angles, `point(u, v)` with both from 0 to 1.
 pub fn ring_grid(n: u32, m: u32, point: impl Fn(f64, f64) -> DVec3) -> Soup {
-    let points: Vec<DVec3> = (0..n * m)
-        .map(|i| point(f64::from(i / m) / f64::from(n), f64::from(i % m) / f64::from(m)))
-        .collect();
+    let points: Vec<DVec3> =
+        (0..n * m).map(|i| point(f64::from(i / m) / f64::from(n), f64::from(i % m) / f64::from(m))).collect();
     let at = |i: u32, j: u32| (i % n) * m + j % m;
     let triangles = (0..n * m)
         .flat_map(|k| {
@@ -140,8 +166,10 @@ pub fn cuboid(low: DVec3, high: DVec3, n: u32) -> Soup {
             for i in 0..n {
                 for j in 0..n {
                     let at = |i: u32, j: u32| first + i * (n + 1) + j;
-                    let mut square =
-                        [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]];
+                    let mut square = [
+                        [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
+                        [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
+                    ];
                     if side == 0 {
                         square.iter_mut().for_each(|t| t.swap(1, 2));
                     }

@@ -49,7 +49,10 @@ impl<'a> Cursor<'a> {
         let end = self.at.checked_add(N);
         let taken = end.and_then(|end| self.bytes.get(self.at..end)).and_then(|slice| slice.try_into().ok());
         let mut taken: [u8; N] = taken.ok_or_else(|| {
-            Problem::byte(self.bytes.len(), "the file ends here, before all of its data; copy or export the file again")
+            Problem::byte(
+                self.bytes.len(),
+                "the file ends here, before all of its data; copy or export the file again",
+            )
         })?;
         self.at += N;
         if self.order == Order::Big {
@@ -61,7 +64,10 @@ impl<'a> Cursor<'a> {
     pub(super) fn skip(&mut self, count: usize) -> Result<(), Problem> {
         let end = self.at.checked_add(count).filter(|end| *end <= self.bytes.len());
         self.at = end.ok_or_else(|| {
-            Problem::byte(self.bytes.len(), "the file ends here, before all of its data; copy or export the file again")
+            Problem::byte(
+                self.bytes.len(),
+                "the file ends here, before all of its data; copy or export the file again",
+            )
         })?;
         Ok(())
     }

@@ -27,8 +27,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Soup, Problem> {
     let glb = Glb::open(bytes)?;
     let mut soup = Soup { metres: Some(1.0), ..Soup::default() };
     let extensions = glb.list(&glb.json, "extensionsRequired");
-    if let Some(name) = extensions.iter().filter_map(Value::as_str).find(|name| name.contains("draco") || name.contains("meshopt") || name.contains("quantization")) {
-        return Err(Problem::file(format!("the mesh is stored with `{name}`, which is not read; export without compression")));
+    if let Some(name) = extensions
+        .iter()
+        .filter_map(Value::as_str)
+        .find(|name| name.contains("draco") || name.contains("meshopt") || name.contains("quantization"))
+    {
+        return Err(Problem::file(format!(
+            "the mesh is stored with `{name}`, which is not read; export without compression"
+        )));
     }
     let scene = glb.json.get("scene").and_then(Value::as_u64).unwrap_or(0);
     let scenes = glb.list(&glb.json, "scenes");
@@ -85,13 +91,17 @@ impl<'a> Glb<'a> {
             let chunk = &bytes[from..cursor.at];
             if kind == JSON as usize && json.is_none() {
                 json = Some(serde_json::from_slice(chunk).map_err(|error| {
-                    Problem::byte(at, format!("the JSON of the file is malformed ({error}); export the mesh again"))
+                    Problem::byte(
+                        at,
+                        format!("the JSON of the file is malformed ({error}); export the mesh again"),
+                    )
                 })?);
             } else if kind == BINARY as usize && start == 0 {
                 (binary, start) = (chunk, from);
             }
         }
-        let json = json.ok_or_else(|| Problem::byte(12, "the file has no JSON chunk; export the mesh again"))?;
+        let json =
+            json.ok_or_else(|| Problem::byte(12, "the file has no JSON chunk; export the mesh again"))?;
         Ok(Self { json, binary, start })
     }
 
@@ -100,7 +110,8 @@ impl<'a> Glb<'a> {
     }
 
     fn node(&self, number: usize, parent: DMat4, depth: usize, soup: &mut Soup) -> Result<(), Problem> {
-        let missing = || Problem::file(format!("node {number} is missing or lies in a circle; export the mesh again"));
+        let missing =
+            || Problem::file(format!("node {number} is missing or lies in a circle; export the mesh again"));
         if depth > DEEPEST {
             return Err(missing());
         }
@@ -153,7 +164,9 @@ impl<'a> Glb<'a> {
                 None => corners.extend(first..first + count),
             }
             if soup.triangles.len() + corners.len() / 3 > MOST_PLACED {
-                return Err(Problem::file("the nodes of the file repeat too many triangles; reduce the mesh"));
+                return Err(Problem::file(
+                    "the nodes of the file repeat too many triangles; reduce the mesh",
+                ));
             }
             let is_mirrored = place.determinant() < 0.0;
             for corner in corners.as_chunks::<3>().0 {
@@ -175,7 +188,8 @@ impl<'a> Glb<'a> {
         width: usize,
         mut row: impl FnMut([f64; 3]) -> Result<(), &'static str>,
     ) -> Result<(), Problem> {
-        let wrong = |problem: &str| Problem::file(format!("accessor {accessor}: {problem}; export the mesh again"));
+        let wrong =
+            |problem: &str| Problem::file(format!("accessor {accessor}: {problem}; export the mesh again"));
         let one = self.list(&self.json, "accessors").get(accessor).ok_or_else(|| wrong("it is missing"))?;
         if one.get("sparse").is_some() {
             return Err(wrong("sparse data are not read"));
@@ -197,7 +211,8 @@ impl<'a> Glb<'a> {
         if index(view, "buffer").unwrap_or(0) != 0 {
             return Err(wrong("its data are in another file"));
         }
-        let offset = index(one, "byteOffset").unwrap_or(0).checked_add(index(view, "byteOffset").unwrap_or(0));
+        let offset =
+            index(one, "byteOffset").unwrap_or(0).checked_add(index(view, "byteOffset").unwrap_or(0));
         let offset = offset.ok_or_else(|| wrong("its data lie outside the file"))?;
         let size = scalar.bytes() * width;
         let stride = index(view, "byteStride").filter(|stride| *stride > 0).unwrap_or(size);

@@ -96,7 +96,9 @@ impl Format {
 /// A [`Problem`]: an unknown format, malformed data, a number that is not finite, no triangle, or too many.
 pub fn read(name: &str, bytes: Vec<u8>) -> Result<Soup, Problem> {
     let format = Format::of(name, &bytes).ok_or_else(|| {
-        Problem::file("the format is unknown: name a file in STL (.stl), OBJ (.obj), PLY (.ply) or binary glTF (.glb)")
+        Problem::file(
+            "the format is unknown: name a file in STL (.stl), OBJ (.obj), PLY (.ply) or binary glTF (.glb)",
+        )
     })?;
     let soup = match format {
         Format::Stl => stl::read(bytes),

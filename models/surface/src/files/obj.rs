@@ -30,7 +30,10 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
                 for x in &mut point {
                     let word = words.next().and_then(|word| word.parse().ok());
                     *x = word.ok_or_else(|| {
-                        Problem::line(number, "a vertex is `v X Y Z` with three numbers; export the mesh again")
+                        Problem::line(
+                            number,
+                            "a vertex is `v X Y Z` with three numbers; export the mesh again",
+                        )
                     })?;
                 }
                 if !point.iter().all(|x| is_usable(*x)) {
@@ -51,7 +54,10 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
                     })?);
                 }
                 if corners.len() < 3 {
-                    return Err(Problem::line(number, "a face needs three or more vertices; export the mesh again"));
+                    return Err(Problem::line(
+                        number,
+                        "a face needs three or more vertices; export the mesh again",
+                    ));
                 }
                 let group = *group.get_or_insert_with(|| soup.group(""));
                 soup.push_polygon(&corners, group);

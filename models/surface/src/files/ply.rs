@@ -58,8 +58,10 @@ fn header(bytes: &[u8]) -> Result<Header, Problem> {
         let wrong = |problem: &str| Problem::line(line, problem);
         let rest = bytes.get(at..).unwrap_or_default();
         let length = rest.iter().take(LONGEST).position(|byte| *byte == b'\n' || *byte == b'\r');
-        let length = length.ok_or_else(|| wrong("the header has no `end_header`; copy or export the file again"))?;
-        let text = std::str::from_utf8(&rest[..length]).map_err(|_| wrong("the header is no text; export the mesh again"))?;
+        let length =
+            length.ok_or_else(|| wrong("the header has no `end_header`; copy or export the file again"))?;
+        let text = std::str::from_utf8(&rest[..length])
+            .map_err(|_| wrong("the header is no text; export the mesh again"))?;
         at += length + if rest[length..].starts_with(b"\r\n") { 2 } else { 1 };
         let words: Vec<&str> = text.split_ascii_whitespace().collect();
         match words[..] {
@@ -67,17 +69,24 @@ fn header(bytes: &[u8]) -> Result<Header, Problem> {
             ["format", "binary_little_endian", _] => encoding = Some(Encoding::Binary(Order::Little)),
             ["format", "binary_big_endian", _] => encoding = Some(Encoding::Binary(Order::Big)),
             ["element", name, rows] => {
-                let rows = rows.parse().map_err(|_| wrong("the number of rows is no whole number; export the mesh again"))?;
+                let rows = rows
+                    .parse()
+                    .map_err(|_| wrong("the number of rows is no whole number; export the mesh again"))?;
                 elements.push(Element { name: name.to_owned(), rows, properties: Vec::new() });
             }
             ["property", ref kind @ .., name] => {
                 let parsed = match *kind {
                     [one] => scalar(one).map(|scalar| (None, scalar)),
-                    ["list", count, one] => scalar(count).zip(scalar(one)).map(|(count, one)| (Some(count), one)),
+                    ["list", count, one] => {
+                        scalar(count).zip(scalar(one)).map(|(count, one)| (Some(count), one))
+                    }
                     _ => None,
                 };
-                let (count, scalar) = parsed.ok_or_else(|| wrong("the type of the property is unknown; export the mesh again"))?;
-                let element = elements.last_mut().ok_or_else(|| wrong("a property stands before its element; export the mesh again"))?;
+                let (count, scalar) = parsed
+                    .ok_or_else(|| wrong("the type of the property is unknown; export the mesh again"))?;
+                let element = elements
+                    .last_mut()
+                    .ok_or_else(|| wrong("a property stands before its element; export the mesh again"))?;
                 element.properties.push(Property { name: name.to_owned(), count, scalar });
             }
             ["end_header"] => break,
@@ -85,7 +94,8 @@ fn header(bytes: &[u8]) -> Result<Header, Problem> {
             _ => return Err(wrong("the line is no line of a PLY header; export the mesh again")),
         }
     }
-    let encoding = encoding.ok_or_else(|| Problem::line(line, "the header has no known `format`; export the mesh again"))?;
+    let encoding = encoding
+        .ok_or_else(|| Problem::line(line, "the header has no known `format`; export the mesh again"))?;
     Ok(Header { encoding, elements, data: at, line })
 }
 
@@ -113,7 +123,9 @@ impl Source<'_> {
             Self::Text { words, .. } => {
                 let word = words.next();
                 let number = word.and_then(|word| word.parse().ok());
-                number.ok_or_else(|| self.wrong("a number is missing or malformed here; copy or export the file again"))
+                number.ok_or_else(|| {
+                    self.wrong("a number is missing or malformed here; copy or export the file again")
+                })
             }
         }
     }
@@ -125,7 +137,11 @@ impl Source<'_> {
         }
         let number = self.number(scalar)?;
         let is_index = (0.0..4.0e9).contains(&number) && number.fract() == 0.0;
-        if is_index { Ok(number as usize) } else { Err(self.wrong("a whole number is expected here; export the mesh again")) }
+        if is_index {
+            Ok(number as usize)
+        } else {
+            Err(self.wrong("a whole number is expected here; export the mesh again"))
+        }
     }
 }
 
@@ -160,12 +176,15 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
             for (number, property) in element.properties.iter().enumerate() {
                 let Some(count) = property.count else {
                     let value = source.number(property.scalar)?;
-                    if let Some(axis) = axes.iter().position(|axis| *axis == Some(number)).filter(|_| is_vertex) {
+                    if let Some(axis) =
+                        axes.iter().position(|axis| *axis == Some(number)).filter(|_| is_vertex)
+                    {
                         point[axis] = value;
                     }
                     continue;
                 };
-                let is_face = element.name == "face" && matches!(property.name.as_str(), "vertex_indices" | "vertex_index");
+                let is_face = element.name == "face"
+                    && matches!(property.name.as_str(), "vertex_indices" | "vertex_index");
                 corners.clear();
                 for _ in 0..source.index(count)? {
                     if !is_face {
@@ -174,7 +193,10 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
                     }
                     let index = source.index(property.scalar)?;
                     if index >= soup.points.len() {
-                        return Err(source.wrong(&format!("a face names vertex {index}, but there are {}; export the mesh again", soup.points.len())));
+                        return Err(source.wrong(&format!(
+                            "a face names vertex {index}, but there are {}; export the mesh again",
+                            soup.points.len()
+                        )));
                     }
                     corners.push(next_index(index, source.at())?);
                 }

@@ -37,7 +37,9 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
                 HEAD as u64 + FACET as u64 * count as u64
             ),
         )),
-        None => Err(Problem::file("this is no STL file: it is shorter than 84 bytes and does not begin with `solid`")),
+        None => Err(Problem::file(
+            "this is no STL file: it is shorter than 84 bytes and does not begin with `solid`",
+        )),
     }
 }
 
@@ -77,7 +79,10 @@ fn read_text(text: &str) -> Result<Soup, Problem> {
                 for x in &mut point {
                     let word = words.next().and_then(|word| word.parse().ok());
                     *x = word.ok_or_else(|| {
-                        Problem::line(number, "a corner is `vertex X Y Z` with three numbers; export the mesh again")
+                        Problem::line(
+                            number,
+                            "a corner is `vertex X Y Z` with three numbers; export the mesh again",
+                        )
                     })?;
                 }
                 if !point.iter().all(|x| is_usable(*x)) {
@@ -88,7 +93,10 @@ fn read_text(text: &str) -> Result<Soup, Problem> {
             }
             Some("endloop") => {
                 if corners != 3 {
-                    return Err(Problem::line(number, format!("a facet has {corners} corners instead of 3; export the mesh again")));
+                    return Err(Problem::line(
+                        number,
+                        format!("a facet has {corners} corners instead of 3; export the mesh again"),
+                    ));
                 }
                 let last = next_index(soup.points.len(), super::At::Line(number))?;
                 soup.triangles.push([last - 3, last - 2, last - 1]);
@@ -98,7 +106,10 @@ fn read_text(text: &str) -> Result<Soup, Problem> {
             Some("facet" | "outer" | "endfacet" | "endsolid" | "color") | None => {}
             Some(other) => {
                 let other: String = other.chars().take(20).flat_map(char::escape_debug).collect();
-                return Err(Problem::line(number, format!("`{other}` is no word of an STL file; export the mesh again")));
+                return Err(Problem::line(
+                    number,
+                    format!("`{other}` is no word of an STL file; export the mesh again"),
+                ));
             }
         }
     }
