@@ -44,7 +44,9 @@ fn bumpy(rings: u32, meridians: u32) -> Vec<u8> {
 }
 
 fn main() {
-    for (rings, meridians) in [(64, 128), (182, 358), (512, 1024)] {
+    let only = std::env::args().nth(1).and_then(|word| word.parse::<u32>().ok());
+    let sizes = [(64, 128), (182, 358), (512, 1024)];
+    for (rings, meridians) in sizes.into_iter().filter(|(rings, _)| only.is_none_or(|only| only == *rings)) {
         let bytes = bumpy(rings, meridians);
         let started = Instant::now();
         let reading = Reading { unit: Unit::Auto, scale: 1.0, edge_angle_rad: 30.0_f64.to_radians() };

@@ -133,13 +133,14 @@ impl Ball {
                 false => Over { direction, height_m },
             };
         }
-        let outward = surface.outward(place) * side.sign();
-        let is_rim = surface.is_border(place);
         if distance_m < 1.0e-9 {
-            let direction = outward.try_normalize().unwrap_or(foot.normal * side.sign());
+            // In a groove each wall holds a point for itself.
+            let direction = foot.normal * side.sign();
             return Over { direction, height_m: from_m.dot(direction) };
         }
-        let sign = if is_rim || from_m.dot(outward) >= 0.0 { 1.0 } else { -1.0 };
+        let outward = surface.outward(place) * side.sign();
+        let is_outside = surface.is_border(place) || from_m.dot(outward) >= 0.0;
+        let sign = if is_outside { 1.0 } else { -1.0 };
         Over { direction: from_m * (sign / distance_m), height_m: sign * distance_m }
     }
 

@@ -197,12 +197,35 @@ impl Surface {
     /// Follows the surface downhill to a local closest point to `c_m`, from a place in `patch`. Real-time: bounded, no allocation.
     #[must_use]
     pub fn walk(&self, c_m: DVec3, patch: usize, at: Barycentric) -> Place {
+        let (patch, at) = self.flat_walk(c_m, patch, at);
         let mut place = Place { patch, foot: self.patches[patch].closest(c_m, at) };
         for _ in 0..MOST_PATCHES {
             let Some(next) = self.step_on(c_m, &place) else { break };
             place = next;
         }
         place
+    }
+
+    /// Follows the flat triangles downhill, which takes a tenth of the time: the patch and the place from which a walk ends soon.
+    fn flat_walk(&self, c_m: DVec3, patch: usize, at: Barycentric) -> (usize, Barycentric) {
+        let (mut number, mut place) = (patch, at);
+        let (mut flat, mut square) = closest_of_triangle(&self.patches[patch].corners_m, c_m);
+        for _ in 0..MOST_PATCHES {
+            let [a, b, c] = flat.map(|x| x <= 0.0);
+            let edge = match (a, b, c) {
+                (true, false, false) => 1,
+                (false, true, false) => 2,
+                (false, false, true) => 0,
+                _ => break,
+            };
+            let Some((other, _)) = self.neighbours[number][edge].get() else { break };
+            let (next, found) = closest_of_triangle(&self.patches[other].corners_m, c_m);
+            if found >= square * (1.0 - 1.0e-9) {
+                break;
+            }
+            (number, flat, square, place) = (other, next, found, next);
+        }
+        (number, place)
     }
 
     /// Returns the closest point of a neighbour over the side or the corner at which a walk arrived, if it is nearer.
@@ -346,9 +369,7 @@ impl Patch {
     /// Finds where a segment meets the patch, with the share of the segment; Newton's method from the flat triangle.
     fn crossing(&self, from_m: DVec3, way_m: DVec3) -> Option<(Barycentric, f64)> {
         let [p, q, r] = self.corners_m;
-        let inside = |at: &Barycentric, share: f64, slack: f64| {
-            at.iter().all(|x| *x >= -slack) && (-slack..=1.0 + slack).contains(&share)
-        };
+        let inside = |at: &Barycentric, slack: f64| at.iter().all(|x| *x >= -slack);
         let (normal, bulge_m) = ((p - r).cross(q - r), f64::from(self.bulge_m));
         let height = (from_m - r).dot(normal);
         let (low, high) = (height.min(height + way_m.dot(normal)), height.max(height + way_m.dot(normal)));
@@ -370,12 +391,13 @@ impl Patch {
         let mut at = [x, y, 1.0 - x - y];
         let mut share = share;
         if self.is_flat() {
-            return inside(&at, share, BETWEEN).then_some((at, share.clamp(0.0, 1.0)));
+            return (inside(&at, BETWEEN) && (0.0..=1.0).contains(&share)).then_some((at, share));
         }
         // A curved patch is crossed near its triangle or not at all.
-        if !inside(&at, share.clamp(0.0, 1.0), 1.0) {
+        if !inside(&at, 1.0) {
             return None;
         }
+        let mut is_met = false;
         for _ in 0..12 {
             let jet = self.jet(at);
             let miss = from_m + way_m * share - jet.point_m;
@@ -386,10 +408,11 @@ impl Patch {
             if !at.iter().all(|x| x.abs() < 3.0) {
                 return None;
             }
-            if x.abs() + y.abs() + more.abs() < 1.0e-12 {
+            is_met = x.abs() + y.abs() + more.abs() < 1.0e-10;
+            if is_met {
                 break;
             }
         }
-        inside(&at, share, BETWEEN).then_some((at, share.clamp(0.0, 1.0)))
+        (is_met && inside(&at, BETWEEN) && (0.0..=1.0).contains(&share)).then_some((at, share))
     }
 }

@@ -74,7 +74,9 @@ const LEAST_STEP_M: f64 = 5.0e-5;
 /// Most parts of a tick.
 const MOST_PARTS: f64 = 64.0;
 /// Most steps of the search for the border of the cone.
-const MOST_SECANTS: usize = 60;
+const MOST_SECANTS: usize = 40;
+/// Distance from the border of the cone at which the search ends, m.
+const ON_CONE_M: f64 = 1.0e-14;
 
 /// Ball in the hand, and the surface it touches.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -262,34 +264,38 @@ fn at_cone(surface: &Surface, before: &Ball, free: &Ball, goal_m: DVec3, coeffic
         Some((ball, excess_m(ball.centre_m - goal_m, normal, coefficient)))
     };
     let (mut low, mut high) = (0.0, 1.0);
-    let (mut low_m, mut high_m) = (at(low)?.1, at(high)?.1);
-    if coefficient == 0.0 || !(low_m <= 0.0) {
+    let (free, mut low_m) = at(low)?;
+    if coefficient == 0.0 || low_m > 0.0 {
         return None;
     }
-    if !high_m.is_finite() {
-        high_m = (before.centre_m - free.centre_m).length();
-    }
+    let way_m = (before.centre_m - free.centre_m).length();
+    let (ball, mut high_m) = at(high)?;
     if high_m <= 0.0 {
-        return at(1.0).map(|(ball, _)| ball);
+        return Some(ball);
     }
-    // Regula falsi with halved ends (Dowell and Jarratt 1971, BIT 11, 168-174).
-    let mut best = at(0.0)?.0;
+    high_m = high_m.min(way_m);
+    // Regula falsi; an end that stays twice counts half (Dowell and Jarratt 1971, BIT 11, 168-174).
+    let (mut best, mut last) = (free, 0);
     for _ in 0..MOST_SECANTS {
         let share = (low * high_m - high * low_m) / (high_m - low_m);
         let share = if share > low && share < high { share } else { 0.5 * (low + high) };
-        let (ball, excess) = at(share)?;
-        if excess <= 0.0 {
+        let (ball, excess_m) = at(share)?;
+        let is_met = excess_m.abs() <= ON_CONE_M;
+        if is_met || excess_m <= 0.0 {
             best = ball;
-            (low, low_m) = (share, excess);
-            high_m *= 0.5;
-        } else {
-            (high, high_m) = (share, excess.min(1.0));
-            low_m *= 0.5;
         }
-        let step_m = (high - low) * (before.centre_m - free.centre_m).length();
-        if excess.abs() <= 1.0e-14 || step_m <= 1.0e-15 {
+        if is_met || (high - low) * way_m <= ON_CONE_M {
             break;
         }
+        let side = if excess_m <= 0.0 { -1 } else { 1 };
+        if excess_m <= 0.0 {
+            (low, low_m) = (share, excess_m);
+            high_m *= if last == side { 0.5 } else { 1.0 };
+        } else {
+            (high, high_m) = (share, excess_m.min(way_m));
+            low_m *= if last == side { 0.5 } else { 1.0 };
+        }
+        last = side;
     }
     Some(best)
 }

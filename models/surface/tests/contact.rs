@@ -82,40 +82,51 @@ fn a_sphere_pushes_as_a_sphere_does() {
 #[test]
 fn a_step_of_the_force_is_no_larger_than_the_stiffness_allows() {
     // Curvatures: the torus has a smallest radius of 8 mm.
-    for (surface, start, radius_m, curve_m) in [
-        (surface(torus(0.02, 0.008, 96, 48), 30.0), DVec3::new(0.02, 0.0, 0.01), 5.0e-4, 0.008),
-        (surface(as_stl(icosphere(0.02, 3)), 30.0), DVec3::new(0.0, 0.0, 0.022), 0.0, 0.02),
-        (surface(globe(32, 64, |_| 0.02), 30.0), DVec3::new(0.0, 0.0, 0.022), 5.0e-4, 0.02),
-    ] {
-        let mut numbers = Numbers(5);
-        let mut hand = Hand::new(&surface, material(0.0, 0.0), radius_m, start);
-        let deepest_m = 0.5 * (curve_m + radius_m);
-        let mut last = hand.slowly_to(start * 0.99);
-        let mut worst = 0.0_f64;
-        for _ in 0..20_000 {
-            let travel_m = 1.0e-6 * math::pow(1000.0, numbers.next());
-            let next_m = hand.at_m + numbers.direction() * travel_m;
-            let answer = hand.to(next_m);
-            assert!(answer.is_settled);
-            if answer.depth_m <= deepest_m && last.depth_m <= deepest_m {
-                let step_n = (answer.force_n - last.force_n).length();
-                worst = worst.max((step_n - 1.0e-3) / (STIFF * travel_m));
-            }
-            last = answer;
-            // Stays near the surface: back to a depth of a quarter.
-            let proxy_m = hand.proxy_m();
-            if (proxy_m - next_m).length() > 0.5 * deepest_m || answer.contacts == 0 {
-                let inwards = if answer.contacts == 0 {
-                    -next_m.normalize() * 1.0e-3
-                } else {
-                    (proxy_m - next_m) * 0.5
-                };
-                last = hand.slowly_to(next_m + inwards);
-            }
+    let ring = |p: DVec3| p.with_z(0.0).normalize() * 0.02;
+    let centre = |_: DVec3| DVec3::ZERO;
+    let torus = surface(torus(0.02, 0.008, 96, 48), 30.0);
+    let sphere = surface(as_stl(icosphere(0.02, 3)), 30.0);
+    let globe = surface(globe(32, 64, |_| 0.02), 30.0);
+    let far_m = DVec3::new(0.0, 0.0, 0.022);
+    largest_steps(&torus, DVec3::new(0.02, 0.0, 0.01), (5.0e-4, 0.008), &ring);
+    largest_steps(&sphere, far_m, (0.0, 0.02), &centre);
+    largest_steps(&globe, far_m, (5.0e-4, 0.02), &centre);
+}
+
+/// Wanders over a surface with radii of the ball and of the smallest curvature; `middle` returns the middle of the body near a point.
+fn largest_steps(
+    surface: &Surface,
+    start: DVec3,
+    (radius_m, curve_m): (f64, f64),
+    middle: &dyn Fn(DVec3) -> DVec3,
+) {
+    let mut numbers = Numbers(5);
+    let mut hand = Hand::new(surface, material(0.0, 0.0), radius_m, start);
+    let deepest_m = 0.5 * (curve_m + radius_m);
+    let mut last = hand.slowly_to(start);
+    let (mut worst, mut touching) = (0.0_f64, 0);
+    for _ in 0..20_000 {
+        let travel_m = 1.0e-6 * math::pow(1000.0, numbers.next());
+        let (from_m, proxy_m) = (hand.at_m, hand.proxy_m());
+        let next_m = from_m + numbers.direction() * travel_m;
+        let answer = hand.to(next_m);
+        assert!(answer.is_settled, "{from_m} {proxy_m} {next_m} {answer:?}");
+        if answer.depth_m <= deepest_m && last.depth_m <= deepest_m {
+            let step_n = (answer.force_n - last.force_n).length();
+            worst = worst.max((step_n - 1.0e-3) / (STIFF * travel_m));
         }
-        println!("largest step {worst} of stiffness x travel");
-        assert!(worst < 1.5, "{worst}");
+        touching += u32::from(answer.contacts > 0);
+        last = answer;
+        // Back to the surface from outside, and from deeper than half the depth in question.
+        let proxy_m = hand.proxy_m();
+        if answer.contacts == 0 {
+            last = hand.slowly_to(next_m + (middle(next_m) - next_m).normalize() * 1.0e-3);
+        } else if (proxy_m - next_m).length() > 0.5 * deepest_m {
+            last = hand.slowly_to(next_m + (proxy_m - next_m) * 0.5);
+        }
     }
+    println!("largest step {worst} of stiffness x travel, {touching} of 20000 in contact");
+    assert!(touching > 10_000 && worst < 1.5, "{worst} {touching}");
 }
 
 /// Returns the distance from the nearest point of all patches on the side of the path: near the contact, and not turned away from it.
@@ -193,9 +204,8 @@ fn a_groove_holds_a_ball_on_both_walls() {
         // Up one wall and out.
         let answer = hand.slowly_to(DVec3::new(4.0e-3, 0.0, 3.0e-3));
         let depth_m = radius_m + 1.0e-3 / 2.0_f64.sqrt();
-        assert!(
-            (answer.force_n - DVec3::new(-1.0, 0.0, 1.0).normalize() * depth_m * STIFF).length() < 1.0e-9
-        );
+        let expected_n = DVec3::new(-1.0, 0.0, 1.0).normalize() * depth_m * STIFF;
+        assert!((answer.force_n - expected_n).length() < 1.0e-9, "{radius_m}: {answer:?} {expected_n}");
         assert_eq!(hand.slowly_to(DVec3::Z * 8.0e-3).force_n, DVec3::ZERO);
     }
 }
@@ -326,7 +336,7 @@ fn a_ball_sticks_within_the_cone_and_slides_on_it() {
     hand.slowly_to(DVec3::Z * (1.0e-3 - depth_m));
     let mut has_slid = false;
     for i in 1..200 {
-        let x_m = 1.0e-5 * f64::from(i);
+        let x_m = 1.03e-5 * f64::from(i);
         let answer = hand.to(DVec3::new(x_m, 0.0, 1.0e-3 - depth_m));
         let along_n = -answer.force_n.x;
         has_slid |= STIFF * x_m > 0.6 * STIFF * depth_m;
@@ -353,12 +363,13 @@ fn a_sphere_has_the_cone_of_a_sphere() {
         let angle = 0.002 * f64::from(i);
         let tool_m = DVec3::new(math::cos(angle), math::sin(angle), 0.1).normalize() * 0.0195;
         let answer = if i == 0 { hand.slowly_to(tool_m) } else { hand.to(tool_m) };
+        // That of the sphere; the patches differ by 1e-5 rad.
         let normal = hand.proxy_m().normalize();
         let normal_n = answer.force_n.dot(normal);
         let along_n = (answer.force_n - normal * normal_n).length();
-        assert!(along_n <= 0.5 * normal_n + 1.0e-6, "{along_n} {normal_n}");
+        assert!(along_n <= 0.5 * normal_n + 2.0e-5, "{along_n} {normal_n}");
         if answer.friction == Friction::Slides {
-            assert!((along_n - 0.5 * normal_n).abs() < 1.0e-6, "{along_n} {normal_n}");
+            assert!((along_n - 0.5 * normal_n).abs() < 2.0e-5, "{along_n} {normal_n}");
         }
     }
 }

@@ -138,8 +138,8 @@ fn a_cylinder_is_round_with_flat_ends_and_a_round_rim() {
             }
         }
         println!("cylinder {n} {m}: {worst:e} m");
-        // The facets of 24 strips lie 86 um under the cylinder.
-        assert!(worst < 1.0e-6, "{n} {m}: {worst}");
+        // The facets of 24 strips lie 86 um under the cylinder: forty times as far.
+        assert!(worst < 2.0e-6, "{n} {m}: {worst}");
     }
 }
 
