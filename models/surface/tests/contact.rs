@@ -9,7 +9,7 @@ use flotor_surface::touch::{Answer, Friction, Materials, Touch};
 
 const STIFF: f64 = 1000.0;
 
-pub fn material(static_friction: f64, kinetic_friction: f64) -> Materials {
+pub(crate) fn material(static_friction: f64, kinetic_friction: f64) -> Materials {
     let common = Material {
         stiffness_n_per_m: STIFF,
         damping_ns_per_m: 0.0,
@@ -21,27 +21,27 @@ pub fn material(static_friction: f64, kinetic_friction: f64) -> Materials {
 }
 
 /// Hand with a ball that moves along straight lines.
-pub struct Hand<'a> {
+pub(crate) struct Hand<'a> {
     surface: &'a Surface,
     materials: Materials,
     touch: Touch,
-    pub at_m: DVec3,
+    pub(crate) at_m: DVec3,
 }
 
 impl<'a> Hand<'a> {
-    pub fn new(surface: &'a Surface, materials: Materials, radius_m: f64, at_m: DVec3) -> Self {
+    pub(crate) fn new(surface: &'a Surface, materials: Materials, radius_m: f64, at_m: DVec3) -> Self {
         let mut touch = Touch::new(radius_m);
         touch.step(surface, &materials, at_m, DVec3::ZERO);
         Self { surface, materials, touch, at_m }
     }
 
-    pub fn to(&mut self, at_m: DVec3) -> Answer {
+    pub(crate) fn to(&mut self, at_m: DVec3) -> Answer {
         self.at_m = at_m;
         self.touch.step(self.surface, &self.materials, at_m, DVec3::ZERO)
     }
 
     /// Moves in steps of at most 0.05 mm, as `flotor eval` does.
-    pub fn slowly_to(&mut self, at_m: DVec3) -> Answer {
+    pub(crate) fn slowly_to(&mut self, at_m: DVec3) -> Answer {
         let from_m = self.at_m;
         let steps = ((at_m - from_m).length() / 5.0e-5).ceil().max(1.0);
         let mut step = 1.0;
@@ -52,7 +52,7 @@ impl<'a> Hand<'a> {
         self.to(at_m)
     }
 
-    pub fn proxy_m(&self) -> DVec3 {
+    pub(crate) fn proxy_m(&self) -> DVec3 {
         self.touch.proxy_m().unwrap_or(self.at_m)
     }
 }

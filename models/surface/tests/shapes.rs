@@ -9,12 +9,12 @@ use flotor_surface::weld::weld;
 use std::collections::BTreeMap;
 
 /// Returns points and triangles as a soup in metres.
-pub fn soup(points: &[DVec3], triangles: Vec<[u32; 3]>) -> Soup {
+pub(crate) fn soup(points: &[DVec3], triangles: Vec<[u32; 3]>) -> Soup {
     Soup { points: points.iter().map(|p| p.to_array()).collect(), triangles, ..Soup::default() }
 }
 
 /// Returns the smooth surface of a soup in metres.
-pub fn surface(soup: Soup, edge_angle_deg: f64) -> Surface {
+pub(crate) fn surface(soup: Soup, edge_angle_deg: f64) -> Surface {
     let (mut mesh, _) = weld(soup, 1.0);
     let topology = connect(&mut mesh).expect("two sides");
     let normals = Normals::new(&mesh, &topology, edge_angle_deg.to_radians());
@@ -22,7 +22,7 @@ pub fn surface(soup: Soup, edge_angle_deg: f64) -> Surface {
 }
 
 /// Rounds the points to binary32, as an STL file has them in millimetres.
-pub fn as_stl(mut soup: Soup) -> Soup {
+pub(crate) fn as_stl(mut soup: Soup) -> Soup {
     #[allow(clippy::cast_possible_truncation)]
     for p in &mut soup.points {
         *p = p.map(|x| f64::from((x * 1.0e3) as f32) * 1.0e-3);
@@ -31,7 +31,7 @@ pub fn as_stl(mut soup: Soup) -> Soup {
 }
 
 /// Icosahedron, each face split into four `level` times, on a sphere.
-pub fn icosphere(radius_m: f64, level: u32) -> Soup {
+pub(crate) fn icosphere(radius_m: f64, level: u32) -> Soup {
     let g = (1.0 + 5.0_f64.sqrt()) * 0.5;
     let mut points: Vec<DVec3> = [
         [-1.0, g, 0.0],
@@ -92,7 +92,7 @@ pub fn icosphere(radius_m: f64, level: u32) -> Soup {
 }
 
 /// Closed grid over two angles, `point(u, v)` with both from 0 to 1.
-pub fn ring_grid(n: u32, m: u32, point: impl Fn(f64, f64) -> DVec3) -> Soup {
+pub(crate) fn ring_grid(n: u32, m: u32, point: impl Fn(f64, f64) -> DVec3) -> Soup {
     let points: Vec<DVec3> =
         (0..n * m).map(|i| point(f64::from(i / m) / f64::from(n), f64::from(i % m) / f64::from(m))).collect();
     let at = |i: u32, j: u32| (i % n) * m + j % m;
@@ -106,7 +106,7 @@ pub fn ring_grid(n: u32, m: u32, point: impl Fn(f64, f64) -> DVec3) -> Soup {
 }
 
 /// Torus about z.
-pub fn torus(big_m: f64, small_m: f64, n: u32, m: u32) -> Soup {
+pub(crate) fn torus(big_m: f64, small_m: f64, n: u32, m: u32) -> Soup {
     ring_grid(n, m, |u, v| {
         let (su, cu) = math::sin_cos(u * std::f64::consts::TAU);
         let (sv, cv) = math::sin_cos(v * std::f64::consts::TAU);
@@ -116,7 +116,7 @@ pub fn torus(big_m: f64, small_m: f64, n: u32, m: u32) -> Soup {
 }
 
 /// Globe of rings and meridians with a radius by direction.
-pub fn globe(rings: u32, meridians: u32, radius_m: impl Fn(DVec3) -> f64) -> Soup {
+pub(crate) fn globe(rings: u32, meridians: u32, radius_m: impl Fn(DVec3) -> f64) -> Soup {
     let direction = |i: u32, j: u32| {
         let (s, c) = math::sin_cos(f64::from(i) / f64::from(rings) * std::f64::consts::PI);
         let (sp, cp) = math::sin_cos(f64::from(j) / f64::from(meridians) * std::f64::consts::TAU);
@@ -149,7 +149,7 @@ pub fn globe(rings: u32, meridians: u32, radius_m: impl Fn(DVec3) -> f64) -> Sou
 }
 
 /// Box between two corners, each side of `n` by `n` squares of two triangles.
-pub fn cuboid(low: DVec3, high: DVec3, n: u32) -> Soup {
+pub(crate) fn cuboid(low: DVec3, high: DVec3, n: u32) -> Soup {
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
     for axis in 0..3 {
         for (side, from) in [(0, low), (1, high)] {
@@ -182,17 +182,17 @@ pub fn cuboid(low: DVec3, high: DVec3, n: u32) -> Soup {
 }
 
 /// Small generator of numbers from 0 to 1 (Marsaglia 2003, xorshift).
-pub struct Numbers(pub u64);
+pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
-    pub fn next(&mut self) -> f64 {
+    pub(crate) fn next(&mut self) -> f64 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    pub fn direction(&mut self) -> DVec3 {
+    pub(crate) fn direction(&mut self) -> DVec3 {
         loop {
             let d = DVec3::new(self.next(), self.next(), self.next()) * 2.0 - 1.0;
             let length = d.length();
