@@ -217,8 +217,10 @@ impl Ball {
     fn obstacle(&self, surface: &Surface, next: &Self) -> Option<Obstacle> {
         let way_m = next.centre_m - self.centre_m;
         if way_m.length() > SAFE_SHARE * self.radius_m {
+            // In a groove the normal of one wall points into the other.
             let normal = |ball: &Self| {
-                ball.contacts.first().map_or(DVec3::ZERO, |c| c.place.foot.normal * c.side.sign())
+                let up = |c: Contact| surface.outward(&c.place).normalize_or_zero() * c.side.sign();
+                ball.contacts.iter().map(up).sum::<DVec3>().normalize_or_zero()
             };
             let (here, there) = (normal(self), normal(next));
             // Over a curved surface the chord runs through it: lift the way by more than its sagitta.
