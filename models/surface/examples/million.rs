@@ -14,8 +14,8 @@ fn bumpy(rings: u32, meridians: u32) -> Vec<u8> {
         let (s, c) = math::sin_cos(f64::from(i) / f64::from(rings) * PI);
         let (sp, cp) = math::sin_cos(f64::from(j % meridians) / f64::from(meridians) * TAU);
         let d = DVec3::new(
-            if i % rings == 0 { 0.0 } else { s * cp },
-            if i % rings == 0 { 0.0 } else { s * sp },
+            if i.is_multiple_of(rings) { 0.0 } else { s * cp },
+            if i.is_multiple_of(rings) { 0.0 } else { s * sp },
             c,
         );
         let bump = 0.6 * math::sin(12.0 * d.x) * math::sin(12.0 * d.y) * math::sin(12.0 * d.z);

@@ -23,6 +23,7 @@ pub enum Friction {
 }
 
 /// State of the touch.
+#[allow(clippy::large_enum_variant)] // one state an instance, in a tick without allocation
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
     /// No step yet.
