@@ -33,6 +33,9 @@
 // Maximum number of coefficients of a calibration: a polynomial of degree seven.
 #define FLOTOR_CALIBRATION_COEFFICIENTS 8
 
+// Largest number of contacts in a set.
+#define FLOTOR_MAX_CONTACTS 16
+
 // Capacity of a stop message, bytes.
 #define FLOTOR_STOP_MESSAGE_BYTES 64
 
@@ -279,6 +282,25 @@ enum FlotorStoppedState
 typedef enum FlotorStoppedState FlotorStoppedState;
 #else
 typedef uint32_t FlotorStoppedState;
+#endif // __STDC_VERSION__ >= 202311L
+#endif // __cplusplus
+
+// Kind of a grip, which decides the units of all its numbers. In C, a `uint32_t` with these values.
+enum FlotorGripKind
+#if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+  : uint32_t
+#endif // defined(__cplusplus) || __STDC_VERSION__ >= 202311L
+ {
+    // Opening in m, velocity in m/s, effort in N.
+    FlotorGripKind_Linear = 0,
+    // Opening in rad, velocity in rad/s, effort in N·m.
+    FlotorGripKind_Angular = 1,
+};
+#ifndef __cplusplus
+#if __STDC_VERSION__ >= 202311L
+typedef enum FlotorGripKind FlotorGripKind;
+#else
+typedef uint32_t FlotorGripKind;
 #endif // __STDC_VERSION__ >= 202311L
 #endif // __cplusplus
 
@@ -876,6 +898,28 @@ typedef struct FlotorDetailsTable {
     uint32_t (*values)(FlotorInstance instance, double *values, uint32_t capacity);
 } FlotorDetailsTable;
 
+// Contact between a point of the tool and a plane that stands for the surface nearby, in the model frame. 136 bytes.
+typedef struct FlotorContact {
+    // Point on the tool, relative to the handle and in its orientation, m; zero for a tool that is a point.
+    double tool_point_m[3];
+    // Closest point on the surface at the anchor, m.
+    double surface_point_m[3];
+    // Unit normal of the surface, towards the tool.
+    double normal[3];
+    // Distance of the point on the tool from the surface at the anchor, along the normal, m; below 0 inside.
+    double gap_m;
+    // Velocity of the surface, m/s. Its power is the model's: a host limits it.
+    double surface_velocity_m_per_s[3];
+    // Stiffness along the normal, N/m; above 0.
+    double stiffness_n_per_m;
+    // Stiffness across the normal while the contact sticks, N/m; 0: no friction.
+    double tangential_stiffness_n_per_m;
+    // Damping along the normal, N·s/m.
+    double damping_ns_per_m;
+    // Coefficient of friction.
+    double friction;
+} FlotorContact;
+
 // Wrench around a pose, in the model frame: `W(d) = W0 - K d`. 416 bytes.
 //
 // `d` is the displacement from the anchor: position in m, then the rotation vector of the turn from the anchor's
@@ -895,6 +939,42 @@ typedef struct FlotorLinearField {
     // Loop time for which the field was computed, ns.
     uint64_t time_ns;
 } FlotorLinearField;
+
+// Contacts near a pose, in the model frame. 2688 bytes.
+typedef struct FlotorContactSet {
+    // Pose of the handle for which the contacts were computed.
+    struct FlotorPose anchor;
+    // Contacts; only the first [`Self::count`] count.
+    struct FlotorContact contacts[FLOTOR_MAX_CONTACTS];
+    // Number of contacts.
+    uint32_t count;
+    // 1 with a bilateral part, 0 without.
+    uint32_t has_field;
+    // Largest displacement from the anchor for which the set is valid, m; above 0, may be infinite. Beyond, a host continues the
+    // planes and counts the ticks.
+    double valid_m;
+    // Largest rotation from the anchor for which the set is valid, rad; above 0, may be infinite.
+    double valid_rad;
+    // Longest age for which the set is valid, s; 0: three periods of the model. The forces of an older set fade.
+    double valid_s;
+    // Bilateral part, a force that also pulls; read only if [`Self::has_field`] is not 0.
+    struct FlotorLinearField field;
+    // Loop time for which the set was computed, ns.
+    uint64_t time_ns;
+} FlotorContactSet;
+
+// Function table `flotor.contact-set/1`: see [`ContactSetModel`].
+typedef struct FlotorContactSetTable {
+    // Size of this table in the plugin's build, bytes.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Writes the contacts at an input, after the time since the previous call; returns a [`crate::abi::CallStatus`]
+    // code. Not real-time, but bounded.
+    uint32_t (*contact_set)(FlotorInstance instance,
+                            const struct FlotorInput *input,
+                            struct FlotorContactSet *set);
+} FlotorContactSetTable;
 
 // Function table `flotor.linear-field/1`: see [`LinearFieldModel`].
 typedef struct FlotorLinearFieldTable {
@@ -1035,6 +1115,68 @@ typedef struct FlotorPacingTable {
     uint32_t (*wait_for_sample)(FlotorInstance instance, uint64_t timeout_ns, uint64_t *samples);
 } FlotorPacingTable;
 
+// Grip of a device as numbers that a host enforces, in the units of its kind. 40 bytes.
+typedef struct FlotorGripAxis {
+    // Code of a [`GripKind`].
+    uint32_t kind;
+    uint32_t reserved;
+    // Opening of the closed and of the open grip.
+    double range[2];
+    // Largest effort in both directions; 0: the grip is sensed only.
+    double max_effort;
+    // Maximum slew rate of the effort, per s.
+    double max_slew_per_s;
+} FlotorGripAxis;
+
+// Sample of a grip, in the units of its kind. 32 bytes.
+typedef struct FlotorGripState {
+    // Opening, larger when the grip is more open.
+    double opening;
+    // Velocity of the opening, positive while the grip opens.
+    double velocity;
+    // Effort delivered since the previous tick, as reported by the device.
+    double delivered;
+    // Code of a [`GripKind`], set by the host.
+    uint32_t kind;
+    uint32_t reserved;
+} FlotorGripState;
+
+// Function table `flotor.grip/1`: see [`GripDevice`], [`ActiveGrip`] and [`GripModel`]. A device sets the first three
+// functions, a model the last. All return a [`crate::abi::CallStatus`] code.
+typedef struct FlotorGripTable {
+    // Size of this table in the plugin's build, bytes.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Writes the grip of an opened device; `Unsupported` without one. Not real-time.
+    uint32_t (*axis)(FlotorInstance instance, struct FlotorGripAxis *axis);
+    // Writes the sample that the last `read` of an active device took. Real-time.
+    uint32_t (*read)(FlotorInstance instance, struct FlotorGripState *state);
+    // Sets the effort that the next `write` of an active device commands. Real-time.
+    uint32_t (*write)(FlotorInstance instance, double effort);
+    // Writes the effort of a model at a grip, right after the step with the same input. Real-time.
+    uint32_t (*effort)(FlotorInstance instance,
+                       const struct FlotorInput *input,
+                       const struct FlotorGripState *grip,
+                       double *effort);
+} FlotorGripTable;
+
+// Function table `flotor.snapshot/1`: see [`Restorable`]. Real-time: bounded by the size of the state. Calls on a device
+// are valid in the active phase only. All return a [`crate::abi::CallStatus`] code.
+typedef struct FlotorSnapshotTable {
+    // Size of this table in the plugin's build, bytes.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Writes the number of bytes of the state, constant while the instance is prepared or active.
+    uint32_t (*count)(FlotorInstance instance, uint64_t *out);
+    // Writes the state to `count` bytes; `OutOfRange` for another number of bytes.
+    uint32_t (*save)(FlotorInstance instance, uint8_t *bytes, uint64_t count);
+    // Restores a state from `count` bytes; `OutOfRange` for another number of bytes, and for bytes that are no state:
+    // the caller then resets or destroys the instance.
+    uint32_t (*restore)(FlotorInstance instance, const uint8_t *bytes, uint64_t count);
+} FlotorSnapshotTable;
+
 /* Version of the contract, for the metadata. */
 #define FLOTOR_CONTRACT "1.0-rc"
 /* Names of interfaces and extensions. */
@@ -1044,12 +1186,15 @@ typedef struct FlotorPacingTable {
 #define FLOTOR_INTERFACE_CALIBRATION "flotor.calibration/1"
 #define FLOTOR_INTERFACE_CENTERLINE "flotor.centerline/1"
 #define FLOTOR_INTERFACE_CONNECTION "flotor.connection/1"
+#define FLOTOR_INTERFACE_CONTACT_SET "flotor.contact-set/1"
 #define FLOTOR_INTERFACE_DETAILS "flotor.details/1"
 #define FLOTOR_INTERFACE_ENERGY_LEDGER "flotor.energy-ledger/1"
+#define FLOTOR_INTERFACE_GRIP "flotor.grip/1"
 #define FLOTOR_INTERFACE_INDEPENDENT_STOP "flotor.independent-stop/1"
 #define FLOTOR_INTERFACE_LINEAR_FIELD "flotor.linear-field/1"
 #define FLOTOR_INTERFACE_PACING "flotor.pacing/1"
 #define FLOTOR_INTERFACE_SHAPE "flotor.shape/1"
+#define FLOTOR_INTERFACE_SNAPSHOT "flotor.snapshot/1"
 #define FLOTOR_INTERFACE_SOFT_RANGE "flotor.soft-range/1"
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
 #define FLOTOR_INTERFACE_WORKSPACE_BOUNDS "flotor.workspace-bounds/1"
@@ -1284,6 +1429,30 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(CenterlineTable, reserved),
     FLOTOR_FIELD(CenterlineTable, info),
     FLOTOR_FIELD(CenterlineTable, centerline),
+    FLOTOR_STRUCT(Contact),
+    FLOTOR_FIELD(Contact, tool_point_m),
+    FLOTOR_FIELD(Contact, surface_point_m),
+    FLOTOR_FIELD(Contact, normal),
+    FLOTOR_FIELD(Contact, gap_m),
+    FLOTOR_FIELD(Contact, surface_velocity_m_per_s),
+    FLOTOR_FIELD(Contact, stiffness_n_per_m),
+    FLOTOR_FIELD(Contact, tangential_stiffness_n_per_m),
+    FLOTOR_FIELD(Contact, damping_ns_per_m),
+    FLOTOR_FIELD(Contact, friction),
+    FLOTOR_STRUCT(ContactSet),
+    FLOTOR_FIELD(ContactSet, anchor),
+    FLOTOR_FIELD(ContactSet, contacts),
+    FLOTOR_FIELD(ContactSet, count),
+    FLOTOR_FIELD(ContactSet, has_field),
+    FLOTOR_FIELD(ContactSet, valid_m),
+    FLOTOR_FIELD(ContactSet, valid_rad),
+    FLOTOR_FIELD(ContactSet, valid_s),
+    FLOTOR_FIELD(ContactSet, field),
+    FLOTOR_FIELD(ContactSet, time_ns),
+    FLOTOR_STRUCT(ContactSetTable),
+    FLOTOR_FIELD(ContactSetTable, size),
+    FLOTOR_FIELD(ContactSetTable, reserved),
+    FLOTOR_FIELD(ContactSetTable, contact_set),
     FLOTOR_STRUCT(Detail),
     FLOTOR_FIELD(Detail, id),
     FLOTOR_FIELD(Detail, unit),
@@ -1294,6 +1463,25 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(DetailsTable, detail_count),
     FLOTOR_FIELD(DetailsTable, details),
     FLOTOR_FIELD(DetailsTable, values),
+    FLOTOR_STRUCT(GripAxis),
+    FLOTOR_FIELD(GripAxis, kind),
+    FLOTOR_FIELD(GripAxis, reserved),
+    FLOTOR_FIELD(GripAxis, range),
+    FLOTOR_FIELD(GripAxis, max_effort),
+    FLOTOR_FIELD(GripAxis, max_slew_per_s),
+    FLOTOR_STRUCT(GripState),
+    FLOTOR_FIELD(GripState, opening),
+    FLOTOR_FIELD(GripState, velocity),
+    FLOTOR_FIELD(GripState, delivered),
+    FLOTOR_FIELD(GripState, kind),
+    FLOTOR_FIELD(GripState, reserved),
+    FLOTOR_STRUCT(GripTable),
+    FLOTOR_FIELD(GripTable, size),
+    FLOTOR_FIELD(GripTable, reserved),
+    FLOTOR_FIELD(GripTable, axis),
+    FLOTOR_FIELD(GripTable, read),
+    FLOTOR_FIELD(GripTable, write),
+    FLOTOR_FIELD(GripTable, effort),
     FLOTOR_STRUCT(LinearField),
     FLOTOR_FIELD(LinearField, anchor),
     FLOTOR_FIELD(LinearField, wrench),
@@ -1330,6 +1518,12 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(ShapeTable, size),
     FLOTOR_FIELD(ShapeTable, reserved),
     FLOTOR_FIELD(ShapeTable, shape),
+    FLOTOR_STRUCT(SnapshotTable),
+    FLOTOR_FIELD(SnapshotTable, size),
+    FLOTOR_FIELD(SnapshotTable, reserved),
+    FLOTOR_FIELD(SnapshotTable, count),
+    FLOTOR_FIELD(SnapshotTable, save),
+    FLOTOR_FIELD(SnapshotTable, restore),
     FLOTOR_STRUCT(SoftRange),
     FLOTOR_FIELD(SoftRange, id),
     FLOTOR_FIELD(SoftRange, min),

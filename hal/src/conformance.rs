@@ -22,6 +22,8 @@ pub enum Rule {
     SurvivesFarPoses,
     /// After `reset` the same poses produce the same bits.
     ResetRepeats,
+    /// After a restore of a saved state the same poses produce the same bits, also in another instance.
+    RestoreRepeats,
     /// 99 of 100 steps take less than half a period at 1 kHz.
     TimeBudget,
     /// An instance returns the same results alone, alternately with another instance, and on two threads.
@@ -49,7 +51,7 @@ pub enum Rule {
 
 impl Rule {
     /// All rules, in the order of the checks.
-    pub const ALL: [Rule; 19] = [
+    pub const ALL: [Rule; 20] = [
         Rule::Metadata,
         Rule::Loads,
         Rule::Schema,
@@ -58,6 +60,7 @@ impl Rule {
         Rule::SurvivesNotFinite,
         Rule::SurvivesFarPoses,
         Rule::ResetRepeats,
+        Rule::RestoreRepeats,
         Rule::TimeBudget,
         Rule::Independent,
         Rule::NoThreads,
@@ -83,6 +86,7 @@ impl Rule {
             Rule::SurvivesNotFinite => "survives-not-finite",
             Rule::SurvivesFarPoses => "survives-far-poses",
             Rule::ResetRepeats => "reset-repeats",
+            Rule::RestoreRepeats => "restore-repeats",
             Rule::TimeBudget => "time-budget",
             Rule::Independent => "independent",
             Rule::NoThreads => "no-threads",
@@ -109,6 +113,9 @@ impl Rule {
             Rule::SurvivesNotFinite => "NaN and infinity in the pose cause a status, not NaN and not a panic",
             Rule::SurvivesFarPoses => "poses far outside any workspace cause finite outputs and no panic",
             Rule::ResetRepeats => "after reset the same poses produce the same bits",
+            Rule::RestoreRepeats => {
+                "after a restore of a saved state the same poses produce the same bits, also in another instance"
+            }
             Rule::TimeBudget => "99 of 100 steps need less than half a period at 1 kHz",
             Rule::Independent => {
                 "an instance returns the same results alone, alternately with another instance, \
@@ -157,6 +164,7 @@ impl Rule {
             | Rule::SurvivesNotFinite
             | Rule::SurvivesFarPoses
             | Rule::ResetRepeats
+            | Rule::RestoreRepeats
             | Rule::TimeBudget
             | Rule::Independent
             | Rule::NoThreads

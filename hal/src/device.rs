@@ -160,6 +160,13 @@ impl Conditions {
     pub const fn contains(self, other: Conditions) -> bool {
         self.bits & other.bits == other.bits
     }
+
+    /// Returns the bits of the set. Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub const fn bits(self) -> u32 {
+        self.bits
+    }
 }
 
 impl DeviceState {
@@ -212,6 +219,12 @@ impl Axes {
     pub const ROTATION: Axes = Axes { bits: 0b11_1000 };
     /// All six axes.
     pub const ALL: Axes = Axes { bits: 0b11_1111 };
+
+    /// Returns the bits of the set, x first; a foreign plugin may have set bits above the sixth.
+    #[must_use]
+    pub const fn bits(self) -> u32 {
+        self.bits
+    }
 
     /// Returns the union of both sets: `Axes::X.union(Axes::Z)` in constants, `Axes::X | Axes::Z` elsewhere.
     #[must_use]

@@ -56,10 +56,10 @@ pub use extension::calibration::{
 };
 pub use extension::centerline::{CenterlineInfo, CenterlineModel};
 pub use extension::connection::{ConnectionDevice, UsbAccess, UsbKind};
+pub use extension::contact_set::{Contact, ContactSet, ContactSetModel, MAX_CONTACTS};
 pub use extension::details::{Detail, DetailsModel};
 pub use extension::energy_ledger::{EnergyLedger, EnergyLedgerDevice};
-#[cfg(feature = "loader")]
-pub use extension::independent_stop::means::Independence;
+pub use extension::grip::{ActiveGrip, GripAxis, GripDevice, GripKind, GripModel, GripState};
 pub use extension::independent_stop::{
     IndependentStop, IndependentStopDevice, STOP_MESSAGE_BYTES, StoppedState,
 };
@@ -68,6 +68,7 @@ pub use extension::pacing::{PacingDevice, SampleWait};
 pub use extension::shape::{
     Form, InvalidShape, Part, Primitive, ScalarField, Shape, ShapeModel, Sides, Surface, SurfaceVertex,
 };
+pub use extension::snapshot::{Restorable, StateBytes};
 pub use extension::soft_range::{SoftRange, SoftRangeModel};
 pub use extension::variant::{VariantInfo, VariantModel};
 pub use extension::workspace_bounds::{WorkspaceBounds, WorkspaceBoundsModel};

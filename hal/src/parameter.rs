@@ -214,8 +214,9 @@ pub struct OutOfRange {
 }
 
 impl OutOfRange {
-    /// Returns true if the number is in the range, so that only its fraction is illegal: the index of a choice.
-    pub(crate) fn has_fraction(&self) -> bool {
+    /// Returns true if the number is in the range, so that only its fraction is illegal: the index of a choice. Not real-time.
+    #[must_use]
+    pub fn has_fraction(&self) -> bool {
         (self.min..=self.max).contains(&self.value)
     }
 }
@@ -271,6 +272,14 @@ pub struct ParameterValue {
     pub(crate) reserved: u32,
     pub(crate) number: f64,
     pub(crate) text: Str,
+}
+
+impl ParameterValue {
+    /// Builds the value of the parameter at `index`, with the text of a text or a file.
+    #[must_use]
+    pub const fn new(index: u32, number: f64, text: Str) -> Self {
+        Self { index, reserved: 0, number, text }
+    }
 }
 
 /// Explicitly set values of one instance, without defaults.

@@ -84,7 +84,7 @@ impl<'a> Table<'a> {
         let columns: Vec<String> = cells(header).map_err(at)?.into_iter().map(Cow::into_owned).collect();
         if let Some(unnamed) = columns.iter().position(String::is_empty) {
             let problem = format!(
-                "column {} has no name; remove the column, or name the column (pandas writes its index so: \
+                "column {} has no name; remove the column, or name the column (without the index of pandas: \
                  `to_csv(FILE, index=False)`)",
                 unnamed + 1
             );

@@ -101,8 +101,8 @@ pub fn text_from_bytes(mut bytes: Vec<u8>) -> Result<String, TextProblem> {
         let line = 1 + bytes.iter().take(at).filter(|byte| **byte == b'\n').count();
         return Err(TextProblem::at(
             line,
-            "the file contains a byte 0, so it is not a text, or a part of the file was not written; name a text file, or \
-             write the file again",
+            "the file contains a byte 0, so it is not a text in UTF-8, or a part of the file was not written; name a text \
+             file in UTF-8, or write the file again",
         ));
     }
     String::from_utf8(bytes).map_err(|error| {

@@ -2,10 +2,11 @@
 
 use crate::peak_bounds::{BoundedPeaks, PeakBound};
 use crate::timing_picture::panels;
+use flotor_core::grip::GripRecord;
 use flotor_core::guidance::is_guidance;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome};
-use flotor_hal::{Demand, rotation_vector};
+use flotor_hal::{Demand, GripKind, rotation_vector};
 use flotor_plot::{Axis, Figure, Mark, Panel, Quantity, Series, Spans, Trace, VectorTrace};
 use flotor_servo::Timing;
 use flotor_session::Observer;
@@ -28,6 +29,8 @@ struct DeviceTraces {
     force: VectorTrace,
     torque: VectorTrace,
     energy: Trace,
+    /// Opening and effort at the grip, with their quantities; empty without a grip.
+    grip: Vec<(Quantity, &'static str, Trace)>,
     events: EventTimes,
 }
 
@@ -181,6 +184,7 @@ impl DeviceTraces {
             force: VectorTrace::new(Quantity::Force),
             torque: VectorTrace::new(Quantity::Torque),
             energy: Trace::default(),
+            grip: Vec::new(),
             events: EventTimes::default(),
         }
     }
@@ -193,15 +197,36 @@ impl DeviceTraces {
         self.torque.add(time_s, record.commanded.torque().to_array());
         let (_, per_si) = Quantity::Energy.unit();
         self.energy.add(time_s, record.model.energy_j().map_or(f64::NAN, |joule| joule * per_si));
+        if let Some(grip) = &record.grip {
+            self.add_grip(time_s, grip);
+        }
         self.events.add(time_s, record.events);
+    }
+
+    fn add_grip(&mut self, time_s: f64, GripRecord { state, commanded, .. }: &GripRecord) {
+        if self.grip.is_empty() {
+            let (opening, effort) = match state.kind() {
+                GripKind::Linear => (Quantity::Length, Quantity::Force),
+                GripKind::Angular => (Quantity::Angle, Quantity::Torque),
+            };
+            let quantities = [(opening, "Opening of the grip"), (effort, "Effort at the grip")];
+            self.grip.extend(quantities.map(|(quantity, name)| (quantity, name, Trace::default())));
+        }
+        for ((quantity, _, trace), value) in self.grip.iter_mut().zip([state.opening, *commanded]) {
+            trace.add(time_s, value * quantity.unit().1);
+        }
     }
 
     /// Returns the panels of the only device of a run.
     fn all_panels(self, changes: &Changes) -> Vec<Result<Panel, String>> {
-        let Self { position, rotation, force, torque, energy, events, .. } = self;
+        let Self { position, rotation, force, torque, energy, grip, events, .. } = self;
         let vectors = [(position, "position"), (rotation, "rotation"), (force, "force"), (torque, "torque")];
         let panels = vectors.map(|(trace, name)| trace.panel(name)).into_iter();
-        with_events(panels.chain([energy_panel("stored energy", energy)]), &events, changes)
+        let grip = grip.into_iter().map(|(quantity, name, trace)| {
+            Ok(Panel::new(Axis::of(name, quantity)).series(Series::trace("", trace)))
+        });
+        let energy = energy_panel("stored energy", energy);
+        with_events(panels.chain(grip).chain([energy]), &events, changes)
     }
 
     /// Returns the panels of one device of several: position, force and energy. Rotation and torque are in the recording only.

@@ -6,8 +6,8 @@
 use criterion::{Criterion, criterion_group};
 use fixture_yardstick_model::{Yardstick, wrench};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{Input, Output, Pose};
+use flotor_loader::Model;
 use flotor_session::registry::load_file;
 use flotor_tests::library::plugin_file;
 use std::hint::black_box;

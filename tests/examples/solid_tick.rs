@@ -4,8 +4,8 @@
 //! `cargo run --release -p flotor-tests --features measurements --example solid_tick`: compare the numbers of one run; a busy
 //! machine can only make them larger.
 
-use flotor_hal::abi::loader::{Model, Plugin, Setting};
 use flotor_hal::{DQuat, DVec3, Input, Output, Pose, Wrench};
+use flotor_loader::{Model, Plugin, Setting};
 use std::collections::BTreeMap;
 use std::time::Instant;
 

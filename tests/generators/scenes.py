@@ -152,69 +152,102 @@ class Sheet:
     def tick(self, tick, x, _v):
         return self.advance(np.array([0, 0, x]), TICK_S if tick else 0.0)[2]
 
-    def linear(self, handle, duration):
-        """Force at the handle and its slope: the same time simulated again, the ball an eighth of a spacing farther along each axis."""
-        before, way = (self.x, self.v, self.ball), handle + [0, 0, self.radius] - self.ball
-        force = self.advance(handle, duration)
-        after, slope = (self.x, self.v, self.ball), np.zeros((3, 3))
-        for axis in range(3):
-            self.x, self.v, self.ball = before
-            probe = np.zeros(3)
-            probe[axis] = math.copysign(self.spacing / 8, way[axis])
-            slope[:, axis] = (self.advance(handle + probe, duration) - force) / probe[axis]
+    def plane(self, handle, duration):
+        """Height and stiffness of the plane with the force at the handle: the same time simulated again, the ball an eighth of a spacing
+        farther in the direction of motion, or, if it touches nothing, below the nearest mass."""
+        before, way = (self.x, self.v, self.ball), handle[2] + self.radius - self.ball[2]
+        force = self.advance(handle, duration)[2]
+        after, clearance = (self.x, self.v, self.ball), 0.0
+        probe = math.copysign(self.spacing / 8, way)
+        if force == 0:
+            clearance, probe = np.linalg.norm(self.ball - self.x, axis=-1).min() - self.radius, -self.spacing / 8
+        self.x, self.v, self.ball = before
+        stiffness = (force - self.advance(handle + [0, 0, probe - clearance], duration)[2]) / probe
         self.x, self.v, self.ball = after
-        return handle, force, slope, self.spacing / 2
+        return handle[2] + (force / stiffness if force > 0 else -clearance), stiffness
 
 
-class LocalModel:
-    """A sheet at a lower rate: each local linear model is available one period later and fades in over another."""
+class Contact:
+    """A sheet at a lower rate: each plane is available one period later. A spring behind it keeps its energy when the plane is replaced;
+    what the new plane is deeper is withheld, and falls as far as the hand has paid for it, over half a period (`host/contact/src`)."""
+
+    largest_balance, drift, longest = 0.01, 0.1e-3 / 60, 0.02  # J, W, s
 
     def __init__(self, rate):
         self.period, self.sheet = 1000 // rate, Sheet()
-        nothing = np.zeros(3), np.zeros(3), np.zeros((3, 3)), math.inf
-        self.old = self.new = nothing
-        self.since, self.computed, self.pending = 0, None, None
+        self.computed, self.pending, self.height = None, None, None
+        self.stiffness = self.depth = self.withheld = self.rate = self.balance = self.stored = 0.0
+        self.since = math.inf
 
-    @staticmethod
-    def at(model, handle):
-        anchor, force, slope, valid = model
-        away = handle - anchor
-        length = np.linalg.norm(away)
-        return force + slope @ (away * min(1.0, valid / length) if length > 0 else away)
+    def replace(self, height, stiffness):
+        if self.height is not None:
+            ratio = self.stiffness / stiffness
+            self.depth *= ratio if ratio < 1 else math.sqrt(ratio)
+        self.height, self.stiffness = height, stiffness
+        self.withheld = height - self.last - self.depth
+        if self.depth == 0:
+            self.withheld = max(self.withheld, 0.0)
+        self.rate = abs(self.withheld) / max(min(self.since / 2, self.longest) / TICK_S, 1.0)
+        self.since = 0.0
 
-    def share(self, tick):
-        return min((tick - self.since) / self.period, 1.0)
+    def relax(self, whole, available):
+        if self.withheld <= 0:
+            self.withheld = min(self.withheld + self.rate, 0.0)
+            return
+        depth = max(whole - self.withheld, 0.0)
+        force = self.stiffness * (max(depth, self.depth) + abs(depth - self.depth))
+        fall = min(self.rate, self.withheld)
+        if (force + self.stiffness * fall / 2) * fall > available:
+            root = math.sqrt(force**2 + 2 * self.stiffness * max(available, 0.0))
+            fall = 2 * max(available, 0.0) / (force + root) if root > 0 else 0.0
+        self.withheld -= fall
 
-    def force(self, tick, handle):
-        share = self.share(tick)
-        return (1 - share) * self.at(self.old, handle) + share * self.at(self.new, handle)
+    def force(self, x, arrived):
+        """The balance is what the hand has put in less what the spring stores; a sampled spring is credited half its stiffness times the
+        squared motion of a tick."""
+        available, moved = self.balance, x - self.last
+        self.since += TICK_S
+        work = -self.stiffness * self.depth * moved + self.drift * TICK_S
+        if arrived:
+            self.replace(*arrived)
+        whole, touched = self.height - x, self.depth > 0
+        self.relax(whole, available)
+        depth = whole - self.withheld
+        self.depth = max(depth, 0.0)
+        if depth < 0 < self.withheld:
+            self.withheld = max(self.withheld + depth, 0.0)
+        if touched or self.depth > 0:
+            work += self.stiffness * moved**2 / 2
+        stored = self.stiffness * self.depth**2 / 2
+        self.balance, self.stored = min(self.balance + work + self.stored - stored, self.largest_balance), stored
+        return self.stiffness * self.depth
 
     def tick(self, tick, x, _v):
-        handle, arrived = np.array([0, 0, x]), None
+        arrived = None
         if self.pending and tick >= self.pending[0]:
             arrived, self.pending = self.pending[1], None
         if tick % self.period == 0:
             duration = 0.0 if self.computed is None else (tick - self.computed) * TICK_S
-            self.computed, self.pending = tick, (tick + self.period, self.sheet.linear(handle, duration))
-        if arrived:
-            share = self.share(tick)
-            slope = self.old[2] + share * (self.new[2] - self.old[2])
-            valid = min((self.old if share < 1 else self.new)[3], self.new[3])
-            self.old = handle, self.force(tick, handle), slope, valid
-            self.new, self.since = arrived, tick
-        return self.force(tick, handle)[2]
+            plane = self.sheet.plane(np.array([0, 0, x]), duration)
+            self.computed, self.pending = tick, (tick + self.period, plane)
+        if self.height is None and not arrived:
+            return 0.0
+        if self.height is None:
+            self.last = x
+        force, self.last = self.force(x, arrived), x
+        return force
 
 
-def errors_of_the_local_model(rate):
-    """Root mean squares over the largest force, and largest steps in N: local model, sheet at 1 kHz, zero-order hold of its force."""
-    positions, local, _ = run(oscillation(-1e-3, 1.5e-3, 3.0), LocalModel(rate).tick)
+def errors_of_the_contact(rate):
+    """Root mean squares over the largest force, and largest steps in N: contact, sheet at 1 kHz, zero-order hold of its force."""
+    positions, contact, _ = run(oscillation(-1e-3, 1.5e-3, 3.0), Contact(rate).tick)
     sheet = Sheet()
     direct = np.array([sheet.tick(tick, x, 0.0) for tick, x in enumerate(positions)])
     period = 1000 // rate
     ticks = np.arange(2 * period, TICKS)
     held = direct[(ticks // period - 1) * period]
-    rms = [math.sqrt(np.mean((forces - direct[ticks]) ** 2)) / np.abs(direct).max() for forces in (local[ticks], held)]
-    steps = np.abs(np.diff(local)).max(), np.abs(np.diff(direct)).max(), np.abs(direct[period:] - direct[:-period]).max()
+    rms = [math.sqrt(np.mean((forces - direct[ticks]) ** 2)) / np.abs(direct).max() for forces in (contact[ticks], held)]
+    steps = np.abs(np.diff(contact)).max(), np.abs(np.diff(direct)).max(), np.abs(direct[period:] - direct[:-period]).max()
     return *rms, *steps
 
 
@@ -309,7 +342,7 @@ def main(folder):
         "study": (explore, spring),
         "wall": (explore, wall),
         "membrane": (press, Sheet().tick),
-        "membrane-200hz": (press, LocalModel(200).tick),
+        "membrane-200hz": (press, Contact(200).tick),
         "solid": (press, solid(f"{folder}/solid/b_block_sphere.csv")),
     }
     peaks = {scene: np.abs(run(aim, law)[2]).max() for scene, (aim, law) in laws.items()}
@@ -317,10 +350,10 @@ def main(folder):
         print("scene,peak_n", file=file)
         for scene, peak in {**peaks, "teleoperation": teleoperation()}.items():
             print(f"{scene},{peak:.8f}", file=file)
-    with open(f"{folder}/local_linear_model.csv", "w") as file:
-        print("rate_hz,local_rms,held_rms,local_step_n,sheet_step_n,held_step_n", file=file)
+    with open(f"{folder}/asynchronous_membrane.csv", "w") as file:
+        print("rate_hz,contact_rms,held_rms,contact_step_n,sheet_step_n,held_step_n", file=file)
         for rate in (50, 100, 200):
-            print(rate, *(f"{number:.8f}" for number in errors_of_the_local_model(rate)), sep=",", file=file)
+            print(rate, *(f"{number:.8f}" for number in errors_of_the_contact(rate)), sep=",", file=file)
 
 
 main(sys.argv[1])

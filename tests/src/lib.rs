@@ -2,8 +2,8 @@
 //!
 //! The end of this file lists the documents whose Rust code is compiled and run as doctests.
 
+pub mod asynchronous_error;
 pub mod commands;
-pub mod field_error;
 pub mod library;
 pub mod printed;
 pub mod process;
@@ -163,6 +163,9 @@ mod documents {
     #[doc = include_str!("../../docs/src/write-a-device.md")]
     struct WriteADevice;
 
+    #[doc = include_str!("../../docs/src/bring-your-solver.md")]
+    struct BringYourSolver;
+
     #[doc = include_str!("../../docs/src/slow-model.md")]
     struct AsynchronousModel;
 
@@ -171,6 +174,9 @@ mod documents {
 
     #[doc = include_str!("../../docs/src/concepts.md")]
     struct Concepts;
+
+    #[doc = include_str!("../../docs/src/grip.md")]
+    struct Grip;
 }
 
 #[cfg(test)]

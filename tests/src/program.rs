@@ -10,7 +10,7 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::JoinHandle;
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 /// Exit codes of the command line, on which scripts rely.
 pub mod exit_code {
@@ -25,6 +25,25 @@ pub mod exit_code {
     /// Fault of the device.
     pub const DEVICE_FAULT: i32 = 4;
 }
+
+/// Runs a program and writes its peak memory, with its processes', as the last line of standard error. A shell starts the program and ends,
+/// so that the program becomes a child of the script (`PR_SET_CHILD_SUBREAPER`): a direct child would count the memory of Python,
+/// more than that of many commands, as its own before it starts.
+const PEAK: &str = "
+import ctypes, os, sys
+assert ctypes.CDLL(None).prctl(36, 1, 0, 0, 0) == 0
+numbers, number = os.pipe()
+os.set_inheritable(number, True)
+shell = ['sh', '-c', f'\"$@\" {number}>&- & echo $! >&{number}', 'sh']
+os.posix_spawnp('sh', shell + sys.argv[1:], os.environ)
+os.close(number)
+program = int(os.read(numbers, 20))
+while True:
+    ended, status, usage = os.wait4(-1, 0)
+    if ended == program:
+        print(usage.ru_maxrss, file=sys.stderr)
+        sys.exit(os.waitstatus_to_exitcode(status))
+";
 
 /// Builder for a run of the program.
 pub struct Flotor {
@@ -136,6 +155,21 @@ impl Flotor {
         self.start().wait()
     }
 
+    /// Runs the program to its end with Python; also returns the peak resident memory of the largest of its processes, KiB. The
+    /// kernel measures it: samples of a test would miss the last moments of a short run on a busy machine.
+    ///
+    /// # Panics
+    /// As [`Self::run`], or if the memory is no number.
+    #[must_use]
+    pub fn run_with_peak_kib(self) -> (Ran, u64) {
+        let mut ran = self.through_shell(r#"exec python3 -c "$PEAK" "$@""#).env("PEAK", PEAK).run();
+        let (stderr, peak_kib) =
+            ran.stderr.trim_end().rsplit_once('\n').unwrap_or(("", ran.stderr.trim_end()));
+        let peak_kib = peak_kib.parse().expect("the last line is the peak");
+        ran.stderr = stderr.to_owned();
+        (ran, peak_kib)
+    }
+
     /// Starts the program, and a thread that writes its standard input.
     ///
     /// # Panics
@@ -173,23 +207,6 @@ impl DerefMut for Running {
 }
 
 impl Running {
-    /// Waits for the end of the program; also returns the peak resident memory of the process that carries out the command, KiB.
-    /// The program must write less than the capacity of a pipe.
-    ///
-    /// # Panics
-    /// As [`Self::wait`] and [`Owned::host`].
-    #[must_use]
-    pub fn wait_with_peak_kib(self) -> (Ran, u64) {
-        let status = format!("/proc/{}/status", self.host().as_raw_nonzero());
-        let mut peak_kib = 0;
-        while let Ok(text) = std::fs::read_to_string(&status) {
-            let Some(line) = text.lines().find_map(|line| line.strip_prefix("VmHWM:")) else { break };
-            peak_kib = peak_kib.max(line.trim().trim_end_matches("kB").trim().parse().unwrap_or(0));
-            std::thread::sleep(Duration::from_millis(2));
-        }
-        (self.wait(), peak_kib)
-    }
-
     /// Waits for the end of the program; returns its exit code and output.
     ///
     /// # Panics

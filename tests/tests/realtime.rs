@@ -10,12 +10,12 @@ mod inverse3;
 mod ml_api;
 
 use flotor_core::trace::TickRecord;
-use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::abi::{CallStatus, Entry, model_entry};
 use flotor_hal::{
     Cycle, Demand, DeviceState, ForceModel, Input, LoopConfig, ModelInfo, Output, Pose, Refusal, Settings,
     Tick, Wrench,
 };
+use flotor_loader::{Plugin, Setting};
 use flotor_servo::{Clock, StopSwitch};
 use flotor_session::registry::Registry;
 use flotor_session::scene::Scene;

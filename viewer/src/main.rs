@@ -85,13 +85,14 @@ struct Arguments {
     /// Force of an arrow of full length, 0.001 to 10000 N, for comparable pictures (default: the largest force of the run)
     #[arg(long, value_name = "NEWTONS", value_parser = arrow_force, conflicts_with_all = ["sitting", "export"])]
     arrow_force: Option<f64>,
-    /// With --export: title of the plot (default: the title of the scene)
+    /// With --export: title of a plot (default: the title of the run)
     #[arg(long, value_name = "TEXT", requires = "export")]
     title: Option<String>,
     /// With --screenshot: draw a screen of a sitting, as `flotor study --screen json` writes it
     #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view", "traces", "force_position", "device", "arrow_force"], value_parser = screen)]
     screen: Option<Screen>,
-    /// With --sitting or --screen: file (TOML) with the texts of the screens, in the language of the person (default: English)
+    /// With --sitting or --screen: file (TOML) with the texts of the screens, in the language of the person: a translated copy of
+    /// viewer/texts/english.toml, with all its keys (default: English)
     #[arg(long, value_name = "FILE", value_parser = texts)]
     texts: Option<Texts>,
     #[command(flatten)]

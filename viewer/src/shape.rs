@@ -7,8 +7,8 @@
 use flotor_core::mapping::Mapping;
 use flotor_drawing::geometry::{Body, Curve, Strain};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting, read_metadata};
 use flotor_hal::{DVec3, Form, Input, Pose};
+use flotor_loader::{LoadError, Model, Plugin, Setting, read_metadata};
 use flotor_record::{PluginDescription, Role, RunDescription};
 use std::path::{Path, PathBuf};
 
@@ -80,7 +80,7 @@ pub enum Posed {
 pub enum ShapeError {
     /// The plugin file of the model is unknown.
     #[error(
-        "the plugin `{id}` of model `{name}` was not found; add its folder to FLOTOR_PLUGIN_PATH (recording), or restore its file (running session)"
+        "the plugin `{id}` of model `{name}` was not found; add its folder to FLOTOR_PLUGIN_PATH (recording), or put its file on this machine at the path that it has on the host's machine (running session)"
     )]
     NoPlugin {
         /// Name of the model in the scene.

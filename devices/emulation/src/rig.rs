@@ -26,7 +26,7 @@ const LINE_BYTES: usize = 80;
 #[derive(Args, Clone, Debug)]
 pub struct RigArguments {
     /// Hold the handle in a calibration rig instead of a hand: a stand that moves down step by step, and a force sensor
-    /// at a pseudo terminal; the path is of a symbolic link to the terminal
+    /// at a pseudo terminal; PATH becomes a symbolic link to the terminal
     #[arg(long, value_name = "PATH")]
     calibration_rig: Option<PathBuf>,
     /// Calibration rig: step of the stand, in mm, 0.1 to 7

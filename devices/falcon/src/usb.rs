@@ -37,6 +37,7 @@ pub(crate) fn open(serial: Option<&str>) -> Result<UsbChip, String> {
         }
         match claim(&device, serial) {
             Ok(chip) => return Ok(chip),
+            Err(Error::NoDevice) if problem != Error::NotFound => {} // no other device hides the problem
             Err(error) => problem = error,
         }
     }

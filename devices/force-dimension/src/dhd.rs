@@ -1,8 +1,8 @@
 //! Device of the SDK in the axes of the contract, with its errors and their remedies.
 
 use crate::ffi::Functions;
-use flotor_hal::{DMat3, DQuat, DVec3, Fault, Pose, Refusal, Twist, Wrench};
-use flotor_vendor_sdk::{DropInPolicy, Library, LibraryProblem, Sdk, without_signals};
+use flotor_hal::{DMat3, DQuat, DVec3, Fault, GripKind, GripState, Pose, Refusal, Twist, Wrench};
+use flotor_vendor_sdk::{Command, DropInPolicy, Library, LibraryProblem, Sdk, without_signals};
 use std::ffi::c_int;
 
 /// Library lookup of the SDK. `libdrd` has the functions of both libraries; `libdhd` cannot initialise.
@@ -69,6 +69,15 @@ pub(crate) struct Dhd {
     functions: Box<Functions>,
     id: i8,
     pub(crate) wrist: Wrist,
+    pub(crate) gripper: Gripper,
+}
+
+/// Gripper of a device: none, sensed, or sensed and driven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Gripper {
+    None,
+    Sensed,
+    Driven,
 }
 
 /// Rotational axes of a device: none, sensed, or sensed and driven.
@@ -128,7 +137,12 @@ impl Dhd {
             (true, false) => Wrist::Sensed,
             (false, false) => Wrist::None,
         };
-        Ok(Self { functions: Box::new(functions), id, wrist })
+        let gripper = match (functions.has_gripper(id), functions.has_active_gripper(id)) {
+            (_, true) => Gripper::Driven,
+            (true, false) => Gripper::Sensed,
+            (false, false) => Gripper::None,
+        };
+        Ok(Self { functions: Box::new(functions), id, wrist, gripper })
     }
 
     fn check(&self, code: c_int, what: &'static str) -> Result<c_int, Failed> {
@@ -176,7 +190,7 @@ impl Dhd {
     /// Sets gravity compensation, limits, velocity windows and watchdog, releases the brakes, enables force and sends
     /// a zero wrench.
     pub(crate) fn energize(&self, setup: &Setup) -> Result<(), Failed> {
-        let Self { functions, id, wrist } = self;
+        let Self { functions, id, wrist, .. } = self;
         let [most_n, most_nm] = setup.most;
         match self.check(functions.set_gravity_compensation(true, *id), "enabling gravity compensation") {
             // Optional: some devices have none.
@@ -194,13 +208,13 @@ impl Dhd {
         self.check(functions.set_watchdog(setup.watchdog_units, *id), "setting the watchdog of the device")?;
         self.check(functions.set_brakes(false, *id), "releasing the brakes")?;
         self.check(functions.enable_force(true, *id), "enabling force")?;
-        self.send(&Wrench::ZERO).map(drop)
+        self.send(&Command::ZERO).map(drop)
     }
 
     /// Sends a zero wrench, disables force and applies the brakes; a failed call does not skip the next calls.
     pub(crate) fn relax(&self) {
         let Self { functions, id, .. } = self;
-        let _ = functions.set_wrench([0.0; 3], [0.0; 3], *id);
+        let _ = functions.set_forces([0.0; 3], [0.0; 3], 0.0, *id);
         let _ = functions.stop(*id);
         let _ = functions.set_brakes(true, *id);
     }
@@ -227,21 +241,35 @@ impl Dhd {
         Ok(Twist::new(linear, angular))
     }
 
-    /// Reads the wrench that the device reports, N and N·m.
-    pub(crate) fn wrench(&self) -> Result<Wrench, Failed> {
-        let (code, force, torque) = self.functions.wrench(self.id);
+    /// Reads the wrench that the device reports, N and N·m, and the grip.
+    pub(crate) fn delivered(&self) -> Result<(Wrench, GripState), Failed> {
+        let (code, force, torque, effort) = self.functions.forces(self.id);
         self.check(code, "reading the force")?;
-        Ok(Wrench::new(from_dhd(force), from_dhd(torque)))
+        let wrench = Wrench::new(from_dhd(force), from_dhd(torque));
+        if self.gripper == Gripper::None {
+            return Ok((wrench, GripState::new(GripKind::Linear, 0.0, 0.0)));
+        }
+        let (code, gap) = self.functions.gripper_gap(self.id);
+        self.check(code, "reading the gripper")?;
+        let (code, velocity) = self.functions.gripper_velocity(self.id);
+        let velocity = match self.check(code, "reading the velocity of the gripper") {
+            Ok(_) => velocity,
+            Err(failed) if failed.code == TIMEOUT => 0.0, // the window is not filled yet
+            Err(failed) => return Err(failed),
+        };
+        Ok((wrench, GripState::new(GripKind::Linear, gap, velocity).with_delivered(effort)))
     }
 
     pub(crate) fn buttons(&self) -> u32 {
         self.functions.buttons(self.id)
     }
 
-    /// Sends a wrench and waits for the exchange with the device; returns whether the motors saturate.
-    pub(crate) fn send(&self, wrench: &Wrench) -> Result<Given, Failed> {
+    /// Sends a command and waits for the exchange with the device; returns whether the motors saturate. A positive force of
+    /// the gripper opens it.
+    pub(crate) fn send(&self, Command { wrench, effort }: &Command) -> Result<Given, Failed> {
         const SATURATED: c_int = 2;
-        let code = self.functions.set_wrench(to_dhd(wrench.force()), to_dhd(wrench.torque()), self.id);
+        let (force, torque) = (to_dhd(wrench.force()), to_dhd(wrench.torque()));
+        let code = self.functions.set_forces(force, torque, *effort, self.id);
         let code = self.check(code, "sending the force")?;
         Ok(if code == SATURATED { Given::Saturated } else { Given::All })
     }

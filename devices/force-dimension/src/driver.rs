@@ -1,7 +1,7 @@
-//! Thread that polls the SDK: reads pose, velocity and buttons, then sends the loop's wrench, a call that waits for the exchange.
+//! Thread that polls the SDK: reads pose, velocity, grip and buttons, then sends the loop's command, a call that waits for the exchange.
 
 use crate::dhd::{Dhd, Failed, Given, Setup};
-use flotor_hal::{Conditions, Fault, Refusal, Wrench};
+use flotor_hal::{Conditions, Fault, Refusal};
 use flotor_vendor_sdk::{CommandCursor, Exchange, Sample, without_signals};
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -93,9 +93,9 @@ fn step(
 ) -> Result<Given, Fault> {
     let sample = measure(dhd, given).map_err(|failed| failed.fault())?;
     exchange.publish(&sample);
-    let wrench = exchange.next_wrench(cursor);
-    let given = dhd.send(&wrench).map_err(|failed| failed.fault())?;
-    exchange.note_sent(&wrench);
+    let command = exchange.next_command(cursor);
+    let given = dhd.send(&command).map_err(|failed| failed.fault())?;
+    exchange.note_sent(&command);
     if cycle % STATUS_EVERY == STATUS_EVERY - 1 {
         let force_off = dhd.force_off().map_err(|failed| failed.fault())?;
         force_off.map_or(Ok(()), Err)?;
@@ -108,6 +108,6 @@ fn measure(dhd: &Dhd, given: Given) -> Result<Sample, Failed> {
         Given::All => Conditions::NONE,
         Given::Saturated => Conditions::SATURATED,
     };
-    let delivered: Wrench = dhd.wrench()?;
-    Ok(Sample { pose: dhd.pose()?, twist: dhd.twist()?, delivered, buttons: dhd.buttons(), conditions })
+    let (delivered, grip) = dhd.delivered()?;
+    Ok(Sample { pose: dhd.pose()?, twist: dhd.twist()?, delivered, grip, buttons: dhd.buttons(), conditions })
 }

@@ -35,8 +35,12 @@ sdk_functions! {
         fn dhdGetPositionAndOrientationFrame(*mut c_double, *mut c_double, *mut c_double, *mut c_double, i8) -> c_int;
         fn dhdGetLinearVelocity(*mut c_double, *mut c_double, *mut c_double, i8) -> c_int;
         fn dhdGetAngularVelocityRad(*mut c_double, *mut c_double, *mut c_double, i8) -> c_int;
-        fn dhdGetForceAndTorque(
-            *mut c_double, *mut c_double, *mut c_double, *mut c_double, *mut c_double, *mut c_double, i8
+        fn dhdHasGripper(i8) -> Truth;
+        fn dhdHasActiveGripper(i8) -> Truth;
+        fn dhdGetGripperGap(*mut c_double, i8) -> c_int;
+        fn dhdGetGripperLinearVelocity(*mut c_double, i8) -> c_int;
+        fn dhdGetForceAndTorqueAndGripperForce(
+            *mut c_double, *mut c_double, *mut c_double, *mut c_double, *mut c_double, *mut c_double, *mut c_double, i8
         ) -> c_int;
         fn dhdSetForceAndTorqueAndGripperForce(
             c_double, c_double, c_double, c_double, c_double, c_double, c_double, i8
@@ -106,6 +110,30 @@ impl Functions {
     pub(crate) fn has_active_wrist(&self, id: i8) -> bool {
         // SAFETY: any id is legal.
         unsafe { (self.dhdHasActiveWrist)(id) != 0 }
+    }
+
+    pub(crate) fn has_gripper(&self, id: i8) -> bool {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdHasGripper)(id) != 0 }
+    }
+
+    pub(crate) fn has_active_gripper(&self, id: i8) -> bool {
+        // SAFETY: any id is legal.
+        unsafe { (self.dhdHasActiveGripper)(id) != 0 }
+    }
+
+    /// Reads the gap of the gripper, m.
+    pub(crate) fn gripper_gap(&self, id: i8) -> (c_int, f64) {
+        let mut gap = 0.0;
+        // SAFETY: any id is legal; a place for the number.
+        (unsafe { (self.dhdGetGripperGap)(&raw mut gap, id) }, gap)
+    }
+
+    /// Reads the velocity of the gap, m/s.
+    pub(crate) fn gripper_velocity(&self, id: i8) -> (c_int, f64) {
+        let mut velocity = 0.0;
+        // SAFETY: any id is legal; a place for the number.
+        (unsafe { (self.dhdGetGripperLinearVelocity)(&raw mut velocity, id) }, velocity)
     }
 
     pub(crate) fn status(&self, id: i8) -> (c_int, [c_int; STATUS]) {
@@ -193,17 +221,20 @@ impl Functions {
         (unsafe { (self.dhdGetAngularVelocityRad)(x, y, z, id) }, velocity)
     }
 
-    /// Reads force, N, and torque, N·m.
-    pub(crate) fn wrench(&self, id: i8) -> (c_int, [f64; 3], [f64; 3]) {
-        let (mut force, mut torque) = ([0.0; 3], [0.0; 3]);
+    /// Reads force, N, torque, N·m, and force of the gripper, N.
+    pub(crate) fn forces(&self, id: i8) -> (c_int, [f64; 3], [f64; 3], f64) {
+        let (mut force, mut torque, mut gripper) = ([0.0; 3], [0.0; 3], 0.0);
         let ([x, y, z], [a, b, g]) = (&mut force, &mut torque);
-        // SAFETY: any id is legal; six places.
-        (unsafe { (self.dhdGetForceAndTorque)(x, y, z, a, b, g, id) }, force, torque)
+        // SAFETY: any id is legal; seven places.
+        let code =
+            unsafe { (self.dhdGetForceAndTorqueAndGripperForce)(x, y, z, a, b, g, &raw mut gripper, id) };
+        (code, force, torque, gripper)
     }
 
-    /// Sends force, N, and torque, N·m, with zero gripper force; waits for the exchange with the device.
-    pub(crate) fn set_wrench(&self, [x, y, z]: [f64; 3], [a, b, g]: [f64; 3], id: i8) -> c_int {
+    /// Sets force, N, torque, N·m, and force of the gripper, N; waits for the exchange with the device.
+    pub(crate) fn set_forces(&self, force: [f64; 3], torque: [f64; 3], gripper: f64, id: i8) -> c_int {
+        let ([x, y, z], [a, b, g]) = (force, torque);
         // SAFETY: any id is legal.
-        unsafe { (self.dhdSetForceAndTorqueAndGripperForce)(x, y, z, a, b, g, 0.0, id) }
+        unsafe { (self.dhdSetForceAndTorqueAndGripperForce)(x, y, z, a, b, g, gripper, id) }
     }
 }

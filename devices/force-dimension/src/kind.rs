@@ -5,7 +5,27 @@
 //! here are lower for these types. All other figures (workspace, continuous force and torque) are assumed to be the
 //! manufacturer's, but were not compared with data sheets; a scene's `[limits]` can lower the limits.
 
+use crate::dhd::Gripper;
+use flotor_hal::{GripAxis, GripKind};
 use std::f64::consts::PI;
+
+/// Largest gap of a gripper, m, and largest force, N: the maker's figures of an omega.7 and a sigma.7, not verified.
+const GAP_M: f64 = 0.025;
+const GRIPPER_N: f64 = 8.0;
+
+/// Returns the grip of a device, with its largest force, N; 0: sensed only.
+pub(crate) const fn grip_axis(force_n: f64) -> GripAxis {
+    // From zero to the maximum in a millisecond, as the other motors.
+    GripAxis::new(GripKind::Linear, [0.0, GAP_M], force_n).with_slew(GRIPPER_N * 1.0e3)
+}
+
+/// Returns the largest force of a gripper, N.
+pub(crate) const fn gripper_n(gripper: Gripper) -> f64 {
+    match gripper {
+        Gripper::Driven => GRIPPER_N,
+        Gripper::None | Gripper::Sensed => 0.0,
+    }
+}
 
 /// Range and limits of a device type.
 #[derive(Clone, Copy, Debug, PartialEq)]

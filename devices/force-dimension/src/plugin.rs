@@ -1,12 +1,13 @@
 //! Implementation of the device contract for Force Dimension's devices, with their parameters.
 
-use crate::dhd::{Dhd, Setup, Which, Wrist};
+use crate::dhd::{Dhd, Gripper, Setup, Which, Wrist};
 use crate::driver::Driver;
-use crate::kind::Kind;
+use crate::kind::{Kind, grip_axis, gripper_n};
 use flotor_hal::{
-    ActiveDevice, Axes, Capabilities, Choices, ConnectionDevice, Cycle, Device, DeviceInfo, DeviceState,
-    IndependentStop, IndependentStopDevice, LoopConfig, PacingDevice, Parameter, Refusal, SampleWait,
-    Settings, StoppedState, Tick, UsbAccess, UsbKind, Wrench, choices, export_device,
+    ActiveDevice, ActiveGrip, Axes, Capabilities, Choices, ConnectionDevice, Cycle, Device, DeviceInfo,
+    DeviceState, GripAxis, GripDevice, GripState, IndependentStop, IndependentStopDevice, LoopConfig,
+    PacingDevice, Parameter, Refusal, SampleWait, Settings, StoppedState, Tick, UsbAccess, UsbKind, Wrench,
+    choices, export_device,
 };
 use flotor_vendor_sdk::parameters::{PACE, STAND_IN, TIMEOUT, max_force, max_torque};
 use flotor_vendor_sdk::{DropInPolicy, Exchange, LoopEnd, Pace, StopSwitch};
@@ -66,6 +67,7 @@ pub struct ForceDimensionDevice {
     exchange: Arc<Exchange>,
     kind: Kind,
     wrist: Wrist,
+    gripper: Gripper,
     initialises: bool,
     setup: Setup,
     timeout: Duration,
@@ -100,7 +102,7 @@ impl Device for ForceDimensionDevice {
                 dhd.name()
             )));
         }
-        let wrist = dhd.wrist;
+        let (wrist, gripper) = (dhd.wrist, dhd.gripper);
         let of_kind = Kind::of_number(dhd.kind());
         let told = |id: &str, own: f64| match settings.number_or_default(id) {
             0.0 => own,
@@ -129,6 +131,7 @@ impl Device for ForceDimensionDevice {
             exchange: Arc::new(Exchange::new(pace)),
             kind,
             wrist,
+            gripper,
             initialises,
             setup,
             timeout: Duration::from_secs_f64(settings.number_or_default(TIMEOUT.id()) * 1.0e-3),
@@ -185,7 +188,8 @@ impl Device for ForceDimensionDevice {
         }
         match Driver::start(dhd, &self.setup, &self.exchange) {
             Ok(driver) => {
-                let end = LoopEnd::new(Arc::clone(&self.exchange), self.setup.most, self.timeout);
+                let end = LoopEnd::new(Arc::clone(&self.exchange), self.setup.most, self.timeout)
+                    .with_grip(gripper_n(self.gripper));
                 Ok(EnergizedDevice { opened: self, driver, end })
             }
             Err((dhd, refusal)) => {
@@ -237,6 +241,22 @@ impl PacingDevice for EnergizedDevice {
     }
 }
 
+impl GripDevice for ForceDimensionDevice {
+    fn grip_axis(&self) -> Option<GripAxis> {
+        (self.gripper != Gripper::None).then(|| grip_axis(gripper_n(self.gripper)))
+    }
+}
+
+impl ActiveGrip for EnergizedDevice {
+    fn read_grip(&mut self, state: &mut GripState) {
+        self.end.read_grip(state);
+    }
+
+    fn write_grip(&mut self, effort: f64) {
+        self.end.write_grip(effort);
+    }
+}
+
 impl IndependentStopDevice for ForceDimensionDevice {
     /// Declares the device's own watchdog, which removes the force.
     fn independent_stop(&self) -> IndependentStop {
@@ -249,4 +269,4 @@ impl ConnectionDevice for ForceDimensionDevice {
     const USB: &'static [UsbKind] = &[UsbKind::of_vendor(0x1451, UsbAccess::Raw)];
 }
 
-export_device!(ForceDimensionDevice, connection, pacing, independent_stop);
+export_device!(ForceDimensionDevice, connection, pacing, independent_stop, grip);

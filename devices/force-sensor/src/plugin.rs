@@ -72,7 +72,7 @@ impl SimpleDevice for ForceSensor {
 
     fn open(settings: &Settings<'_>) -> Result<Opened<Self>, Refusal> {
         let port = settings.text("port").ok_or_else(|| {
-            Refusal::resource(format!("no `port` for the force sensor; set the port, as in {PORT_EXAMPLE}"))
+            Refusal::resource(format!("no `port` for the force sensor; set the port, such as {PORT_EXAMPLE}"))
         })?;
         let timeout = Duration::from_secs_f64(settings.number_or_default("timeout_ms") * 1.0e-3);
         let line = SensorLine::open(port).map_err(Refusal::resource)?;

@@ -1,7 +1,7 @@
 //! Plugin with an emulated sensor at a pseudo terminal, called through the device contract as by a host.
 
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};
 use std::sync::{Arc, Mutex};

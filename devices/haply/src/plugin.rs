@@ -36,7 +36,7 @@ const VERSIONS: Choices = choices!["v2", "v3"];
 
 const SCHEMA: &[Parameter] = &[
     Parameter::text("port", PORT_HELP),
-    Parameter::choice("hardware", VERSIONS, 1, "Version of the device: v2 (metal) or v3 (plastic, 3.1)"),
+    Parameter::choice("hardware", VERSIONS, 1, "Version of the device: v2 (metal) or v3 (plastic, also 3.1)"),
     Parameter::real("max_force_n", "N", 0.0, 10.0, 3.0, "Largest force on the hand"),
     Parameter::real(
         "velocity_cutoff_hz",
@@ -137,7 +137,7 @@ impl SimpleDevice for HaplyDevice {
     fn open(settings: &Settings<'_>) -> Result<Opened<Self>, Refusal> {
         let path = settings.text("port").ok_or_else(|| {
             Refusal::resource(format!(
-                "no `port` for the board; set the port, as in {PORT_EXAMPLE}; without hardware start the emulator \
+                "no `port` for the board; set the port, such as {PORT_EXAMPLE}; without hardware start the emulator \
                  with `cargo run -p flotor-haply --example emulated_board` (on Linux), which prints its port"
             ))
         })?;

@@ -1,10 +1,10 @@
 //! Plugin with an emulated board at a pseudo terminal, called through the device contract as by a host.
 
-use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
 use flotor_hal::glam::DVec2;
 use flotor_hal::{Axes, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
 use flotor_haply::emulator::EmulatedBoard;
 use flotor_haply::pantograph::Pantograph;
+use flotor_loader::{OpenedDevice, Plugin, Setting};
 use serialport::{SerialPort, TTYPort};
 use std::io::{Read, Write};
 use std::sync::{Arc, Mutex, MutexGuard};
@@ -113,7 +113,7 @@ impl Drop for Rig {
 
 /// A loop that reads and writes until something holds, or for ten seconds.
 struct Loop {
-    device: flotor_hal::abi::loader::ActiveDevice,
+    device: flotor_loader::ActiveDevice,
     index: u64,
     state: DeviceState,
     started: Instant,

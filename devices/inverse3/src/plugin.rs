@@ -42,7 +42,14 @@ const SCHEMA: &[Parameter] = &[
         60.0,
         "Half-extent of the workspace along each axis, about the centre of the arm's range",
     ),
-    Parameter::real("force_gate", "1", 0.0, 1.0, 0.0, "Gain of the service's force gate; 0: none"),
+    Parameter::real(
+        "force_gate",
+        "1",
+        0.0,
+        1.0,
+        0.0,
+        "Gain of the service's force gate, whose effect on the force the maker does not document",
+    ),
     Parameter::real(
         "foreign_force_n",
         "N",

@@ -21,7 +21,7 @@ pub struct Request {
     pub arm: Option<String>,
     /// Selection of the grip.
     pub grip: GripRequest,
-    /// Gain of the service's force gate, 0 to 1; 0: no force gate.
+    /// Gain of the service's force gate, 0 to 1.
     pub force_gate: f64,
     /// Timeout of a reply from the service; a missing reply is a fault.
     pub timeout: Duration,

@@ -20,7 +20,7 @@ pub enum SessionError {
     #[error("the service sent an incomplete state; restart the service")]
     Unfinished,
     /// A message above the limit of the plugin; its length, bytes.
-    #[error("the service sent a message of {0} bytes, too long for a device state; {UPDATE}")]
+    #[error("the service sent a message of {0} bytes, more than this plugin accepts; {UPDATE}")]
     TooLong(u64),
     /// A malformed, fragmented or masked WebSocket frame.
     #[error("the service sent a malformed WebSocket frame; {UPDATE}")]
@@ -29,7 +29,7 @@ pub enum SessionError {
     #[error("the service sent a malformed device state; {UPDATE}")]
     NoState,
     /// A field of the state is missing.
-    #[error("the device state has no `{0}`; {UPDATE}")]
+    #[error("the device state has no valid `{0}`; {UPDATE}")]
     Missing(&'static str),
     /// A field of the state is infinite.
     #[error("`{0}` of the device state is not a finite number; {UPDATE}")]

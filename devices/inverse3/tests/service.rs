@@ -1,7 +1,7 @@
 //! Plugin with a faulty service, called through the device contract as by a host.
 
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Axes, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, UsbAccess, Wrench};
+use flotor_loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use stand_in::{ARM, GRIP, OTHER_ARM, Said, StandIn, configured, frame, state};
 use std::time::{Duration, Instant};
 
@@ -319,7 +319,7 @@ fn messages_of_another_version_are_told_with_the_version_that_is_needed() {
     );
     // Its states have another name for a field.
     let told = state(HELD_M, DVec3::ZERO).replace("cursor_velocity", "velocity");
-    refused_with(&answering(2, told), &[], &["the device state has no `cursor_velocity`", UPDATE]);
+    refused_with(&answering(2, told), &[], &["the device state has no valid `cursor_velocity`", UPDATE]);
 }
 
 #[test]

@@ -22,7 +22,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0,
         "Protocol of the controller: flotor (on every transport), or the ML API 1.5b of the Maglev 200 (tcp)",
     ),
-    Parameter::choice("transport", TRANSPORTS, 0, "Transport to the controller"),
+    Parameter::choice("transport", TRANSPORTS, 0, "Transport (usb and hid: if built with these features)"),
     Parameter::text(
         "address",
         "Address: host:port (tcp; default 127.0.0.1:5679, with ml-api 127.0.0.1:5678), a port such as /dev/ttyACM0 or COM3 \

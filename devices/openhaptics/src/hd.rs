@@ -4,7 +4,7 @@ use crate::ffi::{
     ANGULAR_VELOCITY, FORCE, Functions, LAST_FORCE, LAST_TORQUE, MAX_FORCE, MAX_STIFFNESS, MAX_TORQUE,
     TORQUE, TRANSFORM, USABLE_WORKSPACE, VELOCITY, name_of,
 };
-use flotor_hal::{Conditions, DMat3, DQuat, DVec3, Fault, Pose, Refusal, Twist, Wrench};
+use flotor_hal::{Conditions, DMat3, DQuat, DVec3, Fault, GripKind, GripState, Pose, Refusal, Twist, Wrench};
 use flotor_vendor_sdk::{DropInPolicy, Library, LibraryProblem, Sample, Sdk, without_signals};
 use std::ffi::{c_int, c_uint};
 
@@ -233,6 +233,7 @@ impl Hd {
             pose: pose(&transform, self.facts.centre_m),
             twist: Twist::new(velocity, angular),
             delivered: Wrench::new(force_n, torque_nm),
+            grip: GripState::new(GripKind::Linear, 0.0, 0.0), // none
             buttons,
             conditions: Conditions::NONE,
         })

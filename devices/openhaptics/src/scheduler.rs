@@ -58,9 +58,9 @@ impl DeviceClient {
             self.force = Force::On;
         }
         self.exchange.publish(&sample);
-        let wrench = self.exchange.next_wrench(&mut self.cursor);
-        self.hd.finish(&wrench)?;
-        self.exchange.note_sent(&wrench);
+        let command = self.exchange.next_command(&mut self.cursor);
+        self.hd.finish(&command.wrench)?;
+        self.exchange.note_sent(&command);
         Ok(())
     }
 

@@ -27,7 +27,7 @@ use crate::plant::Wrench;
 use crate::validation::{Domain, InvalidParameter, number};
 use coils::{COILS, CoilGeometry, Coils, Currents};
 use field::FieldError;
-use flotor_hal::Fault;
+use flotor_hal::{Fault, restorable};
 use thermal::{Thermal, ThermalParameters};
 
 /// Parameters of coils, amplifiers and field.
@@ -73,6 +73,8 @@ pub struct Actuation {
     currents_a: Currents,
     is_saturated: bool,
 }
+
+restorable!(Actuation { thermal, currents_a, is_saturated } without { coils, lag, field });
 
 impl Actuation {
     /// Creates cold coils without current. Real-time: bounded, no allocation.

@@ -6,7 +6,7 @@
 
 use crate::noise::{Noise, Stream};
 use crate::validation::{Domain, InvalidParameter, number};
-use flotor_hal::math;
+use flotor_hal::{math, restorable};
 
 /// Kind of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,6 +53,8 @@ pub struct Faults {
     /// End of the current random episode, ns.
     until_ns: u64,
 }
+
+restorable!(Faults { noise, until_ns } without { plan });
 
 impl Faults {
     /// Creates the schedule of a run. Real-time: bounded, no allocation.

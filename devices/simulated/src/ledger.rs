@@ -11,6 +11,7 @@
 //! an imbalance is an error of the integration, not of the bookkeeping. The host compares the imbalance with the peak
 //! of the mechanical energy, and so detects every closed loop that gains energy without a source.
 
+use flotor_hal::restorable;
 use std::ops::AddAssign;
 
 /// Mechanical energy of the flotor (without the mass of a gripping hand).
@@ -22,6 +23,8 @@ pub struct MechanicalEnergy {
     /// Energy of gravity, J; zero at home (origin of the device frame, upright).
     pub potential_j: f64,
 }
+
+restorable!(MechanicalEnergy { kinetic_j, potential_j });
 
 impl MechanicalEnergy {
     /// Returns kinetic plus potential energy, J. Real-time: bounded, no allocation.
@@ -44,6 +47,8 @@ pub struct Work {
     /// Energy dissipated by eddy-current drag, J; never negative but for rounding.
     pub dissipated_j: f64,
 }
+
+restorable!(Work { coils_j, feed_forward_j, hand_j, dissipated_j });
 
 impl Work {
     /// Returns the net work on the flotor, J: work of coils, feed-forward and hand, less the dissipated energy. Real-time:
@@ -81,6 +86,8 @@ pub struct Ledger {
     work: Work,
     peak_j: f64,
 }
+
+restorable!(Ledger { start, now, work, peak_j });
 
 impl Ledger {
     /// Creates an energy balance that starts at the given mechanical energy. Real-time: bounded, no allocation.

@@ -9,6 +9,7 @@
 //!
 //! - [`plant`]: the flotor, a rigid body with six degrees of freedom.
 //! - [`hand`]: impedance and intended motion of the hand.
+//! - `fingers`: the grip between the fingers of the hand, if there is one.
 //! - [`ledger`]: energy balance.
 //! - [`workspace`]: range of motion and force limits.
 //! - [`simulation`]: flotor, hand and energy balance on one clock.
@@ -16,6 +17,7 @@
 
 pub mod actuation;
 pub mod faults;
+mod fingers;
 pub mod hand;
 mod lag;
 pub mod ledger;

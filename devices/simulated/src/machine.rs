@@ -14,7 +14,8 @@ use crate::simulation::Simulation;
 use crate::validation::InvalidParameter;
 use crate::workspace::SensorRange;
 use flotor_hal::{
-    Conditions, Cycle, DeviceState, Fault, Tick, Twist, orientation_from_rotation_vector, rotation_vector,
+    Conditions, Cycle, DeviceState, Fault, Tick, Twist, orientation_from_rotation_vector, restorable,
+    rotation_vector,
 };
 
 /// Parameters of the simulated actuators and sensors of a maglev device, with an optional injected fault.
@@ -52,6 +53,8 @@ pub struct Machine {
     /// Value of the stuck coordinate, m or rad; `None` while no axis is stuck.
     stuck_at: Option<f64>,
 }
+
+restorable!(Machine { actuation, sensing, faults, stuck_at });
 
 impl Machine {
     /// Creates a machine with coils at ambient temperature and the flotor in the state `start`. Real-time: bounded, no

@@ -3,7 +3,7 @@
 //! The generator is PCG (O'Neill 2014), fixed here so that an update of a library cannot change a run. Every source of
 //! noise has its own stream: switching a source on or off does not change the others.
 
-use flotor_hal::math;
+use flotor_hal::{Restorable, StateBytes, math};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::f64::consts::TAU;
@@ -23,6 +23,14 @@ pub(crate) enum Stream {
 #[derive(Clone, Debug)]
 pub(crate) struct Noise {
     generator: Pcg64Mcg,
+}
+
+impl Restorable for Noise {
+    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
+        let mut state = self.generator.state();
+        state.pass(bytes);
+        self.generator = Pcg64Mcg::new(state);
+    }
 }
 
 impl Noise {

@@ -8,6 +8,7 @@ use machine::has_machine;
 pub(crate) use machine::machine;
 pub(crate) use schema::SCHEMA;
 
+use crate::fingers::FingerParameters;
 use crate::hand::{Grip, Hand, Impedance, Pose, Recording, Script, Trajectory, Unsteadiness};
 use crate::plant::{FeedForward, FlotorParameters, State};
 use crate::simulation::Setup;
@@ -16,23 +17,35 @@ use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{Refusal, Settings};
 use std::path::Path;
 
-/// Prefix of the documentation of parameters used only by preset `full`.
+/// Prefixes of the documentation of parameters used only by preset `full`, and only with a grip.
 const OF_FULL: &str = "Full:";
+const OF_FINGERS: &str = "Fingers:";
 
-/// Rejects parameters of preset `full` under preset `plain`, where they have no effect.
+/// Rejects parameters without an effect: those of preset `full` under preset `plain`, and those of fingers without a grip.
 ///
 /// # Errors
-/// If such a parameter is set; the error contains its name and the preset that uses it.
+/// If such a parameter is set; the error contains its name and the parameter that makes it effective.
 pub(crate) fn refuse_idle(settings: &Settings<'_>) -> Result<(), Refusal> {
-    if has_machine(settings) {
-        return Ok(());
+    let groups = [
+        (
+            OF_FULL,
+            has_machine(settings),
+            "has no effect in preset `plain`, which omits coils, sensors and faults; set `preset` to `full` as well",
+        ),
+        (
+            OF_FINGERS,
+            FingerParameters::of(settings).is_some(),
+            "has no effect without a grip; set `fingers` to `on` as well",
+        ),
+    ];
+    for (prefix, _, why) in groups.iter().filter(|(_, is_used, _)| !is_used) {
+        let is_idle =
+            |id: &str| SCHEMA.iter().any(|known| known.id() == id && known.doc().starts_with(prefix));
+        if let Some(id) = settings.ids().find(|id| is_idle(id)) {
+            return Err(Refusal::parameter(format!("`{id}` {why}")));
+        }
     }
-    let is_idle = |id: &str| SCHEMA.iter().any(|known| known.id() == id && known.doc().starts_with(OF_FULL));
-    settings.ids().find(|id| is_idle(id)).map_or(Ok(()), |id| {
-        Err(Refusal::parameter(format!(
-            "`{id}` has no effect in preset `plain`, which omits coils, sensors and faults; set `preset` to `full` as well"
-        )))
-    })
+    Ok(())
 }
 
 /// Converts a set of values to a setup; tick length and seed are set at activation. Not real-time.

@@ -43,6 +43,7 @@ use crate::ledger::{MechanicalEnergy, Work};
 use crate::validation::InvalidParameter;
 use body::Body;
 use flotor_hal::glam::BVec3;
+use flotor_hal::restorable;
 use motion::Motion;
 use scheme::Scheme;
 
@@ -67,6 +68,8 @@ pub struct Plant {
     /// One entry per set of axes along which the hand may yield.
     held: Vec<Held>,
 }
+
+restorable!(Plant { motion } without { free, held });
 
 /// The flotor in a hand without stiffness along some axes.
 #[derive(Clone, Debug)]

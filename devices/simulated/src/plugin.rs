@@ -1,5 +1,6 @@
 //! The simulation as a device plugin.
 
+use crate::fingers::{self, FingerParameters, Fingers};
 use crate::machine::{Machine, MachineParameters};
 use crate::parameters::{SCHEMA, in_force, live, machine, refuse_idle, setup};
 use crate::plant::Wrench;
@@ -11,10 +12,11 @@ use crate::workspace::{
     TRANSLATION_RANGE_M,
 };
 use flotor_hal::{
-    ActiveDevice, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, Damper, Device, DeviceInfo,
-    DeviceState, EnergyLedger, EnergyLedgerDevice, Fault, IndependentStop, IndependentStopDevice, LoopConfig,
-    PacingDevice, Parameter, Pose, Refusal, SafeStop, SampleWait, SampledLoop, SetParameterError, Settings,
-    StopFlag, StoppedState, Tick, Twist, VerticalCalibration, export_device,
+    ActiveDevice, ActiveGrip, Axes, CalibrationDevice, Capabilities, Conditions, Cycle, Damper, Device,
+    DeviceInfo, DeviceState, EnergyLedger, EnergyLedgerDevice, Fault, GripAxis, GripDevice, GripState,
+    IndependentStop, IndependentStopDevice, LoopConfig, PacingDevice, Parameter, Pose, Refusal, Restorable,
+    SafeStop, SampleWait, SampledLoop, SetParameterError, Settings, StateBytes, StopFlag, StoppedState, Tick,
+    Twist, VerticalCalibration, export_device,
 };
 use std::time::Duration;
 
@@ -23,6 +25,8 @@ pub struct SimulatedFlotor {
     setup: Setup,
     /// Actuators and sensors between controller and flotor; `None` with preset `plain`.
     machine: Option<MachineParameters>,
+    /// `None` for a hand without a grip.
+    fingers: Option<FingerParameters>,
     /// Values of all parameters, set or default, in the order of the schema.
     values: Vec<f64>,
     /// Correction of the vertical force; no correction until measured.
@@ -34,6 +38,7 @@ pub struct SimulatedFlotor {
 pub struct RunningFlotor {
     simulation: Simulation,
     machine: Option<Box<Machine>>,
+    fingers: Option<Fingers>,
     opened: SimulatedFlotor,
     /// Clock of the samples, for a loop paced by the device.
     samples: SampleClock,
@@ -43,6 +48,19 @@ pub struct RunningFlotor {
     is_limited: bool,
     /// Height of the latest sample, m, for the correction of the vertical force.
     height_m: f64,
+}
+
+/// All but the stop, the clock of the samples, and the settings of the opened phase.
+impl Restorable for RunningFlotor {
+    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
+        let Self { simulation, machine, fingers, opened: _, samples: _, held, is_limited, height_m } = self;
+        simulation.pass(bytes);
+        machine.iter_mut().for_each(|machine| machine.pass(bytes));
+        fingers.iter_mut().for_each(|fingers| fingers.pass(bytes));
+        held.pass(bytes);
+        is_limited.pass(bytes);
+        height_m.pass(bytes);
+    }
 }
 
 /// Maximum slew rate of the force, N/s: full scale in a millisecond. An estimate; no value is published.
@@ -69,6 +87,7 @@ impl Device for SimulatedFlotor {
         let opened = Self {
             setup: setup(settings)?,
             machine: machine(settings),
+            fingers: FingerParameters::of(settings),
             values: settings.values(),
             calibration: VerticalCalibration::NONE,
             stop: StopFlag::default(),
@@ -115,6 +134,7 @@ impl Device for SimulatedFlotor {
                 Ok(RunningFlotor {
                     simulation,
                     machine,
+                    fingers: self.fingers.map(Fingers::new),
                     opened: self,
                     samples,
                     held: Wrench::ZERO,
@@ -172,6 +192,9 @@ impl ActiveDevice for RunningFlotor {
 
     /// Moves the flotor under the wrench of the last write and takes a sample.
     fn read(&mut self, tick: &Tick, state: &mut DeviceState) -> Cycle {
+        if let Some(fingers) = &mut self.fingers {
+            fingers.advance(tick.dt_ns, self.opened.stop.is_set());
+        }
         let coils = if self.opened.stop.is_set() { &Wrench::ZERO } else { &self.held };
         if let Some(machine) = &mut self.machine {
             let cycle = machine.cycle(&mut self.simulation, tick, coils, state);
@@ -245,6 +268,26 @@ impl EnergyLedgerDevice for RunningFlotor {
     }
 }
 
+impl GripDevice for SimulatedFlotor {
+    fn grip_axis(&self) -> Option<GripAxis> {
+        self.fingers.map(|_| fingers::AXIS)
+    }
+}
+
+impl ActiveGrip for RunningFlotor {
+    fn read_grip(&mut self, state: &mut GripState) {
+        if let Some(fingers) = &self.fingers {
+            *state = fingers.state();
+        }
+    }
+
+    fn write_grip(&mut self, effort: f64) {
+        if let Some(fingers) = &mut self.fingers {
+            fingers.hold(effort);
+        }
+    }
+}
+
 impl IndependentStopDevice for SimulatedFlotor {
     /// Returns a stop to zero force without delay: the simulation is part of the host's process and ends with it.
     fn independent_stop(&self) -> IndependentStop {
@@ -252,4 +295,4 @@ impl IndependentStopDevice for SimulatedFlotor {
     }
 }
 
-export_device!(SimulatedFlotor, calibration, pacing, energy_ledger, independent_stop);
+export_device!(SimulatedFlotor, calibration, pacing, energy_ledger, independent_stop, grip, snapshot);

@@ -18,6 +18,7 @@ use crate::noise::{Noise, Stream};
 use crate::plant::State;
 use crate::validation::{Check, Domain, InvalidParameter, number};
 use flotor_hal::glam::DVec3;
+use flotor_hal::restorable;
 use optics::{Optics, OpticsGeometry, Spots};
 use velocity::{Estimator, EstimatorKind, Velocity};
 
@@ -78,6 +79,8 @@ pub struct Sample {
     pub velocity: Velocity,
 }
 
+restorable!(Sample { taken_ns, pose, velocity });
+
 /// Sensor model of a running device: cells, converters, pose solver, velocity estimator, delay.
 #[derive(Clone, Debug)]
 pub struct Sensing {
@@ -94,6 +97,10 @@ pub struct Sensing {
     samples: [Sample; KEPT_SAMPLES],
     newest: usize,
 }
+
+restorable!(Sensing { noise, estimator, found, slow_spots, samples, newest } without {
+    parameters, optics, bandwidth
+});
 
 impl Sensing {
     /// Creates the sensors; `start` is the initial guess of the pose solver and, with zero velocity, the value of all samples

@@ -14,6 +14,7 @@ use crate::units::seconds;
 use crate::validation::InvalidParameter;
 use crate::workspace::SensorRange;
 use flotor_hal::glam::DVec3;
+use flotor_hal::restorable;
 
 /// Longest time simulated by one call of [`Simulation::advance`], ns: ten ticks of the slowest loop (100 Hz). Bounds
 /// the computing time of a tick after a delay of the host.
@@ -78,6 +79,8 @@ pub struct Simulation {
     guidance: Guidance,
     stroke: Stroke,
 }
+
+restorable!(Simulation { plant, ledger, time_ns, guidance, stroke } without { setup, wavering });
 
 impl Simulation {
     /// Creates a simulation at time 0. Not real-time.
@@ -263,6 +266,8 @@ struct Stroke {
     /// Aim of the trajectory at the end, without the guide.
     scripted: Option<Aim>,
 }
+
+restorable!(Stroke { start_ns, end_ns, start, end, is_guided, scripted });
 
 impl Stroke {
     /// Returns the stroke that contains the time `time_ns`.

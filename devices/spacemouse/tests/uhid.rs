@@ -3,8 +3,8 @@
 //! Needs write permission for /dev/uhid: `.ci/vm` runs the test in a virtual machine with this permission.
 
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick};
+use flotor_loader::Plugin;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::time::{Duration, Instant};

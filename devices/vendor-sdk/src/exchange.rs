@@ -4,7 +4,7 @@
 //! [`Exchange::stop`] only zero is sent; a missing sample is stale, then a fault.
 
 use crate::latest::Latest;
-use flotor_hal::{Conditions, DeviceState, Fault, Pose, Twist, Wrench};
+use flotor_hal::{Conditions, DeviceState, Fault, GripKind, GripState, Pose, Twist, Wrench};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -19,8 +19,10 @@ const SLICE: Duration = Duration::from_millis(1);
 const STOP_WITHIN: Duration = Duration::from_millis(20);
 /// Poll interval of a stop.
 const LOOK: Duration = Duration::from_micros(100);
-/// Words of a sample: pose 7, twist 6, delivered wrench 6, buttons, conditions.
-const SAMPLE_WORDS: usize = 21;
+/// Words of a sample: pose 7, twist 6, delivered wrench 6, grip 3, buttons, conditions.
+const SAMPLE_WORDS: usize = 24;
+/// Words of a command: wrench 6, effort.
+const COMMAND_WORDS: usize = 7;
 /// Conditions of a sample, in the order of their bits in the word.
 const CONDITIONS: [Conditions; 3] = [Conditions::SATURATED, Conditions::EXCESS_FORCE, Conditions::NOISY];
 
@@ -42,18 +44,34 @@ pub struct Sample {
     pub twist: Twist,
     /// Wrench delivered according to the device, N and N·m.
     pub delivered: Wrench,
+    /// Grip, m and N; any sample of a device without one.
+    pub grip: GripState,
     /// Buttons, one bit each.
     pub buttons: u32,
     /// Conditions of the device.
     pub conditions: Conditions,
 }
 
-/// Exchange of samples and wrenches, with stop and fault. In real pace the loop reads and writes without a lock.
+/// Command of one cycle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Command {
+    /// Wrench on the hand, N and N·m.
+    pub wrench: Wrench,
+    /// Effort at the grip, N; 0 for a device without one.
+    pub effort: f64,
+}
+
+impl Command {
+    /// No wrench and no effort.
+    pub const ZERO: Self = Self { wrench: Wrench::ZERO, effort: 0.0 };
+}
+
+/// Exchange of samples and commands, with stop and fault. In real pace the loop reads and writes without a lock.
 #[derive(Debug)]
 pub struct Exchange {
     pace: Pace,
     sample: Latest<SAMPLE_WORDS>,
-    command: Latest<6>,
+    command: Latest<COMMAND_WORDS>,
     /// Code of a [`Fault`]; 0: none.
     fault: AtomicU32,
     is_stopped: AtomicBool,
@@ -67,12 +85,12 @@ pub struct Exchange {
     changed: Condvar,
 }
 
-/// Newest wrench of the loop, as seen by the thread of an SDK.
+/// Newest command of the loop, as seen by the thread of an SDK.
 #[derive(Debug)]
 pub struct CommandCursor {
     seen: u64,
     renewed: Instant,
-    wrench: Wrench,
+    command: Command,
 }
 
 impl Exchange {
@@ -98,11 +116,12 @@ impl Exchange {
     /// Publishes a new sample. Called by the thread of the SDK.
     pub fn publish(&self, sample: &Sample) {
         let mut words = [0; SAMPLE_WORDS];
-        let Sample { pose, twist, delivered, buttons, conditions } = sample;
+        let Sample { pose, twist, delivered, grip, buttons, conditions } = sample;
         let numbers = pose.position_m.iter().chain(&pose.orientation_xyzw);
         let numbers = numbers.chain(&twist.linear_m_per_s).chain(&twist.angular_rad_per_s);
-        let numbers =
-            numbers.chain(&delivered.force_n).chain(&delivered.torque_nm).map(|number| number.to_bits());
+        let grip = [grip.opening, grip.velocity, grip.delivered];
+        let numbers = numbers.chain(&delivered.force_n).chain(&delivered.torque_nm).chain(&grip);
+        let numbers = numbers.map(|number| number.to_bits());
         let numbers = numbers.chain([u64::from(*buttons), word_of(*conditions)]);
         words.iter_mut().zip(numbers).for_each(|(place, word)| *place = word);
         self.sample.put(&words);
@@ -115,27 +134,28 @@ impl Exchange {
         self.tell();
     }
 
-    /// Returns the wrench to send and marks it as pending until [`Self::note_sent`]. The wrench is the newest of the loop, or zero
-    /// after [`Self::stop`] or [`Self::end`], and, in real pace, if the loop has not renewed the wrench within [`VALID`]. In
+    /// Returns the command to send and marks it as pending until [`Self::note_sent`]. The command is the newest of the loop, or zero
+    /// after [`Self::stop`] or [`Self::end`], and, in real pace, if the loop has not renewed the command within [`VALID`]. In
     /// lockstep, waits for the loop, a second at most. Called by the thread of the SDK.
-    pub fn next_wrench(&self, cursor: &mut CommandCursor) -> Wrench {
+    pub fn next_command(&self, cursor: &mut CommandCursor) -> Command {
         if self.pace == Pace::Lockstep {
             self.wait_for_command(cursor.seen);
         }
         if let Some((count, words)) = self.command.get()
             && count != cursor.seen
         {
-            let [x, y, z, rx, ry, rz] = words.map(f64::from_bits);
-            cursor.wrench = Wrench { force_n: [x, y, z], torque_nm: [rx, ry, rz] };
+            let [x, y, z, rx, ry, rz, effort] = words.map(f64::from_bits);
+            cursor.command =
+                Command { wrench: Wrench { force_n: [x, y, z], torque_nm: [rx, ry, rz] }, effort };
             (cursor.seen, cursor.renewed) = (count, Instant::now());
         }
         let is_expired = self.pace == Pace::Real && cursor.renewed.elapsed() > VALID;
         // Either the stopping thread sees pending force, or this thread sees the stop: one of both is certain.
         self.is_quiet.store(false, Ordering::SeqCst);
         if is_expired || self.is_over() || self.is_stopped.load(Ordering::SeqCst) {
-            return Wrench::ZERO;
+            return Command::ZERO;
         }
-        cursor.wrench
+        cursor.command
     }
 
     fn wait_for_command(&self, seen: u64) {
@@ -147,9 +167,9 @@ impl Exchange {
         }
     }
 
-    /// Records that `wrench` was sent; zero ends the wait in [`Self::stop`]. Called by the thread of the SDK.
-    pub fn note_sent(&self, wrench: &Wrench) {
-        self.is_quiet.store(*wrench == Wrench::ZERO, Ordering::SeqCst);
+    /// Records that `command` was sent; zero ends the wait in [`Self::stop`]. Called by the thread of the SDK.
+    pub fn note_sent(&self, command: &Command) {
+        self.is_quiet.store(*command == Command::ZERO, Ordering::SeqCst);
     }
 
     /// Records that the thread of the SDK sends no more wrenches and the force is disabled, which ends the wait in
@@ -170,12 +190,12 @@ impl Exchange {
     /// Not real-time.
     #[must_use]
     pub fn begin(&self) -> CommandCursor {
-        self.command.put(&[0; 6]);
+        self.command.put(&[0; COMMAND_WORDS]);
         self.begun_at.store(self.samples(), Ordering::Release);
         self.fault.store(0, Ordering::Release);
         self.is_stopped.store(false, Ordering::SeqCst);
         self.is_over.store(false, Ordering::Release);
-        CommandCursor { seen: self.command.count(), renewed: Instant::now(), wrench: Wrench::ZERO }
+        CommandCursor { seen: self.command.count(), renewed: Instant::now(), command: Command::ZERO }
     }
 
     /// Requests the end of the SDK's thread.
@@ -215,12 +235,13 @@ impl Exchange {
         Fault::from_code(self.fault.load(Ordering::Acquire))
     }
 
-    /// Returns the newest sample and the number of samples so far; `None` before the first sample, or if a writer was
+    /// Returns the number of samples so far, the newest sample and its grip; `None` before the first sample, or if a writer was
     /// suspended while writing.
-    pub(crate) fn newest(&self) -> Option<(u64, DeviceState)> {
+    pub(crate) fn newest(&self) -> Option<(u64, DeviceState, GripState)> {
         let (count, words) = self.sample.get()?;
         let numbers = words.map(f64::from_bits);
-        let [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, fx, fy, fz, tx, ty, tz, ..] = numbers;
+        let [x, y, z, qx, qy, qz, qw, vx, vy, vz, wx, wy, wz, fx, fy, fz, tx, ty, tz, g, vg, fg, ..] =
+            numbers;
         let [.., buttons, conditions] = words;
         let state = DeviceState {
             pose: Pose { position_m: [x, y, z], orientation_xyzw: [qx, qy, qz, qw] },
@@ -230,13 +251,14 @@ impl Exchange {
             buttons: u32::try_from(buttons).unwrap_or(0),
             conditions: conditions_of(conditions),
         };
-        (count > 0).then_some((count, state))
+        let grip = GripState::new(GripKind::Linear, g, vg).with_delivered(fg);
+        (count > 0).then_some((count, state, grip))
     }
 
-    /// Publishes the wrench of the loop.
-    pub(crate) fn command(&self, wrench: &Wrench) {
+    /// Publishes the command of the loop.
+    pub(crate) fn command(&self, Command { wrench, effort }: &Command) {
         let ([x, y, z], [rx, ry, rz]) = (wrench.force_n, wrench.torque_nm);
-        self.command.put(&[x, y, z, rx, ry, rz].map(f64::to_bits));
+        self.command.put(&[x, y, z, rx, ry, rz, *effort].map(f64::to_bits));
         if self.pace == Pace::Lockstep {
             self.tell();
         }
@@ -290,19 +312,20 @@ mod tests {
     use super::*;
     use flotor_hal::DVec3;
 
-    const PUSH: Wrench = Wrench { force_n: [1.0, 2.0, 3.0], torque_nm: [0.1, 0.2, 0.3] };
+    const PUSH: Command =
+        Command { wrench: Wrench { force_n: [1.0, 2.0, 3.0], torque_nm: [0.1, 0.2, 0.3] }, effort: -0.4 };
 
     #[test]
     fn a_wrench_arrives_and_expires() {
         let exchange = Exchange::new(Pace::Real);
         let mut cursor = exchange.begin();
-        assert_eq!(exchange.next_wrench(&mut cursor), Wrench::ZERO);
+        assert_eq!(exchange.next_command(&mut cursor), Command::ZERO);
         exchange.command(&PUSH);
-        assert_eq!(exchange.next_wrench(&mut cursor), PUSH);
+        assert_eq!(exchange.next_command(&mut cursor), PUSH);
         std::thread::sleep(VALID * 2);
-        assert_eq!(exchange.next_wrench(&mut cursor), Wrench::ZERO, "the loop is gone");
+        assert_eq!(exchange.next_command(&mut cursor), Command::ZERO, "the loop is gone");
         exchange.command(&PUSH);
-        assert_eq!(exchange.next_wrench(&mut cursor), PUSH, "and back");
+        assert_eq!(exchange.next_command(&mut cursor), PUSH, "and back");
     }
 
     /// Only saturation arrived.
@@ -311,9 +334,10 @@ mod tests {
         let exchange = Exchange::new(Pace::Real);
         let sets = [Conditions::NONE, CONDITIONS[0].with(CONDITIONS[1]).with(CONDITIONS[2])];
         for conditions in CONDITIONS.into_iter().chain(sets) {
-            let (pose, wrench) = (Pose::HOME, Wrench::ZERO);
-            exchange.publish(&Sample { pose, twist: Twist::ZERO, delivered: wrench, buttons: 0, conditions });
-            assert_eq!(exchange.newest().map(|(_, state)| state.conditions), Some(conditions));
+            let (pose, twist, delivered) = (Pose::HOME, Twist::ZERO, Wrench::ZERO);
+            let grip = GripState::new(GripKind::Linear, 0.0, 0.0);
+            exchange.publish(&Sample { pose, twist, delivered, grip, buttons: 0, conditions });
+            assert_eq!(exchange.newest().map(|(_, state, _)| state.conditions), Some(conditions));
         }
     }
 
@@ -321,20 +345,20 @@ mod tests {
     fn after_a_stop_nothing_but_zero_is_sent_whoever_comes_first() {
         for round in 0..200_u64 {
             let exchange = Exchange::new(Pace::Real);
-            let (sent, mut cursor) = (Mutex::new(Wrench::ZERO), exchange.begin());
+            let (sent, mut cursor) = (Mutex::new(Command::ZERO), exchange.begin());
             let (exchange, sent) = (&exchange, &sent);
             std::thread::scope(|scope| {
                 scope.spawn(move || {
                     while !exchange.is_over() {
-                        let wrench = exchange.next_wrench(&mut cursor);
-                        *sent.lock().expect("nobody panics") = wrench;
-                        exchange.note_sent(&wrench);
+                        let command = exchange.next_command(&mut cursor);
+                        *sent.lock().expect("nobody panics") = command;
+                        exchange.note_sent(&command);
                     }
                 });
                 exchange.command(&PUSH);
                 (0..round % 50).for_each(|_| std::hint::spin_loop());
                 exchange.stop();
-                assert_eq!(*sent.lock().expect("nobody panics"), Wrench::ZERO, "round {round}");
+                assert_eq!(*sent.lock().expect("nobody panics"), Command::ZERO, "round {round}");
                 exchange.end();
             });
         }
@@ -353,20 +377,24 @@ mod tests {
                         pose: Pose::new(DVec3::X * f64::from(cycle), flotor_hal::DQuat::IDENTITY),
                         twist: Twist::ZERO,
                         delivered: Wrench::ZERO,
+                        grip: GripState::new(GripKind::Linear, f64::from(cycle), 0.5),
                         buttons: cycle,
                         conditions: Conditions::NONE,
                     });
-                    let wrench = exchange.next_wrench(&mut cursor);
-                    assert_eq!(wrench.force_n[0], f64::from(cycle) * 2.0);
+                    let command = exchange.next_command(&mut cursor);
+                    assert_eq!(command.wrench.force_n[0], f64::from(cycle) * 2.0);
+                    assert_eq!(command.effort, f64::from(cycle) * 3.0);
                 }
             });
             let mut seen = 0;
             for cycle in 1..=CYCLES {
                 exchange.wait_for_sample(seen, PATIENCE);
-                let (count, state) = exchange.newest().expect("it was published");
+                let (count, state, grip) = exchange.newest().expect("it was published");
                 assert_eq!((count, state.buttons), (u64::from(cycle), cycle));
                 seen = count;
-                exchange.command(&Wrench::from_force(DVec3::X * state.pose.position_m[0] * 2.0));
+                assert_eq!(grip, GripState::new(GripKind::Linear, f64::from(cycle), 0.5));
+                let wrench = Wrench::from_force(DVec3::X * state.pose.position_m[0] * 2.0);
+                exchange.command(&Command { wrench, effort: grip.opening * 3.0 });
             }
         });
     }

@@ -23,7 +23,7 @@ mod platform;
 mod problem;
 mod search;
 
-pub use exchange::{CommandCursor, Exchange, Pace, Sample, VALID};
+pub use exchange::{Command, CommandCursor, Exchange, Pace, Sample, VALID};
 pub use library::{DropInPolicy, Library, static_text};
 pub use loop_end::{LoopEnd, StopSwitch};
 pub use platform::without_signals;

@@ -101,5 +101,6 @@ fn not_found(sdk: &str, searched: &[PathBuf]) -> String {
     };
     let folders = named(|place| place.parent().map(Path::as_os_str));
     let files = named(|place| place.file_name());
-    format!("no library of {sdk} found (searched for {files} in {folders}); {remedy}")
+    // The folders last: a message of a plugin is cut at its limit, and `PATH` may be longer.
+    format!("no library of {sdk} found; {remedy} (searched for {files} in {folders})")
 }

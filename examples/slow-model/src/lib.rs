@@ -1,7 +1,7 @@
 //! Bar of gel. Its forces come from a solver in another language and another process, too slow for the loop.
 
 use flotor_hal::{
-    DVec3, ForceModel, Input, LinearField, LinearFieldModel, ModelInfo, Output, Parameter, Refusal,
+    Contact, ContactSet, ContactSetModel, DVec3, ForceModel, Input, ModelInfo, Output, Parameter, Refusal,
     SetParameterError, Settings, StepStatus, Wrench,
 };
 use std::io::{self, BufRead, BufReader, Write};
@@ -16,9 +16,9 @@ const SOLVER: &str = include_str!("solver.py");
 const START: Duration = Duration::from_secs(5);
 /// Timeout of a reply. A process that hangs must not block the calling thread.
 const PATIENCE: Duration = Duration::from_millis(500);
-/// Largest compression passed to the solver, m. Below this depth the force is constant.
+/// Largest compression passed to the solver, m. Below this depth the stiffness is constant.
 const DEEPEST_M: f64 = 0.012;
-/// Range of validity of a field around its anchor, m: within it the slope changes by less than a tenth.
+/// Range of validity of a contact around its anchor, m: within it the stiffness changes by less than a tenth.
 const VALID_M: f64 = 0.0005;
 
 struct Gel {
@@ -61,27 +61,22 @@ impl ForceModel for Gel {
     }
 }
 
-impl LinearFieldModel for Gel {
-    fn linear_field(&mut self, input: &Input) -> LinearField {
+impl ContactSetModel for Gel {
+    /// Returns the plane whose spring has force and stiffness of the gel at this depth; above the gel, its surface.
+    fn contact_set(&mut self, input: &Input) -> ContactSet {
         let height_m = input.pose.position().z;
         if !input.pose.is_finite() {
-            return LinearField::NONE;
+            return ContactSet::NONE;
         }
-        if height_m >= 0.0 {
-            return LinearField::of_force(input, DVec3::ZERO, [DVec3::ZERO; 3], height_m);
-        }
-        match self.solve((-height_m).min(DEEPEST_M)) {
-            Some([force_n, stiffness_n_per_m]) => {
-                let stiffness_n_per_m = if -height_m < DEEPEST_M { stiffness_n_per_m } else { 0.0 };
-                let slope = [DVec3::ZERO, DVec3::ZERO, DVec3::Z * -stiffness_n_per_m];
-                LinearField::of_force(input, DVec3::Z * force_n, slope, VALID_M)
-            }
-            // NaN: the host removes the force, and its summary names this model.
-            None => LinearField { wrench: Wrench::from_force(DVec3::NAN), ..LinearField::NONE },
-        }
+        let depth_m = (-height_m).clamp(0.0, DEEPEST_M);
+        // NaN: the host refuses the contact, and its summary names this model.
+        let [force_n, stiffness_n_per_m] = self.solve(depth_m).unwrap_or([f64::NAN; 2]);
+        let gap_m = height_m + depth_m - force_n / stiffness_n_per_m;
+        let contact = Contact::of_handle(input, DVec3::Z, gap_m, stiffness_n_per_m);
+        ContactSet { valid_m: VALID_M, ..ContactSet::at(input).with(contact) }
     }
 }
-flotor_hal::export_model!(Gel, linear_field);
+flotor_hal::export_model!(Gel, contact_set);
 
 impl Gel {
     /// Returns force, N, and stiffness, N/m, at a depth. The first call starts the solver and waits for it.
@@ -165,36 +160,41 @@ mod tests {
         (0..20).map(element).sum()
     }
 
+    /// Force and stiffness of the contact with the handle where the set was computed.
+    fn felt(gel: &mut Gel, z_m: f64) -> [f64; 2] {
+        let contact = gel.contact_set(&at(z_m)).contacts[0];
+        [-contact.gap_m * contact.stiffness_n_per_m, contact.stiffness_n_per_m]
+    }
+
     #[test]
     fn the_solver_finds_the_force_of_elements_in_series() {
         let mut gel = gel();
         for z_m in [-0.0005, -0.004, -0.012] {
-            let force_n = gel.linear_field(&at(z_m)).wrench.force_n[2];
+            let [force_n, _] = felt(&mut gel, z_m);
             assert!((depth_m(force_n, 5000.0) + z_m).abs() < 1.0e-9, "{force_n} N at {z_m} m");
         }
     }
 
     #[test]
-    fn a_field_is_near_the_solver_as_far_as_it_says() {
+    fn a_contact_is_near_the_solver_as_far_as_it_says() {
         let mut gel = gel();
-        let field = gel.linear_field(&at(-0.004));
+        let [force_n, stiffness_n_per_m] = felt(&mut gel, -0.004);
         for z_m in [-0.0045, -0.0035] {
-            let (there, is_valid) = field.at(&at(z_m).pose);
-            let exact_n = gel.linear_field(&at(z_m)).wrench.force_n[2];
+            let there_n = force_n - stiffness_n_per_m * (z_m + 0.004);
+            let [exact_n, _] = felt(&mut gel, z_m);
             // The slope changes by less than a tenth, so the force is off by less than a twentieth of its change.
-            let change_n = (exact_n - field.wrench.force_n[2]).abs();
-            assert!(is_valid && (there.force_n[2] - exact_n).abs() < 0.05 * change_n, "{there:?} {exact_n}");
+            assert!((there_n - exact_n).abs() < 0.05 * (exact_n - force_n).abs(), "{there_n} {exact_n}");
         }
-        assert_eq!(gel.linear_field(&at(0.001)).wrench, Wrench::ZERO);
+        assert_eq!(gel.contact_set(&at(0.001)).contacts[0].gap_m, 0.001);
     }
 
     #[test]
     fn a_solver_that_has_died_gives_no_number() {
         let mut gel = gel();
-        let _ = gel.linear_field(&at(-0.004));
+        let _ = gel.contact_set(&at(-0.004));
         let Asking::Running(solver) = &mut gel.solver else { panic!("it was asked") };
         solver.process.kill().expect("it runs");
         solver.process.wait().expect("it ends");
-        assert!(!gel.linear_field(&at(-0.004)).is_finite());
+        assert!(gel.contact_set(&at(-0.004)).contacts[0].stiffness_n_per_m.is_nan());
     }
 }

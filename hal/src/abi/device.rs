@@ -19,7 +19,7 @@ use std::marker::PhantomData;
 #[cfg_attr(feature = "layout-proof", derive(abi_stable::StableAbi))]
 pub struct CycleCode {
     /// 0: fresh; 1: stale; 256 plus the code of a [`crate::Fault`]: fault.
-    pub(super) code: u32,
+    code: u32,
 }
 
 /// Bit of a code that marks a fault.
@@ -36,11 +36,17 @@ impl From<Cycle> for CycleCode {
     }
 }
 
-#[cfg(feature = "loader")]
 impl CycleCode {
+    /// Returns the code as the plugin wrote it.
+    #[must_use]
+    pub const fn code(self) -> u32 {
+        self.code
+    }
+
     /// Converts the code to a result; `None` for a code outside the contract.
     #[inline]
-    pub(super) const fn cycle(self) -> Option<Cycle> {
+    #[must_use]
+    pub const fn cycle(self) -> Option<Cycle> {
         match self.code {
             0 => Some(Cycle::Fresh),
             1 => Some(Cycle::Stale),

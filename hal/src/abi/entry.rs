@@ -79,6 +79,18 @@ impl CallStatus {
             _ => Self::Panicked,
         }
     }
+
+    /// Returns the name of the status in messages: `ok`, `panicked`, `wrong phase`, `out of range` or `unsupported`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Panicked => "panicked",
+            Self::WrongPhase => "wrong phase",
+            Self::OutOfRange => "out of range",
+            Self::Unsupported => "unsupported",
+        }
+    }
 }
 
 /// [`Host::flags`] bit: the plugin has its own Rust runtime and may replace its panic hook with a silent hook.
@@ -155,3 +167,56 @@ pub struct Entry {
 
 // SAFETY: an `Entry` is an immutable static; its pointers lead to immutable statics.
 unsafe impl Sync for Entry {}
+
+/// The entry as a host reads it.
+impl Entry {
+    /// Returns the entry at an address; `None` if null, misaligned, too short or without the magic.
+    ///
+    /// # Safety
+    /// `address` is null or the address of at least eight bytes that stay valid for ever. If these bytes are the magic,
+    /// they begin an entry that fulfils its contract version: the entry has the declared size, and its pointers and
+    /// functions have the declared types.
+    #[must_use]
+    pub unsafe fn at(address: *const Self) -> Option<&'static Self> {
+        if address.is_null() || !address.is_aligned() {
+            return None;
+        }
+        // SAFETY: not null, hence eight bytes at the least, as this function demands; bytes need no alignment.
+        let magic = unsafe { address.cast::<[u8; 8]>().read() };
+        if magic != MAGIC {
+            return None;
+        }
+        // SAFETY: what has the magic is an entry, as this function demands, and every one says its size behind
+        // it.
+        let size = unsafe { (&raw const (*address).size).read() };
+        if (size as usize) < size_of::<Self>() {
+            return None;
+        }
+        // SAFETY: not null, aligned and, by its own word, whole; it stays for ever, and any bits are an `Entry`.
+        Some(unsafe { &*address })
+    }
+
+    /// Returns major version, minor version and candidate number of the plugin's contract.
+    #[must_use]
+    pub const fn contract(&self) -> (u16, u16, u32) {
+        (self.abi_major, self.abi_minor, self.abi_candidate)
+    }
+
+    /// Returns the code of the plugin's kind.
+    #[must_use]
+    pub const fn kind_code(&self) -> u32 {
+        self.kind
+    }
+
+    /// Returns the function that a host calls once after loading; `None` if the plugin has none.
+    #[must_use]
+    pub const fn init(&self) -> Option<unsafe extern "C" fn(host: *const Host)> {
+        self.init
+    }
+
+    /// Returns the lookup of the function tables; `None` if the plugin has none.
+    #[must_use]
+    pub const fn get_interface(&self) -> Option<unsafe extern "C" fn(id: Str) -> *const c_void> {
+        self.get_interface
+    }
+}

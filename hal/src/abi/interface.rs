@@ -5,25 +5,25 @@ use super::Str;
 use std::ffi::c_void;
 use std::marker::PhantomData;
 
-/// A function table of the contract.
+/// A function table of the contract; implemented by this crate for each of its tables.
 ///
 /// # Safety
 /// The type is `repr(C)`, starts with a `u32`, which is its size in bytes, and is valid for any bits: the other fields
 /// are numbers, pointers, texts and functions that may be null. Plugins of this contract return a table of this type
 /// for `ID`.
-pub(crate) unsafe trait Table: Sized + 'static {
+pub unsafe trait Table: Sized + 'static {
     /// Id of the interface or extension.
     const ID: &'static str;
 }
 
 /// Implements [`Table`] for a struct and defines `offer`, which builds the table of a plugin type, for the export
-/// macros.
+/// macros. `P of Kind` has a second type, which the compiler infers from the traits of the plugin type `P`.
 macro_rules! table {
-    ($table:ident: $id:literal, $plugin:ident: [$($bound:tt)+] { $($fields:tt)+ }) => {
+    ($table:ident: $id:literal, $plugin:ident $(of $kind:ident)?: [$($bound:tt)+] { $($fields:tt)+ }) => {
         #[doc(hidden)]
         #[must_use]
         #[allow(unreachable_pub, clippy::cast_possible_truncation)] // main interfaces stay here; sizes are small
-        pub const fn offer<$plugin: $($bound)+>() -> $crate::abi::Interface<$plugin> {
+        pub const fn offer<$plugin: $($bound)+ $(, $kind)?>() -> $crate::abi::Interface<$plugin> {
             let table = const { &$table { size: size_of::<$table>() as u32, $($fields)+ } };
             $crate::abi::Interface::of(table)
         }

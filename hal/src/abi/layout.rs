@@ -38,7 +38,6 @@ impl FieldLayout {
     }
 
     /// Returns the name of the struct.
-    #[cfg(feature = "loader")]
     pub(crate) fn struct_name(&self) -> &str {
         self.name().split('.').next().unwrap_or_default()
     }

@@ -20,7 +20,6 @@ macro_rules! core {
 core!(super::text, frame, parameter, model, device, super::entry, super::model, super::device);
 
 /// Number of rows every plugin must have.
-#[cfg(feature = "loader")]
 pub(crate) const CORE_COUNT: usize = count(CORE);
 
 const COUNT: usize = count(CORE) + count(extension::LAYOUTS);

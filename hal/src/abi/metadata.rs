@@ -92,7 +92,7 @@ macro_rules! export_plugin {
             struct Offered;
             impl $crate::abi::Extensions<$plugin> for Offered {
                 const LIST: &'static [$crate::abi::Interface<$plugin>] =
-                    &[$($crate::extension::$extension::offer::<$plugin>()),*];
+                    &[$($crate::extension::$extension::offer()),*];
             }
             $crate::abi::$entry::<$plugin, Offered>()
         };

@@ -17,6 +17,7 @@
 //! This module and [`crate::extension`] are the only places of the crate with `unsafe` code.
 #![allow(unsafe_code)]
 
+mod agreement;
 mod device;
 mod entry;
 mod export;
@@ -27,11 +28,10 @@ mod layout_table;
 pub mod metadata;
 mod model;
 mod panics;
+mod schema;
 mod text;
 
-#[cfg(feature = "loader")]
-pub mod loader;
-
+pub use agreement::Proof;
 pub use device::{CycleCode, DeviceTable};
 pub(crate) use device::{DeviceAdapter, not_opened};
 pub use entry::{
@@ -39,13 +39,13 @@ pub use entry::{
     LayoutProof, MAGIC, PluginKind,
 };
 pub use export::{device_entry, device_entry_with, model_entry, model_entry_with};
-pub use interface::{Extensions, Interface};
+pub use interface::{Extensions, Interface, Table};
 pub use layout::FieldLayout;
 pub use layout_table::LAYOUTS;
 pub use model::ForceTable;
 pub(crate) use model::ModelAdapter;
+pub use schema::check_schema;
 pub use text::{Choices, MESSAGE_BYTES, Message, Str};
 
 /// The contract for C: the text of `include/flotor.h`.
-#[cfg(feature = "loader")]
 pub const C_HEADER: &str = include_str!("../../include/flotor.h");

@@ -64,7 +64,6 @@ impl Str {
     }
 }
 
-#[cfg(feature = "loader")]
 impl Str {
     /// Returns the declared length, bytes; 0 if null.
     pub(crate) const fn bytes(&self) -> usize {
@@ -118,7 +117,6 @@ impl Choices {
     }
 }
 
-#[cfg(feature = "loader")]
 impl Choices {
     /// Returns the declared number of texts; 0 if null.
     pub(crate) const fn count(&self) -> usize {
@@ -192,8 +190,8 @@ impl Message {
 
     /// Returns the text up to the first NUL byte, for a terminal: bytes that are not UTF-8 become replacement characters,
     /// control characters are escaped. Not real-time.
-    #[cfg(feature = "loader")]
-    pub(crate) fn for_people(&self) -> String {
+    #[must_use]
+    pub fn for_people(&self) -> String {
         let bytes = self.text.get(..self.len as usize).unwrap_or(&self.text);
         let bytes = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
         crate::terminal::escaped(&String::from_utf8_lossy(bytes))
@@ -242,7 +240,6 @@ mod tests {
         assert_eq!(message.as_str(), "ok");
     }
 
-    #[cfg(feature = "loader")]
     #[test]
     fn a_reason_is_told_whatever_its_bytes() {
         let mut message = Message::default();

@@ -3,8 +3,6 @@
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader::Model;
 use crate::abi::{Instance, ModelAdapter};
 use crate::{DVec3, ForceModel};
 
@@ -143,16 +141,6 @@ table!(ActiveRegionTable: "flotor.active-region/1", M: [ActiveRegionModel] {
     reserved: 0,
     region: Some(region::<M>),
 });
-
-#[cfg(feature = "loader")]
-impl Model {
-    /// Returns the active region of the instance with the current parameters; without the extension, everywhere.
-    /// Real-time: bounded, no allocation.
-    pub fn active_region(&mut self) -> ActiveRegion {
-        let ask = self.extensions.active_region.and_then(|table| table.region);
-        self.calls.query(ask, ActiveRegion::EVERYWHERE).unwrap_or(ActiveRegion::EVERYWHERE)
-    }
-}
 
 #[cfg(test)]
 mod tests {

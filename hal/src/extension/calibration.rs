@@ -7,8 +7,6 @@
 use crate::abi::instance::{fill, refusable};
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader::OpenedDevice;
 use crate::abi::{DeviceAdapter, Instance, Message, not_opened};
 use crate::{Device, Refusal};
 
@@ -248,32 +246,6 @@ table!(CalibrationTable: "flotor.calibration/1", D: [CalibrationDevice] {
     serial: Some(serial::<D>),
     calibrate_vertical: Some(calibrate_vertical::<D>),
 });
-
-#[cfg(feature = "loader")]
-impl OpenedDevice {
-    /// Returns the serial number of the hardware; empty if none or not reported.
-    #[must_use]
-    pub fn serial(&mut self) -> String {
-        let ask = self.extensions().calibration.and_then(|table| table.serial);
-        self.calls.query(ask, Message::default()).map_or(String::new(), |serial| serial.as_str().to_owned())
-    }
-
-    /// Corrects the total vertical command from the next activation on.
-    ///
-    /// # Errors
-    /// A [`Refusal`] if the device supports no calibration, or rejects this one.
-    pub fn calibrate_vertical(&mut self, calibration: &VerticalCalibration) -> Result<(), Refusal> {
-        let calibrate = self.extensions().calibration.and_then(|table| table.calibrate_vertical);
-        let Some(calibrate) = calibrate else {
-            return Err(Refusal::unsupported(
-                "this device has no calibration of the vertical force; remove \
-            `calibration` from the scene",
-            ));
-        };
-        // SAFETY: a live instance, used by this thread only (`&mut`), pointers valid for the call.
-        self.calls.refusable(|instance, message| unsafe { calibrate(instance, calibration, message) })
-    }
-}
 
 #[cfg(test)]
 mod tests {

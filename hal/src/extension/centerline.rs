@@ -7,8 +7,6 @@
 use crate::abi::instance::{call, fill};
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader::Model;
 use crate::abi::{CallStatus, Instance, ModelAdapter};
 use crate::{ForceModel, Input, Pose};
 
@@ -146,44 +144,3 @@ table!(CenterlineTable: "flotor.centerline/1", M: [CenterlineModel] {
     info: Some(info::<M>),
     centerline: Some(centerline::<M>),
 });
-
-/// Access to the centreline of a model. Not real-time.
-#[cfg(feature = "loader")]
-pub struct Centerline<'a> {
-    model: &'a mut Model,
-    table: &'static CenterlineTable,
-}
-
-#[cfg(feature = "loader")]
-impl Model {
-    /// Returns access to the model's centreline, if any. Not real-time: for observers with their own instance.
-    #[must_use]
-    pub fn centerline(&mut self) -> Option<Centerline<'_>> {
-        let table = self.extensions.centerline?;
-        Some(Centerline { model: self, table })
-    }
-}
-
-#[cfg(feature = "loader")]
-impl Centerline<'_> {
-    /// Returns the drawing style of the body; `None` if the model failed.
-    #[must_use]
-    pub fn info(&mut self) -> Option<CenterlineInfo> {
-        self.model.calls.query(self.table.info, CenterlineInfo::default())
-    }
-
-    /// Returns the centreline at an input, from the fixed end to the handle, in at most `capacity` points; `None` if
-    /// `capacity` is 0 or the model failed.
-    #[must_use]
-    pub fn points(&mut self, input: &Input, capacity: usize) -> Option<Vec<Pose>> {
-        let (ask, room) = (self.table.centerline?, u32::try_from(capacity).ok()?);
-        let (mut points, mut count) = (vec![Pose::HOME; capacity], 0);
-        // SAFETY: a live instance used by this thread only, room for `capacity` poses, pointers valid for the call.
-        let code = self
-            .model
-            .calls
-            .call(|instance| unsafe { ask(instance, input, points.as_mut_ptr(), room, &raw mut count) });
-        points.truncate(count as usize);
-        (code == CallStatus::Ok as u32).then_some(points)
-    }
-}

@@ -4,8 +4,6 @@
 use crate::Device;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader::{Plugin, static_list};
 
 /// Access path to a USB device, as a closed set. In C, a `uint32_t` with these values.
 #[repr(u32)]
@@ -129,13 +127,3 @@ table!(ConnectionTable: "flotor.connection/1", D: [ConnectionDevice] {
     usb_count: D::USB.len() as u32,
     usb: D::USB.as_ptr(),
 });
-
-#[cfg(feature = "loader")]
-impl Plugin {
-    /// Returns the USB identities of a device; empty without a declaration and for a model.
-    pub fn usb_kinds(&self) -> &'static [UsbKind] {
-        let table = self.device_extensions().and_then(|extensions| extensions.connection);
-        // SAFETY: a table's list is a static array of `usb_count` kinds of the checked layout.
-        table.map_or(&[], |table| unsafe { static_list(table.usb, table.usb_count) })
-    }
-}

@@ -3,8 +3,6 @@
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader;
 use crate::abi::{DeviceAdapter, Instance};
 use crate::{ActiveDevice, Device};
 
@@ -106,14 +104,3 @@ table!(EnergyLedgerTable: "flotor.energy-ledger/1", D: [Device<Active: EnergyLed
     reserved: 0,
     ledger: Some(ledger::<D>),
 });
-
-#[cfg(feature = "loader")]
-impl loader::ActiveDevice {
-    /// Returns the energy balance of the plant; `None` without the extension, or if the plugin failed. Real-time:
-    /// bounded, no allocation.
-    #[must_use]
-    pub fn energy_ledger(&mut self) -> Option<EnergyLedger> {
-        let ask = self.extensions()?.energy_ledger?.ledger;
-        self.calls.query(ask, EnergyLedger::default())
-    }
-}

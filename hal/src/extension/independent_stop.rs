@@ -3,15 +3,11 @@
 //! A device that holds its last command offers a handle and a message; the guard process, which runs no plugin code,
 //! stores both and writes the message when the host is gone. A device that stops by itself declares its timeout.
 
-use crate::Device;
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader::OpenedDevice;
 use crate::abi::{DeviceAdapter, Instance};
-#[cfg(feature = "loader")]
-use crate::{Refusal, extension::independent_stop::means::Independence};
+use crate::{Device, Refusal};
 
 /// Capacity of a stop message, bytes.
 pub const STOP_MESSAGE_BYTES: usize = 64;
@@ -72,6 +68,62 @@ impl IndependentStop {
     pub const fn none() -> Self {
         Self::by_itself(StoppedState::Zero, NEVER_NS)
     }
+
+    /// Checks the declaration of a plugin, all but the descriptor. Not real-time.
+    ///
+    /// # Errors
+    /// A [`Refusal`] for an unknown state, a message without a descriptor, or a message that is empty or too long.
+    pub fn means(&self) -> Result<StopMeans<'_>, Refusal> {
+        let state = match self.state {
+            0 => StoppedState::Zero,
+            1 => StoppedState::Landed,
+            other => {
+                return Err(Self::refusal(&format!("leads to state {other}, but must lead to 0 or 1")));
+            }
+        };
+        let length = self.length as usize;
+        if self.descriptor == BY_ITSELF {
+            return match (length, self.within_ns) {
+                (0, NEVER_NS) => Ok(StopMeans::None),
+                (0, within_ns) => Ok(StopMeans::Itself { within_ns, state }),
+                _ => Err(Self::refusal("has a message but no descriptor")),
+            };
+        }
+        match self.message.get(..length).filter(|message| !message.is_empty()) {
+            Some(message) => Ok(StopMeans::Message { descriptor: self.descriptor, message, state }),
+            None => Err(Self::refusal(&format!(
+                "has a message of {length} bytes, but needs 1 to {STOP_MESSAGE_BYTES}"
+            ))),
+        }
+    }
+
+    /// Builds the refusal of a declaration: "the independent stop of the device", then `problem`.
+    pub fn refusal(problem: &str) -> Refusal {
+        Refusal::broken(format!("the independent stop of the device {problem}"))
+    }
+}
+
+/// Checked content of an [`IndependentStop`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StopMeans<'a> {
+    /// No independent stop.
+    None,
+    /// Stop by a message.
+    Message {
+        /// Descriptor that takes the message, not yet checked.
+        descriptor: i32,
+        /// Message bytes, 1 to 64.
+        message: &'a [u8],
+        /// State of the stopped device.
+        state: StoppedState,
+    },
+    /// Stop by the device's own controller.
+    Itself {
+        /// Timeout without a command, ns.
+        within_ns: u64,
+        /// State of the stopped device.
+        state: StoppedState,
+    },
 }
 
 /// Device with a stop that does not depend on the host's process: a [`Device`], or a [`SimpleDevice`](crate::SimpleDevice).
@@ -138,84 +190,24 @@ table!(IndependentStopTable: "flotor.independent-stop/1", D: [Device + Independe
     independent_stop: Some(independent_stop::<D>),
 });
 
-/// Host side of the independent stop.
-#[cfg(feature = "loader")]
-pub mod means {
-    use super::{BY_ITSELF, IndependentStop, NEVER_NS, STOP_MESSAGE_BYTES, StoppedState};
-    use crate::Refusal;
-    use crate::abi::loader::platform::{Handle, writable_duplicate};
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-    /// Checked independent stop of a device.
-    #[derive(Debug)]
-    pub enum Independence {
-        /// Stop by a message on a duplicated handle.
-        Message {
-            /// Handle that receives the message.
-            handle: Handle,
-            /// Message bytes.
-            message: Vec<u8>,
-            /// State of the stopped device.
-            state: StoppedState,
-        },
-        /// Stop by the device's own controller.
-        Itself {
-            /// Timeout without a command, ns.
-            within_ns: u64,
-            /// State of the stopped device.
-            state: StoppedState,
-        },
-    }
-
-    impl Independence {
-        /// Checks a plugin's declaration and duplicates its descriptor; `None` without an independent stop.
-        pub(crate) fn of(declared: &IndependentStop) -> Result<Option<Self>, Refusal> {
-            let wrong = |what: String| Refusal::broken(format!("the independent stop of the device {what}"));
-            let state = match declared.state {
-                0 => StoppedState::Zero,
-                1 => StoppedState::Landed,
-                other => return Err(wrong(format!("leads to state {other}, but must lead to 0 or 1"))),
-            };
-            let length = declared.length as usize;
-            if declared.descriptor == BY_ITSELF {
-                return match (length, declared.within_ns) {
-                    (0, NEVER_NS) => Ok(None),
-                    (0, within_ns) => Ok(Some(Self::Itself { within_ns, state })),
-                    _ => Err(wrong("has a message but no descriptor".to_owned())),
-                };
-            }
-            let message = declared.message.get(..length).filter(|message| !message.is_empty());
-            let Some(message) = message.map(<[u8]>::to_vec) else {
-                return Err(wrong(format!(
-                    "has a message of {length} bytes, but needs 1 to {STOP_MESSAGE_BYTES}"
-                )));
-            };
-            // SAFETY: the plugin keeps the descriptor open until the device is closed (contract), and the device is
-            // open.
-            let handle = unsafe { writable_duplicate(declared.descriptor) }.map_err(wrong)?;
-            Ok(Some(Self::Message { handle, message, state }))
+    #[test]
+    fn a_declaration_outside_the_contract_is_refused() {
+        let right = IndependentStop::by_message(7, b"stop", StoppedState::Landed, 0);
+        let means = StopMeans::Message { descriptor: 7, message: b"stop", state: StoppedState::Landed };
+        assert_eq!(right.means(), Ok(means));
+        for (wrong, words) in [
+            (IndependentStop { state: 2, ..right }, "state 2"),
+            (IndependentStop { length: 65, ..right }, "has a message of 65 bytes"),
+            (IndependentStop { length: 0, ..right }, "has a message of 0 bytes"),
+            (IndependentStop { descriptor: BY_ITSELF, ..right }, "no descriptor"),
+        ] {
+            let refused = wrong.means().expect_err("it is wrong").reason;
+            assert!(refused.contains(words), "{refused}");
         }
-    }
-}
-
-#[cfg(feature = "loader")]
-impl OpenedDevice {
-    /// Returns the independent stop of the device; `None` if there is none. Not real-time.
-    ///
-    /// # Errors
-    /// A [`Refusal`] if the plugin's declaration is invalid or missing.
-    pub fn independent_stop(&mut self) -> Result<Option<Independence>, Refusal> {
-        let ask = self.extensions().independent_stop.and_then(|table| table.independent_stop);
-        if ask.is_none() {
-            return Ok(None);
-        }
-        // Invalid initial value: rejected below unless the plugin writes it.
-        let unfilled = IndependentStop::by_message(BY_ITSELF, &[0], StoppedState::Zero, 0);
-        let Some(declared) = self.calls.query(ask, unfilled) else {
-            return Err(Refusal::broken(
-                "the device plugin offers `flotor.independent-stop/1` but declares no stop; \
-            declare a stop or remove the extension",
-            ));
-        };
-        Independence::of(&declared)
+        assert_eq!(IndependentStop::none().means(), Ok(StopMeans::None));
     }
 }

@@ -7,8 +7,6 @@
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::{CallStatus, loader::Model};
 use crate::abi::{Instance, ModelAdapter};
 use crate::{DVec3, ForceModel, Input, Pose, Wrench, rotation_vector};
 
@@ -176,24 +174,6 @@ table!(LinearFieldTable: "flotor.linear-field/1", M: [LinearFieldModel] {
     reserved: 0,
     linear_field: Some(linear_field::<M>),
 });
-
-#[cfg(feature = "loader")]
-impl Model {
-    /// Returns true if the model offers a local linear field.
-    #[must_use]
-    pub fn has_linear_field(&self) -> bool {
-        self.extensions.linear_field.is_some_and(|table| table.linear_field.is_some())
-    }
-
-    /// Computes the field at an input; `field` is valid only if the result is [`CallStatus::Ok`]. Not real-time.
-    pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> CallStatus {
-        let Some(ask) = self.extensions.linear_field.and_then(|table| table.linear_field) else {
-            return CallStatus::Unsupported;
-        };
-        // SAFETY: a live instance used by this thread only (`&mut`), pointers valid for the call.
-        CallStatus::from_code(self.calls.call(|instance| unsafe { ask(instance, input, field) }))
-    }
-}
 
 #[cfg(test)]
 mod tests {

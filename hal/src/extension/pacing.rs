@@ -3,8 +3,6 @@
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader;
 use crate::abi::{CallStatus, DeviceAdapter, Instance};
 use crate::{ActiveDevice, Device};
 
@@ -117,30 +115,3 @@ table!(PacingTable: "flotor.pacing/1", D: [Device<Active: PacingDevice>] {
     reserved: 0,
     wait_for_sample: Some(wait_for_sample::<D>),
 });
-
-#[cfg(feature = "loader")]
-impl loader::OpenedDevice {
-    /// Returns true if the device can set the pace of the loop.
-    #[must_use]
-    pub fn can_pace(&self) -> bool {
-        self.extensions().pacing.is_some_and(|table| table.wait_for_sample.is_some())
-    }
-}
-
-#[cfg(feature = "loader")]
-impl loader::ActiveDevice {
-    /// Waits for the device's next sample, for `timeout_ns` at most; a failed call counts as a timeout. Real-time
-    /// except for the wait: no allocation.
-    pub fn wait_for_sample(&mut self, timeout_ns: u64) -> SampleWait {
-        let pacing = self.extensions().and_then(|extensions| extensions.pacing);
-        let Some(wait) = pacing.and_then(|table| table.wait_for_sample) else { return SampleWait::NotPaced };
-        let mut samples = 0;
-        // SAFETY: a live, active instance used by this thread only (`&mut`), an out pointer valid for the call.
-        let code = self.calls.call(|instance| unsafe { wait(instance, timeout_ns, &raw mut samples) });
-        match CallStatus::from_code(code) {
-            CallStatus::Ok if samples > 0 => SampleWait::Arrived { samples },
-            CallStatus::Unsupported => SampleWait::NotPaced,
-            _ => SampleWait::TimedOut,
-        }
-    }
-}

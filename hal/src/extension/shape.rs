@@ -7,11 +7,8 @@
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader::Model;
 use crate::abi::{Instance, ModelAdapter, Str};
 use crate::{DVec3, ForceModel, Input, Pose};
-#[cfg(feature = "loader")]
 use std::ptr::null;
 
 /// Form of a [`Primitive`]. In C, a `uint32_t` with these values.
@@ -288,17 +285,20 @@ layout! {
 }
 
 impl ShapeView {
-    #[cfg(feature = "loader")]
-    const EMPTY: Self = Self {
-        primitives: null(),
-        vertices: null(),
-        triangles: null(),
-        primitive_count: 0,
-        vertex_count: 0,
-        triangle_count: 0,
-        sides: Sides::Outer as u32,
-        field: ScalarField::NONE,
-    };
+    /// Returns the view of a shape without any part.
+    #[must_use]
+    pub const fn empty() -> Self {
+        Self {
+            primitives: null(),
+            vertices: null(),
+            triangles: null(),
+            primitive_count: 0,
+            vertex_count: 0,
+            triangle_count: 0,
+            sides: Sides::Outer as u32,
+            field: ScalarField::NONE,
+        }
+    }
 
     /// Returns the view of a shape, valid as long as the shape is not changed.
     fn of(shape: &Shape) -> Self {
@@ -315,6 +315,46 @@ impl ShapeView {
             sides: *sides as u32,
             field: *field,
         }
+    }
+
+    /// Copies the shape of a plugin, without [`Shape::check`]. Not real-time.
+    ///
+    /// # Errors
+    /// [`InvalidShape`] if a list is too long, or null or misaligned although its length is not 0, or if a text of the
+    /// field is too long.
+    ///
+    /// # Safety
+    /// Each list is null or has the declared number of initialised values, and stays valid during the call.
+    pub unsafe fn copied(&self) -> Result<Shape, InvalidShape> {
+        if [self.field.name, self.field.unit].iter().any(|text| text.bytes() > MOST_TEXT_BYTES) {
+            return Err(InvalidShape::Text);
+        }
+        // SAFETY: by the contract of this function.
+        unsafe {
+            Ok(Shape {
+                primitives: list("primitives", self.primitives, self.primitive_count)?,
+                surface: Surface {
+                    vertices: list("vertices", self.vertices, self.vertex_count)?,
+                    triangles: list("triangles", self.triangles, self.triangle_count)?,
+                    sides: if self.sides == Sides::Both as u32 { Sides::Both } else { Sides::Outer },
+                    field: self.field,
+                },
+            })
+        }
+    }
+}
+
+/// Copies a plugin's list.
+///
+/// # Safety
+/// `first` is null or points at `count` initialised values.
+unsafe fn list<T: Copy>(name: &'static str, first: *const T, count: u32) -> Result<Vec<T>, InvalidShape> {
+    match count {
+        0 => Ok(Vec::new()),
+        MOST.. => Err(InvalidShape::TooLarge(name)),
+        _ if first.is_null() || !first.is_aligned() => Err(InvalidShape::Missing(name)),
+        // SAFETY: by the contract of this function; not null and aligned, as was seen above.
+        _ => Ok(unsafe { std::slice::from_raw_parts(first, count as usize) }.to_vec()),
     }
 }
 
@@ -337,43 +377,44 @@ table!(ShapeTable: "flotor.shape/1", M: [ShapeModel] {
 pub enum InvalidShape {
     /// The model has no shape, or failed.
     Failed,
-    /// 2^20 or more vertices, triangles or primitives.
-    TooLarge,
+    /// 2^20 or more elements of a list: vertices, triangles or primitives.
+    TooLarge(&'static str),
     /// Neither a primitive nor a triangle.
     Empty,
-    /// Null or misaligned pointer to a list that is not empty.
-    Missing,
-    /// Triangle with a vertex index out of range.
-    Corner,
-    /// Number that is not finite, or negative side.
-    Number,
+    /// Null or misaligned pointer to a list that is not empty: vertices, triangles or primitives.
+    Missing(&'static str),
+    /// Triangle, by its index, with a vertex index out of range.
+    Corner(usize),
+    /// Primitive, by its index, with a number that is not finite, or a negative side.
+    Primitive(usize),
+    /// Vertex, by its index, with a number that is not finite.
+    Vertex(usize),
     /// Name or unit of the field that is too long.
     Text,
 }
 
 impl std::fmt::Display for InvalidShape {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Failed => "the model has no shape, or returned an error instead of its shape",
-            Self::TooLarge => "the shape has 1048576 or more vertices, triangles or primitives; return fewer",
-            Self::Empty => "the shape has neither a primitive nor a triangle; return at least one",
-            Self::Missing => "the shape has a list that is null or misaligned although its length is not 0",
-            Self::Corner => "a triangle of the shape has an index beyond the list of vertices",
-            Self::Number => {
-                "a pose, position, normal, value or side of the shape is not finite, or a side is negative"
+        match self {
+            Self::Failed => f.write_str("the model has no shape, or returned an error instead of its shape"),
+            Self::TooLarge(list) => write!(f, "the shape has 1048576 or more {list}; return fewer"),
+            Self::Empty => f.write_str("the shape has no primitive and no triangle; return at least one"),
+            Self::Missing(list) => write!(f, "the list of {list} is null or misaligned, but not empty"),
+            Self::Corner(at) => write!(f, "triangle {at} (from 0) has an index beyond the list of vertices"),
+            Self::Primitive(at) => {
+                write!(f, "primitive {at} (from 0) has `half_sides_m` < 0, or a number that is not finite")
             }
-            Self::Text => "the name or the unit of the field is longer than 64 bytes",
-        })
+            Self::Vertex(at) => write!(f, "vertex {at} (from 0) has a number that is not finite"),
+            Self::Text => f.write_str("the name or the unit of the field is longer than 64 bytes"),
+        }
     }
 }
 
 impl std::error::Error for InvalidShape {}
 
 /// Exclusive limit on the number of vertices, triangles or primitives.
-#[cfg(feature = "loader")]
 const MOST: u32 = 1 << 20;
 /// Maximum length of a name or unit, bytes.
-#[cfg(feature = "loader")]
 const MOST_TEXT_BYTES: usize = 64;
 
 impl Shape {
@@ -388,76 +429,16 @@ impl Shape {
             return Err(InvalidShape::Empty);
         }
         let is_finite = |numbers: &[f64]| numbers.iter().all(|number| number.is_finite());
-        let primitives_are = self.primitives.iter().all(|primitive| {
+        let primitive = self.primitives.iter().position(|primitive| {
             let sides = &primitive.half_sides_m;
-            primitive.pose.is_finite() && is_finite(sides) && sides.iter().all(|side| *side >= 0.0)
+            !(primitive.pose.is_finite() && is_finite(sides) && sides.iter().all(|side| *side >= 0.0))
         });
-        let vertices_are = vertices.iter().all(|vertex| {
-            is_finite(&vertex.position_m) && is_finite(&vertex.normal) && vertex.value.is_finite()
+        let vertex = vertices.iter().position(|vertex| {
+            !(is_finite(&vertex.position_m) && is_finite(&vertex.normal) && vertex.value.is_finite())
         });
-        if !(primitives_are && vertices_are) {
-            return Err(InvalidShape::Number);
-        }
-        let corners = triangles.as_flattened().iter();
-        if corners.into_iter().any(|corner| *corner as usize >= vertices.len()) {
-            return Err(InvalidShape::Corner);
-        }
-        Ok(())
-    }
-}
-
-#[cfg(feature = "loader")]
-impl Model {
-    /// Returns true if the model has a shape.
-    #[must_use]
-    pub fn has_shape(&self) -> bool {
-        self.extensions.shape.is_some_and(|table| table.shape.is_some())
-    }
-
-    /// Returns the model's shape at an input, copied and checked. Not real-time: for observers with their own instance.
-    ///
-    /// # Errors
-    /// [`InvalidShape`]; for a model without a shape, [`InvalidShape::Failed`].
-    pub fn shape(&mut self, input: &Input) -> Result<Shape, InvalidShape> {
-        let ask = self.extensions.shape.and_then(|table| table.shape).ok_or(InvalidShape::Failed)?;
-        let mut view = ShapeView::EMPTY;
-        // SAFETY: a live instance used by this thread only (`&mut`), pointers valid for the call.
-        let code = self.calls.call(|instance| unsafe { ask(instance, input, &raw mut view) });
-        if code != crate::abi::CallStatus::Ok as u32 {
-            return Err(InvalidShape::Failed);
-        }
-        if [view.field.name, view.field.unit].iter().any(|text| text.bytes() > MOST_TEXT_BYTES) {
-            return Err(InvalidShape::Text);
-        }
-        // SAFETY: the plugin's lists are of the checked layout and valid until its next call, which `&mut` keeps away.
-        let shape = unsafe {
-            Shape {
-                primitives: list(view.primitives, view.primitive_count)?,
-                surface: Surface {
-                    vertices: list(view.vertices, view.vertex_count)?,
-                    triangles: list(view.triangles, view.triangle_count)?,
-                    sides: if view.sides == Sides::Both as u32 { Sides::Both } else { Sides::Outer },
-                    field: view.field,
-                },
-            }
-        };
-        shape.check()?;
-        Ok(shape)
-    }
-}
-
-/// Copies a plugin's list.
-///
-/// # Safety
-/// `first` is null or points at `count` initialised values.
-#[cfg(feature = "loader")]
-unsafe fn list<T: Copy>(first: *const T, count: u32) -> Result<Vec<T>, InvalidShape> {
-    match count {
-        0 => Ok(Vec::new()),
-        MOST.. => Err(InvalidShape::TooLarge),
-        _ if first.is_null() || !first.is_aligned() => Err(InvalidShape::Missing),
-        // SAFETY: by the contract of this function; not null and aligned, as was seen above.
-        _ => Ok(unsafe { std::slice::from_raw_parts(first, count as usize) }.to_vec()),
+        let corner = triangles.as_flattened().iter().position(|corner| *corner as usize >= vertices.len());
+        let wrong = primitive.map(InvalidShape::Primitive).or(vertex.map(InvalidShape::Vertex));
+        wrong.or(corner.map(|corner| InvalidShape::Corner(corner / 3))).map_or(Ok(()), Err)
     }
 }
 
@@ -483,14 +464,14 @@ mod tests {
         assert_eq!(Shape::default().check(), Err(InvalidShape::Empty));
         let mut beyond = sheet();
         beyond.surface.triangles[0][1] = 3;
-        assert_eq!(beyond.check(), Err(InvalidShape::Corner));
+        assert_eq!(beyond.check(), Err(InvalidShape::Corner(0)));
         let mut odd = sheet();
         odd.surface.vertices[2].value = f64::NAN;
-        assert_eq!(odd.check(), Err(InvalidShape::Number));
+        assert_eq!(odd.check(), Err(InvalidShape::Vertex(2)));
         for radius_m in [-1.0, f64::INFINITY] {
             let mut odd = sheet();
             odd.primitives[0] = Primitive::sphere(Part::Body, Pose::HOME, radius_m);
-            assert_eq!(odd.check(), Err(InvalidShape::Number));
+            assert_eq!(odd.check(), Err(InvalidShape::Primitive(0)));
         }
     }
 
@@ -514,15 +495,14 @@ mod tests {
         assert_eq!((later.form(), later.part()), (None, Part::Body));
     }
 
-    #[cfg(feature = "loader")]
     #[test]
     fn a_list_that_is_not_there_is_not_read() {
         // SAFETY: null, or a list of its length.
         unsafe {
-            assert_eq!(list::<f64>(null(), 0), Ok(Vec::new()));
-            assert_eq!(list::<f64>(null(), 1), Err(InvalidShape::Missing));
-            assert_eq!(list::<f64>(null(), MOST), Err(InvalidShape::TooLarge));
-            assert_eq!(list([1.0, 2.0].as_ptr(), 2), Ok(vec![1.0, 2.0]));
+            assert_eq!(list::<f64>("numbers", null(), 0), Ok(Vec::new()));
+            assert_eq!(list::<f64>("numbers", null(), 1), Err(InvalidShape::Missing("numbers")));
+            assert_eq!(list::<f64>("numbers", null(), MOST), Err(InvalidShape::TooLarge("numbers")));
+            assert_eq!(list("numbers", [1.0, 2.0].as_ptr(), 2), Ok(vec![1.0, 2.0]));
         }
     }
 }

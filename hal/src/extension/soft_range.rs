@@ -9,8 +9,6 @@
 use crate::abi::Str;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader::{Plugin, static_list};
 use crate::{ForceModel, Parameter, ParameterKind};
 
 /// Soft range of one parameter, in its unit. 40 bytes.
@@ -124,26 +122,6 @@ table!(SoftRangeTable: "flotor.soft-range/1", M: [SoftRangeModel] {
     range_count: M::SOFT_RANGES.len() as u32,
     ranges: M::SOFT_RANGES.as_ptr(),
 });
-
-#[cfg(feature = "loader")]
-impl Plugin {
-    /// Returns the soft ranges that a model declares; empty without the extension and for a device.
-    #[must_use]
-    pub fn soft_ranges(&self) -> &'static [SoftRange] {
-        let table = self.model_extensions().and_then(|extensions| extensions.soft_range);
-        // SAFETY: a table's list is a static array of `range_count` ranges of the checked layout.
-        table.map_or(&[], |table| unsafe { static_list(table.ranges, table.range_count) })
-    }
-
-    /// Returns the soft range of a parameter, declared or [around](SoftRange::around) the current value; `None` for an
-    /// unknown index, and for a parameter that is not a number. Not real-time.
-    #[must_use]
-    pub fn soft_range(&self, index: usize, value: f64) -> Option<SoftRange> {
-        let parameter = self.parameters().get(index)?;
-        let declared = self.soft_ranges().iter().find(|range| range.id() == parameter.id());
-        declared.and_then(|range| range.within(parameter)).or_else(|| SoftRange::around(parameter, value))
-    }
-}
 
 #[cfg(test)]
 mod tests {

@@ -36,8 +36,8 @@ impl VariantInfo {
     }
 
     /// Returns this variant, with its demands limited to those of `most`.
-    #[cfg(feature = "loader")]
-    pub(crate) fn limited_to(&self, most: &Self) -> Self {
+    #[must_use]
+    pub const fn limited_to(&self, most: &Self) -> Self {
         Self::new(self.serves().limited_to(most.serves()), self.memory())
     }
 }

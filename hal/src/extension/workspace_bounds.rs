@@ -7,8 +7,6 @@
 use crate::abi::instance::fill;
 use crate::abi::interface::table;
 use crate::abi::layout::layout;
-#[cfg(feature = "loader")]
-use crate::abi::loader::Model;
 use crate::abi::{Instance, ModelAdapter};
 use crate::{DVec3, ForceModel};
 
@@ -107,16 +105,6 @@ table!(WorkspaceBoundsTable: "flotor.workspace-bounds/1", M: [WorkspaceBoundsMod
     reserved: 0,
     bounds: Some(bounds::<M>),
 });
-
-#[cfg(feature = "loader")]
-impl Model {
-    /// Returns the limits of the instance with the current parameters; unbounded without the extension. Real-time:
-    /// bounded, no allocation.
-    pub fn workspace_bounds(&mut self) -> WorkspaceBounds {
-        let ask = self.extensions.workspace_bounds.and_then(|table| table.bounds);
-        self.calls.query(ask, WorkspaceBounds::UNBOUNDED).unwrap_or(WorkspaceBounds::UNBOUNDED)
-    }
-}
 
 #[cfg(test)]
 mod tests {

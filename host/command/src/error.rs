@@ -10,7 +10,7 @@
 //! - 130 ([`INTERRUPTED`](crate::INTERRUPTED), on Windows another code): forced end, see [`stopping`](crate::stopping)
 
 use flotor_hal::Fault;
-use flotor_hal::abi::loader::LoadError;
+use flotor_loader::LoadError;
 use flotor_record::RecordError;
 use flotor_servo::{Place, RunEnd};
 use flotor_session::registry::LookupError;
@@ -163,7 +163,7 @@ fn ended(end: RunEnd) -> String {
         RunEnd::DeviceFault(fault) => CommandError::DeviceFault(fault).to_string(),
         RunEnd::Stopped | RunEnd::TooFast(_) => end.cause(),
         RunEnd::EmergencyStop(source) => format!(
-            "emergency stop ({}); the device is stopped and exerts no force until the next run",
+            "emergency stop ({}); all devices are stopped and exert no force until the next run",
             source.word()
         ),
         RunEnd::Watchdog(stuck) => format!(

@@ -4,8 +4,8 @@ use crate::CommandError;
 use clap::{Args, Command, CommandFactory, Parser, Subcommand, ValueEnum};
 pub use flotor_core::LARGEST_SEED;
 use flotor_core::limits::Limits;
-use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::terminal::escaped_arguments;
+use flotor_loader::{Plugin, Setting};
 use flotor_servo::Core;
 use flotor_session::Strength;
 use flotor_session::registry::Registry;
@@ -405,7 +405,7 @@ pub fn core(text: &str) -> Result<Core, String> {
         .parse()
         .map_err(|_| format!("invalid core number `{text}`; write a whole number, 0 or more"))?;
     Core::new(number).ok_or_else(|| {
-        format!("no core {number} on this machine; write a smaller number: the first core is 0")
+        format!("the system cannot address core {number}; write a smaller number: the first core is 0")
     })
 }
 

@@ -3,24 +3,35 @@
 //! - [`trace`]: record of a tick; [`demand`]: the outputs of models that a run needs.
 //! - [`mapping`]: mapping between the device frame and a model's frame.
 //! - [`limits`]: limits of force and motion, the wall at the end of a device's range; [`rendered_boundary`]: the same wall on
-//!   a device, in a loop; [`region`]: the vectors that limits allow.
+//!   a device, in a loop; [`end_wall`]: the wall at the bounds of a model; [`region`]: the vectors that limits allow.
+//! - [`asynchronous`]: timing of an asynchronous model, and the limits of its contacts.
 //! - [`plausibility`]: checks of device samples; [`oscillation`]: detection of an unstable loop.
+//! - [`grip`], [`grip_guard`]: the grip of a device, its check and limits; [`feel`]: stiffness and settling time that the hand
+//!   felt.
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between the two ends of a coupling.
+//! - [`health`]: problems of a model, counted and as text.
 //! - [`guidance`]: the parameters that guide a simulated hand.
+//! - [`snapshot`]: saved state of a model or device, refused by an instance of another origin.
 //! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: number of a plugin in the run.
 //! - [`fade()`]: smooth step of a force; [`civil_date()`]: date of a day.
-//! - [`words`]: encoding of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
+//! - [`words`], [`sent`]: encoding of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
 //!
 //! The crate reads no files, starts no threads and, apart from [`lock()`], makes no system calls.
 #![forbid(unsafe_code)]
 
+pub mod asynchronous;
 mod change;
 mod clock;
 pub mod coupling;
 mod date;
 pub mod demand;
+pub mod end_wall;
 mod fade;
+pub mod feel;
+pub mod grip;
+pub mod grip_guard;
 pub mod guidance;
+pub mod health;
 pub mod limits;
 mod lock;
 pub mod mapping;
@@ -33,6 +44,8 @@ mod quantile;
 mod random;
 pub mod region;
 pub mod rendered_boundary;
+pub mod sent;
+pub mod snapshot;
 pub mod trace;
 pub mod words;
 

@@ -72,6 +72,10 @@ pub struct Limits {
     pub force_n: Bound,
     /// Largest torque, N·m.
     pub torque_nm: Bound,
+    /// Largest force of a linear grip, N.
+    pub grip_force_n: f64,
+    /// Largest torque of an angular grip, N·m.
+    pub grip_torque_nm: f64,
     /// Maximum slew rate of the force, N/s (norm of the change).
     pub force_slew_n_per_s: f64,
     /// Maximum slew rate of the torque, N·m/s (norm of the change).
@@ -103,6 +107,8 @@ impl Limits {
         Self {
             force_n: self.force_n.and(Bound::ball(ceiling.force_n)),
             torque_nm: self.torque_nm.and(Bound::ball(ceiling.torque_nm)),
+            grip_force_n: self.grip_force_n.min(ceiling.force_n),
+            grip_torque_nm: self.grip_torque_nm.min(ceiling.torque_nm),
             ..self
         }
     }
@@ -113,6 +119,8 @@ impl Default for Limits {
         Self {
             force_n: Bound::NONE,
             torque_nm: Bound::NONE,
+            grip_force_n: f64::INFINITY,
+            grip_torque_nm: f64::INFINITY,
             force_slew_n_per_s: f64::INFINITY,
             torque_slew_nm_per_s: f64::INFINITY,
             // Long enough not to startle a hand, short enough not to seem a delay.
@@ -182,6 +190,7 @@ mod tests {
     fn a_ceiling_raises_nothing() {
         let limits = Limits { force_n: Bound::ball(3.0), ..Limits::default() }.under(CEILING);
         assert_eq!((limits.force_n.norm(), limits.torque_nm.norm()), (3.0, 1.0));
+        assert_eq!((limits.grip_force_n, limits.grip_torque_nm), (20.0, 1.0));
         let strong = Limits { force_n: Bound::box_of([55.0, 2.0, 140.0]), ..Limits::default() };
         assert_eq!(strong.under(CEILING).force_n.axes(), [20.0, 2.0, 20.0]);
     }

@@ -6,7 +6,7 @@
 #![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
-use flotor_hal::{DQuat, DVec3, Demand, DeviceState, Input, Pose, Tick, Twist, Wrench};
+use flotor_hal::{DQuat, DVec3, Demand, DeviceState, GripKind, GripState, Input, Pose, Tick, Twist, Wrench};
 
 /// Scales and rotation between the device frame and a model's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,16 +43,6 @@ impl Default for Blend {
         // A tenth of a second: long enough for a hand to follow, short enough to feel prompt.
         Self { weight: 1.0, priority: 0, fade_s: 0.1 }
     }
-}
-
-/// Rate and latency of the linear fields of an asynchronous model.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FieldTiming {
-    /// Rate of new fields, Hz.
-    pub rate_hz: f64,
-    /// Time from the sample of the handle to the field computed from it, s. Exact on the virtual clock; on the real
-    /// clock, the computing time of the model.
-    pub latency_s: f64,
 }
 
 /// Mapping between a device and one instance of a model: frames, scales and home position.
@@ -230,6 +220,35 @@ impl Mapping {
         )
     }
 
+    /// Maps the sample of a grip to the scale of the model: lengths of a linear grip as positions, angles unchanged.
+    /// Real-time: bounded, no allocation.
+    pub fn grip_to_model(&self, grip: &GripState) -> GripState {
+        let (motion, _) = self.grip_scales(grip.kind());
+        GripState::new(grip.kind(), grip.opening * motion, grip.velocity * motion)
+            .with_delivered(self.effort_to_model(grip.kind(), grip.delivered))
+    }
+
+    /// Maps the effort of a model at a grip of this kind to the scale of the device. Real-time: bounded, no allocation.
+    #[must_use]
+    pub fn effort_to_device(&self, kind: GripKind, effort: f64) -> f64 {
+        effort * self.grip_scales(kind).1
+    }
+
+    /// Maps an effort at a grip of this kind to the scale of the model: the inverse of [`Self::effort_to_device`]. Real-time:
+    /// bounded, no allocation.
+    #[must_use]
+    pub fn effort_to_model(&self, kind: GripKind, effort: f64) -> f64 {
+        effort / self.grip_scales(kind).1
+    }
+
+    /// Returns the scales of motion and effort of a grip of this kind: those of positions and forces, or of rotations and torques.
+    fn grip_scales(&self, kind: GripKind) -> (f64, f64) {
+        match kind {
+            GripKind::Linear => (self.motion_scale, self.force_scale),
+            GripKind::Angular => (1.0, self.torque_scale),
+        }
+    }
+
     /// Maps a wrench from the device frame to the model frame: the inverse of [`Self::wrench_to_device`]. Real-time:
     /// bounded, no allocation.
     #[must_use]
@@ -267,6 +286,22 @@ mod tests {
         let device_w = at_device.force().dot(twist.linear()) + at_device.torque().dot(twist.angular());
         assert!((device_w - mapping.energy_scale() * model_w).abs() < 1.0e-15);
         assert!(mapping.is_conservative());
+    }
+
+    #[test]
+    fn power_at_a_grip_is_the_scaled_power_of_the_model_in_either_kind() {
+        let mapping = Mapping::new(&MappingConfig { force_scale: 0.7, ..thesis() });
+        for kind in [GripKind::Linear, GripKind::Angular] {
+            let grip = GripState::new(kind, 0.012, -0.3);
+            let at_model = mapping.grip_to_model(&grip);
+            let device_w = mapping.effort_to_device(kind, 2.5) * grip.velocity;
+            // Two roundings of a number of the size of one.
+            assert!(
+                (device_w - mapping.energy_scale() * 2.5 * at_model.velocity).abs() < 1.0e-15,
+                "{kind:?}"
+            );
+            assert_eq!(at_model.kind(), kind);
+        }
     }
 
     #[test]

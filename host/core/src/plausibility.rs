@@ -222,7 +222,23 @@ impl PlausibilityCheck {
     /// Real-time: bounded, no allocation.
     #[inline]
     pub fn check(&mut self, tick: &Tick, sample: &DeviceState) -> Result<(), Implausible> {
-        let checked = self.look(tick, sample);
+        self.check_both(tick, sample, Ok(()))
+    }
+
+    /// Checks a new sample as [`Self::check`] does, together with the result of the check of its grip.
+    ///
+    /// # Errors
+    /// The reason, if one of both is implausible.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    pub fn check_both(
+        &mut self,
+        tick: &Tick,
+        sample: &DeviceState,
+        grip: Result<(), Implausible>,
+    ) -> Result<(), Implausible> {
+        let checked = self.look(tick, sample).and(grip);
         match checked {
             Ok(()) => self.distrust = self.distrust.saturating_sub(1),
             Err(why) => {

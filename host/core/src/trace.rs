@@ -3,6 +3,7 @@
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
 use crate::ModelOutputs;
+use crate::grip::{self, GripRecord};
 use crate::words::Decoder;
 use flotor_hal::{Demand, Pose, Twist, Wrench};
 use flotor_sync::Words;
@@ -162,6 +163,8 @@ pub struct TickRecord {
     pub delivered: Wrench,
     /// Energy that the hand has put into the device's port so far, less the energy that has come out, J.
     pub port_energy_j: f64,
+    /// Grip of the device; `None` without one.
+    pub grip: Option<GripRecord>,
     /// Events of the tick.
     pub events: Events,
     /// Buttons of the device, one bit each.
@@ -172,8 +175,9 @@ pub struct TickRecord {
     pub compute_ns: u64,
 }
 
-/// Number of 64-bit words of a record; the last [`TIMING_WORDS`] depend on the machine and are excluded from digests.
-pub const RECORD_WORDS: usize = 39;
+/// Number of 64-bit words of a record. The last [`TIMING_WORDS`] depend on the machine and are excluded from digests; the words of
+/// the [grip](grip::GRIP_WORDS) come before them.
+pub const RECORD_WORDS: usize = 45;
 /// Number of words with measured times, at the end of a record.
 pub const TIMING_WORDS: usize = 2;
 
@@ -207,6 +211,7 @@ impl Words<RECORD_WORDS> for TickRecord {
         let number = self.tick & TICK_MASK | torque | energy_bit | u64::from(self.device) << DEVICE_BIT;
         let flags = u64::from(self.events.bits) | u64::from(self.buttons) << 32;
         let [energy, port_energy] = [energy_j, self.port_energy_j].map(f64::to_bits);
+        let [g0, g1, g2, g3, g4, g5] = grip::to_words(self.grip);
         #[rustfmt::skip] // a line for each part of a record
         let words = [
             number, self.time_ns, self.dt_ns,
@@ -216,6 +221,7 @@ impl Words<RECORD_WORDS> for TickRecord {
             c0, c1, c2, c3, c4, c5,
             d0, d1, d2, d3, d4, d5,
             energy, port_energy, flags,
+            g0, g1, g2, g3, g4, g5,
             self.lateness_ns, self.compute_ns,
         ];
         words
@@ -237,6 +243,7 @@ impl Words<RECORD_WORDS> for TickRecord {
         let flags = words.word();
         #[allow(clippy::cast_possible_truncation)] // two halves of one word
         let (events, buttons) = (Events::from_bits(flags as u32), (flags >> 32) as u32);
+        let grip = grip::from_words(std::array::from_fn(|_| words.word()));
         let (lateness_ns, compute_ns) = (words.word(), words.word());
         Self {
             tick,
@@ -249,6 +256,7 @@ impl Words<RECORD_WORDS> for TickRecord {
             commanded,
             delivered,
             port_energy_j,
+            grip,
             events,
             buttons,
             lateness_ns,
@@ -260,11 +268,24 @@ impl Words<RECORD_WORDS> for TickRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grip::GRIP_WORDS;
+    use flotor_hal::GripKind;
 
     #[test]
     fn every_word_of_a_record_survives_the_ring() {
-        let words: [u64; RECORD_WORDS] = std::array::from_fn(|i| 0x3ff0_0000_0000_0000 + i as u64 * 0x101);
-        assert_eq!(TickRecord::from_words(&words).to_words(), words);
+        let mut words: [u64; RECORD_WORDS] =
+            std::array::from_fn(|i| 0x3ff0_0000_0000_0000 + i as u64 * 0x101);
+        let code = RECORD_WORDS - TIMING_WORDS - 1;
+        for (kind, number) in [(GripKind::Linear, 1), (GripKind::Angular, 2)] {
+            words[code] = number;
+            let record = TickRecord::from_words(&words);
+            assert_eq!(record.to_words(), words);
+            assert_eq!(record.grip.map(|grip| grip.state.kind()), Some(kind));
+        }
+        words[code] = 3;
+        assert_eq!(TickRecord::from_words(&words).grip, None);
+        words[code + 1 - GRIP_WORDS..=code].fill(0);
+        assert_eq!(TickRecord::from_words(&words).to_words(), words, "without a grip");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use flotor_core::trace::TickRecord;
 use flotor_core::{Change, lock};
 use flotor_record::RunDescription;
 use std::io::{self, ErrorKind, Write};
+use std::net::Shutdown;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -190,11 +191,17 @@ impl RequestClient {
     /// Sends a request; returns the number that the [`Answer`] will contain. Does not wait for the answer.
     ///
     /// # Errors
-    /// [`LiveError::Connection`] if the host has closed the connection, or does not read the request within 1 s.
+    /// [`LiveError::Connection`] if the host has closed the connection, or does not read the request within 1 s: the connection then
+    /// ends, because the host would read the rest of this request as the start of the next one.
     pub fn ask(&self, ask: Ask) -> Result<u64, LiveError> {
         let number = self.number.fetch_add(1, Ordering::Relaxed);
         let request = serde_json::to_vec(&Request { number, ask }).map_err(io::Error::from)?;
-        lock(&self.stream).write_all(&frame(Kind::Request, &request))?;
+        let mut stream = lock(&self.stream);
+        let written = stream.write_all(&frame(Kind::Request, &request));
+        if written.is_err() {
+            let _ = stream.shutdown(Shutdown::Both);
+        }
+        written?;
         Ok(number)
     }
 }
@@ -236,4 +243,35 @@ fn json<T: serde::de::DeserializeOwned>(payload: &[u8]) -> Result<T, LiveError> 
 
 fn silent() -> LiveError {
     io::Error::from(ErrorKind::TimedOut).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::platform::Listening;
+
+    #[test]
+    fn a_host_that_does_not_read_gets_whole_requests_and_then_the_end_of_the_connection() {
+        let folder = tempfile::tempdir().expect("a folder for the socket");
+        let path = folder.path().join("host");
+        let listening = Listening::bind(&path).expect("a free path");
+        let client = connect(&path).expect("a host that listens");
+        let mut host = listening.accept().expect("a client").expect("an open socket");
+        client.set_write_timeout(Some(Duration::from_millis(10))).expect("a time-out is legal");
+        let client = RequestClient { stream: Arc::new(Mutex::new(client)), number: Arc::default() };
+        let asked = (0..1_000_000).take_while(|_| client.ask(Ask::EmergencyStop).is_ok()).count();
+
+        let (mut frames, mut read) = (Frames::default(), 0);
+        loop {
+            while let Some((kind, _)) = frames.take().expect("whole frames") {
+                assert_eq!(kind, Kind::Request);
+                read += 1;
+            }
+            if frames.fill(&mut host).expect("the rest of the connection") == 0 {
+                break;
+            }
+        }
+        assert!(asked > 0 && read == asked, "{read} of {asked}");
+        client.ask(Ask::EmergencyStop).expect_err("the connection has ended");
+    }
 }

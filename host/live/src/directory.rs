@@ -45,10 +45,10 @@ pub enum DirectoryError {
         #[source]
         cause: io::Error,
     },
-    /// Other users may enter the folder, or another user owns it: they could change a run.
+    /// The folder is a link, or another user owns it or may enter it, and could change a run.
     #[error(
-        "{}: unsafe permissions: other users may enter the folder and change a run; run `chmod 700` on the \
-         folder, and make yourself its owner", .0.display())]
+        "{}: not safe for runs: it is a link, or another user owns the folder or may enter it; remove the link, \
+         or become the owner and run `chmod 700` on the folder", .0.display())]
     NotPrivate(PathBuf),
 }
 

@@ -18,7 +18,7 @@
 //! # Ok::<(), flotor_live::LiveError>(())
 //! ```
 //!
-//! # Protocol 1
+//! # Protocol 2
 //!
 //! Both directions are a sequence of frames: length of the payload (4 bytes, little endian), kind (1 byte), payload. A client
 //! ignores unknown kinds, and unknown keys of JSON objects, so that the protocol can be extended; [`PROTOCOL`] changes for
@@ -28,7 +28,7 @@
 //! |---|---|---|
 //! | 1 greeting | host | JSON [`Greeting`]: plugins, with the ranges and present values of their parameters. First, once |
 //! | 2 run | host | protobuf `flotor.Run`, as in a recording (`host/proto`). Second, once |
-//! | 3 ticks | host | records dropped so far (8 bytes), then records of 39 words of 8 bytes, see below |
+//! | 3 ticks | host | records dropped so far (8 bytes), then records of 45 words of 8 bytes, see below |
 //! | 4 change | host | JSON [`ChangeMessage`]: a change to a plugin, before the first tick that uses it |
 //! | 5 answer | host | JSON [`Answer`] to a request |
 //! | 6 end | host | JSON [`End`]: outcome of the run. Last |
@@ -37,7 +37,8 @@
 //! A record has the words of [`flotor_core::trace::TickRecord`], as in the digest of a run, which excludes the last two: tick (low
 //! 46 bits), absence flags of torque and energy (1 bit each) and device (high 16 bits); time (ns), time since the last tick (ns) as
 //! integers; position (3), quaternion xyzw (4), velocity (3), angular velocity (3), model's force and torque (6), commanded (6),
-//! delivered (6), stored energy, energy of the port as IEEE doubles; events (low half) and buttons (high half); lateness and
+//! delivered (6), stored energy, energy of the port as IEEE doubles; events (low half) and buttons (high half); grip: opening, velocity, efforts delivered, of the models and commanded as doubles, kind (0 none, 1 linear, 2 angular); lateness
+//! and
 //! compute time (ns). SI units, device frame, little endian.
 //!
 //! **No client can delay the loop.** A host sends only the first two frames until a client requests more, and does nothing per tick
@@ -82,4 +83,4 @@ pub use peer_socket::{CALL_PERIOD, FoundCoupling, PeerSocket};
 pub use server::{Publication, PublishError, Serve};
 
 /// Version of the protocol, the same in host and client.
-pub const PROTOCOL: u32 = 1;
+pub const PROTOCOL: u32 = 2;

@@ -1,6 +1,7 @@
 //! Digest of a run: equal digests mean equal runs.
 
 use flotor_core::ModelOutputs;
+use flotor_core::grip::{GRIP_WORDS, GripRecord};
 use flotor_core::trace::{RECORD_WORDS, TIMING_WORDS, TickRecord};
 use flotor_sync::Words;
 use xxhash_rust::xxh3::Xxh3;
@@ -11,10 +12,11 @@ const DIGEST_WORDS: usize = RECORD_WORDS - TIMING_WORDS;
 /// Parts of a record that a digest covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coverage {
-    /// Time, pose, twist, commanded and delivered wrench, events and buttons: equal for a run with and without observers.
+    /// Time, pose, twist, grip, commanded and delivered wrench and effort, events and buttons: equal for a run with and without
+    /// observers.
     #[default]
     Hand,
-    /// Also the wrench and energy of the models, and the energy of the port.
+    /// Also the wrench, energy and effort of the models, and the energy of the port.
     Everything,
 }
 
@@ -23,7 +25,12 @@ impl Coverage {
     #[inline]
     fn of(self, record: &TickRecord) -> TickRecord {
         match self {
-            Self::Hand => TickRecord { model: ModelOutputs::ZERO, port_energy_j: 0.0, ..*record },
+            Self::Hand => TickRecord {
+                model: ModelOutputs::ZERO,
+                port_energy_j: 0.0,
+                grip: record.grip.map(|grip| GripRecord { model: 0.0, ..grip }),
+                ..*record
+            },
             Self::Everything => *record,
         }
     }
@@ -33,7 +40,7 @@ impl Coverage {
 ///
 /// The hash runs over the 64-bit words of each record, little-endian, in the order of [`TickRecord`], so it depends
 /// neither on the machine nor on the batches in which records arrive; a part that the digest does not [cover](Coverage)
-/// counts as zero. All NaNs count as equal and zero has no sign, because they differ between processors and compilers.
+/// counts as zero. The words of a grip count for devices with a grip only. All NaNs count as equal and zero has no sign, because they differ between processors and compilers.
 /// The digest distinguishes runs, but is not cryptographic: it is no protection against forgery.
 #[derive(Clone, Default)]
 #[must_use]
@@ -63,7 +70,11 @@ impl TraceDigest {
             let word = if is_integer(index) { word } else { canonical(word) };
             place.copy_from_slice(&word.to_le_bytes());
         }
-        self.hash.update(&bytes);
+        let (all, grip) = bytes.split_at((DIGEST_WORDS - GRIP_WORDS) * size_of::<u64>());
+        self.hash.update(all);
+        if record.grip.is_some() {
+            self.hash.update(grip);
+        }
         self.ticks += 1;
     }
 

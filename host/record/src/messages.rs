@@ -79,6 +79,7 @@ mod tests {
     fn record(seed: u64) -> TickRecord {
         TickRecord::from_words(&std::array::from_fn(|i| match i {
             0..=2 => seed + i as u64,
+            42 => seed % 3, // the kind of a grip, or none
             i => (seed as f64 * 0.1 - i as f64).to_bits() & 0xffff_ffff_ffff,
         }))
     }
@@ -92,7 +93,7 @@ mod tests {
             let back = tick_from_messages(&pose, &tick).unwrap();
             assert_eq!(back.to_words(), record.to_words());
         }
-        assert_eq!(RECORD_WORDS, 39);
+        assert_eq!(RECORD_WORDS, 45);
     }
 
     #[test]

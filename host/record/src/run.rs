@@ -2,8 +2,9 @@
 
 use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Run, Setting, Vector3};
 use flotor_core::Clock;
+use flotor_core::asynchronous::{ContactLimits, FieldTiming, StiffnessCap};
 use flotor_core::coupling::CouplingDescription;
-use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
+use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_hal::Demand;
 use prost::Message;
 use std::collections::BTreeMap;
@@ -176,6 +177,7 @@ impl PluginDescription {
             field: self.field.map(|field| schema::FieldTiming {
                 rate_hz: Some(field.rate_hz),
                 latency_s: Some(field.latency_s),
+                contacts: Some(schema::ContactLimits::from(field.contacts)),
             }),
             latency_s: matches!(self.role, Role::Device).then_some(self.latency_s),
             felt: match self.role {
@@ -206,8 +208,12 @@ impl PluginDescription {
             priority: u8::try_from(blend.priority).unwrap_or(u8::MAX),
             fade_s: blend.fade_s(),
         });
-        let field =
-            plugin.field.map(|field| FieldTiming { rate_hz: field.rate_hz(), latency_s: field.latency_s() });
+        let field = plugin.field.map(|field| FieldTiming {
+            rate_hz: field.rate_hz(),
+            latency_s: field.latency_s(),
+            // Recordings from versions without contacts have no limits of contacts.
+            contacts: field.contacts.map_or(ContactLimits::UNKNOWN, ContactLimits::from),
+        });
         Ok(Self {
             places_m,
             blend,
@@ -251,4 +257,32 @@ pub(crate) fn to_settings(pairs: &[(String, String)]) -> Vec<Setting> {
 
 pub(crate) fn from_settings(settings: Vec<Setting>) -> Vec<(String, String)> {
     settings.into_iter().map(|setting| (setting.key, setting.value)).collect()
+}
+impl From<ContactLimits> for schema::ContactLimits {
+    fn from(limits: ContactLimits) -> Self {
+        Self {
+            stiffness_n_per_m: limits.cap.map(|cap| cap.stiffness_n_per_m),
+            per_damping_1_per_s: limits.cap.map(|cap| cap.per_damping_1_per_s),
+            surface_power_w: Some(limits.surface_power_w),
+            force_n: Some(limits.force_n),
+            torque_nm: Some(limits.torque_nm),
+            by_device_n_per_m: limits.cap.map(|cap| cap.by_device_n_per_m),
+        }
+    }
+}
+
+impl From<schema::ContactLimits> for ContactLimits {
+    fn from(limits: schema::ContactLimits) -> Self {
+        let cap = limits.stiffness_n_per_m.zip(limits.per_damping_1_per_s);
+        Self {
+            cap: cap.map(|(stiffness_n_per_m, per_damping_1_per_s)| StiffnessCap {
+                stiffness_n_per_m,
+                by_device_n_per_m: limits.by_device_n_per_m(),
+                per_damping_1_per_s,
+            }),
+            surface_power_w: limits.surface_power_w(),
+            force_n: limits.force_n(),
+            torque_nm: limits.torque_nm(),
+        }
+    }
 }

@@ -6,12 +6,13 @@
 
 use crate::{Note, Severity};
 use flotor_core::coupling::PassivityMode;
+use flotor_core::grip::GripRecord;
 use flotor_core::mapping::MappingConfig;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{
     Change as ParameterChange, ChangeOutcome, ChangeSubject, Clock as ClockValue, ModelOutputs,
 };
-use flotor_hal::{Demand, Pose, Twist as TwistValue, Wrench as WrenchValue};
+use flotor_hal::{Demand, GripKind, GripState, Pose, Twist as TwistValue, Wrench as WrenchValue};
 use prost::{Enumeration, Message};
 use prost_types::Timestamp;
 
@@ -138,6 +139,16 @@ messages! {
         compute_ns: u64 = 12 [uint64],
         port_energy_j: Option<f64> = 13 [double, optional],
         device: u32 = 14 [uint32],
+        grip: Option<Grip> = 15 [message, optional],
+    }
+
+    Grip: Copy {
+        opening: Option<f64> = 1 [double, optional],
+        velocity: Option<f64> = 2 [double, optional],
+        delivered: Option<f64> = 3 [double, optional],
+        model: Option<f64> = 4 [double, optional],
+        commanded: Option<f64> = 5 [double, optional],
+        kind: i32 = 6 [enumeration = "Kind"],
     }
 
     Change {
@@ -199,6 +210,16 @@ messages! {
     FieldTiming: Copy {
         rate_hz: Option<f64> = 1 [double, optional],
         latency_s: Option<f64> = 2 [double, optional],
+        contacts: Option<ContactLimits> = 3 [message, optional],
+    }
+
+    ContactLimits: Copy {
+        stiffness_n_per_m: Option<f64> = 1 [double, optional],
+        per_damping_1_per_s: Option<f64> = 2 [double, optional],
+        surface_power_w: Option<f64> = 3 [double, optional],
+        force_n: Option<f64> = 4 [double, optional],
+        torque_nm: Option<f64> = 5 [double, optional],
+        by_device_n_per_m: Option<f64> = 6 [double, optional],
     }
 
     Blend: Copy {
@@ -263,6 +284,7 @@ macro_rules! enumerations {
 
 enumerations! {
     Outcome(Unspecified) of ChangeOutcome { Applied = 1, Refused = 2, Broke = 3 }
+    Kind(Unspecified) of GripKind { Linear = 1, Angular = 2 }
     Subject of ChangeSubject { Parameter = 0, Weight = 1, Plugin = 2 }
     Passivity(Unspecified) of PassivityMode { Observe = 1, Control = 2 }
     Clock(Unspecified) of ClockValue { Real = 1, Virtual = 2 }
@@ -420,6 +442,7 @@ impl Tick {
             lateness_ns: record.lateness_ns,
             compute_ns: record.compute_ns,
             device: record.device.into(),
+            grip: record.grip.map(Grip::new),
         }
     }
 
@@ -436,11 +459,31 @@ impl Tick {
             commanded: self.commanded.ok_or(Missing("commanded"))?.value()?,
             delivered: self.delivered.ok_or(Missing("delivered"))?.value()?,
             port_energy_j: self.port_energy_j(),
+            grip: self.grip.map(|grip| grip.record()).transpose()?,
             events: Events::from_bits(self.events),
             buttons: self.buttons,
             lateness_ns: self.lateness_ns,
             compute_ns: self.compute_ns,
         })
+    }
+}
+
+impl Grip {
+    fn new(GripRecord { state, model, commanded }: GripRecord) -> Self {
+        Self {
+            opening: Some(state.opening),
+            velocity: Some(state.velocity),
+            delivered: Some(state.delivered),
+            model: Some(model),
+            commanded: Some(commanded),
+            kind: Kind::from(state.kind()).into(),
+        }
+    }
+
+    fn record(&self) -> Result<GripRecord, Missing> {
+        let kind = self.kind().value().ok_or(Missing("grip.kind"))?;
+        let state = GripState::new(kind, self.opening(), self.velocity()).with_delivered(self.delivered());
+        Ok(GripRecord { state, model: self.model(), commanded: self.commanded() })
     }
 }
 

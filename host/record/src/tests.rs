@@ -74,8 +74,9 @@ fn run() -> RunDescription {
 fn tick(index: u64, dt_ns: u64) -> TickRecord {
     let mut words: [u64; RECORD_WORDS] = std::array::from_fn(|i| (index as f64 + i as f64 / 64.0).to_bits());
     [words[0], words[1], words[2]] = [index, index * dt_ns, dt_ns];
-    let [.., flags, lateness_ns, compute_ns] = &mut words;
-    [*flags, *lateness_ns, *compute_ns] = [index | (index + 1) << 32, 10 * index, 20 * index];
+    words[36] = index | (index + 1) << 32;
+    let [.., kind, lateness_ns, compute_ns] = &mut words;
+    [*kind, *lateness_ns, *compute_ns] = [1 + index % 2, 10 * index, 20 * index];
     TickRecord::from_words(&words)
 }
 
@@ -130,7 +131,9 @@ fn ticks_come_back_bit_for_bit() {
     let mut ticks: Vec<TickRecord> =
         specials.iter().map(|&word| TickRecord::from_words(&[word; RECORD_WORDS])).collect();
     let mut random = Random(1);
-    ticks.extend((0..2000).map(|_| TickRecord::from_words(&std::array::from_fn(|_| random.bits()))));
+    ticks.extend((0..2000).map(|kind| {
+        TickRecord::from_words(&std::array::from_fn(|word| if word == 42 { kind % 3 } else { random.bits() }))
+    }));
 
     let file = TestFile::new("bits");
     write(&file.0, &ticks);
@@ -580,9 +583,9 @@ fn the_digest_of_everything_sees_every_bit_but_measured_times() {
 
 #[test]
 fn the_digest_sees_every_bit_of_what_the_hand_gets_and_nothing_for_an_observer() {
-    // Tick, time, step, pose and twist; commanded and delivered; events and buttons. Not the wrench of the models (16 to
-    // 21), their energy (34) and that of the port (35).
-    let expected: Vec<usize> = (0..16).chain(22..34).chain([36]).collect();
+    // Tick, time, step, pose and twist; commanded and delivered; events and buttons; the grip. Not the wrench of the models (16
+    // to 21), their energy (34) and that of the port (35), and their effort (40).
+    let expected: Vec<usize> = (0..16).chain(22..34).chain(36..40).chain([41, 42]).collect();
     assert_eq!(covered_words(Coverage::Hand), expected);
 }
 

@@ -4,8 +4,8 @@
 
 use flotor_core::limits::{Boundary, Limits};
 use flotor_core::mapping::{Blend, Mapping, MappingConfig};
-use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{LoopConfig, SampledLoop};
+use flotor_loader::Plugin;
 use flotor_servo::{
     Engine, Envelope, Forces, Guarded, Layer, Loop, ParameterQueue, RunConfig, Schedule, Standby, StopSwitch,
     TimeBudget, swap_queues,
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         looped
             .advance(&StopSwitch::default(), |record| peak_n = peak_n.max(record.commanded.force().length()));
     }
-    stoppers.iter().for_each(flotor_hal::abi::loader::Stopper::safe_stop);
+    stoppers.iter().for_each(flotor_loader::Stopper::safe_stop);
     println!("ended as {:?}; largest force on the hand {peak_n:.3} N", looped.end());
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Time budget of a model: a model with too many overruns is faded out and reported.
 
 use super::clock::monotonic_ns;
+use flotor_core::health::Overrun;
 
 /// Tolerated excess of slow ticks over ticks in time. A single slow tick is more likely caused by the machine than by the model; a
 /// model that is slow in most ticks is soon disabled, even without many slow ticks in a row.
@@ -38,17 +39,6 @@ pub struct TimeBudget {
     /// Tick and time at which the model was disabled.
     disabled_at: Option<(u64, u64)>,
     longest_ns: u64,
-}
-
-/// Reason for which a model was disabled: too many steps longer than the time limit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Overrun {
-    /// Last tick in which the model was stepped.
-    pub tick: u64,
-    /// Longest step, ns.
-    pub longest_ns: u64,
-    /// Time limit of a step, ns.
-    pub limit_ns: u64,
 }
 
 impl TimeBudget {

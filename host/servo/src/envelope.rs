@@ -14,13 +14,15 @@ mod slew;
 use super::boundary::BoundaryWall;
 use super::passivity::Passivity;
 use super::state::Gate;
+use flotor_core::grip::GripRecord;
+use flotor_core::grip_guard::GripGuard;
 use flotor_core::limits::{Bound, Boundary, Limits};
 use flotor_core::oscillation::Oscillation;
 use flotor_core::region::Region;
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::Events;
 use flotor_coupling::port_energy::{Controller, PortObserver};
-use flotor_hal::{Capabilities, DVec3, DeviceState, Tick, Twist, Wrench};
+use flotor_hal::{Capabilities, DVec3, DeviceState, GripAxis, Tick, Twist, Wrench};
 use slew::SlewLimit;
 
 /// Effect of a stage of the envelope over a run.
@@ -60,6 +62,8 @@ pub struct Envelope {
     oscillation: Oscillation,
     period_ns: u64,
     last: Wrench,
+    /// Limits of the grip; `None` for a device without one.
+    pub(super) grip: Option<GripGuard>,
 }
 
 impl Envelope {
@@ -91,7 +95,13 @@ impl Envelope {
             oscillation: Oscillation::NONE,
             period_ns,
             last: Wrench::ZERO,
+            grip: None,
         }
+    }
+
+    /// Adds the limits of a declared grip under the limits of a scene. Not real-time.
+    pub fn with_grip(self, grip: Option<GripAxis>, limits: &Limits) -> Self {
+        Self { grip: grip.map(|axis| GripGuard::new(axis, limits)), ..self }
     }
 
     /// Returns the limits of force (N) and torque (N·m) at the hand: the tighter limits of scene and device.
@@ -123,6 +133,13 @@ impl Envelope {
         let sent = self.limit_slew(passive, &state.twist, tick, events);
         self.last = sent;
         sent
+    }
+
+    /// Passes the models' effort at a grip through its limits and stores the effort to command. Real-time: bounded, no allocation.
+    pub fn apply_grip(&mut self, grip: &mut GripRecord, gate: Gate, tick: &Tick, events: &mut Events) {
+        let dt_s = self.slew_time_ns(tick) as f64 * 1.0e-9;
+        grip.commanded =
+            self.grip.as_mut().map_or(0.0, |guard| guard.limit(grip.model, gate.models, dt_s, events));
     }
 
     /// Returns the energy that the hand has put into the device's port less the energy that it received, J; negative: the loop has

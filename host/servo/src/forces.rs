@@ -3,9 +3,11 @@
 //! Servo and replay run the same code, so that a replay can be bit-exact.
 
 use super::Heartbeat;
-use super::models::{Layer, LayerReport, ModelHealth, ModelStack, Replacement, Slot};
+use super::models::{Contribution, Layer, LayerReport, ModelStack, Replacement, Slot, StepContext};
 use flotor_core::ModelOutputs;
 use flotor_core::demand::TickDemand;
+use flotor_core::grip::GripRecord;
+use flotor_core::health::ModelHealth;
 use flotor_core::trace::Events;
 use flotor_coupling::{
     Coupling, CouplingDescription, CouplingEnds, Line, LinkStatistics, LinkTimeouts, PortSample, Pull, Reach,
@@ -13,6 +15,7 @@ use flotor_coupling::{
 };
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
+use flotor_loader::InstanceState;
 
 /// State of one device in a tick, device frame.
 #[derive(Clone, Copy, Debug)]
@@ -21,6 +24,8 @@ pub struct Port {
     pub state: DeviceState,
     /// Wrench commanded to the device, applied until the next tick.
     pub commanded: Wrench,
+    /// Grip of the device; `None` without one.
+    pub grip: Option<GripRecord>,
     /// Model outputs that reach the hand at this device.
     at_hand: Demand,
     /// Model outputs computed in this tick.
@@ -44,6 +49,7 @@ impl Port {
         Self {
             state: DeviceState::HOME,
             commanded: Wrench::ZERO,
+            grip: None,
             at_hand,
             computed: at_hand,
             requested: Wrench::ZERO,
@@ -239,8 +245,11 @@ impl Forces {
         self.couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
         for (stack, port) in self.stacks.iter_mut().zip(&mut *ports) {
             let demand = TickDemand::new(port.at_hand, observed.limited_to(stack.observable()));
-            let (wrench, energy_j) = stack.step(tick, &port.state, demand, heartbeat, &mut port.events);
+            let sampled = port.grip.map(|grip| grip.state);
+            let context = StepContext { tick, state: &port.state, grip: sampled.as_ref(), demand };
+            let Contribution { wrench, energy_j, effort } = stack.step(&context, heartbeat, &mut port.events);
             port.take(demand, wrench, energy_j);
+            port.grip.iter_mut().for_each(|grip| grip.model = effort);
         }
         self.couplings.iter().for_each(|coupled| coupled.add_to(ports));
     }
@@ -309,8 +318,17 @@ impl Forces {
         self.slots().find_map(take)
     }
 
+    /// Iterates over the states of all instances before a tick, each with its model number; `None` for one whose state cannot be
+    /// saved. Not part of them: couplings, blends of models, and a layer that is fading out.
+    pub fn states(&mut self, tick: u64) -> impl Iterator<Item = (usize, Option<InstanceState<'_>>)> {
+        self.slots().flat_map(move |slot| {
+            let number = slot.number;
+            slot.states(tick).map(move |state| (number, state))
+        })
+    }
+
     /// Returns true while a layer is fading out. Real-time: bounded by the models, no allocation.
-    pub(crate) fn is_fading(&self) -> bool {
+    pub fn is_fading(&self) -> bool {
         self.stacks.iter().any(|stack| stack.slots.iter().any(Slot::is_fading))
     }
 

@@ -38,7 +38,7 @@ mod timing;
 mod watchdog;
 pub mod watchdog_process;
 
-pub use budget::{Overrun, TimeBudget};
+pub use budget::TimeBudget;
 pub use clock::{Clock, Due, PaceLost, Schedule, SpinWindow, monotonic_ns, sleep_until};
 pub use engine::{Engine, Stepped};
 pub use envelope::{Envelope, EnvelopeEffects, StageEffect};
@@ -46,7 +46,7 @@ pub use forces::{Coupled, CouplingOutcome, Forces, Port};
 pub use heartbeat::{Heartbeat, Place, Stuck};
 pub use hot_swap::{HostSwaps, LoopSwaps, swap_queues};
 pub use last_stop::{LastStop, Unwound};
-pub use models::{Layer, LayerReport, ModelHealth, Replacement, pushes_at_home};
+pub use models::{Layer, LayerReport, Replacement};
 pub use parameters::{
     ChangeReport, ChangeSender, PLUGIN, Pace, ParameterChange, ParameterQueue, ReportReceiver,
     ScheduledChange, WEIGHT,

@@ -17,8 +17,8 @@ use flotor_core::PluginIndex;
 use flotor_core::demand::ObserverDemand;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Tick, Wrench};
+use flotor_loader::ActiveDevice;
 
 /// Settings of the loop for one run.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +65,7 @@ impl Servo {
         Self {
             _unwound: unwound,
             _last_stop: last_stop,
-            ports: stations.iter().map(|station| Port::at_rest(station.at_hand)).collect(),
+            ports: stations.iter().map(Station::port).collect(),
             stations: stations.into(),
             parts,
             run: RunState::START,
@@ -110,6 +110,7 @@ impl Servo {
                 commanded: *commanded,
                 delivered: state.delivered,
                 port_energy_j: station.envelope.port_energy_j(),
+                grip: port.grip,
                 events,
                 buttons: state.buttons,
                 lateness_ns: due.lateness_ns.unwrap_or_default(),
@@ -225,6 +226,7 @@ impl Servo {
             heartbeat.enter(tick.index, Place::DeviceWrite(device));
             if heartbeat.is_silenced() {
                 port.commanded = Wrench::ZERO; // zeroed by the safe stop
+                port.grip.iter_mut().for_each(|grip| grip.commanded = 0.0);
                 continue;
             }
             if let Some(failed) = station.write(tick, port) {

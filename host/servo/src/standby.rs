@@ -4,8 +4,8 @@ use crate::servo::Parts;
 use crate::{Envelope, Forces, Heartbeat, LastStop, LoopSwaps, ParameterQueue, RunConfig, Servo, Station};
 use flotor_core::demand::ObserverDemand;
 use flotor_core::limits::Bound;
-use flotor_hal::abi::loader::{OpenedDevice, Stopper};
 use flotor_hal::{Capabilities, LoopConfig, Refusal};
+use flotor_loader::{OpenedDevice, Stopper};
 
 /// Opened device, not energised, with its envelope.
 pub struct Guarded {

@@ -4,12 +4,13 @@ use super::envelope::{Envelope, EnvelopeEffects};
 use super::forces::Port;
 use super::state::{Cause, Gate, RunEvent};
 use flotor_core::demand::hand_demand;
+use flotor_core::grip::GripRecord;
 use flotor_core::plausibility::{
     Implausible, ImplausibleSamples, PlausibilityCheck, Trust, normalised, stale_ticks_limit,
 };
 use flotor_core::trace::Events;
-use flotor_hal::abi::loader::ActiveDevice;
 use flotor_hal::{Axes, Capabilities, Conditions, Cycle, Demand, Fault, Tick};
+use flotor_loader::ActiveDevice;
 
 /// Timeout for a device that takes no commands, as a multiple of the sample timeout; the last command stays applied meanwhile.
 const UNTAKEN_TIMES: u32 = 10;
@@ -19,9 +20,9 @@ pub struct Station {
     pub(super) device: ActiveDevice,
     pub(super) envelope: Envelope,
     /// Model outputs that reach the hand at this device.
-    pub(super) at_hand: Demand,
+    at_hand: Demand,
     plausibility: PlausibilityCheck,
-    /// Tolerated number of consecutive ticks without a usable sample; unlimited for a device that senses no axis.
+    /// Tolerated number of consecutive ticks without a usable sample; unlimited for a device that senses nothing.
     stale_ticks_limit: u32,
     stale_ticks: u32,
     untaken_ticks_limit: u32,
@@ -65,12 +66,13 @@ impl Station {
     pub fn new(device: ActiveDevice, envelope: Envelope, told: &Capabilities, period_ns: u64) -> Self {
         let stale_ticks = stale_ticks_limit(period_ns);
         let [_, torque_nm] = envelope.most();
+        let has_samples = told.sensed != Axes::NONE || envelope.grip.is_some();
         Self {
             device,
             envelope,
             at_hand: hand_demand(&torque_nm),
             plausibility: PlausibilityCheck::new(told, period_ns),
-            stale_ticks_limit: if told.sensed == Axes::NONE { u32::MAX } else { stale_ticks },
+            stale_ticks_limit: if has_samples { stale_ticks } else { u32::MAX },
             stale_ticks: 0,
             untaken_ticks_limit: UNTAKEN_TIMES * stale_ticks,
             untaken_ticks: 0,
@@ -86,7 +88,7 @@ impl Station {
     pub(super) fn read(&mut self, tick: &Tick, port: &mut Port) -> RunEvent {
         let last = port.state;
         match self.device.read(tick, &mut port.state) {
-            Cycle::Fresh => match self.plausibility.check(tick, &port.state) {
+            Cycle::Fresh => match self.check(tick, port) {
                 Ok(()) => {
                     self.stale_ticks = 0;
                     port.state.pose = normalised(&port.state.pose);
@@ -116,6 +118,22 @@ impl Station {
         }
     }
 
+    /// Checks the new sample, and reads and checks that of a grip; stores a plausible one in the port.
+    fn check(&mut self, tick: &Tick, port: &mut Port) -> Result<(), Implausible> {
+        let Some(guard) = self.envelope.grip else { return self.plausibility.check(tick, &port.state) };
+        let grip = guard.check(self.device.read_grip(guard.axis().kind()));
+        self.plausibility.check_both(tick, &port.state, grip.map(drop))?;
+        port.grip.iter_mut().zip(grip).for_each(|(record, state)| record.state = state);
+        Ok(())
+    }
+
+    /// Returns the port of the device before the first tick.
+    pub(super) fn port(&self) -> Port {
+        let mut port = Port::at_rest(self.at_hand);
+        port.grip = self.envelope.grip.map(|guard| GripRecord::at(guard.axis().at_rest()));
+        port
+    }
+
     /// Returns the run event for the trust in the device; samples that are implausible for too long are a fault.
     #[inline]
     fn trust_event(&mut self, port: &mut Port) -> RunEvent {
@@ -128,13 +146,21 @@ impl Station {
 
     /// Limits the port's request to the wrench that may be sent. Real-time: bounded, no allocation.
     pub(super) fn limit(&mut self, tick: &Tick, gate: Gate, port: &mut Port) {
-        let Port { state, requested, commanded, events, .. } = port;
+        let Port { state, requested, commanded, grip, events, .. } = port;
         *commanded = self.envelope.apply(requested, gate, state, tick, events);
+        if let Some(grip) = grip {
+            self.envelope.apply_grip(grip, gate, tick, events);
+        }
     }
 
     /// Sends the command; returns a run event if the device faults or has not taken commands for too long. Real-time: bounded by
     /// the device, no allocation.
     pub(super) fn write(&mut self, tick: &Tick, port: &mut Port) -> Option<RunEvent> {
+        if let Some(grip) = port.grip
+            && !self.device.write_grip(grip.commanded)
+        {
+            return Some(self.failed(Fault::Broken, port));
+        }
         match self.device.write(tick, &port.commanded) {
             Cycle::Fresh => {
                 self.untaken_ticks = 0;

@@ -9,7 +9,7 @@ use super::last_stop::{SignalGuard, end_dying, is_dying, take_sent};
 use super::realtime::enter_guard_priority;
 use super::stop::StopSwitch;
 use super::watchdog_process::HeartbeatSender;
-use flotor_hal::abi::loader::Stopper;
+use flotor_loader::Stopper;
 use std::thread::JoinHandle;
 
 /// Number of polls of the watchdog per limit.

@@ -2,7 +2,7 @@
 
 use flotor_hal::Detail;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
+use flotor_loader::Model;
 
 /// Returns the error estimates of a model, each with its detail; empty if the model has none. Not real-time.
 pub fn estimates(model: &mut Model) -> Vec<(Detail, f64)> {

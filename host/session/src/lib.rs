@@ -17,7 +17,6 @@
 pub mod calibration_file;
 mod calls;
 mod estimates;
-mod feel;
 pub mod headless;
 mod long_call;
 mod measurements;

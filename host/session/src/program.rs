@@ -14,9 +14,10 @@ use crate::scene::{ModelUse, Scene};
 use flotor_core::mapping::Mapping;
 use flotor_core::words::{Decoder, Encoder};
 use flotor_core::{fade, lock, to_ns};
-use flotor_hal::abi::{Entry, model_entry};
+use flotor_hal::abi::{Entry, Extensions, Interface, model_entry_with};
 use flotor_hal::{
-    Demand, ForceModel, Input, Memory, ModelInfo, Output, Parameter, Refusal, Settings, StepStatus, Wrench,
+    Demand, ForceModel, GripModel, GripState, Input, Memory, ModelInfo, Output, Parameter, Refusal, Settings,
+    StepStatus, Wrench,
 };
 use flotor_sync::{Observer, Publisher, Words, latest};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
@@ -26,7 +27,14 @@ use std::sync::{Arc, Mutex};
 pub const ID: &str = "program";
 
 /// Plugin entry of the model, for a registry. `create` fails unless a free [`Port`] has the number of the parameter `port`.
-pub static ENTRY: Entry = model_entry::<ProgramModel>();
+pub static ENTRY: Entry = model_entry_with::<ProgramModel, Offered>();
+
+/// Extensions of the model.
+struct Offered;
+
+impl Extensions<ProgramModel> for Offered {
+    const LIST: &'static [Interface<ProgramModel>] = &[flotor_hal::extension::grip::offer()];
+}
 
 /// Scene text with the model, added to devices without such a model.
 const MODEL: &str = "[device]\nplugin = \"none\"\n[[model]]\nplugin = \"program\"\n";
@@ -38,6 +46,8 @@ const RAMP_MS: f64 = 200.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Command {
     wrench: Wrench,
+    /// Effort at the grip of the device, N or N·m.
+    effort: f64,
     /// Number of commands so far; distinguishes a repeated wrench, whose validity starts again.
     commands: u64,
     /// Number of times that force was enabled and disabled; odd: enabled.
@@ -46,20 +56,26 @@ struct Command {
     valid_ns: u64,
 }
 
-impl Words<9> for Command {
+impl Words<COMMAND_WORDS> for Command {
     #[inline]
-    fn to_words(&self) -> [u64; 9] {
-        Encoder::of_zeros().wrench(&self.wrench).words([self.commands, self.gate, self.valid_ns]).finish()
+    fn to_words(&self) -> [u64; COMMAND_WORDS] {
+        let Self { wrench, effort, commands, gate, valid_ns } = self;
+        Encoder::of_zeros().wrench(wrench).words([*commands, *gate, *valid_ns]).numbers([*effort]).finish()
     }
 
     #[inline]
-    fn from_words(words: &[u64; 9]) -> Self {
+    fn from_words(words: &[u64; COMMAND_WORDS]) -> Self {
         let mut words = Decoder::of(words);
-        Self { wrench: words.wrench(), commands: words.word(), gate: words.word(), valid_ns: words.word() }
+        let (wrench, commands, gate, valid_ns) = (words.wrench(), words.word(), words.word(), words.word());
+        let [effort] = words.numbers();
+        Self { wrench, effort, commands, gate, valid_ns }
     }
 }
 
-const NO_COMMAND: Command = Command { wrench: Wrench::ZERO, commands: 0, gate: 0, valid_ns: 0 };
+/// Number of words of a command.
+const COMMAND_WORDS: usize = 10;
+
+const NO_COMMAND: Command = Command { wrench: Wrench::ZERO, effort: 0.0, commands: 0, gate: 0, valid_ns: 0 };
 
 /// Counters of the commands of a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,7 +98,7 @@ struct Lapses {
 
 /// Model side of a port, free until a model is created with its number.
 struct ModelEnd {
-    command: Observer<Command, 9>,
+    command: Observer<Command, COMMAND_WORDS>,
     lapses: Arc<Lapses>,
 }
 
@@ -99,7 +115,7 @@ pub struct NotFinite;
 #[derive(Debug)]
 pub struct Port {
     number: u32,
-    command: Mutex<(Command, Publisher<Command, 9>)>,
+    command: Mutex<(Command, Publisher<Command, COMMAND_WORDS>)>,
     refused: AtomicU64,
     lapses: Arc<Lapses>,
 }
@@ -127,12 +143,20 @@ impl Port {
     /// # Errors
     /// [`NotFinite`]; the previous wrench stays until it expires.
     pub fn command(&self, wrench: &Wrench) -> Result<(), NotFinite> {
-        if !wrench.is_finite() {
+        self.command_with_grip(wrench, 0.0)
+    }
+
+    /// Commands a wrench as [`Self::command`] does, and the effort at the device's grip, N or N·m, in the scale of the model.
+    ///
+    /// # Errors
+    /// [`NotFinite`]; the previous command stays until it expires.
+    pub fn command_with_grip(&self, wrench: &Wrench, effort: f64) -> Result<(), NotFinite> {
+        if !(wrench.is_finite() && effort.is_finite()) {
             self.refused.fetch_add(1, Ordering::Relaxed);
             return Err(NotFinite);
         }
         self.change(|command| {
-            command.wrench = *wrench;
+            (command.wrench, command.effort) = (*wrench, effort);
             command.commands += 1;
         });
         Ok(())
@@ -147,7 +171,7 @@ impl Port {
     pub fn disable(&self) {
         self.change(|command| {
             command.gate += command.gate % 2;
-            command.wrench = Wrench::ZERO;
+            (command.wrench, command.effort) = (Wrench::ZERO, 0.0);
         });
     }
 
@@ -252,6 +276,8 @@ struct ProgramModel {
     since_ns: u64,
     rise_ns: u64,
     has_lapsed: bool,
+    /// Part of the command that the last step passed, 0 to 1.
+    passed: f64,
 }
 
 /// Returns the description of a time parameter, ms, `least` to a minute.
@@ -304,6 +330,7 @@ impl ForceModel for ProgramModel {
             since_ns: 0,
             rise_ns: 0,
             has_lapsed: false,
+            passed: 0.0,
         })
     }
 
@@ -316,15 +343,16 @@ impl ForceModel for ProgramModel {
             self.version = version;
             self.follow(command, now_ns);
         }
-        let Command { wrench, gate, valid_ns, .. } = self.command;
-        if gate.is_multiple_of(2) || wrench == Wrench::ZERO {
-            self.has_lapsed = false;
+        let Command { wrench, effort, gate, valid_ns, .. } = self.command;
+        if gate.is_multiple_of(2) || wrench == Wrench::ZERO && effort == 0.0 {
+            (self.has_lapsed, self.passed) = (false, 0.0);
             return Wrench::ZERO.into();
         }
         let valid_ns = if valid_ns == 0 { self.valid_ns } else { valid_ns };
         let over_ns = now_ns.saturating_sub(self.commanded_ns).saturating_sub(valid_ns);
         let risen = fade(now_ns.saturating_sub(self.since_ns), self.rise_ns);
         if over_ns == 0 {
+            self.passed = risen;
             return (wrench * risen).into();
         }
         if !self.has_lapsed {
@@ -333,6 +361,7 @@ impl ForceModel for ProgramModel {
         }
         self.end.lapses.ticks.fetch_add(1, Ordering::Relaxed);
         let left = risen * (1.0 - fade(over_ns, self.fade_ns));
+        self.passed = left;
         Output::new(wrench * left, f64::NAN, StepStatus::OutOfDomain)
     }
 
@@ -340,6 +369,12 @@ impl ForceModel for ProgramModel {
         let ms = |ns: u64| ns as f64 * 1.0e-6;
         let values = [f64::NAN, ms(self.valid_ns), ms(self.fade_ns), ms(self.ramp_ns)];
         values.get(index).copied().unwrap_or(f64::NAN)
+    }
+}
+
+impl GripModel for ProgramModel {
+    fn grip(&mut self, _: &Input, _: &GripState) -> f64 {
+        self.command.effort * self.passed
     }
 }
 
@@ -365,8 +400,8 @@ impl ProgramModel {
 mod tests {
     use super::*;
     use flotor_hal::abi::CallStatus;
-    use flotor_hal::abi::loader::{Model, Plugin, Setting};
-    use flotor_hal::{DVec3, Pose};
+    use flotor_hal::{DVec3, GripKind, Pose};
+    use flotor_loader::{Model, Plugin, Setting};
 
     const PUSH: Wrench = Wrench { force_n: [1.0, -2.0, 3.0], torque_nm: [0.1, 0.0, 0.0] };
 
@@ -437,6 +472,30 @@ mod tests {
         port.command(&PUSH).expect("it is finite");
         assert_eq!(at(&mut model, 401).0.force(), DVec3::ZERO, "from zero");
         assert_eq!(at(&mut model, 451).0, PUSH, "and back in 50 ms");
+    }
+
+    #[test]
+    fn an_effort_without_a_wrench_is_enabled_expires_and_fades_as_a_wrench() {
+        let (port, mut model) = connected();
+        let mut effort = |port: &Port, time_ms: u64, commanded: Option<f64>| {
+            if let Some(effort) = commanded {
+                port.command_with_grip(&Wrench::ZERO, effort).expect("it is finite");
+            }
+            at(&mut model, time_ms);
+            let grip = GripState::new(GripKind::Linear, 0.01, 0.0);
+            model.grip(&Input::at_rest(Pose::HOME), &grip)
+        };
+        assert_eq!(effort(&port, 0, Some(-2.0)), 0.0, "not enabled");
+        port.enable();
+        let rising: Vec<f64> = (1..=201).map(|time_ms| effort(&port, time_ms, Some(-2.0))).collect();
+        assert!(rising.is_sorted_by(|before, after| before >= after), "{rising:?}");
+        assert_eq!((rising.first(), rising.last()), (Some(&0.0), Some(&-2.0)));
+        assert_eq!(effort(&port, 251, None), -2.0, "50 ms after the last one");
+        assert!((effort(&port, 276, None) + 1.0).abs() < 1.0e-12, "half of the fade");
+        assert_eq!(effort(&port, 301, None), 0.0);
+        assert_eq!(port.command_with_grip(&Wrench::ZERO, f64::NAN), Err(NotFinite));
+        port.disable();
+        assert_eq!(effort(&port, 302, None), 0.0);
     }
 
     #[test]

@@ -21,7 +21,6 @@ pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -
         device: used.device,
         places_m: used.places_m.clone(),
         blend: used.blend,
-        field: used.field,
         ..describe_plugin(&used.plugin, Role::Model(used.mapping), report)
     });
     RunDescription {
@@ -48,7 +47,7 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         device: 0,
         places_m: Vec::new(),
         blend: Blend::default(),
-        field: None,
+        field: report.field,
         latency_s: report.latency_s,
         at_hand: report.at_hand,
         settings: settings.collect(),

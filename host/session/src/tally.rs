@@ -1,9 +1,9 @@
 //! Tick statistics of a run for its summary, from the tick records, in constant memory.
 
 use crate::Observer;
-use crate::feel::Feel;
+use flotor_core::feel::Feel;
 use flotor_core::trace::{Events, TickRecord};
-use flotor_hal::{DVec3, Demand};
+use flotor_hal::{DVec3, Demand, GripKind};
 
 /// Observer that collects the tick statistics for the summary of a run.
 #[derive(Default)]
@@ -24,6 +24,8 @@ pub struct Tally {
 pub(crate) struct DeviceTally {
     pub(crate) peak_force_n: f64,
     pub(crate) peak_torque_nm: f64,
+    /// Largest magnitude of the commanded effort at the grip, N or N·m.
+    peak_effort: f64,
     last: Option<TickRecord>,
     balance: LoopBalance,
     pub(crate) port_lowest_j: f64,
@@ -34,10 +36,18 @@ impl DeviceTally {
     fn observe(&mut self, record: &TickRecord) {
         self.peak_force_n = self.peak_force_n.max(record.commanded.force().length());
         self.peak_torque_nm = self.peak_torque_nm.max(record.commanded.torque().length());
+        let effort = record.grip.map_or(0.0, |grip| grip.commanded.abs());
+        self.peak_effort = self.peak_effort.max(effort);
         self.feel.observe(record);
         self.balance.observe(self.last.as_ref(), record);
         self.port_lowest_j = self.port_lowest_j.min(record.port_energy_j);
         self.last = Some(*record);
+    }
+
+    /// Returns the largest effort at a grip of this kind; `None` without one.
+    pub(crate) fn peak_effort(&self, kind: GripKind) -> Option<f64> {
+        let grip = self.last.as_ref()?.grip?;
+        (grip.state.kind() == kind).then_some(self.peak_effort)
     }
 
     pub(crate) fn port_energy_j(&self) -> f64 {

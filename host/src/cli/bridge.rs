@@ -20,7 +20,8 @@ pub(super) struct Way {
     /// With zenoh/NAME: Zenoh configuration with keys, see `flotor bridge keys`
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// With zenoh/NAME: endpoint to connect to, such as tls/lab.example.org:7447 (repeatable)
+    /// With zenoh/NAME: endpoint to connect to, such as tls/lab.example.org:7447 (repeatable; default: those in --config,
+    /// else the bridges of this user)
     #[arg(long, value_name = "ENDPOINT")]
     connect: Vec<String>,
 }

@@ -133,10 +133,10 @@ enum Command {
     Lend(Separate),
     /// Check this machine's real-time configuration and suggest fixes
     Doctor(doctor::DoctorArguments),
-    /// Process with one force model, started by `run` for `isolation = "process"`
+    /// Process with one force model, started by the host of a run for `isolation = "process"`
     #[command(hide = true)]
     Worker(worker::WorkerArguments),
-    /// Process that stops devices when the host has ended, started by `run`
+    /// Process that stops devices when the host has ended, started by the host of a run
     #[command(hide = true)]
     Watchdog(watchdog::WatchdogArguments),
     /// Print a completion script for a shell

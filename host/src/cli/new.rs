@@ -1,11 +1,10 @@
 //! `flotor new`: creates the folder of a plugin, or the scene of a mesh file.
 
 use crate::cli::object::object_scene;
-use crate::scaffold::{Contract, Language, PluginName, Scaffold, ScaffoldError, scaffold};
+use crate::scaffold::{Contract, Language, PluginName, Scaffold, ScaffoldError, Template, scaffold};
 use clap::{Args, ValueEnum};
 use flotor_command::say;
 use flotor_command::{CommandError, command_line, quoted, style};
-use flotor_hal::abi::PluginKind;
 use flotor_session::registry::Registry;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -13,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Create a plugin: a folder that builds, passes `validate` and runs; or the scene of a mesh file.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  flotor new model jelly\n  flotor new device crank\n  \
-    flotor new model jelly --language c\n  flotor new model jelly --vendor\n  \
+    flotor new model jelly --language c\n  flotor new model jelly --beside\n  flotor new model jelly --vendor\n  \
     flotor new scene duck --object duck.stl\n\nCreates the folder ./NAME with a plugin that builds, passes \
     `flotor validate` and runs in the scene of the same folder; of a scene, the file \
     ./NAME.toml.\nIt overwrites no file.")]
@@ -26,6 +25,9 @@ pub(crate) struct NewArguments {
     /// With `scene`: mesh file (STL, OBJ, PLY, GLB) that the scene touches
     #[arg(long, value_name = "FILE")]
     object: Option<PathBuf>,
+    /// A model too slow for the loop: it computes asynchronously and publishes contacts
+    #[arg(long)]
+    beside: bool,
     /// Programming language
     #[arg(long, value_enum, default_value = "rust")]
     language: Language,
@@ -50,16 +52,21 @@ enum Kind {
 
 pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
     let name = PluginName::new(&arguments.name).map_err(ScaffoldError::from)?;
-    let kind = match (arguments.kind, &arguments.object) {
-        (Kind::Model, None) => PluginKind::Model,
-        (Kind::Device, None) => PluginKind::Device,
-        (Kind::Scene, Some(file)) => return new_scene(&name, file),
-        (Kind::Scene, None) => {
+    let template = match (arguments.kind, arguments.beside, &arguments.object) {
+        (Kind::Model, false, None) => Template::Model,
+        (Kind::Model, true, None) => Template::AsynchronousModel,
+        (Kind::Device, false, None) => Template::Device,
+        (Kind::Scene, false, Some(file)) => return new_scene(&name, file),
+        (Kind::Scene, _, None) => {
             return Err(CommandError::Usage(
                 "`flotor new scene` needs a mesh file: add `--object FILE`".to_owned(),
             ));
         }
-        (_, Some(_)) => {
+        (Kind::Device | Kind::Scene, true, _) => {
+            let problem = "`--beside` is for models: the loop reads and writes a device in every tick; omit it";
+            return Err(CommandError::Usage(problem.to_owned()));
+        }
+        (Kind::Model | Kind::Device, _, Some(_)) => {
             return Err(CommandError::Usage(
                 "only a scene has an object: omit `--object`, or use `flotor new scene`".to_owned(),
             ));
@@ -68,7 +75,7 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
     refuse_an_id_in_use(&name)?;
     let sources = if arguments.vendor { Contract::copied } else { Contract::of_installation };
     let contract = sources(arguments.hal.as_deref())?;
-    let made = scaffold(Path::new("."), &name, kind, arguments.language, &contract)?;
+    let made = scaffold(Path::new("."), &name, template, arguments.language, &contract)?;
     report(&name, &made);
     Ok(())
 }

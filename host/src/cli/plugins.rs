@@ -5,8 +5,8 @@ use flotor_command::options::{JsonOption, KeyValue, PluginResultOptions, setting
 use flotor_command::say;
 use flotor_command::{CommandError, style, while_preparing};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{Metadata, Plugin};
 use flotor_hal::{Input, Mutability, Output, Parameter, ParameterKind, Pose, Wrench};
+use flotor_loader::{Metadata, Plugin};
 use flotor_session::estimates;
 use flotor_session::registry::{Findings, PATH_VARIABLE, Registry, SkippedFolder, installation_is_unknown};
 use serde::Serialize;

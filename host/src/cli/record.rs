@@ -62,8 +62,8 @@ fn record_local(out: &Path) -> Result<(), CommandError> {
     let printed = report_line(format_args!("{}: {ticks} ticks{lost}; {words}", out.display()));
     let whole = end.map(drop).map_err(|_| {
         CommandError::Failed(
-            "the connection was lost before the end of the run, so the recording is incomplete; the file \
-             contains the ticks received until then. To record without a connection, use `flotor run --record`"
+            "the connection was lost, or a message was malformed, before the end of the run, so the recording is incomplete; \
+             the file contains the ticks received until then. To record without a connection, use `flotor run --record`"
                 .to_owned(),
         )
     });

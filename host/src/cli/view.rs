@@ -59,7 +59,8 @@ pub(crate) struct ViewArguments {
     /// With --screenshot: draw a screen of a sitting, as `flotor study --screen json` writes it
     #[arg(long, value_name = "JSON", requires = "screenshot", conflicts_with_all = ["window", "view", "traces", "force_position", "device", "arrow_force"])]
     screen: Option<String>,
-    /// With --screen: file with the texts of the screens in another language (default: English)
+    /// With --screen: file (TOML) with the texts of the screens in another language: a translated copy of viewer/texts/english.toml,
+    /// with all its keys (default: English)
     #[arg(long, value_name = "FILE", requires = "screen")]
     texts: Option<String>,
     /// Device of the recording whose numbers and traces are shown, where there are several (default: the first)

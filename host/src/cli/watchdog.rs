@@ -1,4 +1,4 @@
-//! `flotor watchdog`: the process that stops devices when the host is gone, started by `flotor run`.
+//! `flotor watchdog`: the process that stops devices when the host is gone, started by the host of a run.
 
 use clap::Args;
 use flotor_command::{CommandError, stopping};
@@ -15,7 +15,6 @@ pub(super) struct WatchdogArguments {
 pub(super) fn run(arguments: WatchdogArguments) -> Result<(), CommandError> {
     // A signal to all processes of a run ends the host; this process must survive to stop the devices.
     stopping::outlive_signals();
-    let refused =
-        |error| CommandError::Usage(format!("`flotor watchdog` is started by `flotor run`: {error}"));
+    let refused = |error| CommandError::Usage(format!("`flotor watchdog` is started by a host: {error}"));
     watchdog_process::serve(arguments.host).map_err(refused)
 }

@@ -1,4 +1,4 @@
-//! `flotor worker`: the process of one isolated force model, started by `flotor run`.
+//! `flotor worker`: the process of one isolated force model, started by the host of a run.
 
 use clap::Args;
 use flotor_command::CommandError;
@@ -29,5 +29,5 @@ pub(super) fn run(arguments: WorkerArguments) -> Result<(), CommandError> {
     // Signals end a worker like any process; the signals of a terminal do not reach its separate process group.
     let WorkerArguments { plugin, host, period_ns, seed, sets } = arguments;
     process::serve(&process::WorkerArguments { plugin, host, period_ns, seed, sets }, load_file)
-        .map_err(|error| CommandError::Usage(format!("`flotor worker` is started by `flotor run`: {error}")))
+        .map_err(|error| CommandError::Usage(format!("`flotor worker` is started by a host: {error}")))
 }

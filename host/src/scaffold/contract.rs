@@ -115,7 +115,8 @@ impl ContractFolder {
         };
         let found = candidates.iter().find(is_contract).and_then(|folder| canonical(folder).ok());
         found.map(Self).ok_or_else(|| {
-            ScaffoldError::NoContract(candidates.last().map_or_else(PathBuf::new, |last| plain(last)))
+            let missing = named.map_or_else(|| own.join("../..").join(INSTALLED), Path::to_path_buf);
+            ScaffoldError::NoContract(plain(&missing))
         })
     }
 

@@ -28,7 +28,7 @@ pub enum ScaffoldError {
         .0.display()
     )]
     InsideWorkspace(PathBuf),
-    /// The contract's sources were not found; the path is the last folder searched.
+    /// The contract's sources were not found; the path is the named folder, or else that of an installation.
     #[error(
         "the sources of the contract (manifest and `src/` of flotor-hal) are not at {}; give their folder, such as \
          `share/flotor/hal` of an installation, with --hal PATH",
@@ -44,12 +44,12 @@ pub enum ScaffoldError {
         reason: String,
     },
     /// A path is not valid UTF-8, or has characters that cargo's configuration cannot hold.
-    #[error("{}: the path is not valid UTF-8, or has a double quote, a backslash or a line break; use another folder", .0.display())]
+    #[error("{}: the path is not valid UTF-8, or has a double quote, a backslash or a line break; move the sources to another folder, or copy them with --vendor", .0.display())]
     NotText(PathBuf),
-    /// A file cannot be read.
-    #[error("{}: cannot read the file: {cause}; check its permissions", path.display())]
+    /// A file or folder of the contract cannot be read.
+    #[error("{}: cannot read: {cause}; check its permissions, or give the folder of complete sources with --hal PATH", path.display())]
     Read {
-        /// Path of the file.
+        /// Path of the file or folder.
         path: PathBuf,
         /// Error of the system.
         cause: std::io::Error,

@@ -14,11 +14,22 @@ pub use contract::{Contract, ContractFolder};
 pub use error::ScaffoldError;
 pub use name::{NameError, PluginName};
 
-use crate::platform::C_COMPILER;
-use flotor_hal::abi::{C_HEADER, PluginKind};
+use crate::platform::{C_COMPILER, canonical};
+use flotor_hal::abi::C_HEADER;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 use vendor::write_file;
+
+/// What a new plugin is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Template {
+    /// Model that computes a wrench in every tick.
+    Model,
+    /// Model that computes contacts asynchronously, at a rate of its own.
+    AsynchronousModel,
+    /// Device.
+    Device,
+}
 
 /// Programming language of a plugin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -42,7 +53,7 @@ pub struct Scaffold {
     pub library: String,
 }
 
-/// Creates the plugin `parent/NAME` from the templates for its kind and language. Not real-time.
+/// Creates the plugin `parent/NAME` from the files of a template in a language. Not real-time.
 ///
 /// # Errors
 /// If the name clashes with a type of the template, the folder exists (it is not changed) or belongs to Flotor's workspace, path or
@@ -50,24 +61,24 @@ pub struct Scaffold {
 pub fn scaffold(
     parent: &Path,
     name: &PluginName,
-    kind: PluginKind,
+    template: Template,
     language: Language,
     contract: &Contract,
 ) -> Result<Scaffold, ScaffoldError> {
     let text = Placeholders::new(name, language, contract);
-    let files = files(kind, language);
+    let files = files(template, language);
     if files.iter().any(|(path, source)| path.ends_with(".rs") && text.clashes_with(source)) {
         return Err(ScaffoldError::Clash { id: name.id().to_owned(), type_name: name.type_name() });
     }
     if contract.has_as_member(parent) {
-        return Err(ScaffoldError::InsideWorkspace(parent.into()));
+        return Err(ScaffoldError::InsideWorkspace(canonical(parent).unwrap_or_else(|_| parent.into())));
     }
     let folder = parent.join(name.id());
     make_folder(&folder)?;
     let mut written = Vec::new();
-    for (path, template) in files {
+    for (path, source) in files {
         let path = text.fill(path);
-        write_file(&folder.join(&path), &text.fill(template))?;
+        write_file(&folder.join(&path), &text.fill(source))?;
         written.push(path);
     }
     if language == Language::Rust {
@@ -82,10 +93,12 @@ pub fn scaffold(
 }
 
 /// Returns path and template of each file of a plugin; the file to edit comes first.
-fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'static str)] {
+fn files(template: Template, language: Language) -> &'static [(&'static str, &'static str)] {
     const IGNORE: (&str, &str) = (".gitignore", "/target\n/ANY_LIBRARY\n/.cargo/config.toml\n");
     const HEADER: (&str, &str) = ("flotor.h", C_HEADER);
     const MODEL_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/model-scene.toml"));
+    const SLOW_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/asynchronous-scene.toml"));
+    const SLOW_TEST: (&str, &str) = ("your-name.test.toml", include_str!("templates/asynchronous-test.toml"));
     const DEVICE_SCENE: (&str, &str) = ("scene.toml", include_str!("templates/device-scene.toml"));
     const MODEL_TEST: (&str, &str) = ("your-name.test.toml", include_str!("templates/model-test.toml"));
     const MODEL_CURVE: (&str, &str) = ("your-name.csv", include_str!("templates/model.csv"));
@@ -93,21 +106,29 @@ fn files(kind: PluginKind, language: Language) -> &'static [(&'static str, &'sta
     const DEVICE_TEST: (&str, &str) = ("your-name.test.toml", include_str!("templates/device-test.toml"));
     const MANIFEST: (&str, &str) = ("Cargo.toml", include_str!("templates/rust/manifest.toml"));
     const STYLE: (&str, &str) = ("rustfmt.toml", "max_width = 110\nuse_small_heuristics = \"Max\"\n");
-    match (kind, language) {
-        (PluginKind::Model, Language::Rust) => {
+    match (template, language) {
+        (Template::Model, Language::Rust) => {
             const MODEL: (&str, &str) = ("src/lib.rs", include_str!("templates/rust/model.rs"));
             const SHAPE: (&str, &str) = ("src/shape.rs", include_str!("templates/rust/shape.rs"));
             &[MODEL, SHAPE, MODEL_SCENE, MODEL_TEST, MODEL_CURVE, WORKFLOW, MANIFEST, STYLE, IGNORE]
         }
-        (PluginKind::Device, Language::Rust) => {
+        (Template::AsynchronousModel, Language::Rust) => {
+            const MODEL: (&str, &str) = ("src/lib.rs", include_str!("templates/rust/asynchronous.rs"));
+            &[MODEL, SLOW_SCENE, SLOW_TEST, WORKFLOW, MANIFEST, STYLE, IGNORE]
+        }
+        (Template::Device, Language::Rust) => {
             const DEVICE: (&str, &str) = ("src/lib.rs", include_str!("templates/rust/device.rs"));
             &[DEVICE, DEVICE_SCENE, DEVICE_TEST, WORKFLOW, MANIFEST, STYLE, IGNORE]
         }
-        (PluginKind::Model, Language::C) => {
+        (Template::Model, Language::C) => {
             const MODEL: (&str, &str) = ("plugin.c", include_str!("templates/c/model.c"));
             &[MODEL, MODEL_SCENE, MODEL_TEST, MODEL_CURVE, WORKFLOW, HEADER, IGNORE]
         }
-        (PluginKind::Device, Language::C) => {
+        (Template::AsynchronousModel, Language::C) => {
+            const MODEL: (&str, &str) = ("plugin.c", include_str!("templates/c/asynchronous.c"));
+            &[MODEL, SLOW_SCENE, SLOW_TEST, WORKFLOW, HEADER, IGNORE]
+        }
+        (Template::Device, Language::C) => {
             const DEVICE: (&str, &str) = ("plugin.c", include_str!("templates/c/device.c"));
             &[DEVICE, DEVICE_SCENE, DEVICE_TEST, WORKFLOW, HEADER, IGNORE]
         }
@@ -174,8 +195,11 @@ mod tests {
 
     #[test]
     fn a_useful_model_takes_forty_lines() {
-        let lines = useful_lines(include_str!("templates/rust/model.rs"));
-        assert!((10..=40).contains(&lines), "{lines} lines");
+        for template in [Template::Model, Template::AsynchronousModel] {
+            let [(_, source), ..] = files(template, Language::Rust) else { panic!("no file to edit") };
+            let lines = useful_lines(source);
+            assert!((10..=40).contains(&lines), "{template:?}: {lines} lines");
+        }
     }
 
     #[test]
@@ -183,9 +207,9 @@ mod tests {
         let name = PluginName::new("soft-wall").unwrap();
         for language in [Language::Rust, Language::C] {
             let text = Placeholders::new(&name, language, &Contract::Published);
-            let kinds = [PluginKind::Model, PluginKind::Device];
-            for (path, template) in kinds.into_iter().flat_map(|kind| files(kind, language)) {
-                let filled = text.fill(template);
+            let templates = [Template::Model, Template::AsynchronousModel, Template::Device];
+            for (path, source) in templates.into_iter().flat_map(|template| files(template, language)) {
+                let filled = text.fill(source);
                 for placeholder in text.0.iter().map(|(placeholder, _)| placeholder) {
                     assert!(!filled.contains(placeholder), "{path} still says {placeholder}");
                 }

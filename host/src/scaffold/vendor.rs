@@ -51,19 +51,12 @@ fn copy(from: &Path, to: &Path) -> Result<(), ScaffoldError> {
 fn standalone(manifest: &str, workspace: &str) -> Result<String, String> {
     let parsed = |text: &str| text.parse::<Table>().map_err(|error| error.to_string());
     let (mut manifest, workspace) = (parsed(manifest)?, parsed(workspace)?);
-    // These sections serve the development of the contract only.
+    // The lints serve the development of the contract only.
     manifest.remove("lints");
-    manifest.remove("example");
     let shared = |section: &str| workspace.get("workspace")?.get(section)?.as_table();
     for section in ["package", "dependencies"] {
         let Some(entries) = manifest.get_mut(section).and_then(Value::as_table_mut) else { continue };
         write_out(entries, shared(section))?;
-    }
-    // Dependencies for single platforms.
-    let systems = manifest.get_mut("target").and_then(Value::as_table_mut).into_iter().flatten();
-    for (_, system) in systems {
-        let Some(entries) = system.get_mut("dependencies").and_then(Value::as_table_mut) else { continue };
-        write_out(entries, shared("dependencies"))?;
     }
     Ok(manifest.to_string())
 }
@@ -110,14 +103,12 @@ mod tests {
         let workspace = "[workspace.package]\nedition = \"2024\"\n[workspace.dependencies]\na = \"1.2\"\n\
                          b = { version = \"3\", features = [\"x\"] }\n";
         let manifest = "[package]\nname = \"m\"\nedition.workspace = true\n[dependencies]\na = { workspace = true, \
-                        optional = true }\nb.workspace = true\nc = \"4\"\n\
-                        [target.'cfg(unix)'.dependencies]\nb = { workspace = true, features = [\"y\"] }\n\
-                        [[example]]\nname = \"e\"\n[lints]\nworkspace = true\n";
+                        optional = true }\nb = { workspace = true, features = [\"y\"] }\nc = \"4\"\n\
+                        [lints]\nworkspace = true\n";
         let written: Table = standalone(manifest, workspace).unwrap().parse().unwrap();
         let expected: Table =
             "[package]\nname = \"m\"\nedition = \"2024\"\n[dependencies]\na = { version = \"1.2\", \
-                               optional = true }\nb = { version = \"3\", features = [\"x\"] }\nc = \"4\"\n\
-             [target.'cfg(unix)'.dependencies]\nb = { version = \"3\", features = [\"x\", \"y\"] }\n"
+                               optional = true }\nb = { version = \"3\", features = [\"x\", \"y\"] }\nc = \"4\"\n"
                 .parse()
                 .unwrap();
         assert_eq!(written, expected);

@@ -91,6 +91,17 @@ impl<T: Words<N>, const N: usize> Observer<T, N> {
         (0..READ_ATTEMPTS).find_map(|_| self.attempt())
     }
 
+    /// Returns as [`Self::read`] does, but `None` without a value later than `version`, which is then not copied.
+    ///
+    /// Real-time: bounded, no allocation.
+    #[inline]
+    #[must_use]
+    pub fn read_after(&self, version: u64) -> Option<(u64, T)> {
+        // Relaxed: only the attempts of `read` order the words.
+        let is_later = self.cell.sequence.load(Ordering::Relaxed) / 2 > version;
+        is_later.then(|| self.read()).flatten()
+    }
+
     /// Copies the value once; returns `None` if the copy overlapped with a write.
     #[inline]
     fn attempt(&self) -> Option<(u64, T)> {
@@ -136,6 +147,15 @@ mod tests {
         publisher.publish(&[20]);
         assert_eq!(first.read(), Some((2, [20])));
         assert_eq!(second.read(), Some((2, [20])));
+    }
+
+    #[test]
+    fn a_value_is_read_once_by_who_asks_for_later_ones() {
+        let (mut publisher, observer) = latest([0]);
+        assert_eq!(observer.read_after(0), None);
+        publisher.publish(&[10]);
+        assert_eq!(observer.read_after(0), Some((1, [10])));
+        assert_eq!(observer.read_after(1), None);
     }
 
     #[test]

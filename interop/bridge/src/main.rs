@@ -30,7 +30,7 @@ use std::time::Duration;
     the folder of the user's runs, and visitors connect there. For other users, `flotor bridge keys` writes keys \
     and configurations.\n\n\
     Examples:\n  \
-    flotor bridge serve --name lab                        publish every run of this machine\n  \
+    flotor bridge serve --name lab                        publish your runs on this machine\n  \
     flotor bridge list                                    bridges on the network\n  \
     flotor bridge attach lab                              then `flotor view` shows the run here\n  \
     flotor bridge record lab run.mcap\n  \

@@ -257,8 +257,9 @@ fn done(answers: &Answers) -> Result<Option<()>, String> {
     let mut is_answered = None;
     for answer in answers.iter() {
         let answer = answer.into_result().map_err(|_| NOBODY_ANSWERS)?;
-        let answer: Answer = serde_json::from_slice(&answer.payload().to_bytes())
-            .map_err(|error| format!("malformed reply: {error}; use both programs from one build"))?;
+        let answer: Answer = serde_json::from_slice(&answer.payload().to_bytes()).map_err(|error| {
+            format!("malformed reply: {error}; use the same build of Flotor as the bridge")
+        })?;
         answer.refused.map_or(Ok(()), Err)?;
         is_answered = Some(());
     }

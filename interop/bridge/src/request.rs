@@ -170,7 +170,7 @@ impl NumberedRequest {
 #[serde(rename_all = "kebab-case")]
 pub enum Refusal {
     /// Not a request, or on the wrong key.
-    #[error("the request is malformed, or has the wrong key; use both programs from one build")]
+    #[error("the request is malformed, or has the wrong key; use the same build of Flotor as the bridge")]
     Malformed,
     /// Longer than [`MAX_REQUEST_BYTES`].
     #[error("the request is longer than {MAX_REQUEST_BYTES} bytes; send fewer values at once")]

@@ -179,8 +179,14 @@ impl Lending<'_> {
         let before = std::env::var_os("LD_LIBRARY_PATH").filter(|path| !path.is_empty());
         let before = before.iter().flat_map(std::env::split_paths);
         let path = std::env::join_paths([folder.to_path_buf()].into_iter().chain(before));
-        let path =
-            path.map_err(|error| CommandError::Failed(format!("TMPDIR: {error}; choose another folder")))?;
+        // Fails only for a colon in the new folder: the others come from such a list.
+        let path = path.map_err(|_| {
+            CommandError::Failed(format!(
+                "TMPDIR: `{}` contains a colon, which separates the folders in LD_LIBRARY_PATH; set TMPDIR to another \
+                 folder",
+                folder.display()
+            ))
+        })?;
         command.env("LD_LIBRARY_PATH", path);
         if folder.join("lib").is_dir() {
             command.env("FDSDK", folder).env("FORCEDIM_SDK", folder);

@@ -52,7 +52,7 @@ impl Program {
                 (true, _) => {
                     "; the file is not executable: `chmod +x` the file, or write its interpreter before it"
                 }
-                (false, _) => "; write the program after `--`, as a path or as a name in a folder of PATH",
+                (false, _) => "; write a path, or a name in a folder of PATH",
             };
             return Err(CommandError::Usage(format!("there is no program `{}`{help}", given.display())));
         };

@@ -2,10 +2,10 @@
 
 use crate::error::refuse;
 use crate::rows::{InputRow, OutputRow};
-use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::abi::{CallStatus, PluginKind};
 use flotor_hal::{DVec3, ParameterKind};
 use flotor_lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
+use flotor_loader::{Plugin, Setting};
 use flotor_session::registry::Registry;
 use flotor_session::scene::nearest;
 use numpy::{
@@ -59,7 +59,7 @@ type Columns<'py> =
 pub(crate) struct Model {
     plugin: Plugin,
     settings: Vec<Setting>,
-    instance: Mutex<flotor_hal::abi::loader::Model>,
+    instance: Mutex<flotor_loader::Model>,
     /// Id of the process that created the model: a lock held by another thread at an `os.fork()` is never released in the child.
     process: u32,
 }
@@ -111,7 +111,7 @@ impl Model {
             CallStatus::Unsupported => Err(refuse(format!(
                 "`{id}` cannot change in an existing model; create a new model with this value"
             ))),
-            _ => Err(refuse(format!("`{id}`: {}", instance.last_message()))),
+            status => Err(refuse(format!("`{id}`: {}", instance.reason(status)))),
         }
     }
 
@@ -150,7 +150,9 @@ impl Model {
             let mut instance = self.lock()?;
             match instance.step_batch(inputs, outputs) {
                 CallStatus::Ok => Ok(()),
-                _ => Err(refuse(format!("the model failed: {}", instance.last_message()))),
+                status => {
+                    Err(refuse(format!("the model `{}` failed: {}", self.id(), instance.reason(status))))
+                }
             }
         })
     }
@@ -201,7 +203,7 @@ impl Model {
 
     /// Locks the model. Ignores poisoning: the contract reports panics of a model as a status. In a child of `os.fork()` an error
     /// instead of a wait.
-    fn lock(&self) -> PyResult<MutexGuard<'_, flotor_hal::abi::loader::Model>> {
+    fn lock(&self) -> PyResult<MutexGuard<'_, flotor_loader::Model>> {
         if self.process == std::process::id() {
             return Ok(flotor_core::lock(&self.instance));
         }

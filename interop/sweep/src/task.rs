@@ -3,9 +3,9 @@
 use crate::design::{Cell, Design, Point};
 use crate::plan::{POSE_COLUMNS, Plan, PlanError, Question};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{DVec3, Demand};
 use flotor_lab::evaluate::{Answer, Details, Evaluation, Handle, Travel};
+use flotor_loader::{Plugin, Setting};
 use flotor_session::headless;
 use flotor_session::registry::Registry;
 use flotor_session::scene::{PluginKeyValue, Scene};

@@ -31,9 +31,9 @@ pub mod verify;
 #[cfg(test)]
 mod tests;
 
-use flotor_hal::abi::loader::{LoadError, SettingError};
 use flotor_hal::{Fault, InvalidCalibration, Refusal};
-use flotor_session::RunError;
+use flotor_loader::{LoadError, SettingError};
+use flotor_session::{RunError, THREAD_ADVICE};
 
 /// Failure of a calibration.
 #[derive(Debug, thiserror::Error)]
@@ -83,12 +83,14 @@ pub enum CalibrationError {
     },
     /// The device limited the commanded force.
     #[error(
-        "the device exerts less than the {command_n} N of the plan at {height_mm:.1} mm (it is saturated): plan smaller forces \
-         (--force)"
+        "the device exerts only {delivered_n:.2} N of the planned {command_n} N at {height_mm:.1} mm, because it is saturated; \
+         plan smaller forces (--force)"
     )]
     Saturated {
         /// Commanded force, N.
         command_n: f64,
+        /// Delivered force, N.
+        delivered_n: f64,
         /// Height of the handle, mm.
         height_mm: f64,
     },
@@ -96,7 +98,7 @@ pub enum CalibrationError {
     #[error("the calibration was aborted; the handle was lowered, and no file was written")]
     Aborted,
     /// The thread that holds the handle cannot be started.
-    #[error("cannot start the thread of the holding controller: {0}; end other programs of this user")]
+    #[error("cannot start the thread of the holding controller: {0}; {THREAD_ADVICE}")]
     NoThread(std::io::Error),
     /// The emergency-stop latch is pressed, or the watchdog process cannot be started as required.
     #[error(transparent)]

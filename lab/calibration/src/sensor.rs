@@ -1,8 +1,8 @@
 //! Force sensor of a calibration: device plugin that only measures, read synchronously.
 
 use super::CalibrationError;
-use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick};
+use flotor_loader::{ActiveDevice, Plugin, Setting};
 use std::time::{Duration, Instant};
 
 /// Default plugin of a force sensor on a serial port.

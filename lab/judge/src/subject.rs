@@ -6,11 +6,11 @@
 use crate::PERIOD_NS;
 use crate::watch::enter_call;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_hal::{
     DVec3, Demand, Input, LoopConfig, Memory, Output, Pose, StepStatus, Twist,
     orientation_from_rotation_vector, rotation_vector,
 };
+use flotor_loader::{LoadError, Model, Plugin, Setting};
 
 /// Largest translation in a step of a walk, m.
 const STEP_M: f64 = 0.05e-3;
@@ -26,8 +26,16 @@ const MOST_HOLDS: usize = 2000;
 /// # Errors
 /// [`LoadError`] if the plugin is no model, or rejects the settings or the loop.
 pub fn prepared(plugin: &Plugin, settings: &[Setting], seed: u64) -> Result<Model, LoadError> {
+    prepared_for(plugin, settings, &LoopConfig { period_ns: PERIOD_NS, seed })
+}
+
+/// Creates and prepares an instance for a loop.
+///
+/// # Errors
+/// As [`prepared`].
+pub fn prepared_for(plugin: &Plugin, settings: &[Setting], config: &LoopConfig) -> Result<Model, LoadError> {
     let mut model = plugin.create_model(settings)?;
-    model.prepare(&LoopConfig { period_ns: PERIOD_NS, seed }).map_err(|refusal| {
+    model.prepare(config).map_err(|refusal| {
         let metadata = plugin.metadata();
         LoadError::Refused { path: metadata.path.clone(), id: metadata.id.clone(), refusal }
     })?;
@@ -210,8 +218,8 @@ impl<'a> Subject<'a> {
         let trouble = |kind| Err(Trouble { kind, pose: input.pose });
         let output = match call(&mut self.model, input) {
             Ok(output) => output,
-            Err(CallStatus::Panicked) => {
-                let words = self.model.last_message();
+            Err(panicked @ CallStatus::Panicked) => {
+                let words = self.model.reason(panicked);
                 self.replace();
                 return trouble(TroubleKind::Panicked(words));
             }

@@ -1,19 +1,7 @@
 //! Text form of answers of plugins, with units, for findings.
 
-use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, DeviceState, LinearField, Output, Pose, Twist, Wrench, rotation_vector};
 use std::time::Duration;
-
-/// Returns the text of a call status.
-pub(crate) fn status(status: CallStatus) -> &'static str {
-    match status {
-        CallStatus::Ok => "ok",
-        CallStatus::Panicked => "panicked",
-        CallStatus::WrongPhase => "wrong phase",
-        CallStatus::OutOfRange => "out of range",
-        CallStatus::Unsupported => "unsupported",
-    }
-}
 
 /// Returns a vector as `[x, y, z]`.
 pub(crate) fn vector(vector: DVec3) -> String {

@@ -6,10 +6,10 @@
 
 use super::PERIOD_NS;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
 use flotor_hal::{DVec3, Demand, Input, Memory, Output, Pose, StepStatus, Twist, Wrench};
 use flotor_judge::subject::{Subject, call, steps, walk};
 use flotor_judge::trajectory::at;
+use flotor_loader::{LoadError, Plugin, Setting};
 use rayon::prelude::*;
 
 /// Position and rotation vector of a handle in the model frame, m and rad.
@@ -75,9 +75,9 @@ pub enum EvaluateError {
     /// The model could not be created.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// The model panicked, with its message, and cannot be called any more.
+    /// A call of the model failed, with this reason.
     #[error("the model failed: {0}")]
-    Panicked(String),
+    Failed(String),
 }
 
 /// Maximum number of steps of a walk; a pose farther away is approached in larger steps.
@@ -102,7 +102,7 @@ impl<'a> Evaluation<'a> {
     /// `on_answer` is called once for each answer, in no particular order and from any thread. Not real-time.
     ///
     /// # Errors
-    /// [`EvaluateError`] if the model rejects its settings or panics.
+    /// [`EvaluateError`] if the model rejects its settings or fails.
     pub fn answers(
         &self,
         handles: &[Handle],
@@ -167,8 +167,9 @@ impl Walker<'_> {
         let mut outputs = vec![Output::default(); BATCH];
         for batch in handles.chunks(BATCH) {
             let inputs: Vec<Input> = batch.iter().map(|handle| self.subject.at_rest(handle.pose())).collect();
-            if self.subject.model().step_batch(&inputs, &mut outputs) != CallStatus::Ok {
-                return Err(self.panicked());
+            match self.subject.model().step_batch(&inputs, &mut outputs) {
+                CallStatus::Ok => {}
+                status => return Err(self.failed(status)),
             }
             for (handle, output) in batch.iter().zip(&outputs) {
                 answers.push(self.answer(*handle, output)?);
@@ -201,11 +202,11 @@ impl Walker<'_> {
 
     fn step(&mut self, pose: Pose) -> Result<Output, EvaluateError> {
         let input = self.subject.input(pose, Twist::ZERO, PERIOD_NS);
-        call(self.subject.model(), &input).map_err(|_| self.panicked())
+        call(self.subject.model(), &input).map_err(|status| self.failed(status))
     }
 
-    fn panicked(&mut self) -> EvaluateError {
-        EvaluateError::Panicked(self.subject.model().last_message())
+    fn failed(&mut self, status: CallStatus) -> EvaluateError {
+        EvaluateError::Failed(self.subject.model().reason(status))
     }
 
     fn answer(&mut self, handle: Handle, output: &Output) -> Result<Answer, EvaluateError> {
@@ -229,9 +230,11 @@ impl Walker<'_> {
             return Ok(Vec::new());
         }
         let mut values = vec![f64::NAN; count];
-        if self.subject.model().read_details(&mut values) != CallStatus::Ok {
-            return Err(self.panicked());
+        match self.subject.model().read_details(&mut values) {
+            CallStatus::Ok => {
+                Ok(values.into_iter().map(|value| value.is_finite().then_some(value)).collect())
+            }
+            status => Err(self.failed(status)),
         }
-        Ok(values.into_iter().map(|value| value.is_finite().then_some(value)).collect())
     }
 }

@@ -5,7 +5,7 @@
 //! neighbours. The difference is caused by the servo.
 
 use flotor_hal::SampleWait;
-use flotor_hal::abi::loader::Stopper;
+use flotor_loader::Stopper;
 use flotor_servo::{
     Percentiles, RealTimeReport, RunState, Schedule, SpinWindow, StopSwitch, Timing, enter_real_time,
     monotonic_ns, sleep_until,

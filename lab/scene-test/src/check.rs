@@ -5,6 +5,7 @@ use crate::case::{Case, Check};
 use crate::curve::POSE;
 use crate::file::{Expectation, MeasureDemand, TestFile, Validate};
 use crate::minimise::shortest;
+use crate::near::near_failure;
 use crate::numbers::at;
 use crate::process::{Flotor, ProcessResult};
 use crate::rule::RuleFinding;
@@ -31,6 +32,9 @@ pub(crate) struct Outcome {
     /// Command that reproduces the failure alone: a pose, a rule, a measure, or a run up to its fault.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) detail: Option<String>,
+    /// Command of a replay that starts near the failure.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) near: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) picture: Option<PathBuf>,
     #[serde(skip)]
@@ -48,13 +52,13 @@ impl Outcome {
     pub(crate) fn settle(&mut self) {
         self.passed = self.failures.is_empty();
         if self.passed {
-            (self.repeat, self.detail) = (None, None);
+            (self.repeat, self.detail, self.near) = (None, None, None);
         }
     }
 
     /// Returns the commands for a failure, first the command that repeats the case.
     pub(crate) fn commands(&self) -> impl Iterator<Item = &String> {
-        self.repeat.iter().chain(&self.detail)
+        self.repeat.iter().chain(&self.detail).chain(&self.near)
     }
 }
 
@@ -103,6 +107,7 @@ pub(crate) fn check(
         values: BTreeMap::new(),
         repeat: Some(judging_again(case)),
         detail: None,
+        near: None,
         picture: None,
         digest: None,
         file: case.file.path.clone(),
@@ -118,7 +123,11 @@ pub(crate) fn check(
             arguments.extend(drawn_bounds(case.file));
             if let Some(first) = judged.failures.first() {
                 let shortest = shortest(flotor, case, first, judged.json.as_ref());
-                outcome.detail = shortest.as_deref().map(command_line);
+                let near = shortest.as_ref().zip(plots).and_then(|(shortest, folder)| {
+                    near_failure(flotor, case, shortest, &picture(folder, case))
+                });
+                outcome.detail = shortest.map(|run| command_line(&run.arguments));
+                outcome.near = near.map(command_line);
             }
             if let Some(json) = &judged.json {
                 let paths = case.file.expect.iter().map(|expectation| &expectation.path);

@@ -47,7 +47,7 @@ struct TestArguments {
     /// List the cases, and run none
     #[arg(long)]
     list: bool,
-    /// Cases that run at the same time (default: the number of processors)
+    /// Cases that run at the same time (default: one per core)
     #[arg(long, value_parser = count(1..=1024_usize), value_name = "N")]
     jobs: Option<usize>,
     /// Run only part K of N disjoint parts of the cases

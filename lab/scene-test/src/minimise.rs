@@ -8,7 +8,15 @@ use serde_json::Value;
 /// Longest run in the search for a crash, ticks: a crashed run has no summary with its length.
 const LONGEST: u64 = 1 << 20;
 
-/// Returns the arguments of the shortest run of a case, with its settings, that has the same fault: the run crashed or
+/// Shortest run that has the failure of a case.
+pub(crate) struct ShortestRun {
+    /// Arguments of the command.
+    pub(crate) arguments: Vec<String>,
+    /// Length of the run; the last tick fails.
+    pub(crate) ticks: u64,
+}
+
+/// Returns the shortest run of a case, with its settings, that has the same fault: the run crashed or
 /// ended early, or the health of a plugin is not as expected. `None` for a failed number, which depends on the whole
 /// run, and for a run that timed out, which is not repeated.
 pub(crate) fn shortest(
@@ -16,7 +24,7 @@ pub(crate) fn shortest(
     case: &Case<'_>,
     failure: &Failure,
     json: Option<&Value>,
-) -> Option<Vec<String>> {
+) -> Option<ShortestRun> {
     let Check::Run { seed, set } = &case.check else { return None };
     if !is_fault(failure) {
         return None;
@@ -34,7 +42,7 @@ pub(crate) fn shortest(
     let duration = |ticks: u64| format!("{}s", ticks as f64 / rate_hz);
     let ticks = json.and_then(|json| json.get("ticks")).and_then(Value::as_u64);
     let ticks = first_failing(ticks, |ticks| fails(&duration(ticks)))?;
-    Some(run_arguments(case.file, *seed, set, Some(&duration(ticks))))
+    Some(ShortestRun { arguments: run_arguments(case.file, *seed, set, Some(&duration(ticks))), ticks })
 }
 
 /// Returns true if a failure appears at some instant, and is not a number of the whole run.

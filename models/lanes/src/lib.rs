@@ -10,8 +10,8 @@
 //!
 //! Modules over [`Real`], without the functions of a math library: [`angle`] computes squared angles and twists, [`arctangent`]
 //! angles from sides of triangles, and [`saturation`] limits a quantity below a pole. [`entire`] and [`stability`] compute the
-//! functions of a loaded column. [`chebyshev`] interpolates by polynomials, [`basis`] has polynomials of a field along a rod, and
-//! [`matrix`] solves small symmetric systems.
+//! functions of a loaded column. [`chebyshev`] interpolates by polynomials, [`basis`] has polynomials of a field along a rod,
+//! [`matrix`] solves small symmetric systems, and [`tipped`] minimises an energy with a kink.
 //!
 //! The lanes come from the crate `pulp`, which detects the instruction set of the machine at run time.
 
@@ -27,6 +27,7 @@ pub mod entire;
 pub mod matrix;
 pub mod saturation;
 pub mod stability;
+pub mod tipped;
 
 /// Marks functions `#[inline(always)]`. Lane functions use the instructions of an instruction set only if they are
 /// inlined into code compiled for that set. With `#[inline]` alone a batch executes ten times as many instructions (per

@@ -21,6 +21,8 @@ pub struct Factored<const N: usize> {
     negative: usize,
 }
 
+flotor_hal::restorable!([const N: usize] Factored<N> { column, row, inverse_pivot, negative });
+
 impl<const N: usize> Factored<N> {
     /// Returns the factors of the unit matrix.
     pub fn unit() -> Self {

@@ -10,11 +10,13 @@
 //!
 //! with depth `d = -z` below home and an onset `d0` that smooths the law. Both have an energy, `F z` and `F d0 ln
 //! cosh(d / d0)`, so a closed path generates none.
+//!
+//! On a device with a linear grip the load is a thing between the fingers: a spring that pushes them apart below its width.
 
 use flotor_hal::{
-    Choices, DQuat, DVec3, Demand, ForceModel, Form, Input, ModelInfo, Output, Parameter, Part, Pose,
-    Primitive, Refusal, SetParameterError, Settings, Shape, ShapeModel, SoftRange, SoftRangeModel,
-    StepStatus, Wrench, choices, math,
+    Choices, DQuat, DVec3, Demand, ForceModel, Form, GripKind, GripModel, GripState, Input, ModelInfo,
+    Output, Parameter, Part, Pose, Primitive, Refusal, SetParameterError, Settings, Shape, ShapeModel,
+    SoftRange, SoftRangeModel, StepStatus, Wrench, choices, math,
 };
 
 /// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
@@ -37,6 +39,9 @@ pub struct Load {
     kind: Kind,
     force_n: f64,
     onset_m: f64,
+    /// Stiffness, N/m, and width, m, of the thing between the fingers.
+    grip_stiffness_n_per_m: f64,
+    grip_width_m: f64,
     drawn: Shape,
 }
 
@@ -49,7 +54,14 @@ impl Load {
     /// Creates a load of `force_n` newtons. `onset_m`: depth `d0`, m, at which a resistance has `tanh 1` = 76 % of its force.
     #[must_use]
     pub fn new(kind: Kind, force_n: f64, onset_m: f64) -> Self {
-        Self { kind, force_n, onset_m, drawn: Shape::default() }
+        let drawn = Shape::default();
+        Self { kind, force_n, onset_m, grip_stiffness_n_per_m: 0.0, grip_width_m: 0.0, drawn }
+    }
+
+    /// Sets stiffness, N/m, and width, m, of the thing between the fingers.
+    #[must_use]
+    pub fn with_grip(self, grip_stiffness_n_per_m: f64, grip_width_m: f64) -> Self {
+        Self { grip_stiffness_n_per_m, grip_width_m, ..self }
     }
 
     /// Returns the force on the hand along z, N, at a height above home, m. Real-time: bounded, no allocation.
@@ -107,13 +119,34 @@ impl ForceModel for Load {
             "Depth below home at which a resistance has 76 % of its full force (kind exerted)",
         )
         .live(),
+        Parameter::real(
+            "grip_stiffness_n_per_m",
+            "N/m",
+            0.0,
+            5000.0,
+            0.0,
+            "Stiffness of the thing between the fingers, on a device with a linear grip",
+        )
+        .live(),
+        Parameter::real(
+            "grip_width_mm",
+            "mm",
+            0.0,
+            200.0,
+            15.0,
+            "Width of the thing between the fingers: a wider grip feels nothing",
+        )
+        .live(),
     ];
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let kind = if settings.choice_or_default("kind") == 1 { Kind::Exerted } else { Kind::Felt };
         let (force_n, onset_mm) =
             (settings.number_or_default("force_n"), settings.number_or_default("onset_mm"));
-        Ok(Self::new(kind, force_n, onset_mm * 1.0e-3))
+        let value = |id| settings.number_or_default(id);
+        let grip_width_m = value("grip_width_mm") * 1.0e-3;
+        Ok(Self::new(kind, force_n, onset_mm * 1.0e-3)
+            .with_grip(value("grip_stiffness_n_per_m"), grip_width_m))
     }
 
     fn step(&mut self, input: &Input) -> Output {
@@ -134,6 +167,8 @@ impl ForceModel for Load {
         match index {
             1 => self.force_n = value,
             2 => self.onset_m = value * 1.0e-3,
+            3 => self.grip_stiffness_n_per_m = value,
+            4 => self.grip_width_m = value * 1.0e-3,
             _ => return Err(SetParameterError::Fixed),
         }
         Ok(())
@@ -144,11 +179,25 @@ impl ForceModel for Load {
             0 => f64::from(u8::from(self.kind == Kind::Exerted)),
             1 => self.force_n,
             2 => self.onset_m * 1.0e3,
+            3 => self.grip_stiffness_n_per_m,
+            4 => self.grip_width_m * 1.0e3,
             _ => f64::NAN,
         }
     }
 
     fn reset(&mut self) {}
+}
+
+impl GripModel for Load {
+    /// Returns the force that opens the fingers; none on an angular grip, for which the load has no size.
+    fn grip(&mut self, _: &Input, grip: &GripState) -> f64 {
+        match grip.kind() {
+            GripKind::Linear => {
+                (self.grip_stiffness_n_per_m * (self.grip_width_m - grip.opening)).max(0.0) // 0 for NaN
+            }
+            GripKind::Angular => 0.0,
+        }
+    }
 }
 
 impl ShapeModel for Load {
@@ -178,11 +227,21 @@ impl SoftRangeModel for Load {
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("force_n", 0.0, 15.0, 0.1)];
 }
 
-flotor_hal::export_model!(Load, shape, soft_range);
+flotor_hal::export_model!(Load, shape, soft_range, grip);
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_thing_pushes_the_fingers_apart_below_its_width_and_pulls_never() {
+        let mut load = Load::new(Kind::Felt, 3.0, 1.0e-3).with_grip(500.0, 0.02);
+        let input = Input::at_rest(Pose::HOME);
+        let mut effort = |kind, opening| load.grip(&input, &GripState::new(kind, opening, 0.0));
+        assert_eq!(effort(GripKind::Linear, 0.016), 500.0 * (0.02 - 0.016));
+        assert_eq!([0.02, 0.5, f64::NAN].map(|opening| effort(GripKind::Linear, opening)), [0.0; 3]);
+        assert_eq!(effort(GripKind::Angular, 0.0), 0.0);
+    }
 
     #[test]
     fn soft_ranges_are_of_parameters_and_legal() {

@@ -14,4 +14,4 @@ pub mod curve;
 mod plugin;
 pub mod table;
 
-pub use plugin::Measured;
+pub use plugin::{FLOTOR_ENTRY, Measured};

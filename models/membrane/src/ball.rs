@@ -1,7 +1,7 @@
 //! Contact between a ball and the masses of a network.
 
 use crate::vectors::Vectors;
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, restorable};
 use std::ops::Range;
 
 /// Ball that touches the network.
@@ -12,6 +12,8 @@ pub struct Ball {
     /// Radius, m.
     pub radius_m: f64,
 }
+
+restorable!(Ball { centre_m } without { radius_m });
 
 impl Ball {
     /// Adds the contact forces of the ball to the masses of a block; returns the force on the ball, N. Real-time:

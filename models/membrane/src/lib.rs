@@ -15,8 +15,8 @@
 //! - [`network`]: state and time step; [`vectors`]: one array per coordinate.
 //! - `links`: springs in runs of equal distance between their ends, so that a run is a loop over slices.
 //! - `regions`: blocks of masses at rest, skipped until the ball or a linked block activates them.
-//! - [`ball`]: ball that pushes the masses; [`touch`]: ball that moves through a network, and its local linear model, force and
-//!   stiffness for a faster loop.
+//! - [`ball`]: ball that pushes the masses; [`touch`]: ball that moves through a network, and the plane that stands for the network in
+//!   a faster loop.
 //! - `plugin`: parameters and the contract.
 
 pub mod ball;

@@ -15,7 +15,7 @@ use crate::links::Links;
 use crate::mesh::Mesh;
 use crate::regions::Regions;
 use crate::vectors::Vectors;
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, restorable};
 
 /// Gravity, drag and contact stiffness: forces on every mass from outside the network.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +35,8 @@ pub struct State {
     velocities_m_per_s: Vectors,
     regions: Regions,
 }
+
+restorable!(State { positions_m, velocities_m_per_s, regions });
 
 impl State {
     /// Returns the positions of the masses, m.
@@ -74,6 +76,10 @@ pub struct Network {
     surroundings: Surroundings,
     longest_step_s: f64,
 }
+
+restorable!(Network { state } without {
+    forces_n, inverse_masses_per_kg, weights_m_per_s2, links, surroundings, longest_step_s
+});
 
 /// Fraction of the stability limit in use: contact and stretching shift the limit a little.
 const SHARE_OF_LIMIT: f64 = 0.8;

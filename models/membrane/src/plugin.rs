@@ -4,9 +4,10 @@ use crate::mesh::{Mesh, Sheet};
 use crate::network::{Network, State, Surroundings};
 use crate::touch::Touch;
 use flotor_hal::{
-    DQuat, DVec3, ForceModel, Input, LinearField, LinearFieldModel, Memory, ModelInfo, Output, Parameter,
-    Part, Pose, Primitive, Refusal, ScalarField, SetParameterError, Settings, Shape, ShapeModel, Sides,
-    SoftRange, SoftRangeModel, StepStatus, Surface, SurfaceVertex, Wrench, choices, read_text,
+    Contact, ContactSet, ContactSetModel, DQuat, DVec3, ForceModel, Input, Memory, ModelInfo, Output,
+    Parameter, Part, Pose, Primitive, Refusal, ScalarField, SetParameterError, Settings, Shape, ShapeModel,
+    Sides, SoftRange, SoftRangeModel, StepStatus, Surface, SurfaceVertex, Wrench, choices, read_text,
+    restorable,
 };
 use std::path::Path;
 
@@ -80,6 +81,10 @@ pub struct Membrane {
     untouched_m: Vec<DVec3>,
     drawn: Shape,
 }
+
+restorable!(Membrane { touch } without {
+    radius_m, coarseness_m, parameters, pictured, pictured_at_m, untouched_m, drawn
+});
 
 impl Membrane {
     /// Returns the centre of the ball for a position of the handle, m; at home the ball lies on the sheet.
@@ -238,16 +243,21 @@ impl ShapeModel for Membrane {
     }
 }
 
-/// Displacement of the ball for the slope, relative to the longest spring: several masses come into contact on the way.
+/// Displacement of the ball for the stiffness, relative to the longest spring: several masses come into contact on the way.
 const PROBE_SHARE: f64 = 0.125;
 
-impl LinearFieldModel for Membrane {
-    fn linear_field(&mut self, input: &Input) -> LinearField {
-        let Ok((handle_m, _)) = Self::reached(input) else { return LinearField::NONE };
+impl ContactSetModel for Membrane {
+    /// Returns the plane under the ball.
+    fn contact_set(&mut self, input: &Input) -> ContactSet {
+        let Ok((handle_m, _)) = Self::reached(input) else { return ContactSet::NONE };
         let (centre_m, time_s) = (self.centre_m(handle_m), input.dt_s().min(LONGEST_TIME_S));
-        let measured = self.touch.measure_slope(centre_m, time_s, PROBE_SHARE * self.coarseness_m);
+        let plane = self.touch.measure_plane(centre_m, time_s, PROBE_SHARE * self.coarseness_m);
+        let input = Input { pose: Pose::new(handle_m, input.pose.orientation()), ..*input };
         // Farther than half the longest spring, other masses make or lose contact.
-        LinearField::of_force(input, measured.force_n, measured.slope_n_per_m, 0.5 * self.coarseness_m)
+        let set = ContactSet { valid_m: 0.5 * self.coarseness_m, ..ContactSet::at(&input) };
+        plane.map_or(set, |plane| {
+            set.with(Contact::of_handle(&input, plane.normal, plane.gap_m, plane.stiffness_n_per_m))
+        })
     }
 }
 
@@ -259,7 +269,7 @@ impl SoftRangeModel for Membrane {
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("damping_per_s", 5.0, 500.0, 5.0)];
 }
 
-flotor_hal::export_model!(Membrane, linear_field, shape, soft_range);
+flotor_hal::export_model!(Membrane, contact_set, shape, snapshot, soft_range);
 
 #[cfg(test)]
 mod tests {

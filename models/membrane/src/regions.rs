@@ -6,7 +6,7 @@
 
 use crate::ball::Ball;
 use crate::vectors::Vectors;
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, restorable};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -31,6 +31,8 @@ pub(crate) struct Regions {
     steps: u64,
 }
 
+restorable!(Regions { blocks, steps } without { nodes, neighbours });
+
 #[derive(Clone, Copy, Debug)]
 struct Block {
     active: bool,
@@ -39,6 +41,8 @@ struct Block {
     lowest_m: DVec3,
     highest_m: DVec3,
 }
+
+restorable!(Block { active, quiet_looks, lowest_m, highest_m });
 
 impl Clone for Regions {
     fn clone(&self) -> Self {

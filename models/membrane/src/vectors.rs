@@ -1,6 +1,6 @@
 //! Vectors of all masses, stored as one array per coordinate.
 
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, restorable};
 use std::ops::Range;
 
 /// Vectors as a structure of arrays, one array per coordinate.
@@ -13,6 +13,8 @@ pub struct Vectors {
     /// Components along z.
     pub z: Vec<f64>,
 }
+
+restorable!(Vectors { x, y, z });
 
 impl Clone for Vectors {
     fn clone(&self) -> Self {

@@ -1,10 +1,10 @@
-//! Networks in motion: frequency, momentum, inactive blocks, and the field a faster loop is given.
+//! Networks in motion: frequency, momentum, inactive blocks, and the plane that a faster loop is given.
 
-use flotor_hal::abi::loader::{Model, Plugin};
 use flotor_hal::{DQuat, DVec3, Input, Output, Pose};
+use flotor_loader::{Model, Plugin};
 use flotor_membrane::ball::Ball;
 use flotor_membrane::mesh::{Link, Mesh, Sheet};
-use flotor_membrane::network::{Network, Surroundings};
+use flotor_membrane::network::{Network, State, Surroundings};
 use flotor_membrane::touch::Touch;
 use std::f64::consts::TAU;
 
@@ -124,36 +124,50 @@ fn a_sheet_at_rest_is_inactive_a_touch_activates_it_and_inactivity_changes_nothi
 }
 
 #[test]
-fn the_slope_of_a_field_is_the_change_of_the_force_it_predicts() {
-    let mut touch = Touch::new(Network::new(&Mesh::sheet(&SHEET), TOUCHED), RADIUS_M, DVec3::Z * RADIUS_M);
+fn a_plane_pushes_as_the_network_that_lives_the_period_again() {
     let at = |depth_m: f64| DVec3::new(0.0007, 0.0003, RADIUS_M - depth_m);
-    let period_s = 5.0e-3;
+    let (period_s, probe_m) = (5.0e-3, 1.0e-5);
+    let begun = |state: &State| {
+        let mut touch =
+            Touch::new(Network::new(&Mesh::sheet(&SHEET), TOUCHED), RADIUS_M, at(0.002 * 39.0 / 40.0));
+        touch.network_mut().restore(state);
+        touch
+    };
+    let mut touch = Touch::new(Network::new(&Mesh::sheet(&SHEET), TOUCHED), RADIUS_M, at(0.0));
     for step in 0..40 {
         touch.advance(at(0.002 * f64::from(step) / 40.0), period_s);
     }
     let before = touch.network().state().clone();
-    let field = touch.measure_slope(at(0.002), period_s, 1.0e-5);
+    let plane = touch.measure_plane(at(0.002), period_s, probe_m).expect("the ball is in the sheet");
     let after = touch.network().positions_m().get(144);
-    // The same period lived again, the ball going elsewhere: the field knows the force beforehand.
-    for offset_m in [(1.0, 1.0, 1.0), (1.0, -1.0, -1.0), (-0.5, 0.5, -1.0), (0.0, 1.0, -1.0)] {
-        let offset_m = DVec3::from(offset_m) * 1.0e-5;
-        let mut again =
-            Touch::new(Network::new(&Mesh::sheet(&SHEET), TOUCHED), RADIUS_M, at(0.002 * 39.0 / 40.0));
-        again.network_mut().restore(&before);
-        let lived_n = again.advance(at(0.002) + offset_m, period_s);
-        let [x, y, z] = field.slope_n_per_m;
-        let told_n = field.force_n + x * offset_m.x + y * offset_m.y + z * offset_m.z;
-        let (change_n, error_n) = ((lived_n - field.force_n).length(), (told_n - lived_n).length());
+    let push_n = |height_m: f64| plane.stiffness_n_per_m * (-plane.gap_m - height_m);
+    // Measuring changed nothing: the network is where one period brought it, and the plane has its force.
+    let mut plain = begun(&before);
+    let force_n = plain.advance(at(0.002), period_s);
+    assert_eq!(plain.network().positions_m().get(144), after);
+    assert!((plane.normal * push_n(0.0) - force_n).length() < 1.0e-12 * force_n.length());
+    for height_m in [probe_m, -probe_m] {
+        let lived_n = begun(&before).advance(at(0.002) + plane.normal * height_m, period_s).dot(plane.normal);
+        let (change_n, error_n) = (lived_n - push_n(0.0), push_n(height_m) - lived_n);
         // What is left is curvature: masses at the edge of the contact come and go within a tenth of a millimetre, a
         // tenth of which is asked for here.
-        assert!(error_n < 0.2 * change_n, "{offset_m}: {error_n} of {change_n}");
+        assert!(error_n.abs() < 0.2 * change_n.abs(), "{height_m} m: {error_n} of {change_n} N");
     }
-    // And feeling changed nothing: the network is where one period brought it.
-    let mut plain =
-        Touch::new(Network::new(&Mesh::sheet(&SHEET), TOUCHED), RADIUS_M, at(0.002 * 39.0 / 40.0));
-    plain.network_mut().restore(&before);
-    let force_n = plain.advance(at(0.002), period_s);
-    assert_eq!((force_n, plain.network().positions_m().get(144)), (field.force_n, after));
+}
+
+#[test]
+fn a_ball_near_the_network_has_the_plane_at_the_nearest_mass() {
+    let above = |clearance_m: f64| {
+        let at = DVec3::Z * (RADIUS_M + clearance_m);
+        let mut touch = Touch::new(Network::new(&Mesh::sheet(&SHEET), TOUCHED), RADIUS_M, at);
+        touch.measure_plane(at, 5.0e-3, 3.0e-4)
+    };
+    let plane = above(1.0e-3).expect("a millimetre is near");
+    // The mass in the middle lies there to rounding.
+    assert!((plane.gap_m - 1.0e-3).abs() < 1.0e-15 && plane.normal.distance(DVec3::Z) < 1.0e-12, "{plane:?}");
+    // A ball that is pressed in meets at least one mass, and never more than the masses at their full contact stiffness.
+    assert!(plane.stiffness_n_per_m > 10.0 && plane.stiffness_n_per_m < 4000.0, "{plane:?}");
+    assert_eq!(above(1.5 * RADIUS_M), None);
 }
 
 /// The picture depends on where the ball is and not on its history, and drawing it does not change the force.

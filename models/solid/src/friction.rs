@@ -3,7 +3,7 @@
 //! The spring has the constant stiffness of a sticking contact with a quarter of the sphere's radius. Its plane is constant
 //! while a contact lasts. So the spring's force has a potential, and the slider only dissipates energy.
 
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, restorable};
 
 /// State of the friction between a sphere and a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,13 +14,17 @@ pub struct Friction {
     contact: Option<Slider>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+restorable!(Friction { contact } without { coefficient, stiffness_m });
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Slider {
     /// Anchor of the spring, m.
     anchor_m: DVec3,
     /// Normal of the face at first contact.
     normal: DVec3,
 }
+
+restorable!(Slider { anchor_m, normal });
 
 impl Friction {
     /// Prepares the friction between a sphere and a solid, without contact. Not real-time.

@@ -100,8 +100,20 @@ pub enum MeshError {
         /// Number of an element of the part.
         tag: usize,
     },
-    /// The fixed and the touched surface share nodes.
-    Shared,
+    /// The fixed and the touched surface have the same name.
+    SameName {
+        /// Name of both surfaces.
+        name: String,
+    },
+    /// The fixed and the touched surface share a node.
+    Shared {
+        /// Name of the fixed surface.
+        fixed: String,
+        /// Name of the touched surface.
+        touched: String,
+        /// Position of a shared node, m.
+        at_m: [f64; 3],
+    },
     /// The longest side is zero or above 10 m, or a coordinate is not finite.
     Extent {
         /// Longest side, m; NaN if a coordinate is not finite.
@@ -172,12 +184,16 @@ impl fmt::Display for MeshError {
                      a face of the part to the surface of `fixed_face`"
                 )
             }
-            Self::Shared => {
-                write!(
-                    f,
-                    "the surfaces of `fixed_face` and `touched_face` share nodes: leave a gap between the surfaces"
-                )
-            }
+            Self::SameName { name } => write!(
+                f,
+                "`fixed_face` and `touched_face` are both \"{name}\"; name two surfaces with a gap between them"
+            ),
+            Self::Shared { fixed, touched, at_m } => write!(
+                f,
+                "the surfaces \"{fixed}\" (`fixed_face`) and \"{touched}\" (`touched_face`) share a node at {}; leave a \
+                 gap between them, or choose other surfaces",
+                mm(at_m)
+            ),
             Self::Extent { extent_m } => write!(
                 f,
                 "the longest side of the mesh is {extent_m} m, but must be above 0 and at most 10 m: coordinates are \
@@ -226,8 +242,16 @@ impl Mesh {
         let faces_of = |name: &str| {
             surfaces.get(name).into_iter().flatten().map(|face| sorted(face)).collect::<BTreeSet<_>>()
         };
-        if !faces_of(fixed_name).is_disjoint(&faces_of(touched_name)) {
-            return Err(MeshError::Shared);
+        if fixed_name == touched_name {
+            return Err(MeshError::SameName { name: fixed_name.to_owned() });
+        }
+        let shared = |node: usize| MeshError::Shared {
+            fixed: fixed_name.to_owned(),
+            touched: touched_name.to_owned(),
+            at_m: nodes_m[node],
+        };
+        if let Some(&node) = faces_of(fixed_name).intersection(&faces_of(touched_name)).flatten().next() {
+            return Err(shared(node));
         }
         let mut border = border(&elements)?;
         let mut take = |role: &'static str, name: &str| -> Result<Vec<Facet>, MeshError> {
@@ -251,8 +275,8 @@ impl Mesh {
         let (clamped, touched) = (take("fixed", fixed_name)?, take("touched", touched_name)?);
         let mut fixed = vec![false; nodes_m.len()];
         clamped.iter().flat_map(|facet| &facet.nodes).for_each(|&node| fixed[node] = true);
-        if touched.iter().flat_map(|facet| &facet.nodes).any(|&node| fixed[node]) {
-            return Err(MeshError::Shared);
+        if let Some(&node) = touched.iter().flat_map(|facet| &facet.nodes).find(|&&node| fixed[node]) {
+            return Err(shared(node));
         }
         check_held(&elements, &fixed)?;
         let free = border.into_values().collect();

@@ -11,7 +11,7 @@ use crate::{cache, gmsh};
 use flotor_hal::{
     DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, Output, Parameter, Pose,
     Refusal, SetParameterError, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel, Wrench,
-    read_file, text_from_bytes,
+    read_file, restorable, text_from_bytes,
 };
 use std::path::Path;
 
@@ -42,6 +42,10 @@ pub struct Solid {
     drawing: Option<Drawing>,
     nothing: Shape,
 }
+
+restorable!(Solid { friction, depth_m, contacts } without {
+    law, mesh_error, parameters, description, mesh, drawing, nothing
+});
 
 /// Maximum size of a mesh file, bytes: beyond any body that can be solved for.
 const MOST_MESH_BYTES: u64 = 1 << 30;
@@ -252,4 +256,4 @@ impl DetailsModel for Solid {
     }
 }
 
-flotor_hal::export_model!(Solid, variant, details, shape);
+flotor_hal::export_model!(Solid, variant, details, shape, snapshot);

@@ -1,7 +1,7 @@
 //! A sphere that comes and goes: energy of closed paths, steps of the force, poses of every kind.
 
-use flotor_hal::abi::loader::{Model, Plugin, Setting};
 use flotor_hal::{DQuat, DVec3, Input, Output, Pose, StepStatus, Wrench};
+use flotor_loader::{Model, Plugin, Setting};
 use flotor_solid::atlas::Atlas;
 use flotor_solid::description::{Body, Description, Tool};
 use flotor_solid::law::Law;

@@ -12,6 +12,7 @@ use crate::rod::{Accuracy, Coils, Rod, State};
 use crate::rod_blend::RodBlend;
 use crate::validity::Validity;
 use crate::wire::Wire;
+use flotor_hal::{Restorable, StateBytes};
 
 /// Maximum number of ticks for a shape to converge before it is drawn. A drawn model is evaluated far less often than a
 /// rendered one, so the rod moves farther between two poses.
@@ -23,6 +24,16 @@ pub(crate) enum Elastic {
     Energy(Held<EnergyForm>),
     Rod(Held<Rod>),
     RodBlend(Held<RodBlend>),
+}
+
+impl Restorable for Elastic {
+    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
+        match self {
+            Self::Energy(_) => {}
+            Self::Rod(held) => held.law.pass(bytes),
+            Self::RodBlend(held) => held.law.pass(bytes),
+        }
+    }
 }
 
 /// Evaluates an expression with any of the laws.

@@ -34,6 +34,8 @@ pub(crate) struct Pace {
     since_ns: Option<i64>,
 }
 
+flotor_hal::restorable!(Pace { since_ns });
+
 impl Pace {
     /// Returns the response of a tick, after as many steps of the law as are due. Real-time: bounded by the law, no
     /// allocation.

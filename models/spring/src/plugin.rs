@@ -11,7 +11,7 @@ use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{
     CenterlineInfo, CenterlineModel, Choices, Demand, Detail, DetailsModel, ForceModel, Input, Memory,
     ModelInfo, Output, Parameter, Refusal, SetParameterError, Settings, VariantInfo, VariantModel,
-    WorkspaceBounds, WorkspaceBoundsModel, choices, export_model,
+    WorkspaceBounds, WorkspaceBoundsModel, choices, export_model, restorable,
 };
 
 /// Force model of the spring: parameters, prepared law and timing.
@@ -21,6 +21,8 @@ pub struct SpringModel {
     pace: Pace,
     batch: Batch,
 }
+
+restorable!(SpringModel { law, pace } without { choice, batch });
 
 impl SpringModel {
     fn new(choice: Choice) -> Self {
@@ -140,7 +142,7 @@ impl WorkspaceBoundsModel for SpringModel {
     }
 }
 
-export_model!(SpringModel, centerline, variant, details, workspace_bounds);
+export_model!(SpringModel, centerline, variant, details, snapshot, workspace_bounds);
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! Prepared law of a model, with its seat.
 
-use flotor_hal::{Demand as Served, Input, Memory, Output, VariantInfo};
+use flotor_hal::{Demand as Served, Input, Memory, Output, Restorable, StateBytes, VariantInfo};
 
 use crate::batch::Batch;
 use crate::centerline::Section;
@@ -24,6 +24,15 @@ pub(crate) enum Prepared {
     Thesis(Thesis),
     ClosedForm(ClosedForm),
     Elastic(Elastic, Option<Seat>),
+}
+
+impl Restorable for Prepared {
+    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
+        if let Self::Elastic(law, seat) = self {
+            law.pass(bytes);
+            seat.iter_mut().for_each(|seat| seat.pass(bytes));
+        }
+    }
 }
 
 /// Diagnostics of a response beside the wrench; `None` for quantities that a law does not have.

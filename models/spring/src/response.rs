@@ -32,6 +32,8 @@ pub struct Response {
     pub validity: Validity,
 }
 
+flotor_hal::restorable!(Response { force_n, torque_nm, energy_j, validity });
+
 impl Response {
     /// Returns a response without a wrench, with the reason.
     pub(crate) fn none(validity: Validity) -> Self {

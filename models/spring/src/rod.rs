@@ -29,6 +29,7 @@
 use std::f64::consts::PI;
 
 use flotor_hal::glam::DVec3;
+use flotor_hal::{Restorable, StateBytes};
 
 use crate::centerline::Section;
 use crate::held::HeldSpring;
@@ -304,6 +305,14 @@ impl Rod {
         }
         self.last = response;
         response
+    }
+}
+
+impl Restorable for Rod {
+    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
+        either!(&mut self.solver, equilibrium => equilibrium.pass(bytes));
+        bytes.choice(&mut self.branch, &[Branch::Unbuckled, Branch::Buckled]);
+        self.last.pass(bytes);
     }
 }
 

@@ -18,6 +18,7 @@
 //! such poses and no history.
 
 use flotor_hal::glam::DVec3;
+use flotor_hal::restorable;
 use pulp::NullaryFnOnce;
 
 use crate::contract;
@@ -54,6 +55,9 @@ pub struct RodBlend {
     marked: (f64, Follows),
 }
 
+restorable!(RodBlend { rod, share, follows, marked }
+    without { energy, remainder, shares, spring, tolerance_n });
+
 /// Origin of the rod's equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Follows {
@@ -62,6 +66,8 @@ enum Follows {
     /// Followed from the last tick, after buckling or an unfinished search, until the rod's weight is zero.
     LastTick,
 }
+
+restorable!(Follows = Pose | LastTick);
 
 impl RodBlend {
     /// Prepares both laws for the default tolerance. Not real-time: the rod allocates.

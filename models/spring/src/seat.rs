@@ -29,7 +29,8 @@
 //! limit, found by rolling and sliding in turns. If a tick begins with the base pulled off the ground, the base gives way along
 //! the straight line to its hanging place, only as far as it needs to stand again; so the force has no step there.
 //!
-//! `base` has the pose of the base and the load on it; `tilt` finds the tilt of least energy; `friction` has the friction limit.
+//! `base` has the pose of the base and the load on it; [`flotor_lanes::tipped`] finds the tilt of least energy; `friction` has the
+//! friction limit.
 //!
 //! Derivation: the book, chapter "The spring"; the step with a tip is the proximal Newton step of Lee, Sun
 //! and Saunders (2014); one bound for force and torque of friction: Howe and Cutkosky (1996), a limit surface.
@@ -45,13 +46,12 @@ use crate::response::{Demand, Response};
 use crate::rigidity::Spring;
 use crate::validity::Validity;
 use base::{Base, Lengths, Standing};
+use flotor_lanes::tipped::Quadratic;
 pub use friction::Friction;
 use friction::FrictionLimit;
-use tilt::Quadratic;
 
 mod base;
 mod friction;
-mod tilt;
 
 /// Maximum cost of a tick, in evaluations of an energy, if each evaluation costs no more than the one before.
 const MOST_COST: u32 = 60;
@@ -94,6 +94,8 @@ pub struct Seat {
     /// Largest change of the tilt between evaluations (rad): reduced after a tick of failed steps.
     stride_rad: f64,
 }
+
+flotor_hal::restorable!(Seat { at, quadratic, grip, lifted, hold, stride_rad } without { lengths });
 
 /// Call of a tick, with the hanging place of the base and its height above the ground.
 struct Tick<'a> {

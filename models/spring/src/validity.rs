@@ -18,6 +18,8 @@ pub enum Validity {
     InvalidInput,
 }
 
+flotor_hal::restorable!(Validity = Ok | Clamped | NotConverged | OutOfDomain | InvalidInput);
+
 impl Validity {
     /// Returns true if the wrench is the response of the spring: accurate, of a shape in motion, or beyond the accurate range.
     #[must_use]

@@ -12,7 +12,7 @@
 //! its tangent `T(s)` and a vector `K(s)` that is linear from corner to corner. Normals are thus continuous over edges and at corners
 //! (G1), and the distance to the surface is continuously differentiable up to the centres of curvature. The position errs by the
 //! fourth power of the edge length on a sphere, by the third elsewhere; planes are exact. At a real edge each side has its own normals.
-//! Curvature is bounded, and jumps at edges of patches. `docs/src/adr/0016-smooth-surface.md` has the alternatives.
+//! Curvature is bounded, and jumps at edges of patches. `docs/src/adr/0018-smooth-surface.md` has the alternatives.
 //!
 //! # Modules
 //!

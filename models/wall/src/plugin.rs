@@ -4,9 +4,9 @@ use crate::proxy::Proxy;
 use crate::shape::Shape;
 use crate::surface::Surface;
 use flotor_hal::{
-    self as hal, ActiveRegion, ActiveRegionModel, Choices, DQuat, DVec3, Demand, ForceModel, Form, Input,
-    Memory, ModelInfo, Output, Parameter, Part, Pose, Primitive, Refusal, SetParameterError, Settings,
-    ShapeModel, SoftRange, SoftRangeModel, StepStatus, Wrench, choices,
+    self as hal, ActiveRegion, ActiveRegionModel, Choices, Contact, ContactSet, ContactSetModel, DQuat,
+    DVec3, Demand, ForceModel, Form, Input, Memory, ModelInfo, Output, Parameter, Part, Pose, Primitive,
+    Refusal, SetParameterError, Settings, ShapeModel, SoftRange, SoftRangeModel, StepStatus, Wrench, choices,
 };
 
 /// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
@@ -31,6 +31,8 @@ pub struct Wall {
     drawn: hal::Shape,
 }
 
+hal::restorable!(Wall { proxy } without { shape, size_mm, height_m, surface, drawn_proxy, drawn });
+
 impl ForceModel for Wall {
     const INFO: ModelInfo = ModelInfo::new("wall", "Wall", "A stiff wall, sphere or box with friction")
         .serving(Demand::ALL)
@@ -48,14 +50,14 @@ impl ForceModel for Wall {
         )
         .live(),
         Parameter::real("friction", "1", 0.0, 10.0, 0.0, "Coefficient of friction").live(),
-        Parameter::choice("shape", SHAPES, 0, "Shape of the solid: half-space below a plane, ball, or cube"),
+        Parameter::choice("shape", SHAPES, 0, "Shape of the solid: plane (half-space), sphere, box (cube)"),
         Parameter::real(
             "size_mm",
             "mm",
             0.1,
             1000.0,
             10.0,
-            "Radius of the ball, or half the edge of the cube",
+            "Radius of the sphere, or half the edge of the box; no effect with a plane",
         ),
         Parameter::real("height_mm", "mm", -100.0, 100.0, 0.0, "Height of the top of the solid above home"),
     ];
@@ -139,6 +141,29 @@ impl ActiveRegionModel for Wall {
     }
 }
 
+impl ContactSetModel for Wall {
+    /// Returns the plane under the handle: of the face through which it entered, or that it faces from outside.
+    fn contact_set(&mut self, input: &Input) -> ContactSet {
+        let position_m = input.pose.position();
+        let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
+        let Surface { stiffness_n_per_m, damping_ns_per_m, friction } = self.surface;
+        if !input.pose.is_finite() || stiffness_n_per_m == 0.0 {
+            return ContactSet::NONE;
+        }
+        let above_top_m = reached_m - DVec3::Z * self.height_m;
+        self.proxy.follow(&self.shape, &self.surface, above_top_m, DVec3::ZERO);
+        let place = match self.proxy.contact() {
+            Some(proxy) => self.shape.nearest(above_top_m, proxy.normal),
+            None => self.shape.facing(above_top_m),
+        };
+        let input = Input { pose: Pose::new(reached_m, input.pose.orientation()), ..*input };
+        let gap_m = (above_top_m - place.point_m).dot(place.normal);
+        let contact = Contact::of_handle(&input, place.normal, gap_m, stiffness_n_per_m);
+        ContactSet::at(&input)
+            .with(contact.with_damping(damping_ns_per_m).with_friction(friction, stiffness_n_per_m))
+    }
+}
+
 impl ShapeModel for Wall {
     /// Draws the solid, the handle, and, while the handle is inside, the proxy.
     fn shape(&mut self, input: &Input) -> &hal::Shape {
@@ -166,7 +191,7 @@ impl SoftRangeModel for Wall {
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("friction", 0.0, 1.5, 0.01)];
 }
 
-flotor_hal::export_model!(Wall, active_region, shape, soft_range);
+flotor_hal::export_model!(Wall, active_region, contact_set, shape, snapshot, soft_range);
 
 #[cfg(test)]
 mod tests {

@@ -2,7 +2,7 @@
 
 use crate::shape::{Place, Shape};
 use crate::surface::Surface;
-use flotor_hal::DVec3;
+use flotor_hal::{DVec3, restorable};
 
 /// Force on the handle, with the energy of the spring.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,6 +20,8 @@ pub struct Proxy {
     /// Last position of the handle outside, m.
     outside_m: DVec3,
 }
+
+restorable!(Proxy { contact, outside_m });
 
 impl Default for Proxy {
     /// Creates a proxy of a handle that comes from above.

@@ -1,8 +1,7 @@
 //! Convex solids, with their top at the origin.
 
 use crate::surface::Surface;
-use flotor_hal::DVec3;
-use flotor_hal::math;
+use flotor_hal::{DVec3, math, restorable};
 
 /// Solid whose highest point is the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,7 +21,7 @@ pub enum Shape {
 }
 
 /// Place on a surface.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[must_use]
 pub struct Place {
     /// Position from the top of the solid, m.
@@ -30,6 +29,8 @@ pub struct Place {
     /// Outward unit normal.
     pub normal: DVec3,
 }
+
+restorable!(Place { point_m, normal });
 
 impl Shape {
     /// Returns true for a point inside the solid, false on its surface. Real-time: bounded, no allocation.
@@ -70,6 +71,12 @@ impl Shape {
                 Place { point_m: inside_m + entered * depth_m, normal: entered }
             }
         }
+    }
+
+    /// Returns the place on the face that a point outside faces; on a cube on the plane of that face. Real-time: bounded, no
+    /// allocation.
+    pub fn facing(&self, outside_m: DVec3) -> Place {
+        self.nearest(outside_m, self.entry(outside_m, self.centre_m()).normal)
     }
 
     /// Slides a proxy on the surface towards the place nearest to the handle, as far as Coulomb's friction requires:

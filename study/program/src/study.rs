@@ -272,7 +272,8 @@ struct JndArguments {
     /// Obvious pairs in each track to check attention; they do not count
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     obvious_pairs: u32,
-    /// Difference of the obvious pairs, as a share of the base: 0.4 to the largest difference of a track
+    /// Difference of the obvious pairs, as a share of the base: 0.4 to the largest difference of a track; no effect without
+    /// --obvious-pairs
     #[arg(long, default_value_t = 0.6, value_parser = real, value_name = "SHARE")]
     obvious_difference: f64,
     /// Omit the practice pairs
@@ -296,7 +297,8 @@ struct MagnitudeArguments {
     /// Stimuli presented once more in each replication to check the consistency of ratings; they do not count
     #[arg(long, default_value_t = 0, value_parser = count(0..=20_u32), value_name = "N")]
     repeat_checks: u32,
-    /// Number of stimuli presented as practice before each modality, 0: no practice
+    /// Number of stimuli presented as practice before each modality (the smallest, the largest and random others), at most all
+    /// of --stimuli; 0: no practice
     #[arg(long, default_value_t = 5, value_parser = count(0..=1000_u32), value_name = "N")]
     demo: u32,
 }

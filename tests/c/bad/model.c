@@ -8,6 +8,10 @@
 
 DESCRIPTION("model", bad_model, "fixture-c-bad-model", "Bad model", "A spring with a mistake");
 
+#if defined(SAVES) || defined(SAVES_NOTHING)
+#define INTEGRATES_AND_RESETS
+#endif
+
 #if defined(INTEGRATES) || defined(INTEGRATES_AND_RESETS)
 #define MEMORY FlotorMemory_PathDependent
 #else
@@ -233,7 +237,47 @@ static uint32_t region(FlotorInstance instance, FlotorActiveRegion *out) {
 static const FlotorActiveRegionTable activity_table = {.size = sizeof(FlotorActiveRegionTable), .region = region};
 #endif
 
+#if defined(SAVES) || defined(SAVES_NOTHING)
+#ifdef SAVES
+enum { STATE_BYTES = sizeof(double) };
+#else
+enum { STATE_BYTES = 0 };
+#endif
+
+static uint32_t count(FlotorInstance instance, uint64_t *out) {
+    (void)instance;
+    *out = STATE_BYTES;
+    return FlotorCallStatus_Ok;
+}
+
+static uint32_t save(FlotorInstance instance, uint8_t *bytes, uint64_t length) {
+    const Spring *spring = instance;
+    if (length != STATE_BYTES) {
+        return FlotorCallStatus_OutOfRange;
+    }
+    memcpy(bytes, &spring->way_m_s, STATE_BYTES);
+    return FlotorCallStatus_Ok;
+}
+
+static uint32_t restore(FlotorInstance instance, const uint8_t *bytes, uint64_t length) {
+    Spring *spring = instance;
+    if (length != STATE_BYTES) {
+        return FlotorCallStatus_OutOfRange;
+    }
+    memcpy(&spring->way_m_s, bytes, STATE_BYTES);
+    return FlotorCallStatus_Ok;
+}
+
+static const FlotorSnapshotTable snapshot_table = {
+    .size = sizeof(FlotorSnapshotTable), .count = count, .save = save, .restore = restore};
+#endif
+
 static const void *get_interface(FlotorStr id) {
+#if defined(SAVES) || defined(SAVES_NOTHING)
+    if (is_called(id, FLOTOR_INTERFACE_SNAPSHOT)) {
+        return &snapshot_table;
+    }
+#endif
 #if defined(LOCAL) || defined(ACTS_OUTSIDE)
     if (is_called(id, FLOTOR_INTERFACE_ACTIVE_REGION)) {
         return &activity_table;

@@ -12,8 +12,8 @@ DESCRIPTION("model", planted_model, "fixture-planted-model", "Planted model", "A
     X(neg_status) X(destroy_segv) X(destroy_exit) X(atexit_loop) X(dtor_segv) X(exec) X(ptrace) X(double_answer)          \
     X(null_deref_thread) X(free_host) X(write_host_stack) X(munmap_self) X(env)                                           \
     X(heap_read) X(use_after_free) X(write_input) X(umask) X(late_alloc) X(thread_prepare) X(crash_reach)                 \
-    X(crash_activity) X(crash_field) X(crash_centerline) X(crash_details) X(field_nan) X(sigaltered_step)           \
-    X(thread_destroy) X(timer) X(crash_shape) X(shape_corner)
+    X(crash_activity) X(crash_field) X(crash_centerline) X(crash_details) X(field_nan) X(sigaltered_step)                 \
+    X(thread_destroy) X(timer) X(crash_shape) X(shape_corner) X(crash_contacts) X(contacts_gap)
 
 PLANTED_SCHEMA
 
@@ -368,6 +368,22 @@ static uint32_t linear_field(FlotorInstance instance, const FlotorInput *input, 
     return FlotorCallStatus_Ok;
 }
 
+static uint32_t contact_set(FlotorInstance instance, const FlotorInput *input, FlotorContactSet *set) {
+    const Spring *spring = instance;
+    if (spring->fault == FAULT_crash_contacts) {
+        crash();
+    }
+    memset(set, 0, sizeof *set);
+    set->anchor = input->pose;
+    set->valid_m = set->valid_rad = INFINITY;
+    set->count = 1;
+    set->contacts[0].normal[2] = 1.0;
+    set->contacts[0].surface_point_m[2] = -1.0;
+    set->contacts[0].gap_m = input->pose.position_m[2] + (spring->fault == FAULT_contacts_gap ? 0.5 : 1.0);
+    set->contacts[0].stiffness_n_per_m = 200.0;
+    return FlotorCallStatus_Ok;
+}
+
 static uint32_t line_info(FlotorInstance instance, FlotorCenterlineInfo *out) {
     (void)instance;
     out->suggested_points = 2;
@@ -415,6 +431,7 @@ static const void *get_interface(FlotorStr id) {
     static const FlotorActiveRegionTable regions = {.size = sizeof regions, .region = region};
     static const FlotorWorkspaceBoundsTable reaches = {.size = sizeof reaches, .bounds = bounds};
     static const FlotorLinearFieldTable fields = {.size = sizeof fields, .linear_field = linear_field};
+    static const FlotorContactSetTable sets = {.size = sizeof sets, .contact_set = contact_set};
     static const FlotorCenterlineTable lines = {.size = sizeof lines, .info = line_info, .centerline = line};
     static const FlotorShapeTable shapes = {.size = sizeof shapes, .shape = shape};
     static const FlotorDetailsTable details = {
@@ -427,6 +444,7 @@ static const void *get_interface(FlotorStr id) {
         {FLOTOR_INTERFACE_ACTIVE_REGION, &regions},
         {FLOTOR_INTERFACE_WORKSPACE_BOUNDS, &reaches},
         {FLOTOR_INTERFACE_LINEAR_FIELD, &fields},
+        {FLOTOR_INTERFACE_CONTACT_SET, &sets},
         {FLOTOR_INTERFACE_CENTERLINE, &lines},
         {FLOTOR_INTERFACE_SHAPE, &shapes},
         {FLOTOR_INTERFACE_DETAILS, &details},

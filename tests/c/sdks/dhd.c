@@ -73,6 +73,15 @@ const char *dhdGetSystemName(signed char id) { (void)id; return "omega.3"; }
 int dhdGetSerialNumber(unsigned short *serial, signed char id) { (void)id; *serial = 4711; return 0; }
 bool dhdHasWrist(signed char id) { (void)id; return false; }
 bool dhdHasActiveWrist(signed char id) { (void)id; return false; }
+#ifdef GRIPPER
+bool dhdHasGripper(signed char id) { (void)id; return true; }
+bool dhdHasActiveGripper(signed char id) { (void)id; return true; }
+#else
+bool dhdHasGripper(signed char id) { (void)id; return false; }
+bool dhdHasActiveGripper(signed char id) { (void)id; return false; }
+#endif
+int dhdGetGripperGap(double *gap, signed char id) { (void)id; *gap = 0.015; return 0; }
+int dhdGetGripperLinearVelocity(double *velocity, signed char id) { (void)id; *velocity = -0.02; return 0; }
 int dhdGetStatus(int *status, signed char id) {
     (void)id;
     memset(status, 0, 17 * sizeof *status);
@@ -129,9 +138,10 @@ int dhdGetAngularVelocityRad(double *x, double *y, double *z, signed char id) {
     *x = *y = *z = 0;
     return 0;
 }
-static double force[3];
-int dhdGetForceAndTorque(double *x, double *y, double *z, double *a, double *b, double *g, signed char id) {
+static double force[3], gripper_force;
+int dhdGetForceAndTorqueAndGripperForce(double *x, double *y, double *z, double *a, double *b, double *g, double *gripper, signed char id) {
     (void)id;
+    *gripper = gripper_force;
     *x = force[0];
     *y = force[1];
     *z = force[2];
@@ -141,7 +151,11 @@ int dhdGetForceAndTorque(double *x, double *y, double *z, double *a, double *b, 
 unsigned dhdGetButtonMask(signed char id) { (void)id; return 5; }
 int dhdSetForceAndTorqueAndGripperForce(double x, double y, double z, double a, double b, double g, double gripper, signed char id) {
     (void)id;
-    (void)a, (void)b, (void)g, (void)gripper;
+    (void)a, (void)b, (void)g;
+    if (gripper != gripper_force) {
+        note("gripper", gripper, 0, 0);
+    }
+    gripper_force = gripper;
     if (sent > 0 || x != 0 || y != 0 || z != 0) {
         sent++;
     }

@@ -1,9 +1,9 @@
 //! Settings of the shipped models whose steps are counted by demand.
 
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{Model, Setting};
 use flotor_hal::glam::{DQuat, DVec3};
 use flotor_hal::{Demand, Input, LoopConfig, Output, Pose};
+use flotor_loader::{Model, Setting};
 use flotor_session::registry::Registry;
 use std::f64::consts::TAU;
 use std::hint::black_box;

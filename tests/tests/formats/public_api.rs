@@ -1,4 +1,4 @@
-//! The public interface of `flotor-hal` is the committed one, and a break of it comes with a version that says so.
+//! The public interface of `flotor-hal` and `flotor-loader` is the committed one, and a break of it comes with a version that says so.
 //!
 //! `data/public_api.txt` has a line for each public item, feature and the oldest Rust. What an author of a plugin cannot avoid stands
 //! in one line: a trait with the items it requires, a struct that can be built with its fields, an enum that can be matched with its
@@ -40,11 +40,10 @@ struct Module {
 
 impl Reader {
     /// All public items of a source file and of the modules that it names.
-    fn of_crate(file: &Path) -> BTreeSet<String> {
+    fn of_crate(name: &str, file: &Path) -> BTreeSet<String> {
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         let mut reader = Self::default();
-        reader
-            .module(&text(file), &Module { path: "flotor_hal".to_owned(), condition: String::new(), folder });
+        reader.module(&text(file), &Module { path: name.to_owned(), condition: String::new(), folder });
         reader.finish()
     }
 
@@ -348,7 +347,8 @@ impl Api {
         let manifest =
             |path: &str| text(&root.join(path)).parse::<toml::Table>().expect("a manifest is TOML");
         let (workspace, hal) = (manifest("Cargo.toml"), manifest("hal/Cargo.toml"));
-        let mut lines = Reader::of_crate(&root.join("hal/src/lib.rs"));
+        let mut lines = Reader::of_crate("flotor_hal", &root.join("hal/src/lib.rs"));
+        lines.extend(Reader::of_crate("flotor_loader", &root.join("hal/loader/src/lib.rs")));
         let features = hal["features"].as_table().expect("the contract has features");
         lines.extend(features.keys().map(|feature| format!("feature {feature}")));
         lines
@@ -421,7 +421,7 @@ fn the_public_interface_is_the_committed_one() {
     }
     assert!(
         old == new,
-        "the public interface of flotor-hal has changed: CHANGELOG.md says how, under ABI, and\n\
+        "the public interface of flotor-hal or flotor-loader has changed: CHANGELOG.md says how, under ABI, and\n\
          FLOTOR_WRITE_API=1 cargo test -p flotor-tests --features formats public_api\n{}",
         old.changes_to(&new)
     );

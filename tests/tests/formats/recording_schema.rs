@@ -4,10 +4,11 @@
 mod plugin_description;
 
 use flotor_core::coupling::{CouplingConfig, CouplingDescription, CouplingEnd, CouplingEnds, PassivityMode};
+use flotor_core::grip::GripRecord;
 use flotor_core::mapping::MappingConfig;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs};
-use flotor_hal::{Pose, Twist, Wrench};
+use flotor_hal::{GripKind, GripState, Pose, Twist, Wrench};
 use flotor_record::{Note, PluginDescription, Recorder, Role, RunDescription, Severity};
 use flotor_servo::Clock;
 use plugin_description::described;
@@ -105,6 +106,11 @@ fn record() -> TickRecord {
         commanded: wrench(),
         delivered: wrench(),
         port_energy_j: 98.5,
+        grip: Some(GripRecord {
+            state: GripState::new(GripKind::Angular, 97.5, 96.5).with_delivered(95.5),
+            model: 94.5,
+            commanded: 93.5,
+        }),
         events: Events::from_bits(0b101),
         buttons: 0b10,
         lateness_ns: 1234,
@@ -219,6 +225,15 @@ fn expected_tick(record: &TickRecord) -> Vec<String> {
         format!("port_energy_j = {:?}", record.port_energy_j),
         format!("device = {}", record.device),
     ]);
+    let grip = [
+        "opening = 97.5",
+        "velocity = 96.5",
+        "delivered = 95.5",
+        "model = 94.5",
+        "commanded = 93.5",
+        "kind = 2",
+    ];
+    lines.extend(grip.map(|line| format!("grip.{line}")));
     lines
 }
 
@@ -287,6 +302,15 @@ fn expected_run() -> Vec<String> {
     );
     lines.push("plugins[2].device = 1".to_owned());
     lines.extend(["rate_hz = 200.0", "latency_s = 0.0025"].map(|line| format!("plugins[2].field.{line}")));
+    let contacts = [
+        "stiffness_n_per_m = 900.0",
+        "per_damping_1_per_s = 250.0",
+        "surface_power_w = 0.5",
+        "force_n = 3.0",
+        "torque_nm = inf",
+        "by_device_n_per_m = 120.0",
+    ];
+    lines.extend(contacts.map(|line| format!("plugins[2].field.contacts.{line}")));
     let coupling = [
         "name = \"pair\"",
         "stiffness_n_per_m = 600.5",

@@ -9,7 +9,7 @@ use flotor_falcon_emulator::in_process::InProcess;
 use flotor_falcon_emulator::machine::{Machine, Motion, Power};
 use flotor_falcon_emulator::port::{Port, Reach};
 use flotor_hal::Wrench;
-use flotor_hal::abi::loader::Plugin;
+use flotor_loader::Plugin;
 use flotor_maglev::protocol::Mode;
 use flotor_maglev::transport::Transport;
 use flotor_maglev::transport::stream::StreamLink;

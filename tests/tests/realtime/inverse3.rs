@@ -1,9 +1,9 @@
 //! The plugin of the Inverse3 against its stand-in: neither a tick nor the thread's exchange of messages allocates.
 
 use super::counted;
-use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, Tick, Wrench};
 use flotor_inverse3::session::{GripRequest, Request, Session};
+use flotor_loader::{Plugin, Setting};
 use flotor_tests::TestSize;
 use service_with_faults::{ARM, Said, StandIn, configured, state};
 use std::time::Duration;

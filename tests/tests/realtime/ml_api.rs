@@ -3,8 +3,8 @@
 //! realtime ml_api -- --nocapture` with `FLOTOR_TEST_SIZE=full` prints the numbers.
 
 use super::counted;
-use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, SampleWait, Tick, Wrench};
+use flotor_loader::{Plugin, Setting};
 use flotor_maglev_emulator::controller::Sample;
 use flotor_maglev_emulator::ml_api::server::{Hub, serve};
 use flotor_maglev_emulator::ml_api::{Controller, ControllerConfig, Machine};

@@ -1,11 +1,11 @@
 //! The errors of the spring's laws in `docs/src/bench.md`, and the gains in `docs/src/stress.md`, against exact rods of an
 //! independent shooting method (`tests/generators/bench.py`).
 
-use flotor_hal::abi::loader::Setting;
 use flotor_hal::{DVec3, Demand, Input, Pose, StepStatus, Wrench};
 use flotor_judge::subject::{call, input_of, prepared};
 use flotor_judge::trajectory::sensed;
 use flotor_lab::bench::{Hand, Sampling, Workspace};
+use flotor_loader::Setting;
 use flotor_session::registry::load_file;
 use flotor_tests::library::plugin_file;
 use flotor_tests::printed::assert_chapter_prints;

@@ -1,11 +1,17 @@
-//! A weight laid on the boundary wall of the simulated flotor comes to rest, whatever its sensors' latency and the rate.
+//! A weight laid on the boundary wall of the simulated flotor comes to rest, whatever its sensors' latency and the rate, and with the
+//! numbers of other devices.
+
+mod handle;
 
 use flotor_core::limits::{Bound, Boundary};
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_hal::{Capabilities, Damper, SampledLoop};
 use flotor_servo::{Clock, RunEnd};
+use flotor_session::registry::Registry;
+use flotor_tests::library::build_folder;
 use flotor_tests::printed::assert_chapter_prints;
-use flotor_tests::watched::{prepared, watch};
+use flotor_tests::watched::{prepared, watch, watch_with};
+use handle::KINDS;
 
 /// Run of an open hand that starts at the wall, under a load.
 fn scene(preset: &str, latency_ticks: u32, rate_hz: u32, start_mm: f64, load_n: f64) -> String {
@@ -70,6 +76,45 @@ fn a_weight_laid_on_the_boundary_comes_to_rest() {
             // The field of preset full is uneven.
             let is_there = (middle - rest_m).abs() < 0.03 * depth_m;
             assert!(preset == "full" || is_there, "{what}: {middle}, not {rest_m}");
+        }
+    }
+}
+
+/// A handle under its weight, which no hand holds, on the wall at the end of its range: 5 N, where the device has more force. At a limit of
+/// the force itself nothing more pushes back: nine tenths of it there (Inverse3, Touch).
+#[test]
+fn a_weight_on_the_wall_of_every_kind_of_device_comes_to_rest() {
+    let folder = build_folder().join("deps");
+    let registry = Registry::search(&[folder]).with_linked(&handle::ENTRY).expect("it is a plugin");
+    for kind in KINDS {
+        let rates = [250_u32, 500, 1000, 2000, 4000];
+        for rate_hz in rates.into_iter().filter(|rate_hz| f64::from(*rate_hz) <= kind.fastest_hz) {
+            let period_ns = 1_000_000_000 / u64::from(rate_hz);
+            let wall =
+                RenderedBoundary::new(&Boundary::default(), &kind.capabilities(), &Bound::NONE, period_ns);
+            let least_n = kind.max_force_n.min(5.0);
+            assert!(wall.holds_n > 0.999 * least_n, "{} at {rate_hz} Hz: {wall:?}", kind.name);
+            let weight_n = if kind.max_force_n > 5.0 { 5.0 } else { 0.9 * kind.max_force_n };
+            let run = watch_with(
+                &registry,
+                &format!(
+                    "duration_s = 8\nrate_hz = {rate_hz}\n[device]\nplugin = \"handle\"\n[device.parameters]\n\
+                     kind = \"{}\"\nweight_n = {weight_n}\nstart_z_mm = {}\n[[model]]\nplugin = \"load\"\n\
+                     [model.parameters]\nforce_n = 0\n",
+                    kind.name,
+                    -wall.begins_m[2] * 1.0e3
+                ),
+            );
+            let what = format!("{}, {weight_n:.2} N at {rate_hz} Hz", kind.name);
+            assert_eq!(run.outcome.end, RunEnd::Finished, "{what}");
+            let depth_m = weight_n / wall.stiffness_n_per_m;
+            let rest_m = -(wall.begins_m[2] + depth_m);
+            let last = run.records.get(run.records.len() * 3 / 4..).unwrap_or_default();
+            let off_m =
+                last.iter().map(|record| (record.pose.position().z - rest_m).abs()).fold(0.0, f64::max);
+            println!("{what}: {:.3} mm deep, {:.1e} of that off", depth_m * 1.0e3, off_m / depth_m);
+            // The oscillation has decayed.
+            assert!(!last.is_empty() && off_m < 0.01 * depth_m, "{what}: {off_m} m off");
         }
     }
 }

@@ -197,5 +197,5 @@ fn an_answer_outside_the_contract_is_no_force() {
     let Watched { records, outcome, .. } = watch(&scene(&Scratch::default(), &["ODD_ANSWERS"]));
     assert!(records.iter().all(|record| record.commanded == Wrench::ZERO));
     assert!(records.iter().all(|record| record.events.intersects(Events::MODEL_FAULT)));
-    assert_eq!(outcome.models[0].1.rejected_ticks, 20);
+    assert_eq!(outcome.models[0].1.rejected.ticks, 20);
 }

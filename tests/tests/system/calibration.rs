@@ -163,7 +163,7 @@ fn what_cannot_be_is_refused_in_one_line() {
 #[test]
 fn the_extension_checks_what_it_is_given() {
     use flotor_hal::VerticalCalibration;
-    use flotor_hal::abi::loader::Setting;
+    use flotor_loader::Setting;
     let plugin = load_file(&plugin_file("flotor-simulated")).expect("the simulated flotor loads");
     let full = [Setting::parse(plugin.parameters(), "preset", "full").expect("the preset exists")];
     let mut device = plugin.open_device(&full).expect("it opens");

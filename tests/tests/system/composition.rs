@@ -4,8 +4,8 @@
 use flotor_core::mapping::{Mapping, MappingConfig};
 use flotor_core::trace::TickRecord;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{Model, Plugin, Setting};
 use flotor_hal::{Demand, Input, LoopConfig, Output, Wrench};
+use flotor_loader::{Model, Plugin, Setting};
 use flotor_session::scene::Scene;
 use flotor_tests::TestSize;
 use flotor_tests::watched::watch;

@@ -1,6 +1,7 @@
 //! Each kind of file that a command reads, damaged in each way that files get damaged: the damage is reported with the file's name,
 //! or the answer is that of the undamaged file. A cut, a lost part or a wrong bit inside the last digits of a text without a
-//! checksum leaves another valid text; the damage here is what a reader can see.
+//! checksum leaves another valid text; the damage here is what a reader can see. Each kind of file gets twenty kinds of damage or more:
+//! what happens to any bytes, and what happens to text, to tables and to a line of a log.
 
 use flotor_tests::library::plugin_file;
 use flotor_tests::program::{Flotor, Ran, exit_code};
@@ -27,7 +28,7 @@ struct Input {
 }
 
 /// What the bytes of a file are.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Layout {
     /// Numbers separated by commas.
     Table,
@@ -76,6 +77,9 @@ kinds_of_damage! {
     Pipe
     Device
     Gigabyte
+    LostHead
+    SwappedBlocks
+    PaddedEnd
 }
 
 use Damage::*;
@@ -85,9 +89,9 @@ impl Damage {
     fn befalls(self, layout: Layout) -> bool {
         match self {
             GermanTable | SeparatorLine | QuotedCells => layout == Layout::Table,
-            LineEndsOfWindows | LineEndsOfOldMacs | ByteOrderMark | Utf16 | BlankLinesAtTheEnd => {
-                layout != Layout::Binary
-            }
+            Utf16 | BlankLinesAtTheEnd => layout != Layout::Binary,
+            // Two lines of another text in the other order, or a part less, may be valid; a log has a chain of hashes.
+            LostHead | SwappedBlocks | PaddedEnd => matches!(layout, Layout::Binary | Layout::Log),
             // A folder with a log less is a study with a subject less.
             Missing => layout != Layout::Log,
             // The superuser reads whatever he likes.
@@ -130,8 +134,9 @@ impl Damage {
                 bytes[content.len() / 2] ^= 0x80;
                 write(&bytes);
             }
-            LineEndsOfWindows => write(text().replace('\n', "\r\n").as_bytes()),
-            LineEndsOfOldMacs => write(text().replace('\n', "\r").as_bytes()),
+            // Of bytes that are no text: a transfer in the mode for text.
+            LineEndsOfWindows => write(&with_line_ends(content, b"\r\n")),
+            LineEndsOfOldMacs => write(&with_line_ends(content, b"\r")),
             ByteOrderMark => write(&[b"\xef\xbb\xbf", content].concat()),
             Utf16 => {
                 let units = std::iter::once(0xfeff).chain(text().encode_utf16().collect::<Vec<u16>>());
@@ -159,8 +164,27 @@ impl Damage {
                 let file = std::fs::File::create(path).expect("a scratch folder can be written to");
                 file.set_len(1 << 30).expect("a file may have holes");
             }
+            LostHead => write(&content[12..]),
+            SwappedBlocks => {
+                let length = (content.len() / 4).min(1000);
+                let (mut bytes, middle) = (content.to_vec(), content.len() / 2);
+                let (first, second) = bytes.split_at_mut(middle);
+                first[middle - length..].swap_with_slice(&mut second[..length]);
+                write(&bytes);
+            }
+            // As XMODEM pads the last block of 128 bytes.
+            PaddedEnd => {
+                let mut bytes = content.to_vec();
+                bytes.resize((content.len() + 1).next_multiple_of(128), 0x1a);
+                write(&bytes);
+            }
         }
     }
+}
+
+/// Bytes with another mark in place of each line feed.
+fn with_line_ends(content: &[u8], mark: &[u8]) -> Vec<u8> {
+    content.split(|byte| *byte == b'\n').collect::<Vec<_>>().join(mark)
 }
 
 /// A place near `at` where a reader can see that the rest is missing: in a text after the first word or cell of a line with several.
@@ -433,6 +457,15 @@ fn complaint(input: &Input, ran: &Ran, expected: &str) -> Option<String> {
     let said = |text: &str| text.chars().take(300).collect::<String>();
     (!is_read_right && !is_reported)
         .then(|| format!("{:?} {} / {}", ran.code, said(&ran.stderr), said(&(input.answer)(ran))))
+}
+
+#[test]
+fn each_kind_of_file_gets_twenty_kinds_of_damage() {
+    for layout in [Layout::Table, Layout::Text, Layout::Log, Layout::Binary] {
+        let kinds: Vec<_> = DAMAGE.iter().filter(|damage| damage.befalls(layout)).collect();
+        println!("{layout:?}: {} kinds of damage: {kinds:?}", kinds.len());
+        assert!(kinds.len() >= 20, "{layout:?}: {kinds:?}");
+    }
 }
 
 #[test]

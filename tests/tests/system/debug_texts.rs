@@ -14,7 +14,7 @@ const READERS: [(&str, &str); 16] = [
     ("devices/maglev/emulator/src/bin/flotor-maglev-emulator/ml_api.rs", "a scene in TOML"),
     ("devices/maglev/emulator/src/bin/flotor-maglev-emulator/proxy.rs", "a scene in TOML"),
     ("devices/maglev/emulator/src/ml_api/server/state.rs", "a log: the name of a phase"),
-    ("hal/src/abi/loader/capabilities.rs", NUMBERS),
+    ("hal/loader/src/capabilities.rs", NUMBERS),
     ("hal/src/extension/calibration.rs", NUMBERS),
     ("lab/measure/src/cli/eval.rs", "a number of a CSV file"),
     ("interop/python/src/model.rs", "`repr` of Python"),

@@ -241,7 +241,7 @@ fn variants(source: &str, name: &str) -> Vec<String> {
 
 #[test]
 fn the_book_prints_every_refusal_of_the_loader() {
-    let refusals = variants(&read("hal/src/abi/loader/error.rs"), "LoadError");
+    let refusals = variants(&read("hal/loader/src/error.rs"), "LoadError");
     assert!(refusals.len() >= 10 && refusals.contains(&"Truncated".to_owned()), "{refusals:?}");
     let printed = table_under(&read("docs/src/plugin-contract.md"), "## Refusals");
     let printed: Vec<String> = printed.iter().map(|row| row[0].trim_matches('`').to_owned()).collect();

@@ -9,6 +9,7 @@ use flotor_tests::watched::watch;
 use flotor_tests::workspace_root;
 use flotor_tests::{TestSize, holds_ticks};
 use rustix::process::Signal;
+use std::os::unix::fs::PermissionsExt;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -387,7 +388,7 @@ fn a_model_that_rounds_otherwise_changes_no_other_number_and_is_named() {
         }
         let told = run(habit, "");
         let health = told.outcome.models[1].1;
-        assert_eq!(health.first_float_change, Some(0), "{habit}: {health:?}");
+        assert_eq!(health.float_changes.first, Some(0), "{habit}: {health:?}");
         assert!(told.outcome.models[0].1.is_good(), "the spring is not blamed");
     }
 }
@@ -442,6 +443,84 @@ fn variables_that_a_plugin_changes_are_named() {
     let told = "note: `jelly` changed the mode mask of new files of the host, which the host restored as far as permitted; the plugin also changed environment variables \
                 of the host (TZ), which the host does not restore\n";
     assert!(ran.stderr.starts_with(told), "{ran:?}");
+}
+
+/// What software of makers does when it starts, in one model, and what the next model finds: numbers with a point, files that can be read,
+/// the folder of the host.
+#[test]
+fn a_model_finds_the_process_as_it_was_before_another_changed_it() {
+    let moves = "IN_CREATE=if (chdir(\"/\")) { abort(); } umask(0777); setenv(\"TZ\", \"Pacific/Kiritimati\", 1); \
+                 if (!setlocale(LC_ALL, \"de_DE.UTF-8\") && !setlocale(LC_ALL, \"C.UTF-8\")) { abort(); }";
+    let asks = "IN_CREATE=char folder[1000]; mode_t mask = umask(0); umask(mask); fprintf(stderr, \
+                \"%o %s %g %g %s\\n\", (unsigned)mask, setlocale(LC_ALL, NULL), 0.5, strtod(\"0.5\", NULL), \
+                getcwd(folder, sizeof folder) ? folder : \"-\");";
+    let scratch = Scratch::default();
+    let second = format!(
+        "isolation = \"none\"\n[[model]]\nname = \"asks\"\nplugin = \"{}\"\nisolation = \"none\"\n",
+        plugin_that(&scratch, "model", asks).display()
+    );
+    let scene = scratch.file("scene.toml", scene_of(&scratch, HONEST, moves, &second)).display().to_string();
+    let names = ["run.mcap", "run.json", "run.svg"];
+    let [recording, json, plot] = names.map(|name| scratch.path().join(name).display().to_string());
+    let arguments =
+        ["run", &scene, "--clock", "virtual", "--record", &recording, "--json", &json, "--plot", &plot];
+    let ran = Flotor::with(arguments).through_shell("umask 027; exec \"$@\"").inside(scratch.path()).run();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    let found = format!("27 C 0.5 0.5 {}", scratch.path().display());
+    assert!(ran.stderr.lines().any(|line| line == found), "{found}: {ran:?}");
+    for name in names {
+        let attributes = std::fs::metadata(scratch.path().join(name)).expect("the run wrote it");
+        assert_eq!(attributes.permissions().mode() & 0o777, 0o640, "{name}");
+    }
+}
+
+/// Thread-local data of a plugin, as allocators and OpenMP have it, takes room that no swap gives back: each swap to another build succeeds or
+/// is refused with that cause, and the run goes on.
+#[test]
+fn rebuilt_plugins_with_thread_local_data_are_swapped_until_the_room_is_used_up() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let scratch = Scratch::default();
+    let runtime = scratch.folder("runtime").display().to_string();
+    let library = scratch.path().join("libbuilt.so");
+    let build = |number: usize| {
+        let step = "IN_STEP=static __thread __attribute__((tls_model(\"initial-exec\"))) char block[200]; block[3]++;";
+        let create = format!("IN_CREATE=static volatile int build = {number}; build++;");
+        let new = scratch.path().join("new.so");
+        compile_c_file(&workspace_root().join("tests/c/model_that.c"), &[step, &create], &new);
+        std::fs::rename(new, &library).expect("both are in one folder");
+    };
+    build(0);
+    let scene =
+        scene_of(&scratch, HONEST, HONEST, "[model.blend]\nfade_s = 0.01\n[limits]\nwatchdog_ms = 60000\n");
+    let scene = scratch.file("scene.toml", scene).display().to_string();
+    let recording = scratch.path().join("run.mcap");
+    let record = recording.display().to_string();
+    let flotor = |arguments: &[&str]| Flotor::with(arguments).env("XDG_RUNTIME_DIR", &runtime);
+    let running = flotor(&["run", &scene, "--duration", "600s", "--record", &record]).start();
+    let started = Instant::now();
+    while !holds_ticks(&recording) && started.elapsed() < Duration::from_secs(20) {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let path = library.display().to_string();
+    let swaps = (1..40).map(|number| {
+        build(number);
+        let mut ran = flotor(&["swap", "jelly", "--plugin", &path]).run();
+        while ran.stderr.contains("still fading") {
+            ran = flotor(&["swap", "jelly", "--plugin", &path]).run();
+        }
+        ran
+    });
+    let refused = swaps.into_iter().find(|ran| ran.code != Some(exit_code::OK)).expect("the room has an end");
+    assert_eq!(refused.code, Some(exit_code::PLUGIN_REFUSED), "{refused:?}");
+    for part in ["[jelly] model unchanged: ", "static TLS", "optional_static_tls=16384"] {
+        assert!(refused.error().contains(part), "{part}: {refused:?}");
+    }
+    running.signal(Signal::INT);
+    let ran = running.wait();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert!(ran.stdout.contains("digest"), "{ran:?}");
 }
 
 // ---------------------------------------------------------------- files

@@ -153,7 +153,7 @@ fn a_calibration_with_more_than_the_motors_have_says_so() {
     let ran =
         calibrate(&emulator, &sensor, &["vertical", "--force", "7.5,8", "--steps", "7", "--step-mm", "2"]);
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
-    assert!(ran.error().contains("less than the 7.5 N of the plan at 7.0 mm"), "{}", ran.error());
+    assert!(ran.error().contains("N of the planned 7.5 N at 7.0 mm"), "{}", ran.error());
     let ran = calibrate(&emulator, &sensor, &["vertical"]);
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
     assert!(ran.error().contains("at most 8 N") && ran.error().contains("--force"), "{}", ran.error());

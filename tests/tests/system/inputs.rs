@@ -109,3 +109,35 @@ fn a_scene_has_a_bounded_number_of_models() {
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
     assert!(ran.stderr.contains("many.toml:12292: there are more than 4096 models"), "{}", ran.stderr);
 }
+
+/// A measured spring as spreadsheets write it: a plain table, Excel's "CSV UTF-8" (mark and line ends), and Excel in German.
+fn of_spreadsheets() -> [String; 3] {
+    let rows = (0..=40).map(|row| format!("{:?},{:?}\n", f64::from(row) * 0.25, f64::from(row) / 10.0));
+    let plain = format!("compression_mm,force_n\n{}", rows.collect::<String>());
+    let marked = format!("\u{feff}{}", plain.replace('\n', "\r\n"));
+    let german = plain.replace(',', ";").replace('.', ",");
+    [plain, marked, german]
+}
+
+/// Every reader of a table takes the mark and the line ends, and names the separator that it does not take.
+#[test]
+fn tables_of_spreadsheets_are_read_or_refused_with_the_separator() {
+    let scratch = Scratch::default();
+    let poses = scratch.file("poses.csv", "x_m,y_m,z_m,rx_rad,ry_rad,rz_rad\n0,0,-0.005,0,0,0\n");
+    let poses = poses.display().to_string();
+    let commands: [&[&str]; 2] = [
+        &["study", "spring", "spring.csv"],
+        &["eval", "--model", "measured", "--set", "curve=spring.csv", "--poses", &poses, "--out", "-"],
+    ];
+    for command in commands {
+        let [plain, marked, german] = of_spreadsheets().map(|table| {
+            let folder = Scratch::default();
+            let _ = folder.file("spring.csv", table);
+            Flotor::with(command).inside(folder.path()).run()
+        });
+        assert_eq!(plain.code, Some(exit_code::OK), "{plain:?}");
+        assert_eq!(marked, plain, "{command:?}");
+        assert_eq!(german.code, Some(exit_code::CONFIGURATION), "{german:?}");
+        assert!(german.error().contains("spring.csv") && german.error().contains("`;`"), "{german:?}");
+    }
+}

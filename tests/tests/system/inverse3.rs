@@ -2,8 +2,8 @@
 //! an error of either side shows.
 
 use super::services::Service;
-use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, Tick, Wrench};
+use flotor_loader::{ActiveDevice, Plugin, Setting};
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::stand_in::said_of_a_spring_on;

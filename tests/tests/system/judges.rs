@@ -179,37 +179,38 @@ fn the_page_has_the_card() {
     }
 }
 
-/// Shipped models have no defect: nothing may be said of them that is not so. Their stiffness and what a call costs are
-/// noted, not held against them here.
+/// Shipped models have no defect: nothing may be said of them that is not so. The membrane alone is stiffer than a device renders: near
+/// its fixed border, in a fifth of the workspace, with a damping of 2 N·s/m (M2, M5).
 #[test]
 fn shipped_models_pass() {
     if TestSize::of_this_run().leaves_out_long_tests() {
         return;
     }
-    let models: &[&[&str]] = match TestSize::of_this_run() {
+    let models: &[(&[&str], &[&str])] = match TestSize::of_this_run() {
         // `flotor test` judges the spring and the wall each day: `host/scenes` has a file for each.
-        TestSize::Quick | TestSize::Daily => &[&["load"]],
+        TestSize::Quick | TestSize::Daily => &[(&["load"], &[])],
         TestSize::Full => &[
-            &["spring"],
-            &["spring", "--set", "preset=thesis-2"],
-            &["spring", "--set", "preset=thesis-3"],
-            &["spring", "--set", "preset=slender"],
-            &["wall"],
-            &["load"],
-            &["measured"],
-            &["membrane"],
+            (&["spring"], &[]),
+            (&["spring", "--set", "preset=thesis-2"], &[]),
+            (&["spring", "--set", "preset=thesis-3"], &[]),
+            (&["spring", "--set", "preset=slender"], &[]),
+            (&["wall"], &[]),
+            (&["load"], &[]),
+            (&["measured"], &[]),
+            (&["membrane"], &["M2", "M5"]),
         ],
     };
-    for arguments in models {
+    for (arguments, expected) in models {
         let [model, further @ ..] = arguments else { continue };
-        assert_eq!(failed(model, further), Vec::<Value>::new(), "{arguments:?}");
+        let failed = failed(model, further);
+        let ids: Vec<&str> = failed.iter().filter_map(|measure| measure["id"].as_str()).collect();
+        assert_eq!(ids, *expected, "{arguments:?}: {failed:#?}");
     }
 }
 
-/// The measures that fail, without stiffness (M2, M5), which is for the device to render, and cost (M7), which is the machine's too.
+/// The measures that fail, without cost (M7), which is the machine's too.
 fn failed(model: &str, further: &[&str]) -> Vec<Value> {
-    let is_defect = |measure: &Value| !["M2", "M5", "M7"].contains(&measure["id"].as_str().expect("a name"));
-    let is_failure = |measure: &Value| measure["verdict"] == "fail" && is_defect(measure);
+    let is_failure = |measure: &Value| measure["verdict"] == "fail" && measure["id"] != "M7";
     measures(model, further).into_iter().filter(is_failure).collect()
 }
 

@@ -2,8 +2,8 @@
 //! with the simulated flotor, and what happens when one side dies, hangs, or talks nonsense.
 
 use flotor_core::trace::{Events, TickRecord};
-use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_loader::Setting;
 use flotor_maglev::protocol::stream::{Received, StreamDecoder, coded};
 use flotor_maglev::protocol::{Answer, AnswerFrame, Mode, Request, RequestFrame, Status};
 use flotor_servo::RunEnd;

@@ -3,8 +3,8 @@
 
 use super::haply::{Board, HELD_M};
 use flotor_core::trace::TickRecord;
-use flotor_hal::abi::loader::{ActiveDevice, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_loader::{ActiveDevice, Setting};
 use flotor_maglev::ml_api::{
     AxisValues, EventKind, FaultBits, Function, GainSet, Pid, Reply, Request, Results, Status,
 };

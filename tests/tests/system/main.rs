@@ -28,6 +28,7 @@ mod falcon;
 mod force_sensor;
 mod gallery;
 mod golden;
+mod grip;
 mod hand_recording;
 mod hanging_device;
 mod haply;
@@ -66,6 +67,7 @@ mod scene_test;
 #[cfg(feature = "drop-ins")]
 mod services;
 mod simulated;
+mod snapshot;
 mod stop_delivery;
 mod stop_time;
 mod study;

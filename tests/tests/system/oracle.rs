@@ -188,7 +188,7 @@ fn a_wrong_file_is_told_with_file_and_line() {
     }
     let ran = eval(&format!("{POSE_HEADER}\n{good},0\n"), &[]);
     assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:#?}");
-    assert!(ran.error().starts_with("-:2: "), "a row that is too long: {ran:#?}");
+    assert!(ran.error().starts_with("standard input:2: "), "a row that is too long: {ran:#?}");
 }
 
 #[test]

@@ -3,9 +3,9 @@
 //! noise does; the seeds are fixed, so a failure comes back.
 
 use flotor_hal::Demand;
-use flotor_hal::abi::loader::read_metadata;
 use flotor_lab::poses::Poses;
 use flotor_live::{Ask, Frames, Kind, Request, SetValue, frame, ticks_from_payload};
+use flotor_loader::read_metadata;
 use flotor_record::Recording;
 use flotor_session::calibration_file::CalibrationFile;
 use flotor_session::scene::{DEMO, Scene};

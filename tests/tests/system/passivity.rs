@@ -4,6 +4,7 @@ use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, rotation_vector};
 use flotor_servo::RunEnd;
 use flotor_tests::TestSize;
+use flotor_tests::printed::assert_chapter_prints;
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::watched::{Watched, watch};
 use rayon::prelude::*;
@@ -41,45 +42,124 @@ fn lowest_port_j(records: &[TickRecord]) -> f64 {
     steps.fold(0.0, f64::min)
 }
 
+/// Energy `K a² T⁴ / 8` of a spring over the distance that a handle covers from rest at 50 m/s² in one period, J.
+fn energy_of_a_start_j(stiffness_n_per_m: f64, rate_hz: f64) -> f64 {
+    stiffness_n_per_m * 2500.0 / (8.0 * rate_hz.powi(4))
+}
+
+/// A scripted hand on a model at one rate, with the controller and without.
+#[derive(Debug)]
+struct Cell {
+    script: &'static str,
+    stiffness_n_per_m: f64,
+    rate_hz: f64,
+    /// Peak force without the controller at 4 kHz, N.
+    fine_n: f64,
+    /// Peak force without the controller, N.
+    free_n: f64,
+    /// Peak force with the controller, N.
+    kept_n: f64,
+    /// Lowest port energy with the controller, J.
+    lowest_j: f64,
+    /// Outcome of the run with the controller.
+    end: RunEnd,
+}
+
+impl Cell {
+    fn run(
+        script: &'static str,
+        (model, stiffness_n_per_m): &(&str, f64),
+        rate_hz: f64,
+        fine_n: f64,
+    ) -> Self {
+        let [free, kept] =
+            ["observe", "control"].map(|passivity| scripted(script, model, rate_hz, passivity));
+        let [free_n, kept_n] = [&free, &kept].map(peak_n);
+        let lowest_j = lowest_port_j(&kept.records);
+        let stiffness_n_per_m = *stiffness_n_per_m;
+        Self { script, stiffness_n_per_m, rate_hz, fine_n, free_n, kept_n, lowest_j, end: kept.outcome.end }
+    }
+
+    /// Returns the reserve that the chapter states, J.
+    fn reserve_j(&self) -> f64 {
+        energy_of_a_start_j(100.0, self.rate_hz)
+    }
+
+    fn bound_j(&self) -> f64 {
+        energy_of_a_start_j(self.stiffness_n_per_m, self.rate_hz)
+    }
+
+    /// Returns the part of the reserve that left the port; more than 1: beyond the reserve.
+    fn of_the_reserve(&self) -> f64 {
+        -self.lowest_j / self.reserve_j()
+    }
+
+    /// Returns true if more energy left the port than the reserve, beyond the error of rotations of the controller (1e-6).
+    fn is_beyond_the_reserve(&self) -> bool {
+        self.of_the_reserve() > 1.0 + 1.0e-6
+    }
+
+    fn is_right(&self) -> bool {
+        self.fine_n > 0.1
+            && self.kept_n >= 0.95 * self.fine_n
+            && self.kept_n <= 1.05 * self.free_n
+            && self.lowest_j >= -self.bound_j()
+            // The hand of this script starts faster than predicted, at the end of its last pulse.
+            && (!self.is_beyond_the_reserve() || self.script == "push")
+            && self.end == RunEnd::Finished
+    }
+}
+
+impl std::fmt::Display for Cell {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{} at {} Hz on {} N/m: port energy {:.2e} J or more, {:.6} of the reserve of {:.2e} J; bound {:.2e} J",
+            self.script,
+            self.rate_hz,
+            self.stiffness_n_per_m,
+            self.lowest_j,
+            self.of_the_reserve(),
+            self.reserve_j(),
+            self.bound_j()
+        )
+    }
+}
+
 /// The controller once assumed that a handle might start at 50 m/s² in any tick: each contact slower than 25 mm/s at 1 kHz, and 100 mm/s
 /// at 250 Hz, had no force for as long as it lasted.
 #[test]
-fn every_script_of_a_hand_feels_its_contact_and_gets_no_more_energy_than_the_reserve() {
+fn every_script_of_a_hand_feels_its_contact_and_gets_no_more_energy_than_the_book_states() {
     let rates: &[f64] = match TestSize::of_this_run() {
         TestSize::Quick => &[250.0, 1000.0],
         TestSize::Daily | TestSize::Full => &[250.0, 500.0, 1000.0, 2000.0, 4000.0],
     };
     let cases: Vec<_> =
         MODELS.iter().flat_map(|model| SCRIPTS.iter().map(move |script| (model, script))).collect();
-    let wrong: Vec<String> = cases
+    let cells: Vec<Cell> = cases
         .par_iter()
-        .flat_map_iter(|((model, stiffness_n_per_m), script)| {
-            let fine_n = peak_n(&scripted(script, model, 4000.0, "observe"));
-            rates.iter().filter_map(move |rate_hz| {
-                let (free, kept) = (
-                    scripted(script, model, *rate_hz, "observe"),
-                    scripted(script, model, *rate_hz, "control"),
-                );
-                let [free_n, kept_n] = [&free, &kept].map(peak_n);
-                let lowest_j = lowest_port_j(&kept.records);
-                // `K a² T⁴ / 8` with 50 m/s²: the energy of the spring over the way of one period from rest.
-                let reserve_j = stiffness_n_per_m * 2500.0 / (8.0 * rate_hz.powi(4));
-                let is_right = fine_n > 0.1
-                    && kept_n >= 0.95 * fine_n
-                    && kept_n <= 1.05 * free_n
-                    && lowest_j >= -reserve_j
-                    && kept.outcome.end == RunEnd::Finished;
-                (!is_right).then(|| {
-                    format!(
-                        "{script} at {rate_hz} Hz on {stiffness_n_per_m} N/m: {kept_n} N, {fine_n} N at 4 kHz, {free_n} N \
-                         without; {lowest_j} J of {reserve_j} J; {:?}",
-                        kept.outcome.end
-                    )
-                })
-            })
+        .flat_map_iter(|(model, script)| {
+            let fine_n = peak_n(&scripted(script, model.0, 4000.0, "observe"));
+            rates.iter().map(move |rate_hz| Cell::run(script, model, *rate_hz, fine_n))
         })
         .collect();
+    cells.iter().for_each(|cell| println!("{cell}"));
+    let wrong: Vec<String> =
+        cells.iter().filter(|cell| !cell.is_right()).map(|cell| format!("{cell}: {cell:?}")).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    let beyond: Vec<&Cell> = cells.iter().filter(|cell| cell.is_beyond_the_reserve()).collect();
+    let most = cells.iter().map(Cell::of_the_reserve).fold(0.0, f64::max);
+    let line = format!(
+        "in {} of these {} runs, and below it by up to {:.0} % of the reserve in the {} others",
+        cells.len() - beyond.len(),
+        cells.len(),
+        (most - 1.0) * 100.0,
+        beyond.len()
+    );
+    println!("above minus the reserve {line}");
+    if TestSize::of_this_run() > TestSize::Quick {
+        assert_chapter_prints("safety-envelope.md", &line);
+    }
 }
 
 /// A free handle with 5 N of its weight left, laid down next to the boundary.

@@ -2,6 +2,7 @@
 
 use flotor_tests::program::{Flotor, exit_code};
 use flotor_tests::scratch::Scratch;
+use flotor_tests::tools::{Tool, required};
 use flotor_tests::{TestSize, workspace_root};
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,7 @@ const GROWTH_KIB: u64 = 6 * 1024;
 
 /// Largest memory of a command that draws, KiB.
 fn peak_kib(arguments: &[&str], folder: &Path) -> u64 {
-    let (ran, peak_kib) = Flotor::with(arguments).inside(folder).start().wait_with_peak_kib();
+    let (ran, peak_kib) = Flotor::with(arguments).inside(folder).run_with_peak_kib();
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let picture = arguments.last().map(|name| folder.join(name)).expect("a picture is asked for");
     assert!(std::fs::read_to_string(picture).expect("the picture is there").starts_with("<svg"));
@@ -23,7 +24,7 @@ fn peak_kib(arguments: &[&str], folder: &Path) -> u64 {
 #[test]
 fn memory_of_a_picture_does_not_grow_with_the_run() {
     let size = TestSize::of_this_run();
-    if size.leaves_out_long_tests() {
+    if size.leaves_out_long_tests() || !required(Tool::Python) {
         return;
     }
     let scratch = Scratch::default();

@@ -103,6 +103,8 @@ const MODEL: &[Row] = &[
     ("shape_corner", "a triangle with a corner that there is not", By("extensions")),
     ("crash_details", "crash in `details`", By("extensions")),
     ("field_nan", "NaN in its local linear model", By("extensions")),
+    ("crash_contacts", "crash in `contact-set`", By("extensions")),
+    ("contacts_gap", "a contact whose gap is not that of its points", By("extensions")),
 ];
 
 const DEVICE: &[Row] = &[

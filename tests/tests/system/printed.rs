@@ -1,7 +1,7 @@
 //! Numbers that the book prints and no other test computes: tables of examples, what the simulated flotor declares, the size of a
 //! recording.
 
-use flotor_hal::abi::loader::Setting;
+use flotor_loader::Setting;
 use flotor_session::registry::load_file;
 use flotor_simulated::hand::Impedance;
 use flotor_simulated::plant::FlotorParameters;

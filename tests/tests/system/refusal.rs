@@ -6,11 +6,11 @@
 //! look at every tick, and through the program, to look at the line and the exit code. A line on standard error
 //! is compared whole, so that no backtrace and no panic message of a plugin slips through.
 
+use flotor_core::health::ModelHealth;
 use flotor_core::trace::Events;
-use flotor_hal::abi::loader::{LoadError, Setting, read_metadata};
 use flotor_hal::abi::{ABI_MAJOR, ABI_MINOR, CallStatus, MAGIC};
 use flotor_hal::{Input, Output, Pose, Wrench};
-use flotor_servo::ModelHealth;
+use flotor_loader::{LoadError, Setting, read_metadata};
 use flotor_servo::RunEnd;
 use flotor_session::Outcome;
 use flotor_session::registry::load_file;
@@ -452,7 +452,7 @@ fn nan_from_a_model_is_no_force_for_that_tick_alone() {
         assert_eq!(record.model.wrench(), Some(model), "tick {}", record.tick);
         assert_eq!(record.events.intersects(Events::MODEL_FAULT), failed, "tick {}", record.tick);
     }
-    assert_eq!((health.rejected_ticks, health.first_rejected, health.panicked_at), (1, Some(7), None));
+    assert_eq!((health.rejected.ticks, health.rejected.first, health.panicked_at), (1, Some(7), None));
 }
 
 #[test]

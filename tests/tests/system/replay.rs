@@ -304,3 +304,68 @@ fn the_file_of_the_run_is_found_or_the_replay_is_refused() {
     let asked = replay(&recording, &["--set", &named]).run();
     assert_eq!(asked.code, Some(exit_code::OK), "{asked:?}");
 }
+
+// ---------------------------------------------------------------- a saved state
+
+/// Objects with a history: friction, masses, a rod past buckling.
+const WITH_HISTORY: [&str; 3] = [
+    "plugin = \"wall\"\n[model.parameters]\nfriction = 0.5\n",
+    "plugin = \"membrane\"\n",
+    "plugin = \"spring\"\n[model.parameters]\npreset = \"slender\"\nvariant = \"rod\"\n",
+];
+
+#[test]
+fn a_replay_from_a_saved_state_is_the_run_to_the_bit() {
+    for model in WITH_HISTORY {
+        let scratch = Scratch::default();
+        let recording = recorded(&scratch, &format!("duration_s = 1\n{DEVICE}[[model]]\n{model}"));
+        let state = scratch.path().join("state.json").display().to_string();
+        let saved = report(&recording, &["--save-state", &state, "--at-tick", "617"], exit_code::OK);
+        assert_eq!(saved["bit_exact"], Value::from(true), "{model}");
+        let started = report(&recording, &["--from-state", &state], exit_code::OK);
+        assert_eq!(started["bit_exact"], Value::from(true), "{model}");
+        assert_eq!(number(&started, "begins_at_tick"), 617, "{model}");
+        assert_eq!(number(&started, "ticks"), number(&saved, "ticks") - 617, "{model}");
+    }
+}
+
+#[test]
+fn a_saved_state_holds_what_changed_before_it() {
+    let scratch = Scratch::default();
+    let change = "[[change]]\nat_s = 0.4\nset = \"wall.friction=0.2\"\n";
+    let scene = format!("duration_s = 1\n{DEVICE}[[model]]\n{}{change}", WITH_HISTORY[0]);
+    let recording = recorded(&scratch, &scene);
+    let state = scratch.path().join("state.json").display().to_string();
+    report(&recording, &["--save-state", &state, "--at-tick", "617"], exit_code::OK);
+    let started = report(&recording, &["--from-state", &state], exit_code::OK);
+    assert_eq!(started["bit_exact"], Value::from(true));
+}
+
+#[test]
+fn a_state_of_other_settings_or_of_no_tick_is_refused_in_one_line() {
+    let scratch = Scratch::default();
+    let recording = recorded(&scratch, &format!("duration_s = 0.5\n{DEVICE}[[model]]\n{}", WITH_HISTORY[0]));
+    let state = scratch.path().join("state.json").display().to_string();
+    report(&recording, &["--save-state", &state, "--at-tick", "300"], exit_code::OK);
+    let version = std::fs::read_to_string(&state).expect("it was written");
+    let other = scratch.file("other.json", version.replacen("\"version\":\"", "\"version\":\"9", 1));
+    let other = other.display().to_string();
+    let cases: [(&[&str], &str); 5] = [
+        (
+            &["--from-state", &state, "--set", "wall.friction=0.25"],
+            "friction = 0.5, now it is 0.25; set friction to 0.5",
+        ),
+        (&["--from-state", &state, "--model", "wall=load"], "the snapshot is of `wall`, not of `load`"),
+        (&["--from-state", &other], "save the state with this version"),
+        (&["--save-state", &other, "--at-tick", "9999"], "the recording has no tick 9999"),
+        (&["--from-state", "absent.json"], "absent.json: "),
+    ];
+    for (more, words) in cases {
+        let ran = replay(&recording, more).run();
+        assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+        assert!(
+            ran.stderr.contains(words) && ran.stderr.trim_end().lines().count() == 1,
+            "{more:?}: {ran:?}"
+        );
+    }
+}

@@ -4,8 +4,8 @@
 //! Nothing is tuned on the tables, which hold a quarter of the rows their authors computed.
 
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{Model, Setting};
 use flotor_hal::{DVec3, Demand, Input, Output, Pose, StepStatus, orientation_from_rotation_vector};
+use flotor_loader::{Model, Setting};
 use flotor_session::registry::load_file;
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;

@@ -1,11 +1,12 @@
 //! How a run ends when it must: every state of a run reached through real libraries, emergency stops from signal,
 //! button and device, and a watchdog that stops the device when a plugin does not come back.
 
+use flotor_core::health::ModelHealth;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::DVec3;
 use flotor_record::{Ending, Recording, Severity};
 use flotor_servo::RunEnd;
-use flotor_servo::{Clock, EmergencySource, ModelHealth};
+use flotor_servo::{Clock, EmergencySource};
 use flotor_tests::library::{compile_c_file, plugin_file};
 use flotor_tests::program::{Flotor, Ran, Running, exit_code};
 use flotor_tests::scratch::Scratch;
@@ -651,7 +652,7 @@ fn nothing_a_wild_model_answers_gets_past_a_limit_or_the_slew() {
     for (tables, last_guard) in [("", Events::SLEW_LIMITED), (controlled, Events::PASSIVITY_DAMPED)] {
         let run = wild(ticks, "fault = \"wild\"", tables);
         assert_no_limit_is_passed(&run);
-        let rejected = the_model(&run).rejected_ticks;
+        let rejected = the_model(&run).rejected.ticks;
         assert!(rejected > 100, "NaN and infinity are counted, by name: {rejected}");
         assert!(run.records.iter().any(|record| record.events.intersects(last_guard)));
     }

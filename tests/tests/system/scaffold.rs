@@ -16,8 +16,8 @@ fn new(folder: &Path, arguments: &[&str]) -> Ran {
 
 /// Makes a plugin in an empty folder and builds it as told. Its build output is kept from one test run to the next:
 /// the dependencies of the contract are compiled once.
-fn made(scratch: &Scratch, kind: &str, name: &str, language: &str) -> PathBuf {
-    let ran = new(scratch.path(), &[kind, name, "--language", language]);
+fn made(scratch: &Scratch, kind: &[&str], name: &str, language: &str) -> PathBuf {
+    let ran = new(scratch.path(), &[kind, &[name, "--language", language]].concat());
     assert_eq!((ran.code, ran.stderr.as_str()), (Some(exit_code::OK), ""), "{ran:?}");
     let folder = scratch.path().join(name);
     let output = build_folder().join("scaffold");
@@ -69,7 +69,7 @@ fn peak_force_n(folder: &Path, name: &str, language: &str) -> f64 {
 fn a_new_model_builds_validates_and_pushes() {
     for language in ["rust", "c"] {
         let (scratch, name) = (Scratch::default(), format!("jelly-in-{language}"));
-        let folder = made(&scratch, "model", &name, language);
+        let folder = made(&scratch, &["model"], &name, language);
         // The intended position of the hand is 4 mm down, against 800 N/m, and the hand is soft: more than nothing,
         // less than 3.2 N.
         let peak = peak_force_n(&folder, &name, language);
@@ -90,16 +90,49 @@ fn a_new_model_builds_validates_and_pushes() {
 }
 
 #[test]
-fn the_model_a_newcomer_starts_from_is_forty_lines_at_most() {
+fn a_new_asynchronous_model_builds_validates_and_pushes() {
+    for language in ["rust", "c"] {
+        let (scratch, name) = (Scratch::default(), format!("gel-in-{language}"));
+        let folder = made(&scratch, &["model", "--beside"], &name, language);
+        // The hand goes less than 4 mm down, where the layers give way by 4 mm under 3.5 N.
+        let peak = peak_force_n(&folder, &name, language);
+        assert!(peak > 1.5 && peak < 3.5, "{language}: {peak} N");
+    }
+}
+
+#[test]
+fn a_device_is_never_asynchronous() {
     let scratch = Scratch::default();
-    let ran = new(scratch.path(), &["model", "jelly"]);
+    let ran = new(scratch.path(), &["device", "crank", "--beside"]);
+    assert_eq!(ran.code, Some(exit_code::CONFIGURATION), "{ran:?}");
+    assert!(ran.error().contains("`--beside` is for models"), "{ran:?}");
+    assert!(!scratch.path().join("crank").exists());
+}
+
+#[test]
+fn the_model_a_newcomer_starts_from_is_forty_lines_at_most() {
+    for kind in [&["model", "jelly"][..], &["model", "jelly", "--beside"]] {
+        let scratch = Scratch::default();
+        let ran = new(scratch.path(), kind);
+        assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+        let source = std::fs::read_to_string(scratch.path().join("jelly/src/lib.rs")).expect("it was made");
+        let model = source.split("#[cfg(test)]").next().unwrap_or_default();
+        let lines =
+            model.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//")).count();
+        println!("{lines} lines, without comments and its test");
+        assert!((10..=40).contains(&lines), "{kind:?}: {lines}");
+    }
+}
+
+#[test]
+fn the_asynchronous_model_a_newcomer_starts_from_is_that_of_the_book() {
+    let scratch = Scratch::default();
+    let ran = new(scratch.path(), &["model", "jelly", "--beside"]);
     assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
     let source = std::fs::read_to_string(scratch.path().join("jelly/src/lib.rs")).expect("it was made");
-    let model = source.split("#[cfg(test)]").next().unwrap_or_default();
-    let lines =
-        model.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("//")).count();
-    println!("{lines} lines, without comments and its test");
-    assert!((10..=40).contains(&lines), "{lines}");
+    let chapter = workspace_root().join("docs/src/bring-your-solver.md");
+    let chapter = std::fs::read_to_string(chapter).expect("it is there");
+    assert!(chapter.contains(&source), "docs/src/bring-your-solver.md does not have this file:\n{source}");
 }
 
 #[test]
@@ -116,7 +149,7 @@ fn the_device_a_newcomer_starts_from_is_that_of_the_book() {
 fn a_new_device_builds_validates_and_moves() {
     for language in ["rust", "c"] {
         let (scratch, name) = (Scratch::default(), format!("crank-in-{language}"));
-        let folder = made(&scratch, "device", &name, language);
+        let folder = made(&scratch, &["device"], &name, language);
         // Spring 1 at 4 mm: k_hand is gamma / L0 = 679 N/m without the demo's scale; the energy form adds little.
         let peak = peak_force_n(&folder, &name, language);
         assert!((peak - 2.7).abs() < 0.3, "{language}: {peak} N");
@@ -130,16 +163,20 @@ fn a_new_plugin_in_rust_is_formatted_whatever_its_name() {
         return lacks(Tool::Rustfmt, "rustfmt is not installed");
     }
     for name in ["j", "jelly", "jelly-with-a-name-of-32-letters"] {
-        for kind in ["model", "device"] {
+        for kind in [&["model"][..], &["model", "--beside"], &["device"]] {
             let scratch = Scratch::default();
-            let ran = new(scratch.path(), &[kind, name]);
+            let ran = new(scratch.path(), &[kind, &[name]].concat());
             assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
             let mut format = Command::new("rustfmt");
             format
                 .args(["--edition", "2024", "--check", "src/lib.rs"])
                 .current_dir(scratch.path().join(name));
             let checked = format.output().expect("it is installed");
-            assert!(checked.status.success(), "{kind} {name}: {}", String::from_utf8_lossy(&checked.stdout));
+            assert!(
+                checked.status.success(),
+                "{kind:?} {name}: {}",
+                String::from_utf8_lossy(&checked.stdout)
+            );
         }
     }
 }

@@ -310,7 +310,8 @@ fn a_file_that_is_no_text_is_told_with_its_line() {
 #[test]
 fn a_scene_writes_no_control_characters_to_a_terminal() {
     let title = spoiled("A spring", "\\u001b[2J");
-    assert_eq!(title, "scene.toml:1: `title` must not contain control characters");
+    let remedy = "remove the character, or, if a backslash was meant, put the text in single quotes";
+    assert_eq!(title, format!("scene.toml:1: `title` contains the control character \\u{{1b}}; {remedy}"));
     let scratch = Scratch::default();
     let scene = scratch.file("scene.toml", "title = \"\x1b[2J\"\n").display().to_string();
     let ran = Flotor::with(["run", &scene]).run();

@@ -247,6 +247,28 @@ fn a_client_gets_an_inventory_then_one_state_for_each_message_and_its_force_with
     assert!(summary.contains("asked for 1.118 N"), "{summary}");
 }
 
+/// The loop of a simulator's client: it receives, sends a force for the first device, and pauses for 5 ms. Each of its messages has its
+/// answer, and the hand gets the force.
+#[test]
+fn a_client_that_receives_first_and_pauses_gets_an_answer_to_each_message() {
+    let service = Service::start(&[]);
+    let mut client = service.client();
+    let mut told = client.receive();
+    let grip = &told["wireless_verse_grip"][0];
+    assert!(grip["device_id"].is_string() && grip["state"]["orientation"].is_object(), "{told}");
+    assert!(grip["state"]["buttons"].is_object(), "{told}");
+    for _ in 0..600 {
+        let id = told["inverse3"][0]["device_id"].as_str().expect("a device has an id");
+        let force = force_of(id, "values", [0.0, 0.0, 1.0]);
+        client.send_raw(&Client::frame(0x80 | TEXT, force.as_bytes()));
+        std::thread::sleep(Duration::from_millis(5));
+        told = client.receive();
+    }
+    let applied = vector(&state(&told)["current_cursor_force"]);
+    assert!((applied - DVec3::Z).length() < 1.0e-12, "{told}");
+    let _ = service.end();
+}
+
 #[test]
 fn a_session_sees_a_device_in_axes_of_its_own_and_all_of_it_can_be_set_by_http_too() {
     let service = Service::start(&["--pace", "lockstep"]);

@@ -2,8 +2,8 @@
 //! refused, and the same bits however it is run.
 
 use flotor_core::trace::{Events, TickRecord};
-use flotor_hal::abi::loader::{LoadError, OpenedDevice, Setting};
 use flotor_hal::{Conditions, Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_loader::{LoadError, OpenedDevice, Setting};
 use flotor_servo::RunEnd;
 use flotor_session::registry::load_file;
 use flotor_tests::TestSize;
@@ -303,7 +303,7 @@ fn opened(settings: &[(&str, &str)]) -> Result<OpenedDevice, LoadError> {
     plugin.open_device(&settings.iter().map(parse).collect::<Vec<_>>())
 }
 
-fn activated(settings: &[(&str, &str)], seed: u64) -> flotor_hal::abi::loader::ActiveDevice {
+fn activated(settings: &[(&str, &str)], seed: u64) -> flotor_loader::ActiveDevice {
     let device = opened(settings).expect("it opens");
     let Ok(device) = device.activate(&LoopConfig { period_ns: PERIOD_NS, seed }) else {
         panic!("it can be activated")

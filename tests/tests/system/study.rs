@@ -22,6 +22,7 @@ use flotor_tests::program::{Flotor, Ran, exit_code};
 use flotor_tests::scratch::Scratch;
 use flotor_tests::tools::{Tool, required};
 use rustix::process::Signal;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -685,6 +686,51 @@ fn a_sitting_that_runs_elsewhere_is_not_continued_here() {
     assert_eq!(SittingLog::read(&path).unwrap().trials.len(), 2);
 }
 
+/// The same with two programs: the second start is refused in the middle of a trial of the first, which goes on to its end.
+#[test]
+fn a_second_program_is_refused_beside_a_running_sitting() {
+    let scratch = Scratch::default();
+    let out = scratch.path().join("data");
+    let scene = scratch.patient_scene(flotor_session::scene::STUDY).display().to_string();
+    let arguments = PERSON.into_iter().chain(["json", "--scene", &scene, "--no-demo", "--subject", "1"]);
+    let arguments: Vec<&str> = arguments.collect();
+    let script = "mkfifo lines && exec 3<>lines && exec \"$@\" <&3";
+    let first = study(&arguments, &out).through_shell(script).inside(scratch.path()).start();
+    let path = log_of(&out, 1);
+    let until = Instant::now() + Duration::from_secs(60);
+    let wait_for = |trials: usize| {
+        while SittingLog::read(&path).map_or(0, |log| log.trials.len()) < trials {
+            assert!(Instant::now() < until, "no trial {trials}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    };
+    let lines = scratch.path().join("lines");
+    while !path.exists() {
+        assert!(Instant::now() < until, "no sitting begins");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let say = |words: &[&str]| {
+        let mut pipe = std::fs::OpenOptions::new().write(true).open(&lines).unwrap();
+        pipe.write_all((words.join("\n") + "\n").as_bytes()).unwrap();
+    };
+    let go = r#"{"input":"continue"}"#;
+    let answer = r#"{"input":"answer","response":"first"}"#;
+    say(&[go, go, go, answer, go]);
+    wait_for(1);
+    for more in [&[][..], &["--resume"]] {
+        let arguments: Vec<&str> = arguments.iter().chain(more).copied().collect();
+        let refused = study(&arguments, &out).reading([go, go, answer].join("\n")).run();
+        assert_eq!(refused.code, Some(exit_code::CONFIGURATION), "{refused:?}");
+        assert!(refused.error().contains("another process is running this sitting"), "{refused:?}");
+    }
+    say(&[go, answer]);
+    wait_for(2);
+    say(&[r#"{"input":"stop"}"#]);
+    let ran = first.wait();
+    assert_eq!(ran.code, Some(exit_code::OK), "{ran:?}");
+    assert_eq!(SittingLog::read(&path).unwrap().trials.len(), 2);
+}
+
 /// Another build of a plugin is another stimulus, also under the same version.
 #[test]
 fn a_sitting_does_not_go_on_with_another_build_of_a_plugin() {
@@ -933,7 +979,7 @@ fn nothing_is_kept_of_the_movements_if_so_asked() {
 fn peak_kib(subjects: &str, out: &Path) -> u64 {
     let together = ["--subjects", subjects, "--jobs", "2"]; // else as many as there are cores have a seat in memory
     let arguments: Vec<&str> = SMALL.into_iter().chain(together).collect();
-    let (ran, peak_kib) = study(&arguments, out).start().wait_with_peak_kib();
+    let (ran, peak_kib) = study(&arguments, out).run_with_peak_kib();
     assert_eq!(ran.code, Some(exit_code::OK));
     peak_kib
 }
@@ -941,7 +987,7 @@ fn peak_kib(subjects: &str, out: &Path) -> u64 {
 /// Eight times the subjects need no more memory: nothing is kept of what is on disk.
 #[test]
 fn memory_does_not_grow_with_the_subjects() {
-    if TestSize::of_this_run().leaves_out_long_tests() {
+    if TestSize::of_this_run().leaves_out_long_tests() || !required(Tool::Python) {
         return;
     }
     let scratch = Scratch::default();

@@ -1,6 +1,7 @@
 //! Devices over a vendor's SDK. Behind their plugins stand, in turn, Flotor's own drop-in libraries on the simulated flotor, so
 //! that an error of one side shows at the other, and small libraries in C with one thing wrong each.
 
+use flotor_core::grip::GripRecord;
 use flotor_core::trace::{Events, TickRecord};
 use flotor_hal::{DVec3, rotation_vector};
 use flotor_record::Recording;
@@ -123,6 +124,34 @@ fn moved(from: &TickRecord, to: &TickRecord) -> [f64; 6] {
     let turned = rotation_vector(to.pose.orientation() * from.pose.orientation().conjugate());
     let DVec3 { x, y, z } = to.pose.position() - from.pose.position();
     [x, y, z, turned.x, turned.y, turned.z]
+}
+
+/// The grip of the simulated flotor is the gripper of the drop-in library, and that is the grip of the plugin.
+#[test]
+fn a_thing_between_the_fingers_is_felt_through_the_gripper_of_the_sdk() {
+    let scratch = Scratch::default();
+    let device = format!("library = {:?}\nstand_in = true\npace = \"lockstep\"", DHD.drop_in());
+    let load = "[[model]]\nplugin = \"load\"\n[model.parameters]\nforce_n = 0\ngrip_stiffness_n_per_m = 500";
+    let scene = DHD.scene(&scratch, 2.0, &format!("{device}\n{load}"), "");
+    let circle = Circle::run(&scratch, &scene, "hold\"\nfingers = \"on", "lockstep");
+    let grips = |records: &[TickRecord]| -> Vec<GripRecord> {
+        records.iter().map(|record| record.grip.expect("it has a grip")).collect()
+    };
+    let (outside, inside) = (grips(&circle.outside), grips(&circle.inside));
+    let gap_m = |before: usize| {
+        let pairs = outside.iter().zip(inside.iter().skip(before));
+        pairs
+            .map(|(outside, inside)| (outside.state.opening - inside.state.opening).abs())
+            .fold(0.0, f64::max)
+    };
+    // The flotor has some ticks before the first sample of the plugin.
+    assert!((0..8).any(|before| gap_m(before) <= DHD.rounding), "{}", gap_m(0));
+    let most = |efforts: &mut dyn Iterator<Item = f64>| efforts.fold(0.0, f64::max);
+    let sent_n = most(&mut outside.iter().map(|grip| grip.commanded));
+    let got_n = most(&mut inside.iter().map(|grip| grip.model));
+    let read_n = most(&mut outside.iter().map(|grip| grip.state.delivered));
+    assert!(sent_n > 1.0 && (sent_n - got_n).abs() <= DHD.rounding, "{sent_n} sent, {got_n} arrived");
+    assert!((sent_n - read_n).abs() <= DHD.rounding, "{sent_n} sent, {read_n} read back");
 }
 
 #[test]

@@ -6,9 +6,9 @@
 //! contact is never lost, and the limit is that of the linear loop, [`exact_limit_n_per_m`].
 
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DeviceState, Input, LoopConfig, Output, Tick};
 use flotor_lab::stability::theory::{Plant, Rendering, exact_limit_n_per_m};
+use flotor_loader::{Plugin, Setting};
 use flotor_session::registry::load_file;
 use flotor_tests::TestSize;
 use flotor_tests::library::plugin_file;

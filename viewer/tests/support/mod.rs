@@ -48,7 +48,7 @@ pub(crate) fn model_run(id: &str, settings: &[(&str, &str)]) -> (RunDescription,
     let owned = |(key, value): &(&str, &str)| ((*key).to_owned(), (*value).to_owned());
     let settings: Vec<(String, String)> = settings.iter().map(owned).collect();
     let parse = |(key, value): &(String, String)| {
-        flotor_hal::abi::loader::Setting::parse(plugin.parameters(), key, value).expect("a legal setting")
+        flotor_loader::Setting::parse(plugin.parameters(), key, value).expect("a legal setting")
     };
     let parsed: Vec<_> = settings.iter().map(parse).collect();
     let mut model = plugin.create_model(&parsed).expect("a legal model");

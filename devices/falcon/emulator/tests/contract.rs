@@ -6,8 +6,8 @@ use flotor_falcon::kinematics::CENTRE_M;
 use flotor_falcon_emulator::in_process::InProcess;
 use flotor_falcon_emulator::machine::{Fault, Machine, Motion, Power};
 use flotor_falcon_emulator::server;
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, Tick, VerticalCalibration, Wrench};
+use flotor_loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use std::time::{Duration, Instant};
 
 pub(super) const CONFIG: LoopConfig = LoopConfig { period_ns: 1_000_000, seed: 1 };

@@ -4,8 +4,8 @@
 use super::contract::{CONFIG, open, serve};
 use flotor_falcon::kinematics::CENTRE_M;
 use flotor_falcon_emulator::machine::{Fault, Power};
-use flotor_hal::abi::loader::Plugin;
 use flotor_hal::{Axes, UsbAccess};
+use flotor_loader::Plugin;
 
 const PUSH_AND_PULL: &str =
     "push the handle in as far as possible and pull the handle out as far as possible";

@@ -8,8 +8,8 @@ use flotor_falcon::kinematics::CENTRE_M;
 use flotor_falcon_emulator::gadget::Gadget;
 use flotor_falcon_emulator::in_process::InProcess;
 use flotor_falcon_emulator::machine::{Machine, Motion, Power};
-use flotor_hal::abi::loader::{Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_loader::{Plugin, Setting};
 use std::time::{Duration, Instant};
 
 const PATIENCE: Duration = Duration::from_secs(60);

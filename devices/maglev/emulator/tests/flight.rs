@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used)] // helpers of tests
 
 use crate::machine::CAPABILITIES;
-use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, LoopConfig, Pose, Refusal, Tick, Twist, Wrench};
+use flotor_loader::{ActiveDevice, Plugin, Setting};
 use flotor_maglev::protocol::Mode;
 use flotor_maglev::transport::stream::StreamLink;
 use flotor_maglev::transport::tcp::prepared;

@@ -7,8 +7,8 @@
 
 mod machine;
 
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Pose, Tick, Twist, Wrench};
+use flotor_loader::{ActiveDevice, OpenedDevice, Plugin, Setting};
 use flotor_maglev::protocol::{Answer, AnswerFrame, Condition, Mode, Request, RequestFrame};
 use flotor_maglev::transport::{self, Incoming, Kind, LinkLost, OpenError, Transport};
 use flotor_maglev_emulator::controller::Sample;

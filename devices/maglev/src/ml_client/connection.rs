@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum NoResults {
     /// The connection is lost.
-    #[error("the controller closed the connection")]
+    #[error("the controller closed the connection, or refused it")]
     Lost,
     /// No reply within the timeout.
     #[error("the controller did not answer in time")]

@@ -14,7 +14,7 @@
 use super::coils::{COILS, Currents};
 use crate::lag::Lag;
 use crate::validation::{Check, Domain, number};
-use flotor_hal::Fault;
+use flotor_hal::{Fault, restorable};
 
 /// Limit of the root mean square current over a minute, A.
 pub const MEAN_CURRENT_LIMIT_A: f64 = 2.0;
@@ -56,6 +56,8 @@ pub struct Thermal {
     load_a2: Currents,
     temperature_c: Currents,
 }
+
+restorable!(Thermal { load_a2, temperature_c } without { parameters, minute, warming });
 
 impl Thermal {
     /// Creates coils at ambient temperature. Real-time: bounded, no allocation.

@@ -3,15 +3,18 @@
 
 use crate::validation::{Check, Domain, InvalidParameter, vector};
 use flotor_hal::glam::{BVec3, DQuat, DVec3};
+use flotor_hal::restorable;
 
 /// Position and orientation in the device frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
     /// Position of the flotor frame's origin, m.
     pub position_m: DVec3,
     /// Unit quaternion, flotor to device frame.
     pub orientation: DQuat,
 }
+
+restorable!(Pose { position_m, orientation });
 
 impl Pose {
     /// Origin of the device frame, upright.
@@ -37,7 +40,7 @@ impl Pose {
 }
 
 /// Intention of the hand at one instant, device frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aim {
     /// Intended pose of the handle.
     pub pose: Pose,
@@ -46,6 +49,8 @@ pub struct Aim {
     /// Axes with an intended force instead of a position: the hand has no stiffness there.
     pub yielding: BVec3,
 }
+
+restorable!(Aim { pose, force_n, yielding });
 
 impl Aim {
     /// Creates an aim at a pose, without force. Real-time: bounded, no allocation.

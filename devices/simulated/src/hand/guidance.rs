@@ -14,6 +14,7 @@
 use super::{Aim, Pose, minimum_jerk};
 use crate::plant::State;
 use flotor_hal::glam::DVec3;
+use flotor_hal::{Restorable, StateBytes, restorable};
 
 /// Timeout of a guide: time without a message after which the hand is released, ns.
 pub const SILENCE_NS: u64 = 1_000_000_000;
@@ -36,13 +37,15 @@ pub struct NotGuiding {
 }
 
 /// Motion of the intended position towards the target.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Follower {
     /// Intended pose; the orientation is constant.
     pub(crate) pose: Pose,
     /// Velocity of the intended position, m/s.
     pub(crate) velocity_m_per_s: DVec3,
 }
+
+restorable!(Follower { pose, velocity_m_per_s });
 
 /// Source of the hand's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,6 +56,24 @@ enum Phase {
     Guided(Follower),
     /// The trajectory, blended with the last guided motion; the blend fades from this time on, ns.
     Releasing(Follower, u64),
+}
+
+impl Restorable for Phase {
+    fn pass(&mut self, bytes: &mut StateBytes<'_>) {
+        let (mut code, mut follower, mut since_ns) = match *self {
+            Self::Free => (0, Follower::default(), 0),
+            Self::Guided(follower) => (1, follower, 0),
+            Self::Releasing(follower, since_ns) => (2, follower, since_ns),
+        };
+        bytes.choice(&mut code, &[0, 1, 2]);
+        follower.pass(bytes);
+        since_ns.pass(bytes);
+        *self = match code {
+            0 => Self::Free,
+            1 => Self::Guided(follower),
+            _ => Self::Releasing(follower, since_ns),
+        };
+    }
 }
 
 /// Guidance of one hand.
@@ -67,6 +88,8 @@ pub(crate) struct Guidance {
     /// Time of the latest value from the guide, ns.
     heard_ns: u64,
 }
+
+restorable!(Guidance { phase, guide, is_guide_speaking, target_m, heard_ns });
 
 impl Guidance {
     /// Guidance of a hand without a guide.

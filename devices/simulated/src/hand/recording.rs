@@ -128,7 +128,7 @@ impl Sample {
         match samples.last() {
             Some(last) if self.time_ns <= last.time_ns => Err(format!(
                 "the time {} s after the first pose is not above {} s, the time of the pose before; give ascending \
-                     times",
+                     times, and the poses of one device only",
                 self.time_ns as f64 * 1.0e-9,
                 last.time_ns as f64 * 1.0e-9
             )),

@@ -19,6 +19,9 @@ const SCRIPTS: Choices = choices!(= &Script::NAMES);
 /// Grips of the hand.
 const GRIPS: Choices = choices!["firm", "relaxed"];
 
+/// Presence of a grip.
+const FINGERS: Choices = choices!["off", "on"];
+
 /// Velocity estimators.
 const ESTIMATORS: Choices = choices!["low-pass", "difference", "kalman"];
 
@@ -197,6 +200,40 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     target("hand_target_x_mm", "Guide: intended position of the handle, x; only with hand_guide"),
     target("hand_target_y_mm", "Guide: intended position of the handle, y; only with hand_guide"),
     target("hand_target_z_mm", "Guide: intended position of the handle, z; only with hand_guide"),
+    Parameter::choice("fingers", FINGERS, 0, "Grip between the fingers of the hand: none, or one of 25 mm and 8 N"),
+    Parameter::real("fingers_mass_kg", "kg", 0.005, 1.0, 0.02, "Fingers: mass that moves with the grip"),
+    Parameter::real(
+        "fingers_stiffness_n_per_m",
+        "N/m",
+        0.0,
+        5000.0,
+        400.0,
+        "Fingers: stiffness of the hand about the intended opening",
+    ),
+    Parameter::real(
+        "fingers_damping_ns_per_m",
+        "N s/m",
+        0.0,
+        20.0,
+        4.0,
+        "Fingers: damping of the hand about the intended opening",
+    ),
+    Parameter::real(
+        "fingers_closed_mm",
+        "mm",
+        0.0,
+        25.0,
+        5.0,
+        "Fingers: intended opening of the closed grip",
+    ),
+    Parameter::real(
+        "fingers_frequency_hz",
+        "Hz",
+        0.0,
+        10.0,
+        1.0,
+        "Fingers: cycles of closing and opening per second",
+    ),
     Parameter::real("start_x_mm", "mm", -12.0, 12.0, 0.0, "Initial position of the flotor, x"),
     Parameter::real("start_y_mm", "mm", -12.0, 12.0, 0.0, "Initial position of the flotor, y"),
     Parameter::real("start_z_mm", "mm", -12.0, 12.0, 0.0, "Initial position of the flotor, z"),
@@ -218,7 +255,8 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         0.0,
         50.0,
         10.87,
-        "Full: variation of the ratio of delivered to commanded vertical force, peak to peak over ±7 mm",
+        "Full: variation of the ratio of delivered to commanded vertical force, peak to peak over heights of -7 to \
+         7 mm from home",
     ),
     Parameter::real("coil_ambient_c", "°C", -40.0, 300.0, 20.0, "Full: ambient temperature of the coils"),
     Parameter::real(

@@ -2,6 +2,7 @@
 
 use super::state::State;
 use flotor_hal::glam::{DMat3, DQuat, DVec3};
+use flotor_hal::restorable;
 
 /// Largest physical magnitude: m, m/s and rad/s alike.
 const PHYSICAL_LIMIT: f64 = 1.0e6;
@@ -22,6 +23,8 @@ pub(super) struct Motion {
     /// Angular velocity in the **flotor** frame, rad/s.
     pub(super) spin_rad_per_s: DVec3,
 }
+
+restorable!(Motion { position_m, orientation, velocity_m_per_s, spin_rad_per_s });
 
 impl Motion {
     /// Converts a state and sets negligible numbers to zero: a straight step settles only the numbers it changes.

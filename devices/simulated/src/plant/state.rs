@@ -3,6 +3,7 @@
 use crate::hand::Pose;
 use crate::validation::{Domain, InvalidParameter, vector};
 use flotor_hal::glam::{DQuat, DVec3};
+use flotor_hal::restorable;
 
 /// Force and torque of the coils on the flotor, at the origin of the flotor frame, device frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -12,6 +13,8 @@ pub struct Wrench {
     /// Torque about the origin of the flotor frame, N·m.
     pub torque_nm: DVec3,
 }
+
+restorable!(Wrench { force_n, torque_nm });
 
 impl Wrench {
     /// Zero force and torque.

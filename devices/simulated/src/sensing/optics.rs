@@ -67,13 +67,15 @@ impl OpticsGeometry {
 }
 
 /// Coordinates of the light spots relative to the centres of their cells, m: one component of each vector per diode.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spots {
     /// Tangential coordinates, `u`.
     pub across_m: DVec3,
     /// Vertical coordinates, `v`, positive for a diode above its lens.
     pub up_m: DVec3,
 }
+
+flotor_hal::restorable!(Spots { across_m, up_m });
 
 /// A diode with its lens.
 #[derive(Clone, Copy, Debug)]

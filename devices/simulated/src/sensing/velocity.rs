@@ -59,6 +59,8 @@ pub struct Velocity {
     pub angular_rad_per_s: DVec3,
 }
 
+flotor_hal::restorable!(Velocity { linear_m_per_s, angular_rad_per_s });
+
 impl Velocity {
     /// Zero velocity.
     pub const ZERO: Self = Self { linear_m_per_s: DVec3::ZERO, angular_rad_per_s: DVec3::ZERO };
@@ -74,6 +76,8 @@ pub struct Estimator {
     last: Option<Pose>,
     velocity: Velocity,
 }
+
+flotor_hal::restorable!(Estimator { last, velocity } without { kind, lag });
 
 impl Estimator {
     /// Creates an estimator before its first pose, with zero velocity. Real-time: bounded, no allocation.

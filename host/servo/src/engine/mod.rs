@@ -2,17 +2,18 @@
 
 pub mod asynchronous;
 pub mod process;
-mod records;
 mod stepped;
 
 pub use stepped::Stepped;
 
 use asynchronous::AsynchronousModel;
+use flotor_contact::FeltStiffness;
+use flotor_core::grip::GripRecord;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{
-    ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
+    ActiveRegion, ContactSet, Demand, Input, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
 };
+use flotor_loader::{InstanceState, Model};
 use process::Worker;
 
 /// Model, executed in one of three ways.
@@ -21,7 +22,7 @@ pub enum Engine {
     Here(Model),
     /// In a worker process: a crash or hang of the model does not stop the loop.
     Process(Worker),
-    /// Asynchronous, at the model's own rate; the loop evaluates a local linear model.
+    /// Asynchronous, at the model's own rate; the loop evaluates its contacts or its local linear model.
     Asynchronous(Box<AsynchronousModel>),
 }
 
@@ -37,11 +38,18 @@ macro_rules! each {
 }
 
 impl Engine {
-    /// Steps the model; `output` is only valid for [`Stepped::Answered`]. Real-time: bounded by the model or its timeout, no allocation.
-    pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
+    /// Steps the model, also at a grip in its scale, where an asynchronous model has no effort; the results are only valid for
+    /// [`Stepped::Answered`]. Real-time: bounded by the model or its timeout, no allocation.
+    pub fn step(&mut self, input: &Input, output: &mut Output, grip: &mut Option<GripRecord>) -> Stepped {
         match self {
-            Self::Here(model) => model.step(input, output).into(),
-            Self::Process(worker) => worker.step(input, output),
+            Self::Here(model) => {
+                let stepped = model.step(input, output).into();
+                if let (Some(grip), Stepped::Answered) = (grip, stepped) {
+                    grip.model = model.grip(input, &grip.state);
+                }
+                stepped
+            }
+            Self::Process(worker) => worker.step(input, output, grip),
             Self::Asynchronous(model) => model.step(input, output),
         }
     }
@@ -71,6 +79,15 @@ impl Engine {
         each!(self, model => model.reset())
     }
 
+    /// Returns the state of the model, to save or restore; `None` for a model with a history that offers no snapshot, and for a
+    /// worker or asynchronous model.
+    pub fn state(&mut self) -> Option<InstanceState<'_>> {
+        match self {
+            Self::Here(model) => model.state(),
+            Self::Process(_) | Self::Asynchronous(_) => None,
+        }
+    }
+
     /// Returns the active region of the model; everywhere for an asynchronous model. Real-time: bounded, no allocation.
     pub fn active_region(&mut self) -> ActiveRegion {
         match self {
@@ -89,21 +106,21 @@ impl Engine {
         }
     }
 
-    /// Returns true if the model has a linear field; false for an asynchronous model. Not real-time.
-    pub fn has_linear_field(&self) -> bool {
+    /// Returns true if the model can run asynchronously; false for a model that already does. Not real-time.
+    pub fn has_local_model(&self) -> bool {
         match self {
-            Self::Here(model) => model.has_linear_field(),
-            Self::Process(worker) => worker.has_linear_field(),
+            Self::Here(model) => model.has_local_model(),
+            Self::Process(worker) => worker.has_local_model(),
             Self::Asynchronous(_) => false,
         }
     }
 
-    /// Computes the linear field at an input; `field` is only valid for [`Stepped::Answered`]. Returns [`Stepped::Broken`] for an
-    /// asynchronous model. Not real-time.
-    pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
+    /// Computes the contacts or the linear field at an input; `set` is only valid for [`Stepped::Answered`]. Returns
+    /// [`Stepped::Broken`] for an asynchronous model. Not real-time.
+    pub fn local_model(&mut self, input: &Input, set: &mut ContactSet) -> Stepped {
         match self {
-            Self::Here(model) => model.linear_field(input, field).into(),
-            Self::Process(worker) => worker.linear_field(input, field),
+            Self::Here(model) => model.local_model(input, set).into(),
+            Self::Process(worker) => worker.local_model(input, set),
             Self::Asynchronous(_) => Stepped::Broken,
         }
     }
@@ -132,6 +149,14 @@ impl Engine {
         match self {
             Self::Here(model) => model.float_changes(),
             Self::Process(_) | Self::Asynchronous(_) => 0,
+        }
+    }
+
+    /// Returns what the hand has felt of the stiffness of contacts, in the model frame. Real-time: bounded, no allocation.
+    pub fn felt_stiffness(&self) -> FeltStiffness {
+        match self {
+            Self::Asynchronous(model) => model.felt_stiffness(),
+            Self::Here(_) | Self::Process(_) => FeltStiffness::default(),
         }
     }
 

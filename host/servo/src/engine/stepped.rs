@@ -1,5 +1,6 @@
 //! Result of a model's step.
 
+use flotor_contact::Shortcoming;
 use flotor_hal::abi::CallStatus;
 
 /// Result of a model's step, independent of its kind of execution.
@@ -7,9 +8,13 @@ use flotor_hal::abi::CallStatus;
 pub enum Stepped {
     /// The model has returned an output, which is not validated yet.
     Answered,
+    /// The contacts of an asynchronous model have an output with a shortcoming.
+    Short(Shortcoming),
+    /// The newest contacts of an asynchronous model contradict themselves; the output is that of the contacts before.
+    Refused,
     /// No output in time; it may arrive in a later tick.
     Late,
-    /// The newest linear field of an asynchronous model is too old.
+    /// The newest answer of an asynchronous model is too old.
     Silent,
     /// The model panicked or violated the contract.
     Broken,

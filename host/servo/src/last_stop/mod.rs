@@ -21,7 +21,7 @@ pub use end_report::{ReportedEnd, report_end, report_end_to};
 use crate::platform::last_stop as system;
 use crate::{Heartbeat, Place, Stuck};
 use flotor_core::lock;
-use flotor_hal::abi::loader::Stopper;
+use flotor_loader::Stopper;
 use line::Line;
 use std::fmt::Write;
 use std::mem::ManuallyDrop;

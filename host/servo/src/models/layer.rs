@@ -1,57 +1,21 @@
 //! One force model with all its instances: the unit that is blended, faded and replaced.
 
 use super::broad_phase::{Bounds, BroadPhase};
-use super::end_wall::EndWall;
-use crate::budget::{Allowed, Answer, Overrun, TimeBudget};
+use crate::budget::{Allowed, Answer, TimeBudget};
 use crate::engine::{Engine, Stepped};
+use flotor_contact::Shortcoming;
 use flotor_core::demand::TickDemand;
+use flotor_core::end_wall::EndWall;
+use flotor_core::grip::GripRecord;
+use flotor_core::health::ModelHealth;
 use flotor_core::mapping::{Blend, Mapping};
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    DVec3, Demand, DeviceState, Input, Memory, Output, RegionShape, SampledLoop, StepStatus, Tick, Wrench,
+    DVec3, Demand, DeviceState, GripState, Input, Memory, Output, RegionShape, SampledLoop, StepStatus, Tick,
+    Wrench,
 };
-
-/// Health counters of a model, summed over its instances.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ModelHealth {
-    /// Tick of the first panic or violation of the contract by an instance; the instance is disabled from then on.
-    pub panicked_at: Option<u64>,
-    /// Number of outputs with non-finite numbers or an unknown status; each was replaced by no force.
-    pub rejected_ticks: u64,
-    /// First tick with a rejected output.
-    pub first_rejected: Option<u64>,
-    /// Tick at which the process of an instance was found to have ended; the instance is disabled from then on.
-    pub lost_at: Option<u64>,
-    /// Number of ticks in which the last field of an asynchronous model was too old.
-    pub late_ticks: u64,
-    /// First late tick.
-    pub first_late: Option<u64>,
-    /// Number of steps without a reply in time from a worker process. Late replies alone are no fault: the time budget limits their
-    /// number.
-    pub late_answers: u64,
-    /// Overrun for which the model was disabled; `None` for a model that is not disabled.
-    pub overrun: Option<Overrun>,
-    /// Number of steps that changed the floating-point environment, which the host restored each time.
-    pub float_changes: u64,
-    /// First tick with a changed floating-point environment.
-    pub first_float_change: Option<u64>,
-}
-
-impl ModelHealth {
-    /// Returns true without a problem to report; late replies alone are no problem.
-    #[must_use]
-    pub fn is_good(&self) -> bool {
-        *self == Self { late_answers: self.late_answers, ..Self::default() }
-    }
-
-    /// Counts a tick with a problem, and stores the first one.
-    #[cold]
-    fn count(counter: &mut u64, first: &mut Option<u64>, tick: u64) {
-        *counter += 1;
-        first.get_or_insert(tick);
-    }
-}
+use flotor_loader::InstanceState;
 
 /// One instance of a model with its mapping.
 struct Object {
@@ -59,8 +23,8 @@ struct Object {
     mapping: Mapping,
     /// Wall at the bounds of the model; `None` for a model without bounds.
     end: Option<EndWall>,
-    /// Usable output of the last tick, in the model frame, kept for an engine whose next output may be late.
-    last: Option<Output>,
+    /// Usable output and effort of the last tick, in the model frame, kept for an engine whose next output may be late.
+    last: Option<(Output, f64)>,
     /// Tick of the last step.
     stepped_at: Option<u64>,
     /// Number of calls so far that changed the floating-point environment.
@@ -69,37 +33,41 @@ struct Object {
     is_disabled: bool,
 }
 
-/// Tick, state of the device and demanded outputs of a step.
+/// Tick, state of the device and of its grip, and demanded outputs of a step.
 #[derive(Clone, Copy)]
-pub(super) struct StepContext<'a> {
-    pub(super) tick: &'a Tick,
-    pub(super) state: &'a DeviceState,
-    pub(super) demand: TickDemand,
+pub(crate) struct StepContext<'a> {
+    pub(crate) tick: &'a Tick,
+    pub(crate) state: &'a DeviceState,
+    pub(crate) grip: Option<&'a GripState>,
+    pub(crate) demand: TickDemand,
 }
 
-/// Wrench and energy of one layer in a tick. An output that was not computed is NaN.
+/// Wrench, energy and effort of one layer, or of all, in a tick. An output that was not computed is NaN.
 #[derive(Clone, Copy)]
-pub(super) struct Contribution {
-    /// Wrench in the device frame, unweighted; the torque is NaN if it is not finite and only an observer requests it.
-    pub(super) wrench: Wrench,
+pub(crate) struct Contribution {
+    /// Wrench in the device frame; the torque is NaN if it is not finite and only an observer requests it.
+    pub(crate) wrench: Wrench,
     /// Stored energy scaled to the device, J; NaN where it is not finite.
-    pub(super) energy_j: f64,
+    pub(crate) energy_j: f64,
+    /// Effort at the grip scaled to the device, N or N·m; 0 without a grip.
+    pub(crate) effort: f64,
 }
 
 impl Contribution {
-    /// No wrench and no energy.
-    pub(super) const NONE: Contribution = Contribution { wrench: Wrench::ZERO, energy_j: 0.0 };
+    /// No wrench, no energy and no effort.
+    pub(super) const NONE: Contribution = Contribution { wrench: Wrench::ZERO, energy_j: 0.0, effort: 0.0 };
 
     /// Scales the contribution. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn times(self, part: f64) -> Self {
-        Self { wrench: self.wrench * part, energy_j: self.energy_j * part }
+        Self { wrench: self.wrench * part, energy_j: self.energy_j * part, effort: self.effort * part }
     }
 
     /// Adds two contributions. Real-time: bounded, no allocation.
     #[inline]
     pub(super) fn plus(self, other: Self) -> Self {
-        Self { wrench: self.wrench + other.wrench, energy_j: self.energy_j + other.energy_j }
+        let (wrench, effort) = (self.wrench + other.wrench, self.effort + other.effort);
+        Self { wrench, energy_j: self.energy_j + other.energy_j, effort }
     }
 }
 
@@ -234,12 +202,12 @@ impl Layer {
     /// Steps all objects that can act at the handle and returns the sum of their contributions; other objects are not called.
     #[inline]
     fn ask(&mut self, context: &StepContext<'_>, events: &mut Events) -> Contribution {
-        let StepContext { tick, state, demand } = *context;
+        let StepContext { tick, state, grip, demand } = *context;
         let Self { objects, broad, serves, memory, health, .. } = self;
         let mut share = Contribution::NONE;
         broad.for_each_near(objects, state.pose.position(), |object| {
             let input = object.mapping.input(tick, state, demand.computed().limited_to(*serves));
-            let Some(output) = object.answer(&input, demand, *memory, health, events) else {
+            let Some((output, effort)) = object.answer(&input, grip, demand, *memory, health, events) else {
                 events.insert(Events::MODEL_FAULT);
                 return;
             };
@@ -250,6 +218,9 @@ impl Layer {
                 share.wrench = share.wrench + push;
             }
             share.energy_j += output.energy_j * object.mapping.energy_scale();
+            if let Some(grip) = grip {
+                share.effort += object.mapping.effort_to_device(grip.kind(), effort);
+            }
             if output.status() != Some(StepStatus::Ok) {
                 events.insert(Events::MODEL_DEGRADED);
             }
@@ -284,10 +255,21 @@ impl Layer {
         worst
     }
 
+    /// Iterates over the states of the model's instances before a tick; `None` for one whose state cannot be saved. A path-dependent
+    /// instance that was not stepped in the last tick is reset first, as before its next step.
+    pub(super) fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>> {
+        let memory = self.memory;
+        self.objects.iter_mut().map(move |object| {
+            let is_ready = object.forget_before(tick, memory);
+            object.stepped_at = tick.checked_sub(1);
+            object.model.state().filter(|_| is_ready)
+        })
+    }
+
     /// Returns a report on the layer of the model numbered `model`. Queries the last message of an unhealthy model only, and calls
     /// `on_query` before the query. Not real-time.
     pub fn report(&mut self, model: usize, on_query: impl FnOnce()) -> LayerReport {
-        let Self { generation, health, .. } = *self;
+        let (generation, health) = (self.generation, self.health());
         let words = if health.is_good() {
             String::new()
         } else {
@@ -295,6 +277,19 @@ impl Layer {
             self.last_message()
         };
         LayerReport { model, generation, health, words }
+    }
+
+    /// Returns the health counters, with the stiffness of contacts. Not real-time.
+    pub(super) fn health(&self) -> ModelHealth {
+        let mut health = self.health;
+        for Object { model, mapping, .. } in &self.objects {
+            let (felt, scale) = (model.felt_stiffness(), mapping.stiffness_scale());
+            let contacts = &mut health.contacts;
+            contacts.undamped_n_per_m = contacts.undamped_n_per_m.max(felt.undamped_n_per_m * scale);
+            let at_hand = felt.reduced_n_per_m.map(|pair| pair.map(|stiffness| stiffness * scale));
+            contacts.reduced_n_per_m = contacts.reduced_n_per_m.or(at_hand);
+        }
+        health
     }
 
     /// Returns the first non-empty last message of the instances. Not real-time.
@@ -316,64 +311,75 @@ impl Object {
         Some(Bounds::about(self.mapping.position_to_device(region.center()), half_sides_m))
     }
 
-    /// Steps the model. Returns the output, model frame, if it is usable; otherwise counts the problem in `health`.
+    /// Resets a path-dependent model that was not stepped in the tick before `tick`; false if the reset fails. Real-time: bounded by
+    /// the model, no allocation.
+    #[inline(always)]
+    fn forget_before(&mut self, tick: u64, memory: Memory) -> bool {
+        let was_inactive = self.stepped_at.is_some_and(|last| last + 1 != tick);
+        !(was_inactive && memory == Memory::PathDependent) || self.model.reset() == CallStatus::Ok
+    }
+
+    /// Steps the model. Returns output and effort, model frame, if they are usable; otherwise counts the problem in `health`.
     #[inline(always)] // with the three of `Mapping` and `limit_wrench` 22 ns a tick
     fn answer(
         &mut self,
         input: &Input,
+        grip: Option<&GripState>,
         demand: TickDemand,
         memory: Memory,
         health: &mut ModelHealth,
         events: &mut Events,
-    ) -> Option<Output> {
+    ) -> Option<(Output, f64)> {
         if self.is_disabled {
             return None;
         }
-        // A path-dependent model that was not stepped in the last tick is reset before its next step.
-        let was_inactive = self.stepped_at.is_some_and(|last| last + 1 != input.tick);
-        if was_inactive && memory == Memory::PathDependent && self.model.reset() != CallStatus::Ok {
+        if !self.forget_before(input.tick, memory) {
             return self.fail(input.tick, health);
         }
         self.stepped_at = Some(input.tick);
         let mut output = Output::new(Wrench::ZERO, 0.0, StepStatus::Ok);
-        let stepped = self.model.step(input, &mut output);
+        let mut grip = grip.map(|state| GripRecord::at(self.mapping.grip_to_model(state)));
+        let stepped = self.model.step(input, &mut output, &mut grip);
         if self.model.float_changes() != self.float_changes {
             self.float_changes = self.model.float_changes();
             events.insert(Events::FLOAT_ENVIRONMENT);
-            ModelHealth::count(&mut health.float_changes, &mut health.first_float_change, input.tick);
+            health.float_changes.count(input.tick);
         }
         match stepped {
-            Stepped::Answered => {
-                let usable = usable(demand, output);
-                if usable.is_none() {
-                    self.last = None;
-                    ModelHealth::count(&mut health.rejected_ticks, &mut health.first_rejected, input.tick);
-                } else if self.model.may_be_late() {
-                    self.last = usable;
-                }
-                usable
-            }
+            Stepped::Answered => {}
+            Stepped::Short(Shortcoming::Aged) => health.contacts.aged.count(input.tick),
+            Stepped::Short(Shortcoming::Unsolved) => health.contacts.unsolved.count(input.tick),
+            Stepped::Refused => health.refused_sets.count(input.tick),
             // The last output replaces one late output; a second late output in a row has no replacement.
             Stepped::Late => {
                 events.insert(Events::MODEL_OVERRUN);
                 health.late_answers += 1;
-                self.last.take()
+                return self.last.take();
             }
             Stepped::Silent => {
                 events.insert(Events::MODEL_OVERRUN);
-                ModelHealth::count(&mut health.late_ticks, &mut health.first_late, input.tick);
-                self.last.take()
+                health.late.count(input.tick);
+                return self.last.take();
             }
-            Stepped::Broken => self.fail(input.tick, health),
+            Stepped::Broken => return self.fail(input.tick, health),
             Stepped::Gone => {
                 self.is_disabled = true;
                 health.lost_at.get_or_insert(input.tick);
-                None
+                return None;
             }
         }
+        let effort = grip.map_or(0.0, |grip| grip.model);
+        let usable = usable(demand, output).map(|output| (output, effort)).filter(|_| effort.is_finite());
+        if usable.is_none() {
+            self.last = None;
+            health.rejected.count(input.tick);
+        } else if self.model.may_be_late() {
+            self.last = usable;
+        }
+        usable
     }
 
-    fn fail(&mut self, tick: u64, health: &mut ModelHealth) -> Option<Output> {
+    fn fail(&mut self, tick: u64, health: &mut ModelHealth) -> Option<(Output, f64)> {
         self.is_disabled = true;
         health.panicked_at.get_or_insert(tick);
         None

@@ -5,23 +5,20 @@
 //! without an object that can act at the handle, or with weight 0, is not stepped.
 
 mod broad_phase;
-mod end_wall;
 mod fade;
 mod layer;
 mod slot;
 
-pub use end_wall::pushes_at_home;
-pub use layer::{Layer, LayerReport, ModelHealth};
+pub(crate) use layer::{Contribution, StepContext};
+pub use layer::{Layer, LayerReport};
 pub(crate) use slot::Slot;
 
 use super::{Heartbeat, Place};
 use broad_phase::BroadPhase;
 use fade::Fade;
-use flotor_core::demand::TickDemand;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
-use layer::{Contribution, StepContext};
+use flotor_hal::{DVec3, Demand, Tick};
 
 /// Time over which layers of lower priority fade out and in again, s: shorter than a hand's reaction, and long enough that the slew
 /// limit need not act.
@@ -83,22 +80,20 @@ impl ModelStack {
         self.observable
     }
 
-    /// Steps the models near the handle; returns the weighted sum of their wrenches, device frame, and of their stored energies, J.
+    /// Steps the models near the handle; returns the weighted sum of their contributions.
     /// An output without demand is undefined; an output that only observers demand is NaN if it is not finite.
     ///
     /// Real-time: bounded by the models that are near, no allocation.
     #[inline]
     pub(crate) fn step(
         &mut self,
-        tick: &Tick,
-        state: &DeviceState,
-        demand: TickDemand,
+        context: &StepContext<'_>,
         heartbeat: &Heartbeat,
         events: &mut Events,
-    ) -> (Wrench, f64) {
+    ) -> Contribution {
+        let StepContext { tick, state, demand, .. } = *context;
         let Self { slots, broad, levels, .. } = self;
         levels.iter_mut().for_each(|level| level.pushes = false);
-        let context = StepContext { tick, state, demand };
         let mut sum = Contribution::NONE;
         broad.for_each_near(slots, state.pose.position(), |slot| {
             let level = levels.iter_mut().find(|level| level.priority == slot.priority);
@@ -107,14 +102,13 @@ impl ModelStack {
                 return;
             }
             heartbeat.enter(tick.index, Place::Model(slot.number));
-            let share = slot.step(&context, events);
+            let share = slot.step(context, events);
             let mut weight = slot.weight.at(tick.time_ns);
             if let Some(level) = level {
-                level.pushes |= weight > 0.0 && reaches_hand(&share.wrench, demand.at_hand());
+                level.pushes |= weight > 0.0 && reaches_hand(&share, demand.at_hand());
                 weight *= level.gain.at(tick.time_ns);
             }
-            sum.wrench = sum.wrench + share.wrench * weight;
-            sum.energy_j += share.energy_j * weight;
+            sum = sum.plus(share.times(weight));
         });
         heartbeat.enter(tick.index, Place::Host);
         let mut is_silenced = false;
@@ -122,7 +116,7 @@ impl ModelStack {
             level.gain.set_target(if is_silenced { 0.0 } else { 1.0 }, tick.time_ns);
             is_silenced |= level.pushes;
         }
-        (sum.wrench, sum.energy_j)
+        sum
     }
 
     /// Changes a live parameter of the model at index `model` of the stack; unsupported if there is no such model. Real-time:
@@ -167,8 +161,11 @@ impl ModelStack {
     }
 }
 
-/// Returns true if the wrench has a nonzero part that reaches the hand.
+/// Returns true if a nonzero part of the contribution reaches the hand.
 #[inline]
-fn reaches_hand(wrench: &Wrench, at_hand: Demand) -> bool {
-    wrench.force() != DVec3::ZERO || at_hand.contains(Demand::TORQUE) && wrench.torque() != DVec3::ZERO
+fn reaches_hand(share: &Contribution, at_hand: Demand) -> bool {
+    let Contribution { wrench, effort, .. } = share;
+    wrench.force() != DVec3::ZERO
+        || at_hand.contains(Demand::TORQUE) && wrench.torque() != DVec3::ZERO
+        || *effort != 0.0
 }

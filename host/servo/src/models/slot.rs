@@ -6,10 +6,12 @@
 
 use super::broad_phase::Bounds;
 use super::fade::Fade;
-use super::layer::{Contribution, Layer, LayerReport, ModelHealth, StepContext};
+use super::layer::{Contribution, Layer, LayerReport, StepContext};
+use flotor_core::health::ModelHealth;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, Tick};
+use flotor_loader::InstanceState;
 
 pub(crate) struct Slot {
     /// Number of the model in the scene.
@@ -129,9 +131,14 @@ impl Slot {
         self.current.set_parameter(tick, parameter, value)
     }
 
+    /// Iterates over the states of the current layer's instances before a tick; `None` for one whose state cannot be saved.
+    pub(crate) fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>> {
+        self.current.states(tick)
+    }
+
     /// Returns health and last message of the current layer. Not real-time.
     pub(crate) fn health(&mut self) -> (ModelHealth, String) {
-        (self.current.health, self.current.last_message())
+        (self.current.health(), self.current.last_message())
     }
 
     /// Returns reports on all layers of the slot. Not real-time.

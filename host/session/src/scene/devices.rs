@@ -17,6 +17,8 @@ pub struct DeviceUse {
     pub plugin: PluginUse,
     /// Calibration file of the vertical force; `None`: not calibrated.
     pub calibration: Option<CalibrationUse>,
+    /// Viscous damping of the device along each axis, N·s/m; 0: not known.
+    pub damping_ns_per_m: f64,
 }
 
 /// Reads the devices, each with a unique name.
@@ -50,7 +52,8 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<DeviceUse>, SceneError>
             let location = value.location.clone();
             Ok(CalibrationUse { file: value.text()?.into(), location })
         })?;
-        devices.push(DeviceUse { name, plugin, calibration });
+        let damping_ns_per_m = section.number_or("damping_ns_per_m", 0.0..=1.0e3, 0.0)?;
+        devices.push(DeviceUse { name, plugin, calibration, damping_ns_per_m });
         section.finish()?;
     }
     Ok(devices)

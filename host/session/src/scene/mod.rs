@@ -12,9 +12,10 @@ mod setting;
 pub use change::{Alternative, ChangeUse, ChangeWhat};
 pub use devices::DeviceUse;
 pub use devices::{is_named, without_device};
+use flotor_core::asynchronous::{ContactLimits, FieldTiming, StiffnessCap};
 use flotor_core::coupling::{CouplingDescription, PassivityMode};
 use flotor_core::limits::{Boundary, Limits};
-use flotor_core::mapping::{Blend, FieldTiming, MappingConfig};
+use flotor_core::mapping::{Blend, MappingConfig};
 use flotor_core::plausibility::is_rotation;
 pub use own::{OWN_SCENES, OwnScene};
 pub use reader::{Location, ParameterText, SceneError};
@@ -111,7 +112,7 @@ pub struct ModelUse {
     pub blend: Blend,
     /// Isolation of the model from the host process.
     pub isolation: Isolation,
-    /// Timing of an asynchronous model, whose local linear model the loop evaluates; `None`: the loop steps the model itself.
+    /// Timing of an asynchronous model, whose contacts or local linear model the loop evaluates; `None`: the loop steps the model.
     pub field: Option<FieldTiming>,
     /// Time limit of a step, s; `None`: half a period on the real clock, no limit on the virtual clock.
     pub budget_s: Option<f64>,
@@ -315,15 +316,21 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
     Ok(on.into_iter().map(on_device).collect())
 }
 
-/// Reads the timing of an asynchronous model.
+/// Reads timing and limits of an asynchronous model.
 fn field(mut section: Section<'_>) -> Result<FieldTiming, SceneError> {
     let rate_hz = section.require("rate_hz")?.number(1.0..=10_000.0)?;
     let period_s = 1.0 / rate_hz;
     let latency_s =
         section.number("latency_ms", 0.0..=period_s * 1.0e3)?.map(|milliseconds| milliseconds * 1.0e-3);
+    let known = ContactLimits::UNKNOWN;
+    let contacts = ContactLimits {
+        cap: section.read("cap", Value::truth)?.unwrap_or(true).then_some(StiffnessCap::UNKNOWN),
+        surface_power_w: section.number_or("surface_power_w", 1.0e-6..=100.0, known.surface_power_w)?,
+        ..known
+    };
     section.finish()?;
     // Default: the model needs its whole period.
-    Ok(FieldTiming { rate_hz, latency_s: latency_s.unwrap_or(period_s) })
+    Ok(FieldTiming { rate_hz, latency_s: latency_s.unwrap_or(period_s), contacts })
 }
 
 fn blend(mut section: Section<'_>) -> Result<Blend, SceneError> {
@@ -412,19 +419,16 @@ const MOST: f64 = f64::INFINITY;
 
 fn limits(mut section: Section<'_>, rate_hz: f64) -> Result<Limits, SceneError> {
     let default = Limits::default();
+    let force_n = section.bound_or("force_n", 0.0..=MOST, default.force_n)?;
+    let torque_nm = section.bound_or("torque_nm", 0.0..=MOST, default.torque_nm)?;
+    let mut number = |key, least, default| section.number_or(key, least..=MOST, default);
     let limits = Limits {
-        force_n: section.bound_or("force_n", 0.0..=MOST, default.force_n)?,
-        torque_nm: section.bound_or("torque_nm", 0.0..=MOST, default.torque_nm)?,
-        force_slew_n_per_s: section.number_or(
-            "force_slew_n_per_s",
-            1.0..=MOST,
-            default.force_slew_n_per_s,
-        )?,
-        torque_slew_nm_per_s: section.number_or(
-            "torque_slew_nm_per_s",
-            0.01..=MOST,
-            default.torque_slew_nm_per_s,
-        )?,
+        force_n,
+        torque_nm,
+        grip_force_n: number("grip_force_n", 0.0, default.grip_force_n)?,
+        grip_torque_nm: number("grip_torque_nm", 0.0, default.grip_torque_nm)?,
+        force_slew_n_per_s: number("force_slew_n_per_s", 1.0, default.force_slew_n_per_s)?,
+        torque_slew_nm_per_s: number("torque_slew_nm_per_s", 0.01, default.torque_slew_nm_per_s)?,
         velocity_m_per_s: section.bound_or("velocity_m_per_s", 1.0e-6..=MOST, default.velocity_m_per_s)?,
         angular_velocity_rad_per_s: section.bound_or(
             "angular_velocity_rad_per_s",

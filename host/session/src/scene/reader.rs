@@ -4,7 +4,7 @@
 //! remain at the end are unknown.
 
 use flotor_core::limits::Bound;
-pub use flotor_hal::abi::loader::nearest;
+pub use flotor_loader::nearest;
 use std::borrow::Cow;
 use std::cell::RefCell;
 use std::fmt::Display;
@@ -143,9 +143,9 @@ impl<'t> Source<'t> {
     }
 }
 
-/// Returns true if a text has no control character except line feed and tab, so that it cannot control a terminal.
-fn is_for_people(text: &str) -> bool {
-    text.chars().all(|character| !character.is_control() || matches!(character, '\n' | '\t'))
+/// Returns the first control character of a text except line feed and tab: it could control a terminal.
+fn control_character(text: &str) -> Option<char> {
+    text.chars().find(|character| character.is_control() && !matches!(character, '\n' | '\t'))
 }
 
 /// Table of a scene. Keys are removed as they are read; remaining keys are unknown.
@@ -368,12 +368,20 @@ impl Value<'_> {
 
     pub(super) fn text(self) -> Result<String, SceneError> {
         match &self.value {
-            DeValue::String(text) if is_for_people(text) => Ok(text.to_string()),
-            DeValue::String(_) => {
-                Err(self.problem(format!("`{}` must not contain control characters", self.key)))
-            }
+            DeValue::String(text) => self.for_people(text),
             _ => Err(self.wrong_type("text in quotes")),
         }
+    }
+
+    /// Returns the text if a terminal can show it.
+    fn for_people(&self, text: &str) -> Result<String, SceneError> {
+        let Some(control) = control_character(text) else { return Ok(text.to_owned()) };
+        Err(self.problem(format!(
+            "`{}` contains the control character {}; remove the character, or, if a backslash was meant, put the text in \
+             single quotes",
+            self.key,
+            control.escape_default()
+        )))
     }
 
     /// Returns a Boolean value.
@@ -390,11 +398,11 @@ impl Value<'_> {
     }
 
     pub(super) fn texts(self) -> Result<Vec<String>, SceneError> {
-        let wrong = self.must_be("a list of texts in quotes, without control characters");
-        let DeValue::Array(list) = self.value else { return Err(wrong) };
-        let texts = list.into_iter().map(|value| match value.into_inner() {
-            DeValue::String(text) if is_for_people(&text) => Ok(text.into_owned()),
-            _ => Err(wrong.clone()),
+        let wrong = || self.must_be("a list of texts in quotes");
+        let DeValue::Array(list) = &self.value else { return Err(wrong()) };
+        let texts = list.iter().map(|value| match value.get_ref() {
+            DeValue::String(text) => self.for_people(text),
+            _ => Err(wrong()),
         });
         texts.collect()
     }

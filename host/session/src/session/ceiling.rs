@@ -146,8 +146,10 @@ impl Guards {
         let mut notices: Vec<String> = norm_notice(&scene.limits, &capabilities).into_iter().collect();
         let (mut devices, mut strong_envelopes, mut strong_devices) = (Vec::new(), Vec::new(), Vec::new());
         for (used, opened) in scene.devices.iter().zip(opened) {
-            let Opened { device, capabilities, embodiment, .. } = opened;
-            let envelope = |limits: &Limits| Envelope::new(limits, &scene.boundary, &capabilities, period_ns);
+            let Opened { device, capabilities, grip, embodiment, .. } = opened;
+            let envelope = |limits: &Limits| {
+                Envelope::new(limits, &scene.boundary, &capabilities, period_ns).with_grip(grip, limits)
+            };
             let names = [used.name.as_str(), used.plugin.plugin.as_str()];
             strong_devices.extend(StrongDevice::of(names, embodiment, &scene.limits, &capabilities));
             strong_envelopes.push(envelope(&scene.limits));

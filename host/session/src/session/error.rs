@@ -6,8 +6,8 @@ use crate::long_call::Exceeded;
 use crate::registry::LookupError;
 use crate::scene::SceneError;
 use flotor_hal::Refusal;
-use flotor_hal::abi::loader::{LoadError, Metadata};
 use flotor_live::Pressed;
+use flotor_loader::{LoadError, Metadata};
 use flotor_servo::{Stuck, THREAD_ADVICE};
 
 /// Reason why a run did not start, or failed.
@@ -26,7 +26,7 @@ pub enum RunError {
     /// Scene and device do not fit; the error lists all mismatches.
     #[error("the scene does not fit the device `{device}`: {}", mismatches.join("; "))]
     Mismatch {
-        /// Id of the device's plugin.
+        /// Id of the device's plugin; of several devices, the name in the scene.
         device: String,
         /// Mismatches, each with a remedy.
         mismatches: Vec<String>,

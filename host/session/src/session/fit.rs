@@ -15,7 +15,8 @@ pub(super) fn check_fit(scene: &Scene, opened: &[Opened]) -> Result<(), RunError
         let mut mismatches = pair(scene, number, &opened.capabilities, opened.device.can_pace());
         mismatches.extend(opened.stop.missing().filter(|_| scene.limits.require_independent_stop));
         if !mismatches.is_empty() {
-            return Err(RunError::Mismatch { device: device.plugin.plugin.clone(), mismatches });
+            let name = if scene.devices.len() > 1 { &device.name } else { &device.plugin.plugin };
+            return Err(RunError::Mismatch { device: name.clone(), mismatches });
         }
     }
     Ok(())

@@ -165,7 +165,7 @@ impl StopReach {
             Ok(processes) => {
                 let processes: Vec<String> = processes.iter().map(u32::to_string).collect();
                 let processes = processes.join(", ");
-                problems.push(format!("not confirmed by process {processes}: switch its device off"));
+                problems.push(format!("not confirmed by process {processes}: switch the devices off"));
             }
             Err(cause) => problems.push(format!(
                 "the state of the other runs is unknown: {cause}; check that each has stopped"

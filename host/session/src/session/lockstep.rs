@@ -8,7 +8,7 @@ use super::{Controls, Observer, Outcome, RunError, Session};
 use crate::calls::EndReserve;
 use flotor_core::demand::DemandRequest;
 use flotor_hal::Demand;
-use flotor_hal::abi::loader::Stopper;
+use flotor_loader::Stopper;
 use flotor_servo::{Loop, RealTimeReport, RunEnd, Schedule, StopSwitch};
 
 /// Run that the caller advances tick by tick. Dropping it stops the devices.

@@ -44,9 +44,9 @@ use fit::check_fit;
 use flotor_core::demand::ObserverDemand;
 use flotor_core::{period_ns, to_ns};
 use flotor_coupling::{Line, LinkTimeouts, Reach};
-use flotor_hal::abi::loader::Stopper;
-use flotor_hal::{Capabilities, LoopConfig};
+use flotor_hal::{Capabilities, GripAxis, LoopConfig};
 use flotor_live::{Directory, WrenchLimits};
+use flotor_loader::Stopper;
 use flotor_servo::{
     Clock, Core, Coupled, Envelope, Forces, ParameterQueue, RunConfig, Servo, Standby, StopSwitch,
     swap_queues,
@@ -86,6 +86,7 @@ pub struct Session {
     limit_notices: Vec<String>,
     warnings: Vec<String>,
     capabilities: Vec<Capabilities>,
+    grips: Vec<Option<GripAxis>>,
 }
 
 impl Session {
@@ -124,7 +125,8 @@ impl Session {
         let controls = Controls::new(table.clone(), sender, &scene.models, (config, clock), host_swaps);
 
         let [ramp_ns, watchdog_ns] = [scene.limits.ramp_s, scene.limits.watchdog_s].map(to_ns);
-        let capabilities: Vec<_> = opened.iter().map(|opened| opened.capabilities).collect();
+        let (capabilities, grips): (Vec<_>, Vec<_>) =
+            opened.iter().map(|opened| (opened.capabilities, opened.grip)).unzip();
         // A partner on another host has the same timeout as the loop.
         let timeouts = LinkTimeouts { silence_ns: watchdog_ns, fade_ns: ramp_ns };
         let (couplings, lines) = couple(scene, &capabilities, config.period_ns, timeouts);
@@ -163,6 +165,7 @@ impl Session {
             limit_notices: notices,
             warnings,
             capabilities,
+            grips,
         };
         Ok(session.with_strength(Strength::of_the_environment()))
     }
@@ -284,6 +287,11 @@ impl Session {
     /// Returns the capabilities of the devices, in the scene's order.
     pub fn capabilities(&self) -> &[Capabilities] {
         &self.capabilities
+    }
+
+    /// Returns the grip of each device, in the scene's order; `None` without one.
+    pub fn grips(&self) -> &[Option<GripAxis>] {
+        &self.grips
     }
 
     /// Returns the handle with which other threads change the run.

@@ -35,6 +35,7 @@ const AT_HOME: TickRecord = TickRecord {
     commanded: Wrench::ZERO,
     delivered: Wrench::ZERO,
     port_energy_j: 0.0,
+    grip: None,
     events: Events::NONE,
     buttons: 0,
     lateness_ns: 0,

@@ -4,11 +4,12 @@ use super::controls::Settled;
 use super::plugin_report::PluginNames;
 use super::{Controls, FaultyPlugin, PluginReport, StopTime, UnfreedPlugins};
 use crate::calls::{Call, CallError, CallThread, EndReserve, Unresponsive};
+use flotor_core::health::ModelHealth;
 use flotor_core::plausibility::ImplausibleSamples;
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice};
 use flotor_hal::{EnergyLedger, Fault};
+use flotor_loader::{ActiveDevice, OpenedDevice};
 use flotor_servo::{
-    CouplingOutcome, Dismantled, EnvelopeEffects, Forces, Heartbeat, Layer, LayerReport, Loop, ModelHealth,
+    CouplingOutcome, Dismantled, EnvelopeEffects, Forces, Heartbeat, Layer, LayerReport, Loop,
     RealTimeReport, Reported, RunEnd, Servo, Stuck, Timing,
 };
 use std::time::Instant;
@@ -160,7 +161,8 @@ impl Epilogue {
         let Settled { first: health, faulty_plugins, replacements, hung } = controls.settle(reports);
         unresponsive = unresponsive.or(hung);
         let models = names.models().iter().cloned().zip(health);
-        let models = models.map(|(name, (health, words))| (name, health, words)).collect();
+        let models: Vec<_> = models.map(|(name, (health, words))| (name, health, words)).collect();
+        warnings.extend(models.iter().filter_map(|(name, health, _)| health.notice(name)));
         let layers = layers.into_iter().chain(waiting);
         let layers = layers.map(|(model, layer)| (names.model(model), layer)).collect();
         let unfreed_plugins = UnfreedPlugins { devices: closing, models: layers, last_stop, calls };

@@ -2,9 +2,10 @@
 
 use crate::scene::Isolation;
 use flotor_core::PluginIndex;
+use flotor_core::asynchronous::FieldTiming;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::Metadata;
 use flotor_hal::{Demand, Embodiment, Parameter, SoftRange};
+use flotor_loader::Metadata;
 use flotor_servo::Place;
 use flotor_servo::last_stop::TakenSignals;
 
@@ -32,6 +33,8 @@ pub struct PluginReport {
     pub at_hand: Demand,
     /// Isolation of a model, with `ByOrigin` resolved; `None` for a device.
     pub isolation: Option<Isolation>,
+    /// Timing and limits of an asynchronous model, as on its device; `None` for other plugins.
+    pub field: Option<FieldTiming>,
     /// Signals of the host that the plugin blocked, or whose actions the plugin replaced, during its creation; the host has
     /// restored these signals.
     pub signals_taken: TakenSignals,

@@ -9,18 +9,20 @@ use crate::scene::{
     CalibrationUse, DeviceUse, Isolation, ModelUse, ParameterText, PluginUse, Scene, SceneError,
 };
 use flotor_core::demand::hand_demand;
+use flotor_core::end_wall::pushes_at_home;
 use flotor_core::limits::Bound;
 use flotor_core::mapping::Mapping;
 use flotor_core::to_ns;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{Metadata, OpenedDevice, Plugin, Setting};
 use flotor_hal::{
-    Capabilities, DVec3, Demand, Embodiment, LoopConfig, Parameter, ParameterKind, SampledLoop, SoftRange,
+    Capabilities, DVec3, Demand, Embodiment, GripAxis, LoopConfig, Parameter, ParameterKind, SampledLoop,
+    SoftRange,
 };
+use flotor_loader::{Metadata, OpenedDevice, Plugin, Setting};
 use flotor_servo::engine::asynchronous::AsynchronousModel;
 use flotor_servo::engine::process::{Worker, WorkerConfig};
 use flotor_servo::last_stop::{SignalGuard, TakenSignals};
-use flotor_servo::{Clock, Engine, Layer, TimeBudget, pushes_at_home};
+use flotor_servo::{Clock, Engine, Layer, TimeBudget};
 use std::borrow::Cow;
 use std::time::Duration;
 
@@ -71,6 +73,8 @@ fn calibrate(
 pub(super) struct Opened {
     pub(super) device: OpenedDevice,
     pub(super) capabilities: Capabilities,
+    /// Declared grip; `None` without one.
+    pub(super) grip: Option<GripAxis>,
     pub(super) embodiment: Embodiment,
     /// Means that stop the device after the end of this process.
     pub(super) stop: StopWithoutHost,
@@ -91,7 +95,7 @@ pub(super) fn open_devices(
 }
 
 fn open_device(registry: &Registry, device: &DeviceUse) -> Result<(Opened, PluginReport), RunError> {
-    let DeviceUse { name, plugin: used, calibration } = device;
+    let DeviceUse { name, plugin: used, calibration, .. } = device;
     let signals = SignalGuard::take();
     let plugin = load(registry, used, PluginKind::Device)?;
     let settings = settings(&plugin, name, &used.parameters)?;
@@ -102,11 +106,12 @@ fn open_device(registry: &Registry, device: &DeviceUse) -> Result<(Opened, Plugi
         let refuse = |refusal| RunError::refused(opening.metadata(), refusal);
         let mut device = opening.open_device(&given)?;
         let capabilities = device.capabilities().map_err(refuse)?;
+        let grip = device.grip_axis().map_err(refuse)?;
         let stop = StopWithoutHost::of(&who, embodiment, &capabilities, &mut device).map_err(refuse)?;
         let values: Vec<f64> = (0..opening.parameters().len()).map(|index| device.parameter(index)).collect();
-        Ok::<_, RunError>((device, capabilities, stop, values))
+        Ok::<_, RunError>((device, capabilities, grip, stop, values))
     };
-    let (mut device, capabilities, stop, values) =
+    let (mut device, capabilities, grip, stop, values) =
         keeping_machine(name, || CallThread::default().run_while(limit(), is_to_begin, open))??;
     let mut report = report(&plugin, name, used, &settings, &values);
     if let Some(calibration) = calibration {
@@ -114,7 +119,7 @@ fn open_device(registry: &Registry, device: &DeviceUse) -> Result<(Opened, Plugi
     }
     report.signals_taken = signals.put_back();
     report.latency_s = capabilities.latency_s;
-    Ok((Opened { device, capabilities, embodiment, stop }, report))
+    Ok((Opened { device, capabilities, grip, embodiment, stop }, report))
 }
 
 /// Loads the plugin of a model and creates an instance at each of the model's positions. Not real-time; runs the plugin's code.
@@ -163,6 +168,7 @@ pub(super) fn prepare_model_while(
     report.signals_taken = signals.put_back();
     report.estimates = estimates;
     report.isolation = Some(isolation);
+    report.field = model.field;
     Ok((layer, report))
 }
 
@@ -170,13 +176,20 @@ pub(super) fn prepare_model_while(
 /// clock and on simulated devices.
 pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
     let mut scene = scene.clone();
+    let period_s = 1.0 / scene.rate_hz;
     for model in &mut scene.models {
-        let device = opened.get(usize::from(model.device));
+        let number = usize::from(model.device);
+        let device = opened.get(number);
+        let damping_ns_per_m = scene.devices.get(number).map_or(0.0, |used| used.damping_ns_per_m);
         let is_simulated = device.is_some_and(|device| device.embodiment == Embodiment::Simulated);
         if model.isolation == Isolation::ByOrigin && (clock == Clock::Virtual || is_simulated) {
             model.isolation = Isolation::None;
         }
-        model.latency_s = device.map_or(0.0, |device| device.capabilities.latency_s);
+        let Some(Opened { capabilities, .. }) = device else { continue };
+        model.latency_s = capabilities.latency_s;
+        if let Some(field) = &mut model.field {
+            field.contacts = field.contacts.on(capabilities, damping_ns_per_m, &scene.limits, period_s);
+        }
     }
     scene
 }
@@ -244,7 +257,8 @@ impl ModelBuilder {
         let budget_ns = budget_ns(model, *clock, config.period_ns);
         let mapping = Mapping::new(&model.mapping);
         let instance = |place_m: &[f64; 3]| {
-            let (mut engine, mapping) = (self.engine(budget_ns, progress)?, mapping.at(*place_m));
+            let mapping = mapping.at(*place_m);
+            let mut engine = self.engine(&mapping, budget_ns, progress)?;
             if pushes_at_home(&engine.workspace_bounds(), &mapping) {
                 let problem = format!(
                     "at {} mm the workspace limits of the model exclude the home of its device, and the wall at these \
@@ -275,7 +289,12 @@ impl ModelBuilder {
     }
 
     /// Creates and prepares one instance: in the loop, in a worker, or asynchronous.
-    fn engine(&self, budget_ns: Option<u64>, progress: &Progress) -> Result<Engine, RunError> {
+    fn engine(
+        &self,
+        mapping: &Mapping,
+        budget_ns: Option<u64>,
+        progress: &Progress,
+    ) -> Result<Engine, RunError> {
         let Self { isolation, plugin, settings, model, config, clock } = self;
         let no = |refusal| RunError::refused(plugin.metadata(), refusal);
         progress.enter(&model.name, Call::Create);
@@ -302,13 +321,13 @@ impl ModelBuilder {
             engine.prepare(config).map_err(no)?;
             return Ok(engine);
         };
-        if !engine.has_linear_field() {
-            let problem =
-                "the plugin has no local linear model; remove `[model.field]` to run it in the loop";
+        if !engine.has_local_model() {
+            let problem = "the plugin has no contacts and no local linear model; remove `[model.field]` to run it in the loop";
             return Err(complain(model, problem).into());
         }
         progress.enter(&model.name, Call::Prepare);
-        let slow = AsynchronousModel::start(engine, plugin.parameters().len(), timing, config, *clock);
+        let parameters = plugin.parameters().len();
+        let slow = AsynchronousModel::start(engine, parameters, (timing, mapping), config, *clock);
         Ok(Engine::Asynchronous(Box::new(slow.map_err(no)?)))
     }
 }
@@ -376,6 +395,7 @@ fn report(
         latency_s: 0.0,
         at_hand: Demand::WRENCH,
         isolation: None,
+        field: None,
         signals_taken: TakenSignals::default(),
         estimates: Vec::new(),
     }

@@ -5,7 +5,7 @@ use super::plugin_report::PluginNames;
 use super::{PluginReport, RunError};
 use crate::calls::{Call, CallThread, Progress, is_to_begin, limit};
 use flotor_core::PluginIndex;
-use flotor_hal::abi::loader::Stopper;
+use flotor_loader::Stopper;
 use flotor_servo::{Servo, Standby};
 
 /// Loop whose devices are open and not energised.

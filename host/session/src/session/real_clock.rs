@@ -13,7 +13,7 @@ use crate::long_call::Exceeded;
 use crate::scene::Pacing;
 use flotor_core::PluginIndex;
 use flotor_core::trace::TickRecord;
-use flotor_hal::abi::loader::Stopper;
+use flotor_loader::Stopper;
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
     Core, Heartbeat, Loop, Producer, RunEnd, Schedule, SpinWindow, StopSwitch, Stuck, drain, enter_real_time,

@@ -4,8 +4,9 @@
 use super::error::RunError;
 use crate::platform::NOT_CAUGHT;
 use flotor_core::limits::Limits;
-use flotor_hal::abi::loader::OpenedDevice;
-use flotor_hal::{Axes, Capabilities, Embodiment, Independence, Refusal};
+use flotor_hal::{Axes, Capabilities, Embodiment, Refusal};
+use flotor_loader::Independence;
+use flotor_loader::OpenedDevice;
 use flotor_servo::watchdog_process::WatchdogProcess;
 
 /// Means that stop an open device after the end of the host's process.

@@ -3,7 +3,7 @@
 //! Plugin code may hang or end the process. So recordings should be closed and summaries printed before the instances are freed.
 
 use crate::calls::{Call, CallError, CallThread, Unresponsive};
-use flotor_hal::abi::loader::OpenedDevice;
+use flotor_loader::OpenedDevice;
 use flotor_servo::{LastStop, Layer};
 
 /// Models and devices of a finished run. Dropping the value frees models and devices; [`Self::free`] also reports a plugin that

@@ -13,7 +13,7 @@ use flotor_core::MAX_DEVICES;
 use flotor_core::demand::DemandRequest;
 use flotor_core::trace::TickRecord;
 use flotor_hal::Demand;
-use flotor_hal::abi::loader::Stopper;
+use flotor_loader::Stopper;
 use flotor_servo::{
     Consumer, CouplingOutcome, Heartbeat, Loop, RealTimeReport, RunEnd, Schedule, StopSwitch, Stuck, drain,
     queue,

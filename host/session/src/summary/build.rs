@@ -12,10 +12,8 @@ use flotor_core::coupling::CouplingDescription;
 use flotor_core::peer::TankState;
 use flotor_core::trace::Events;
 use flotor_coupling::LinkStatistics;
-use flotor_hal::{Demand, EnergyLedger};
-use flotor_servo::{
-    CouplingOutcome, Durations, EnvelopeEffects, ModelHealth, Overrun, Stage, StageEffect, Timing,
-};
+use flotor_hal::{Demand, EnergyLedger, GripKind};
+use flotor_servo::{CouplingOutcome, Durations, EnvelopeEffects, Stage, StageEffect, Timing};
 
 impl RunSummary {
     /// Creates the summary of a run from its inputs, its outcome and the counts over its ticks.
@@ -49,7 +47,7 @@ impl RunSummary {
             stages_ns: StageSummary { read, models, envelope, write },
             peak_force_n: tally.largest(|device| device.peak_force_n),
             peak_torque_nm: tally.largest(|device| device.peak_torque_nm),
-            peak_stiffness_n_per_m: tally.largest(|device| device.feel.peak_stiffness_n_per_m),
+            peak_stiffness_n_per_m: tally.largest(|device| device.feel.peak_stiffness_n_per_m()),
             settled_after_s: (tally.devices.iter())
                 .map(|device| device.feel.settled_after_s())
                 .try_fold(0.0, |latest_s: f64, settled_s| Some(latest_s.max(settled_s?))),
@@ -131,6 +129,8 @@ fn device_summary(
         name: plugin.name.clone(),
         peak_force_n: tally.peak_force_n,
         peak_torque_nm: tally.peak_torque_nm,
+        peak_grip_force_n: tally.peak_effort(GripKind::Linear),
+        peak_grip_torque_nm: tally.peak_effort(GripKind::Angular),
         port_lowest_j: tally.port_lowest_j,
         port_end_j: tally.port_energy_j(),
         envelope: effects.map(EnvelopeSummary::of).unwrap_or_default(),
@@ -169,40 +169,6 @@ fn coupling_summary(
     }
 }
 
-/// Returns the problem of a model as text; "ok" without a problem.
-fn health_words(health: &ModelHealth, words: &str) -> String {
-    let us = |ns: u64| ns as f64 * 1.0e-3;
-    if let Some(tick) = health.panicked_at {
-        return format!("panicked at tick {tick}, no force since: {words}");
-    }
-    if let Some(tick) = health.lost_at {
-        return format!("process lost at tick {tick}, no force since: {words}");
-    }
-    if let Some(Overrun { tick, longest_ns, limit_ns }) = health.overrun {
-        let (longest_us, limit_us) = (us(longest_ns), us(limit_ns));
-        return format!(
-            "took up to {longest_us:.0} µs a step, more than its {limit_us:.0} µs, and was faded out at tick {tick}"
-        );
-    }
-    if let Some(tick) = health.first_late {
-        return format!("late in {} ticks, the first at tick {tick}", health.late_ticks);
-    }
-    if let Some(tick) = health.first_rejected {
-        let count = health.rejected_ticks;
-        return format!(
-            "{count} results were not finite, the first at tick {tick}; the host replaced each by zero force"
-        );
-    }
-    if let Some(tick) = health.first_float_change {
-        let ticks = health.float_changes;
-        return format!(
-            "changed the floating-point environment in {ticks} ticks, the first at tick {tick}; the host restored it \
-             each time"
-        );
-    }
-    "ok".to_owned()
-}
-
 /// Returns the summary of the plugin with this number; devices have the first numbers.
 fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
     let device = outcome.devices.get(number);
@@ -214,13 +180,13 @@ fn plugin_summary(number: usize, plugin: &PluginReport, outcome: &Outcome) -> Pl
     });
     let problem = device.and_then(|device| device.problem.clone());
     let model = outcome.models.iter().find(|(name, ..)| *name == plugin.name);
-    let model = model.map(|(_, health, words)| health_words(health, words));
-    summary_of(plugin, problem.or(float_changes).or(model).unwrap_or_else(|| "ok".to_owned()))
+    let model = model.and_then(|(_, health, words)| health.problem(words));
+    summary_of(plugin, problem.or(float_changes).or(model))
 }
 
 /// Returns the summary of a replacement with faults.
 fn faulty_plugin_summary(FaultyPlugin { plugin, health, words }: &FaultyPlugin) -> PluginSummary {
-    summary_of(plugin, health_words(health, words))
+    summary_of(plugin, health.problem(words))
 }
 
 /// Returns the summary of a replacement in place at the end.
@@ -229,10 +195,11 @@ fn replacement(plugin: &PluginReport, outcome: &Outcome) -> PluginSummary {
         known.plugin.name == plugin.name && known.plugin.metadata.path == plugin.metadata.path
     };
     let faulty = outcome.faulty_plugins.iter().find(same);
-    faulty.map_or_else(|| summary_of(plugin, "ok".to_owned()), faulty_plugin_summary)
+    faulty.map_or_else(|| summary_of(plugin, None), faulty_plugin_summary)
 }
 
-fn summary_of(plugin: &PluginReport, health: String) -> PluginSummary {
+/// Returns the summary of a plugin with this problem, if any.
+fn summary_of(plugin: &PluginReport, problem: Option<String>) -> PluginSummary {
     PluginSummary {
         name: plugin.name.clone(),
         id: plugin.metadata.id.clone(),
@@ -240,7 +207,7 @@ fn summary_of(plugin: &PluginReport, health: String) -> PluginSummary {
         version: plugin.metadata.version.clone(),
         file: plugin.metadata.path.display().to_string(),
         isolation: plugin.isolation.map(Isolation::word),
-        health,
+        health: problem.unwrap_or_else(|| "ok".to_owned()),
         parameters: plugin.parameters.iter().cloned().collect(),
         estimates: plugin.estimates.iter().cloned().collect(),
     }

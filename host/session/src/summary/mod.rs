@@ -102,6 +102,12 @@ pub struct DeviceSummary {
     pub peak_force_n: f64,
     /// Largest magnitude of the commanded torque, N·m.
     pub peak_torque_nm: f64,
+    /// Largest magnitude of the commanded force at a linear grip, N; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_grip_force_n: Option<f64>,
+    /// Largest magnitude of the commanded torque at an angular grip, N·m; absent without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_grip_torque_nm: Option<f64>,
     /// Lowest net energy put in by the hand at the device's port, J; below zero: more energy came out than had gone in, for example
     /// from a coupled device.
     pub port_lowest_j: f64,

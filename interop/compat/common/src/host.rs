@@ -133,13 +133,15 @@ impl Host {
         let period_ns = session.period_ns();
         let limits = session.limits();
         let capabilities = session.capabilities().to_vec();
-        let stations = connected.into_iter().zip(capabilities).map(|(connected, capabilities)| {
+        let grips = session.grips().to_vec();
+        let devices = connected.into_iter().zip(capabilities.into_iter().zip(grips));
+        let stations = devices.map(|(connected, told)| {
             let number = usize::from(connected.device);
             let report = session.plugins().get(number);
             let name = report.map_or_else(String::new, |report| report.name.clone());
             let plugin = report.map_or_else(String::new, |report| report.metadata.id.clone());
             let tap = session.tap(connected.device);
-            Station::new([name, plugin], connected, capabilities, &limits, tap, period_ns)
+            Station::new([name, plugin], connected, told, &limits, tap, period_ns)
         });
         let stations = stations.collect();
         notice_copies();

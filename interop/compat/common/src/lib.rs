@@ -24,7 +24,7 @@ mod station;
 pub use frame::{Frame, length};
 pub use host::{Host, host, prepare};
 pub use process::{Language, guarded, interned, language, library, quietly};
-pub use run::report_no_thread;
+pub use run::{no_thread, report_no_thread};
 pub use settings::{Pace, Settings, SharedControlGroup, env_value};
 pub use station::{Axes, State, Station, Turn};
 

@@ -333,7 +333,9 @@ pub fn report_no_thread(purpose: &str, cause: &io::Error) {
     report_line(&no_thread(purpose, cause));
 }
 
-fn no_thread(purpose: &str, cause: &io::Error) -> String {
+/// Returns the error of a thread that the system has not started; `purpose` is the part of the session without its thread.
+#[must_use]
+pub fn no_thread(purpose: &str, cause: &io::Error) -> String {
     format!("cannot start a thread for {purpose}: {cause}; {THREAD_ADVICE}")
 }
 

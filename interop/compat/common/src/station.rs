@@ -2,7 +2,7 @@
 
 use flotor_core::mapping::Mapping;
 use flotor_core::trace::TickRecord;
-use flotor_hal::{Axes as Driven, Capabilities, DQuat, DVec3, Wrench};
+use flotor_hal::{Axes as Driven, Capabilities, DQuat, DVec3, GripAxis, GripState, Wrench};
 use flotor_live::WrenchLimits;
 use flotor_servo::{monotonic_ns, sleep_until};
 use flotor_session::Tap;
@@ -37,6 +37,8 @@ pub struct Station {
     port: Port,
     mapping: Mapping,
     capabilities: Capabilities,
+    /// Declared grip; `None` without one.
+    grip: Option<GripAxis>,
     /// Limits of the wrench on the hand: N, N·m.
     most: [f64; 2],
     tap: Tap,
@@ -85,13 +87,15 @@ pub struct State {
     pub buttons: u32,
     /// Wrench sent to the device, after all limits, N and N·m, Flotor's axes.
     pub applied: Wrench,
+    /// Grip, and the effort sent there after all limits, in the units of its kind; `None` without one.
+    pub grip: Option<(GripState, f64)>,
 }
 
 impl Station {
     pub(crate) fn new(
         [name, plugin]: [String; 2],
         connected: Connected,
-        capabilities: Capabilities,
+        (capabilities, grip): (Capabilities, Option<GripAxis>),
         limits: &WrenchLimits,
         tap: Tap,
         period_ns: u64,
@@ -113,6 +117,7 @@ impl Station {
             port,
             mapping,
             capabilities,
+            grip,
             most,
             tap,
             period_ns,
@@ -161,6 +166,12 @@ impl Station {
     #[must_use]
     pub fn most(&self) -> [f64; 2] {
         self.most
+    }
+
+    /// Returns the declared grip of the device; `None` without one.
+    #[must_use]
+    pub fn grip(&self) -> Option<&GripAxis> {
+        self.grip.as_ref()
     }
 
     /// Returns the largest stiffness that the device renders, N/m; 0: unknown.
@@ -234,7 +245,15 @@ impl Station {
     /// # Errors
     /// [`NotFinite`]; the previous wrench remains.
     pub fn command(&self, wrench: &Wrench, now_ns: u64) -> Result<(), NotFinite> {
-        self.port.command(wrench)?;
+        self.command_with_grip(wrench, 0.0, now_ns)
+    }
+
+    /// Commands a wrench as [`Self::command`] does, and the effort at the grip, N or N·m.
+    ///
+    /// # Errors
+    /// [`NotFinite`]; the previous command remains.
+    pub fn command_with_grip(&self, wrench: &Wrench, effort: f64, now_ns: u64) -> Result<(), NotFinite> {
+        self.port.command_with_grip(wrench, effort)?;
         let mut rate = flotor_core::lock(&self.rate);
         rate.commands += 1;
         let elapsed_ns = now_ns.saturating_sub(rate.since_ns);
@@ -271,6 +290,10 @@ impl Station {
             angular_velocity_rad_per_s: twist.angular(),
             buttons: record.buttons,
             applied: self.mapping.wrench_to_model(&record.commanded),
+            grip: record.grip.map(|grip| {
+                let applied = self.mapping.effort_to_model(grip.state.kind(), grip.commanded);
+                (self.mapping.grip_to_model(&grip.state), applied)
+            }),
         }
     }
 

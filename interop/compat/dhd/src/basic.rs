@@ -4,6 +4,7 @@ use crate::device::{
     FRAME, Open, any, close, count, default, expert, kind, open, open_first, open_number, set_default,
 };
 use crate::error::{Code, DONE, failed, result};
+use crate::gripper::{Gripper, is_driven};
 use crate::regulator::{follow_all, sampled};
 use flotor_compat::pointer::Out;
 use flotor_compat::{Pace, export, host, interned};
@@ -101,10 +102,10 @@ export! {
     fn dhdHasWrist(id: i8) -> bool [false] { any(id).is_ok_and(|open| open.has_wrist()) }
     /// Returns true if the device drives its rotations.
     fn dhdHasActiveWrist(id: i8) -> bool [false] { any(id).is_ok_and(|open| open.has_active_wrist()) }
-    /// Returns false: no device of Flotor has a gripper.
-    fn dhdHasGripper(_id: i8) -> bool [false] { false }
-    /// Returns false: no device of Flotor has a gripper.
-    fn dhdHasActiveGripper(_id: i8) -> bool [false] { false }
+    /// Returns whether the device has a gripper.
+    fn dhdHasGripper(id: i8) -> bool [false] { any(id).is_ok_and(|open| open.station.grip().is_some()) }
+    /// Returns whether the device has a gripper with a motor.
+    fn dhdHasActiveGripper(id: i8) -> bool [false] { any(id).is_ok_and(|open| is_driven(open.station)) }
     /// Returns true if the device is for the left hand, by its type.
     fn dhdIsLeftHanded(id: i8) -> bool [false] {
         any(id).is_ok_and(|open| [36, 37, 105, 109, 132].contains(&kind(open.station)))
@@ -168,22 +169,22 @@ export! {
     /// Returns the buttons, one bit each; 0 on error.
     fn dhdGetButtonMask(id: i8) -> c_uint [0] { sampled(id).map_or(0, |open| open.station.state().buttons) }
 
-    /// Reads 0 and returns an error: there is no gripper.
-    fn dhdGetGripperAngleRad(angle: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([angle]) }
-    /// Reads 0 and returns an error: there is no gripper.
-    fn dhdGetGripperAngleDeg(angle: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([angle]) }
-    /// Reads 0 and returns an error: there is no gripper.
-    fn dhdGetGripperGap(gap: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([gap]) }
-    /// Reads 0 and returns an error: there is no gripper.
-    fn dhdGetGripperAngularVelocityRad(velocity: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([velocity]) }
-    /// Reads 0 and returns an error: there is no gripper.
-    fn dhdGetGripperAngularVelocityDeg(velocity: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([velocity]) }
-    /// Reads 0 and returns an error: there is no gripper.
-    fn dhdGetGripperLinearVelocity(velocity: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([velocity]) }
-    /// Reads 0 and returns an error: there is no gripper.
-    fn dhdGetGripperThumbPos(x: Out<f64>, y: Out<f64>, z: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([x, y, z]) }
-    /// Reads 0 and returns an error: there is no gripper.
-    fn dhdGetGripperFingerPos(x: Out<f64>, y: Out<f64>, z: Out<f64>, _id: i8) -> c_int [-1] { no_gripper([x, y, z]) }
+    /// Reads the angle of the gripper, rad; 0 and an error without one.
+    fn dhdGetGripperAngleRad(angle: Out<f64>, id: i8) -> c_int [-1] { gripper(id, angle, |gripper| gripper.angle_rad()) }
+    /// Reads the angle of the gripper, degrees; 0 and an error without one.
+    fn dhdGetGripperAngleDeg(angle: Out<f64>, id: i8) -> c_int [-1] { gripper(id, angle, |gripper| gripper.angle_rad() * DEGREES) }
+    /// Reads the gap of the gripper, m; 0 and an error without one.
+    fn dhdGetGripperGap(gap: Out<f64>, id: i8) -> c_int [-1] { gripper(id, gap, |gripper| gripper.gap_m) }
+    /// Reads the angular velocity of the gripper, rad/s; 0 and an error without one.
+    fn dhdGetGripperAngularVelocityRad(velocity: Out<f64>, id: i8) -> c_int [-1] { gripper(id, velocity, |gripper| gripper.velocity_rad_per_s()) }
+    /// Reads the angular velocity of the gripper, degrees/s; 0 and an error without one.
+    fn dhdGetGripperAngularVelocityDeg(velocity: Out<f64>, id: i8) -> c_int [-1] { gripper(id, velocity, |gripper| gripper.velocity_rad_per_s() * DEGREES) }
+    /// Reads the velocity of the gap, m/s; 0 and an error without a gripper.
+    fn dhdGetGripperLinearVelocity(velocity: Out<f64>, id: i8) -> c_int [-1] { gripper(id, velocity, |gripper| gripper.velocity_m_per_s) }
+    /// Reads 0 and returns an error: the positions of the fingers are unknown.
+    fn dhdGetGripperThumbPos(x: Out<f64>, y: Out<f64>, z: Out<f64>, _id: i8) -> c_int [-1] { no_finger([x, y, z]) }
+    /// Reads 0 and returns an error: the positions of the fingers are unknown.
+    fn dhdGetGripperFingerPos(x: Out<f64>, y: Out<f64>, z: Out<f64>, _id: i8) -> c_int [-1] { no_finger([x, y, z]) }
 
     /// Returns the time of a monotonic clock, s; in lockstep that of the run.
     fn dhdGetTime() -> f64 [0.0] { now_s() }
@@ -241,7 +242,16 @@ pub(crate) fn put6(places: [Out<f64>; 6], values: [DVec3; 2]) {
         .for_each(|(place, value)| place.put(value));
 }
 
-fn no_gripper<const N: usize>(places: [Out<f64>; N]) -> c_int {
+/// Reads a number of a gripper; 0 and an error without one.
+fn gripper(id: i8, place: Out<f64>, number: impl FnOnce(&Gripper) -> f64) -> c_int {
+    result(sampled(id).and_then(|open| {
+        let found = Gripper::of(open.station);
+        place.put(found.as_ref().map_or(0.0, number));
+        found.map(|_| DONE).ok_or(Code::NotAvailable)
+    }))
+}
+
+fn no_finger(places: [Out<f64>; 3]) -> c_int {
     places.into_iter().for_each(|place| place.put(0.0));
     failed(Code::NotAvailable)
 }

@@ -1,6 +1,7 @@
 //! DHD device as presented to the program: settings of the program, and last command.
 
 use crate::error::Code;
+use crate::gripper;
 use crate::regulation::Regulation;
 use flotor_compat::{Axes, Frame, Host, Language, Station, env_value, host, language, length};
 use flotor_hal::{DVec3, Wrench, math};
@@ -32,6 +33,8 @@ pub(crate) struct Device {
     /// Last command, in the axes of the interface: N and N·m.
     pub(crate) force_n: DVec3,
     pub(crate) torque_nm: DVec3,
+    /// Last commanded force of the gripper, N.
+    pub(crate) gripper_n: f64,
     /// Limits of the program: N, N·m, gripper N; negative: none.
     pub(crate) most: [f64; 3],
     pub(crate) vibration: [f64; 2],
@@ -59,6 +62,7 @@ impl Device {
         switch: Switch::Unsaid,
         force_n: DVec3::ZERO,
         torque_nm: DVec3::ZERO,
+        gripper_n: 0.0,
         most: [-1.0; 3],
         vibration: [0.0; 2],
         mass_kg: 0.1,
@@ -215,7 +219,7 @@ impl Open {
             device.has_been_stopped = false;
         } else {
             device.switch = switch;
-            (device.force_n, device.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+            (device.force_n, device.torque_nm, device.gripper_n) = (DVec3::ZERO, DVec3::ZERO, 0.0);
             device.regulation = Regulation::OFF;
             self.station.disable();
         }
@@ -231,19 +235,28 @@ impl Open {
         }
     }
 
-    /// Limits the program's force and torque, and sends both in addition to regulation and vibration. Enables force unless the
+    /// Limits the program's force, torque and force of the gripper, and sends both in addition to regulation and vibration. Enables force unless the
     /// program has set the force switch. Returns true if force or torque is scaled down, here or later by the envelope;
     /// [`Code::Invalid`] for a non-finite command.
-    pub(crate) fn send(&self, device: &mut Device, force_n: DVec3, torque_nm: DVec3) -> Result<bool, Code> {
-        if !(force_n.is_finite() && torque_nm.is_finite()) {
+    pub(crate) fn send(
+        &self,
+        device: &mut Device,
+        [force_n, torque_nm]: [DVec3; 2],
+        gripper_n: f64,
+    ) -> Result<bool, Code> {
+        if !(force_n.is_finite() && torque_nm.is_finite() && gripper_n.is_finite()) {
             // The port counts and rejects the command.
             let wrench = Wrench::new(FRAME.to_flotor(force_n), FRAME.to_flotor(torque_nm));
-            let _ = self.station.command(&wrench, self.host.now_ns());
+            let _ = self.station.command_with_grip(&wrench, gripper_n, self.host.now_ns());
             return Err(Code::Invalid);
         }
         let own = |vector: DVec3, most: f64| if most < 0.0 { vector } else { shortened(vector, most) };
-        let [most_n, most_nm, _] = device.most;
+        let [most_n, most_nm, most_gripper_n] = device.most;
         (device.force_n, device.torque_nm) = (own(force_n, most_n), own(torque_nm, most_nm));
+        device.gripper_n = match most_gripper_n {
+            most if most < 0.0 => gripper_n,
+            most => gripper_n.clamp(-most, most),
+        };
         if device.switch == Switch::Unsaid {
             self.enable(device);
         }
@@ -266,7 +279,8 @@ impl Open {
         let force_n = FRAME.to_flotor(device.force_n + DVec3::Z * shake_n) + held_n;
         let torque_nm = FRAME.to_flotor(device.torque_nm) + held_nm;
         // Non-finite parts were rejected before; the port rejects an overflowing sum in the same way.
-        let _ = self.station.command(&Wrench::new(force_n, torque_nm), now_ns);
+        let effort = gripper::effort(self.station, device.gripper_n);
+        let _ = self.station.command_with_grip(&Wrench::new(force_n, torque_nm), effort, now_ns);
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::basic::{put3, put6, read, read_live};
 use crate::device::{Device, FRAME, Open, Switch, live, open};
 use crate::error::{Code, DONE, SATURATED, failed, result};
+use crate::gripper::Gripper;
 use flotor_compat::export;
 use flotor_compat::pointer::Out;
 use flotor_hal::DVec3;
@@ -11,10 +12,10 @@ use std::ffi::{c_int, c_uchar, c_uint};
 /// Number of elements of a status.
 const STATUS: usize = 17;
 
-/// Sends a command; with `waits`, waits for the next tick.
-fn command(id: i8, force_n: DVec3, torque_nm: Option<DVec3>, waits: bool) -> c_int {
+/// Sends force, N, torque, N·m, and force of the gripper, N; with `waits`, waits for the next tick.
+fn command(id: i8, wrench: [DVec3; 2], gripper_n: f64, waits: bool) -> c_int {
     result(live(id).and_then(|open| {
-        let sent = open.send(&mut open.device(), force_n, torque_nm.unwrap_or(DVec3::ZERO));
+        let sent = open.send(&mut open.device(), wrench, gripper_n);
         // A rejected command waits too: a program that retries must not loop faster for it.
         if waits {
             open.host.wait(open.station);
@@ -52,22 +53,22 @@ fn most(id: i8, axis: usize) -> f64 {
 
 export! {
     /// Sets the force, N, and zero torque; waits for the next tick.
-    fn dhdSetForce(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { command(id, DVec3::new(x, y, z), None, true) }
+    fn dhdSetForce(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { command(id, [DVec3::new(x, y, z), DVec3::ZERO], 0.0, true) }
     /// Sets force, N, and torque, N·m; waits for the next tick.
     fn dhdSetForceAndTorque(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, id: i8) -> c_int [-1] {
-        command(id, DVec3::new(x, y, z), Some(DVec3::new(tx, ty, tz)), true)
+        command(id, [DVec3::new(x, y, z), DVec3::new(tx, ty, tz)], 0.0, true)
     }
-    /// Sets the force, N, and zero torque; ignores the gripper; waits for the next tick.
-    fn dhdSetForceAndGripperForce(x: f64, y: f64, z: f64, _gripper: f64, id: i8) -> c_int [-1] {
-        command(id, DVec3::new(x, y, z), None, true)
+    /// Sets force and force of the gripper, N, and zero torque; waits for the next tick.
+    fn dhdSetForceAndGripperForce(x: f64, y: f64, z: f64, gripper: f64, id: i8) -> c_int [-1] {
+        command(id, [DVec3::new(x, y, z), DVec3::ZERO], gripper, true)
     }
-    /// Sets force, N, and torque, N·m; ignores the gripper; waits for the next tick.
-    fn dhdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, _gripper: f64, id: i8) -> c_int [-1] {
-        command(id, DVec3::new(x, y, z), Some(DVec3::new(tx, ty, tz)), true)
+    /// Sets force, N, torque, N·m, and force of the gripper, N; waits for the next tick.
+    fn dhdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, gripper: f64, id: i8) -> c_int [-1] {
+        command(id, [DVec3::new(x, y, z), DVec3::new(tx, ty, tz)], gripper, true)
     }
-    /// Sets force, N, and torque, N·m, in addition to the regulation; returns at once.
-    fn drdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, _gripper: f64, id: i8) -> c_int [-1] {
-        command(id, DVec3::new(x, y, z), Some(DVec3::new(tx, ty, tz)), false)
+    /// Sets force, N, torque, N·m, and force of the gripper, N, in addition to the regulation; returns at once.
+    fn drdSetForceAndTorqueAndGripperForce(x: f64, y: f64, z: f64, tx: f64, ty: f64, tz: f64, gripper: f64, id: i8) -> c_int [-1] {
+        command(id, [DVec3::new(x, y, z), DVec3::new(tx, ty, tz)], gripper, false)
     }
     /// Reads the applied force, after all limits, N.
     fn dhdGetForce(x: Out<f64>, y: Out<f64>, z: Out<f64>, id: i8) -> c_int [-1] {
@@ -77,18 +78,18 @@ export! {
     fn dhdGetForceAndTorque(x: Out<f64>, y: Out<f64>, z: Out<f64>, tx: Out<f64>, ty: Out<f64>, tz: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| put6([x, y, z, tx, ty, tz], applied(open)))
     }
-    /// Reads the applied force, N, and torque, N·m, and 0 for a gripper.
+    /// Reads the applied force, N, torque, N·m, and force of the gripper, N; 0 without one.
     fn dhdGetForceAndTorqueAndGripperForce(x: Out<f64>, y: Out<f64>, z: Out<f64>, tx: Out<f64>, ty: Out<f64>, tz: Out<f64>, gripper: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             put6([x, y, z, tx, ty, tz], applied(open));
-            gripper.put(0.0);
+            gripper.put(Gripper::of(open.station).map_or(0.0, |gripper| gripper.applied_n));
         })
     }
     /// Enables or disables force.
     fn dhdEnableForce(on: c_uchar, id: i8) -> c_int [-1] {
         read(id, |open| open.set_switch(&mut open.device(), if on == 0 { Switch::Off } else { Switch::On }))
     }
-    /// Does nothing: there is no gripper.
+    /// Does nothing: the force of a gripper is enabled with all force.
     fn dhdEnableGripperForce(_on: c_uchar, id: i8) -> c_int [-1] { read(id, |_| ()) }
     /// Disables force. Returns 0 even without an open device: programs call it until it succeeds.
     fn dhdStop(id: i8) -> c_int [0] {
@@ -113,7 +114,7 @@ export! {
     fn dhdSetMaxForce(force_n: f64, id: i8) -> c_int [-1] { set_most(id, 0, force_n) }
     /// Sets the limit of torque, N·m, within the envelope; negative: none.
     fn dhdSetMaxTorque(torque_nm: f64, id: i8) -> c_int [-1] { set_most(id, 1, torque_nm) }
-    /// Stores the limit of gripper force, N, without effect.
+    /// Sets the limit of the force of the gripper, N, within the envelope; negative: none.
     fn dhdSetMaxGripperForce(force_n: f64, id: i8) -> c_int [-1] { set_most(id, 2, force_n) }
     /// Returns the limit of force, N; -1: none.
     fn dhdGetMaxForce(id: i8) -> f64 [-1.0] { most(id, 0) }
@@ -132,7 +133,7 @@ export! {
         }
         keep(id, |device| device.vibration = [frequency_hz, amplitude_n])
     }
-    /// Returns an error: there is no gripper whose closing could be a button.
+    /// Returns an error: a gripper is no button.
     fn dhdEmulateButton(_on: c_uchar, _id: i8) -> c_int [-1] { failed(Code::NotAvailable) }
     /// Does nothing: the device needs no calibration.
     fn dhdReset(id: i8) -> c_int [-1] { read(id, |_| ()) }

@@ -23,7 +23,7 @@ export! {
     fn dhdConfigLinearVelocity(_window_ms: c_int, _mode: c_int, id: i8) -> c_int [-1] { read(id, |_| ()) }
     /// Does nothing: the loop has its own velocity estimate.
     fn dhdConfigAngularVelocity(_window_ms: c_int, _mode: c_int, id: i8) -> c_int [-1] { read(id, |_| ()) }
-    /// Does nothing: there is no gripper.
+    /// Does nothing: the device estimates the velocity of a gripper itself.
     fn dhdConfigGripperVelocity(_window_ms: c_int, _mode: c_int, id: i8) -> c_int [-1] { read(id, |_| ()) }
     /// Stores the angle of the base about x, rad, without effect.
     fn dhdSetBaseAngleXRad(angle_rad: f64, id: i8) -> c_int [-1] { set_angle(id, 0, angle_rad) }

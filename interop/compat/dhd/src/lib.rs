@@ -4,7 +4,7 @@
 //! Lengths in m, forces in N, torques in N·m, angles in rad; x towards the user, y right, z up. A result of 0 is success, 2 a
 //! command that was scaled down, -1 an error, whose number the calling thread may read. Functions that set a force wait for the
 //! next tick, which paces the program. Encoders and joints are those of a nominal base. For parts that a Flotor device lacks (motors,
-//! a gripper), the functions return the SDK's results for a device without them.
+//! fingers of a gripper), the functions return the SDK's results for a device without them.
 //!
 //! Source: the public header of the interface, version 3.17, and a dozen open programs that use it: names, numbers and behaviour
 //! only.
@@ -17,6 +17,7 @@ mod device;
 mod error;
 mod expert;
 mod force;
+mod gripper;
 mod joints;
 mod kept;
 mod keyboard;

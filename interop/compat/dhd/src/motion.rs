@@ -3,6 +3,7 @@
 use crate::basic::{angles, put6, read, read_live, turning};
 use crate::device::{FRAME, Open, Switch, live, open};
 use crate::error::{Code, DONE, failed, result};
+use crate::gripper::Gripper;
 use crate::kept::{POSITION_MOVE, ROTATION_MOVE};
 use crate::regulation::{Motion, Progress, Regulation};
 use crate::regulator::{follow, sampled, start};
@@ -157,7 +158,7 @@ export! {
         read(id, |open| {
             let mut device = open.device();
             device.regulation = Regulation::OFF;
-            (device.force_n, device.torque_nm) = (DVec3::ZERO, DVec3::ZERO);
+            (device.force_n, device.torque_nm, device.gripper_n) = (DVec3::ZERO, DVec3::ZERO, 0.0);
             if keeps_force {
                 open.send_again(&mut device);
             } else {
@@ -187,7 +188,7 @@ export! {
     fn drdMoveToPos(x: f64, y: f64, z: f64, block: bool, id: i8) -> c_int [-1] { go(id, position(x, y, z), way(block)) }
     /// Turns the handle to angles, rad; with `block`, waits for the arrival.
     fn drdMoveToRot(a: f64, b: f64, g: f64, block: bool, id: i8) -> c_int [-1] { go(id, rotation(a, b, g), way(block)) }
-    /// Checks the regulation and moves nothing: there is no gripper.
+    /// Checks the regulation and moves nothing: a gripper is not regulated.
     fn drdMoveToGrip(_gap: f64, _block: bool, id: i8) -> c_int [-1] { go(id, Goal::NONE, Way::Follow) }
     /// Moves the handle to a position, m, and turns it to angles, rad; with `block`, waits for the arrival.
     fn drdMoveTo(place: In<f64>, block: bool, id: i8) -> c_int [-1] {
@@ -197,23 +198,23 @@ export! {
     fn drdTrackPos(x: f64, y: f64, z: f64, id: i8) -> c_int [-1] { go(id, position(x, y, z), Way::Follow) }
     /// Sets the target angles, rad, without a planned motion.
     fn drdTrackRot(a: f64, b: f64, g: f64, id: i8) -> c_int [-1] { go(id, rotation(a, b, g), Way::Follow) }
-    /// Checks the regulation and moves nothing: there is no gripper.
+    /// Checks the regulation and moves nothing: a gripper is not regulated.
     fn drdTrackGrip(_gap: f64, id: i8) -> c_int [-1] { go(id, Goal::NONE, Way::Follow) }
-    /// Reads position, m, angles, rad, 0 for a gripper, and rotation matrix, row-major.
+    /// Reads position, m, angles, rad, gap of the gripper, m (0 without one), and rotation matrix, row-major.
     fn drdGetPositionAndOrientation(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, matrix: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let (position_m, rows) = open.pose();
             put6([x, y, z, a, b, g], [position_m, angles(&rows)]);
-            gap.put(0.0);
+            gap.put(Gripper::of(open.station).map_or(0.0, |gripper| gripper.gap_m));
             matrix.put_all(rows.as_flattened());
         })
     }
-    /// Reads velocity, m/s, angular velocity, rad/s, and 0 for a gripper.
+    /// Reads velocity, m/s, angular velocity, rad/s, and velocity of the gap, m/s (0 without a gripper).
     fn drdGetVelocity(x: Out<f64>, y: Out<f64>, z: Out<f64>, a: Out<f64>, b: Out<f64>, g: Out<f64>, gap: Out<f64>, id: i8) -> c_int [-1] {
         read_live(id, |open| {
             let velocity_m_per_s = FRAME.of_flotor(open.station.state().velocity_m_per_s);
             put6([x, y, z, a, b, g], [velocity_m_per_s, turning(open)]);
-            gap.put(0.0);
+            gap.put(Gripper::of(open.station).map_or(0.0, |gripper| gripper.velocity_m_per_s));
         })
     }
     /// Returns the rate of the loop, kHz.

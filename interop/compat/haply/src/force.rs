@@ -96,6 +96,7 @@ mod tests {
         angular_velocity_rad_per_s: DVec3::ZERO,
         buttons: 0,
         applied: Wrench::ZERO,
+        grip: None,
     };
 
     fn force(x: f64) -> SessionCommand {

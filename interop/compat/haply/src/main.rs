@@ -36,7 +36,7 @@ use connection::accept;
 use flotor_command::options::{LendOptions, arguments, seed};
 use flotor_command::stopping::stop_on_signals;
 use flotor_command::{CommandError, say, supervised};
-use flotor_compat::{Pace, Settings, SharedControlGroup, prepare};
+use flotor_compat::{Pace, Settings, SharedControlGroup, no_thread, prepare};
 use flotor_emulation::port::{Port, Reach, ReachArguments};
 use rustix::process::{Signal, set_parent_process_death_signal};
 use service::Service;
@@ -136,11 +136,7 @@ fn run(arguments: Arguments) -> Result<(), CommandError> {
         accept(events, "flotor-events", |stream| channels::send_events(service, stream))?;
         accept(simulation, "flotor-accept", |stream| channels::answer_client(service, stream))
     });
-    started.map_err(|cause| {
-        CommandError::Failed(format!(
-            "cannot start a thread for the service: {cause}; end other programs of this user"
-        ))
-    })?;
+    started.map_err(|cause| CommandError::Failed(no_thread("the service", &cause)))?;
     say!("listening ws://{simulation_at}/ events ws://{events_at}/");
     while !stop.is_stop_requested() && host.is_running() {
         std::thread::sleep(LOOK);

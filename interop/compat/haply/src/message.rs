@@ -145,7 +145,8 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
             let along =
                 value.get("vector").filter(|vector| !vector.is_null()).map_or(Some(DVec3::ZERO), vector);
             let damping = along.map(|along| along + scalar).filter(|damping| damping.min_element() >= 0.0);
-            view.damping = damping.ok_or("`scalar` and the x, y, z of `vector` must be 0 N·s/m or more")?;
+            view.damping = damping
+                .ok_or("`vector` needs x, y, z, and their sums with `scalar` must be 0 N·s/m or more")?;
         }
         "force_gate" => {
             let gain = value.get("gain").and_then(Value::as_f64).filter(|gain| (0.0..=1.0).contains(gain));
@@ -158,7 +159,7 @@ pub(crate) fn set(view: &mut View, name: &str, value: &Value) -> Result<(), Stri
         }
         other => {
             return Err(format!(
-                "unknown setting `{other}`; use basis, damping, force_gate, mount or preset"
+                "unknown setting `{other}`; use basis, damping, force_gate, mount or preset, directly or in `filters`"
             ));
         }
     }

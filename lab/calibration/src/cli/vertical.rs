@@ -36,7 +36,7 @@ pub(super) struct VerticalArguments {
     /// Number of sweeps over all heights for each force
     #[arg(long, default_value_t = 2, value_name = "N", value_parser = count(1..=100_u32))]
     runs: u32,
-    /// Number of steps down from the top, at least 7
+    /// Number of steps down, 7 to 200, from half of their total length above home to half below; at most 22 mm in all
     #[arg(long, default_value_t = 14, value_name = "N", value_parser = count(7..=200_u32))]
     steps: u32,
     /// Length of a step in mm

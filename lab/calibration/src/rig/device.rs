@@ -7,8 +7,8 @@ use crate::procedure::Plan;
 use crate::sensor::ForceSensor;
 use flotor_core::limits::{Boundary, CEILING, Limits};
 use flotor_core::plausibility::PlausibilityCheck;
-use flotor_hal::abi::loader::{OpenedDevice, Plugin, Setting};
 use flotor_hal::{Embodiment, Fault, LoopConfig, VerticalCalibration};
+use flotor_loader::{OpenedDevice, Plugin, Setting};
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{Envelope, StopSwitch};
 use flotor_session::calibration_file::CalibratedDevice;
@@ -192,8 +192,8 @@ impl<W: FnMut(Option<Waiting>) -> ControlFlow<()>> Rig for DeviceRig<W> {
             if report.state == Holding::Steady(command_n) && is_close && report.moved_m <= REST_M {
                 // The saturation flag alone proves nothing: for a tick, a coil may saturate that holds a locked axis.
                 if report.saturated > 0 && report.delivered_n < command_n - STEADY_N {
-                    let height_mm = report.height_m * 1.0e3;
-                    return Err(CalibrationError::Saturated { command_n, height_mm });
+                    let (height_mm, delivered_n) = (report.height_m * 1.0e3, report.delivered_n);
+                    return Err(CalibrationError::Saturated { command_n, delivered_n, height_mm });
                 }
                 self.tell(None)?;
                 self.restless = report.restless;

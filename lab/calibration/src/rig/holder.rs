@@ -8,8 +8,8 @@ use super::{AVERAGED_TICKS, Mean, PERIOD_NS, locked};
 use crate::CalibrationError;
 use flotor_core::plausibility::{PlausibilityCheck, Trust};
 use flotor_core::trace::Events;
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Conditions, Cycle, DeviceState, Fault, Tick};
+use flotor_loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_servo::watchdog_process::WatchdogProcess;
 use flotor_servo::{
     EmergencySource, Envelope, Gate, Heartbeat, LastStop, Place, StopSwitch, enter_real_time, start_watchdog,

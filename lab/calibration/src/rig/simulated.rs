@@ -2,8 +2,8 @@
 
 use super::{AVERAGED_TICKS, Mean, PERIOD_NS, Rest, Rig, locked};
 use crate::CalibrationError;
-use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting};
 use flotor_hal::{Cycle, DeviceState, LoopConfig, Refusal, Tick, VerticalCalibration, math};
+use flotor_loader::{ActiveDevice, Plugin, Setting};
 use flotor_session::calibration_file::CalibratedDevice;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;

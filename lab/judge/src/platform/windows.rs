@@ -79,7 +79,7 @@ pub(crate) mod state {
 /// Check that a step only computes: not possible on Windows, which has no seccomp.
 pub(crate) mod locked {
     use crate::validate::Outcome;
-    use flotor_hal::abi::loader::Model;
+    use flotor_loader::Model;
     use std::process::Command;
 
     /// Does nothing: no preparation needed.

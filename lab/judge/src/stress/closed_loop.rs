@@ -23,8 +23,8 @@ use crate::sampling::Random;
 use crate::subject::Subject;
 use crate::tally::Worst;
 use crate::trajectory::{at, sensed};
-use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Memory, Pose, Wrench, math, rotation_vector};
+use flotor_loader::LoadError;
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 

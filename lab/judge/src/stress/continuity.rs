@@ -18,8 +18,8 @@ use crate::sampling::{Random, Sobol};
 use crate::subject::Subject;
 use crate::tally::{Worst, tally};
 use crate::trajectory::at;
-use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Memory, Pose, Twist, Wrench};
+use flotor_loader::LoadError;
 use serde::{Deserialize, Serialize};
 
 const NAME: &str = "continuity";

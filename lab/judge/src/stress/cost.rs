@@ -16,8 +16,8 @@ use crate::subject::Subject;
 use crate::tally::{Decades, Worst};
 use crate::watch::enter_call;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Memory, Output, Pose};
+use flotor_loader::LoadError;
 use hdrhistogram::Histogram;
 use std::time::Instant;
 

@@ -13,8 +13,8 @@ use crate::subject::{Subject, call};
 use crate::tally::{Worst, tally};
 use crate::watch::enter_call;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{LoadError, Model};
 use flotor_hal::{Input, Memory, Output, Pose, Twist};
+use flotor_loader::{LoadError, Model};
 use xxhash_rust::xxh3::Xxh3;
 
 const NAME: &str = "determinism";

@@ -23,8 +23,8 @@ use crate::sampling::Random;
 use crate::subject::Subject;
 use crate::tally::{Decades, Worst, tally};
 use crate::trajectory::Trajectory;
-use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Memory, Pose};
+use flotor_loader::LoadError;
 
 const LOOPS: &str = "loop energy";
 /// Initial number of samples of a lap: doubled until the work has converged, up to [`MOST_SAMPLES`].

@@ -110,7 +110,7 @@ impl From<Pose> for PoseRecord {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[must_use]
 pub struct Measure {
-    /// Identifier, "M0" to "M10".
+    /// Identifier, "M0" to "M11".
     pub id: Cow<'static, str>,
     /// Name of the measure.
     pub name: Cow<'static, str>,

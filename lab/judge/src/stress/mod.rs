@@ -13,6 +13,7 @@
 //! | M8 `determinism` | same poses, same bits? | |
 //! | M9 `search` | what does a search for the worst find? | evolution strategy, Rechenberg 1973 |
 //! | M10 `symmetry` | does it keep a symmetry that is declared for it? | |
+//! | M11 `asynchronous` | do its contacts or its local linear model pull, where it is computed at a rate of its own? | |
 //!
 //! Each measure creates its own instances through the plugin contract, without knowledge of the model beyond the
 //! contract. Data flows one way: `poses` and `trajectory` generate poses, `subject` calls the model, `sweep`
@@ -21,6 +22,7 @@
 //!
 //! Not real-time: everything here allocates and may take long.
 
+mod asynchronous;
 mod closed_loop;
 mod continuity;
 mod cost;
@@ -55,7 +57,7 @@ pub use symmetry::Symmetry;
 use crate::subject::Subject;
 use crate::{Progress, Size};
 use flotor_hal::Memory;
-use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
+use flotor_loader::{LoadError, Plugin, Setting};
 
 /// Reference period of the loop, s.
 const PERIOD_S: f64 = 1.0e-3;
@@ -122,7 +124,8 @@ fn measure_all(setup: &Setup<'_>) -> Result<StressReport, LoadError> {
     use crate::tally::Merge;
 
     let mut found = parts::Found::default();
-    for part in Part::all(&setup.options) {
+    let model = setup.plugin.create_model(setup.settings)?;
+    for part in Part::all(&setup.options, &model) {
         found.merge(parts::measure(setup, part)?);
     }
     Ok(StressReport::new(setup, found.measures, found.spread))

@@ -7,13 +7,13 @@
 use super::measure::{Measure, PoseRecord};
 use super::score::{Distributions, StressReport};
 use super::{
-    Setup, StressOptions, closed_loop, continuity, cost, determinism, energy, part_of, search, stiffness,
-    symmetry, totality,
+    Setup, StressOptions, asynchronous, closed_loop, continuity, cost, determinism, energy, part_of, search,
+    stiffness, symmetry, totality,
 };
 use crate::platform::{anonymous_file, end_at_once, ending_signal, standard_input};
 use crate::tally::{Merge, tally};
 use crate::{Progress, watch};
-use flotor_hal::abi::loader::{LoadError, Plugin, Setting};
+use flotor_loader::{LoadError, Model, Plugin, Setting};
 use flotor_session::PluginProcess;
 use serde::{Deserialize, Serialize};
 use std::io::{self, Read, Seek, Write};
@@ -41,10 +41,12 @@ pub enum Part {
     Search,
     /// Measure M10, if the options name a symmetry.
     Symmetry,
+    /// Measure M11, of a model that can run asynchronously.
+    Asynchronous,
 }
 
 /// Parts with their names and measures.
-const PARTS: [(Part, &str, &[[&str; 2]]); 9] = [
+const PARTS: [(Part, &str, &[[&str; 2]]); 10] = [
     (Part::Totality, "totality", &[["M0", "totality"]]),
     (Part::Continuity, "continuity", &[["M1", "continuity"]]),
     (
@@ -58,14 +60,18 @@ const PARTS: [(Part, &str, &[[&str; 2]]); 9] = [
     (Part::Determinism, "determinism", &[["M8", "determinism"]]),
     (Part::Search, "search", &[["M9", "search"]]),
     (Part::Symmetry, "symmetry", &[["M10", "symmetry"]]),
+    (Part::Asynchronous, "asynchronous", &[["M11", "asynchronous"]]),
 ];
 
 impl Part {
-    /// Returns all parts that the options select.
-    pub(super) fn all(options: &StressOptions) -> impl Iterator<Item = Self> + use<> {
-        let has_symmetry = options.symmetry.is_some();
-        let parts = PARTS.into_iter().map(|(part, ..)| part);
-        parts.filter(move |part| *part != Self::Symmetry || has_symmetry)
+    /// Returns all parts that the options select and that apply to the model.
+    pub(super) fn all(options: &StressOptions, model: &Model) -> impl Iterator<Item = Self> + use<> {
+        let (has_symmetry, is_asynchronous) = (options.symmetry.is_some(), model.has_local_model());
+        PARTS.into_iter().map(|(part, ..)| part).filter(move |part| match part {
+            Self::Symmetry => has_symmetry,
+            Self::Asynchronous => is_asynchronous,
+            _ => true,
+        })
     }
 
     /// Returns the name of the part on the command line.
@@ -80,7 +86,7 @@ impl Part {
         PARTS.iter().find(|(_, known, _)| *known == word).map(|(part, ..)| *part)
     }
 
-    /// Finds the part of a measure, "M0" to "M10"; `None` for an unknown measure.
+    /// Finds the part of a measure, "M0" to "M11"; `None` for an unknown measure.
     #[must_use]
     pub fn of_measure(id: &str) -> Option<Self> {
         PARTS.iter().find(|(.., names)| names.iter().any(|[known, _]| *known == id)).map(|(part, ..)| *part)
@@ -138,6 +144,7 @@ pub(super) fn measure(setup: &Setup<'_>, part: Part) -> Result<Found, LoadError>
             Some(symmetry) => Found::of(symmetry::measure(setup, symmetry)?),
             None => Found::default(),
         },
+        Part::Asynchronous => Found::of(asynchronous::measure(setup)?),
     })
 }
 
@@ -199,9 +206,13 @@ pub fn score_in_processes(
     only: &[Part],
     program: impl Fn(Part) -> Command,
 ) -> Result<StressReport, LoadError> {
-    let memory = plugin.create_model(settings)?.memory();
+    let model = plugin.create_model(settings)?;
     let (mut found, mut stuck) = (Found::default(), None);
-    for part in Part::all(options).filter(|part| only.is_empty() || only.contains(part)) {
+    let parts: Vec<Part> = match only {
+        [] => Part::all(options, &model).collect(),
+        only => PARTS.into_iter().map(|(part, ..)| part).filter(|part| only.contains(part)).collect(),
+    };
+    for part in parts {
         let delivered = in_own_process(program(part));
         found.merge(match delivered {
             Ok(Ok(Delivery::Found(found))) => found,
@@ -214,8 +225,13 @@ pub fn score_in_processes(
             Err(error) => part.broken(None, &format!("cannot be measured: {error}")),
         });
     }
-    let setup =
-        Setup { plugin, settings, options: *options, part: part_of(options.size, memory), progress: &() };
+    let setup = Setup {
+        plugin,
+        settings,
+        options: *options,
+        part: part_of(options.size, model.memory()),
+        progress: &(),
+    };
     Ok(StressReport { stuck, ..StressReport::new(&setup, found.measures, found.spread) })
 }
 

@@ -25,7 +25,7 @@ pub struct StressReport {
     pub reach: Reach,
     /// Fraction of the measures that passed.
     pub score: f64,
-    /// Measures, M0 to M10.
+    /// Measures, M0 to M11.
     pub measures: Vec<Measure>,
     /// Distributions for pictures.
     pub distributions: Distributions,
@@ -55,7 +55,7 @@ impl StressReport {
         // Sorts "M2" before "M10".
         measures.sort_by_key(|measure| (measure.id.len(), measure.id.clone()));
         let schema = setup.plugin.parameters();
-        let named = |setting: &flotor_hal::abi::loader::Setting| {
+        let named = |setting: &flotor_loader::Setting| {
             let parameter = schema.get(setting.index())?;
             Some((parameter.id().to_owned(), setting.display()))
         };

@@ -32,8 +32,8 @@ use crate::sampling::Random;
 use crate::subject::Subject;
 use crate::tally::{Worst, tally};
 use crate::trajectory::{Series, Trajectory};
-use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DVec3, Memory, Pose, Twist, WorkspaceBounds, math, rotation_vector};
+use flotor_loader::LoadError;
 use std::array::from_fn;
 
 const NAME: &str = "search";

@@ -22,7 +22,7 @@ use super::sweep::sweep;
 use super::{DAMPINGS_NS_PER_M, LEVER_M, MOSTLY, PERIOD_S, Setup};
 use crate::sampling::Sobol;
 use crate::tally::{Decades, Worst, tally};
-use flotor_hal::abi::loader::LoadError;
+use flotor_loader::LoadError;
 
 const NAME: &str = "Lipschitz constant, reciprocity and sampled energy";
 /// Poses per block.

@@ -6,7 +6,7 @@
 use super::Setup;
 use crate::subject::Subject;
 use crate::tally::Merge;
-use flotor_hal::abi::loader::LoadError;
+use flotor_loader::LoadError;
 use rayon::prelude::*;
 
 /// Runs `work` for every block and merges the results in order.

@@ -13,8 +13,8 @@ use crate::subject::Subject;
 use crate::tally::{Worst, tally};
 use crate::trajectory::at;
 use clap::ValueEnum;
-use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{DQuat, DVec3, Memory, Pose, Wrench, rotation_vector};
+use flotor_loader::LoadError;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 

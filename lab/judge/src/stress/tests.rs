@@ -2,12 +2,13 @@
 
 use super::{Measure, Part, Setup, Size, StressOptions, StressReport, Verdict, measure_all};
 use crate::tally::Merge;
-use flotor_hal::abi::loader::Plugin;
-use flotor_hal::abi::model_entry;
+use flotor_hal::abi::{Extensions, Interface, model_entry, model_entry_with};
+use flotor_hal::extension::{contact_set, linear_field};
 use flotor_hal::{
-    DVec3, Demand, ForceModel, Input, Memory, ModelInfo, Output, Pose, Refusal, Settings, Wrench,
-    rotation_vector,
+    Contact, ContactSet, ContactSetModel, DVec3, Demand, ForceModel, Input, LinearField, LinearFieldModel,
+    Memory, ModelInfo, Output, Pose, Refusal, Settings, Wrench, rotation_vector,
 };
+use flotor_loader::Plugin;
 use std::io::Write;
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -459,6 +460,96 @@ impl<const STIFFNESS_N_PER_M: u32> Law for Wall<STIFFNESS_N_PER_M> {
     fn wrench(pose: &Pose) -> Wrench {
         Wrench::from_force(DVec3::Z * (-pose.position().z).max(0.0) * f64::from(STIFFNESS_N_PER_M))
     }
+}
+
+/// A floor of 2 kN/m at home, in the loop or asynchronously; the length of its normal is `LENGTH`.
+struct Floor<const LENGTH: u32 = 1>;
+
+impl<const LENGTH: u32> Floor<LENGTH> {
+    fn force_n(input: &Input) -> DVec3 {
+        DVec3::Z * (-2000.0 * input.pose.position().z).max(0.0)
+    }
+}
+
+impl<const LENGTH: u32> ForceModel for Floor<LENGTH> {
+    const INFO: ModelInfo = ModelInfo::new("floor", "Floor", "A floor under test");
+
+    fn create(_: &Settings<'_>) -> Result<Self, Refusal> {
+        Ok(Self)
+    }
+
+    fn step(&mut self, input: &Input) -> Output {
+        Wrench::from_force(Self::force_n(input)).into()
+    }
+}
+
+impl<const LENGTH: u32> ContactSetModel for Floor<LENGTH> {
+    fn contact_set(&mut self, input: &Input) -> ContactSet {
+        let mut floor = Contact::of_handle(input, DVec3::Z, input.pose.position().z, 2000.0);
+        floor.normal[2] = f64::from(LENGTH);
+        ContactSet::at(input).with(floor)
+    }
+}
+
+impl LinearFieldModel for Floor {
+    fn linear_field(&mut self, input: &Input) -> LinearField {
+        let force_n = Self::force_n(input);
+        let slope_n_per_m = if force_n.z > 0.0 { DVec3::Z * -2000.0 } else { DVec3::ZERO };
+        LinearField::of_force(input, force_n, [DVec3::ZERO, DVec3::ZERO, slope_n_per_m], 0.01)
+    }
+}
+
+struct Contacts;
+impl<const LENGTH: u32> Extensions<Floor<LENGTH>> for Contacts {
+    const LIST: &'static [Interface<Floor<LENGTH>>] = &[contact_set::offer()];
+}
+
+struct Field;
+impl Extensions<Floor> for Field {
+    const LIST: &'static [Interface<Floor>] = &[linear_field::offer()];
+}
+
+/// A short M11.
+fn asynchronous<M: ForceModel, E: Extensions<M>>() -> StressReport {
+    let plugin = Plugin::in_process(Box::leak(Box::new(model_entry_with::<M, E>()))).unwrap();
+    let part = super::part_of(Size::Short, Memory::Stateless);
+    let options = StressOptions::default();
+    let setup = Setup { plugin: &plugin, settings: &[], options, part, progress: &() };
+    let found = super::parts::measure(&setup, Part::Asynchronous).unwrap();
+    StressReport::new(&setup, found.measures, found.spread)
+}
+
+#[test]
+fn contacts_never_pull_and_a_field_that_leaves_a_floor_does() {
+    let contacts = asynchronous::<Floor, Contacts>();
+    let report = contacts.to_text();
+    assert_eq!(with(&contacts, Verdict::Pass), ["M11"], "{report}");
+    assert!(value(&contacts, "M11", "ticks with a force") > 1000.0, "{report}");
+    for rate in ["50", "100", "200", "500"] {
+        let number = |name: &str| value(&contacts, "M11", &format!("{name}, {rate} Hz"));
+        assert_eq!((number("pull"), number("ticks that pull")), (0.0, 0.0));
+        let [given_mj, in_loop_mj] = ["energy given to the hand", "energy given in the loop"].map(number);
+        assert!(in_loop_mj > 0.0 && given_mj <= 1.15 * in_loop_mj + 0.02, "{given_mj} of {in_loop_mj} mJ");
+    }
+    let field = asynchronous::<Floor, Field>();
+    assert_eq!(with(&field, Verdict::Note), ["M11"], "{}", field.to_text());
+    let pull_n = |rate: &str| value(&field, "M11", &format!("pull, {rate} Hz"));
+    assert!(pull_n("50") > pull_n("500") && pull_n("500") > 0.01, "{} {}", pull_n("50"), pull_n("500"));
+    assert!(value(&field, "M11", "oldest answer, 50 Hz") >= 40.0, "an answer is used for two periods");
+}
+
+#[test]
+fn contacts_that_are_refused_fail_with_the_reason() {
+    let report = asynchronous::<Floor<2>, Contacts>();
+    assert_eq!(with(&report, Verdict::Fail), ["M11"], "{}", report.to_text());
+    let comment = &measure(&report, "M11").comment;
+    assert!(comment.contains("refused") && comment.contains("`normal`"), "{comment}");
+}
+
+#[test]
+fn a_model_of_the_loop_alone_is_no_asynchronous_one() {
+    let report = asynchronous::<Floor, ()>();
+    assert_eq!(with(&report, Verdict::NothingToJudge), ["M11"], "{}", report.to_text());
 }
 
 #[test]

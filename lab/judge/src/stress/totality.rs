@@ -13,9 +13,8 @@ use crate::PERIOD_NS;
 use crate::sampling::{Random, Sobol};
 use crate::subject::{Subject, Trouble, TroubleKind};
 use crate::tally::{Worst, tally};
-use crate::wording;
-use flotor_hal::abi::loader::LoadError;
 use flotor_hal::{Input, Memory, Pose, StepStatus, Twist};
+use flotor_loader::LoadError;
 
 const NAME: &str = "totality";
 /// Poses per block.
@@ -105,7 +104,7 @@ fn judge(total: &Tally) -> Measure {
             TroubleKind::Panicked(words) => words.clone(),
             TroubleKind::NotFinite => "returned a number that is not finite".to_owned(),
             TroubleKind::UnknownStatus => "returned a status unknown to the contract".to_owned(),
-            TroubleKind::Refused(status) => format!("rejected the call (`{}`)", wording::status(*status)),
+            TroubleKind::Refused(status) => format!("rejected the call (`{}`)", status.name()),
             TroubleKind::AcceptsNonFiniteInput => "returned `ok` for a pose that is not finite".to_owned(),
         };
         format!("first at {place}: {what}")

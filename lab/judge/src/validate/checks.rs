@@ -4,11 +4,11 @@ use super::outcome::{Figures, Outcome};
 use super::rule::Check;
 use super::subject::Subject;
 use super::untouched::{Host, untouched};
-use super::{device, guarded, life, live_parameters, model, passive};
+use super::{device, guarded, life, live_parameters, model, passive, restore};
 use crate::platform::locked;
-use flotor_hal::abi::loader::{LoadError, Model, Setting, read_metadata};
 use flotor_hal::conformance::Rule;
 use flotor_hal::{Parameter, ParameterKind};
+use flotor_loader::{LoadError, Model, Setting, read_metadata};
 use flotor_session::registry::load_file;
 use flotor_session::scene::KeyValue;
 use std::path::Path;
@@ -56,6 +56,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
             Rule::SurvivesNotFinite => of_model(model::not_finite)?,
             Rule::SurvivesFarPoses => of_model(model::far_poses)?,
             Rule::ResetRepeats => of_model(model::reset_repeats)?,
+            Rule::RestoreRepeats => restore::restore_repeats(&subject)?,
             Rule::TimeBudget => of_model(model::time_budget)?,
             Rule::Independent => model::independent(&subject)?,
             Rule::NoThreads => model::no_threads(subject.prepared_model()?, before.threads()?)?,

@@ -4,8 +4,8 @@ use super::outcome::Outcome;
 use super::path::CONFIG;
 use crate::wording;
 use flotor_core::plausibility::{PoseBounds, is_rotation};
-use flotor_hal::abi::loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_hal::{Axes, Capabilities, Conditions, Cycle, DVec3, DeviceState, Fault, Tick, Wrench};
+use flotor_loader::{ActiveDevice, OpenedDevice, Stopper};
 use flotor_session::LatchGuard;
 use std::time::{Duration, Instant};
 
@@ -253,7 +253,11 @@ impl Running {
             ));
         }
         if !KNOWN.contains(state.conditions) {
-            return Err("`conditions` has bits that the contract does not define; clear them".to_owned());
+            return Err(format!(
+                "`conditions` is {:#x}, but the contract defines only the bits {:#x}; clear the others",
+                state.conditions.bits(),
+                KNOWN.bits()
+            ));
         }
         let Sampled { count, first, last } = self.sampled;
         let now = state.sampled_ns;
@@ -314,11 +318,11 @@ impl Running {
         let mut at_rest = 0;
         while at_rest < SAMPLES {
             if started.elapsed() > PATIENCE {
+                let (time, force) = (wording::time(PATIENCE), wording::wrench(&self.state.delivered));
                 return Err(match self.delivers() {
-                    true => format!("the device still delivers {}", wording::wrench(&self.state.delivered)),
+                    true => format!("{time} after the stop the device still delivers {force}"),
                     false => format!(
-                        "the device has delivered only {at_rest} of {SAMPLES} samples without force in {} since the stop",
-                        wording::time(PATIENCE)
+                        "the device has delivered only {at_rest} of {SAMPLES} samples without force in {time} since the stop"
                     ),
                 });
             }

@@ -4,13 +4,16 @@
 use super::device::Running;
 use super::outcome::Outcome;
 use super::path::{CONFIG, finite, walk};
+use super::restore;
 use super::subject::Subject;
 use crate::watch::enter_call;
 use crate::wording;
+use flotor_core::grip_guard::GripGuard;
+use flotor_core::limits::Limits;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::{Model, OpenedDevice};
 use flotor_hal::extension::linear_field::LinearField;
-use flotor_hal::{Input, Mutability, Output, Parameter, Pose, Wrench};
+use flotor_hal::{ContactSet, GripKind, GripState, Input, Mutability, Output, Parameter, Pose, Wrench};
+use flotor_loader::{Model, OpenedDevice};
 
 /// Number of steps of a model, and of ticks of a device.
 const STEPS: u64 = 300;
@@ -39,8 +42,9 @@ pub(super) fn live(subject: &Subject, after: After<'_>) -> Result<(), Outcome> {
         return Err(format!("last_message returned {problem}").into());
     }
     after("last_message", model.float_changes())?;
-    if model.reset() != CallStatus::Ok {
-        return Err("reset failed".to_owned().into());
+    match model.reset() {
+        CallStatus::Ok => {}
+        status => return Err(format!("reset failed: {}", model.reason(status)).into()),
     }
     after("reset", model.float_changes())?;
     drop(model);
@@ -56,7 +60,7 @@ fn steps(model: &mut Model) -> Result<(), String> {
             model.step(&input, &mut output)
         };
         if status != CallStatus::Ok {
-            return Err(format!("step {} failed: {}", sent.tick, model.last_message()));
+            return Err(format!("step {} failed: {}", sent.tick, model.reason(status)));
         }
         if *input != sent {
             return Err(format!("step {} changed its input", sent.tick));
@@ -67,7 +71,7 @@ fn steps(model: &mut Model) -> Result<(), String> {
     let _calls = enter_call(&inputs);
     match model.step_batch(&inputs, &mut outputs) {
         CallStatus::Ok => Ok(()),
-        other => Err(format!("step_batch returned `{}`", wording::status(other))),
+        other => Err(format!("step_batch returned `{}`", other.name())),
     }
 }
 
@@ -93,13 +97,41 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
             let mut field = Box::new(LinearField::NONE);
             let answer = model.linear_field(&input, &mut field);
             works(model, "linear-field")?;
-            if answer != CallStatus::Ok || !field.is_finite() {
+            let at = wording::pose(&input.pose);
+            if answer != CallStatus::Ok {
                 return Err(format!(
-                    "linear-field returned `{}`: {}",
-                    wording::status(answer),
-                    wording::linear_field(&field)
+                    "linear-field returned `{}` at {at}; return ok at every pose, or do not offer flotor.linear-field/1",
+                    answer.name()
                 ));
             }
+            if !field.is_finite() {
+                let field = wording::linear_field(&field);
+                return Err(format!(
+                    "linear-field returned a field that is not finite at {at}: {field}; return finite numbers"
+                ));
+            }
+        }
+        for kind in [GripKind::Linear, GripKind::Angular] {
+            let effort = model.grip(&input, &GripState::new(kind, 0.01, -0.1));
+            works(model, "grip")?;
+            if !effort.is_finite() {
+                return Err(format!("grip returned the effort {effort}"));
+            }
+        }
+        if model.has_contact_set() {
+            let mut set = Box::new(ContactSet::NONE);
+            let answer = model.contact_set(&input, &mut set);
+            works(model, "contact-set")?;
+            if answer != CallStatus::Ok || !set.bilateral().is_finite() {
+                return Err(format!(
+                    "contact-set returned `{}`; its bilateral part: {}",
+                    wording::status(answer),
+                    wording::linear_field(&set.bilateral())
+                ));
+            }
+            // Any period: how long a set is valid does not make it right or wrong.
+            flotor_contact::ContactSet::published(&set, 1.0)
+                .map_err(|error| format!("contact-set: {error}"))?;
         }
         let drawn = model.centerline().map(|mut line| (line.info(), line.points(&input, POINTS)));
         works(model, "centerline")?;
@@ -123,8 +155,10 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
         let answer = model.read_details(&mut values);
         works(model, "details")?;
         if !matches!(answer, CallStatus::Ok | CallStatus::Unsupported) {
-            return Err(format!("details answered `{}`", wording::status(answer)));
+            return Err(format!("details answered `{}`", answer.name()));
         }
+        restore::saved_and_restored(model.state())?;
+        works(model, "snapshot")?;
     }
     after("an extension", model.float_changes())
 }
@@ -143,6 +177,7 @@ fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Outcome> {
         let _ = device.parameter(index);
     }
     drop(device.serial());
+    let grip = device.grip_axis().map_err(|refusal| refusal.to_string())?;
     after("an extension", 0)?;
     let stopper = device.stopper();
     let mut running = Running::start(device)?;
@@ -152,6 +187,14 @@ fn device(mut device: OpenedDevice, after: After<'_>) -> Result<(), Outcome> {
     }
     after("read and write", running.device.float_changes())?;
     let _ = running.device.energy_ledger();
+    if let Some(axis) = grip {
+        let is_taken = running.device.write_grip(0.0);
+        let sample = running.device.read_grip(axis.kind());
+        if !is_taken || GripGuard::new(axis, &Limits::default()).check(sample).is_err() {
+            return Err("the grip takes no effort, or returns no plausible sample".to_owned().into());
+        }
+    }
+    restore::saved_and_restored(running.device.state())?;
     drop(running.device.last_message());
     after("an extension", running.device.float_changes())?;
     stopper.safe_stop();

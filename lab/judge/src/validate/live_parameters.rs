@@ -6,8 +6,8 @@ use super::subject::Subject;
 use crate::platform::processor_time;
 use crate::wording;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{Mutability, Parameter};
+use flotor_loader::Model;
 use std::time::Duration;
 
 /// Number of repetitions of a change, for its duration.
@@ -68,9 +68,11 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
                  do not declare `{id}` live"
             ));
         }
-        CallStatus::Panicked => return Err(format!("`{id}` = {value}: the model {}", model.last_message())),
+        CallStatus::Panicked => {
+            return Err(format!("setting `{id}` = {value} failed: {}", model.reason(last)));
+        }
         CallStatus::WrongPhase => {
-            return Err(format!("setting `{id}` = {value} returned `{}`", wording::status(last)));
+            return Err(format!("setting `{id}` = {value} returned `{}`", last.name()));
         }
     };
     took.sort_unstable();
@@ -87,7 +89,7 @@ fn set(model: &mut Model, index: usize, parameter: &Parameter, value: f64) -> Re
     if is_told && (read_back - expected).abs() > 1.0e-9 * read_back.abs().max(expected.abs()) {
         return Err(format!(
             "`set_parameter` of `{id}` to {value} returned `{}`, but then `{id}` is {read_back} instead of {expected}",
-            wording::status(last)
+            last.name()
         ));
     }
     walk(10).try_for_each(|input| {

@@ -4,7 +4,7 @@
 //! - `rule`: list of rules; `checks`: check of one rule, in this process; `outcome`: result of a check; `patience`: timeout of a
 //!   check.
 //! - `subject`: checked plugin; `life`: all calls of an instance; `untouched` and `guarded` check their side effects.
-//! - `path`: poses of the checks; `model`, `live_parameters`, `passive`, `locked`: checks of a model.
+//! - `path`: poses of the checks; `model`, `live_parameters`, `passive`, `restore`, `locked`: checks of a model.
 //! - `device`: checks of a device.
 
 mod checks;
@@ -17,6 +17,7 @@ mod outcome;
 mod passive;
 pub(crate) mod path;
 pub(crate) mod patience;
+mod restore;
 mod rule;
 mod subject;
 mod untouched;
@@ -27,8 +28,8 @@ pub use rule::Check;
 
 use crate::platform::{anonymous_file, end_at_once, ending_signal, locked, standard_input};
 use crate::{watch, wording};
-use flotor_hal::abi::loader::read_metadata;
 use flotor_hal::conformance::Rule;
+use flotor_loader::read_metadata;
 use flotor_session::PluginProcess;
 use flotor_session::scene::KeyValue;
 use patience::Ended;

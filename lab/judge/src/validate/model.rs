@@ -7,10 +7,10 @@ use crate::platform::{processor_time, state};
 use crate::subject::input_of;
 use crate::wording;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{
     ActiveRegion, DQuat, DVec3, Demand, Input, Memory, Output, Pose, RegionShape, StepStatus, Twist, Wrench,
 };
+use flotor_loader::Model;
 use std::time::Duration;
 
 fn finite_at(model: &mut Model, pose: Pose) -> Result<(), String> {
@@ -83,7 +83,7 @@ fn is_other(first: [f64; 3], second: [f64; 3]) -> bool {
 fn demanded(model: &mut Model, of: impl Fn(u64) -> Demand) -> Result<Vec<Output>, String> {
     match model.reset() {
         CallStatus::Ok => {}
-        other => return Err(format!("reset returned `{}`", wording::status(other))),
+        other => return Err(format!("reset returned `{}`", other.name())),
     }
     let serves = model.serves();
     walk(500)
@@ -119,7 +119,7 @@ pub(super) fn reset_repeats(model: &mut Model) -> Result<(), String> {
     let first = run(model)?;
     match model.reset() {
         CallStatus::Ok => {}
-        other => return Err(format!("reset returned `{}`", wording::status(other))),
+        other => return Err(format!("reset returned `{}`", other.name())),
     }
     let second = run(model)?;
     let differs = first.iter().zip(&second).position(|(a, b)| a.wrench != b.wrench);
@@ -257,7 +257,7 @@ fn agree(seen: &[(f64, f64)], [what, unit]: [&str; 2]) -> Result<(), String> {
     let example = seen.iter().find(differs).map_or(String::new(), |(own, gradient)| {
         format!(": {own:.4} {unit} instead of the {gradient:.4} {unit} of the energy's gradient")
     });
-    Err(format!("{what} and energy disagree in {different} of {} places{example}", seen.len()))
+    Err(format!("{what} and energy disagree in {different} of {} components{example}", seen.len()))
 }
 
 /// Steps the model around its active region, where a host does not step it and assumes zero.

@@ -2,7 +2,7 @@
 
 use super::rule::Check;
 use flotor_hal::RefusalKind;
-use flotor_hal::abi::loader::LoadError;
+use flotor_loader::LoadError;
 use flotor_session::THREAD_ADVICE;
 use serde::{Deserialize, Serialize};
 

@@ -13,10 +13,10 @@
 use super::outcome::{Figures, Outcome};
 use super::path::{FAST, finite, walk_at};
 use crate::wording;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{
     DVec3, Input, Memory, Pose, Twist, Wrench, math, orientation_from_rotation_vector, rotation_vector,
 };
+use flotor_loader::Model;
 use std::f64::consts::TAU;
 
 /// Points of a circle: enough to detect a gain of a hundredth of the stiffness.

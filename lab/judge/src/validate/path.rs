@@ -4,8 +4,8 @@ use crate::subject::{call, input_of};
 use crate::trajectory::{Series, Trajectory};
 use crate::wording;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{DQuat, DVec3, Input, LoopConfig, Output, Pose, Twist};
+use flotor_loader::Model;
 
 /// Loop configuration of the checks.
 pub(super) const CONFIG: LoopConfig = LoopConfig { period_ns: 1_000_000, seed: 1 };
@@ -60,8 +60,8 @@ pub(super) fn walk_at(speed: f64, steps: u64) -> impl Iterator<Item = Input> {
 /// Makes one step; returns the answer, or a description of the failure.
 pub(super) fn step(model: &mut Model, input: &Input) -> Result<Output, String> {
     call(model, input).map_err(|status| match status {
-        CallStatus::Panicked => format!("{} the model {}", place(input), model.last_message()),
-        other => format!("{} the model returned `{}`", place(input), wording::status(other)),
+        CallStatus::Panicked => format!("{} the model failed: {}", place(input), model.reason(status)),
+        other => format!("{} the model returned `{}`", place(input), other.name()),
     })
 }
 

@@ -3,7 +3,7 @@
 use super::path::CONFIG;
 use crate::subject::prepared;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{LoadError, Model, OpenedDevice, Plugin, Setting};
+use flotor_loader::{LoadError, Model, OpenedDevice, Plugin, Setting};
 
 /// Checked plugin with the settings of its instances.
 pub(super) struct Subject {

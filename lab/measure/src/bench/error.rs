@@ -1,8 +1,8 @@
 //! Error of the computed wrenches relative to the reference.
 
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Pose, StepStatus, Wrench};
 use flotor_judge::subject::{call, input_of};
+use flotor_loader::Model;
 use serde::Serialize;
 
 /// Number of ticks for a model to converge at the first pose.

@@ -4,7 +4,7 @@ use super::error::{Distance, walk};
 use super::path::Workspace;
 use super::times::{Times, in_turns};
 use flotor_hal::Demand;
-use flotor_hal::abi::loader::Model;
+use flotor_loader::Model;
 use serde::Serialize;
 
 /// Cost and error of the cases over one workspace.

@@ -37,8 +37,8 @@ pub use whole_tick::{BenchDevice, TickCost, WholeTick};
 
 use super::{Progress, Size};
 use flotor_hal::Demand;
-use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
 use flotor_judge::subject::prepared;
+use flotor_loader::{LoadError, Model, Plugin, Setting};
 
 /// Named settings of the model, or of another model, to be measured.
 #[derive(Clone)]

@@ -11,9 +11,9 @@
 
 use super::error::{Distance, answer, settle, walk};
 use super::path::Hand;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{DVec3, Pose, Wrench};
 use flotor_judge::trajectory::sensed;
+use flotor_loader::Model;
 use serde::Serialize;
 
 /// Delay and sensor resolution of a loop.

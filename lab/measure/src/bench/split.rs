@@ -3,9 +3,9 @@
 
 use super::times::{call_ns, inputs};
 use flotor_core::quantile;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Pose};
 use flotor_judge::call_timer::overhead_ns;
+use flotor_loader::Model;
 use serde::Serialize;
 
 /// Times of the calls with a detail above zero, and of the other calls.

@@ -5,10 +5,10 @@
 //! quotients of neighbouring slices are those of a quiet machine.
 
 use flotor_core::quantile;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{Demand, Input, Memory, Output, Pose};
 use flotor_judge::call_timer::{net_ns, overhead_ns};
 use flotor_judge::subject::input_of;
+use flotor_loader::Model;
 use serde::Serialize;
 use std::hint::black_box;
 use std::time::Instant;

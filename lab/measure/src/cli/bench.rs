@@ -11,7 +11,7 @@ use flotor_command::tables::table;
 use flotor_command::{CommandError, print_result, style, write_text};
 use flotor_hal::Detail;
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{Plugin, Setting};
+use flotor_loader::{Plugin, Setting};
 use flotor_servo::THREAD_ADVICE;
 use flotor_session::registry::Registry;
 use serde::Serialize;

@@ -75,8 +75,8 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
     let bar = progress_bar(handles.len() as u64, "{wide_bar} {pos}/{len} poses  {elapsed}");
     let answers = evaluation.answers(&handles, &|| bar.inc(1)).map_err(|error| match error {
         EvaluateError::Load(error) => CommandError::from(error),
-        panicked @ EvaluateError::Panicked(_) => {
-            CommandError::PluginRefused(format!("{}: {panicked}", plugin.metadata().path.display()))
+        failed @ EvaluateError::Failed(_) => {
+            CommandError::PluginRefused(format!("{}: {failed}", plugin.metadata().path.display()))
         }
     })?;
     bar.finish_and_clear();
@@ -85,12 +85,10 @@ pub(crate) fn run(arguments: &EvalArguments) -> Result<(), CommandError> {
 
 /// Reads the poses from a file or from standard input.
 fn read_poses(path: &Path) -> Result<Poses, CommandError> {
-    let problem = |cause| {
-        let file = if path.as_os_str() == "-" { "standard input".into() } else { path.display().to_string() };
-        CommandError::Usage(format!("{file}: cannot read the poses: {cause}"))
-    };
+    let file = if path.as_os_str() == "-" { "standard input".into() } else { path.display().to_string() };
+    let problem = |cause| CommandError::Usage(format!("{file}: cannot read the poses: {cause}"));
     let bytes = read(path).map_err(problem)?;
-    Poses::parse(&path.display().to_string(), bytes).map_err(|error| CommandError::Usage(error.to_string()))
+    Poses::parse(&file, bytes).map_err(|error| CommandError::Usage(error.to_string()))
 }
 
 /// Maximum size of a file of poses, bytes: twenty million poses.

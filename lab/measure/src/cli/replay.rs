@@ -1,13 +1,14 @@
 //! `flotor replay`: re-evaluation of the models of a recording, unchanged or changed.
 
 use super::replay_picture::ReplayPicture;
-use crate::replay::{Compared, Coverage, Difference, DivergenceCause, Replay};
+use crate::replay::{Compared, Coverage, Difference, DivergenceCause, Replay, ReplayState};
 use clap::Args;
 use flotor_command::options::{JsonOption, KeyValue, PluginKeyValue, PluginPathOption, svg_file};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_text};
+use flotor_hal::read_text;
 use flotor_record::Ending;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Re-evaluate the models on a recorded trajectory: bit-exact, or with changed parameters.
@@ -19,7 +20,8 @@ use std::time::Instant;
     that file with --plugin-path.\n\n\
     Examples:\n  flotor replay run.mcap\n  flotor replay run.mcap --set spring.preset=thesis-3 --plot difference.svg\n  \
     flotor replay run.mcap --model spring=./libmy_spring.so --json -\n  \
-    flotor replay run.mcap --plugin-path target/release"
+    flotor replay run.mcap --plugin-path target/release\n  \
+    flotor replay run.mcap --save-state before.json --at-tick 1200; flotor replay run.mcap --from-state before.json"
 )]
 pub(crate) struct ReplayArguments {
     /// Recording to replay
@@ -35,6 +37,15 @@ pub(crate) struct ReplayArguments {
     plugin_path: PluginPathOption,
     #[command(flatten)]
     json: JsonOption,
+    /// Save the state of the models before the tick of --at-tick, to start other replays there
+    #[arg(long, value_name = "FILE.json", requires = "at_tick")]
+    save_state: Option<PathBuf>,
+    /// Tick before which --save-state saves
+    #[arg(long, value_name = "TICK", requires = "save_state")]
+    at_tick: Option<u64>,
+    /// Start at the tick of a saved state: earlier ticks are not evaluated
+    #[arg(long, value_name = "FILE.json")]
+    from_state: Option<PathBuf>,
     /// Plot recorded and replayed force
     #[arg(long, value_parser = svg_file, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
@@ -67,6 +78,8 @@ struct Report {
     complete: bool,
     #[serde(skip)]
     ending: Ending,
+    #[serde(skip)]
+    starts_from_state: bool,
     #[serde(flatten)]
     coverage: Coverage,
     #[serde(flatten)]
@@ -81,14 +94,20 @@ struct Report {
 
 pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
     let registry = arguments.plugin_path.registry();
-    let replay = Replay::open(&arguments.recording, &registry, &arguments.models, &arguments.sets)?;
+    let mut replay = Replay::open(&arguments.recording, &registry, &arguments.models, &arguments.sets)?;
+    if let Some(file) = &arguments.from_state {
+        replay = replay.start_from(read_state(file)?);
+    }
+    if let Some(tick) = arguments.at_tick {
+        replay = replay.save_before(tick);
+    }
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // at most a year
     let progress = progress_bar((replay.run().duration_s * 1.0e3) as u64, "{percent:>3} %  replaying");
     let names: Vec<String> = replay.plugins().iter().map(|plugin| plugin.name.clone()).collect();
     let started = Instant::now();
     let mut picture = arguments.plot.as_ref().map(|_| ReplayPicture::new());
     let mut end_ns = 0;
-    let Compared { difference, coverage, why, ending, implausible, health } =
+    let Compared { difference, coverage, why, ending, implausible, health, state } =
         replay.compare(|record, outputs| {
             end_ns = record.time_ns;
             progress.set_position(record.time_ns / 1_000_000);
@@ -97,6 +116,9 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
             }
         })?;
     progress.finish_and_clear();
+    if let (Some(file), Some(state)) = (&arguments.save_state, &state) {
+        write_text(Some(file.as_path()), || serde_json::to_string(state).unwrap_or_default())?;
+    }
 
     let recorded_s = end_ns as f64 * 1.0e-9;
     let bit_exact = difference.is_bit_exact();
@@ -104,6 +126,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
         bit_exact,
         complete: ending == Ending::Finished && coverage.is_whole(),
         ending,
+        starts_from_state: arguments.from_state.is_some(),
         coverage,
         difference,
         why_apart: why,
@@ -124,6 +147,16 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<(), CommandError> {
         return Err(CommandError::Failed(format!("the outputs differ although nothing was changed: {why}")));
     }
     Ok(())
+}
+
+/// Reads a state that `--save-state` has written.
+fn read_state(file: &Path) -> Result<ReplayState, CommandError> {
+    let text = read_text(file, "the state")
+        .map_err(|problem| CommandError::Usage(problem.in_file(file.display())))?;
+    serde_json::from_str(&text).map_err(|cause| {
+        let advice = "use a file that `flotor replay --save-state` has written";
+        CommandError::Usage(format!("{}: {cause}; {advice}", file.display()))
+    })
 }
 
 impl Report {
@@ -152,8 +185,13 @@ impl Report {
     fn gaps(&self) -> Vec<String> {
         let Coverage { begins_at_tick, missing_ticks, first_missing_tick, .. } = self.coverage;
         let late = begins_at_tick.filter(|first| *first > 0);
-        let late =
-            late.map(|first| format!("the recording begins at tick {first}, after the start of the run"));
+        let late = late.map(|first| {
+            if self.starts_from_state {
+                format!("the replay started with the saved state before tick {first}")
+            } else {
+                format!("the recording begins at tick {first}, after the start of the run")
+            }
+        });
         let missing = first_missing_tick.map(|first| {
             format!("{missing_ticks} ticks are missing, from {first} on: their records were lost")
         });

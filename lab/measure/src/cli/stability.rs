@@ -7,7 +7,7 @@ use flotor_command::options::{PluginResultOptions, count, number, rate_hz, svg_f
 use flotor_command::tables::{table, to_csv};
 use flotor_command::{CommandError, print_result, progress_bar, style, write_json, write_text};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::Plugin;
+use flotor_loader::Plugin;
 use flotor_plot::{Axis, Figure, Panel, Series};
 use serde::Serialize;
 use std::path::PathBuf;

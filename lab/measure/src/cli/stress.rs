@@ -18,7 +18,7 @@ use std::time::Duration;
 #[derive(Args)]
 #[command(after_help = "Ten measures: M0 totality, M1 continuity, M2 Lipschitz constant, M3 reciprocity, \
     M4 loop energy, M5 sampled energy, M6 closed loop, M7 cost, M8 determinism, M9 search for the worst case; \
-    with --symmetry also M10. Each measure runs in its own process, so a call that does not return fails only \
+    with --symmetry also M10, of a model that can run asynchronously also M11. Each measure runs in its own process, so a call that does not return fails only \
     one measure. `score` is the share of measures that passed; the chapter \"Stability of a model\" of the book has the criterion of each.\n\n\
     Examples:\n  \
     flotor stress spring\n  \
@@ -39,7 +39,8 @@ pub(crate) struct StressArguments {
     /// Symmetry that the model should have; M10 checks it
     #[arg(long, value_enum)]
     symmetry: Option<Symmetry>,
-    /// Compute only this measure, M0 to M9, or with --symmetry M10 (repeatable; default: all)
+    /// Compute only this measure, M0 to M9, M11, or with --symmetry M10; any of M2, M3 and M5 computes all three (repeatable; default:
+    /// all)
     #[arg(long, value_parser = measure, value_name = "M0", requires_if("M10", "symmetry"))]
     only: Vec<Part>,
     /// Limit of the processor time of one step, such as 5s or 500ms; ten times as long for a step that waits
@@ -58,7 +59,7 @@ pub(crate) struct StressArguments {
 
 fn measure(id: &str) -> Result<Part, String> {
     Part::of_measure(id)
-        .ok_or_else(|| format!("unknown measure `{id}`; use M0 to M9, or with --symmetry M10"))
+        .ok_or_else(|| format!("unknown measure `{id}`; use M0 to M9, M11, or with --symmetry M10"))
 }
 
 fn part(word: &str) -> Result<Part, String> {

@@ -60,7 +60,7 @@ fn exchange(other: &KeyValue, models: &mut [ModelUse]) -> Result<Vec<String>, St
     }
     if exchanged.is_empty() {
         let names: Vec<&str> = models.iter().map(|model| model.name.as_str()).collect();
-        let names = names.join(", ");
+        let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
         return Err(format!(
             "--model {asked}={plugin}: the recording has no model `{asked}` (it has {names})"
         ));

@@ -4,23 +4,30 @@
 //! of the change on the same hand movement.
 
 mod divergence;
+mod error;
 mod files;
 mod held;
+mod state;
 
 pub use divergence::{Coverage, DivergenceCause};
+pub use error::ReplayError;
 use held::Held;
+use state::Models;
+pub use state::ReplayState;
 
 use divergence::Evidence;
 use files::as_recorded;
 use flotor_core::coupling::{CouplingDescription, CouplingEnds};
+use flotor_core::grip::GripRecord;
+use flotor_core::health::ModelHealth;
 use flotor_core::plausibility::{ImplausibleSamples, PlausibilityCheck};
 use flotor_core::trace::{Events, TickRecord};
 use flotor_core::{Change, ChangeOutcome, ChangeSubject, ModelOutputs, period_ns};
 use flotor_coupling::{LinkTimeouts, Reach};
 use flotor_hal::abi::PluginKind;
 use flotor_hal::{Axes, Capabilities, Demand, DeviceState, LoopConfig, Tick};
-use flotor_record::{Ending, ReadError, Recording, Role, RunDescription};
-use flotor_servo::{Clock, Coupled, Forces, Heartbeat, ModelHealth, Port, Replacement};
+use flotor_record::{Ending, Recording, Role, RunDescription};
+use flotor_servo::{Clock, Coupled, Forces, Heartbeat, Port, Replacement};
 use flotor_session::program;
 use flotor_session::registry::Registry;
 use flotor_session::scene::{
@@ -29,37 +36,6 @@ use flotor_session::scene::{
 use flotor_session::{PluginReport, RunError, prepare_model};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-
-/// Failure of a replay.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum ReplayError {
-    /// The recording cannot be read.
-    #[error(transparent)]
-    Read(#[from] ReadError),
-    /// A model cannot be created.
-    #[error(transparent)]
-    Run(#[from] RunError),
-    /// The coupling's messages from another host are not in the recording.
-    #[error(
-        "the coupling `{0}` has its other end on another host, whose messages are not in the recording: \
-         only runs whose couplings have both ends on one host can be replayed"
-    )]
-    RemoteCoupling(String),
-    /// The forces of a model came from a program, which is not in the recording.
-    #[error(
-        "the forces of `{model}` came from an external program, which a replay cannot repeat; replace \
-         `{model}` with a force model to evaluate that force model on the recorded motion, for example \
-         `--model {model}=spring`"
-    )]
-    Program {
-        /// Name of the model in the scene.
-        model: String,
-    },
-    /// The requested change does not fit the recording.
-    #[error("{0}")]
-    Change(String),
-}
 
 /// Timeouts of couplings with both ends on this host, which never wait.
 const NO_TIMEOUTS: LinkTimeouts = LinkTimeouts { silence_ns: 0, fade_ns: 0 };
@@ -92,6 +68,9 @@ pub struct Difference {
     /// Largest difference of stored energy, J; `None` where the recording contains no energy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub max_energy_j: Option<f64>,
+    /// Largest difference of the effort at a grip, N or N·m; `None` where the recording contains no grip.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_effort: Option<f64>,
 }
 
 /// Result of a replay.
@@ -110,6 +89,8 @@ pub struct Compared {
     pub implausible: Vec<(String, ImplausibleSamples)>,
     /// Health of each model in this replay and its last message, in the scene's order.
     pub health: Vec<(ModelHealth, String)>,
+    /// State requested by [`Replay::save_before`].
+    pub state: Option<ReplayState>,
 }
 
 /// Models of a recording, ready for re-evaluation.
@@ -123,6 +104,10 @@ pub struct Replay<'r> {
     forces: Forces,
     plugins: Vec<PluginReport>,
     held: Held,
+    /// State with which the comparison starts.
+    start: Option<ReplayState>,
+    /// Tick before which the state is saved.
+    save_before: Option<u64>,
 }
 
 impl<'r> Replay<'r> {
@@ -162,7 +147,8 @@ impl<'r> Replay<'r> {
         let couplings =
             couplings.map(|coupling| Coupled::new(coupling, period_s, NO_TIMEOUTS, Reach::default()).0);
         let forces = Forces::new(devices, layers, couplings.collect());
-        Ok(Self { registry, config, recording, uses, devices, forces, plugins, held })
+        let (start, save_before) = (None, None);
+        Ok(Self { registry, config, recording, uses, devices, forces, plugins, held, start, save_before })
     }
 
     /// Returns the description of the run.
@@ -177,12 +163,24 @@ impl<'r> Replay<'r> {
         &self.plugins
     }
 
+    /// Starts the comparison at the tick of a saved state: earlier ticks are read, but not evaluated.
+    #[must_use]
+    pub fn start_from(self, state: ReplayState) -> Self {
+        Self { start: Some(state), ..self }
+    }
+
+    /// Saves the state of the models before a tick, for [`Compared::state`].
+    #[must_use]
+    pub fn save_before(self, tick: u64) -> Self {
+        Self { save_before: Some(tick), ..self }
+    }
+
     /// Evaluates the models at every recorded pose and compares their outputs with the recorded outputs. Calls `look` with each
     /// recorded tick and the outputs of the models in this replay, limited to the recorded outputs. Not real-time.
     ///
     /// # Errors
-    /// [`ReplayError`] if the data are damaged, or if a plugin swapped in during the run is rejected; the results of the earlier
-    /// ticks are then lost.
+    /// [`ReplayError`] if the data are damaged, if a plugin swapped in during the run is rejected, or if a state cannot be saved or
+    /// restored; the results of the earlier ticks are then lost.
     pub fn compare(
         mut self,
         mut look: impl FnMut(&TickRecord, &ModelOutputs),
@@ -194,6 +192,8 @@ impl<'r> Replay<'r> {
         let mut ports: Vec<Port> =
             self.recording.run().devices().map(|device| Port::at_rest(device.at_hand)).collect();
         let mut records: Vec<TickRecord> = Vec::with_capacity(self.devices);
+        let mut state = None;
+        let starts_from_state = self.start.is_some();
         while let Some(record) = self.recording.next() {
             let record = record?;
             // Skip a tick that lost a record before the recording: it cannot be compared.
@@ -213,6 +213,7 @@ impl<'r> Replay<'r> {
                 buttons: record.buttons,
                 ..DeviceState::HOME
             };
+            port.grip = record.grip;
             port.events = Events::NONE;
             if let Some(check) = plausibility.get_mut(usize::from(record.device)) {
                 look_at_sample(check, record);
@@ -222,19 +223,26 @@ impl<'r> Replay<'r> {
             }
             let tick = Tick { index: record.tick, time_ns: record.time_ns, dt_ns: record.dt_ns };
             while self.forces.take_faded(&tick).is_some() {}
+            if self.is_before_start(&tick)? {
+                records.clear();
+                continue;
+            }
+            if self.save_before == Some(tick.index) {
+                state = Some(self.models(&tick)?.save(tick.index)?);
+            }
             // Compute all recorded outputs of the tick, and no more.
             let computed = |all: Demand, record: &TickRecord| all.with(record.model.computed());
             let observed = records.iter().fold(Demand::FORCE, computed);
             self.forces.step(&tick, &mut ports, observed, &heartbeat);
             evidence.look(tick.index, &records, &ports);
             let is_other =
-                |(record, port): (&TickRecord, &Port)| bits(&replayed(port, record)) != bits(&record.model);
+                |(record, port): (&TickRecord, &Port)| differs(record, &replayed(port, record), port);
             if records.iter().zip(&ports).any(is_other) {
                 evidence.differs(tick.index, &records, &ports);
             }
             for (port, record) in ports.iter_mut().zip(records.drain(..)) {
                 let outputs = replayed(port, &record);
-                difference.add(&record, &outputs);
+                difference.add(&record, &outputs, port);
                 look(&record, &outputs);
                 // Use the wrench that was commanded in the run.
                 port.commanded = record.commanded;
@@ -243,17 +251,56 @@ impl<'r> Replay<'r> {
         if let Some(record) = records.first() {
             evidence.coverage.break_off(record.tick);
         }
+        if let Some(tick) =
+            self.start.as_ref().map(|start| start.tick).or(self.save_before.filter(|_| state.is_none()))
+        {
+            return Err(ReplayError::NoSuchTick { tick });
+        }
         difference.finish();
         let why = if self.held.is_nothing() { evidence.cause } else { evidence.other_cause() };
+        // The state replaces what was before its tick.
+        let why = why.map(|cause| match cause {
+            DivergenceCause::JoinedLate { .. } if starts_from_state => DivergenceCause::OtherBuild,
+            cause => cause,
+        });
         let names = self.recording.run().devices().map(|device| device.name.clone());
         let found = plausibility.iter().map(PlausibilityCheck::found);
         let implausible = names.zip(found).filter(|(_, found)| found.first_tick().is_some()).collect();
         let (ending, health) = (self.recording.ending(), self.forces.health());
-        Ok(Compared { difference, coverage: evidence.coverage, why, ending, implausible, health })
+        Ok(Compared { difference, coverage: evidence.coverage, why, ending, implausible, health, state })
     }
 }
 
 impl<'r> Replay<'r> {
+    /// Returns true before the tick of the state to start with; restores the state at its tick.
+    fn is_before_start(&mut self, tick: &Tick) -> Result<bool, ReplayError> {
+        match self.start.take() {
+            Some(start) if tick.index < start.tick => {
+                self.start = Some(start);
+                Ok(true)
+            }
+            Some(start) if tick.index == start.tick => self.models(tick)?.restore(&start).map(|()| false),
+            Some(start) => Err(ReplayError::NoSuchTick { tick: start.tick }),
+            None => Ok(false),
+        }
+    }
+
+    /// Returns the models if they have all of the history at a tick.
+    fn models(&mut self, tick: &Tick) -> Result<Models<'_>, ReplayError> {
+        let mut priorities = self.uses.iter().map(|model| model.blend.priority);
+        let first = priorities.next();
+        let what = if !self.recording.run().couplings.is_empty() {
+            "devices are coupled"
+        } else if priorities.any(|other| Some(other) != first) {
+            "models of different priority fade"
+        } else if self.forces.is_fading() {
+            "a model is being replaced"
+        } else {
+            return Ok(Models { forces: &mut self.forces, reports: &self.plugins, config: &self.config });
+        };
+        Err(ReplayError::Entangled { what, tick: tick.index })
+    }
+
     /// Repeats a parameter change of the run. Skips it if the user fixed another value, or if the model has no such
     /// parameter: the effect on the wrench is the result.
     fn repeat(&mut self, change: &Change) -> Result<(), ReplayError> {
@@ -273,6 +320,10 @@ impl<'r> Replay<'r> {
         let parameter = schema.iter().position(|parameter| parameter.id() == change.parameter);
         if let (Some(parameter), false, ChangeOutcome::Applied) = (parameter, is_held, change.outcome) {
             self.forces.set_parameter(model, &tick, parameter, change.number);
+            let now = self.plugins.get_mut(model).and_then(|plugin| plugin.parameters.get_mut(parameter));
+            if let Some((_, value)) = now {
+                *value = change.number.to_string();
+            }
         }
         Ok(())
     }
@@ -307,9 +358,9 @@ impl<'r> Replay<'r> {
 
 impl Difference {
     /// Adds one tick; the root mean squares contain sums until [`Self::finish`].
-    fn add(&mut self, record: &TickRecord, outputs: &ModelOutputs) {
+    fn add(&mut self, record: &TickRecord, outputs: &ModelOutputs, port: &Port) {
         self.ticks += 1;
-        if bits(outputs) != bits(&record.model) {
+        if differs(record, outputs, port) {
             self.differing_ticks += 1;
             self.first_tick.get_or_insert(record.tick);
             self.last_tick = Some(record.tick);
@@ -323,6 +374,10 @@ impl Difference {
             let torque_nm = finite((now - then).length());
             self.max_torque_nm = Some(self.max_torque_nm.unwrap_or(0.0).max(torque_nm));
             self.rms_torque_nm = Some(self.rms_torque_nm.unwrap_or(0.0) + torque_nm * torque_nm);
+        }
+        if let Some((now, then)) = port.grip.zip(record.grip) {
+            let effort = finite((now.model - then.model).abs());
+            self.max_effort = Some(self.max_effort.unwrap_or(0.0).max(effort));
         }
         if let Some((now_j, then_j)) = outputs.energy_j().zip(record.model.energy_j()) {
             self.max_energy_j = Some(self.max_energy_j.unwrap_or(0.0).max(finite((now_j - then_j).abs())));
@@ -340,6 +395,12 @@ impl Difference {
     pub fn is_bit_exact(&self) -> bool {
         self.differing_ticks == 0
     }
+}
+
+/// Returns true if some bit of the models' outputs now differs from the record, or of their effort at the grip.
+fn differs(record: &TickRecord, outputs: &ModelOutputs, port: &Port) -> bool {
+    let effort = |grip: Option<GripRecord>| grip.map(|grip| grip.model.to_bits());
+    bits(outputs) != bits(&record.model) || effort(port.grip) != effort(record.grip)
 }
 
 /// Returns the plausibility check of a device of unknown capabilities, held by a hand.

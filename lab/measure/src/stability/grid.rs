@@ -3,7 +3,7 @@
 use super::search::is_search_end;
 use super::simulated_loop::{Grip, LoopError, LoopSetup};
 use super::theory::{Rendering, exact_limit_n_per_m, gil_limit_n_per_m, passive_limit_n_per_m};
-use flotor_hal::abi::loader::Plugin;
+use flotor_loader::Plugin;
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -12,8 +12,8 @@
 
 use super::search::largest_stable;
 use super::theory::Plant;
-use flotor_hal::abi::loader::{ActiveDevice, LoadError, OpenedDevice, Plugin, Setting, SettingError};
 use flotor_hal::{Cycle, DVec3, DeviceState, Fault, LoopConfig, Refusal, Tick, Wrench, math};
+use flotor_loader::{ActiveDevice, LoadError, OpenedDevice, Plugin, Setting, SettingError};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 

@@ -66,13 +66,17 @@ impl Contact {
 
 /// Set of touching sections, one bit each. A different set has a different matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Touching(u32);
+pub(crate) struct Touching {
+    sections: u32,
+}
+
+flotor_hal::restorable!(Touching { sections });
 
 impl Touching {
-    pub(crate) const NONE: Self = Self(0);
+    pub(crate) const NONE: Self = Self { sections: 0 };
 
     fn add(&mut self, section: usize) {
-        self.0 |= 1 << section;
+        self.sections |= 1 << section;
     }
 }
 

@@ -9,6 +9,7 @@
 //! (pseudo-transient continuation, the damped flow); Morse index by inertia, see [`flotor_lanes::matrix`].
 
 use flotor_hal::glam::{DVec2, DVec3};
+use flotor_hal::restorable;
 
 use super::contact::Touching;
 use super::curve::Curve;
@@ -119,6 +120,9 @@ pub(crate) struct Equilibrium<const K: usize, const N: usize, const Q: usize> {
     pub(crate) work: Work,
 }
 
+restorable!([const K: usize, const N: usize, const Q: usize] Equilibrium<K, N, Q>
+    { shape, history, marked, matrix, damping, unstable_directions } without { functional, effort, stride, work });
+
 /// Cost of a tick: numbers of evaluations of the rod's energy, of matrices computed, and of factorisations.
 /// Reproducible in tests, unlike the time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -169,6 +173,9 @@ struct CachedMatrix<const N: usize> {
     neutral: f64,
     steps_left: u32,
 }
+
+restorable!([const N: usize] CachedMatrix<N>
+    { factored, reaction, shape, plate, touching, softest, neutral, steps_left });
 
 impl<const N: usize> CachedMatrix<N> {
     /// Returns a placeholder that is valid for no step.

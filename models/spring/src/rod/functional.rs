@@ -115,6 +115,8 @@ pub(crate) struct Reaction<const N: usize> {
     pub(crate) torsion: [f64; N],
 }
 
+flotor_hal::restorable!([const N: usize] Reaction<N> { force, by_lean, torsion });
+
 impl<const K: usize, const N: usize, const Q: usize> Functional<K, N, Q> {
     const TWO_COMPONENTS: () = assert!(N == 2 * K);
 

@@ -24,6 +24,8 @@ pub(crate) struct Plate {
     pub(crate) turn_rad: f64,
 }
 
+flotor_hal::restorable!(Plate { displacement, lean, turn_rad });
+
 impl Plate {
     /// Plate at home.
     pub(crate) const HOME: Self = Self { displacement: DVec3::ZERO, lean: DVec2::ZERO, turn_rad: 0.0 };

@@ -29,6 +29,8 @@ pub(crate) struct History<const N: usize> {
     length: usize,
 }
 
+flotor_hal::restorable!([const N: usize] History<N> { plates, shapes, length });
+
 impl<const N: usize> History<N> {
     pub(crate) fn new(plate: Plate, shape: Shape<N>) -> Self {
         Self { plates: [plate; DEPTH], shapes: [shape; DEPTH], length: 1 }

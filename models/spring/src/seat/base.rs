@@ -35,6 +35,8 @@ pub(super) struct Standing {
     pub(super) turn_rad: f64,
 }
 
+flotor_hal::restorable!(Standing { tilt_rad, slide_m, turn_rad });
+
 impl Standing {
     /// Flat, at the initial place.
     pub(super) const SEATED: Self = Self { tilt_rad: DVec2::ZERO, slide_m: DVec2::ZERO, turn_rad: 0.0 };

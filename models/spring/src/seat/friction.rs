@@ -43,6 +43,9 @@ pub(super) struct FrictionLimit {
     observed: f64,
 }
 
+flotor_hal::restorable!(FrictionLimit { observed }
+    without { by_force, by_height, axial_n_per_m, longest_m, lateral_n_per_m, turning_n_per_m });
+
 impl FrictionLimit {
     /// Prepares Coulomb's law up to `D/L0`. Beyond, a bent spring whose rim slides loses force onto the ground faster
     /// than its pull is relieved: the rest of the coefficient acts by the height.

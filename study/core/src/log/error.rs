@@ -34,7 +34,10 @@ pub enum LogProblem {
         cause: std::io::Error,
     },
     /// Another process has the log open, or has written to it since it was read.
-    #[error("another process is running this sitting; end that process before you continue the sitting here")]
+    #[error(
+        "another process is running this sitting, or has just written to its log; end that process or wait for its end, and \
+         try again"
+    )]
     InUse,
     /// The log has no complete line.
     #[error("the log has no complete line, so it contains no data; remove the file")]

@@ -50,7 +50,8 @@ impl From<BoundaryChoice> for AtBoundary {
 /// Values of `--procedure`.
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(super) enum ProcedureChoice {
-    /// Kaernbach's rule, as in the thesis
+    /// Smaller difference after a correct answer, larger after a wrong one or "I don't know", until --stop-after reversals
+    /// (Kaernbach 2001)
     #[default]
     WeightedUpDown,
     /// A fixed number of trials, each at the difference of the largest expected information

@@ -66,7 +66,9 @@ pub(super) fn run(arguments: &ExploreArguments) -> Result<(), CommandError> {
     session.warnings().iter().for_each(note);
     let model = scene.models.first().ok_or_else(|| {
         let file = arguments.scene.as_deref().unwrap_or(Path::new("built-in study")).display();
-        CommandError::Usage(format!("{file}: the scene has no model to explore; add a `[[model]]`"))
+        CommandError::Usage(format!(
+            "{file}: the scene has no model to explore; name a scene with a `[[model]]`"
+        ))
     })?;
     let mapping = model.mapping.motion_scale * model.mapping.force_scale;
     let watch = Shared::default();

@@ -9,8 +9,8 @@ use crate::analyse::choices::{Choices, PlannedTable};
 use clap::{Args, FromArgMatches};
 use flotor_command::CommandError;
 use flotor_core::LARGEST_SEED;
-use flotor_hal::abi::loader::nearest;
 use flotor_hal::read_text;
+use flotor_loader::nearest;
 use flotor_session::scene::OwnScene;
 use flotor_study::exclusion::ExclusionRules;
 use flotor_study::log::{Plan, digest};
@@ -226,9 +226,7 @@ fn words(
         let name = key.replace('_', "-");
         let refuse = |why: String| CommandError::Usage(format!("{}: options.{key}: {why}", file.display()));
         if OF_THE_COMMAND_LINE.contains(&name.as_str()) {
-            return Err(refuse(
-                "write this option only on the command line, after the name of the study file".to_owned(),
-            ));
+            return Err(refuse("write this option only on the command line".to_owned()));
         }
         let option = known.iter().find(|option| option.get_long() == Some(&name)).ok_or_else(|| {
             let names = known.iter().filter_map(|option| option.get_long());

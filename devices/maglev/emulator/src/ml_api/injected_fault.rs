@@ -68,7 +68,7 @@ pub struct InjectedFault {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "`{0}` is not a fault: write KIND[@STATE][+MS]; kinds: silence, half-frame, close, reset, stall, wrong-length, \
-     status=CODE/N (CODE decimal), late-tick, out-of-range, over-temperature, over-current, over-speed; states: landed, \
+     status=CODE/N (CODE decimal, every Nth call), late-tick, out-of-range, over-temperature, over-current, over-speed; states: landed, \
      taking-off, flying, ticking, landing"
 )]
 pub struct Unknown(String);

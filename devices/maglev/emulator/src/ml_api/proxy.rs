@@ -9,8 +9,8 @@ use super::server::{Hub, serve};
 use crate::controller::Sample;
 use flotor_emulation::port::{Port, Reach};
 use flotor_hal::{
-    Choices, ForceModel, Input, LoopConfig, Memory, ModelInfo, Output, Parameter, Refusal, Settings,
-    StepStatus, Wrench, choices, export_model,
+    Choices, ForceModel, GripModel, GripState, Input, LoopConfig, Memory, ModelInfo, Output, Parameter,
+    Refusal, Settings, StepStatus, Wrench, choices, export_model,
 };
 use std::io::ErrorKind;
 use std::sync::Arc;
@@ -58,6 +58,14 @@ const SCHEMA: &[Parameter] = &[
         500.0,
         "Longest time without an acknowledged tick while a client commands forces and is registered for ticks",
     ),
+    Parameter::real(
+        "grasp_n_per_a",
+        "N/A",
+        -100.0,
+        100.0,
+        0.0,
+        "Effort at the grip of the device for the current of the grasp, in N/A or N·m/A; positive currents open the grip; 0: none",
+    ),
 ];
 
 /// Controller of the Maglev 200 as a force model, with a server for its clients.
@@ -70,6 +78,9 @@ pub struct MlApiModel {
     period_s: f64,
     /// Last output, repeated while a client's call holds the lock: a step never waits.
     wrench: Wrench,
+    /// Effort at the grip for each ampere of the grasp, and the current of the last interval, A.
+    grasp_n_per_a: f64,
+    grasp_a: f64,
 }
 
 impl ForceModel for MlApiModel {
@@ -99,6 +110,8 @@ impl ForceModel for MlApiModel {
             values: settings.values(),
             period_s: 1.0e-3,
             wrench: Wrench::ZERO,
+            grasp_n_per_a: settings.number_or_default("grasp_n_per_a"),
+            grasp_a: 0.0,
         })
     }
 
@@ -129,8 +142,8 @@ impl ForceModel for MlApiModel {
         }
         let sample = Sample { pose: input.pose, twist: input.twist, buttons: input.buttons, ..Sample::HOME };
         let dt_s = if input.dt_ns == 0 { self.period_s } else { input.dt_s() };
-        if let Some(wrench) = self.hub.try_cycle(&sample, dt_s) {
-            self.wrench = wrench;
+        if let Some(driven) = self.hub.try_cycle(&sample, dt_s) {
+            (self.wrench, self.grasp_a) = driven;
         }
         self.wrench.into()
     }
@@ -140,8 +153,15 @@ impl ForceModel for MlApiModel {
     }
 
     fn reset(&mut self) {
-        self.wrench = Wrench::ZERO;
+        (self.wrench, self.grasp_a) = (Wrench::ZERO, 0.0);
     }
 }
 
-export_model!(MlApiModel);
+impl GripModel for MlApiModel {
+    /// Returns the effort of the current of the grasp. The interface has no opening.
+    fn grip(&mut self, _: &Input, _: &GripState) -> f64 {
+        self.grasp_n_per_a * self.grasp_a
+    }
+}
+
+export_model!(MlApiModel, grip);

@@ -181,7 +181,7 @@ pub(super) fn read_file(path: &Path) -> Result<Script, ScriptError> {
         wrong(format!("the script cannot be read: {error}; a script is a TOML file or one of {names}"))
     })?;
     if !size.is_file() {
-        return Err(wrong("the path is a folder or a device, not a file; name a TOML file".to_owned()));
+        return Err(wrong("the path is not a regular file; name a TOML file".to_owned()));
     }
     if size.len() > MAX_BYTES {
         let bytes = size.len();

@@ -2,22 +2,22 @@
 //!
 //! Loop and thread share two latest-value cells, a queue of commands and two flags; neither waits for the other.
 
-use super::source::FieldSource;
-use crate::engine::records::{INPUT_WORDS, SentField, SentInput};
+use super::source::Source;
 use crate::{Engine, Stepped, THREAD_ADVICE, enter_worker_priority};
-use flotor_core::words::FIELD_WORDS;
+use flotor_core::sent::{INPUT_WORDS, SentInput, SentSet};
+use flotor_core::words::CONTACT_SET_WORDS;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{Input, LinearField, Pose, Refusal};
+use flotor_hal::{ContactSet, Input, Pose, Refusal};
 use flotor_sync::{Observer, Publisher, latest};
 use rtrb::{Consumer, Producer, RingBuffer};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-/// Capacity of the command queue between two fields.
+/// Capacity of the command queue between two answers.
 const OPERATIONS: usize = 64;
 
-/// Command that the model executes before its next field.
+/// Command that the model executes before its next answer.
 #[derive(Clone, Copy, Debug)]
 enum Operation {
     Set { index: usize, value: f64 },
@@ -32,33 +32,33 @@ struct Flags {
     last_words: OnceLock<String>,
 }
 
-/// Loop side of the model thread; dropping it ends the thread after the current field.
+/// Loop side of the model thread; dropping it ends the thread after the current answer.
 pub(super) struct ModelThread {
     samples: Publisher<SentInput, INPUT_WORDS>,
-    fields: Observer<SentField, FIELD_WORDS>,
+    sets: Observer<SentSet, CONTACT_SET_WORDS>,
     operations: Producer<Operation>,
     flags: Arc<Flags>,
-    /// Version of the newest field taken.
+    /// Version of the newest set taken.
     taken: u64,
-    /// Time of the last reset, ns; fields of older samples are dropped.
+    /// Time of the last reset, ns; sets of older samples are dropped.
     forgotten_ns: u64,
     now_ns: u64,
 }
 
 impl ModelThread {
-    /// Starts a thread that computes a field each period while samples arrive. Not real-time.
+    /// Starts a thread that computes a set each period while samples arrive. Not real-time.
     ///
     /// # Errors
     /// If the system cannot start a thread.
     pub(super) fn start(model: Engine, period_ns: u64) -> Result<Self, Refusal> {
         let (samples, seen) = latest(SentInput(Input::at_rest(Pose::HOME)));
-        let (sent, fields) = latest(SentField(LinearField::NONE));
+        let (sent, sets) = latest(SentSet(ContactSet::NONE));
         let (operations, pending) = RingBuffer::new(OPERATIONS);
         let flags = Arc::new(Flags::default());
         let computer = Computer {
-            source: FieldSource::new(model),
+            source: Source::new(model),
             samples: seen,
-            fields: sent,
+            sets: sent,
             operations: pending,
             flags: Arc::clone(&flags),
         };
@@ -70,24 +70,24 @@ impl ModelThread {
                 "cannot start a thread for an asynchronous model: {error}; {THREAD_ADVICE}"
             ))
         })?;
-        Ok(Self { samples, fields, operations, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
+        Ok(Self { samples, sets, operations, flags, taken: 0, forgotten_ns: 0, now_ns: 0 })
     }
 
-    /// Publishes the input and copies a new field to `field`; returns late if there is none. Real-time: bounded, no allocation.
+    /// Publishes the input and copies a new set to `set`; returns late if there is none. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn poll(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
+    pub(super) fn poll(&mut self, input: &Input, set: &mut ContactSet) -> Stepped {
         self.samples.publish(&SentInput(*input));
         self.now_ns = input.time_ns;
         if self.flags.is_broken.load(Ordering::Acquire) {
             return Stepped::Broken;
         }
-        match self.fields.read() {
-            Some((version, SentField(newest))) if version > self.taken => {
+        match self.sets.read_after(self.taken) {
+            Some((version, SentSet(newest))) => {
                 self.taken = version;
-                *field = newest;
+                *set = newest;
                 if newest.time_ns < self.forgotten_ns { Stepped::Late } else { Stepped::Answered }
             }
-            _ => Stepped::Late,
+            None => Stepped::Late,
         }
     }
 
@@ -96,7 +96,7 @@ impl ModelThread {
         self.enqueue(Operation::Set { index, value })
     }
 
-    /// Queues a reset and discards fields of older samples; unsupported if the queue is full. Real-time: bounded, no allocation.
+    /// Queues a reset and discards sets of older samples; unsupported if the queue is full. Real-time: bounded, no allocation.
     pub(super) fn reset(&mut self) -> CallStatus {
         self.forgotten_ns = self.now_ns.saturating_add(1);
         self.enqueue(Operation::Reset)
@@ -120,9 +120,9 @@ impl Drop for ModelThread {
 
 /// Thread side: model and ends of the shared cells and queue.
 struct Computer {
-    source: FieldSource,
+    source: Source,
     samples: Observer<SentInput, INPUT_WORDS>,
-    fields: Publisher<SentField, FIELD_WORDS>,
+    sets: Publisher<SentSet, CONTACT_SET_WORDS>,
     operations: Consumer<Operation>,
     flags: Arc<Flags>,
 }
@@ -167,15 +167,15 @@ impl Computer {
     }
 
     fn answer(&mut self, input: &Input) -> CallStatus {
-        let mut field = LinearField::NONE;
-        match self.source.compute(input, &mut field) {
+        let mut set = ContactSet::NONE;
+        match self.source.compute(input, &mut set) {
             Stepped::Answered => {
-                self.fields.publish(&SentField(field));
+                self.sets.publish(&SentSet(set));
                 CallStatus::Ok
             }
-            // The next computation may yield a field.
-            Stepped::Late | Stepped::Silent => CallStatus::Ok,
             Stepped::Broken | Stepped::Gone => CallStatus::Panicked,
+            // The next computation may yield a set.
+            _ => CallStatus::Ok,
         }
     }
 }

@@ -3,13 +3,14 @@
 use super::Greeting;
 use super::memory::{MESSAGE_BYTES, SharedMemory};
 use super::shared_words::{Operation, wait_for_change};
-use crate::engine::records::DEMANDS;
 use crate::enter_worker_priority;
 use crate::last_stop::ignore_no_signal;
 use crate::platform::processes::HostProcess;
-use flotor_hal::abi::loader::{LoadError, Model, Plugin, Setting};
+use flotor_core::grip::GripRecord;
+use flotor_core::sent::DEMANDS;
 use flotor_hal::abi::{CallStatus, PluginKind};
-use flotor_hal::{LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind};
+use flotor_hal::{ContactSet, LoopConfig, Memory, Output, Refusal, RefusalKind};
+use flotor_loader::{LoadError, Model, Plugin, Setting};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -56,8 +57,8 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
             put_extent(&mut model, &memory);
             let serves = DEMANDS.map(|demand| model.serves().contains(demand));
             let remembers = model.memory() == Memory::PathDependent;
-            let has_field = model.has_linear_field();
-            (Greeting::Ready { parameters, serves, remembers, has_field }, Some(model))
+            let has_local_model = model.has_local_model();
+            (Greeting::Ready { parameters, serves, remembers, has_local_model }, Some(model))
         }
         Err(refusal) => (Greeting::Refused { kind: refusal.kind as u32, reason: refusal.reason }, None),
     };
@@ -85,9 +86,12 @@ pub fn serve(arguments: &WorkerArguments, load: LoadFile) -> io::Result<()> {
 fn execute(model: &mut Model, memory: &SharedMemory) -> CallStatus {
     match memory.operation() {
         Some(Operation::Step) => {
-            let mut output = Output::default();
-            let status = model.step(&memory.input(), &mut output);
+            let (input, mut output) = (memory.input(), Output::default());
+            let status = model.step(&input, &mut output);
             memory.put_output(&output);
+            if let Some(grip) = memory.grip() {
+                memory.put_grip(Some(GripRecord { model: model.grip(&input, &grip.state), ..grip }));
+            }
             status
         }
         Some(Operation::SetParameter) => {
@@ -97,10 +101,10 @@ fn execute(model: &mut Model, memory: &SharedMemory) -> CallStatus {
             put_extent(model, memory);
             status
         }
-        Some(Operation::Field) => {
-            let mut field = LinearField::NONE;
-            let status = model.linear_field(&memory.input(), &mut field);
-            memory.put_field(&field);
+        Some(Operation::LocalModel) => {
+            let mut set = ContactSet::NONE;
+            let status = model.local_model(&memory.input(), &mut set);
+            memory.put_contact_set(&set);
             status
         }
         Some(Operation::Reset) => model.reset(),

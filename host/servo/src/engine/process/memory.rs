@@ -2,9 +2,10 @@
 //!
 //! All fields are atomics, and every bit pattern is a valid value: neither process can make the other read invalid data.
 
-use crate::engine::records::INPUT_WORDS;
 pub(super) use crate::platform::shared_memory::{SharedMemory, create_file};
-use flotor_core::words::FIELD_WORDS;
+use flotor_core::grip::GRIP_WORDS;
+use flotor_core::sent::INPUT_WORDS;
+use flotor_core::words::CONTACT_SET_WORDS;
 use std::sync::atomic::{AtomicU8, AtomicU32, AtomicU64};
 
 /// Number of 64-bit words in the reply to a step: wrench (6), energy, status.
@@ -33,9 +34,10 @@ pub(crate) struct SharedPage {
     pub(super) value: AtomicU64,
     pub(super) input: [AtomicU64; INPUT_WORDS],
     pub(super) output: [AtomicU64; OUTPUT_WORDS],
+    pub(super) grip: [AtomicU64; GRIP_WORDS],
     pub(super) region: [AtomicU64; REGION_WORDS],
     pub(super) bounds: [AtomicU64; BOUNDS_WORDS],
-    pub(super) field: [AtomicU64; FIELD_WORDS],
+    pub(super) contact_set: [AtomicU64; CONTACT_SET_WORDS],
     pub(super) message_len: AtomicU32,
     pub(super) message: [AtomicU8; MESSAGE_BYTES],
 }

@@ -30,8 +30,8 @@ enum Greeting {
         serves: [bool; 3],
         /// True if the output depends on the path of the handle.
         remembers: bool,
-        /// True if the model has a linear field.
-        has_field: bool,
+        /// True if the model can run asynchronously.
+        has_local_model: bool,
     },
     /// The plugin could not be loaded, or refused to create the model.
     Refused {

@@ -4,17 +4,19 @@ use super::Greeting;
 use super::child::WHOLE;
 use super::memory::{SharedMemory, create_file};
 use super::shared_words::{Operation, wait_for_change};
-use crate::engine::records::demand_of;
 use crate::engine::stepped::Stepped;
 use crate::platform::{process_group, processes};
 use crate::{THREAD_ADVICE, monotonic_ns};
+use flotor_core::grip::GripRecord;
 use flotor_core::lock;
+use flotor_core::sent::demand_of;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    ActiveRegion, Demand, Input, LinearField, LoopConfig, Memory, Output, Refusal, RefusalKind,
+    ActiveRegion, ContactSet, Demand, Input, LoopConfig, Memory, Output, Refusal, RefusalKind,
     WorkspaceBounds,
 };
 use std::io;
+use std::io::ErrorKind::{NotFound, PermissionDenied, WouldBlock};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::sync::Mutex;
@@ -49,7 +51,7 @@ pub struct Worker {
     parameters: Vec<Option<f64>>,
     serves: Demand,
     remembers: Memory,
-    has_field: bool,
+    has_local_model: bool,
 }
 
 impl Worker {
@@ -58,8 +60,7 @@ impl Worker {
     /// # Errors
     /// The plugin's [`Refusal`], or a refusal with the cause if the worker process cannot be started, ends, or exceeds the timeout.
     pub fn start(config: &WorkerConfig<'_>) -> Result<Self, Refusal> {
-        let no_worker =
-            |error: io::Error| Refusal::resource(format!("cannot start a worker process: {error}"));
+        let no_worker = |error| Refusal::resource(format!("cannot start a worker process: {error}"));
         let file = create_file().map_err(no_worker)?;
         let memory = SharedMemory::map(&file).map_err(no_worker)?;
         let mut command = Command::new(program().map_err(no_worker)?);
@@ -72,7 +73,7 @@ impl Worker {
         command.stdin(file).stdout(io::stderr());
         // Terminal signals go to the host alone: it needs the model until the force has faded out.
         process_group::lead_until_parent_ends(&mut command);
-        let child = spawn(command).map_err(|error| no_worker(with_advice(error)))?;
+        let child = spawn(command).map_err(no_worker)?;
         let mut worker = Self {
             child,
             memory,
@@ -83,12 +84,12 @@ impl Worker {
             parameters: Vec::new(),
             serves: Demand::FORCE,
             remembers: Memory::PathDependent,
-            has_field: false,
+            has_local_model: false,
         };
         let greeting = worker.greeting(config.create_timeout);
         match serde_json::from_str(&greeting) {
-            Ok(Greeting::Ready { parameters, serves, remembers, has_field }) => {
-                worker.has_field = has_field;
+            Ok(Greeting::Ready { parameters, serves, remembers, has_local_model }) => {
+                worker.has_local_model = has_local_model;
                 worker.remembers = if remembers { Memory::PathDependent } else { Memory::Stateless };
                 worker.parameters = parameters;
                 worker.serves = demand_of(serves);
@@ -106,7 +107,7 @@ impl Worker {
                     let create_timeout_s = config.create_timeout.as_secs_f64();
                     return Err(Refusal::broken(format!(
                         "loading, `create` or `prepare` did not return within {create_timeout_s} s in the worker process; \
-                         check the plugin with `flotor validate`, or raise the limit with `FLOTOR_CALL_LIMIT_S`"
+                         check the plugin with `flotor validate`, or raise the limit with the environment variable `FLOTOR_CALL_LIMIT_S`"
                     )));
                 }
                 Err(Refusal::broken(format!(
@@ -138,24 +139,29 @@ impl Worker {
         self.serves
     }
 
-    /// Steps the model; `output` is only valid for [`Stepped::Answered`]. Real-time: bounded by the reply timeout, no allocation.
+    /// Steps the model, also at a grip; the results are only valid for [`Stepped::Answered`]. Real-time: bounded by the timeout.
     #[inline]
-    pub fn step(&mut self, input: &Input, output: &mut Output) -> Stepped {
-        let put = |memory: &SharedMemory| memory.put_input(input);
-        let reply = self.request(Operation::Step, put, |memory| *output = memory.output());
+    pub fn step(&mut self, input: &Input, output: &mut Output, grip: &mut Option<GripRecord>) -> Stepped {
+        let asked = *grip;
+        let put = |memory: &SharedMemory| {
+            memory.put_input(input);
+            memory.put_grip(asked);
+        };
+        let reply =
+            self.request(Operation::Step, put, |memory| (*output, *grip) = (memory.output(), memory.grip()));
         reply.map_or_else(|missing| missing, Stepped::from)
     }
 
-    /// Returns true if the model has a linear field.
-    pub fn has_linear_field(&self) -> bool {
-        self.has_field
+    /// Returns true if the model can run asynchronously.
+    pub fn has_local_model(&self) -> bool {
+        self.has_local_model
     }
 
-    /// Computes the linear field at an input; `field` is only valid for [`Stepped::Answered`]. Not real-time: bounded by the reply
-    /// timeout.
-    pub fn linear_field(&mut self, input: &Input, field: &mut LinearField) -> Stepped {
+    /// Computes the contacts or the linear field at an input; `set` is only valid for [`Stepped::Answered`]. Not real-time: bounded by
+    /// the reply timeout.
+    pub fn local_model(&mut self, input: &Input, set: &mut ContactSet) -> Stepped {
         let put = |memory: &SharedMemory| memory.put_input(input);
-        let reply = self.request(Operation::Field, put, |memory| *field = memory.field());
+        let reply = self.request(Operation::LocalModel, put, |memory| *set = memory.contact_set());
         reply.map_or_else(|missing| missing, Stepped::from)
     }
 
@@ -291,14 +297,13 @@ type Start = (Command, Sender<io::Result<Child>>);
 fn spawn(command: Command) -> io::Result<Child> {
     static STARTER: Mutex<Option<Sender<Start>>> = Mutex::new(None);
     let (reply, child) = channel();
-    {
-        let mut starter = lock(&STARTER);
-        let starter = match &mut *starter {
-            Some(starter) => starter,
-            none => none.insert(start_starter()?),
-        };
-        let _ = starter.send((command, reply)); // the thread ends after this sender
-    }
+    let mut starter = lock(&STARTER);
+    let sender = match &mut *starter {
+        Some(sender) => sender,
+        none => none.insert(start_starter().map_err(|error| cannot_start(&command, &error))?),
+    };
+    let _ = sender.send((command, reply)); // the thread ends after this sender
+    drop(starter);
     child.recv().map_err(|_| io::Error::other("the thread that starts worker processes has ended"))?
 }
 
@@ -308,18 +313,20 @@ fn start_starter() -> io::Result<Sender<Start>> {
     let thread = std::thread::Builder::new().name("flotor-starter".to_owned());
     thread.spawn(move || {
         for (mut command, reply) in orders {
-            let _ = reply.send(command.spawn());
+            let _ = reply.send(command.spawn().map_err(|error| cannot_start(&command, &error)));
         }
     })?;
     Ok(starter)
 }
 
-/// Adds advice to the error if a limit of processes or threads is reached (`EAGAIN`).
-fn with_advice(error: io::Error) -> io::Error {
-    match error.kind() {
-        io::ErrorKind::WouldBlock => io::Error::other(format!("{error}; {THREAD_ADVICE}")),
-        _ => error,
-    }
+/// Names the program in the error of its start, with advice.
+pub(crate) fn cannot_start(command: &Command, error: &io::Error) -> io::Error {
+    let said = format!("`{}` cannot be started: {error}", command.get_program().display());
+    io::Error::other(match error.kind() {
+        NotFound | PermissionDenied => format!("{said}; check that the file exists and is executable"),
+        WouldBlock => format!("{said}; {THREAD_ADVICE}"), // `EAGAIN`: a limit of processes or threads
+        _ => said,
+    })
 }
 
 /// Returns the `flotor` executable for child processes: the one set in guest mode, this program, or `flotor` in this program's
@@ -336,8 +343,7 @@ pub(crate) fn program() -> io::Result<PathBuf> {
     let folders = own.ancestors().skip(1).take(2).map(|folder| folder.join(&name));
     folders.into_iter().find(|file| file.is_file()).ok_or_else(|| {
         io::Error::other(format!(
-            "the program `{name}` for worker processes is neither in the folder of `{}` nor in the folder \
-             above; copy it there",
+            "the program `{name}` is neither in the folder of `{}` nor in the folder above; copy it to one of these folders",
             own.display()
         ))
     })

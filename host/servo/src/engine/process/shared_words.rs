@@ -1,14 +1,13 @@
 //! Encoding of requests and replies in shared memory.
 
 use super::memory::SharedPage;
-use crate::engine::records::{SentField, SentInput};
 pub(super) use crate::platform::shared_memory::wait_for_change;
 use crate::platform::shared_memory::wake;
+use flotor_core::grip::{self, GripRecord};
+use flotor_core::sent::{SentInput, SentSet};
 use flotor_core::words::{Decoder, Encoder};
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{
-    ActiveRegion, Input, LinearField, Output, RegionShape, StepStatus, WorkspaceBounds, Wrench,
-};
+use flotor_hal::{ActiveRegion, ContactSet, Input, Output, RegionShape, StepStatus, WorkspaceBounds, Wrench};
 use flotor_sync::Words;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -19,11 +18,11 @@ pub(super) enum Operation {
     Step,
     SetParameter,
     Reset,
-    Field,
+    LocalModel,
 }
 
 impl Operation {
-    const ALL: [Self; 4] = [Self::Step, Self::SetParameter, Self::Reset, Self::Field];
+    const ALL: [Self; 4] = [Self::Step, Self::SetParameter, Self::Reset, Self::LocalModel];
 }
 
 impl SharedPage {
@@ -97,6 +96,14 @@ impl SharedPage {
         Output::new(wrench, energy_j, status)
     }
 
+    pub(super) fn put_grip(&self, grip: Option<GripRecord>) {
+        store(&self.grip, grip::to_words(grip));
+    }
+
+    pub(super) fn grip(&self) -> Option<GripRecord> {
+        grip::from_words(load(&self.grip))
+    }
+
     pub(super) fn put_region(&self, region: &ActiveRegion) {
         let shape = match region.shape() {
             RegionShape::Everywhere => 0,
@@ -132,12 +139,12 @@ impl SharedPage {
         WorkspaceBounds::between(words.numbers(), words.numbers())
     }
 
-    pub(super) fn put_field(&self, field: &LinearField) {
-        store(&self.field, SentField(*field).to_words());
+    pub(super) fn put_contact_set(&self, set: &ContactSet) {
+        store(&self.contact_set, SentSet(*set).to_words());
     }
 
-    pub(super) fn field(&self) -> LinearField {
-        SentField::from_words(&load(&self.field)).0
+    pub(super) fn contact_set(&self) -> ContactSet {
+        SentSet::from_words(&load(&self.contact_set)).0
     }
 }
 

@@ -1,7 +1,7 @@
 //! Watchdog process: not available yet; starting it for a device that is stopped by a message returns an error.
 
 use super::not_yet;
-use flotor_hal::Independence;
+use flotor_loader::Independence;
 use std::io;
 
 /// Returns an error: this system has no watchdog process yet. Not real-time.

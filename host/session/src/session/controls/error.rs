@@ -1,7 +1,7 @@
 //! Errors of changes to a running loop.
 
-use flotor_hal::abi::loader::SettingError;
 use flotor_live::RefusalCause;
+use flotor_loader::SettingError;
 
 /// Reason why a change was rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -8,8 +8,8 @@ use crate::scene::{is_named, nearest};
 use flotor_core::lock;
 use flotor_core::{Change, ChangeSubject, PluginIndex};
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Mutability, Parameter};
+use flotor_loader::Setting;
 use flotor_servo::{ChangeReport, PLUGIN, Pace, ParameterChange, WEIGHT};
 use std::sync::{Arc, Mutex, MutexGuard};
 

@@ -4,7 +4,8 @@ use super::super::plugin_report::PluginReport;
 use super::error::ControlError;
 use super::plugin_table::PluginTable;
 use crate::calls::{Call, CallThread, PendingCall, Unresponsive, end_limit};
-use flotor_servo::{HostSwaps, Layer, LayerReport, ModelHealth, Replacement};
+use flotor_core::health::ModelHealth;
+use flotor_servo::{HostSwaps, Layer, LayerReport, Replacement};
 use std::time::Duration;
 
 /// Model plugin of a run with faults: the plugin that the run began with, or a replacement.

@@ -11,8 +11,8 @@
 use crate::validate::Outcome;
 use crate::validate::path::walk;
 use flotor_hal::abi::CallStatus;
-use flotor_hal::abi::loader::Model;
 use flotor_hal::{Input, Output};
+use flotor_loader::Model;
 use rustix::process::{Signal, getpid, kill_process};
 use rustix::thread::{SecureComputingMode, gettid, set_secure_computing_mode};
 use std::path::{Path, PathBuf};

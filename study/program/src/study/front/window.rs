@@ -36,9 +36,9 @@ impl Window {
             command.arg("--texts").arg(texts);
         }
         command.stdin(Stdio::piped()).stdout(Stdio::piped());
-        let failed =
-            |cause| CommandError::file(SeparateProgram::VIEWER.program.as_ref(), "cannot be started", cause);
-        let mut viewer = Running(spawn_unblocked(&mut command).map_err(failed)?);
+        let spawned = spawn_unblocked(&mut command);
+        let failed = |cause| CommandError::file(command.get_program().as_ref(), "cannot be started", cause);
+        let mut viewer = Running(spawned.map_err(failed)?);
         let (Some(input), Some(output)) = (viewer.0.stdin.take(), viewer.0.stdout.take()) else {
             return Err(CommandError::Failed(
                 "cannot open the pipes of the viewer; use --screen terminal".to_owned(),

@@ -15,7 +15,7 @@ use flotor_emulation::command_line::{arguments, link_to, say, warn};
 use flotor_emulation::port::{Port, ReachArguments};
 use flotor_emulation::rig::{RigArguments, serve};
 use flotor_hal::Refusal;
-use flotor_hal::abi::loader::{LoadError, Setting};
+use flotor_loader::{LoadError, Setting};
 use flotor_maglev::protocol::FRAME_BYTES;
 use flotor_maglev::transport::stream::StreamLink;
 use flotor_maglev::transport::tcp::{self, prepared};

@@ -41,7 +41,7 @@ pub(crate) struct MlApiArguments {
     /// Hand that holds the flotor; no effect with --device or --calibration-rig
     #[arg(long, value_enum, default_value = "none", value_name = "WHO")]
     hand: HandOption,
-    /// Effect of a force command on the gains
+    /// Effect of a force command
     #[arg(long, value_enum, default_value = "replace", value_name = "WHAT")]
     force_command: ForceCommand,
     /// Clients that may command: the first client that sends a command, or all

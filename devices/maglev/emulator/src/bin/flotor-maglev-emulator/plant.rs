@@ -1,8 +1,8 @@
 //! A device plugin as the plant: the controller takes the role of the host.
 
 use flotor_hal::abi::PluginKind;
-use flotor_hal::abi::loader::{ActiveDevice, Plugin, Setting, read_metadata};
 use flotor_hal::{Capabilities, Cycle, DeviceState, Fault, LoopConfig, Tick, Wrench};
+use flotor_loader::{ActiveDevice, Plugin, Setting, read_metadata};
 use flotor_maglev_emulator::Plant;
 use flotor_maglev_emulator::controller::Sample;
 use std::error::Error;

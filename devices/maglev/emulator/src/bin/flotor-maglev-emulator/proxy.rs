@@ -4,8 +4,8 @@
 use super::plant::SIMULATED;
 use super::{Arguments, ProtocolOption, key_value, plant};
 use flotor_emulation::port::Reach;
-use flotor_hal::abi::loader::Setting;
 use flotor_hal::{Axes, Capabilities, Refusal};
+use flotor_loader::Setting;
 use flotor_maglev::ml_api::PORT;
 use rustix::fs::{MemfdFlags, memfd_create};
 use std::error::Error;

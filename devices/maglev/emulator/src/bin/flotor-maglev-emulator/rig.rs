@@ -31,7 +31,7 @@ impl SensedForce {
 pub(crate) fn settings(link: &Path, stand: Stand) -> Result<Vec<(&'static str, String)>, Box<dyn Error>> {
     let script = link.with_extension("stand.toml");
     std::fs::write(&script, stand.script()).map_err(|error| {
-        format!("cannot write {}: {error}; name another --calibration-rig", script.display())
+        format!("cannot write {}: {error}; name another path with --calibration-rig", script.display())
     })?;
     Ok(vec![
         ("preset", "full".to_owned()),

@@ -13,10 +13,10 @@ use flotor_maglev::ml_api::{
 /// Effect of a force command on the gains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ForceCommand {
-    /// The force replaces the gains.
+    /// Its force replaces the force of the gains.
     #[value(name = "replace")]
     Replaces,
-    /// The force is added to the gains.
+    /// Its force is added to the force of the gains.
     #[value(name = "add")]
     Adds,
 }
@@ -190,6 +190,15 @@ impl Controller {
     #[must_use]
     pub fn is_driven_by_forces(&self) -> bool {
         self.flight == Flight::Flying && matches!(self.command, Command::Forces(_) | Command::Currents(_))
+    }
+
+    /// Returns the current of the grasp that the clients command, A: within the limit that they have set, and none unless the
+    /// flotor levitates.
+    #[must_use]
+    pub fn grasp_a(&self) -> f64 {
+        let Grasp { current_a, limit_a, .. } = self.grasp;
+        let most_a = if limit_a > 0.0 { limit_a } else { f32::MAX };
+        if self.flight == Flight::Flying { f64::from(current_a.clamp(-most_a, most_a)) } else { 0.0 }
     }
 
     /// Sets the injected faults, until the next call.

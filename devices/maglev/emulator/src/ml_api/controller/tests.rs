@@ -332,3 +332,18 @@ fn a_users_frame_moves_and_turns_the_pose_and_nothing_else() {
     assert!(told.iter().zip(expected).all(|(told, expected)| (told - expected).abs() < 1.0e-8), "{told:?}");
     assert_eq!(rig.plain(Function::GetDesiredPosition), Reply::ok(Results::Pose(WirePose::default())));
 }
+
+#[test]
+fn a_grasp_carries_its_current_within_its_limit_while_the_flotor_levitates() {
+    let mut rig = Rig::new(ForceCommand::Replaces);
+    assert_eq!(rig.status(Request::Number(Function::SetGraspCurrent, -2.0)), Status::OK);
+    assert_eq!(rig.controller.grasp_a(), 0.0, "on the stator");
+    let mut rig = Rig::flying(ForceCommand::Replaces);
+    assert_eq!(rig.status(Request::Number(Function::SetGraspCurrent, -2.0)), Status::OK);
+    assert_eq!(rig.controller.grasp_a(), -2.0);
+    assert_eq!(rig.status(Request::Number(Function::SetGraspCurrentLimit, 1.5)), Status::OK);
+    assert_eq!(rig.controller.grasp_a(), -1.5);
+    rig.controller.inject(FaultBits::OVER_TEMPERATURE);
+    rig.step();
+    assert_eq!(rig.controller.grasp_a(), 0.0, "a fault takes it away with the levitation");
+}

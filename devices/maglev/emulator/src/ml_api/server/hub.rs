@@ -65,16 +65,16 @@ impl Hub {
         self.changed.notify_all();
     }
 
-    /// Runs a whole servo interval of `dt_s` without waiting for the lock, and returns the wrench over the interval; `None` if a
-    /// connection holds the lock. Real-time: bounded, no allocation; one system call.
+    /// Runs a whole servo interval of `dt_s` without waiting for the lock, and returns the wrench over the interval and the current of
+    /// the grasp, A; `None` if a connection holds the lock. Real-time: bounded, no allocation; one system call.
     #[must_use]
-    pub fn try_cycle(&self, sample: &Sample, dt_s: f64) -> Option<Wrench> {
+    pub fn try_cycle(&self, sample: &Sample, dt_s: f64) -> Option<(Wrench, f64)> {
         let mut state = self.state.try_lock().ok()?;
         state.begin(sample, dt_s, &self.log);
-        let wrench = state.controller.drive(dt_s);
+        let driven = (state.controller.drive(dt_s), state.controller.grasp_a());
         drop(state);
         self.changed.notify_all();
-        Some(wrench)
+        Some(driven)
     }
 
     /// Advances the coil temperatures and the integral terms by a servo interval of `dt_s`, and returns the wrench over the

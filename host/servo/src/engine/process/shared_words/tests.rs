@@ -1,6 +1,6 @@
 use super::super::memory::mapped;
 use super::*;
-use flotor_hal::{DQuat, DVec3, Demand, Pose, Twist};
+use flotor_hal::{Contact, DQuat, DVec3, Demand, LinearField, Pose, Twist};
 
 #[test]
 fn input_and_output_cross_bit_for_bit() {
@@ -51,8 +51,10 @@ fn extensions_cross_bit_for_bit() {
     let wrench = Wrench { force_n: [7.0, 8.0, 9.0], torque_nm: [-1.0, -2.0, -3.0] };
     let field =
         LinearField { anchor, wrench, stiffness, valid_m: 0.5, valid_rad: f64::INFINITY, time_ns: u64::MAX };
-    memory.put_field(&field);
-    assert_eq!(memory.field(), field);
+    let contact = Contact { normal: [0.6, 0.0, 0.8], gap_m: -0.001, friction: 0.3, ..Contact::default() };
+    let set = ContactSet { valid_s: 0.1, time_ns: 5, ..ContactSet::NONE.with(contact).with_field(field) };
+    memory.put_contact_set(&set);
+    assert_eq!(memory.contact_set(), set);
 }
 
 #[test]

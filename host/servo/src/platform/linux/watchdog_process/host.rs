@@ -1,8 +1,8 @@
 //! Host side: start and end of the watchdog process.
 
 use super::{PACKET_BYTES, Packet, bytes_of};
-use crate::engine::process::parent::program;
-use flotor_hal::Independence;
+use crate::engine::process::parent::{cannot_start, program};
+use flotor_loader::Independence;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::net::{
     AddressFamily, RecvFlags, SendAncillaryBuffer, SendAncillaryMessage, SendFlags, SocketFlags, SocketType,
@@ -51,7 +51,7 @@ impl WatchdogProcess {
         let mut command = Command::new(program()?);
         command.args(["watchdog", "--host", &std::process::id().to_string()]);
         command.stdin(Stdio::from(theirs)).stdout(Stdio::null());
-        let child = command.spawn()?;
+        let child = command.spawn().map_err(|error| cannot_start(&command, &error))?;
         drop(command); // and with it the other end of the link
         let mut process = Self { child, link, shared_group: None };
         for (name, handle, message) in devices {
