@@ -63,7 +63,8 @@ pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
             ));
         }
         (Kind::Device | Kind::Scene, true, _) => {
-            let problem = "`--beside` is for models: the loop reads and writes a device in every tick; omit it";
+            let problem =
+                "`--beside` is for models: the loop reads and writes a device in every tick; omit it";
             return Err(CommandError::Usage(problem.to_owned()));
         }
         (Kind::Model | Kind::Device, _, Some(_)) => {

@@ -3,8 +3,8 @@
 use flotor_command::options::{KeyValue, PluginKeyValue, settings};
 use flotor_command::{CommandError, while_preparing};
 use flotor_hal::abi::PluginKind;
-use flotor_loader::Model;
 use flotor_hal::{DQuat, DVec3, Input, Pose};
+use flotor_loader::Model;
 use flotor_session::registry::Registry;
 use std::path::Path;
 

@@ -24,6 +24,8 @@ pub struct Foot {
 const MOST_STEPS: usize = 40;
 /// Step below which the next one, squared, is below rounding, relative to the size of the patch.
 const LAST_STEP: f64 = 1.0e-8;
+/// Next step, as two steps of quadratic convergence predict it, that is below rounding.
+const NEXT_STEP: f64 = 1.0e-14;
 /// Most halvings of a step that does not lessen the distance.
 const MOST_HALVINGS: usize = 12;
 
@@ -78,13 +80,15 @@ struct Quadratic {
     gauss_newton: [f64; 3],
 }
 
-fn quadratic(jet: &Jet, c: DVec3) -> Quadratic {
-    let d = jet.point_m - c;
-    let [a, b] = jet.first;
-    let gauss_newton = [a.dot(a), a.dot(b), b.dot(b)];
-    let curved = jet.second.map(|s| s.dot(d));
-    let hessian = [0, 1, 2].map(|i| gauss_newton[i] + curved[i]);
-    Quadratic { gradient: [a.dot(d), b.dot(d)], hessian, gauss_newton }
+impl Quadratic {
+    fn of(patch: &Patch, at: Barycentric, jet: &Jet, c: DVec3) -> Self {
+        let d = jet.point_m - c;
+        let [a, b] = jet.first;
+        let gauss_newton = [a.dot(a), a.dot(b), b.dot(b)];
+        let bend = patch.bend_along(at, d);
+        let hessian = [0, 1, 2].map(|i| gauss_newton[i] + bend[i]);
+        Self { gradient: [a.dot(d), b.dot(d)], hessian, gauss_newton }
+    }
 }
 
 /// Directions in which the two coordinates change while the third compensates, by the coordinate held at zero.
@@ -146,8 +150,9 @@ impl Patch {
         let mut at = start;
         let mut jet = self.jet(at);
         let mut square = (jet.point_m - c_m).length_squared();
+        let mut before = f64::INFINITY;
         for _ in 0..MOST_STEPS {
-            let step = held_and_step(&quadratic(&jet, c_m), at);
+            let step = held_and_step(&Quadratic::of(self, at, &jet, c_m), at);
             let size = step[0].abs().max(step[1].abs()).max(step[2].abs());
             if size == 0.0 {
                 break;
@@ -180,7 +185,11 @@ impl Patch {
                 (share, blocked) = (0.5 * share, None);
             }
             let Some((next, there, found)) = moved else { break };
-            let done = size * share < LAST_STEP && blocked.is_none();
+            let is_full = share == 1.0 && blocked.is_none();
+            let next_size = size * (size / before) * (size / before);
+            let done = size * share < LAST_STEP && blocked.is_none()
+                || is_full && next_size < NEXT_STEP && before < 1.0;
+            before = if is_full { size } else { f64::INFINITY };
             (at, jet, square) = (next, there, found);
             if done {
                 break;

@@ -47,15 +47,10 @@ pub struct Patch {
 pub(crate) struct Jet {
     pub(crate) point_m: DVec3,
     pub(crate) first: [DVec3; 2],
-    /// Derivatives `aa`, `ab`, `bb`.
-    pub(crate) second: [DVec3; 3],
 }
 
 /// Displacement below which an inner point is in the flat triangle, relative to the edges.
 const FLAT: f64 = 1.0e-11;
-
-/// Value, two first and three second derivatives of a weight.
-type Weight = [f64; 6];
 
 /// Returns a displacement as stored; the neighbour of an edge rounds the same number.
 #[allow(clippy::cast_possible_truncation)] // seven digits of a displacement are far below its own error
@@ -67,54 +62,17 @@ fn vector(v: Stored) -> DVec3 {
     DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]))
 }
 
-/// Reduces gradient `[u, v, w]` and Hessian `[uu, uv, uw, vv, vw, ww]` to the coordinates `u`, `v` with `w = 1 - u - v`.
-fn reduce(value: f64, g: [f64; 3], h: [f64; 6]) -> Weight {
-    let [uu, uv, uw, vv, vw, ww] = h;
-    [value, g[0] - g[2], g[1] - g[2], uu - 2.0 * uw + ww, uv - uw - vw + ww, vv - 2.0 * vw + ww]
-}
+/// Each coordinate with the two after it.
+const TURNS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
+/// Sum of two coordinates below which a place is the third corner: the shares of its inner points have no limit there.
+const AT_CORNER: f64 = 1.0e-12;
 
-/// Index of a pair of coordinates in a Hessian.
-const PAIR: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
-
-/// Returns the cubic weights `3 x_i^2 x_j` and `3 x_i x_j^2` of an edge.
-fn edge_weights(x: Barycentric, i: usize) -> [Weight; 2] {
-    let j = (i + 1) % 3;
-    let (a, b) = (x[i], x[j]);
-    let weight = |value, by_i, by_j, ii, ij, jj| {
-        let (mut g, mut h) = ([0.0; 3], [0.0; 6]);
-        (g[i], g[j]) = (by_i, by_j);
-        (h[PAIR[i][i]], h[PAIR[i][j]], h[PAIR[j][j]]) = (ii, ij, jj);
-        reduce(value, g, h)
-    };
-    [
-        weight(3.0 * a * a * b, 6.0 * a * b, 3.0 * a * a, 6.0 * b, 6.0 * a, 0.0),
-        weight(3.0 * a * b * b, 3.0 * b * b, 6.0 * a * b, 0.0, 6.0 * b, 6.0 * a),
-    ]
-}
-
-/// Returns the weights `12 x_i^2 x_j^2 x_k / (x_j + x_k)` and `12 x_i^2 x_j x_k^2 / (x_j + x_k)` near a corner; their second
-/// derivatives have no limit at the corner and count as zero there.
-fn inner_weights(x: Barycentric, i: usize) -> [Weight; 2] {
-    let (j, k) = ((i + 1) % 3, (i + 2) % 3);
-    let (a, sum) = (x[i], x[j] + x[k]);
-    if sum <= 1.0e-12 {
-        return [[0.0; 6]; 2];
-    }
-    let half = |j: usize, k: usize| {
-        let (t, r) = (x[j] / sum, x[k] / sum);
-        // The share s^2 t^2 r, with its derivatives by x_j and x_k.
-        let f = sum * sum * t * t * r;
-        let (f_j, f_k) = (sum * t * r * (t + 2.0 * r), sum * t * t * t);
-        let (f_jj, f_jk, f_kk) = (2.0 * r * r * r, t * t * (3.0 - 2.0 * t), -2.0 * t * t * t);
-        let (mut g, mut h) = ([0.0; 3], [0.0; 6]);
-        (g[i], g[j], g[k]) = (24.0 * a * f, 12.0 * a * a * f_j, 12.0 * a * a * f_k);
-        h[PAIR[i][i]] = 24.0 * f;
-        (h[PAIR[i][j]], h[PAIR[i][k]]) = (24.0 * a * f_j, 24.0 * a * f_k);
-        (h[PAIR[j][j]], h[PAIR[j][k]], h[PAIR[k][k]]) =
-            (12.0 * a * a * f_jj, 12.0 * a * a * f_jk, 12.0 * a * a * f_kk);
-        reduce(12.0 * a * a * f, g, h)
-    };
-    [half(j, k), half(k, j)]
+/// Returns the shares of two coordinates in their sum; zero at the corner where both vanish.
+#[inline(always)]
+fn shares(xj: f64, xk: f64) -> [f64; 2] {
+    let sum = xj + xk;
+    let each = if sum > AT_CORNER { 1.0 / sum } else { 0.0 };
+    [xj * each, xk * each]
 }
 
 /// Returns the inner points of a quartic next to an edge from `from` to `to`: displacements near its start and its end.
@@ -231,28 +189,64 @@ impl Patch {
         [p.min(q).min(r) - bulge, p.max(q).max(r) + bulge]
     }
 
-    /// Evaluates the patch. Real-time: bounded, no allocation.
+    /// Evaluates point and tangents: weights `3 x_i^2 x_j` and `3 x_i x_j^2` of the points of an edge, `12 x_i^2 x_j^2 x_k / (x_j +
+    /// x_k)` and `12 x_i^2 x_j x_k^2 / (x_j + x_k)` of those near a corner. Real-time: bounded, no allocation.
+    #[inline]
     pub(crate) fn jet(&self, x: Barycentric) -> Jet {
         let [p, q, r] = self.corners_m;
-        let mut point_m = p * x[0] + q * x[1] + r * x[2];
-        let mut first = [p - r, q - r];
-        let mut second = [DVec3::ZERO; 3];
-        let mut add = |weights: [Weight; 2], points: &[Stored; 2]| {
-            for (weight, point) in weights.iter().zip(points) {
-                let v = vector(*point);
-                point_m += v * weight[0];
-                first[0] += v * weight[1];
-                first[1] += v * weight[2];
-                second[0] += v * weight[3];
-                second[1] += v * weight[4];
-                second[2] += v * weight[5];
-            }
-        };
-        for i in 0..3 {
-            add(edge_weights(x, i), &self.edges[i]);
-            add(inner_weights(x, i), &self.inner[i]);
+        let mut bent_m = DVec3::ZERO;
+        let mut by = [DVec3::ZERO; 3];
+        for [i, j, k] in TURNS {
+            let (start, end) = (vector(self.edges[i][0]) * x[i], vector(self.edges[i][1]) * x[j]);
+            let both = start + end;
+            bent_m += both * (3.0 * x[i] * x[j]);
+            by[i] += (both + start) * (3.0 * x[j]);
+            by[j] += (both + end) * (3.0 * x[i]);
+
+            let (near, far) = (vector(self.inner[i][0]), vector(self.inner[i][1]));
+            let [t, r] = shares(x[j], x[k]);
+            let square = 12.0 * x[i] * x[i];
+            let mixed = (near * t + far * r) * (x[j] * x[k]);
+            bent_m += mixed * square;
+            by[i] += mixed * (24.0 * x[i]);
+            let scale = square * (x[j] + x[k]);
+            by[j] += (near * (t * r * (t + 2.0 * r)) + far * (r * r * r)) * scale;
+            by[k] += (near * (t * t * t) + far * (t * r * (r + 2.0 * t))) * scale;
         }
-        Jet { point_m, first, second }
+        Jet {
+            point_m: p * x[0] + q * x[1] + r * x[2] + bent_m,
+            first: [p - r + (by[0] - by[2]), q - r + (by[1] - by[2])],
+        }
+    }
+
+    /// Returns the second derivatives `aa`, `ab`, `bb` along `d`, m^2 for a `d` in m; they have no limit at a corner and count as
+    /// those of its edges there. Real-time: bounded, no allocation.
+    #[inline]
+    pub(crate) fn bend_along(&self, x: Barycentric, d: DVec3) -> [f64; 3] {
+        // By pairs of coordinates: each with itself, and each with the next one.
+        let (mut own, mut next) = ([0.0; 3], [0.0; 3]);
+        for [i, j, k] in TURNS {
+            let (start, end) = (vector(self.edges[i][0]).dot(d), vector(self.edges[i][1]).dot(d));
+            own[i] += 6.0 * x[j] * start;
+            own[j] += 6.0 * x[i] * end;
+            next[i] += 6.0 * (x[i] * start + x[j] * end);
+
+            let (near, far) = (vector(self.inner[i][0]).dot(d), vector(self.inner[i][1]).dot(d));
+            let [t, r] = shares(x[j], x[k]);
+            let square = 12.0 * x[i] * x[i];
+            own[i] += 24.0 * x[j] * x[k] * (t * near + r * far);
+            let scale = 24.0 * x[i] * (x[j] + x[k]);
+            next[i] += scale * (t * r * (t + 2.0 * r) * near + r * r * r * far);
+            next[k] += scale * (t * t * t * near + t * r * (r + 2.0 * t) * far);
+            own[j] += 2.0 * square * r * r * r * (near - far);
+            own[k] += 2.0 * square * t * t * t * (far - near);
+            next[j] += square * (t * t * (3.0 - 2.0 * t) * near + r * r * (3.0 - 2.0 * r) * far);
+        }
+        [
+            own[0] - 2.0 * next[2] + own[2],
+            next[0] - next[2] - next[1] + own[2],
+            own[1] - 2.0 * next[1] + own[2],
+        ]
     }
 
     /// Returns the outward unit normal at a place. Real-time: bounded, no allocation.
@@ -280,5 +274,42 @@ impl Patch {
         let far = if edge == corner { (corner + 1) % 3 } else { edge };
         let point = usize::from(edge != corner);
         self.corners_m[far] - self.corners_m[corner] + vector(self.edges[edge][point]) * 3.0
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_are_those_of_differences() {
+        let corners_m = [DVec3::ZERO, DVec3::new(1.0, 0.1, 0.0), DVec3::new(0.2, 0.9, 0.1)];
+        let number = |i: usize| 0.1 * flotor_hal::math::sin(1.7 * i as f64 + 0.3);
+        let displaced = |first: usize| {
+            std::array::from_fn(|i| {
+                std::array::from_fn(|k| {
+                    stored(DVec3::from_array([0, 1, 2].map(|axis| number(first + 6 * i + 3 * k + axis))))
+                })
+            })
+        };
+        let patch = Patch::of_parts(corners_m, displaced(0), displaced(40));
+        let (h, d) = (1.0e-5, DVec3::new(0.3, -0.5, 0.8));
+        for at in [[0.3, 0.3, 0.4], [0.7, 0.1, 0.2], [0.05, 0.15, 0.8]] {
+            let moved = |u: f64, v: f64| patch.jet([at[0] + u * h, at[1] + v * h, at[2] - (u + v) * h]);
+            let [aa, ab, bb] = patch.bend_along(at, d);
+            let (u, v) = ((moved(1.0, 0.0), moved(-1.0, 0.0)), (moved(0.0, 1.0), moved(0.0, -1.0)));
+            // Errors of a central difference: h^2 times the third derivative, and rounding over h.
+            let by = |(ahead, behind): &(Jet, Jet)| (ahead.point_m - behind.point_m) / (2.0 * h);
+            assert!((by(&u) - patch.jet(at).first[0]).length() < 1.0e-8);
+            assert!((by(&v) - patch.jet(at).first[1]).length() < 1.0e-8);
+            let second = |(ahead, behind): &(Jet, Jet), i: usize| {
+                (ahead.first[i] - behind.first[i]).dot(d) / (2.0 * h)
+            };
+            for (found, expected) in
+                [(second(&u, 0), aa), (second(&u, 1), ab), (second(&v, 0), ab), (second(&v, 1), bb)]
+            {
+                assert!((found - expected).abs() < 1.0e-7, "{at:?}: {found} {expected}");
+            }
+        }
     }
 }

@@ -322,7 +322,8 @@ const BUILT_BY_NAME: [&str; 1] = ["surface"];
 /// Returns the command that builds a plugin outside the default build; `None` for another id.
 fn not_built(id: &str) -> Option<String> {
     let is_known = BUILT_BY_NAME.contains(&id);
-    is_known.then(|| format!("it is built by name: `cargo build --release -p flotor-{id}` in Flotor's sources"))
+    is_known
+        .then(|| format!("it is built by name: `cargo build --release -p flotor-{id}` in Flotor's sources"))
 }
 
 /// Returns the reason why plugins beside this program are not found, if the system does not report the program's path; `None`
