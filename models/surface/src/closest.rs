@@ -26,6 +26,8 @@ const MOST_STEPS: usize = 40;
 const LAST_STEP: f64 = 1.0e-8;
 /// Next step, as two steps of quadratic convergence predict it, that is below rounding.
 const NEXT_STEP: f64 = 1.0e-14;
+/// Step up to which a quadratic describes the distance well, relative to the size of the patch.
+const SHORT_STEP: f64 = 0.25;
 /// Most halvings of a step that does not lessen the distance.
 const MOST_HALVINGS: usize = 12;
 
@@ -80,6 +82,11 @@ struct Quadratic {
     gauss_newton: [f64; 3],
 }
 
+/// Returns true for a matrix `[aa, ab, bb]` that is positive definite beyond rounding.
+fn is_positive([aa, ab, bb]: [f64; 3]) -> bool {
+    aa > 0.0 && aa * bb - ab * ab > 1.0e-9 * aa * bb.abs()
+}
+
 impl Quadratic {
     fn of(patch: &Patch, at: Barycentric, jet: &Jet, c: DVec3) -> Self {
         let d = jet.point_m - c;
@@ -95,6 +102,10 @@ impl Quadratic {
 const SIDES: [[f64; 2]; 3] = [[0.0, 1.0], [1.0, 0.0], [1.0, -1.0]];
 
 impl Quadratic {
+    fn is_convex(&self) -> bool {
+        is_positive(self.hessian)
+    }
+
     /// Returns the Newton step in the three coordinates, with those of `held` at zero.
     fn step(&self, held: [bool; 3]) -> [f64; 3] {
         let [ga, gb] = self.gradient;
@@ -102,8 +113,7 @@ impl Quadratic {
             0 => {
                 let solve = |[aa, ab, bb]: [f64; 3]| {
                     let det = aa * bb - ab * ab;
-                    let is_positive = aa > 0.0 && det > 1.0e-9 * aa * bb.abs();
-                    is_positive.then(|| [(ab * gb - bb * ga) / det, (ab * ga - aa * gb) / det])
+                    is_positive([aa, ab, bb]).then(|| [(ab * gb - bb * ga) / det, (ab * ga - aa * gb) / det])
                 };
                 solve(self.hessian).or_else(|| solve(self.gauss_newton)).unwrap_or([0.0; 2])
             }
@@ -141,6 +151,17 @@ impl Patch {
     /// Finds the local closest point to `c_m` from the place `start`. Real-time: bounded, no allocation.
     #[must_use]
     pub fn closest(&self, c_m: DVec3, start: Barycentric) -> Foot {
+        self.descend(c_m, start, f64::INFINITY)
+    }
+
+    /// Finds the place that [`Self::closest`] finds if it is nearer than `bound_m`.
+    pub(crate) fn closest_within(&self, c_m: DVec3, start: Barycentric, bound_m: f64) -> Option<Foot> {
+        let foot = self.descend(c_m, start, bound_m);
+        (foot.distance_m < bound_m).then_some(foot)
+    }
+
+    /// Descends from `start` to the closest point, or to a place from which no point nearer than `bound_m` is to be expected.
+    fn descend(&self, c_m: DVec3, start: Barycentric, bound_m: f64) -> Foot {
         if self.is_flat() {
             let (at, square) = closest_of_triangle(&self.corners_m, c_m);
             let [p, q, r] = self.corners_m;
@@ -152,9 +173,14 @@ impl Patch {
         let mut square = (jet.point_m - c_m).length_squared();
         let mut before = f64::INFINITY;
         for _ in 0..MOST_STEPS {
-            let step = held_and_step(&Quadratic::of(self, at, &jet, c_m), at);
+            let quadratic = Quadratic::of(self, at, &jet, c_m);
+            let step = held_and_step(&quadratic, at);
             let size = step[0].abs().max(step[1].abs()).max(step[2].abs());
-            if size == 0.0 {
+            // The step lessens the squared distance by its slope; twice as much is allowed for.
+            let slope = quadratic.gradient[0] * step[0] + quadratic.gradient[1] * step[1];
+            let is_too_far =
+                size < SHORT_STEP && quadratic.is_convex() && square + 2.0 * slope > bound_m * bound_m;
+            if size == 0.0 || is_too_far {
                 break;
             }
             let mut share = 1.0_f64;

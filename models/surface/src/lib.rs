@@ -43,7 +43,7 @@ mod store;
 pub mod surface;
 pub mod topology;
 pub mod touch;
-pub mod tree;
+mod tree;
 pub mod weld;
 
 pub use plugin::{FLOTOR_ENTRY, Touched};

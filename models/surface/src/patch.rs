@@ -9,6 +9,7 @@
 //!
 //! All shapes are displacements from the flat triangle: three corners with equal normals and straight edges give the plane.
 
+use crate::tree::Disc;
 use flotor_hal::DVec3;
 
 /// Barycentric coordinates of a place in a triangle: not negative, sum 1.
@@ -187,6 +188,34 @@ impl Patch {
         let [p, q, r] = self.corners_m;
         let bulge = DVec3::splat(f64::from(self.bulge_m));
         [p.min(q).min(r) - bulge, p.max(q).max(r) + bulge]
+    }
+
+    /// Returns a flat cylinder about the patch.
+    pub(crate) fn disc(&self) -> Disc {
+        let [p, q, r] = self.corners_m;
+        let longest = [(p, q), (q, r), (r, p)].into_iter().fold((p, p), |longest, edge| {
+            if edge.0.distance_squared(edge.1) > longest.0.distance_squared(longest.1) {
+                edge
+            } else {
+                longest
+            }
+        });
+        let half_way_m = (longest.0 + longest.1) * 0.5;
+        let (a, b) = (q - p, r - p);
+        let normal = a.cross(b);
+        // The circle through the corners; of an obtuse triangle that over the longest edge is smaller.
+        let centre_m = p
+            + (normal.cross(a) * b.length_squared() + b.cross(normal) * a.length_squared())
+                / (2.0 * normal.length_squared());
+        let radius_m = |m: DVec3| self.corners_m.iter().map(|corner| m.distance(*corner)).fold(0.0, f64::max);
+        let (middle_m, radius_m) = [centre_m, half_way_m]
+            .map(|m| (m, radius_m(m)))
+            .into_iter()
+            .filter(|(_, radius_m)| radius_m.is_finite())
+            .fold((p, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best });
+        let bulge_m = f64::from(self.bulge_m);
+        let axis = normal.try_normalize().unwrap_or(DVec3::Z);
+        Disc { middle_m, axis, radius_m: radius_m + bulge_m, half_m: bulge_m }
     }
 
     /// Evaluates point and tangents: weights `3 x_i^2 x_j` and `3 x_i x_j^2` of the points of an edge, `12 x_i^2 x_j^2 x_k / (x_j +

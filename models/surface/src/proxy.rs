@@ -167,7 +167,7 @@ impl Ball {
     }
 
     fn over_one(&self, surface: &Surface, goal_m: DVec3, contact: Contact) -> Self {
-        let place = surface.walk(goal_m, contact.place.patch, contact.place.foot.at);
+        let place = surface.walk(goal_m, contact.place.patch);
         let side = self.side(surface, &place, contact.side);
         let over = self.over(surface, &place, side, goal_m);
         if over.height_m >= self.radius_m {
@@ -185,7 +185,7 @@ impl Ball {
             let mut planes = [Plane::default(); MOST_CONTACTS];
             let (mut contacts, mut kept) = (Contacts::default(), 0);
             for contact in ball.contacts.iter() {
-                let place = surface.walk(ball.centre_m, contact.place.patch, contact.place.foot.at);
+                let place = surface.walk(ball.centre_m, contact.place.patch);
                 let side = self.side(surface, &place, contact.side);
                 let over = ball.over(surface, &place, side, ball.centre_m);
                 if contacts.add(Contact { place, side }) {
@@ -300,7 +300,7 @@ impl Ball {
     fn drop_idle(&mut self, surface: &Surface) {
         let mut left = Contacts::default();
         for contact in self.contacts.iter() {
-            let place = surface.walk(self.centre_m, contact.place.patch, contact.place.foot.at);
+            let place = surface.walk(self.centre_m, contact.place.patch);
             let over = self.over(surface, &place, contact.side, self.centre_m);
             if over.height_m - self.radius_m <= SKIN_M {
                 left.add(Contact { place, ..contact });
@@ -322,7 +322,7 @@ impl Ball {
         let Some(contact) = self.contacts.first().filter(|_| self.contacts.count() == 1) else {
             return self.target(surface, near_m);
         };
-        let place = surface.walk(near_m, contact.place.patch, contact.place.foot.at);
+        let place = surface.walk(near_m, contact.place.patch);
         let direction = self.over(surface, &place, contact.side, near_m).direction;
         let mut contacts = Contacts::default();
         contacts.add(Contact { place, ..contact });
