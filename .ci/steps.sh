@@ -191,19 +191,21 @@ bits() {
     done
 }
 
-# Coverage-guided fuzzing of what reads bytes that others wrote, a minute each. The instrumentation is LLVM's, as `cargo fuzz` asks
+# Coverage-guided fuzzing of what reads bytes that others wrote, a minute each, and ten for each of the four formats of meshes. The instrumentation is LLVM's, as `cargo fuzz` asks
 # for it; without its address sanitizer no nightly compiler is needed, and the decoders have no `unsafe`.
 fuzz() {
-    local reader coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
+    local reader seconds coverage="--cfg fuzzing -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
         -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table
         -Cllvm-args=-sanitizer-coverage-trace-compares"
-    for reader in decode ml_api gmsh; do
+    for reader in decode ml_api gmsh mesh; do
+        seconds=60
+        [ $reader != mesh ] || seconds=2400
         # What it starts from, and what it finds on the way.
         mkdir -p "target/fuzz/found/$reader"
         find "tests/fuzz/seeds/$reader" -type f -exec cp {} "target/fuzz/found/$reader" \; 2>/dev/null || true
         RUSTFLAGS="$(echo $coverage)" cargo run --release --manifest-path tests/fuzz/Cargo.toml \
             --target "$(target)" --target-dir target/fuzz --bin "$reader" -- \
-            "target/fuzz/found/$reader" -max_total_time=60 -print_final_stats=1
+            "target/fuzz/found/$reader" -max_total_time=$seconds -print_final_stats=1
     done
 }
 

@@ -97,6 +97,12 @@ impl SceneOptions {
         if self.allow_strong { Strength::Strong } else { Strength::UnderCeiling }
     }
 
+    /// Searches the given plugin folders, then the default ones, and returns the registry of their plugins. Not real-time.
+    #[must_use]
+    pub fn registry(&self) -> Registry {
+        self.plugin_path.registry()
+    }
+
     /// Inserts the given plugin folders before the plugin folders of a scene, and sets the scene's consent to a shared control
     /// group if it was given on the command line.
     pub fn apply(&self, scene: &mut Scene) {

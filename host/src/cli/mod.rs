@@ -6,6 +6,7 @@ mod bridge;
 mod doctor;
 mod emulate;
 mod new;
+mod object;
 mod plugins;
 mod record;
 mod release;
@@ -98,7 +99,7 @@ enum Command {
     Plugins(plugins::PluginsArguments),
     /// Check a plugin file against the rules of the contract
     Validate(Separate),
-    /// Create a plugin: a folder that builds, passes `validate` and runs
+    /// Create a plugin: a folder that builds, passes `validate` and runs; or the scene of a mesh file
     New(new::NewArguments),
     /// Run scenes with expectations: pass or fail, for CI
     Test(Separate),

@@ -1,23 +1,30 @@
-//! `flotor new`: creates the folder of a plugin.
+//! `flotor new`: creates the folder of a plugin, or the scene of a mesh file.
 
+use crate::cli::object::object_scene;
 use crate::scaffold::{Contract, Language, PluginName, Scaffold, ScaffoldError, Template, scaffold};
 use clap::{Args, ValueEnum};
 use flotor_command::say;
 use flotor_command::{CommandError, command_line, quoted, style};
 use flotor_session::registry::Registry;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Create a plugin: a folder that builds, passes `validate` and runs.
+/// Create a plugin: a folder that builds, passes `validate` and runs; or the scene of a mesh file.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  flotor new model jelly\n  flotor new device crank\n  \
-    flotor new model jelly --language c\n  flotor new model jelly --beside\n  flotor new model jelly --vendor\n\nCreates the folder ./NAME with a plugin that builds, passes \
-    `flotor validate` and runs in the scene of the same folder.\nIt overwrites no file.")]
+    flotor new model jelly --language c\n  flotor new model jelly --beside\n  flotor new model jelly --vendor\n  \
+    flotor new scene duck --object duck.stl\n\nCreates the folder ./NAME with a plugin that builds, passes \
+    `flotor validate` and runs in the scene of the same folder; of a scene, the file \
+    ./NAME.toml.\nIt overwrites no file.")]
 pub(crate) struct NewArguments {
-    /// Kind of plugin
+    /// Kind of plugin, or a scene
     #[arg(value_enum)]
     kind: Kind,
-    /// Id of the plugin: at most 32 lower-case letters, digits and single hyphens, a letter first
+    /// Id of the plugin or name of the scene: at most 32 lower-case letters, digits and single hyphens, a letter first
     name: String,
+    /// With `scene`: mesh file (STL, OBJ, PLY, GLB) that the scene touches
+    #[arg(long, value_name = "FILE")]
+    object: Option<PathBuf>,
     /// A model too slow for the loop: it computes asynchronously and publishes contacts
     #[arg(long)]
     beside: bool,
@@ -39,25 +46,50 @@ enum Kind {
     Model,
     /// Measures the pose and exerts a wrench
     Device,
+    /// Touches the object of a mesh file
+    Scene,
 }
 
 pub(crate) fn run(arguments: &NewArguments) -> Result<(), CommandError> {
-    let template = match (arguments.kind, arguments.beside) {
-        (Kind::Model, false) => Template::Model,
-        (Kind::Model, true) => Template::AsynchronousModel,
-        (Kind::Device, false) => Template::Device,
-        (Kind::Device, true) => {
+    let name = PluginName::new(&arguments.name).map_err(ScaffoldError::from)?;
+    let template = match (arguments.kind, arguments.beside, &arguments.object) {
+        (Kind::Model, false, None) => Template::Model,
+        (Kind::Model, true, None) => Template::AsynchronousModel,
+        (Kind::Device, false, None) => Template::Device,
+        (Kind::Scene, false, Some(file)) => return new_scene(&name, file),
+        (Kind::Scene, _, None) => {
+            return Err(CommandError::Usage(
+                "`flotor new scene` needs a mesh file: add `--object FILE`".to_owned(),
+            ));
+        }
+        (Kind::Device | Kind::Scene, true, _) => {
             let problem =
                 "`--beside` is for models: the loop reads and writes a device in every tick; omit it";
             return Err(CommandError::Usage(problem.to_owned()));
         }
+        (Kind::Model | Kind::Device, _, Some(_)) => {
+            return Err(CommandError::Usage(
+                "only a scene has an object: omit `--object`, or use `flotor new scene`".to_owned(),
+            ));
+        }
     };
-    let name = PluginName::new(&arguments.name).map_err(ScaffoldError::from)?;
     refuse_an_id_in_use(&name)?;
     let sources = if arguments.vendor { Contract::copied } else { Contract::of_installation };
     let contract = sources(arguments.hal.as_deref())?;
     let made = scaffold(Path::new("."), &name, template, arguments.language, &contract)?;
     report(&name, &made);
+    Ok(())
+}
+
+/// Writes the scene of a mesh file.
+fn new_scene(name: &PluginName, object: &Path) -> Result<(), CommandError> {
+    let scene = object_scene(object, &[], &Registry::search(&[]))?;
+    let file = PathBuf::from(format!("{}.toml", name.id()));
+    let created =
+        std::fs::File::create_new(&file).and_then(|mut created| created.write_all(scene.text.as_bytes()));
+    created.map_err(|cause| CommandError::file(&file, "cannot write", cause))?;
+    let file = file.display().to_string();
+    say!("{file}\n\nNext:\n  {}", command_line(["run", file.as_str(), "--plot", "run.svg"]));
     Ok(())
 }
 

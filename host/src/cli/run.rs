@@ -1,5 +1,6 @@
 //! `flotor run`: runs a scene in the servo loop, with its observers.
 
+use crate::cli::object::{ObjectScene, object_scene};
 use crate::peak_bounds::PeakBound;
 use crate::platform::most_open_files;
 use crate::run_picture::RunPicture;
@@ -37,11 +38,15 @@ use std::path::{Path, PathBuf};
     flotor run --duration 5s --plot run.svg\n  \
     flotor run wall                                       a scene of Flotor's own (`flotor scenes` lists them)\n  \
     flotor run scene.toml --clock virtual --seed 7 --record run.mcap --json run.json\n  \
+    flotor run --object duck.stl --set surface.tool_radius_mm=1\n  \
     flotor run --set spring.variant=closed-form --set device.hand=press\n  \
     flotor run maglev.toml --allow-strong                 more than 20 N and 1 N·m, where scene and device allow it")]
 pub(crate) struct RunArguments {
     /// Scene file (TOML), or the name of one of Flotor's own scenes (default: demo)
     scene: Option<PathBuf>,
+    /// Touch the object of a mesh file (STL, OBJ, PLY, GLB) in place of a scene: the top of its box lies 5 mm below home
+    #[arg(long, conflicts_with = "scene", value_name = "FILE")]
+    object: Option<PathBuf>,
     /// Duration of the run: 10s, 500ms, 2min; a number alone is in seconds (default: the duration in the scene)
     #[arg(long, value_parser = duration_s, allow_hyphen_values = true, value_name = "TIME")]
     duration: Option<f64>,
@@ -117,9 +122,11 @@ pub(crate) fn run(arguments: RunArguments) -> Result<(), CommandError> {
     if arguments.json.is_on_standard_output() {
         keep_results_apart()?;
     }
-    let scene = scene(&arguments)?;
+    let object = object(&arguments)?;
+    let scene = scene(&arguments, object.as_ref())?;
     let options = run_options(&arguments)?;
     let mut session = prepare(&arguments, &scene, &options)?;
+    drop(object);
     let links = peer_links(&mut session, options.clock)?;
     let plugins = session.plugins().to_vec();
     let description = describe(&scene, &options, &plugins);
@@ -283,11 +290,18 @@ fn enough_files() -> Result<(), CommandError> {
     }
 }
 
+/// Reads the mesh file of `--object`; `None` without the option.
+fn object(arguments: &RunArguments) -> Result<Option<ObjectScene>, CommandError> {
+    let registry = || arguments.options.registry();
+    arguments.object.as_deref().map(|file| object_scene(file, &arguments.sets, &registry())).transpose()
+}
+
 /// Loads the scene and applies the options of the command line.
-fn scene(arguments: &RunArguments) -> Result<Scene, CommandError> {
-    let scene = match &arguments.scene {
-        Some(path) => Scene::load(path),
-        None => Scene::demo(),
+fn scene(arguments: &RunArguments, object: Option<&ObjectScene>) -> Result<Scene, CommandError> {
+    let scene = match (&arguments.scene, object) {
+        (_, Some(object)) => Scene::parse(Path::new("--object"), &object.text),
+        (Some(path), None) => Scene::load(path),
+        (None, None) => Scene::demo(),
     };
     let mut scene = scene.map_err(RunError::Scene)?;
     if let Some(duration_s) = arguments.duration {

@@ -282,7 +282,7 @@ impl Registry {
             id: id.to_owned(),
             kind,
             nearest: nearest(id, candidates.map(|known| known.id.as_str())).map(str::to_owned),
-            hint: broken().or_else(|| self.unbuilt()).or_else(unknown_program),
+            hint: broken().or_else(|| not_built(id)).or_else(|| self.unbuilt()).or_else(unknown_program),
         }
     }
 
@@ -314,6 +314,16 @@ impl Registry {
         loaded.push(Loaded { path: path.into(), stamp, hash, plugin: plugin.clone() });
         Ok(plugin)
     }
+}
+
+/// Ids of Flotor's own plugins outside the default build, because of what they need: readers of mesh files.
+const BUILT_BY_NAME: [&str; 1] = ["surface"];
+
+/// Returns the command that builds a plugin outside the default build; `None` for another id.
+fn not_built(id: &str) -> Option<String> {
+    let is_known = BUILT_BY_NAME.contains(&id);
+    is_known
+        .then(|| format!("it is built by name: `cargo build --release -p flotor-{id}` in Flotor's sources"))
 }
 
 /// Returns the reason why plugins beside this program are not found, if the system does not report the program's path; `None`

@@ -1,0 +1,178 @@
+//! From a file to a surface: unit, healing, and refusal of what cannot be felt safely.
+
+use crate::check::{Crossings, crossings};
+use crate::files::{self, Problem};
+use crate::normals::Normals;
+use crate::soup::Soup;
+use crate::surface::Surface;
+use crate::topology::{OneSided, connect};
+use crate::weld::{Welded, diagonal_m, weld};
+use flotor_hal::DVec3;
+use std::fmt;
+
+/// Unit of the coordinates of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// Guess from format and size.
+    Auto,
+    /// Metres.
+    Metre,
+    /// Millimetres.
+    Millimetre,
+    /// Inches.
+    Inch,
+}
+
+/// Choices for the reading of a file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// Unit of the coordinates.
+    pub unit: Unit,
+    /// Factor on the size.
+    pub scale: f64,
+    /// Angle between two faces above which their edge stays an edge, rad.
+    pub edge_angle_rad: f64,
+}
+
+/// Surface of a file, with what was changed.
+#[derive(Clone, Debug, Default)]
+pub struct Object {
+    /// Smooth surface.
+    pub surface: Surface,
+    /// Names of the groups.
+    pub names: Vec<String>,
+    /// What was guessed or changed, one sentence each.
+    pub remarks: Vec<String>,
+}
+
+/// Reason why an object cannot be touched.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Unfit {
+    /// The file cannot be read.
+    File(Problem),
+    /// The surface has only one side; place of the edge, m.
+    OneSided(DVec3),
+    /// Nothing is left of the mesh.
+    Empty,
+    /// The object is too large for the workspace; its diagonal, m.
+    TooLarge(f64),
+}
+
+/// Largest diagonal of an object, m: one metre of workspace to each side.
+const LARGEST_M: f64 = 4.0;
+/// Size of a file's box above which its unit is millimetres: no object in metres that a hand touches is larger.
+const METRES_UP_TO: f64 = 3.0;
+
+impl fmt::Display for Unfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(problem) => problem.fmt(f),
+            Self::OneSided(at) => write!(
+                f,
+                "the surface has only one side, as a Moebius strip: its faces meet with opposite sides at ({:.6} {:.6} {:.6}) m; \
+                 cut the surface there, or remove the band",
+                at.x, at.y, at.z
+            ),
+            Self::Empty => f.write_str("no face of the mesh has an area; export the mesh again"),
+            Self::TooLarge(size_m) => write!(
+                f,
+                "the object is {size_m:.3} m long, but at most {LARGEST_M} m can be touched; set `unit` or `scale`"
+            ),
+        }
+    }
+}
+
+impl From<Problem> for Unfit {
+    fn from(problem: Problem) -> Self {
+        Self::File(problem)
+    }
+}
+
+/// Reads an object from the bytes of a file named `name`. Not real-time.
+///
+/// # Errors
+/// [`Unfit`] with the place and the remedy.
+pub fn read(name: &str, bytes: Vec<u8>, reading: &Reading) -> Result<Object, Unfit> {
+    build(files::read(name, bytes)?, reading)
+}
+
+/// Builds an object from the triangles of a file. Not real-time.
+///
+/// # Errors
+/// [`Unfit`] with the place and the remedy.
+pub fn build(mut soup: Soup, reading: &Reading) -> Result<Object, Unfit> {
+    let names = std::mem::take(&mut soup.names);
+    let (metres, remark) = metres(&soup.points, soup.metres, reading.unit);
+    let mut remarks: Vec<String> = remark.into_iter().collect();
+    let (mut mesh, welded) = weld(soup, metres * reading.scale);
+    if mesh.triangles.is_empty() {
+        return Err(Unfit::Empty);
+    }
+    let size_m = diagonal_m(&mesh.points_m);
+    if size_m > LARGEST_M {
+        return Err(Unfit::TooLarge(size_m));
+    }
+    let topology = connect(&mut mesh).map_err(|OneSided(at_m)| Unfit::OneSided(at_m))?;
+    describe(&welded, &mut remarks);
+    let mut count = |number: usize, what: &str| {
+        if number > 0 {
+            remarks.push(format!("{number} {what}"));
+        }
+    };
+    count(topology.turned, "faces turned to the side of the others");
+    count(topology.crowded_edges, "edges of three or more faces, joined by the body between two");
+    let open = topology.components.iter().filter(|component| !component.is_closed).count();
+    count(open, "open parts, touched from both sides");
+    let normals = Normals::new(&mesh, &topology, reading.edge_angle_rad);
+    let surface = Surface::new(&mesh, &topology, &normals);
+    let Crossings { count, first_m } = crossings(&surface);
+    if let Some(at) = first_m {
+        remarks.push(format!(
+            "{count} pairs of faces run through each other, the first at ({:.6} {:.6} {:.6}) m: a ball may be held on the \
+             wrong face there; repair the mesh",
+            at.x, at.y, at.z
+        ));
+    }
+    Ok(Object { surface, names, remarks })
+}
+
+fn describe(welded: &Welded, remarks: &mut Vec<String>) {
+    for (number, what) in [
+        (welded.collapsed, "faces removed because two corners are one point"),
+        (welded.doubled, "faces removed because they were there twice"),
+        (welded.flipped, "faces without area removed"),
+        (welded.closed, "points of borders joined over gaps of rounding"),
+        (welded.unresolved, "points merged because binary32 does not resolve their edge"),
+    ] {
+        if number > 0 {
+            remarks.push(format!("{number} {what}"));
+        }
+    }
+}
+
+/// Returns the length of a unit of the file, m, and a sentence about a guess.
+fn metres(points: &[[f64; 3]], of_format: Option<f64>, unit: Unit) -> (f64, Option<String>) {
+    match unit {
+        Unit::Metre => (1.0, None),
+        Unit::Millimetre => (1.0e-3, None),
+        Unit::Inch => (0.0254, None),
+        Unit::Auto => {
+            if let Some(metres) = of_format {
+                return (metres, None);
+            }
+            let mut ends = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+            for point in points {
+                for axis in 0..3 {
+                    ends[0][axis] = ends[0][axis].min(point[axis]);
+                    ends[1][axis] = ends[1][axis].max(point[axis]);
+                }
+            }
+            let size = (0..3).map(|axis| ends[1][axis] - ends[0][axis]).fold(0.0, f64::max);
+            let (metres, word) = if size > METRES_UP_TO { (1.0e-3, "mm") } else { (1.0, "m") };
+            let remark = format!(
+                "the file has no unit and is {size:.6} long: taken as {word}; set `unit` if this is wrong"
+            );
+            (metres, Some(remark))
+        }
+    }
+}

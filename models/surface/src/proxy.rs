@@ -1,0 +1,336 @@
+//! Proxy: the ball that touches the surface and never enters it, between ticks.
+//!
+//! The centre `q` of the proxy is the point nearest to the centre `c` of the tool that the ball can reach without entering the
+//! surface (god-object of Zilles and Salisbury 1995; for a ball Ruspini, Kolarov and Khatib 1997). The energy is `k/2 |q - c|^2`, its
+//! gradient the force. With one contact `q` lies at a radius over the closest point of `c`, found by a walk from the last one; with
+//! several, in a groove, Newton's method on the tangent planes of up to four contacts finds it. A new position counts only if no
+//! other part of the surface lies in the ball there nor between the old centre and the new.
+
+use crate::closest::Foot;
+use crate::planes::{Plane, project};
+use crate::surface::{Place, Surface};
+use flotor_hal::DVec3;
+
+/// Most contacts at once: three determine a position, a fourth takes the place of one of them.
+pub(crate) const MOST_CONTACTS: usize = 4;
+/// Depth of a foreign patch in the ball that is not yet a contact, m.
+const TOLERANCE_M: f64 = 2.0e-10;
+/// Movement at which several contacts have settled, m.
+const SETTLED_M: f64 = 1.0e-12;
+/// Most Newton steps for several contacts.
+const MOST_STEPS: usize = 40;
+/// Most attempts to reach a goal, with a new contact or half the way each.
+const MOST_ROUNDS: usize = 24;
+/// Part of the radius that the centre moves between two searches of the ball: nothing fits through.
+const SAFE_SHARE: f64 = 0.9;
+/// Height of a lifted way from which the ways up and down are tested too, m.
+const HIGH_M: f64 = 1.0e-6;
+/// Gap at which a contact ends, m.
+const SKIN_M: f64 = 1.0e-7;
+
+/// Side of a surface on which the ball is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// Side of the normals.
+    Front,
+    /// Other side, of an open surface only.
+    Back,
+    /// Not determined: at the rim of an open surface.
+    Rim,
+}
+
+impl Side {
+    fn of(height: f64) -> Self {
+        if height < 0.0 { Self::Back } else { Self::Front }
+    }
+
+    fn sign(self) -> f64 {
+        if self == Self::Back { -1.0 } else { 1.0 }
+    }
+}
+
+/// Patch in contact with the ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Contact {
+    pub(crate) place: Place,
+    pub(crate) side: Side,
+}
+
+/// Contacts of a ball.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Contacts {
+    all: [Option<Contact>; MOST_CONTACTS],
+    count: usize,
+}
+
+impl Contacts {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Contact> + '_ {
+        self.all[..self.count].iter().copied().flatten()
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
+    pub(crate) fn first(&self) -> Option<Contact> {
+        self.iter().next()
+    }
+
+    /// Adds a contact; returns false if it is one already or there is no room.
+    fn add(&mut self, contact: Contact) -> bool {
+        let is_known = self.iter().any(|other| is_same(&other.place.foot, &contact.place.foot));
+        if is_known || self.count == MOST_CONTACTS {
+            return false;
+        }
+        self.all[self.count] = Some(contact);
+        self.count += 1;
+        true
+    }
+}
+
+/// Returns true for two feet at one point of one sheet.
+fn is_same(a: &Foot, b: &Foot) -> bool {
+    (a.point_m - b.point_m).length() < 1.0e-9 && a.normal.dot(b.normal) > 1.0 - 1.0e-9
+}
+
+/// Position of a centre over a place: direction from the surface to the centre, and height over the surface.
+#[derive(Clone, Copy, Debug)]
+struct Over {
+    direction: DVec3,
+    height_m: f64,
+}
+
+/// Ball and its contacts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Ball {
+    pub(crate) radius_m: f64,
+    /// Centre, m.
+    pub(crate) centre_m: DVec3,
+    pub(crate) contacts: Contacts,
+}
+
+/// Obstacle on the way of a ball.
+enum Obstacle {
+    /// Patch in the ball at the end of the way.
+    Inside(Contact),
+    /// Patch between the centres; where the centre meets it, m.
+    Between(Contact, DVec3),
+}
+
+impl Ball {
+    /// Returns the direction and height of `x_m` over a place on a side.
+    fn over(&self, surface: &Surface, place: &Place, side: Side, x_m: DVec3) -> Over {
+        let foot = &place.foot;
+        let from_m = x_m - foot.point_m;
+        let distance_m = from_m.length();
+        let is_inner = foot.at.iter().all(|x| *x > 0.0);
+        if is_inner {
+            let direction = foot.normal * side.sign();
+            let height_m = from_m.dot(direction);
+            // The direction between two points is exact far from the surface, the normal near it.
+            return match distance_m > 1.0e-6 && height_m > 0.0 {
+                true => Over { direction: from_m / distance_m, height_m: distance_m },
+                false => Over { direction, height_m },
+            };
+        }
+        if distance_m < 1.0e-9 {
+            // In a groove each wall holds a point for itself.
+            let direction = foot.normal * side.sign();
+            return Over { direction, height_m: from_m.dot(direction) };
+        }
+        let outward = surface.outward(place) * side.sign();
+        let is_outside = surface.is_border(place) || from_m.dot(outward) >= 0.0;
+        let sign = if is_outside { 1.0 } else { -1.0 };
+        Over { direction: from_m * (sign / distance_m), height_m: sign * distance_m }
+    }
+
+    /// Returns the side of an open surface on which the proxy is, seen from a place.
+    fn side(&self, surface: &Surface, place: &Place, before: Side) -> Side {
+        if surface.is_closed(place) {
+            return Side::Front;
+        }
+        if surface.is_border(place) {
+            return Side::Rim;
+        }
+        let height_m = (self.centre_m - place.foot.point_m).dot(place.foot.normal);
+        let is_clear = height_m.abs() > 0.5 * self.radius_m && height_m.abs() > 1.0e-9;
+        if before == Side::Rim || is_clear { Side::of(height_m) } else { before }
+    }
+
+    /// Returns the ball nearest to `goal_m` over its contacts; without contacts at the goal.
+    fn target(&self, surface: &Surface, goal_m: DVec3) -> Self {
+        match (self.contacts.count(), self.contacts.first()) {
+            (1, Some(contact)) => self.over_one(surface, goal_m, contact),
+            (0, _) | (_, None) => Self { centre_m: goal_m, ..*self },
+            _ => self.over_several(surface, goal_m),
+        }
+    }
+
+    fn over_one(&self, surface: &Surface, goal_m: DVec3, contact: Contact) -> Self {
+        let place = surface.walk(goal_m, contact.place.patch);
+        let side = self.side(surface, &place, contact.side);
+        let over = self.over(surface, &place, side, goal_m);
+        if over.height_m >= self.radius_m {
+            return Self { centre_m: goal_m, contacts: Contacts::default(), ..*self };
+        }
+        let mut contacts = Contacts::default();
+        contacts.add(Contact { place, side });
+        Self { centre_m: place.foot.point_m + over.direction * self.radius_m, contacts, ..*self }
+    }
+
+    fn over_several(&self, surface: &Surface, goal_m: DVec3) -> Self {
+        let mut ball = *self;
+        let mut touching = [false; MOST_CONTACTS];
+        for _ in 0..MOST_STEPS {
+            let mut planes = [Plane::default(); MOST_CONTACTS];
+            let (mut contacts, mut kept) = (Contacts::default(), 0);
+            for contact in ball.contacts.iter() {
+                let place = surface.walk(ball.centre_m, contact.place.patch);
+                let side = self.side(surface, &place, contact.side);
+                let over = ball.over(surface, &place, side, ball.centre_m);
+                if contacts.add(Contact { place, side }) {
+                    planes[kept] = Plane { normal: over.direction, least_m: self.radius_m - over.height_m };
+                    kept += 1;
+                }
+            }
+            ball.contacts = contacts;
+            let (step_m, active) = project(&planes[..kept], goal_m - ball.centre_m);
+            touching = active;
+            ball.centre_m += step_m;
+            if step_m.length() <= SETTLED_M {
+                break;
+            }
+        }
+        let mut left = Contacts::default();
+        for (contact, _) in ball.contacts.iter().zip(touching).filter(|(_, touches)| *touches) {
+            left.add(contact);
+        }
+        ball.contacts = left;
+        match (ball.contacts.count(), ball.contacts.first()) {
+            // One contact is exact by a walk.
+            (1, Some(contact)) => self.over_one(surface, goal_m, contact),
+            _ => ball,
+        }
+    }
+
+    /// Returns what lies between this ball and `next`, or in `next`.
+    fn obstacle(&self, surface: &Surface, next: &Self) -> Option<Obstacle> {
+        let way_m = next.centre_m - self.centre_m;
+        if way_m.length() > SAFE_SHARE * self.radius_m {
+            // In a groove the normal of one wall points into the other.
+            let normal = |ball: &Self| {
+                let up = |c: Contact| surface.outward(&c.place).normalize_or_zero() * c.side.sign();
+                ball.contacts.iter().map(up).sum::<DVec3>().normalize_or_zero()
+            };
+            let (here, there) = (normal(self), normal(next));
+            // Over a curved surface the chord runs through it: lift the way by more than its sagitta.
+            let lift_m = way_m.length() * ((here - there).length() * 0.25).min(0.25) + 1.0e-9;
+            let (from_m, to_m) = (self.centre_m + here * lift_m, next.centre_m + there * lift_m);
+            let skin = 1.0e-9;
+            let up = (self.centre_m + here * skin, from_m);
+            let down = (to_m, next.centre_m + there * skin);
+            let is_high = lift_m > HIGH_M;
+            let segments = [Some((from_m, to_m)), is_high.then_some(up), is_high.then_some(down)];
+            for (from_m, to_m) in segments.into_iter().flatten() {
+                let Some(crossing) = surface.first_crossing(from_m, to_m) else { continue };
+                let place = surface.place(crossing.patch, crossing.at);
+                let side = match surface.is_closed(&place) {
+                    true => Side::Front,
+                    false => Side::of(-(to_m - from_m).dot(place.foot.normal)),
+                };
+                let met_m = place.foot.point_m + place.foot.normal * (side.sign() * self.radius_m);
+                return Some(Obstacle::Between(Contact { place, side }, met_m));
+            }
+        }
+        if self.radius_m == 0.0 {
+            return None;
+        }
+        let in_front = |place: &Place| {
+            !surface.is_closed(place)
+                || (next.centre_m - place.foot.point_m).dot(surface.outward(place)) > 0.0
+        };
+        // What the ball touches is as far as its radius.
+        let is_touched = |patch| next.contacts.iter().any(|contact| contact.place.patch == patch);
+        let bound_m = self.radius_m - TOLERANCE_M;
+        let place = surface.nearest_besides(next.centre_m, bound_m, is_touched, in_front)?;
+        let side = self.side(surface, &place, Side::Rim);
+        Some(Obstacle::Inside(Contact { place, side }))
+    }
+
+    /// Moves the ball towards `goal_m` as far as the surface permits; returns false if the attempts are used up before the ball
+    /// is at rest, at a place that is free all the same. Real-time: bounded, no allocation.
+    pub(crate) fn settle(&mut self, surface: &Surface, goal_m: DVec3) -> bool {
+        let (mut share, mut blocked) = (1.0, 0);
+        for _ in 0..MOST_ROUNDS {
+            let to_m = self.centre_m + (goal_m - self.centre_m) * share;
+            let next = self.target(surface, if share == 1.0 { goal_m } else { to_m });
+            let contact = match self.obstacle(surface, &next) {
+                None => {
+                    *self = next;
+                    if share == 1.0 {
+                        return true;
+                    }
+                    (share, blocked) = (1.0, 0);
+                    continue;
+                }
+                Some(Obstacle::Inside(contact)) => contact,
+                Some(Obstacle::Between(contact, met_m)) => {
+                    if self.contacts.count() == 0 {
+                        self.centre_m = met_m;
+                    }
+                    contact
+                }
+            };
+            let mut is_new = self.contacts.add(contact);
+            if !is_new {
+                // A contact that touches nothing makes room.
+                self.drop_idle(surface);
+                is_new = self.contacts.add(contact);
+            }
+            // A new contact changes the way; if it does not, a shorter way does.
+            blocked += 1;
+            if !is_new || blocked > 2 {
+                share *= 0.5;
+            }
+        }
+        false
+    }
+
+    /// Removes contacts that the ball does not touch.
+    fn drop_idle(&mut self, surface: &Surface) {
+        let mut left = Contacts::default();
+        for contact in self.contacts.iter() {
+            let place = surface.walk(self.centre_m, contact.place.patch);
+            let over = self.over(surface, &place, contact.side, self.centre_m);
+            if over.height_m - self.radius_m <= SKIN_M {
+                left.add(Contact { place, ..contact });
+            }
+        }
+        self.contacts = left;
+    }
+
+    /// Returns the direction of the surface under the ball, from the surface outwards; of several contacts, their sum.
+    pub(crate) fn normal(&self, surface: &Surface) -> Option<DVec3> {
+        let sum: DVec3 =
+            self.contacts.iter().map(|c| self.over(surface, &c.place, c.side, self.centre_m).direction).sum();
+        sum.try_normalize()
+    }
+
+    /// Returns this ball over the surface under `near_m`, on its single contact whatever the side of `near_m`; with several contacts,
+    /// nearest to `near_m`.
+    pub(crate) fn placed_under(&self, surface: &Surface, near_m: DVec3) -> Self {
+        let Some(contact) = self.contacts.first().filter(|_| self.contacts.count() == 1) else {
+            return self.target(surface, near_m);
+        };
+        let place = surface.walk(near_m, contact.place.patch);
+        let direction = self.over(surface, &place, contact.side, near_m).direction;
+        let mut contacts = Contacts::default();
+        contacts.add(Contact { place, ..contact });
+        Self { centre_m: place.foot.point_m + direction * self.radius_m, contacts, ..*self }
+    }
+
+    /// Returns true if nothing lies in the ball `next` or between it and this one.
+    pub(crate) fn can_move_to(&self, surface: &Surface, next: &Self) -> bool {
+        self.obstacle(surface, next).is_none()
+    }
+}

@@ -1,0 +1,302 @@
+//! Touch of a ball that moves through space: home rule, path of a tick, friction.
+//!
+//! A tool whose ball overlaps the surface at the start, or lies in a closed body, feels nothing until the whole ball has been
+//! outside once. Friction is Coulomb's, on the proxy: it rests while the force along the surface is at most `static_friction` times
+//! the normal force, else it slides towards the frictionless place until that force is `kinetic_friction` times the normal force, and
+//! slides on at this coefficient until a tick in which it need not move. A slide shortens `|q - c|`, so friction only dissipates.
+
+use crate::material::{Material, Own};
+use crate::proxy::Ball;
+use crate::surface::Surface;
+use flotor_hal::DVec3;
+
+/// State of the friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Friction {
+    /// No contact, or none with friction.
+    #[default]
+    Free = 0,
+    /// The proxy rests.
+    Sticks = 1,
+    /// The proxy slides.
+    Slides = 2,
+}
+
+/// State of the touch.
+#[allow(clippy::large_enum_variant)] // one state an instance, in a tick without allocation
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    /// No step yet.
+    Start,
+    /// Overlapping since the start; distance to the surface in the last step, m.
+    Overlapping { tool_m: DVec3, distance_m: f64 },
+    /// Outside, perhaps in contact.
+    Outside { ball: Ball, tool_m: DVec3 },
+}
+
+/// Result of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer {
+    /// Force on the tool, N.
+    pub force_n: DVec3,
+    /// Energy of the spring, J.
+    pub energy_j: f64,
+    /// Distance of the tool's centre from that of the proxy, m.
+    pub depth_m: f64,
+    /// Point of the first contact, m, and the direction from the surface to the ball; `None` without contact.
+    pub contact: Option<(DVec3, DVec3)>,
+    /// Number of contacts.
+    pub contacts: usize,
+    /// State of the friction.
+    pub friction: Friction,
+    /// True while a tool that started in the surface has not been outside.
+    pub is_overlapping: bool,
+    /// True if the proxy is at rest.
+    pub is_settled: bool,
+}
+
+impl Answer {
+    const NOTHING: Self = Self {
+        force_n: DVec3::ZERO,
+        energy_j: 0.0,
+        depth_m: 0.0,
+        contact: None,
+        contacts: 0,
+        friction: Friction::Free,
+        is_overlapping: false,
+        is_settled: true,
+    };
+}
+
+/// Longest way of the tool in one search for balls below it, m: a finer way gives nothing for a point.
+const POINT_STEP_M: f64 = 2.0e-3;
+/// Shortest way into which a tick is divided, m.
+const LEAST_STEP_M: f64 = 5.0e-5;
+/// Most parts of a tick.
+const MOST_PARTS: f64 = 64.0;
+/// Most steps of the search for the border of the cone.
+const MOST_SECANTS: usize = 40;
+/// Distance from the border of the cone at which the search ends, m.
+const ON_CONE_M: f64 = 1.0e-14;
+
+/// Ball in the hand, and the surface it touches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    pub(crate) radius_m: f64,
+    state: State,
+    friction: Friction,
+}
+
+/// Materials of a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Materials {
+    /// Material of groups without values of their own.
+    pub common: Material,
+    /// Own values of each group.
+    pub own: Vec<Own>,
+}
+
+impl Materials {
+    fn of(&self, surface: &Surface, ball: &Ball) -> Material {
+        let group = ball.contacts.first().map(|contact| usize::from(surface.group(&contact.place)));
+        let own = group.and_then(|group| self.own.get(group));
+        own.map_or(self.common, |own| self.common.with(own))
+    }
+}
+
+impl Touch {
+    /// Places a ball of radius `radius_m` nowhere yet. Not real-time.
+    #[must_use]
+    pub fn new(radius_m: f64) -> Self {
+        Self { radius_m, state: State::Start, friction: Friction::Free }
+    }
+
+    /// Forgets all steps. Real-time: bounded, no allocation.
+    pub fn reset(&mut self) {
+        *self = Self::new(self.radius_m);
+    }
+
+    /// Returns true if the whole ball at `tool_m` is outside, and the distance of its centre from the surface, at most `bound_m`.
+    fn clearance(&self, surface: &Surface, tool_m: DVec3, bound_m: f64) -> (bool, f64) {
+        let Some(place) = surface.nearest(tool_m, bound_m, |_| true) else { return (true, bound_m) };
+        let is_outside =
+            !surface.is_closed(&place) || (tool_m - place.foot.point_m).dot(surface.outward(&place)) >= 0.0;
+        (is_outside && place.foot.distance_m >= self.radius_m, place.foot.distance_m)
+    }
+
+    /// Moves the tool to `tool_m` with `velocity_m_per_s` and returns what the hand feels. Real-time: bounded, no allocation.
+    pub fn step(
+        &mut self,
+        surface: &Surface,
+        materials: &Materials,
+        tool_m: DVec3,
+        velocity_m_per_s: DVec3,
+    ) -> Answer {
+        let (mut ball, from_m) = match self.state {
+            State::Outside { ball, tool_m } => (ball, tool_m),
+            State::Start | State::Overlapping { .. } => {
+                let bound_m = match self.state {
+                    // The nearest point of the last step bounds the search, with a margin for rounding.
+                    State::Overlapping { tool_m: last_m, distance_m } => {
+                        (distance_m + (tool_m - last_m).length()) * (1.0 + 1.0e-9) + 1.0e-9
+                    }
+                    _ => f64::INFINITY,
+                };
+                let (is_free, distance_m) = self.clearance(surface, tool_m, bound_m);
+                if !is_free {
+                    self.state = State::Overlapping { tool_m, distance_m };
+                    return Answer { is_overlapping: true, ..Answer::NOTHING };
+                }
+                let ball = Ball { radius_m: self.radius_m, centre_m: tool_m, contacts: Default::default() };
+                self.state = State::Outside { ball, tool_m };
+                return Answer::NOTHING;
+            }
+        };
+        let way_m = tool_m - from_m;
+        let part_m = if self.radius_m < LEAST_STEP_M { POINT_STEP_M } else { 0.9 * self.radius_m };
+        let parts = (way_m.length() / part_m).ceil().clamp(1.0, MOST_PARTS);
+        let mut is_settled = true;
+        let mut part = 1.0;
+        while part <= parts {
+            let goal_m = if part == parts { tool_m } else { from_m + way_m * (part / parts) };
+            is_settled &= self.advance(surface, materials, &mut ball, goal_m);
+            part += 1.0;
+        }
+        self.state = State::Outside { ball, tool_m };
+        let material = materials.of(surface, &ball);
+        Answer { is_settled, ..self.answer(surface, &material, &ball, tool_m, velocity_m_per_s) }
+    }
+
+    /// Moves the proxy for a tool at `goal_m`; returns true if the proxy is at rest.
+    fn advance(&mut self, surface: &Surface, materials: &Materials, ball: &mut Ball, goal_m: DVec3) -> bool {
+        let material = materials.of(surface, ball);
+        let normal = ball.normal(surface);
+        let Some(normal) = normal.filter(|_| material.static_friction > 0.0) else {
+            let settled = ball.settle(surface, goal_m);
+            let has_friction = materials.of(surface, ball).static_friction > 0.0 && ball.contacts.count() > 0;
+            self.friction = if has_friction { Friction::Sticks } else { Friction::Free };
+            return settled;
+        };
+        let coefficient = match self.friction {
+            Friction::Slides => material.sliding(),
+            _ => material.static_friction,
+        };
+        if excess_m(ball.centre_m - goal_m, normal, coefficient) <= 0.0 {
+            self.friction = Friction::Sticks;
+            return true;
+        }
+        let before = *ball;
+        let settled = ball.settle(surface, goal_m);
+        if ball.contacts.count() == 0 {
+            self.friction = Friction::Free;
+            return settled;
+        }
+        self.friction = Friction::Slides;
+        if let Some(edge) = at_cone(surface, &before, ball, goal_m, material.sliding()) {
+            // Between the two places the ball slides over what it touches; anything else is met by the frictionless ball.
+            if before.can_move_to(surface, &edge) {
+                *ball = edge;
+            }
+        }
+        settled
+    }
+
+    fn answer(
+        &self,
+        surface: &Surface,
+        material: &Material,
+        ball: &Ball,
+        tool_m: DVec3,
+        velocity_m_per_s: DVec3,
+    ) -> Answer {
+        let stretch_m = ball.centre_m - tool_m;
+        let Some(contact) = ball.contacts.first() else { return Answer::NOTHING };
+        let Some(mut normal) = ball.normal(surface) else { return Answer::NOTHING };
+        if material.static_friction == 0.0 || ball.contacts.count() > 1 {
+            // Without friction the spring pulls along the normal of all contacts.
+            normal = stretch_m.try_normalize().unwrap_or(normal);
+        }
+        let Material { stiffness_n_per_m, damping_ns_per_m, viscous_ns_per_m, .. } = *material;
+        let depth_m = stretch_m.dot(normal);
+        let outwards_m_per_s = velocity_m_per_s.dot(normal);
+        let normal_n = (stiffness_n_per_m * depth_m - damping_ns_per_m * outwards_m_per_s).max(0.0);
+        let along_m = stretch_m - normal * depth_m;
+        let along_m_per_s = velocity_m_per_s - normal * outwards_m_per_s;
+        let force_n = normal * normal_n + along_m * stiffness_n_per_m - along_m_per_s * viscous_ns_per_m;
+        Answer {
+            force_n,
+            energy_j: 0.5 * stiffness_n_per_m * stretch_m.length_squared(),
+            depth_m: stretch_m.length(),
+            contact: Some((contact.place.foot.point_m, normal)),
+            contacts: ball.contacts.count(),
+            friction: self.friction,
+            is_overlapping: false,
+            is_settled: true,
+        }
+    }
+
+    /// Returns the centre of the proxy while it touches, m.
+    #[must_use]
+    pub fn proxy_m(&self) -> Option<DVec3> {
+        match self.state {
+            State::Outside { ball, .. } if ball.contacts.count() > 0 => Some(ball.centre_m),
+            _ => None,
+        }
+    }
+}
+
+/// Returns by how much a stretch along the surface exceeds `coefficient` times its part along the normal, m; not positive for a ball
+/// that rests. A stretch that does not press counts as free.
+fn excess_m(stretch_m: DVec3, normal: DVec3, coefficient: f64) -> f64 {
+    let depth_m = stretch_m.dot(normal);
+    if depth_m <= 0.0 {
+        return f64::INFINITY;
+    }
+    (stretch_m - normal * depth_m).length() - coefficient * depth_m
+}
+
+/// Returns the ball between a frictionless place and the place `before` at which the force along the surface is on the cone;
+/// `None` if even the frictionless place is.
+fn at_cone(surface: &Surface, before: &Ball, free: &Ball, goal_m: DVec3, coefficient: f64) -> Option<Ball> {
+    let at = |share: f64| {
+        let near_m = free.centre_m.lerp(before.centre_m, share);
+        let ball = free.placed_under(surface, near_m);
+        let normal = ball.normal(surface)?;
+        Some((ball, excess_m(ball.centre_m - goal_m, normal, coefficient)))
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    let (free, mut low_m) = at(low)?;
+    if coefficient == 0.0 || low_m > 0.0 {
+        return None;
+    }
+    let way_m = (before.centre_m - free.centre_m).length();
+    let (ball, mut high_m) = at(high)?;
+    if high_m <= 0.0 {
+        return Some(ball);
+    }
+    high_m = high_m.min(way_m);
+    // Regula falsi; an end that stays twice counts half (Dowell and Jarratt 1971, BIT 11, 168-174).
+    let (mut best, mut last) = (free, 0);
+    for _ in 0..MOST_SECANTS {
+        let share = (low * high_m - high * low_m) / (high_m - low_m);
+        let share = if share > low && share < high { share } else { 0.5 * (low + high) };
+        let (ball, excess_m) = at(share)?;
+        let is_met = excess_m.abs() <= ON_CONE_M;
+        if is_met || excess_m <= 0.0 {
+            best = ball;
+        }
+        if is_met || (high - low) * way_m <= ON_CONE_M {
+            break;
+        }
+        let side = if excess_m <= 0.0 { -1 } else { 1 };
+        if excess_m <= 0.0 {
+            (low, low_m) = (share, excess_m);
+            high_m *= if last == side { 0.5 } else { 1.0 };
+        } else {
+            (high, high_m) = (share, excess_m.min(way_m));
+            low_m *= if last == side { 0.5 } else { 1.0 };
+        }
+        last = side;
+    }
+    Some(best)
+}

@@ -1,0 +1,203 @@
+//! Tree over the patches: four children a node, packed bottom-up over patches sorted along Hilbert's curve.
+//!
+//! No pointers: the children of node `i` of a level are nodes `4 i` to `4 i + 3` of the level below, and of the lowest level patches.
+//! The two lowest levels have discs, the others boxes, in binary32; distances are computed in binary32, with a margin.
+
+mod boxes;
+mod discs;
+mod hilbert;
+
+use crate::parallel::fill;
+use boxes::Boxes;
+pub(crate) use discs::Disc;
+use discs::Discs;
+use flotor_hal::DVec3;
+pub(crate) use hilbert::hilbert_order;
+
+/// Children of a node.
+const WIDTH: usize = 4;
+/// Levels of discs.
+const DISC_LEVELS: usize = 2;
+/// Most levels: four to this power is more than the number of patches that is read.
+const MOST_LEVELS: usize = 14;
+/// Size of the stack of a traversal.
+const STACK: usize = WIDTH * MOST_LEVELS;
+/// Rounding of a few operations in binary32, relative: eight units in the last place.
+const ROUNDING: f32 = 1.0e-6;
+
+#[allow(clippy::cast_possible_truncation)] // rounded outwards
+fn below(x: f64) -> f32 {
+    (x as f32).next_down()
+}
+
+#[allow(clippy::cast_possible_truncation)] // rounded outwards
+fn above(x: f64) -> f32 {
+    (x as f32).next_up()
+}
+
+#[allow(clippy::cast_possible_truncation)] // margins cover it
+fn narrow(v: DVec3) -> [f32; 3] {
+    [v.x as f32, v.y as f32, v.z as f32]
+}
+
+/// Tree over numbered items.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Tree {
+    /// Discs of the items, and of four of these.
+    discs: [Vec<Discs>; DISC_LEVELS],
+    /// Levels of boxes, from the lowest to the root; none for a few items.
+    boxes: Vec<Vec<Boxes>>,
+    count: usize,
+    /// Rounding of a coordinate to binary32 near the items, m.
+    rounding_m: f32,
+}
+
+impl Tree {
+    /// Packs `count` items with their discs and boxes (lower and upper corner, m) in their order. Not real-time.
+    #[must_use]
+    pub(crate) fn new(
+        count: usize,
+        disc: impl Fn(usize) -> Disc + Sync,
+        box_m: impl Fn(usize) -> [DVec3; 2] + Sync,
+    ) -> Self {
+        let mut items = vec![Discs::EMPTY; count.div_ceil(WIDTH)];
+        fill(&mut items, |node| {
+            Discs::of(WIDTH * node..count.min(WIDTH * (node + 1)), |item| Some(disc(item)))
+        });
+        let mut groups = vec![Discs::EMPTY; items.len().div_ceil(WIDTH)];
+        fill(&mut groups, |node| {
+            Discs::of(WIDTH * node..items.len().min(WIDTH * (node + 1)), |item| items[item].disc())
+        });
+        let mut lowest = vec![Boxes::EMPTY; groups.len().div_ceil(WIDTH)];
+        // Items under one box of the lowest level of boxes.
+        let share = WIDTH.pow(DISC_LEVELS as u32);
+        fill(&mut lowest, |node| {
+            let mut boxes = Boxes::EMPTY;
+            for item in WIDTH * share * node..count.min(WIDTH * share * (node + 1)) {
+                boxes.widen(item / share % WIDTH, box_m(item));
+            }
+            boxes
+        });
+        let mut boxes = vec![lowest];
+        while boxes.last().is_some_and(|level| level.len() > 1) {
+            let level = &boxes[boxes.len() - 1];
+            let mut up = vec![Boxes::EMPTY; level.len().div_ceil(WIDTH)];
+            for (i, node) in level.iter().enumerate() {
+                up[i / WIDTH].widen(i % WIDTH, node.all_m());
+            }
+            boxes.push(up);
+        }
+        let root = boxes.last().and_then(|root| root.first()).map(Boxes::all_m);
+        let largest = root.map_or(0.0, |[low, high]| low.abs().max(high.abs()).max_element());
+        Self { discs: [items, groups], boxes, count, rounding_m: above(largest * 2.4e-7) }
+    }
+
+    /// Returns the number of bytes.
+    #[must_use]
+    pub(crate) fn bytes(&self) -> usize {
+        let boxes: usize = self.boxes.iter().map(Vec::len).sum();
+        let discs: usize = self.discs.iter().map(Vec::len).sum();
+        boxes * size_of::<Boxes>() + discs * size_of::<Discs>()
+    }
+
+    /// Number of the level of the root.
+    fn top(&self) -> u32 {
+        u32::try_from(DISC_LEVELS + self.boxes.len()).unwrap_or(0) - 1
+    }
+
+    /// Returns a lower bound of the squared distance of a point to each child of a node.
+    #[inline]
+    fn squares(&self, level: u32, index: u32, c: [f32; 3]) -> [f32; WIDTH] {
+        let (level, index) = (level as usize, index as usize);
+        match self.discs.get(level) {
+            Some(discs) => discs[index].squares(c),
+            None => self.boxes[level - DISC_LEVELS][index].squares(c),
+        }
+    }
+
+    /// Visits the items nearer to `c_m` than the bound, nearest first as far as the tree knows; `visit` returns the new bound, m.
+    /// Real-time: bounded, no allocation.
+    pub(crate) fn nearest(&self, c_m: DVec3, bound_m: f64, mut visit: impl FnMut(usize) -> f64) {
+        let c = narrow(c_m);
+        let limit = |bound_m: f64| {
+            let bound = above(bound_m) + self.rounding_m;
+            bound * bound * (1.0 + 4.0 * ROUNDING)
+        };
+        if self.count == 0 || bound_m < 0.0 {
+            return;
+        }
+        let mut most = limit(bound_m);
+        let mut stack = [(0_u32, 0_u32, 0.0_f32); STACK];
+        stack[0] = (self.top(), 0, 0.0);
+        let mut used = 1;
+        while used > 0 {
+            used -= 1;
+            let (level, index, square) = stack[used];
+            if square > most {
+                continue;
+            }
+            let squares = self.squares(level, index, c);
+            if squares.iter().all(|square| *square > most) {
+                continue;
+            }
+            let mut order = [0_u32, 1, 2, 3];
+            let mut sort = |i: usize, j: usize| {
+                if squares[order[i] as usize] < squares[order[j] as usize] {
+                    order.swap(i, j);
+                }
+            };
+            // Farthest first: the stack returns the nearest.
+            sort(0, 1);
+            sort(2, 3);
+            sort(0, 2);
+            sort(1, 3);
+            sort(1, 2);
+            if level == 0 {
+                for child in order.into_iter().rev() {
+                    let item = WIDTH * index as usize + child as usize;
+                    if squares[child as usize] <= most && item < self.count {
+                        most = most.min(limit(visit(item)));
+                    }
+                }
+                continue;
+            }
+            for child in order {
+                if squares[child as usize] <= most && used < STACK {
+                    stack[used] = (level - 1, index * 4 + child, squares[child as usize]);
+                    used += 1;
+                }
+            }
+        }
+    }
+
+    /// Visits the items that the box of a segment may meet. Real-time: bounded, no allocation.
+    pub(crate) fn along(&self, from_m: DVec3, to_m: DVec3, mut visit: impl FnMut(usize)) {
+        if self.count == 0 {
+            return;
+        }
+        let low = narrow(from_m.min(to_m)).map(|x| x - self.rounding_m);
+        let high = narrow(from_m.max(to_m)).map(|x| x + self.rounding_m);
+        let mut stack = [(0_u32, 0_u32); STACK];
+        stack[0].0 = self.top();
+        let mut used = 1;
+        while used > 0 {
+            used -= 1;
+            let (level, index) = stack[used];
+            let meets = match self.discs.get(level as usize) {
+                Some(discs) => discs[index as usize].meets(low, high),
+                None => self.boxes[level as usize - DISC_LEVELS][index as usize].meets(low, high),
+            };
+            for child in (0..4_u32).filter(|child| meets[*child as usize]) {
+                let item = index * 4 + child;
+                if level == 0 {
+                    if (item as usize) < self.count {
+                        visit(item as usize);
+                    }
+                } else if used < STACK {
+                    stack[used] = (level - 1, item);
+                    used += 1;
+                }
+            }
+        }
+    }
+}
