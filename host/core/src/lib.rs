@@ -3,7 +3,9 @@
 //! - [`trace`]: record of a tick; [`demand`]: the outputs of models that a run needs.
 //! - [`mapping`]: mapping between the device frame and a model's frame.
 //! - [`limits`]: limits of force and motion, the wall at the end of a device's range; [`rendered_boundary`]: the same wall on
-//!   a device, in a loop; [`end_wall`]: the wall at the bounds of a model; [`region`]: the vectors that limits allow.
+//!   a device, in a loop, and [`boundary_wall`] its force; [`end_wall`]: the wall at the bounds of a model; [`region`]: the vectors
+//!   that limits allow.
+//! - [`broad_phase`]: the models that can act at a position.
 //! - [`asynchronous`]: timing of an asynchronous model, and the limits of its contacts.
 //! - [`plausibility`]: checks of device samples; [`oscillation`]: detection of an unstable loop.
 //! - [`grip`], [`grip_guard`]: the grip of a device, its check and limits; [`feel`]: stiffness and settling time that the hand
@@ -20,6 +22,8 @@
 #![forbid(unsafe_code)]
 
 pub mod asynchronous;
+pub mod boundary_wall;
+pub mod broad_phase;
 mod change;
 mod clock;
 pub mod coupling;
@@ -63,3 +67,7 @@ pub use random::Random;
 pub const LARGEST_SEED: u64 = 1 << 53;
 /// Largest number of devices in a run.
 pub const MAX_DEVICES: u16 = 8;
+
+#[cfg(test)]
+#[path = "../../../tests/src/random.rs"]
+mod test_random;

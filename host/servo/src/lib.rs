@@ -7,7 +7,6 @@
 //! Independent of scenes and files: the caller provides opened devices and prepared models.
 #![cfg_attr(rtsan, feature(sanitize))] // the step `blocking` of .ci/full
 
-mod boundary;
 mod budget;
 mod clock;
 pub mod engine;
@@ -19,7 +18,6 @@ mod hot_swap;
 pub mod last_stop;
 mod models;
 mod parameters;
-mod passivity;
 pub mod platform;
 mod queue;
 #[cfg(test)]

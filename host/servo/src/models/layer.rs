@@ -1,9 +1,9 @@
 //! One force model with all its instances: the unit that is blended, faded and replaced.
 
-use super::broad_phase::{Bounds, BroadPhase};
 use crate::budget::{Allowed, Answer, TimeBudget};
 use crate::engine::{Engine, Stepped};
 use flotor_contact::Shortcoming;
+use flotor_core::broad_phase::{Bounds, BroadPhase};
 use flotor_core::demand::TickDemand;
 use flotor_core::end_wall::EndWall;
 use flotor_core::grip::GripRecord;

@@ -4,7 +4,6 @@
 //! of lower priority; weights move at a constant rate, so that the force does not jump when one model yields to another. A layer
 //! without an object that can act at the handle, or with weight 0, is not stepped.
 
-mod broad_phase;
 mod fade;
 mod layer;
 mod slot;
@@ -14,8 +13,8 @@ pub use layer::{Layer, LayerReport};
 pub(crate) use slot::Slot;
 
 use super::{Heartbeat, Place};
-use broad_phase::BroadPhase;
 use fade::Fade;
+use flotor_core::broad_phase::BroadPhase;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, Demand, Tick};

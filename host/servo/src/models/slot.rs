@@ -4,9 +4,9 @@
 //! faded in; then the old layer is returned, to be dropped outside the loop. If a third layer arrives before that, the oldest is
 //! removed at once and its last contribution fades instead: the force does not jump however soon replacements follow each other.
 
-use super::broad_phase::Bounds;
 use super::fade::Fade;
 use super::layer::{Contribution, Layer, LayerReport, StepContext};
+use flotor_core::broad_phase::Bounds;
 use flotor_core::health::ModelHealth;
 use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
