@@ -13,7 +13,6 @@
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between the two ends of a coupling.
 //! - [`health`]: problems of a model, counted and as text.
 //! - [`guidance`]: the parameters that guide a simulated hand.
-//! - [`snapshot`]: saved state of a model or device, refused by an instance of another origin.
 //! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: number of a plugin in the run.
 //! - [`fade()`]: smooth step of a force; [`civil_date()`]: date of a day.
 //! - [`words`], [`sent`]: encoding of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
@@ -49,7 +48,6 @@ mod random;
 pub mod region;
 pub mod rendered_boundary;
 pub mod sent;
-pub mod snapshot;
 pub mod trace;
 pub mod words;
 

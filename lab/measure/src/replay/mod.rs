@@ -7,6 +7,7 @@ mod divergence;
 mod error;
 mod files;
 mod held;
+mod snapshot;
 mod state;
 
 pub use divergence::{Coverage, DivergenceCause};
