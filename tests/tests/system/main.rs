@@ -66,6 +66,7 @@ mod scene;
 mod scene_test;
 #[cfg(feature = "drop-ins")]
 mod services;
+mod shared;
 mod simulated;
 mod snapshot;
 mod stop_delivery;
