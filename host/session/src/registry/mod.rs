@@ -278,20 +278,22 @@ impl Registry {
         let candidates = self.found().iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
         let unknown_program = || installation_is_unknown().map(str::to_owned);
         let broken = || self.findings.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
+        // Outside the default build: only meshes need its readers.
+        let command = "build it in Flotor's sources: `cargo build --release -p flotor-surface`";
+        let by_name = || (id == "surface").then(|| command.to_owned());
         LookupError::Unknown {
             id: id.to_owned(),
             kind,
             nearest: nearest(id, candidates.map(|known| known.id.as_str())).map(str::to_owned),
-            hint: broken().or_else(|| not_built(id)).or_else(|| self.unbuilt()).or_else(unknown_program),
+            hint: broken().or_else(by_name).or_else(|| self.unbuilt()).or_else(unknown_program),
         }
     }
 
     /// Returns advice to build the plugins of the first folder of the scene that contains none; `None` if every folder has one.
     fn unbuilt(&self) -> Option<String> {
-        let holds_plugin =
-            |folder: &Path| self.found().iter().any(|known| known.path.parent() == Some(folder));
+        let with_plugin: Vec<_> = self.found().iter().filter_map(|known| known.path.parent()).collect();
         let mut of_scene = self.folders.iter().take(self.of_scene);
-        let empty = of_scene.find(|folder| !holds_plugin(folder))?;
+        let empty = of_scene.find(|folder| !with_plugin.contains(&folder.as_path()))?;
         Some(format!("`{}` contains no plugin: build it first", empty.display()))
     }
 
@@ -314,16 +316,6 @@ impl Registry {
         loaded.push(Loaded { path: path.into(), stamp, hash, plugin: plugin.clone() });
         Ok(plugin)
     }
-}
-
-/// Ids of Flotor's own plugins outside the default build, because of what they need: readers of mesh files.
-const BUILT_BY_NAME: [&str; 1] = ["surface"];
-
-/// Returns the command that builds a plugin outside the default build; `None` for another id.
-fn not_built(id: &str) -> Option<String> {
-    let is_known = BUILT_BY_NAME.contains(&id);
-    is_known
-        .then(|| format!("it is built by name: `cargo build --release -p flotor-{id}` in Flotor's sources"))
 }
 
 /// Returns the reason why plugins beside this program are not found, if the system does not report the program's path; `None`

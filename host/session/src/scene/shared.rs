@@ -29,8 +29,8 @@ pub(super) fn read(
             "`model.port` is the port of a shared model: set `shared = true`, or write `[model.mapping]`";
         return if ports.is_empty() { Ok(None) } else { Err(place.problem(unused)) };
     };
-    let distinct: std::collections::BTreeSet<u16> = on.iter().copied().collect();
-    if !(2..=MAX_PORTS).contains(&on.len()) || distinct.len() < on.len() {
+    let is_twice = |device: &u16| on.iter().filter(|other| *other == device).count() > 1;
+    if !(2..=MAX_PORTS).contains(&on.len()) || on.iter().any(is_twice) {
         return Err(location.problem(format!(
             "`model.shared` needs 2 to {MAX_PORTS} different devices: list them in `device`, or remove the key"
         )));

@@ -179,17 +179,15 @@ pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
     let period_s = 1.0 / scene.rate_hz;
     for model in &mut scene.models {
         let number = usize::from(model.device);
-        let device = opened.get(number);
+        let on = model.devices();
         let damping_ns_per_m = scene.devices.get(number).map_or(0.0, |used| used.damping_ns_per_m);
-        let devices = || model.devices().into_iter().filter_map(|number| opened.get(number));
+        let devices = || on.iter().filter_map(|number| opened.get(*number));
         let is_simulated = devices().all(|device| device.embodiment == Embodiment::Simulated);
-        let latency_s = devices().map(|device| device.capabilities.latency_s).fold(0.0, f64::max);
         if model.isolation == Isolation::ByOrigin && (clock == Clock::Virtual || is_simulated) {
             model.isolation = Isolation::None;
         }
-        let Some(Opened { capabilities, .. }) = device else { continue };
-        model.latency_s = latency_s;
-        if let Some(field) = &mut model.field {
+        model.latency_s = devices().map(|device| device.capabilities.latency_s).fold(0.0, f64::max);
+        if let (Some(field), Some(Opened { capabilities, .. })) = (&mut model.field, opened.get(number)) {
             field.contacts = field.contacts.on(capabilities, damping_ns_per_m, &scene.limits, period_s);
         }
     }
