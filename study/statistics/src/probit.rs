@@ -39,6 +39,8 @@ pub struct Probit {
 
 /// 95 % quantile of chi-square with one degree of freedom.
 const LIKELIHOOD_RATIO: f64 = 3.841_458_820_694_124;
+/// Relative rounding of a log-likelihood: a few hundred roundings of its terms.
+const ROUNDING: f64 = 1.0e-13;
 /// Number of steps of Fisher scoring, of a search for a maximum, and of a bisection.
 const STEPS: u32 = 200;
 /// Number of doublings in the search for the end of an interval.
@@ -158,14 +160,16 @@ fn maximum(counts: &[Counts]) -> Option<(f64, f64)> {
             (second * score - first * of_slope) / determinant,
             (weight * of_slope - first * score) / determinant,
         ];
-        // Halve the step until the likelihood rises.
+        // Halve the step until the likelihood falls by no more than its rounding: at the maximum a step of 1e-8 changes only its last
+        // digits, and scoring has to go on to the zero of the score.
+        let least = before - ROUNDING * (1.0 + before.abs());
         let mut share = 1.0;
         let mut now = likelihood(intercept + steps[0], slope + steps[1]);
-        while now < before && share > 1.0e-9 {
+        while now < least && share > 1.0e-9 {
             share *= 0.5;
             now = likelihood(intercept + share * steps[0], slope + share * steps[1]);
         }
-        if now < before {
+        if now < least {
             break;
         }
         intercept += share * steps[0];

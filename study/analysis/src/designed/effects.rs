@@ -59,8 +59,10 @@ impl DesignEffects {
         let mut pairs: Vec<LevelPair> = Vec::new();
         for (index, factor) in within.iter().enumerate().filter(|(_, factor)| factor.values.len() > 1) {
             let levels = level_means(&responses, &counts, index);
-            ranks.push(RankEffect { factor: factor.name.clone(), test: friedman(&levels).into() });
-            pairs.extend(compare(factor, &levels));
+            let unit = unit_of_ranks(levels.iter().flatten());
+            let tied = levels.iter().map(|row| rounded(row.iter().copied(), unit)).collect::<Vec<_>>();
+            ranks.push(RankEffect { factor: factor.name.clone(), test: friedman(&tied).into() });
+            pairs.extend(compare(factor, &levels, unit));
         }
         for (factor, groups) in groups.iter().filter(|(factor, _)| factor.values.len() > 1) {
             let of_group = |group: usize| -> Vec<f64> {
@@ -68,6 +70,8 @@ impl DesignEffects {
                 members.map(|(_, row)| mean(row)).collect()
             };
             let split: Vec<Vec<f64>> = (0..factor.values.len()).map(of_group).collect();
+            let unit = unit_of_ranks(split.iter().flatten());
+            let split: Vec<Vec<f64>> = split.into_iter().map(|group| rounded(group, unit)).collect();
             ranks.push(RankEffect { factor: factor.name.clone(), test: kruskal_wallis(&split).into() });
         }
         let anova = anova(&within, &groups, &responses).into();
@@ -120,16 +124,31 @@ fn level_means(responses: &[Vec<f64>], counts: &[usize], index: usize) -> Vec<Ve
     responses.iter().map(of_row).collect()
 }
 
-/// Compares each pair of levels, the later minus the earlier one.
-fn compare(factor: &Factor, levels: &[Vec<f64>]) -> Vec<LevelPair> {
-    let column = |level: usize| levels.iter().filter_map(|row| row.get(level).copied()).collect::<Vec<f64>>();
+/// Returns the unit to which numbers are rounded before they are ranked: 2^-40 of the largest, a power of two. Means of the same answers
+/// are tied then, whatever the order of their sums.
+fn unit_of_ranks<'a>(numbers: impl Iterator<Item = &'a f64>) -> f64 {
+    let largest = numbers.fold(0.0_f64, |largest, number| largest.max(number.abs()));
+    if largest > 0.0 { libm::exp2(libm::log2(largest).floor() - 40.0) } else { 1.0 }
+}
+
+fn rounded(numbers: impl IntoIterator<Item = f64>, unit: f64) -> Vec<f64> {
+    numbers.into_iter().map(|number| (number / unit).round() * unit).collect()
+}
+
+/// Compares each pair of levels, the later minus the earlier one; differences are rounded to `unit`.
+fn compare(factor: &Factor, levels: &[Vec<f64>], unit: f64) -> Vec<LevelPair> {
+    let differences = |low: usize, high: usize| {
+        let of_row = |row: &Vec<f64>| Some(row.get(high)? - row.get(low)?);
+        rounded(levels.iter().filter_map(of_row), unit)
+    };
     let count = factor.values.len();
     let pairs = (0..count).flat_map(|low| (low + 1..count).map(move |high| (low, high)));
     let tested: Vec<(String, Result<SignedRank, StatisticsError>)> = pairs
         .map(|(low, high)| {
             let name = |level: usize| factor.values.get(level).map_or(String::new(), ToString::to_string);
             let comparison = format!("{} {} - {}", factor.name, name(high), name(low));
-            (comparison, signed_rank(&column(high), &column(low)))
+            let differences = differences(low, high);
+            (comparison, signed_rank(&differences, &vec![0.0; differences.len()]))
         })
         .collect();
     let p: Vec<f64> = tested.iter().map(|(_, test)| test.as_ref().map_or(1.0, |test| test.p)).collect();

@@ -112,11 +112,14 @@ if (length(c(within, between)) > 0 && length(subjects) > 1) {
   }
 }
 
-# By ranks, over the mean of each subject at each level; a test of values that are all tied has no result.
+# By ranks, over the mean of each subject at each level; a test of values that are all tied has no result. Before they are ranked, numbers
+# are rounded to 2^-40 of the largest: means of the same answers are tied then, whatever the order of their sums.
+unit_of <- function(x) if (max(abs(x)) > 0) 2^(floor(log2(max(abs(x)))) - 40) else 1
+rounded <- function(x, unit = unit_of(x)) round(x / unit) * unit
 for (factor in within) {
   if (length(subjects) < 2) break
   wide <- tapply(cells$value, list(cells$subject, factor(cells[[factor]], levels_of[[factor]])), mean)
-  test <- friedman.test(wide)
+  test <- friedman.test(rounded(wide))
   if (is.nan(test$p.value)) next
   line(factor, sprintf("chi-square(%d) = %.2f, %s", test$parameter, test$statistic, p_text(test$p.value)))
 }
@@ -125,7 +128,7 @@ for (factor in between) {
   means <- tapply(cells$value, cells$subject, mean)
   group <- cells[[factor]][match(names(means), cells$subject)]
   if (length(unique(group)) < length(levels_of[[factor]])) next
-  test <- kruskal.test(means, factor(group))
+  test <- kruskal.test(rounded(means), factor(group))
   if (is.nan(test$p.value)) next
   line(factor, sprintf("chi-square(%d) = %.2f, %s", test$parameter, test$statistic, p_text(test$p.value)))
 }
@@ -134,7 +137,7 @@ for (factor in within) {
   wide <- tapply(cells$value, list(cells$subject, factor(cells[[factor]], levels_of[[factor]])), mean)
   pairs <- combn(ncol(wide), 2)
   tests <- lapply(seq_len(ncol(pairs)), function(index)
-    suppressWarnings(wilcox.test(wide[, pairs[2, index]], wide[, pairs[1, index]], paired = TRUE)))
+    suppressWarnings(wilcox.test(rounded(wide[, pairs[2, index]] - wide[, pairs[1, index]], unit_of(wide)))))
   p <- sapply(tests, function(test) test$p.value)
   # A comparison without any difference counts with 1.
   holm <- p.adjust(ifelse(is.nan(p), 1, p), "holm")

@@ -143,12 +143,23 @@ if within + between and len(subjects) > 1:
             f = (rest(products, smaller) - error) / df / (error / error_df)
             row(":".join(term + inside), f"F({df}, {error_df}) = {f:.2f}, {p_text(stats.f.sf(f, df, error_df))}")
 
-# By ranks, over the mean of each subject at each level; a test of values that are all tied has no result.
+# By ranks, over the mean of each subject at each level; a test of values that are all tied has no result. Before they are ranked, numbers
+# are rounded to 2^-40 of the largest: means of the same answers are tied then, whatever the order of their sums.
+def unit_of(x):
+    most = np.max(np.abs(x))
+    return 2.0 ** (np.floor(np.log2(most)) - 40) if most > 0 else 1.0
+
+
+def rounded(x, unit):
+    return np.round(x / unit) * unit
+
+
 by_level = {
     factor: cells.groupby(["subject", factor]).value.mean().unstack()[levels[factor]] for factor in within if len(subjects) > 0
 }
 for factor in within if len(subjects) > 1 else []:
     columns = by_level[factor].to_numpy().T
+    columns = rounded(columns, unit_of(columns))
     if len(columns) > 2:
         test = stats.friedmanchisquare(*columns)
         chi, p = test.statistic, test.pvalue
@@ -162,6 +173,7 @@ for factor in within if len(subjects) > 1 else []:
         row(factor, f"chi-square({len(columns) - 1}) = {chi:.2f}, {p_text(p)}")
 for factor in between if len(subjects) > 1 else []:
     means = cells.groupby("subject").value.mean().loc[subjects]
+    means = rounded(means, unit_of(means))
     split = [means[(group[factor] == level).to_numpy()] for level in levels[factor]]
     if min(len(one) for one in split) == 0 or means.nunique() < 2:
         continue
@@ -172,7 +184,7 @@ for factor in by_level:
     pairs = list(itertools.combinations(range(len(names)), 2))
     tests = []
     for low, high in pairs:
-        change = columns[high] - columns[low]
+        change = rounded(columns[high] - columns[low], unit_of(columns))
         nonzero = change[change != 0]
         if len(nonzero) == 0:
             tests.append((0.0, np.nan))
