@@ -39,6 +39,8 @@ pub struct Probit {
 
 /// 95 % quantile of chi-square with one degree of freedom.
 const LIKELIHOOD_RATIO: f64 = 3.841_458_820_694_124;
+/// Spread in ranges of the levels above which an end is no bound: the function is flat over the levels.
+const WIDEST: f64 = 1.0e3;
 /// Relative rounding of a log-likelihood: a few hundred roundings of its terms.
 const ROUNDING: f64 = 1.0e-13;
 /// Number of steps of Fisher scoring, of a search for a maximum, and of a bisection.
@@ -65,7 +67,8 @@ pub fn probit(counts: &[Counts]) -> Result<Probit, StatisticsError> {
         location: first + scale * location,
         location_interval: location_interval.map(|end| end.map(|end| first + scale * end)),
         spread: scale * spread,
-        spread_interval: spread_interval.map(|end| end.map(|end| scale * libm::exp(end))),
+        spread_interval: spread_interval
+            .map(|end| end.map(libm::exp).filter(|end| *end < WIDEST).map(|end| scale * end)),
         deviance,
         df,
         p: (df > 0.0).then(|| chi_square_above(deviance, df)),
@@ -299,6 +302,15 @@ mod tests {
         assert!((other.spread - 50.0 * found.spread).abs() < 1.0e-6);
         let [Some(low), Some(high)] = other.spread_interval else { panic!("{other:?}") };
         assert!(low < other.spread && other.spread < high);
+    }
+
+    /// Answers that hardly rise with the level do not bound the spread from above.
+    #[test]
+    fn a_flat_function_has_no_widest_spread() {
+        let found =
+            probit(&counts(&[(0.0, 2.0, 6.0), (1.0, 3.0, 6.0), (2.0, 3.0, 6.0)])).expect("a function");
+        let [Some(narrow), None] = found.spread_interval else { panic!("{found:?}") };
+        assert!(narrow < found.spread);
     }
 
     #[test]

@@ -180,7 +180,7 @@ fn a_person_goes_through_a_study_of_delay_and_stiffness() {
         }
     }
     let result = analysed(scratch.path(), "delayed");
-    assert_eq!(result["cells"].as_array().map(Vec::len), Some(8), "{result}");
+    assert_eq!(result["cells"].as_array().map(Vec::len), Some(8 * usize::from(people)), "{result}");
     let noted =
         Flotor::with(["study", "note", "delayed", "1", "wrote down later"]).inside(scratch.path()).run();
     assert_eq!(noted.code, Some(exit_code::OK), "{noted:?}");
