@@ -67,6 +67,7 @@ mod scene;
 mod scene_test;
 #[cfg(feature = "drop-ins")]
 mod services;
+mod shared;
 mod simulated;
 mod slow_contacts;
 mod snapshot;

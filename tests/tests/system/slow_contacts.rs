@@ -76,7 +76,7 @@ impl Scene<'_> {
         let layer = self.layer(&capabilities);
         let (parameters, _sender, _reports) = ParameterQueue::new(Vec::new(), 1);
         let (swaps, _host_swaps) = swap_queues(1, Vec::new());
-        let forces = Forces::new(1, vec![(0, layer)], Vec::new());
+        let forces = Forces::new(1, vec![(vec![0], layer)], Vec::new());
         let run = RunConfig {
             period_ns: CONFIG.period_ns,
             ramp_ns: 0,

@@ -1,9 +1,9 @@
 //! Passivity stage of the envelope: the energy balance of a device's port, and the optional passivity controller.
 //!
-//! Port energy and the controller that ports and couplings share: [`flotor_coupling::port_energy`].
+//! Port energy and the controller that ports and couplings share: [`crate::port_energy`].
 
+use crate::port_energy::{Controller, Displacement};
 use flotor_core::coupling::PassivityMode;
-use flotor_coupling::port_energy::{Controller, Displacement};
 use flotor_hal::{DVec3, DeviceState, Twist, Wrench};
 
 /// Acceleration of a handle from rest that the reserve covers, m/s²: 40 N on 0.58 kg would give 69 m/s², but a hand takes most of
@@ -21,7 +21,7 @@ fn reserve_j(period_s: f64) -> f64 {
 }
 
 /// Passivity observer of one port, with an optional passivity controller.
-pub(super) struct Passivity {
+pub struct Passivity {
     mode: PassivityMode,
     controller: Controller,
     reserve_j: f64,
@@ -34,7 +34,7 @@ pub(super) struct Passivity {
 
 impl Passivity {
     /// Creates the stage for a port with the force and torque limits `most`, N and N·m. Not real-time.
-    pub(super) fn new(mode: PassivityMode, controller: Controller, most: [DVec3; 2]) -> Self {
+    pub fn new(mode: PassivityMode, controller: Controller, most: [DVec3; 2]) -> Self {
         let driven = most.map(|most| DVec3::select(most.cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO));
         let reserve_j = reserve_j(controller.period_s());
         Self { mode, controller, reserve_j, driven, energy_j: 0.0, change: None }
@@ -45,14 +45,14 @@ impl Passivity {
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn observe(&mut self, moved: &Displacement, held: &Wrench) -> f64 {
+    pub fn observe(&mut self, moved: &Displacement, held: &Wrench) -> f64 {
         self.energy_j -= moved.work_j(held);
         self.change.take().map_or(0.0, |change| -moved.work_j(&change))
     }
 
     /// Returns the energy that the hand has put into the port less the energy that it received, J. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn energy_j(&self) -> f64 {
+    pub fn energy_j(&self) -> f64 {
         self.energy_j
     }
 
@@ -61,7 +61,7 @@ impl Passivity {
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn limit(&mut self, wrench: &Wrench, held: &Wrench, state: &DeviceState) -> Option<Wrench> {
+    pub fn limit(&mut self, wrench: &Wrench, held: &Wrench, state: &DeviceState) -> Option<Wrench> {
         match self.mode {
             PassivityMode::Observe => None,
             PassivityMode::Control => {

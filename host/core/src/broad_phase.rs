@@ -23,32 +23,32 @@ const ROUNDING_M: f64 = 1.0e-9;
 
 /// Axis-aligned box in the device frame around an object's region, m.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Bounds {
+pub struct Bounds {
     low_m: DVec3,
     high_m: DVec3,
 }
 
 impl Bounds {
     /// Creates a box about `center_m` with half extents `half_sides_m` and a margin for rounding.
-    pub(super) fn about(center_m: DVec3, half_sides_m: DVec3) -> Self {
+    pub fn about(center_m: DVec3, half_sides_m: DVec3) -> Self {
         let half_sides_m = half_sides_m + ROUNDING_M;
         Self { low_m: center_m - half_sides_m, high_m: center_m + half_sides_m }
     }
 
     /// Returns the bounding box of both boxes. Real-time: bounded, no allocation.
-    pub(super) fn with(self, other: Self) -> Self {
+    pub fn with(self, other: Self) -> Self {
         Self { low_m: self.low_m.min(other.low_m), high_m: self.high_m.max(other.high_m) }
     }
 
     /// Returns true if the handle is inside. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn contains(&self, position_m: DVec3) -> bool {
+    pub fn contains(&self, position_m: DVec3) -> bool {
         self.low_m.cmple(position_m).all() && position_m.cmple(self.high_m).all()
     }
 }
 
 /// Lookup of the objects that can act at a position. Allocates at construction only.
-pub(super) struct BroadPhase {
+pub struct BroadPhase {
     /// Box of each object; `None` for an object that can act anywhere.
     bounds: Box<[Option<Bounds>]>,
     /// Objects to check in every tick, in order, without duplicates.
@@ -70,7 +70,7 @@ struct Grid {
 impl BroadPhase {
     /// Sorts objects into the grid; `bounds` has the box in which each object can act, `None` for everywhere. Not real-time.
     #[allow(clippy::indexing_slicing)] // the cells of a box are cells of the grid
-    pub(super) fn new(bounds: Vec<Option<Bounds>>) -> Self {
+    pub fn new(bounds: Vec<Option<Bounds>>) -> Self {
         let boxed: Vec<Bounds> = bounds.iter().copied().flatten().collect();
         let mut grid = Grid::over(&boxed);
         let mut always = Vec::with_capacity(bounds.len());
@@ -94,12 +94,7 @@ impl BroadPhase {
     ///
     /// Real-time: bounded by the objects that are near or may act anywhere; no allocation.
     #[inline]
-    pub(super) fn for_each_near<T>(
-        &self,
-        objects: &mut [T],
-        position_m: DVec3,
-        mut meet: impl FnMut(&mut T),
-    ) {
+    pub fn for_each_near<T>(&self, objects: &mut [T], position_m: DVec3, mut meet: impl FnMut(&mut T)) {
         let (mut in_cell, mut always) = (self.grid.objects_at(position_m), &*self.always);
         loop {
             let number = match (in_cell, always) {
@@ -131,7 +126,7 @@ impl BroadPhase {
     /// Replaces the box of an object after a live parameter has changed it; the object is checked in every tick from now on.
     ///
     /// Real-time: bounded by the number of objects, no allocation.
-    pub(super) fn watch_always(&mut self, object: usize, bounds: Option<Bounds>) {
+    pub fn watch_always(&mut self, object: usize, bounds: Option<Bounds>) {
         let (Some(place), Ok(number)) = (self.bounds.get_mut(object), u32::try_from(object)) else { return };
         *place = bounds;
         if let Err(at) = self.always.binary_search(&number) {
@@ -142,14 +137,14 @@ impl BroadPhase {
     /// Returns the bounding box of all objects' boxes; `None` if an object can act everywhere, or there is no object.
     ///
     /// Real-time: bounded by the number of objects, no allocation.
-    pub(super) fn hull(&self) -> Option<Bounds> {
+    pub fn hull(&self) -> Option<Bounds> {
         let mut boxes = self.bounds.iter().copied();
         let first = boxes.next().flatten()?;
         boxes.try_fold(first, |hull, bounds| Some(hull.with(bounds?)))
     }
 
     /// Returns the box in which an object can act; `None` for everywhere. Real-time: bounded, no allocation.
-    pub(super) fn bounds(&self, object: usize) -> Option<Bounds> {
+    pub fn bounds(&self, object: usize) -> Option<Bounds> {
         self.bounds.get(object).copied().flatten()
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use flotor_core::limits::{Bound, Boundary};
+use crate::limits::{Bound, Boundary};
 use flotor_hal::{Capabilities, Pose, orientation_from_rotation_vector};
 
 /// What is surely inside meets no wall, anywhere near the edge of either range.

@@ -6,13 +6,13 @@
 //! limited force took. Until the difference is recovered, a force along the motion is scaled by the ratio of the energy taken to
 //! the energy requested, so that a spring returns exactly the energy that it received.
 
+use crate::port_energy::Displacement;
 use flotor_core::limits::Limits;
 use flotor_core::region::Region;
-use flotor_coupling::port_energy::Displacement;
 use flotor_hal::{Capabilities, DVec3, Twist, Wrench};
 
 /// Slew limit of a wrench, with the energy balances of force and torque.
-pub(super) struct SlewLimit {
+pub struct SlewLimit {
     force: Side,
     torque: Side,
     /// Last requested wrench; `None` if it was applied unchanged.
@@ -21,7 +21,7 @@ pub(super) struct SlewLimit {
 
 impl SlewLimit {
     /// Creates the limit from the slew rates of scene and device, of which the smaller apply. Not real-time.
-    pub(super) fn new(limits: &Limits, device: &Capabilities) -> Self {
+    pub fn new(limits: &Limits, device: &Capabilities) -> Self {
         let side = |scene: f64, device: f64| Side {
             most_per_s: scene.min(device),
             most_fall_per_s: device,
@@ -39,7 +39,7 @@ impl SlewLimit {
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn observe(&mut self, moved: &Displacement, held: &Wrench) -> f64 {
+    pub fn observe(&mut self, moved: &Displacement, held: &Wrench) -> f64 {
         if self.requested.is_none() && self.force.is_settled() && self.torque.is_settled() {
             return 0.0;
         }
@@ -54,7 +54,7 @@ impl SlewLimit {
     ///
     /// Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn limit(
+    pub fn limit(
         &mut self,
         request: &Wrench,
         held: &Wrench,

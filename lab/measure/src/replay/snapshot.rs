@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Plugin, parameters and loop of an instance whose state is saved.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct SnapshotOrigin {
+pub(super) struct SnapshotOrigin {
     /// Id of the plugin.
     pub id: String,
     /// Version of the plugin.
@@ -24,7 +24,7 @@ pub struct SnapshotOrigin {
 
 /// Saved state of an instance.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Snapshot {
+pub(super) struct Snapshot {
     origin: SnapshotOrigin,
     bytes: Vec<u8>,
 }
@@ -93,7 +93,12 @@ pub enum SnapshotError {
 impl SnapshotOrigin {
     /// Returns the origin of an instance in a loop.
     #[must_use]
-    pub fn new(id: &str, version: &str, config: &LoopConfig, parameters: Vec<(String, String)>) -> Self {
+    pub(super) fn new(
+        id: &str,
+        version: &str,
+        config: &LoopConfig,
+        parameters: Vec<(String, String)>,
+    ) -> Self {
         let LoopConfig { period_ns, seed } = *config;
         Self { id: id.to_owned(), version: version.to_owned(), period_ns, seed, parameters }
     }
@@ -102,7 +107,7 @@ impl SnapshotOrigin {
 impl Snapshot {
     /// Joins saved bytes with their origin.
     #[must_use]
-    pub fn new(origin: SnapshotOrigin, bytes: Vec<u8>) -> Self {
+    pub(super) fn new(origin: SnapshotOrigin, bytes: Vec<u8>) -> Self {
         Self { origin, bytes }
     }
 
@@ -110,7 +115,7 @@ impl Snapshot {
     ///
     /// # Errors
     /// [`SnapshotError`] with the first difference.
-    pub fn bytes_for(&self, present: &SnapshotOrigin) -> Result<&[u8], SnapshotError> {
+    pub(super) fn bytes_for(&self, present: &SnapshotOrigin) -> Result<&[u8], SnapshotError> {
         let SnapshotOrigin { id: saved, version, period_ns, seed, parameters } = &self.origin;
         let id = present.id.clone();
         if *saved != id {

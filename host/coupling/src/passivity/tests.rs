@@ -1,6 +1,6 @@
 use super::*;
-use crate::random::Random;
-use flotor_coupling::port_energy::PortObserver;
+use crate::port_energy::PortObserver;
+use crate::tests::random::Random;
 use flotor_hal::{DQuat, Pose};
 
 const PERIOD_S: f64 = 1.0e-3;

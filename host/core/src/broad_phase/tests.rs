@@ -1,5 +1,5 @@
 use super::*;
-use crate::random::Random;
+use crate::test_random::Random;
 
 fn random_point(random: &mut Random) -> DVec3 {
     DVec3::new(random.symmetric(), random.symmetric(), random.symmetric())

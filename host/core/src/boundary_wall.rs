@@ -7,19 +7,19 @@
 //!
 //! Stiffness and position of the wall come from a [`RenderedBoundary`].
 
-use flotor_core::rendered_boundary::RenderedBoundary;
+use crate::rendered_boundary::RenderedBoundary;
 use flotor_hal::{DVec3, DeviceState, Wrench, math, rotation_vector};
 use std::f64::consts::PI;
 
 /// Boundary wall of one device.
-pub(super) struct BoundaryWall {
+pub struct BoundaryWall {
     position: Ellipsoid,
     rotation: Ellipsoid,
 }
 
 impl BoundaryWall {
     /// Creates the wall of a device. Not real-time.
-    pub(super) fn new(rendered: &RenderedBoundary) -> Self {
+    pub fn new(rendered: &RenderedBoundary) -> Self {
         let RenderedBoundary {
             begins_m,
             begins_rad,
@@ -38,14 +38,14 @@ impl BoundaryWall {
     /// Returns the wrench of the wall on the handle, device frame; `None` inside, and for a state with non-finite numbers.
     /// Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn push(&self, state: &DeviceState) -> Option<Wrench> {
+    pub fn push(&self, state: &DeviceState) -> Option<Wrench> {
         if self.surely_holds(state) { None } else { self.push_outside(state) }
     }
 
     /// Returns true only for a pose inside, but not for all of these: the test overestimates a rotation by a factor of up to π/2,
     /// and is false close to the edge. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn surely_holds(&self, state: &DeviceState) -> bool {
+    pub fn surely_holds(&self, state: &DeviceState) -> bool {
         // A rotation vector is the axis times the angle, and an angle is at most pi times the sine of half the angle.
         let at_most_rad = state.pose.orientation().xyz() * PI;
         self.position.surely_holds(state.pose.position()) && self.rotation.surely_holds(at_most_rad)
