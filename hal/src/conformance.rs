@@ -24,6 +24,9 @@ pub enum Rule {
     ResetRepeats,
     /// After a restore of a saved state the same poses produce the same bits, also in another instance.
     RestoreRepeats,
+    /// With one port a shared object repeats the bits of a step; with several, the output at each is finite, whatever pose the
+    /// others have, and independent of what they demand.
+    Ports,
     /// 99 of 100 steps take less than half a period at 1 kHz.
     TimeBudget,
     /// An instance returns the same results alone, alternately with another instance, and on two threads.
@@ -51,7 +54,7 @@ pub enum Rule {
 
 impl Rule {
     /// All rules, in the order of the checks.
-    pub const ALL: [Rule; 20] = [
+    pub const ALL: [Rule; 21] = [
         Rule::Metadata,
         Rule::Loads,
         Rule::Schema,
@@ -61,6 +64,7 @@ impl Rule {
         Rule::SurvivesFarPoses,
         Rule::ResetRepeats,
         Rule::RestoreRepeats,
+        Rule::Ports,
         Rule::TimeBudget,
         Rule::Independent,
         Rule::NoThreads,
@@ -87,6 +91,7 @@ impl Rule {
             Rule::SurvivesFarPoses => "survives-far-poses",
             Rule::ResetRepeats => "reset-repeats",
             Rule::RestoreRepeats => "restore-repeats",
+            Rule::Ports => "ports",
             Rule::TimeBudget => "time-budget",
             Rule::Independent => "independent",
             Rule::NoThreads => "no-threads",
@@ -115,6 +120,9 @@ impl Rule {
             Rule::ResetRepeats => "after reset the same poses produce the same bits",
             Rule::RestoreRepeats => {
                 "after a restore of a saved state the same poses produce the same bits, also in another instance"
+            }
+            Rule::Ports => {
+                "a shared object with one port repeats the bits of a step, and is finite at every one of several ports"
             }
             Rule::TimeBudget => "99 of 100 steps need less than half a period at 1 kHz",
             Rule::Independent => {
@@ -165,6 +173,7 @@ impl Rule {
             | Rule::SurvivesFarPoses
             | Rule::ResetRepeats
             | Rule::RestoreRepeats
+            | Rule::Ports
             | Rule::TimeBudget
             | Rule::Independent
             | Rule::NoThreads

@@ -9,6 +9,7 @@ pub fn whole_program() -> Command {
         flotor_lab::cli::PARSER(),
         flotor_study_program::PARSER(),
         flotor_calibration::cli::PARSER(),
+        flotor_identify::cli::PARSER(),
         flotor_test::cli::PARSER(),
         flotor_lend::PARSER(),
     ];

@@ -29,6 +29,7 @@ pub(crate) fn described(name: &str, role: Role) -> PluginDescription {
         file: format!("lib{name}.so"),
         role,
         places_m: if is_device { Vec::new() } else { vec![[0.001, -0.002, 0.003], [0.25; 3]] },
+        shared_with: Vec::new(),
         blend: if is_device { Blend::default() } else { Blend { weight: 0.5, priority: 3, fade_s: 0.25 } },
         field: (!is_device).then_some(FieldTiming { rate_hz: 200.0, latency_s: 0.0025, contacts: CONTACTS }),
         latency_s: if is_device { 0.001 } else { 0.0 },

@@ -237,8 +237,8 @@ impl Ran {
 }
 
 /// Separate programs that `flotor` starts for some commands. `cargo test` builds them, because each has an integration test.
-const SEPARATE: [&str; 5] =
-    ["flotor-lab", "flotor-study", "flotor-calibration", "flotor-test", "flotor-lend"];
+const SEPARATE: [&str; 6] =
+    ["flotor-lab", "flotor-study", "flotor-calibration", "flotor-identify", "flotor-test", "flotor-lend"];
 
 /// Returns the path of `flotor` in the build folder; panics if it or a separate program is missing or not up to date.
 fn program() -> PathBuf {

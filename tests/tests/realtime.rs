@@ -136,6 +136,13 @@ fn the_host_allocates_nothing_with_two_devices_and_a_coupling() {
     assert_eq!(ticks_with_allocations(scene, "device = \"left\"\n", 10_000), Vec::<u64>::new());
 }
 
+#[test]
+fn the_host_allocates_nothing_while_two_hands_share_an_object_and_it_is_swapped() {
+    let scene = include_str!("../../host/scenes/two-hands.toml");
+    let scene = format!("{scene}\n[[change]]\nat_s = 2.0\nswap = \"membrane\"\n");
+    assert_eq!(ticks_with_allocations(&scene, "device = \"left\"\n", 4_000), Vec::<u64>::new());
+}
+
 /// The demo with a change at tick 5000 and another spring from tick 7000 on, in the middle of batches of ticks.
 const CHANGED: &str = "[[change]]\nat_s = 5.0\nset = \"spring.gamma_n=20\"\n\
     [[change]]\nat_s = 7.0\nswap = \"spring\"\n";

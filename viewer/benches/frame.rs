@@ -76,6 +76,7 @@ fn run(model: &str) -> RunDescription {
             file: String::new(),
             role: Role::Model(MappingConfig::default()),
             places_m: Vec::new(),
+            shared_with: Vec::new(),
             blend: Blend::default(),
             field: None,
             latency_s: 0.0,

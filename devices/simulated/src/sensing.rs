@@ -22,8 +22,8 @@ use flotor_hal::restorable;
 use optics::{Optics, OpticsGeometry, Spots};
 use velocity::{Estimator, EstimatorKind, Velocity};
 
-/// Number of stored samples: 32 ms at 10 kHz, the newest sample, and one more for a late sample.
-const KEPT_SAMPLES: usize = 322;
+/// Number of stored samples: 64 ms at 10 kHz, the newest sample, and one more for a late sample.
+const KEPT_SAMPLES: usize = 642;
 
 /// Parameters of optics, cells, converters, delay and velocity estimation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub struct SensingParameters {
     pub edge_nonlinearity: f64,
     /// Bandwidth of the cells with their amplifiers, Hz; 0 for no limit.
     pub bandwidth_hz: f64,
-    /// Time between a sample and its arrival, ns; at most 320 ticks (32 ms at 10 kHz).
+    /// Time between a sample and its arrival, ns; at most 640 ticks (64 ms at 10 kHz).
     pub latency_ns: u64,
     /// Velocity estimator.
     pub estimator: EstimatorKind,

@@ -19,6 +19,7 @@ pub mod snapshot;
 pub mod soft_range;
 pub mod variant;
 pub mod workspace_bounds;
+pub mod world;
 
 macro_rules! extensions {
     ($($name:ident),+ $(,)?) => {
@@ -43,6 +44,7 @@ extensions! {
     soft_range,
     variant,
     workspace_bounds,
+    world,
     calibration,
     connection,
     energy_ledger,

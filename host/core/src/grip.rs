@@ -36,7 +36,7 @@ pub fn to_words(grip: Option<GripRecord>) -> [u64; GRIP_WORDS] {
     [opening, velocity, delivered, model, commanded, state.kind() as u64 + 1]
 }
 
-/// Returns the grip of its words; `None` without one. Real-time: bounded, no allocation.
+/// Returns the grip that was stored in words; `None` without one. Real-time: bounded, no allocation.
 #[inline]
 #[must_use]
 pub fn from_words(

@@ -3,7 +3,9 @@
 //! - [`trace`]: record of a tick; [`demand`]: the outputs of models that a run needs.
 //! - [`mapping`]: mapping between the device frame and a model's frame.
 //! - [`limits`]: limits of force and motion, the wall at the end of a device's range; [`rendered_boundary`]: the same wall on
-//!   a device, in a loop; [`end_wall`]: the wall at the bounds of a model; [`region`]: the vectors that limits allow.
+//!   a device, in a loop, and [`boundary_wall`] its force; [`end_wall`]: the wall at the bounds of a model; [`region`]: the vectors
+//!   that limits allow.
+//! - [`broad_phase`]: the models that can act at a position.
 //! - [`asynchronous`]: timing of an asynchronous model, and the limits of its contacts.
 //! - [`plausibility`]: checks of device samples; [`oscillation`]: detection of an unstable loop.
 //! - [`grip`], [`grip_guard`]: the grip of a device, its check and limits; [`feel`]: stiffness and settling time that the hand
@@ -11,7 +13,6 @@
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between the two ends of a coupling.
 //! - [`health`]: problems of a model, counted and as text.
 //! - [`guidance`]: the parameters that guide a simulated hand.
-//! - [`snapshot`]: saved state of a model or device, refused by an instance of another origin.
 //! - [`Change`]: a change to a plugin while the loop ran; [`PluginIndex`]: number of a plugin in the run.
 //! - [`fade()`]: smooth step of a force; [`civil_date()`]: date of a day.
 //! - [`words`], [`sent`]: encoding of records that threads or processes share; [`lock()`]: locks of threads other than the loop.
@@ -20,6 +21,8 @@
 #![forbid(unsafe_code)]
 
 pub mod asynchronous;
+pub mod boundary_wall;
+pub mod broad_phase;
 mod change;
 mod clock;
 pub mod coupling;
@@ -45,7 +48,6 @@ mod random;
 pub mod region;
 pub mod rendered_boundary;
 pub mod sent;
-pub mod snapshot;
 pub mod trace;
 pub mod words;
 
@@ -63,3 +65,7 @@ pub use random::Random;
 pub const LARGEST_SEED: u64 = 1 << 53;
 /// Largest number of devices in a run.
 pub const MAX_DEVICES: u16 = 8;
+
+#[cfg(test)]
+#[path = "../../../tests/src/random.rs"]
+mod test_random;

@@ -27,6 +27,17 @@ impl Default for MappingConfig {
     }
 }
 
+/// Port of a shared model at one of its devices.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PortConfig {
+    /// Number of the device, from 0 in the scene's order.
+    pub device: u16,
+    /// Mapping between the frame of this device and that of the model.
+    pub mapping: MappingConfig,
+    /// Home of the model in the device frame, m.
+    pub place_m: [f64; 3],
+}
+
 /// Weight, priority and fade time of a model among the models of its scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {

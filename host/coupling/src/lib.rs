@@ -15,6 +15,9 @@
 //! If frames or scales differ, both ends use one shared frame, to which each device has a mapping, like the mapping of
 //! a model. Energies are given in the shared frame.
 //!
+//! The energy at the port of one device is in [`port_energy`]; [`passivity`] and [`slew`] are the stages of the envelope that keep
+//! accounts of it.
+//!
 //! [`Coupling`] has both ends in one loop with a delay of whole ticks. [`RemoteEnd`] is an end whose partner is on
 //! another host; other threads transport its messages over the [`Line`].
 //!
@@ -28,8 +31,10 @@ mod brake;
 mod claims;
 mod delay;
 mod end;
+pub mod passivity;
 pub mod port_energy;
 mod remote;
+pub mod slew;
 mod tank;
 #[cfg(test)]
 mod tests;

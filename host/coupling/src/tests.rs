@@ -1,7 +1,7 @@
 //! The coupling against what it promises: energy, delay, lost and overtaken messages, scales and frames.
 
 #[path = "../../../tests/src/random.rs"]
-mod random;
+pub(crate) mod random;
 
 use super::*;
 use flotor_core::mapping::MappingConfig;

@@ -9,6 +9,9 @@ use xxhash_rust::xxh3::Xxh3;
 /// Number of words of a record that depend on the run alone, not on the machine.
 const DIGEST_WORDS: usize = RECORD_WORDS - TIMING_WORDS;
 
+/// Index of the word of events and buttons, the last before the grip.
+const FLAGS_WORD: usize = DIGEST_WORDS - GRIP_WORDS - 1;
+
 /// Parts of a record that a digest covers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Coverage {
@@ -40,7 +43,8 @@ impl Coverage {
 ///
 /// The hash runs over the 64-bit words of each record, little-endian, in the order of [`TickRecord`], so it depends
 /// neither on the machine nor on the batches in which records arrive; a part that the digest does not [cover](Coverage)
-/// counts as zero. The words of a grip count for devices with a grip only. All NaNs count as equal and zero has no sign, because they differ between processors and compilers.
+/// counts as zero. The words of a grip count for devices with a grip only. All NaNs count as equal and zero has no sign, because they
+/// differ between processors and compilers.
 /// The digest distinguishes runs, but is not cryptographic: it is no protection against forgery.
 #[derive(Clone, Default)]
 #[must_use]
@@ -85,9 +89,9 @@ impl TraceDigest {
     }
 }
 
-/// Returns true for a word of a record that is an integer: index, time and period of the tick first, events and buttons last.
+/// Returns true for a word of a record that is an integer: index, time and period of the tick, events with buttons, kind of the grip.
 fn is_integer(index: usize) -> bool {
-    index < 3 || index == DIGEST_WORDS - 1
+    index < 3 || index == FLAGS_WORD || index == DIGEST_WORDS - 1
 }
 
 /// Returns the canonical bits of a number.

@@ -1,10 +1,10 @@
 //! Description of a run, known before the run begins and sufficient to repeat it.
 
-use crate::schema::{self, FORMAT, Mapping, Missing, Plugin, Run, Setting, Vector3};
+use crate::schema::{self, FORMAT, FORMAT_WITHOUT_SHARED, Mapping, Missing, Plugin, Run, Setting, Vector3};
 use flotor_core::Clock;
 use flotor_core::asynchronous::{ContactLimits, FieldTiming, StiffnessCap};
 use flotor_core::coupling::CouplingDescription;
-use flotor_core::mapping::{Blend, MappingConfig};
+use flotor_core::mapping::{Blend, MappingConfig, PortConfig};
 use flotor_hal::Demand;
 use prost::Message;
 use std::collections::BTreeMap;
@@ -52,6 +52,8 @@ pub struct PluginDescription {
     pub device: u16,
     /// Home positions of a model in the device frame, m, one for each instance.
     pub places_m: Vec<[f64; 3]>,
+    /// Further ports of a model whose one instance several devices share; empty for other plugins.
+    pub shared_with: Vec<PortConfig>,
     /// Blending of a model with the other models.
     pub blend: Blend,
     /// Timing of an asynchronous model; `None` for other plugins.
@@ -100,7 +102,7 @@ impl RunDescription {
 
     pub(crate) fn to_message(&self) -> Run {
         Run {
-            format: FORMAT,
+            format: self.format(),
             flotor_version: self.flotor_version.clone(),
             rate_hz: Some(self.rate_hz),
             duration_s: Some(self.duration_s),
@@ -129,6 +131,12 @@ impl RunDescription {
         })
     }
 
+    /// Returns the format: the earlier one without shared models, so that earlier versions can read the recording.
+    fn format(&self) -> u32 {
+        let is_shared = self.plugins.iter().any(|plugin| !plugin.shared_with.is_empty());
+        if is_shared { FORMAT } else { FORMAT_WITHOUT_SHARED }
+    }
+
     /// Returns the devices, in the order of the scene.
     pub fn devices(&self) -> impl Iterator<Item = &PluginDescription> {
         self.plugins.iter().filter(|plugin| plugin.role == Role::Device)
@@ -137,7 +145,7 @@ impl RunDescription {
     /// Returns the description as keys and values, for tools that show the metadata of an MCAP file.
     pub(crate) fn to_metadata(&self) -> BTreeMap<String, String> {
         let mut texts = BTreeMap::from([
-            ("format".to_owned(), FORMAT.to_string()),
+            ("format".to_owned(), self.format().to_string()),
             ("flotor_version".to_owned(), self.flotor_version.clone()),
             ("rate_hz".to_owned(), self.rate_hz.to_string()),
             ("duration_s".to_owned(), self.duration_s.to_string()),
@@ -186,6 +194,7 @@ impl PluginDescription {
                 Role::Device => schema::Felt::Force,
             }
             .into(),
+            shared_with: self.shared_with.iter().map(schema::Port::from).collect(),
         }
     }
 
@@ -216,6 +225,11 @@ impl PluginDescription {
         });
         Ok(Self {
             places_m,
+            shared_with: plugin
+                .shared_with
+                .into_iter()
+                .map(PortConfig::try_from)
+                .collect::<Result<_, _>>()?,
             blend,
             device: u16::try_from(plugin.device).map_err(|_| Missing("plugin.device"))?,
             field,
@@ -258,6 +272,29 @@ pub(crate) fn to_settings(pairs: &[(String, String)]) -> Vec<Setting> {
 pub(crate) fn from_settings(settings: Vec<Setting>) -> Vec<(String, String)> {
     settings.into_iter().map(|setting| (setting.key, setting.value)).collect()
 }
+
+impl From<&PortConfig> for schema::Port {
+    fn from(port: &PortConfig) -> Self {
+        Self {
+            device: port.device.into(),
+            mapping: Some(Mapping::new(&port.mapping)),
+            place: Some(Vector3::new(port.place_m)),
+        }
+    }
+}
+
+impl TryFrom<schema::Port> for PortConfig {
+    type Error = Missing;
+
+    fn try_from(port: schema::Port) -> Result<Self, Missing> {
+        Ok(Self {
+            device: u16::try_from(port.device).map_err(|_| Missing("plugin.shared_with.device"))?,
+            mapping: port.mapping.ok_or(Missing("plugin.shared_with.mapping"))?.config()?,
+            place_m: port.place.ok_or(Missing("plugin.shared_with.place"))?.to_array(),
+        })
+    }
+}
+
 impl From<ContactLimits> for schema::ContactLimits {
     fn from(limits: ContactLimits) -> Self {
         Self {

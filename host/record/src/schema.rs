@@ -22,8 +22,11 @@ pub(crate) const DESCRIPTOR_SET: &[u8] = include_bytes!("../proto/flotor.binpb")
 /// The encoding of messages and schemas, as MCAP's registry names it.
 pub(crate) const ENCODING: &str = "protobuf";
 
-/// Format that this program writes, and the highest that it reads.
-pub(crate) const FORMAT: u32 = 2;
+/// Highest format that this program reads, and the one that it writes of a run with shared models.
+pub(crate) const FORMAT: u32 = 3;
+
+/// Format of a run without shared models.
+pub(crate) const FORMAT_WITHOUT_SHARED: u32 = 2;
 
 /// Frame of all numbers; its axes are those of the device frame.
 const DEVICE_FRAME: &str = "device";
@@ -205,6 +208,13 @@ messages! {
         field: Option<FieldTiming> = 11 [message, optional],
         latency_s: Option<f64> = 12 [double, optional],
         felt: i32 = 13 [enumeration = "Felt"],
+        shared_with: Vec<Port> = 14 [message, repeated],
+    }
+
+    Port: Copy {
+        device: u32 = 1 [uint32],
+        mapping: Option<Mapping> = 2 [message, optional],
+        place: Option<Vector3> = 3 [message, optional],
     }
 
     FieldTiming: Copy {

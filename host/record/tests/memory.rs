@@ -27,6 +27,7 @@ fn the_index_of_a_long_recording_is_not_in_memory() {
         file: "libdevice.so".to_owned(),
         role: Role::Device,
         places_m: Vec::new(),
+        shared_with: Vec::new(),
         blend: Blend::default(),
         field: None,
         latency_s: 0.0,

@@ -32,7 +32,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // No scheduled changes, and none during the run.
     let (parameters, _sender, _reports) = ParameterQueue::new(Vec::new(), 1);
     let (swaps, _host_swaps) = swap_queues(1, Vec::new());
-    let forces = Forces::new(1, vec![(0, layer)], Vec::new());
+    let forces = Forces::new(1, vec![(vec![0], layer)], Vec::new());
     let run = RunConfig {
         period_ns: config.period_ns,
         ramp_ns: 0,

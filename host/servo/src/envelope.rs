@@ -1,19 +1,16 @@
 //! Safety envelope: the stages between models and device that every command passes.
 //!
 //! Order: guard (a wrench with a non-finite number becomes zero) -> gate (the start-up ramp and the other [states of the
-//! run](super::state)) -> velocity limit -> [boundary wall](super::boundary) -> force and torque limits -> [damping of an
-//! oscillation](flotor_core::oscillation) -> [passivity](super::passivity), and the limits once more if the controller has changed
+//! run](super::state)) -> velocity limit -> [boundary wall](flotor_core::boundary_wall) -> force and torque limits -> [damping of an
+//! oscillation](flotor_core::oscillation) -> [passivity](flotor_coupling::passivity), and the limits once more if the controller has changed
 //! the wrench -> slew limit.
 //!
-//! The [slew limit](slew) is last, so that no fault upstream, not even the loss of a model, makes the force jump; only the force
+//! The [slew limit](flotor_coupling::slew) is last, so that no fault upstream, not even the loss of a model, makes the force jump; only the force
 //! component that accelerates the handle may fall faster. The limits hold after the slew limit too: a wrench that it has changed is
 //! limited to the [regions](flotor_core::region) once more.
 
-mod slew;
-
-use super::boundary::BoundaryWall;
-use super::passivity::Passivity;
 use super::state::Gate;
+use flotor_core::boundary_wall::BoundaryWall;
 use flotor_core::grip::GripRecord;
 use flotor_core::grip_guard::GripGuard;
 use flotor_core::limits::{Bound, Boundary, Limits};
@@ -21,9 +18,10 @@ use flotor_core::oscillation::Oscillation;
 use flotor_core::region::Region;
 use flotor_core::rendered_boundary::RenderedBoundary;
 use flotor_core::trace::Events;
+use flotor_coupling::passivity::Passivity;
 use flotor_coupling::port_energy::{Controller, PortObserver};
+use flotor_coupling::slew::SlewLimit;
 use flotor_hal::{Capabilities, DVec3, DeviceState, GripAxis, Tick, Twist, Wrench};
-use slew::SlewLimit;
 
 /// Effect of a stage of the envelope over a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -2,97 +2,21 @@
 //!
 //! Servo and replay run the same code, so that a replay can be bit-exact.
 
-use super::Heartbeat;
-use super::models::{Contribution, Layer, LayerReport, ModelStack, Replacement, Slot, StepContext};
-use flotor_core::ModelOutputs;
+use super::models::{
+    Body, Contribution, Kind, Layer, LayerReport, ModelStack, Replacement, Sample, SharedSlot, Slot,
+    limit_observable,
+};
+use super::port::Port;
+use super::{Heartbeat, Place};
 use flotor_core::demand::TickDemand;
-use flotor_core::grip::GripRecord;
 use flotor_core::health::ModelHealth;
-use flotor_core::trace::Events;
 use flotor_coupling::{
     Coupling, CouplingDescription, CouplingEnds, Line, LinkStatistics, LinkTimeouts, PortSample, Pull, Reach,
     RemoteEnd, Tank, TankState,
 };
 use flotor_hal::abi::CallStatus;
-use flotor_hal::{DVec3, Demand, DeviceState, Tick, Wrench};
+use flotor_hal::{Demand, Tick};
 use flotor_loader::InstanceState;
-
-/// State of one device in a tick, device frame.
-#[derive(Clone, Copy, Debug)]
-pub struct Port {
-    /// Last valid state of the handle.
-    pub state: DeviceState,
-    /// Wrench commanded to the device, applied until the next tick.
-    pub commanded: Wrench,
-    /// Grip of the device; `None` without one.
-    pub grip: Option<GripRecord>,
-    /// Model outputs that reach the hand at this device.
-    at_hand: Demand,
-    /// Model outputs computed in this tick.
-    computed: Demand,
-    /// Wrench requested by models and couplings, without the models' torque if the device exerts none.
-    pub requested: Wrench,
-    /// Part of `requested` from the models.
-    by_models: Wrench,
-    /// Torque of the models that does not reach the hand, N·m; computed for observers that request it.
-    unfelt_torque_nm: DVec3,
-    /// Energy stored in models and couplings, J, if computed.
-    energy_j: f64,
-    /// Events of this tick.
-    pub events: Events,
-}
-
-impl Port {
-    /// Creates a port at rest; the outputs `at_hand` reach the hand ([`flotor_core::demand::hand_demand`]).
-    #[must_use]
-    pub const fn at_rest(at_hand: Demand) -> Self {
-        Self {
-            state: DeviceState::HOME,
-            commanded: Wrench::ZERO,
-            grip: None,
-            at_hand,
-            computed: at_hand,
-            requested: Wrench::ZERO,
-            by_models: Wrench::ZERO,
-            unfelt_torque_nm: DVec3::ZERO,
-            energy_j: 0.0,
-            events: Events::NONE,
-        }
-    }
-
-    /// Returns the outputs of models and couplings in this tick. Real-time: bounded, no allocation.
-    #[inline]
-    pub fn outputs(&self) -> ModelOutputs {
-        let Self { at_hand, computed, requested, unfelt_torque_nm, energy_j, .. } = self;
-        let wrench = if at_hand.contains(Demand::TORQUE) {
-            *requested
-        } else {
-            Wrench::new(requested.force(), requested.torque() + *unfelt_torque_nm)
-        };
-        ModelOutputs::new(wrench, *energy_j).limited_to(*computed)
-    }
-
-    /// Stores the request of the models; an output that only observers request is recorded, but not part of the request.
-    #[inline]
-    fn take(&mut self, demand: TickDemand, wrench: Wrench, energy_j: f64) {
-        (self.by_models, self.unfelt_torque_nm) = if self.at_hand.contains(Demand::TORQUE) {
-            (wrench, DVec3::ZERO)
-        } else {
-            (Wrench::from_force(wrench.force()), wrench.torque())
-        };
-        (self.requested, self.energy_j, self.computed) = (self.by_models, energy_j, demand.computed());
-    }
-
-    /// Adds the pull of a coupling to the request.
-    #[inline]
-    fn add(&mut self, pull: &Pull) {
-        self.requested = self.requested + pull.wrench;
-        self.energy_j += pull.energy_j;
-        if pull.is_damped {
-            self.events.insert(Events::PASSIVITY_DAMPED);
-        }
-    }
-}
 
 /// Statistics of a coupling after a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,39 +126,79 @@ impl Coupled {
     }
 }
 
-/// Position of a model: its device, and its index in the device's stack.
+/// Position of a model.
 #[derive(Clone, Copy, Debug)]
-struct Whereabouts {
-    device: usize,
-    place: usize,
+enum Whereabouts {
+    /// In the stack of a device.
+    OnDevice {
+        /// Number of the device.
+        device: usize,
+        /// Index in its stack.
+        place: usize,
+    },
+    /// Among the shared models, at this index.
+    Shared(usize),
 }
 
 /// Models and couplings of a run.
 pub struct Forces {
     /// The models of each device.
     stacks: Box<[ModelStack]>,
+    /// The models that several devices share.
+    shared: Box<[SharedSlot]>,
     /// Positions of the models, by their number in the scene.
     models: Box<[Whereabouts]>,
     couplings: Box<[Coupled]>,
 }
 
+/// Calls the same function on the slot of a model, on a device or shared; returns `none` if there is no such model.
+macro_rules! with_slot {
+    ($forces:expr, $model:expr, $slot:ident => $call:expr, $none:expr) => {
+        match $forces.models.get($model).copied() {
+            Some(Whereabouts::OnDevice { device, place }) => {
+                match $forces.stacks.get_mut(device).and_then(|stack| stack.slots.get_mut(place)) {
+                    Some($slot) => $call,
+                    None => $none,
+                }
+            }
+            Some(Whereabouts::Shared(index)) => {
+                match $forces.shared.get_mut(index).map(|shared| &mut shared.slot) {
+                    Some($slot) => $call,
+                    None => $none,
+                }
+            }
+            None => $none,
+        }
+    };
+}
+
 impl Forces {
-    /// Creates the force sources of `devices` devices; `layers` are the models in the scene's order, each with the number of its
-    /// device. Not real-time.
-    pub fn new(devices: usize, layers: Vec<(usize, Layer)>, couplings: Vec<Coupled>) -> Self {
-        let mut on_device: Vec<Vec<(usize, Layer)>> =
-            std::iter::repeat_with(Vec::new).take(devices).collect();
-        let mut models = Vec::with_capacity(layers.len());
-        for (number, (device, layer)) in layers.into_iter().enumerate() {
-            let Some(stack) = on_device.get_mut(device) else { continue };
-            models.push(Whereabouts { device, place: stack.len() });
-            stack.push((number, layer));
+    /// Creates the force sources of `devices` devices; `layers` are the models in the scene's order, each with the numbers of its
+    /// devices: one, or those of the ports of a shared model. Not real-time.
+    pub fn new(devices: usize, layers: Vec<(Vec<usize>, Layer)>, couplings: Vec<Coupled>) -> Self {
+        let mut on_device: Vec<Vec<_>> = std::iter::repeat_with(Vec::new).take(devices).collect();
+        let (mut models, mut shared) = (Vec::with_capacity(layers.len()), Vec::new());
+        for (number, (ports, Layer(layer))) in layers.into_iter().enumerate() {
+            match layer {
+                Kind::OnDevice(layer) => {
+                    let device = ports.first().copied().unwrap_or(devices);
+                    let Some(stack) = on_device.get_mut(device) else { continue };
+                    models.push(Whereabouts::OnDevice { device, place: stack.len() });
+                    stack.push((number, layer));
+                }
+                Kind::Shared(layer) => {
+                    models.push(Whereabouts::Shared(shared.len()));
+                    shared.push(SharedSlot::new(number, layer, ports));
+                }
+            }
         }
-        Self {
-            stacks: on_device.into_iter().map(ModelStack::new).collect(),
-            models: models.into(),
-            couplings: couplings.into(),
-        }
+        let stack = |(device, layers)| {
+            let priorities: Vec<u8> = shared.iter().filter_map(|shared| shared.priority_on(device)).collect();
+            ModelStack::new(layers, &priorities)
+        };
+        let mut stacks: Box<[ModelStack]> = on_device.into_iter().enumerate().map(stack).collect();
+        limit_observable(&shared, &mut stacks);
+        Self { stacks, shared: shared.into(), models: models.into(), couplings: couplings.into() }
     }
 
     /// Steps all couplings and models at the states of the ports, and stores the requested wrenches, energies and events in the
@@ -246,48 +210,39 @@ impl Forces {
         for (stack, port) in self.stacks.iter_mut().zip(&mut *ports) {
             let demand = TickDemand::new(port.at_hand, observed.limited_to(stack.observable()));
             let sampled = port.grip.map(|grip| grip.state);
-            let context = StepContext { tick, state: &port.state, grip: sampled.as_ref(), demand };
-            let Contribution { wrench, energy_j, effort } = stack.step(&context, heartbeat, &mut port.events);
+            let sample = Sample { state: &port.state, grip: sampled.as_ref(), demand };
+            let Contribution { wrench, energy_j, effort } =
+                stack.step(tick, &sample, heartbeat, &mut port.events);
             port.take(demand, wrench, energy_j);
             port.grip.iter_mut().for_each(|grip| grip.model = effort);
         }
+        if !self.shared.is_empty() {
+            let Self { shared, stacks, .. } = self;
+            shared.iter_mut().for_each(|shared| shared.step(tick, stacks, ports, observed, heartbeat));
+            heartbeat.enter(tick.index, Place::Host);
+        }
+        self.stacks.iter_mut().for_each(|stack| stack.settle(tick));
         self.couplings.iter().for_each(|coupled| coupled.add_to(ports));
-    }
-
-    /// Returns the stack of a model and the model's index in that stack.
-    #[inline]
-    fn stack_of(&mut self, model: usize) -> Option<(&mut ModelStack, usize)> {
-        let Whereabouts { device, place } = *self.models.get(model)?;
-        Some((self.stacks.get_mut(device)?, place))
-    }
-
-    /// Returns the slot of a model.
-    #[inline]
-    fn slot_of(&mut self, model: usize) -> Option<&mut Slot> {
-        let (stack, place) = self.stack_of(model)?;
-        stack.slots.get_mut(place)
-    }
-
-    /// Iterates over the slots of all models, by device.
-    #[inline]
-    fn slots(&mut self) -> impl Iterator<Item = &mut Slot> {
-        self.stacks.iter_mut().flat_map(|stack| &mut stack.slots)
     }
 
     /// Changes a live parameter of the current layer of the model numbered `model`; unsupported if there is no such model.
     /// Real-time: bounded by the model's objects, no allocation.
     pub fn set_parameter(&mut self, model: usize, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
-        match self.stack_of(model) {
-            Some((stack, place)) => stack.set_parameter(place, tick, parameter, value),
-            None => CallStatus::Unsupported,
+        match self.models.get(model).copied() {
+            Some(Whereabouts::OnDevice { device, place }) => match self.stacks.get_mut(device) {
+                Some(stack) => stack.set_parameter(place, tick, parameter, value),
+                None => CallStatus::Unsupported,
+            },
+            _ => {
+                with_slot!(self, model, slot => slot.set_parameter(tick, parameter, value), CallStatus::Unsupported)
+            }
         }
     }
 
     /// Sets the target weight of the model numbered `model`, 0 to 1, to which the weight moves at the model's fade rate;
     /// unsupported if there is no such model. Real-time: bounded, no allocation.
     pub fn set_weight(&mut self, model: usize, tick: &Tick, weight: f64) -> CallStatus {
-        let Some(slot) = self.slot_of(model) else { return CallStatus::Unsupported };
-        slot.set_weight(tick, weight);
+        with_slot!(self, model, slot => slot.set_weight(tick, weight), return CallStatus::Unsupported);
         CallStatus::Ok
     }
 
@@ -295,61 +250,94 @@ impl Forces {
     /// Real-time: bounded, no allocation.
     #[inline]
     pub fn generation(&mut self, model: usize) -> Option<u16> {
-        self.slot_of(model).map(|slot| slot.generation())
+        with_slot!(self, model, slot => Some(slot.generation()), None)
     }
 
-    /// Replaces a model; the new layer fades in from this tick on. Returns an older layer that was still fading out (or the new
-    /// layer if there is no such model), to be dropped outside the loop.
+    /// Replaces a model, a shared one at all its ports; the new layer fades in from this tick on. Returns an older layer that was
+    /// still fading out (or the new layer if there is no such model of its kind), to be dropped outside the loop.
     ///
     /// Real-time: bounded by the objects of the model, no allocation.
-    pub fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Box<Layer>> {
-        let Replacement { model, generation, layer } = replacement;
-        match self.stack_of(model) {
-            Some((stack, place)) => stack.replace(place, layer, generation, tick),
-            None => Some(layer),
+    pub fn replace(&mut self, replacement: Replacement, tick: &Tick) -> Option<Layer> {
+        let Replacement { model, generation, layer: Layer(layer) } = replacement;
+        let Self { stacks, shared, models, .. } = self;
+        match (models.get(model).copied(), layer) {
+            (Some(Whereabouts::OnDevice { device, place }), Kind::OnDevice(layer)) => {
+                match stacks.get_mut(device) {
+                    Some(stack) => stack.replace(place, layer, generation, tick).map(Layer::from),
+                    None => Some(layer.into()),
+                }
+            }
+            (Some(Whereabouts::Shared(index)), Kind::Shared(layer)) => {
+                let Some(slot) = shared.get_mut(index).map(|shared| &mut shared.slot) else {
+                    return Some(layer.into());
+                };
+                let pushed_out = slot.put(layer, generation, tick);
+                limit_observable(shared, stacks);
+                pushed_out.map(Layer::from)
+            }
+            (_, layer) => Some(Layer(layer)),
         }
     }
 
     /// Removes a layer that has faded out; returns the layer with its model number, or `None` if no layer has. Real-time: bounded
     /// by the models, no allocation.
     #[inline]
-    pub fn take_faded(&mut self, tick: &Tick) -> Option<(usize, Box<Layer>)> {
-        let take = |slot: &mut Slot| Some((slot.number, slot.take_faded(tick)?));
-        self.slots().find_map(take)
+    pub fn take_faded(&mut self, tick: &Tick) -> Option<(usize, Layer)> {
+        let mut on_devices = self.stacks.iter_mut().flat_map(|stack| &mut stack.slots);
+        let mut shared = self.shared.iter_mut().map(|shared| &mut shared.slot);
+        on_devices
+            .find_map(|slot| Some((slot.number, slot.take_faded(tick)?.into())))
+            .or_else(|| shared.find_map(|slot| Some((slot.number, slot.take_faded(tick)?.into()))))
     }
 
     /// Iterates over the states of all instances before a tick, each with its model number; `None` for one whose state cannot be
     /// saved. Not part of them: couplings, blends of models, and a layer that is fading out.
     pub fn states(&mut self, tick: u64) -> impl Iterator<Item = (usize, Option<InstanceState<'_>>)> {
-        self.slots().flat_map(move |slot| {
-            let number = slot.number;
-            slot.states(tick).map(move |state| (number, state))
-        })
+        let on_devices = self.stacks.iter_mut().flat_map(|stack| &mut stack.slots);
+        let shared = self.shared.iter_mut().map(|shared| &mut shared.slot);
+        let on_devices = on_devices.flat_map(move |slot| numbered_states(slot, tick));
+        on_devices.chain(shared.flat_map(move |slot| numbered_states(slot, tick)))
     }
 
     /// Returns true while a layer is fading out. Real-time: bounded by the models, no allocation.
     pub fn is_fading(&self) -> bool {
         self.stacks.iter().any(|stack| stack.slots.iter().any(Slot::is_fading))
+            || self.shared.iter().any(|shared| shared.slot.is_fading())
     }
 
     /// Returns a report on every current layer and every layer that is fading out; calls `on_query` with the model number before
     /// each query of a model's last message. Not real-time.
     pub fn reports(&mut self, on_query: impl Fn(usize)) -> Vec<LayerReport> {
-        self.slots().flat_map(|slot| slot.reports(&on_query)).collect()
+        let on_devices = self.stacks.iter_mut().flat_map(|stack| &mut stack.slots);
+        let shared = self.shared.iter_mut().flat_map(|shared| shared.slot.reports(&on_query));
+        on_devices.flat_map(|slot| slot.reports(&on_query)).chain(shared).collect()
     }
 
     /// Returns all current layers and layers that are fading out, each with its model number. Not real-time.
-    pub fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
-        self.stacks.into_iter().flat_map(|stack| stack.slots).flat_map(Slot::into_layers)
+    pub fn into_layers(self) -> impl Iterator<Item = (usize, Layer)> {
+        let on_devices = self.stacks.into_iter().flat_map(|stack| stack.slots).flat_map(Slot::into_layers);
+        let shared = self.shared.into_iter().flat_map(|shared| shared.slot.into_layers());
+        let shared = shared.map(|(number, layer)| (number, layer.into()));
+        on_devices.map(|(number, layer)| (number, layer.into())).chain(shared)
     }
 
     /// Returns health and last message of the current layer of each model, in the scene's order. Not real-time.
     pub fn health(&mut self) -> Vec<(ModelHealth, String)> {
-        (0..self.models.len()).filter_map(|model| Some(self.slot_of(model)?.health())).collect()
+        let health = |model| with_slot!(self, model, slot => Some(slot.health()), None);
+        (0..self.models.len()).filter_map(health).collect()
     }
 
     /// Returns the statistics of each coupling. Not real-time.
     pub fn coupling_outcomes(&self) -> Vec<CouplingOutcome> {
         self.couplings.iter().map(Coupled::outcome).collect()
     }
+}
+
+/// Iterates over the states of a slot's instances before a tick, each with the model number.
+fn numbered_states<B: Body>(
+    slot: &mut Slot<B>,
+    tick: u64,
+) -> impl Iterator<Item = (usize, Option<InstanceState<'_>>)> {
+    let number = slot.number;
+    slot.states(tick).map(move |state| (number, state))
 }

@@ -9,7 +9,7 @@ use flotor_hal::Tick;
 use rtrb::{Consumer, Producer, RingBuffer};
 
 /// Layer that is no longer needed, with its model number.
-pub(crate) type Retired = (usize, Box<Layer>);
+pub(crate) type Retired = (usize, Layer);
 
 /// Loop side of the hot swap: scheduled replacements, and both queues.
 pub struct LoopSwaps {
@@ -74,7 +74,7 @@ impl LoopSwaps {
     }
 
     /// Returns the layers of the replacements that were not applied, each with its model number. Not real-time.
-    pub fn into_layers(mut self) -> Vec<(usize, Box<Layer>)> {
+    pub fn into_layers(mut self) -> Vec<(usize, Layer)> {
         let scheduled = self.schedule.into_iter().filter_map(|(_, replacement)| replacement);
         let arriving = std::iter::from_fn(|| self.arriving.pop().ok());
         scheduled.chain(arriving).map(|replacement| (replacement.model, replacement.layer)).collect()

@@ -7,7 +7,6 @@
 //! Independent of scenes and files: the caller provides opened devices and prepared models.
 #![cfg_attr(rtsan, feature(sanitize))] // the step `blocking` of .ci/full
 
-mod boundary;
 mod budget;
 mod clock;
 pub mod engine;
@@ -19,8 +18,8 @@ mod hot_swap;
 pub mod last_stop;
 mod models;
 mod parameters;
-mod passivity;
 pub mod platform;
+mod port;
 mod queue;
 #[cfg(test)]
 #[path = "../../../tests/src/random.rs"]
@@ -42,7 +41,7 @@ pub use budget::TimeBudget;
 pub use clock::{Clock, Due, PaceLost, Schedule, SpinWindow, monotonic_ns, sleep_until};
 pub use engine::{Engine, Stepped};
 pub use envelope::{Envelope, EnvelopeEffects, StageEffect};
-pub use forces::{Coupled, CouplingOutcome, Forces, Port};
+pub use forces::{Coupled, CouplingOutcome, Forces};
 pub use heartbeat::{Heartbeat, Place, Stuck};
 pub use hot_swap::{HostSwaps, LoopSwaps, swap_queues};
 pub use last_stop::{LastStop, Unwound};
@@ -52,6 +51,7 @@ pub use parameters::{
     ScheduledChange, WEIGHT,
 };
 pub use platform::{PRIORITY_NAME, THREAD_ADVICE};
+pub use port::Port;
 pub use queue::{Consumer, Producer, drain, queue};
 pub use realtime::{Core, Privilege, RealTimeReport};
 pub use realtime::{enter_guard_priority, enter_real_time, enter_worker_priority, probe_real_time};

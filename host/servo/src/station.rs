@@ -1,7 +1,7 @@
 //! One device of a loop with its sample check and safety envelope.
 
 use super::envelope::{Envelope, EnvelopeEffects};
-use super::forces::Port;
+use super::port::Port;
 use super::state::{Cause, Gate, RunEvent};
 use flotor_core::demand::hand_demand;
 use flotor_core::grip::GripRecord;

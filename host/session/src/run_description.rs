@@ -20,6 +20,7 @@ pub fn describe(scene: &Scene, options: &RunOptions, plugins: &[PluginReport]) -
     let models = models.map(|(used, report)| PluginDescription {
         device: used.device,
         places_m: used.places_m.clone(),
+        shared_with: used.shared_with.clone(),
         blend: used.blend,
         ..describe_plugin(&used.plugin, Role::Model(used.mapping), report)
     });
@@ -46,6 +47,7 @@ fn describe_plugin(used: &PluginUse, role: Role, report: &PluginReport) -> Plugi
         role,
         device: 0,
         places_m: Vec::new(),
+        shared_with: Vec::new(),
         blend: Blend::default(),
         field: report.field,
         latency_s: report.latency_s,

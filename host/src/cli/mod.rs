@@ -56,6 +56,8 @@ const LAB: SeparateProgram<'static> = built_with_this("flotor-lab");
 const STUDY: SeparateProgram<'static> = built_with_this("flotor-study");
 /// Program for the calibration of devices.
 const CALIBRATION: SeparateProgram<'static> = built_with_this("flotor-calibration");
+/// Program that identifies real things.
+const IDENTIFY: SeparateProgram<'static> = built_with_this("flotor-identify");
 /// Program that tests scenes with expectations.
 const TEST: SeparateProgram<'static> = built_with_this("flotor-test");
 /// Program that lends a device to programs of other makers.
@@ -127,6 +129,8 @@ enum Command {
     Analyse(Separate),
     /// Measure the ratio of delivered to commanded vertical force, and correct it
     Calibrate(Separate),
+    /// Find the force law of a real thing from measured force and displacement
+    Identify(Separate),
     /// Emulate the controller of a device, to use its plugin without hardware
     Emulate(emulate::EmulateArguments),
     /// Run an unmodified program, written for another maker's device, on the device of a scene, within the scene's limits
@@ -208,6 +212,7 @@ fn carry_out(command: Command) -> Result<(), CommandError> {
         Command::Study(separate) => STUDY.carry_out("study", &separate.arguments),
         Command::Analyse(separate) => STUDY.carry_out("analyse", &separate.arguments),
         Command::Calibrate(separate) => CALIBRATION.carry_out("calibrate", &separate.arguments),
+        Command::Identify(separate) => IDENTIFY.carry_out("identify", &separate.arguments),
         Command::Emulate(arguments) => emulate::run(&arguments),
         Command::Lend(_) => check_lend().and_then(|()| LEND.carry_out("lend", &after_the_command())),
         Command::Doctor(arguments) => doctor::run(&arguments),

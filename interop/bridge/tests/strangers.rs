@@ -1,23 +1,28 @@
-//! Strangers at the ports of a bridge: they cost little, and a new member's emergency stop arrives in time.
+//! Strangers at the ports of a bridge: they cost little, a new member's emergency stop arrives in time, and no loop is later.
+//!
+//! Lateness needs the program: `FLOTOR=target/release/flotor`, as `.ci/full` sets it; its test says so and does nothing without.
 
-mod common;
 #[path = "../../../tests/src/attacks.rs"]
-mod strangers;
+mod attacks;
+mod common;
+#[path = "../../../tests/src/loop_lateness.rs"]
+mod loop_lateness;
 
+use attacks::{Place, Target};
 use common::process::Owned;
-use common::{FakeHost, free_port, wait_until};
+use common::{FakeHost, free_port, is_full_size, program, wait_until};
 use flotor_bridge::access::{Members, VALID, write_keys};
 use flotor_bridge::keys::Name;
 use flotor_bridge::link::{End, LinkOptions, open};
 use flotor_bridge::remote::Remote;
 use flotor_bridge::request::{Request, Right};
-use flotor_live::Ask;
+use flotor_live::{Ask, Client, Directory, Event};
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream, UdpSocket};
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use strangers::{Place, Target};
 
 /// The bound for the stop of a new member under a flood; a busy machine gets twice the time that it needs without one.
 const IN_TIME: Duration = Duration::from_secs(1);
@@ -44,20 +49,42 @@ fn flotor_bridge(arguments: &[&str]) -> Command {
     command
 }
 
+/// Keys of a bridge at this machine and of one member.
+fn keys() -> tempfile::TempDir {
+    let keys = tempfile::tempdir().unwrap();
+    let peers = vec![(Name::new("alan").unwrap(), Right::Watch)];
+    write_keys(keys.path(), &Members { hosts: vec!["localhost".to_owned()], peers, valid: VALID }).unwrap();
+    keys
+}
+
+/// Starts a bridge for the runs in a folder; returns its process and its port.
+fn serve(way: Way, keys: &tempfile::TempDir, runtime: &Path) -> (Owned, u16) {
+    let port = free_port();
+    let mut command = flotor_bridge(&["serve", "--name", "lab"]);
+    with_keys(&mut command, way, keys, "bridge");
+    command.args(["--listen", &endpoint(way, port)]).stderr(Stdio::null());
+    let process = Owned::start(command.env("XDG_RUNTIME_DIR", runtime));
+    wait_until("the bridge listens", || TcpStream::connect(("127.0.0.1", port)).is_ok());
+    (process, port)
+}
+
+/// Returns the first bytes that a member sends at a new connection.
+fn first_bytes(way: Way, keys: &tempfile::TempDir) -> Vec<u8> {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let mut command = flotor_bridge(&["list"]);
+    with_keys(&mut command, way, keys, "alan");
+    let at = endpoint(way, listener.local_addr().unwrap().port());
+    let _member = Owned::start(command.args(["--connect", &at]).stderr(Stdio::null()));
+    let mut bytes = vec![0; 4096];
+    let length = listener.accept().unwrap().0.read(&mut bytes).unwrap();
+    bytes.truncate(length);
+    bytes
+}
+
 impl Bridge {
     fn start(way: Way) -> Self {
-        let host = FakeHost::start_in("flotor");
-        let keys = tempfile::tempdir().unwrap();
-        let peers = vec![(Name::new("alan").unwrap(), Right::Watch)];
-        write_keys(keys.path(), &Members { hosts: vec!["localhost".to_owned()], peers, valid: VALID })
-            .unwrap();
-        let port = free_port();
-        let mut command = flotor_bridge(&["serve", "--name", "lab"]);
-        with_keys(&mut command, way, &keys, "bridge");
-        command.args(["--listen", &endpoint(way, port)]).stderr(Stdio::null());
-        command.env("XDG_RUNTIME_DIR", host.directory.path().parent().unwrap());
-        let process = Owned::start(&mut command);
-        wait_until("the bridge listens", || TcpStream::connect(("127.0.0.1", port)).is_ok());
+        let (host, keys) = (FakeHost::start_in("flotor"), keys());
+        let (process, port) = serve(way, &keys, host.directory.path().parent().unwrap());
         Self { host, keys, way, port, process }
     }
 
@@ -83,19 +110,6 @@ impl Bridge {
     /// Machine stops that the host has received.
     fn presses(&self) -> usize {
         self.host.asked.0.lock().unwrap().iter().filter(|ask| matches!(ask, Ask::MachineStop)).count()
-    }
-
-    /// The first bytes that a member sends at a new connection.
-    fn first_bytes(&self) -> Vec<u8> {
-        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-        let mut command = flotor_bridge(&["list"]);
-        with_keys(&mut command, self.way, &self.keys, "alan");
-        let at = endpoint(self.way, listener.local_addr().unwrap().port());
-        let _member = Owned::start(command.args(["--connect", &at]).stderr(Stdio::null()));
-        let mut bytes = vec![0; 4096];
-        let length = listener.accept().unwrap().0.read(&mut bytes).unwrap();
-        bytes.truncate(length);
-        bytes
     }
 
     fn target(&self) -> Target {
@@ -288,7 +302,36 @@ fn a_stranger_gets_no_answer_to_a_datagram() {
 fn strangers_cost_a_bridge_little() {
     for way in [Way::Tls, Way::Tcp] {
         let bridge = Bridge::start(way);
-        let request = bridge.first_bytes();
+        let request = first_bytes(way, &bridge.keys);
         bridge.target().withstand(&request, |_| bridge.ask_at(bridge.port).0.status.success());
+    }
+}
+
+/// Strangers take processor time of the bridge, another process than that of the loop.
+#[test]
+fn strangers_at_a_bridge_do_not_make_the_loop_later() {
+    let Some(flotor) = program() else { return };
+    let count = if is_full_size() { 80 } else { 12 };
+    for way in [Way::Tls, Way::Tcp] {
+        let (folder, keys) = (tempfile::tempdir().unwrap(), keys());
+        let scene = folder.path().join("scene.toml");
+        let text = "duration_s = 3000\n[device]\nplugin = \"simulated\"\n[limits]\nwatchdog_ms = 60000\n";
+        std::fs::write(&scene, text).unwrap();
+        let mut command = Command::new(&flotor);
+        command.arg("run").arg(&scene).env("XDG_RUNTIME_DIR", folder.path());
+        let _run = Owned::start(command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()));
+        let directory = Directory::at(folder.path().join("flotor"));
+        wait_until("the run is there", || Client::find(&directory).is_ok());
+        let (_bridge, port) = serve(way, &keys, folder.path());
+        let request = first_bytes(way, &keys);
+        let mut client = Client::find(&directory).unwrap();
+        let _ = client.request_client().ask(Ask::Watch { every: 1 }).unwrap();
+        let next = || match client.next(Duration::from_millis(20)).unwrap() {
+            Some(Event::Ticks { records, .. }) => records.iter().map(|record| record.lateness_ns).collect(),
+            _ => Vec::new(),
+        };
+        let place = Place::Port(([127, 0, 0, 1], port).into());
+        let windows = loop_lateness::windows(&place, folder.path(), &request, count, next);
+        loop_lateness::judge(&format!("bridge, {way:?}"), &windows);
     }
 }

@@ -153,18 +153,25 @@ impl Network {
     /// Advances the network by a step of `step_s`, at most [`Self::longest_step_s`]; returns the force on the ball, N, zero
     /// without a ball. Real-time: bounded, no allocation.
     pub fn step(&mut self, step_s: f64, ball: Option<&Ball>) -> DVec3 {
+        let mut on_ball_n = [DVec3::ZERO];
+        self.step_among(step_s, ball.map_or(&[], std::slice::from_ref), &mut on_ball_n);
+        let [on_ball_n] = on_ball_n;
+        on_ball_n
+    }
+
+    /// Advances the network by a step of `step_s` among several balls, and writes the force on each, N. At most
+    /// [`Self::longest_step_s`] over the root of their number: all of them may push one mass. Real-time: bounded, no allocation.
+    pub fn step_among(&mut self, step_s: f64, balls: &[Ball], on_balls_n: &mut [DVec3]) {
         let Self { state: State { positions_m, velocities_m_per_s, regions }, forces_n, .. } = self;
-        if let Some(ball) = ball {
-            regions.activate_near(ball);
-        }
+        balls.iter().for_each(|ball| regions.activate_near(ball));
         for range in regions.active() {
             forces_n.clear(range);
         }
         self.links.add_forces(positions_m, forces_n, regions);
-        let mut on_ball_n = DVec3::ZERO;
-        if let Some(ball) = ball {
+        for (ball, on_ball_n) in balls.iter().zip(on_balls_n) {
+            *on_ball_n = DVec3::ZERO;
             for range in regions.active() {
-                on_ball_n += ball.push(self.surroundings.contact_n_per_m, positions_m, forces_n, range);
+                *on_ball_n += ball.push(self.surroundings.contact_n_per_m, positions_m, forces_n, range);
             }
         }
         let damped = 1.0 / (1.0 + step_s * self.surroundings.damping_per_s);
@@ -179,7 +186,6 @@ impl Network {
             move_masses(z, vz, fz, inverse, Some(weight), step_s, damped);
         }
         regions.settle(positions_m, velocities_m_per_s);
-        on_ball_n
     }
 
     /// Steps without a ball until all masses are inactive, at most `most_steps` times; returns true if all masses are inactive.

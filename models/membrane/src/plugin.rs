@@ -4,10 +4,10 @@ use crate::mesh::{Mesh, Sheet};
 use crate::network::{Network, State, Surroundings};
 use crate::touch::Touch;
 use flotor_hal::{
-    Contact, ContactSet, ContactSetModel, DQuat, DVec3, ForceModel, Input, Memory, ModelInfo, Output,
-    Parameter, Part, Pose, Primitive, Refusal, ScalarField, SetParameterError, Settings, Shape, ShapeModel,
-    Sides, SoftRange, SoftRangeModel, StepStatus, Surface, SurfaceVertex, Wrench, choices, read_text,
-    restorable,
+    Contact, ContactSet, ContactSetModel, DQuat, DVec3, ForceModel, Input, MAX_PORTS, Memory, ModelInfo,
+    Output, Parameter, Part, Pose, Primitive, Refusal, ScalarField, SetParameterError, Settings, Shape,
+    ShapeModel, Sides, SoftRange, SoftRangeModel, StepStatus, Surface, SurfaceVertex, WorldModel, Wrench,
+    choices, read_text, restorable,
 };
 use std::path::Path;
 
@@ -187,12 +187,10 @@ impl ForceModel for Membrane {
     }
 
     fn step(&mut self, input: &Input) -> Output {
-        let (handle_m, status) = match Self::reached(input) {
-            Ok(reached) => reached,
-            Err(status) => return Output::new(Wrench::ZERO, f64::NAN, status),
-        };
-        let force_n = self.touch.advance(self.centre_m(handle_m), input.dt_s().min(LONGEST_TIME_S));
-        Output::new(Wrench::from_force(force_n), f64::NAN, status)
+        let mut output = [Output::default()];
+        self.step_ports(std::slice::from_ref(input), &mut output);
+        let [output] = output;
+        output
     }
 
     fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
@@ -210,6 +208,31 @@ impl ForceModel for Membrane {
 
     fn reset(&mut self) {
         self.touch.reset(DVec3::Z * self.radius_m);
+    }
+}
+
+impl WorldModel for Membrane {
+    /// Moves the ball of every port through one network. The ball of an invalid input stays where it is, and its hand feels no
+    /// force; without a valid input the network stands still.
+    fn step_ports(&mut self, inputs: &[Input], outputs: &mut [Output]) {
+        let mut centres_m: [DVec3; MAX_PORTS] = std::array::from_fn(|port| self.touch.centre_m(port));
+        let (mut forces_n, mut is_valid) = ([DVec3::ZERO; MAX_PORTS], false);
+        for (input, centre_m) in inputs.iter().zip(&mut centres_m) {
+            if let Ok((handle_m, _)) = Self::reached(input) {
+                (*centre_m, is_valid) = (self.centre_m(handle_m), true);
+            }
+        }
+        if is_valid && let [first, ..] = inputs {
+            let centres_m = &centres_m[..inputs.len().min(MAX_PORTS)];
+            self.touch.advance_among(centres_m, first.dt_s().min(LONGEST_TIME_S), &mut forces_n);
+        }
+        for ((input, output), force_n) in inputs.iter().zip(outputs).zip(forces_n) {
+            let (force_n, status) = match Self::reached(input) {
+                Ok((_, status)) => (force_n, status),
+                Err(status) => (DVec3::ZERO, status),
+            };
+            *output = Output::new(Wrench::from_force(force_n), f64::NAN, status);
+        }
     }
 }
 
@@ -269,7 +292,7 @@ impl SoftRangeModel for Membrane {
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("damping_per_s", 5.0, 500.0, 5.0)];
 }
 
-flotor_hal::export_model!(Membrane, contact_set, shape, snapshot, soft_range);
+flotor_hal::export_model!(Membrane, contact_set, shape, snapshot, soft_range, world);
 
 #[cfg(test)]
 mod tests {

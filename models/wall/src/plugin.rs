@@ -1,12 +1,13 @@
-//! Plugin of the wall: parameters, and the contact state of one handle.
+//! Plugin of the wall: parameters, and the contact state of each handle.
 
 use crate::proxy::Proxy;
 use crate::shape::Shape;
 use crate::surface::Surface;
 use flotor_hal::{
     self as hal, ActiveRegion, ActiveRegionModel, Choices, Contact, ContactSet, ContactSetModel, DQuat,
-    DVec3, Demand, ForceModel, Form, Input, Memory, ModelInfo, Output, Parameter, Part, Pose, Primitive,
-    Refusal, SetParameterError, Settings, ShapeModel, SoftRange, SoftRangeModel, StepStatus, Wrench, choices,
+    DVec3, Demand, ForceModel, Form, Input, MAX_PORTS, Memory, ModelInfo, Output, Parameter, Part, Pose,
+    Primitive, Refusal, SetParameterError, Settings, ShapeModel, SoftRange, SoftRangeModel, StepStatus,
+    WorldModel, Wrench, choices,
 };
 
 /// Workspace limit along each axis, m; a position beyond it is limited to the edge, with status `Clamped`.
@@ -25,13 +26,28 @@ pub struct Wall {
     size_mm: f64,
     height_m: f64,
     surface: Surface,
-    proxy: Proxy,
+    /// Proxy of the handle at each port.
+    proxies: [Proxy; MAX_PORTS],
     /// Proxy for the drawing, which follows the drawn poses instead of the ticks.
     drawn_proxy: Proxy,
     drawn: hal::Shape,
 }
 
-hal::restorable!(Wall { proxy } without { shape, size_mm, height_m, surface, drawn_proxy, drawn });
+hal::restorable!(Wall { proxies } without { shape, size_mm, height_m, surface, drawn_proxy, drawn });
+
+/// Returns the output at a handle with its proxy on a surface of this shape, whose top is `height_m` above home.
+#[inline]
+fn touch(proxy: &mut Proxy, (shape, surface, height_m): (&Shape, &Surface, f64), input: &Input) -> Output {
+    let velocity_m_per_s = input.twist.linear();
+    if !input.pose.is_finite() || !velocity_m_per_s.is_finite() {
+        return Output::new(Wrench::ZERO, 0.0, StepStatus::InvalidInput);
+    }
+    let position_m = input.pose.position();
+    let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
+    let pull = proxy.follow(shape, surface, reached_m - DVec3::Z * height_m, velocity_m_per_s);
+    let status = if reached_m == position_m { StepStatus::Ok } else { StepStatus::Clamped };
+    Output::new(Wrench::from_force(pull.force_n), pull.energy_j, status)
+}
 
 impl ForceModel for Wall {
     const INFO: ModelInfo = ModelInfo::new("wall", "Wall", "A stiff wall, sphere or box with friction")
@@ -78,23 +94,15 @@ impl ForceModel for Wall {
                 damping_ns_per_m: settings.number_or_default("damping_ns_per_m"),
                 friction: settings.number_or_default("friction"),
             },
-            proxy: Proxy::default(),
+            proxies: [Proxy::default(); MAX_PORTS],
             drawn_proxy: Proxy::default(),
             drawn: hal::Shape::default(),
         })
     }
 
     fn step(&mut self, input: &Input) -> Output {
-        let velocity_m_per_s = input.twist.linear();
-        if !input.pose.is_finite() || !velocity_m_per_s.is_finite() {
-            return Output::new(Wrench::ZERO, 0.0, StepStatus::InvalidInput);
-        }
-        let position_m = input.pose.position();
-        let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
-        let above_top_m = reached_m - DVec3::Z * self.height_m;
-        let pull = self.proxy.follow(&self.shape, &self.surface, above_top_m, velocity_m_per_s);
-        let status = if reached_m == position_m { StepStatus::Ok } else { StepStatus::Clamped };
-        Output::new(Wrench::from_force(pull.force_n), pull.energy_j, status)
+        let Self { shape, surface, height_m, proxies: [proxy, ..], .. } = self;
+        touch(proxy, (shape, surface, *height_m), input)
     }
 
     fn set_parameter(&mut self, index: usize, value: f64) -> Result<(), SetParameterError> {
@@ -124,7 +132,17 @@ impl ForceModel for Wall {
     }
 
     fn reset(&mut self) {
-        self.proxy = Proxy::default();
+        self.proxies = [Proxy::default(); MAX_PORTS];
+    }
+}
+
+impl WorldModel for Wall {
+    /// Each handle has a proxy of its own: a rigid wall carries nothing from one contact to another.
+    fn step_ports(&mut self, inputs: &[Input], outputs: &mut [Output]) {
+        let Self { shape, surface, height_m, proxies, .. } = self;
+        for ((proxy, input), output) in proxies.iter_mut().zip(inputs).zip(outputs) {
+            *output = touch(proxy, (shape, surface, *height_m), input);
+        }
     }
 }
 
@@ -151,8 +169,9 @@ impl ContactSetModel for Wall {
             return ContactSet::NONE;
         }
         let above_top_m = reached_m - DVec3::Z * self.height_m;
-        self.proxy.follow(&self.shape, &self.surface, above_top_m, DVec3::ZERO);
-        let place = match self.proxy.contact() {
+        let [proxy, ..] = &mut self.proxies;
+        proxy.follow(&self.shape, &self.surface, above_top_m, DVec3::ZERO);
+        let place = match proxy.contact() {
             Some(proxy) => self.shape.nearest(above_top_m, proxy.normal),
             None => self.shape.facing(above_top_m),
         };
@@ -191,7 +210,7 @@ impl SoftRangeModel for Wall {
     const SOFT_RANGES: &'static [SoftRange] = &[SoftRange::new("friction", 0.0, 1.5, 0.01)];
 }
 
-flotor_hal::export_model!(Wall, active_region, contact_set, shape, snapshot, soft_range);
+flotor_hal::export_model!(Wall, active_region, contact_set, shape, snapshot, soft_range, world);
 
 #[cfg(test)]
 mod tests {

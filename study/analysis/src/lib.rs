@@ -2,6 +2,7 @@
 
 mod blinded;
 mod checks;
+pub mod designed;
 pub mod exclusion;
 mod jnd;
 mod kinematics;

@@ -1,12 +1,12 @@
 //! Bias and standard deviation of each threshold estimator, from many simulated tracks of observers with known thresholds.
 
-use crate::estimate::{Observation, Prior, most_likely};
 use crate::observer::TernaryObserver;
-use crate::procedure::{Procedure, QuestPlusRule, Track, WeightedUpDownRule};
-use crate::random::{Purpose, Stream};
-use crate::trial::{Judgement, Response};
-use crate::word::words;
+use crate::trial::{Judgement, Position};
 use flotor_statistics::describe::{deviation, mean};
+use flotor_study_design::estimate::{Observation, Prior, most_likely};
+use flotor_study_design::procedure::{Procedure, QuestPlusRule, Track, WeightedUpDownRule};
+use flotor_study_design::random::{Purpose, Stream};
+use flotor_study_design::words;
 use serde::Serialize;
 
 /// Procedure and estimator of a threshold.
@@ -113,10 +113,10 @@ fn walk(
         let delta = track.delta();
         let larger_second = stream.coin();
         let judgement = match observer.respond(if larger_second { delta } else { -delta }, stream) {
-            Response::Second if larger_second => Judgement::Correct,
-            Response::First if !larger_second => Judgement::Correct,
-            Response::First | Response::Second => Judgement::Wrong,
-            Response::DontKnow | Response::Rating(_) | Response::Seen => Judgement::Unsure,
+            Some(Position::Second) if larger_second => Judgement::Correct,
+            Some(Position::First) if !larger_second => Judgement::Correct,
+            Some(_) => Judgement::Wrong,
+            None => Judgement::Unsure,
         };
         answers.push(Observation { delta, judgement });
         track.answer(judgement);

@@ -3,8 +3,8 @@
 //! The assignment depends on protocol and seed alone, so it need not be stored.
 
 use crate::protocol::Protocol;
-use crate::random::{Purpose, Stream};
 use crate::trial::{Modality, Presented};
+use flotor_study_design::random::{Purpose, Stream};
 
 /// Condition codes of a study.
 #[derive(Clone, Debug, PartialEq)]

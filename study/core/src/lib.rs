@@ -17,11 +17,16 @@
 //! - [`screen`]: screens of a person's sitting, for any front end; [`blinding`]: codes that replace conditions.
 //! - [`conduct`]: runs a sitting with presenter, simulated subject and log.
 //! - [`cohort`]: studies of many simulated subjects in parallel.
+//! - [`designed`]: logs, data sets and cohorts of studies of one's own design.
 //! - [`exclusion`]: exclusion rules, fixed before data collection.
 //!
 //! `flotor-analysis` computes thresholds, tests and effects from the logs.
 //!
+//! Procedures, estimators and streams of random numbers are those of `flotor-study-design`.
+//!
 //! Nothing here is real-time.
+
+pub use flotor_study_design::{estimate, procedure};
 
 #[cfg(feature = "apparatus")]
 pub mod apparatus;
@@ -30,18 +35,15 @@ pub mod blinding;
 pub mod cohort;
 pub mod conduct;
 pub mod dataset;
-pub mod estimate;
+pub mod designed;
 pub mod exclusion;
 pub mod kinematics;
 pub mod log;
 pub mod observer;
 mod platform;
-pub mod procedure;
 pub mod protocol;
-mod random;
 mod schedule;
 pub mod screen;
 pub mod sitting;
 pub mod time_of_day;
 pub mod trial;
-mod word;

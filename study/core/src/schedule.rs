@@ -1,8 +1,8 @@
 //! Orders of blocks, demonstrations, stimuli and checks, determined by the subject's number and the seed.
 
 use crate::protocol::{JndProtocol, MagnitudeProtocol};
-use crate::random::{Draws, Purpose};
 use crate::trial::{Modality, Phase};
+use flotor_study_design::random::{Draws, Purpose};
 
 /// Returns the order of the bases in each replication, as indices: rows of Latin squares, without repetition of a row before
 /// all rows were used.

@@ -3,14 +3,14 @@
 //! [`Sitting::next`] returns the next trial, [`Sitting::answer`] processes its answer. Both depend only on the protocol, the seed,
 //! the subject's number and the answers so far.
 
-use crate::estimate::NotBounded;
-use crate::procedure::Track;
 use crate::protocol::{
     AtBoundary, ComparisonSide, JndProtocol, MagnitudeProtocol, PresentationOrder, Protocol, SubjectNumber,
 };
-use crate::random::{Draws, Purpose};
 use crate::schedule;
 use crate::trial::{Exploration, Judgement, Modality, Pair, Phase, Position, Presented, Response, Trial};
+use flotor_study_design::estimate::NotBounded;
+use flotor_study_design::procedure::Track;
+use flotor_study_design::random::{Draws, Purpose};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 

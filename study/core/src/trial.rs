@@ -2,8 +2,10 @@
 
 use crate::kinematics::StimulusKinematics;
 use crate::time_of_day::TimeOfDay;
-use crate::word::words;
+use flotor_study_design::words;
 use serde::{Deserialize, Serialize};
+
+pub use flotor_study_design::answer::{Judgement, Position};
 
 /// Sensory modalities of a trial.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -61,29 +63,6 @@ words! {
         Practice = "practice", Main = "main", Catch = "catch", Obvious = "obvious", RepeatCheck = "repeat_check",
     }
 }
-
-/// Position within a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Position {
-    /// Presented first.
-    First,
-    /// Presented second.
-    Second,
-}
-
-impl Position {
-    /// Returns the other position.
-    #[must_use]
-    pub fn other(self) -> Self {
-        match self {
-            Self::First => Self::Second,
-            Self::Second => Self::First,
-        }
-    }
-}
-
-words! { Position { First = "first", Second = "second" } }
 
 /// Two stimuli to compare: a base and a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -209,25 +188,6 @@ impl Response {
         }
     }
 }
-
-/// Judgement of the answer to a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Judgement {
-    /// The larger stimulus was named.
-    Correct,
-    /// The smaller stimulus was named.
-    Wrong,
-    /// Neither stimulus was named.
-    Unsure,
-}
-
-impl Judgement {
-    /// All judgements.
-    pub const ALL: [Self; 3] = [Self::Correct, Self::Wrong, Self::Unsure];
-}
-
-words! { Judgement { Correct = "correct", Wrong = "wrong", Unsure = "unsure" } }
 
 /// Measurements during a presentation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

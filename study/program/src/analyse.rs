@@ -1,6 +1,7 @@
 //! `flotor analyse`: computes thresholds, effects and tests from the data of a study.
 
 pub(crate) mod choices;
+mod designed;
 pub(crate) mod provenance;
 pub(crate) mod report;
 
@@ -15,6 +16,7 @@ use flotor_command::tables::to_csv;
 use flotor_command::{CommandError, note, print_result, style, write_text};
 use flotor_study::blinding::Codes;
 use flotor_study::dataset::{Dataset, trials_csv};
+use flotor_study::designed::DesignedData;
 use flotor_study::exclusion::Exclusion;
 use flotor_study::log::{Begin, Incident, ObserverKind, SittingLog};
 use flotor_study::protocol::Protocol;
@@ -59,6 +61,10 @@ pub(crate) struct AnalyseArguments {
 }
 
 pub(crate) fn run(arguments: &AnalyseArguments) -> Result<(), CommandError> {
+    let designed = DesignedData::at(&arguments.data);
+    if designed.is_here() {
+        return designed::run(arguments, &designed);
+    }
     let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
     let Some(begin) = logs.first().map(|first| first.begin.clone()) else { return Ok(()) };
     // With fewer than two complete sittings, such as in a pilot study, only results of single subjects are possible.

@@ -1,14 +1,20 @@
 //! `flotor study`: perception experiments.
 
 mod bias;
+mod check;
 mod choices;
 mod curve;
+mod design_file;
+mod designed;
 mod explore;
 mod front;
 mod noise;
+mod note;
+mod options_table;
 mod person;
 pub(crate) mod plan;
 mod power;
+mod shipped;
 mod space;
 mod spring;
 
@@ -69,12 +75,14 @@ enum Task {
     Force(ForceArguments),
     /// Run a study file: begin, or resume an interrupted study
     Run(plan::RunArguments),
+    /// Show what a study file does, without a person: schedule, balance, length, power
+    Check(check::CheckArguments),
     /// Explore a spring by hand while its dimensions and material change, without trials
     Explore(explore::ExploreArguments),
     /// Fit a spring model to the measured curve of a real spring
     Spring(spring::SpringArguments),
     /// Add a note of the experimenter to a subject's log
-    Note(NoteArguments),
+    Note(note::NoteArguments),
     /// Sample size of a difference experiment, by simulated studies
     Power(power::PowerArguments),
     /// Bias and error of each threshold estimator, on observers with a known threshold
@@ -193,19 +201,6 @@ struct Common {
     plan: Option<Plan>,
     #[command(flatten)]
     options: SceneOptions,
-}
-
-#[derive(Args)]
-struct NoteArguments {
-    /// Folder of the study
-    #[arg(value_name = "DIR")]
-    data: PathBuf,
-    /// Number of the subject
-    #[arg(value_name = "SUBJECT", value_parser = count(1..=SubjectNumber::MOST))]
-    subject: u16,
-    /// Text of the note, without names
-    #[arg(value_name = "TEXT")]
-    text: String,
 }
 
 #[derive(Args)]
@@ -333,7 +328,8 @@ const FORCE: Subject = Subject { stimulus: "load.force_n", bases: [3.0, 6.0, 9.0
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), CommandError> {
     match &arguments.task {
         Task::Run(arguments) => plan::run(arguments),
-        Task::Note(arguments) => note(arguments),
+        Task::Check(arguments) => check::run(arguments),
+        Task::Note(arguments) => note::run(arguments),
         Task::Power(arguments) => power::run(arguments),
         Task::Bias(arguments) => bias::run(arguments),
         Task::Explore(arguments) => explore::run(arguments),
@@ -559,18 +555,6 @@ fn unfit(error: ApparatusError) -> CommandError {
         ApparatusError::Run(error) => error.into(),
         other => CommandError::Usage(other.to_string()),
     }
-}
-
-fn note(arguments: &NoteArguments) -> Result<(), CommandError> {
-    let logs = Dataset::at(&arguments.data).logs().map_err(crate::of_dataset)?;
-    let subjects: Vec<String> = logs.iter().map(|log| log.begin.subject.get().to_string()).collect();
-    let log = logs.into_iter().find(|log| log.begin.subject.get() == arguments.subject);
-    let log = log.ok_or_else(|| {
-        let (data, subject) = (arguments.data.display(), arguments.subject);
-        let subjects = subjects.join(", ");
-        CommandError::Usage(format!("{data}: the study has no subject {subject}; choose one of: {subjects}"))
-    })?;
-    log.annotate(&arguments.text).map_err(|error| CommandError::Failed(error.to_string()))
 }
 
 fn tell(dataset: &Dataset) -> Result<(), CommandError> {

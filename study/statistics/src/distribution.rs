@@ -1,7 +1,7 @@
-//! Distributions: tail probabilities of the normal, Student's t, Fisher's F and binomial distributions, and the quantile of
-//! the second.
+//! Distributions: tail probabilities of the normal, Student's t, Fisher's F, chi-square and binomial distributions, and the quantiles of
+//! the first two.
 
-use crate::special::regularised_beta;
+use crate::special::{regularised_beta, upper_gamma};
 use std::f64::consts::{PI, SQRT_2};
 
 /// Maximum number of steps of a quantile search; bisection alone needs 60.
@@ -17,6 +17,40 @@ pub fn normal_density(x: f64) -> f64 {
 #[must_use]
 pub fn normal_below(x: f64) -> f64 {
     0.5 * libm::erfc(-x / SQRT_2)
+}
+
+/// Returns the quantile of the standard normal distribution; infinite for a probability of 0 or 1, NaN outside.
+#[must_use]
+pub fn normal_quantile(probability: f64) -> f64 {
+    if !(0.0..=1.0).contains(&probability) {
+        return f64::NAN;
+    }
+    if probability > 0.5 {
+        return -normal_quantile(1.0 - probability);
+    }
+    if probability == 0.0 {
+        return f64::NEG_INFINITY;
+    }
+    // The smallest positive number is the probability below -38.5.
+    let (mut low, mut high) = (-40.0, 0.0);
+    for _ in 0..QUANTILE_STEPS_MOST {
+        let middle = 0.5 * (low + high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if normal_below(middle) < probability {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Returns the p-value of a chi-square statistic with `df` degrees of freedom: the upper tail probability.
+#[must_use]
+pub fn chi_square_above(chi_square: f64, df: f64) -> f64 {
+    upper_gamma(0.5 * df, 0.5 * chi_square)
 }
 
 /// Returns the two-sided p-value of Student's t with `df` degrees of freedom: the probability of a larger |t|.
@@ -114,6 +148,21 @@ mod tests {
                 near(student_two_sided_quantile(probability, df), t, 1.0e-11);
             }
         }
+    }
+
+    /// Chi-square with one degree of freedom is the square of a normal number, with two exponential.
+    #[test]
+    fn normal_quantiles_turn_back_and_chi_square_is_a_square() {
+        for x in [-12.0, -3.0, -0.2, 0.0, 0.7, 2.0] {
+            assert!((normal_quantile(normal_below(x)) - x).abs() < 1.0e-9 * (1.0 + x.abs()));
+        }
+        near(normal_quantile(0.975), 1.959_963_984_540_054, 1.0e-12);
+        for x in [0.3_f64, 1.0, 2.5, 5.0] {
+            near(chi_square_above(x * x, 1.0), 2.0 * normal_below(-x), 1.0e-12);
+            near(chi_square_above(x, 2.0), (-0.5 * x).exp(), 1.0e-12);
+        }
+        assert_eq!((normal_quantile(0.0), normal_quantile(1.0)), (f64::NEG_INFINITY, f64::INFINITY));
+        assert!(normal_quantile(1.1).is_nan());
     }
 
     #[test]

@@ -6,9 +6,11 @@
 //! - [`anova`]: analysis of variance with factors between and within subjects, sums of squares of type II and III,
 //!   corrections for lack of sphericity.
 //! - [`trend`]: linear trend of an effect within subjects.
+//! - [`rank`]: tests by ranks (Wilcoxon, Friedman, Kruskal and Wallis).
+//! - [`probit`]: psychometric function of counts; [`detection`]: sensitivity and criterion of yes/no answers.
 //! - [`effect_size`], [`multiple`]: effect sizes with intervals; corrections for multiple tests.
 //! - [`quadrature`]: integrals and quantiles of a density.
-//! - [`distribution`]: normal, Student's t, Fisher's F. A small p-value is computed directly as a tail, not as one minus the
+//! - [`distribution`]: normal, Student's t, Fisher's F, chi-square. A small p-value is computed directly as a tail, not as one minus the
 //!   other tail, so that it keeps its relative precision.
 //!
 //! A statistic that the data cannot give is an [`Outcome`] with the reason; other results are unaffected.
@@ -18,11 +20,14 @@
 
 pub mod anova;
 pub mod describe;
+pub mod detection;
 pub mod distribution;
 pub mod effect_size;
 mod linear;
 pub mod multiple;
+pub mod probit;
 pub mod quadrature;
+pub mod rank;
 pub mod regression;
 mod special;
 pub mod t_test;
@@ -85,6 +90,15 @@ pub enum StatisticsError {
     /// Neither the effect nor its error varies, for example after division of the responses by each subject's mean.
     #[error("scaling of the responses removes the effect")]
     RemovedByScaling,
+    /// The answers change from none to all at one level, so that no finite slope fits best.
+    #[error("the answers change from none to all between two levels; add levels between them, or trials")]
+    Separated,
+    /// The share of positive answers does not rise with the level.
+    #[error("the share of positive answers does not rise with the level")]
+    NotRising,
+    /// All values are tied or all differences are 0, so that ranks carry no information.
+    #[error("all values are tied")]
+    Tied,
     /// The design of an analysis of variance is invalid.
     #[error("analysis of variance: {0}")]
     Design(String),

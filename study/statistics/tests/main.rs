@@ -1,4 +1,5 @@
 //! Every result against published tables.
 
 mod certified;
+mod ranks;
 mod reference;

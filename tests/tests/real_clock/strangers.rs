@@ -3,29 +3,25 @@
 
 #[path = "../../src/attacks.rs"]
 mod attacks;
+#[path = "../../src/loop_lateness.rs"]
+mod loop_lateness;
 
 use crate::board::{Board, PAST, Where, children_of, dies, run_on, wait_until};
 use crate::keyboard::Keyboard;
-use attacks::{Attackers, Listening, Place, Target};
+use attacks::{Listening, Place, Target};
 use flotor_live::{Ask, Client, Directory, Event, Kind, Request, frame};
 use flotor_tests::TestSize;
 use flotor_tests::library::build_folder;
 use flotor_tests::program::{Flotor, Running, exit_code};
 use flotor_tests::scratch::Scratch;
+use loop_lateness::{judge, stand_in, under_attack};
 use rustix::process::{Pid, Signal};
-use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::net::TcpListener;
-use std::os::unix::net::{UnixListener, UnixStream};
+use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::AtomicUsize;
 use std::time::{Duration, Instant};
-
-/// Threads of attackers, each with up to a hundred connections, and the pause after an attack of each.
-const ATTACKERS: usize = 2;
-const PAUSE: Duration = Duration::from_millis(1);
-/// Connections that a stand-in holds, as a live socket does.
-const HELD: usize = 20;
 
 /// A request to watch, of which attackers send parts.
 fn request() -> Vec<u8> {
@@ -45,70 +41,14 @@ fn socket(directory: &Directory) -> PathBuf {
     first().expect("it is there").path
 }
 
-/// Carries out attacks on the place that a number selects, until the body returns.
-fn under_attack<T>(places: &[Place], request: &[u8], selected: &AtomicUsize, body: impl FnOnce() -> T) -> T {
-    /// Ends the attackers, also by a panic.
-    struct End<'e>(&'e AtomicBool);
-    impl Drop for End<'_> {
-        fn drop(&mut self) {
-            self.0.store(true, Ordering::Relaxed);
-        }
-    }
-    let is_over = AtomicBool::new(false);
-    std::thread::scope(|scope| {
-        let _end = End(&is_over);
-        for _ in 0..ATTACKERS {
-            scope.spawn(|| {
-                let attackers = |place: &Place| Attackers::new(place.clone(), request);
-                let mut attackers: Vec<_> = places.iter().map(attackers).collect();
-                while !is_over.load(Ordering::Relaxed) {
-                    let place = selected.load(Ordering::Relaxed);
-                    attackers[place].attack();
-                    // Nobody stays at the other place.
-                    attackers[1 - place].leave();
-                    std::thread::sleep(PAUSE);
-                }
-            });
-        }
-        body()
-    })
-}
-
-/// A port of this process that accepts, and holds some connections: of the family of the place that it stands in for.
-fn stand_in(place: &Place, scratch: &Scratch) -> Place {
-    fn hold<T>(mut accept: impl FnMut() -> std::io::Result<T> + Send + 'static)
-    where
-        T: 'static,
-    {
-        std::thread::spawn(move || {
-            let mut held = VecDeque::new();
-            while let Ok(stream) = accept() {
-                held.push_back(stream);
-                if held.len() > HELD {
-                    held.pop_front();
-                }
-            }
-        });
-    }
-    match place {
-        Place::Socket(_) => {
-            let path = scratch.path().join("stand-in");
-            let listener = UnixListener::bind(&path).expect("a scratch folder takes a socket");
-            hold(move || listener.accept().map(|(stream, _)| stream));
-            Place::Socket(path)
-        }
-        Place::Port(_) => {
-            let listener = TcpListener::bind("127.0.0.1:0").expect("there is a port");
-            let at = listener.local_addr().expect("it is bound");
-            hold(move || listener.accept().map(|(stream, _)| stream));
-            Place::Port(at)
-        }
-    }
-}
-
 /// A run on the simulated device for longer than any test.
 fn start(scratch: &Scratch, models: &str) -> Running {
-    let scene = format!("duration_s = 3000\n[device]\nplugin = \"simulated\"\n{models}");
+    start_on("plugin = \"simulated\"", scratch, models)
+}
+
+/// A run on a device for longer than any test.
+fn start_on(device: &str, scratch: &Scratch, models: &str) -> Running {
+    let scene = format!("duration_s = 3000\n[device]\n{device}\n{models}");
     let scene = scratch.patient_scene(&scene).display().to_string();
     Flotor::with(["run", &scene]).env("XDG_RUNTIME_DIR", &scratch.path().display().to_string()).start()
 }
@@ -201,7 +141,7 @@ fn stop_time(stop: Stop, selected: usize) -> Duration {
     let _ = connected.ask(Ask::Watch { every: 1 }).expect("likewise");
     board.wait_for_force(PAST);
     let place = Place::Socket(path.clone());
-    let places = [place.clone(), stand_in(&place, &scratch)];
+    let places = [place.clone(), stand_in(&place, scratch.path())];
     let since = under_attack(&places, &request(), &AtomicUsize::new(selected), || {
         std::thread::sleep(Duration::from_millis(300));
         let since = Instant::now();
@@ -250,11 +190,7 @@ fn strangers_at_the_live_socket_delay_no_stop() {
 
 // ---------------------------------------------------------------- lateness
 
-/// Time of a window, and the beginning of it that is not judged: batches of ticks come up to 10 ms late.
-const WINDOW: Duration = Duration::from_millis(1500);
-const SETTLING: Duration = Duration::from_millis(100);
-
-/// Lateness of the ticks, ns, of each window; the strangers are at the run in the even ones, elsewhere in the others.
+/// Lateness of the ticks, ns, of each window of a run in a run folder.
 fn windows(
     directory: &Directory,
     place: &Place,
@@ -264,60 +200,11 @@ fn windows(
 ) -> Vec<Vec<u64>> {
     let mut client = Client::connect(&socket(directory)).expect("the run answers");
     let _ = client.request_client().ask(Ask::Watch { every: 1 }).expect("likewise");
-    let places = [place.clone(), stand_in(place, scratch)];
-    let selected = AtomicUsize::new(0);
-    under_attack(&places, request, &selected, || {
-        let mut windows = Vec::new();
-        for number in 0..count {
-            selected.store(number % 2, Ordering::Relaxed);
-            let (begun, mut window) = (Instant::now(), Vec::new());
-            while begun.elapsed() < WINDOW {
-                let event = client.next(Duration::from_millis(20)).expect("the run goes on");
-                if let Some(Event::Ticks { records, .. }) = event
-                    && begun.elapsed() > SETTLING
-                {
-                    window.extend(records.iter().map(|record| record.lateness_ns));
-                }
-            }
-            windows.push(window);
-        }
-        windows
-    })
-}
-
-/// The median, and its standard error from the spread of the values.
-fn median(mut values: Vec<f64>) -> (f64, f64) {
-    fn middle(values: &mut [f64]) -> f64 {
-        values.sort_by(f64::total_cmp);
-        values[values.len() / 2]
-    }
-    let centre = middle(&mut values);
-    let mut distances: Vec<f64> = values.iter().map(|value| (value - centre).abs()).collect();
-    // Of a normal distribution: 1.4826 distances are a standard deviation, and the median varies by 1.2533 / sqrt(n) of it.
-    let error = 1.4826 * 1.2533 * middle(&mut distances) / (values.len() as f64).sqrt();
-    (centre, error)
-}
-
-/// The ratio of the 99th percentiles of the lateness, strangers at the run to strangers elsewhere, and its standard error.
-#[track_caller]
-fn judge(name: &str, windows: &[Vec<u64>]) {
-    let p99 = |window: &Vec<u64>| {
-        let mut window = window.clone();
-        window.sort_unstable();
-        assert!(window.len() > 200, "{name}: ticks come: {}", window.len());
-        window[window.len() * 99 / 100] as f64
+    let next = || match client.next(Duration::from_millis(20)).expect("the run goes on") {
+        Some(Event::Ticks { records, .. }) => records.iter().map(|record| record.lateness_ns).collect(),
+        _ => Vec::new(),
     };
-    let of = |first: usize| median(windows.iter().skip(first).step_by(2).map(p99).collect());
-    let ((at_the_run, error), (elsewhere, error_elsewhere)) = (of(0), of(1));
-    let ratio = at_the_run / elsewhere;
-    let ratio_error = ratio * ((error / at_the_run).powi(2) + (error_elsewhere / elsewhere).powi(2)).sqrt();
-    println!(
-        "{name}: lateness p99 {:.0} µs, strangers elsewhere {:.0} µs, ratio {ratio:.2} +- {ratio_error:.2}",
-        at_the_run * 1e-3,
-        elsewhere * 1e-3
-    );
-    // Beyond twice its standard error the ratio is none of chance.
-    assert!(ratio - 2.0 * ratio_error <= 1.2, "{name}: {ratio:.2} +- {ratio_error:.2}");
+    loop_lateness::windows(place, scratch.path(), request, count, next)
 }
 
 #[test]
@@ -350,4 +237,42 @@ fn strangers_at_a_port_of_the_loops_process_do_not_make_it_later() {
     let service = Listening::start("env", &arguments, "listening ws://");
     let here = directory(&scratch);
     judge("haply-service", &windows(&here, &service.target.place, &scratch, HTTP, count));
+}
+
+/// A stranger gets processor time of the emulator, another process than that of the loop, and takes the place of no host.
+#[test]
+fn strangers_at_an_emulated_device_do_not_make_the_loop_later() {
+    if TestSize::of_this_run().leaves_out_long_tests() {
+        return;
+    }
+    let _turn = crate::alone();
+    let count = TestSize::of_this_run().pick(12, 80);
+    for (plugin, listening, transport, more, request) in [
+        // The chip's request to empty its buffers.
+        ("falcon", "listening tcp:", "tcp:", "", vec![flotor_falcon::remote::REQUEST, 0, 1, 0]),
+        // Its controller bears a host that a busy machine delays.
+        ("maglev", "listening tcp ", "", ", watchdog_ms = 700", description()),
+    ] {
+        let program = build_folder().join(format!("flotor-{plugin}-emulator")).display().to_string();
+        let emulator = Listening::start(&program, &["--listen", "127.0.0.1:0"], listening);
+        let place = emulator.target.place.clone();
+        let Place::Port(address) = place else { panic!("it is a port: {place:?}") };
+        let parameters = format!("{{ address = \"{transport}{address}\", timeout_ms = 9000{more} }}");
+        let device = format!("plugin = \"{plugin}\"\nparameters = {parameters}");
+        let scratch = Scratch::default();
+        let run = start_on(&device, &scratch, "[[model]]\nplugin = \"spring\"\n");
+        let name = format!("emulated {plugin}");
+        judge(&name, &windows(&directory(&scratch), &place, &scratch, &request, count));
+        run.signal(Signal::INT);
+        assert_eq!(run.wait().code, Some(exit_code::OK), "{name}");
+    }
+}
+
+/// A request of a host to the maglev's controller.
+fn description() -> Vec<u8> {
+    use flotor_maglev::protocol::{Request, RequestFrame, stream::coded};
+    let request = Request::Describe { page: 0 };
+    let frame = RequestFrame { sequence: 1, acknowledged: 0, time_us: 0, session: 0, request };
+    let (bytes, length) = coded(&frame.encode());
+    bytes.get(..length).expect("it is as long").to_vec()
 }

@@ -67,8 +67,12 @@ enum Role {
     /// An allocator for one process of the lab.
     Guard,
     Calibration,
+    /// Finds the law of a real thing.
+    Identify,
     /// Judges runs from outside.
     SceneTest,
+    /// Designs of experiments, without input and output.
+    StudyDesign,
     Study,
     /// Results from logs.
     Analysis,
@@ -82,9 +86,9 @@ enum Role {
 
 use Role::{
     Analysis, Calibration, Command, Compat, Contact, Container, Contract, Core, Coupling, Drawing, DropIn,
-    Emulator, Fixture, Guard, History, Host, Judge, Lab, Lend, Live, Loader, OfDevices, OfEmulators,
-    OfModels, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study, StudyProgram,
-    Sync, Tests, Viewer,
+    Emulator, Fixture, Guard, History, Host, Identify, Judge, Lab, Lend, Live, Loader, OfDevices,
+    OfEmulators, OfModels, Plot, Plugin, Record, SceneTest, Service, Servo, Session, Statistics, Study,
+    StudyDesign, StudyProgram, Sync, Tests, Viewer,
 };
 
 /// The folders of the crates that have one of their own, and the roles each may depend on.
@@ -128,15 +132,29 @@ const CRATES: &[(&str, Role, &[Role])] = &[
         Calibration,
         &[Contract, Loader, Sync, Core, Servo, Record, Live, Session, Plot, Command],
     ),
+    ("lab/identify", Identify, &[Contract, Record, Plot, Command]),
     // Neither the session nor the loader: everything it runs is a process of its own.
     ("lab/scene-test", SceneTest, &[Contract, Core, Plot, Command]),
-    ("study/core", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics]),
-    ("study/analysis", Analysis, &[Core, Statistics, Study]),
+    ("study/design", StudyDesign, &[Statistics]),
+    ("study/core", Study, &[Contract, Sync, Core, Servo, Record, Live, Session, Statistics, StudyDesign]),
+    ("study/analysis", Analysis, &[Core, Statistics, StudyDesign, Study]),
     (
         "study/program",
         StudyProgram,
         &[
-            Contract, Loader, Sync, Core, Servo, Record, Live, Session, Plot, Statistics, Command, Study,
+            Contract,
+            Loader,
+            Sync,
+            Core,
+            Servo,
+            Record,
+            Live,
+            Session,
+            Plot,
+            Statistics,
+            Command,
+            StudyDesign,
+            Study,
             Analysis,
         ],
     ),
@@ -515,6 +533,7 @@ const PORTED: &[&str] = &[
     "host/contact/src/",
     "host/core/src/",
     "host/coupling/src/",
+    "lab/identify/src/",
     "lab/judge/src/",
     "lab/measure/src/",
     "host/live/src/",
@@ -528,6 +547,7 @@ const PORTED: &[&str] = &[
     "study/analysis/src/",
     "study/program/src/",
     "study/core/src/",
+    "study/design/src/",
     "host/sync/src/",
     "models/",
     "viewer/drawing/src/",

@@ -8,7 +8,7 @@ use std::path::Path;
 /// Folders of the product.
 const FOLDERS: [&str; 8] = ["devices", "hal", "host", "interop", "lab", "models", "study", "viewer"];
 /// Sources that use `{:?}`, with the reader of the text.
-const READERS: [(&str, &str); 16] = [
+const READERS: [(&str, &str); 18] = [
     ("devices/emulation/src/rig.rs", "a scene in TOML"),
     ("devices/maglev/emulator/src/bin/flotor-maglev-emulator/main.rs", "a log: the name of a mode"),
     ("devices/maglev/emulator/src/bin/flotor-maglev-emulator/ml_api.rs", "a scene in TOML"),
@@ -16,6 +16,7 @@ const READERS: [(&str, &str); 16] = [
     ("devices/maglev/emulator/src/ml_api/server/state.rs", "a log: the name of a phase"),
     ("hal/loader/src/capabilities.rs", NUMBERS),
     ("hal/src/extension/calibration.rs", NUMBERS),
+    ("lab/identify/src/curve.rs", "a scene in TOML"),
     ("lab/measure/src/cli/eval.rs", "a number of a CSV file"),
     ("interop/python/src/model.rs", "`repr` of Python"),
     ("host/record/src/run.rs", "a setting of a recording"),
@@ -24,6 +25,7 @@ const READERS: [(&str, &str); 16] = [
     ("study/program/src/study/spring.rs", "a scene in TOML"),
     ("interop/sweep/src/design.rs", "a key of the store"),
     ("models/solid/src/law.rs", "the key of a prepared solid"),
+    ("models/surface/src/store.rs", "the key of a prepared surface"),
     ("viewer/drawing/src/light.rs", "a shader"),
 ];
 /// What has an exponent so where it is large.

@@ -57,7 +57,7 @@ fn a_chapter_about_a_makers_device_has_a_note_on_licences() {
 // ---------------------------------------------------------------- commands
 
 /// Files and folders that a command of the book writes: the value of such an option, or a new plugin.
-fn written_by(command: &str) -> Vec<&str> {
+fn written_by(command: &str) -> Vec<String> {
     const OUTPUTS: [&str; 10] = [
         "--out",
         "--curve-scene",
@@ -71,8 +71,11 @@ fn written_by(command: &str) -> Vec<&str> {
         "--screenshot",
     ];
     let words: Vec<&str> = command.split_whitespace().take_while(|word| !word.starts_with('#')).collect();
-    let of_option = words.windows(2).filter(|pair| OUTPUTS.contains(&pair[0])).map(|pair| pair[1]);
-    let new = words.windows(3).filter(|three| three[0] == "new").map(|three| three[2]);
+    let of_option = words.windows(2).filter(|pair| OUTPUTS.contains(&pair[0])).map(|pair| pair[1].to_owned());
+    let new = words.windows(3).filter(|three| three[0] == "new").map(|three| match three[1] {
+        "scene" => format!("{}.toml", three[2]),
+        _ => three[2].to_owned(),
+    });
     of_option.chain(new).filter(|name| !name.starts_with(['-', '/'])).collect()
 }
 
@@ -90,7 +93,7 @@ fn what_the_commands_of_the_book_write_is_nothing_to_commit() {
         let text = read(&chapter);
         for command in text.lines().filter_map(|line| line.strip_prefix("$ flotor ")) {
             for name in written_by(command) {
-                assert!(is_ignored(name), "{}: {command}: {name} is not in .gitignore", chapter.display());
+                assert!(is_ignored(&name), "{}: {command}: {name} is not in .gitignore", chapter.display());
                 seen += 1;
             }
         }

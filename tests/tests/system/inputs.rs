@@ -7,7 +7,7 @@ use std::process::Command;
 
 /// Every command that reads a file, with `FILE` in its place; `PLUGIN` and `CALIBRATION` are scenes that
 /// name it, and `TEST` is a test of it.
-const DOORS: [&[&str]; 26] = [
+const DOORS: [&[&str]; 28] = [
     &["run", "FILE"],
     &["run", "PLUGIN"],
     &["replay", "FILE"],
@@ -26,6 +26,8 @@ const DOORS: [&[&str]; 26] = [
     &["run", "--clock", "virtual", "--duration", "10ms", "--set", "device.hand_script=FILE"],
     &["run", "CALIBRATION"],
     &["calibrate", "verify", "FILE", "--simulated"],
+    &["identify", "FILE"],
+    &["identify", "FILE", "--law", "linear"],
     &["study", "run", "FILE"],
     &["analyse", "FILE"],
     &["study", "spring", "FILE"],

@@ -32,6 +32,7 @@ mod grip;
 mod hand_recording;
 mod hanging_device;
 mod haply;
+mod identify;
 mod inputs;
 mod installation;
 #[cfg(feature = "drop-ins")]
@@ -66,13 +67,18 @@ mod scene;
 mod scene_test;
 #[cfg(feature = "drop-ins")]
 mod services;
+mod shared;
 mod simulated;
+mod slow_contacts;
 mod snapshot;
 mod stop_delivery;
 mod stop_time;
 mod study;
 mod study_claims;
+mod study_design;
+mod study_designs_in_r;
 mod study_file;
+mod study_keyboard;
 mod study_scripts;
 mod supply;
 mod swap;

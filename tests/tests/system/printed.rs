@@ -18,6 +18,9 @@ mod integrators;
 #[allow(dead_code)] // its `main`
 #[path = "../../../devices/maglev/examples/penetration.rs"]
 mod penetration;
+#[allow(dead_code)] // its `main`
+#[path = "../../examples/release_oscillation.rs"]
+mod release_oscillation;
 #[allow(dead_code)] // the picture
 #[path = "../../examples/velocity_estimators.rs"]
 mod velocity_estimators;
@@ -31,6 +34,13 @@ fn the_book_prints_the_errors_of_the_integrators() {
     }
     for error in integrators::errors() {
         assert_chapter_prints(CHAPTER, &format!("{},", error.line()));
+    }
+}
+
+#[test]
+fn the_book_prints_how_a_released_spring_oscillates() {
+    for line in release_oscillation::lines().expect("the flotor swings") {
+        assert_chapter_prints("models/spring/corrections.md", &line);
     }
 }
 

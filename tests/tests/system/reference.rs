@@ -61,8 +61,8 @@ fn an_option_of_many_commands_is_the_same_in_each() {
         (
             "--json",
             "| `--json [FILE.json]` |  | Write the result as JSON to this file; without a file or with -, to standard output |",
-            "run, replay, scenes, plugins, validate, test, jitter, stability, bench, stress, study spring, \
-             study power, study bias, analyse, calibrate vertical, calibrate verify, doctor",
+            "run, replay, scenes, plugins, validate, test, jitter, stability, bench, stress, study check, study spring, \
+             study power, study bias, analyse, calibrate vertical, calibrate verify, identify, doctor",
         ),
         (
             "--plugin-path",

@@ -18,7 +18,7 @@ const OUTSIDE: [&str; 2] = ["examples", "tests"];
 /// Rooms for crates of contributors: the README of each lists its crates.
 const DOORS: [&str; 5] = ["devices", "interop", "lab", "models", "study"];
 const MOST_LINES_OF_A_README: usize = 15;
-const MOST_FOLDERS_OF_THE_HOST: usize = 13;
+const MOST_FOLDERS_OF_THE_HOST: usize = 14;
 /// The document with the drawing, and the line above it.
 const DOCUMENT: &str = "ARCHITECTURE.md";
 const NOTE: &str = "<!-- Drawn by `FLOTOR_WRITE_REFERENCE=1 cargo test -p flotor-tests rooms`. -->\n\n";

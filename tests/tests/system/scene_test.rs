@@ -96,6 +96,29 @@ fn the_model_of_the_generator_passes_and_has_a_workflow() {
 // ---------------------------------------------------------------- what is not
 
 #[test]
+fn a_replay_that_starts_near_a_failure_fails_with_the_same_error() {
+    let scratch = Scratch::default();
+    let library = plugin_file("fixture-faulty-model");
+    let beside = Path::new(&library).file_name().and_then(|name| name.to_str()).expect("it has a name");
+    std::fs::copy(&library, scratch.path().join(beside)).expect("a scratch folder can be written to");
+    let scene = "duration_s = 0.2\n[device]\nplugin = \"simulated\"\n[[model]]\nname = \"faulty\"\n";
+    let _ = scratch.file("scene.toml", format!("{scene}plugin = \"./{beside}\"\n"));
+    let set = "set.faulty.fault = [\"panics-in-step\"]\nset.faulty.at_tick = [50]\n";
+    let expect = "[expect]\n\"plugins.faulty.health\" = \"ok\"\n";
+    let _ = scratch.file("faulty.test.toml", format!("scene = \"scene.toml\"\n{set}{expect}"));
+    // The second run finds the files of the first.
+    for _ in 0..2 {
+        let ran = test(scratch.path(), &["faulty.test.toml", "--plots", "pictures"]);
+        assert_eq!(ran.code, Some(exit_code::OTHER), "{ran:#?}");
+        let near = ran.stdout.lines().find_map(|line| line.trim().strip_prefix("$ flotor replay "));
+        let words: Vec<&str> = near.unwrap_or_else(|| panic!("{ran:#?}")).split(' ').collect();
+        assert!(words.contains(&"--from-state"), "{words:?}");
+        let again = Flotor::with(["replay"].iter().chain(&words)).inside(scratch.path()).run();
+        assert!(again.stderr.contains("step gave up at tick 50"), "{again:#?}");
+    }
+}
+
+#[test]
 fn a_defect_of_the_model_is_found_with_its_cause_and_a_picture() {
     if !required(Tool::Cc) {
         return;

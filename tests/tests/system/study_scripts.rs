@@ -155,7 +155,7 @@ fn repeats_every_line(program: &str, extension: &str) {
 }
 
 /// A Python with numpy, scipy and pandas.
-fn science_python() -> Option<String> {
+pub(crate) fn science_python() -> Option<String> {
     let python = std::env::var("FLOTOR_SCIENCE_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let has = Command::new(&python).args(["-c", "import numpy, pandas, scipy"]).output();
     if has.is_ok_and(|ran| ran.status.success()) {

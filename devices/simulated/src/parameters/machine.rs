@@ -103,7 +103,7 @@ fn fault(settings: &Settings<'_>) -> Option<FaultPlan> {
 /// Unit of the setting `sensor_latency_ticks`, ns: the tick of the device's own controller.
 const TICK_OF_THE_SENSORS_NS: u64 = 1_000_000;
 
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the schema keeps it between 0 and 32
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the schema keeps it between 0 and 64
 fn whole(number: f64) -> usize {
     number.round() as usize
 }

@@ -302,7 +302,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "sensor_latency_ticks",
         "1",
         0.0,
-        32.0,
+        64.0,
         1.0,
         "Full: latency of a sample, in ticks of the device's own controller (1 ms at every rate of the loop), rounded",
     ),

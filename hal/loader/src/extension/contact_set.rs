@@ -1,4 +1,4 @@
-//! Host side of `flotor.contact-set/1`: contacts of the tool, from a model computed beside the loop.
+//! Host side of `flotor.contact-set/1`: contacts of the tool, from an asynchronous model.
 
 use crate::Model;
 use flotor_hal::abi::CallStatus;
@@ -26,8 +26,8 @@ impl Model {
         self.has_contact_set() || self.has_linear_field()
     }
 
-    /// Computes the contacts at an input, or for a model without them its linear field, as the bilateral part of a set
-    /// without contacts; `set` is valid only if the result is [`CallStatus::Ok`]. Not real-time.
+    /// Computes the contacts at an input; for a model without them a set with the local linear model as its bilateral part.
+    /// `set` is valid only if the result is [`CallStatus::Ok`]. Not real-time.
     pub fn local_model(&mut self, input: &Input, set: &mut ContactSet) -> CallStatus {
         *set = ContactSet::NONE;
         if self.has_contact_set() {

@@ -1,4 +1,4 @@
-//! Host side of `flotor.linear-field/1`: local linear field of a model computed beside the loop.
+//! Host side of `flotor.linear-field/1`: local linear field of an asynchronous model.
 
 use crate::Model;
 use flotor_hal::abi::CallStatus;

@@ -17,6 +17,7 @@ mod shape;
 pub(crate) mod snapshot;
 mod soft_range;
 mod workspace_bounds;
+mod world;
 
 use crate::LoadError;
 use crate::offers::Offers;
@@ -26,6 +27,7 @@ use flotor_hal::extension::{
     energy_ledger::EnergyLedgerTable, grip::GripTable, independent_stop::IndependentStopTable,
     linear_field::LinearFieldTable, pacing::PacingTable, shape::ShapeTable, snapshot::SnapshotTable,
     soft_range::SoftRangeTable, variant::VariantTable, workspace_bounds::WorkspaceBoundsTable,
+    world::WorldTable,
 };
 
 macro_rules! extensions {
@@ -63,6 +65,7 @@ extensions! {
         soft_range: SoftRangeTable,
         variant: VariantTable,
         workspace_bounds: WorkspaceBoundsTable,
+        world: WorldTable,
     }
     DeviceExtensions {
         calibration: CalibrationTable,

@@ -11,7 +11,7 @@ use flotor_contact::FeltStiffness;
 use flotor_core::grip::GripRecord;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{
-    ActiveRegion, ContactSet, Demand, Input, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
+    ActiveRegion, ContactSet, Demand, GripState, Input, LoopConfig, Memory, Output, Refusal, WorkspaceBounds,
 };
 use flotor_loader::{InstanceState, Model};
 use process::Worker;
@@ -51,6 +51,29 @@ impl Engine {
             }
             Self::Process(worker) => worker.step(input, output, grip),
             Self::Asynchronous(model) => model.step(input, output),
+        }
+    }
+
+    /// Returns true if several devices can share the model; false outside the loop thread. Not real-time.
+    pub fn has_ports(&self) -> bool {
+        matches!(self, Self::Here(model) if model.has_ports())
+    }
+
+    /// Steps the model once for all its ports; `outputs` are only valid for [`Stepped::Answered`]. Returns [`Stepped::Broken`] for a
+    /// model without ports, and for a worker or asynchronous model. Real-time: bounded by the model, no allocation.
+    pub fn step_ports(&mut self, inputs: &[Input], outputs: &mut [Output]) -> Stepped {
+        match self {
+            Self::Here(model) => model.step_ports(inputs, outputs).into(),
+            Self::Process(_) | Self::Asynchronous(_) => Stepped::Broken,
+        }
+    }
+
+    /// Returns the effort at the grip of a port after [`Self::step_ports`]; 0 for a model without one. Real-time: bounded by the model,
+    /// no allocation.
+    pub fn grip(&mut self, input: &Input, grip: &GripState) -> f64 {
+        match self {
+            Self::Here(model) => model.grip(input, grip),
+            Self::Process(_) | Self::Asynchronous(_) => 0.0,
         }
     }
 

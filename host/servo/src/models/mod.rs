@@ -1,171 +1,30 @@
-//! Force models of a device: selects the active ones and adds up their wrenches.
+//! Force models of a run: selects the active ones and adds up their wrenches.
 //!
 //! A scene's models are *layers*. Their wrenches add up, each times its weight; a layer with a nonzero wrench silences the layers
 //! of lower priority; weights move at a constant rate, so that the force does not jump when one model yields to another. A layer
 //! without an object that can act at the handle, or with weight 0, is not stepped.
+//!
+//! A layer is on one device, in that device's stack; or several devices share its one instance, which is then stepped once for
+//! all of them, wherever their handles are.
 
-mod broad_phase;
+mod body;
+mod contribution;
 mod fade;
+mod instance;
 mod layer;
+mod model_layer;
+mod objects;
+mod placement;
+mod shared_object;
+mod shared_slot;
 mod slot;
+mod stack;
 
-pub(crate) use layer::{Contribution, StepContext};
-pub use layer::{Layer, LayerReport};
+pub(crate) use body::Body;
+pub(crate) use contribution::{Contribution, Sample};
+pub(crate) use layer::Kind;
+pub use layer::{Layer, Replacement};
+pub use model_layer::LayerReport;
+pub(crate) use shared_slot::{SharedSlot, limit_observable};
 pub(crate) use slot::Slot;
-
-use super::{Heartbeat, Place};
-use broad_phase::BroadPhase;
-use fade::Fade;
-use flotor_core::trace::Events;
-use flotor_hal::abi::CallStatus;
-use flotor_hal::{DVec3, Demand, Tick};
-
-/// Time over which layers of lower priority fade out and in again, s: shorter than a hand's reaction, and long enough that the slew
-/// limit need not act.
-const SILENCE_S: f64 = 0.02;
-
-/// Models of a device.
-pub(crate) struct ModelStack {
-    /// Slots of the models, in the scene's order.
-    pub(crate) slots: Box<[Slot]>,
-    broad: BroadPhase,
-    /// Levels by ascending priority; empty if all layers have the same priority: then no layer is silenced.
-    levels: Box<[Level]>,
-    observable: Demand,
-}
-
-/// Replacement of a model in a running loop.
-pub struct Replacement {
-    /// Number of the model to replace.
-    pub model: usize,
-    /// Generation of the new layer, named in changes of its parameters.
-    pub generation: u16,
-    /// New layer.
-    pub layer: Box<Layer>,
-}
-
-/// Returns the outputs that the sum of the models has: energy only if every model computes its energy.
-fn observable(slots: &[Slot]) -> Demand {
-    if slots.iter().all(Slot::gives_energy) { Demand::ALL } else { Demand::WRENCH }
-}
-
-/// Gain and activity of the layers of one priority.
-struct Level {
-    priority: u8,
-    gain: Fade,
-    /// True if a layer of this priority had a nonzero wrench in this tick.
-    pushes: bool,
-}
-
-impl ModelStack {
-    /// Creates the stack from layers, each with the number of its model in the scene. Not real-time.
-    pub(crate) fn new(layers: Vec<(usize, Layer)>) -> Self {
-        let slots: Box<[Slot]> = layers.into_iter().map(|(number, layer)| Slot::new(number, layer)).collect();
-        let broad = BroadPhase::new(slots.iter().map(Slot::bounds).collect());
-        let mut priorities: Vec<u8> = slots.iter().map(|slot| slot.priority).collect();
-        priorities.sort_unstable();
-        priorities.dedup();
-        if priorities.len() == 1 {
-            priorities.clear();
-        }
-        let level = |priority| Level { priority, gain: Fade::new(1.0, SILENCE_S), pushes: false };
-        let observable = observable(&slots);
-        Self { slots, broad, levels: priorities.into_iter().map(level).collect(), observable }
-    }
-
-    /// Returns the outputs that the sum of the models has: energy only if every model computes its energy. Real-time: bounded, no
-    /// allocation.
-    #[inline]
-    pub(crate) fn observable(&self) -> Demand {
-        self.observable
-    }
-
-    /// Steps the models near the handle; returns the weighted sum of their contributions.
-    /// An output without demand is undefined; an output that only observers demand is NaN if it is not finite.
-    ///
-    /// Real-time: bounded by the models that are near, no allocation.
-    #[inline]
-    pub(crate) fn step(
-        &mut self,
-        context: &StepContext<'_>,
-        heartbeat: &Heartbeat,
-        events: &mut Events,
-    ) -> Contribution {
-        let StepContext { tick, state, demand, .. } = *context;
-        let Self { slots, broad, levels, .. } = self;
-        levels.iter_mut().for_each(|level| level.pushes = false);
-        let mut sum = Contribution::NONE;
-        broad.for_each_near(slots, state.pose.position(), |slot| {
-            let level = levels.iter_mut().find(|level| level.priority == slot.priority);
-            let is_silenced = level.as_ref().is_some_and(|level| level.gain.is_silent(tick.time_ns));
-            if is_silenced || slot.weight.is_silent(tick.time_ns) {
-                return;
-            }
-            heartbeat.enter(tick.index, Place::Model(slot.number));
-            let share = slot.step(context, events);
-            let mut weight = slot.weight.at(tick.time_ns);
-            if let Some(level) = level {
-                level.pushes |= weight > 0.0 && reaches_hand(&share, demand.at_hand());
-                weight *= level.gain.at(tick.time_ns);
-            }
-            sum = sum.plus(share.times(weight));
-        });
-        heartbeat.enter(tick.index, Place::Host);
-        let mut is_silenced = false;
-        for level in levels.iter_mut().rev() {
-            level.gain.set_target(if is_silenced { 0.0 } else { 1.0 }, tick.time_ns);
-            is_silenced |= level.pushes;
-        }
-        sum
-    }
-
-    /// Changes a live parameter of the model at index `model` of the stack; unsupported if there is no such model. Real-time:
-    /// bounded by the model's objects, no allocation.
-    pub(crate) fn set_parameter(
-        &mut self,
-        model: usize,
-        tick: &Tick,
-        parameter: usize,
-        value: f64,
-    ) -> CallStatus {
-        let Some(slot) = self.slots.get_mut(model) else { return CallStatus::Unsupported };
-        let status = slot.set_parameter(tick, parameter, value);
-        self.rebound(model);
-        status
-    }
-
-    /// Replaces a model; the new layer fades in from this tick on. Returns an older layer that was still fading out (or the new
-    /// layer if there is no such model), to be dropped outside the loop.
-    ///
-    /// Real-time: bounded by the objects of the model, no allocation.
-    pub(crate) fn replace(
-        &mut self,
-        model: usize,
-        layer: Box<Layer>,
-        generation: u16,
-        tick: &Tick,
-    ) -> Option<Box<Layer>> {
-        let Some(slot) = self.slots.get_mut(model) else { return Some(layer) };
-        let pushed_out = slot.put(layer, generation, tick);
-        self.observable = observable(&self.slots);
-        self.rebound(model);
-        pushed_out
-    }
-
-    /// Updates the bounds of a layer in the broad phase.
-    fn rebound(&mut self, model: usize) {
-        let bounds = self.slots.get(model).and_then(Slot::bounds);
-        if bounds != self.broad.bounds(model) {
-            self.broad.watch_always(model, bounds);
-        }
-    }
-}
-
-/// Returns true if a nonzero part of the contribution reaches the hand.
-#[inline]
-fn reaches_hand(share: &Contribution, at_hand: Demand) -> bool {
-    let Contribution { wrench, effort, .. } = share;
-    wrench.force() != DVec3::ZERO
-        || at_hand.contains(Demand::TORQUE) && wrench.torque() != DVec3::ZERO
-        || *effort != 0.0
-}
+pub(crate) use stack::ModelStack;

@@ -4,39 +4,41 @@
 //! faded in; then the old layer is returned, to be dropped outside the loop. If a third layer arrives before that, the oldest is
 //! removed at once and its last contribution fades instead: the force does not jump however soon replacements follow each other.
 
-use super::broad_phase::Bounds;
+use super::body::Body;
+use super::contribution::Share;
 use super::fade::Fade;
-use super::layer::{Contribution, Layer, LayerReport, StepContext};
+use super::model_layer::{LayerReport, ModelLayer};
+use super::objects::Objects;
+use flotor_core::broad_phase::Bounds;
 use flotor_core::health::ModelHealth;
-use flotor_core::trace::Events;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, Tick};
 use flotor_loader::InstanceState;
 
-pub(crate) struct Slot {
+pub(crate) struct Slot<B: Body> {
     /// Number of the model in the scene.
     pub(crate) number: usize,
-    current: Box<Layer>,
+    current: Box<ModelLayer<B>>,
     /// Weight of the current layer while the old one fades out.
     presence: Fade,
     /// Old layer, while it fades out.
-    leaving: Option<Box<Layer>>,
+    leaving: Option<Box<ModelLayer<B>>>,
     /// Last contribution of a layer removed before it had faded out; fades out with `leaving`.
-    rest: Option<Contribution>,
+    rest: Option<B::Share>,
     /// Tick of the last step, and the old contributions less the current one in that step.
-    gap: Option<(u64, Contribution)>,
+    gap: Option<(u64, B::Share)>,
     pub(super) weight: Fade,
     pub(super) priority: u8,
     fade_s: f64,
 }
 
-impl Slot {
+impl<B: Body> Slot<B> {
     /// Creates a slot with its first layer. Not real-time.
-    pub(super) fn new(number: usize, layer: Layer) -> Self {
+    pub(super) fn new(number: usize, layer: Box<ModelLayer<B>>) -> Self {
         let blend = layer.blend;
         Self {
             number,
-            current: Box::new(layer),
+            current: layer,
             presence: Fade::new(1.0, blend.fade_s),
             leaving: None,
             rest: None,
@@ -56,7 +58,12 @@ impl Slot {
     /// Installs a layer, which fades in from this tick on; returns the layer that was still fading out, if there was one.
     ///
     /// Real-time: bounded, no allocation.
-    pub(super) fn put(&mut self, mut layer: Box<Layer>, generation: u16, tick: &Tick) -> Option<Box<Layer>> {
+    pub(crate) fn put(
+        &mut self,
+        mut layer: Box<ModelLayer<B>>,
+        generation: u16,
+        tick: &Tick,
+    ) -> Option<Box<ModelLayer<B>>> {
         self.rest = self.missing_without_leaving(tick);
         self.gap = None;
         layer.generation = generation;
@@ -68,7 +75,7 @@ impl Slot {
 
     /// Returns the contribution that would be missing without the leaving layer, as of the last tick; `None` if no layer is
     /// leaving, or the slot was not stepped in the last tick.
-    fn missing_without_leaving(&self, tick: &Tick) -> Option<Contribution> {
+    fn missing_without_leaving(&self, tick: &Tick) -> Option<B::Share> {
         let (asked_at, gap) = self.gap?;
         let absence = 1.0 - self.presence.at(tick.time_ns);
         let is_felt = self.leaving.is_some() && absence > 0.0 && asked_at.saturating_add(1) == tick.index;
@@ -82,7 +89,7 @@ impl Slot {
 
     /// Removes the layer that has faded out, if there is one. Real-time: bounded, no allocation.
     #[inline]
-    pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<Box<Layer>> {
+    pub(crate) fn take_faded(&mut self, tick: &Tick) -> Option<Box<ModelLayer<B>>> {
         if self.leaving.is_none() || self.presence.at(tick.time_ns) < 1.0 {
             return None;
         }
@@ -95,29 +102,18 @@ impl Slot {
         self.current.serves.contains(Demand::ENERGY)
     }
 
-    /// Returns the bounding box, device frame, in which the objects can act; `None` for everywhere. Real-time: bounded by their
-    /// number, no allocation.
-    pub(super) fn bounds(&self) -> Option<Bounds> {
-        // The contribution of a removed layer fades wherever the handle is.
-        if self.rest.is_some() {
-            return None;
-        }
-        let current = self.current.bounds()?;
-        self.leaving.as_ref().map_or(Some(current), |leaving| Some(current.with(leaving.bounds()?)))
-    }
-
     /// Steps the current and the leaving layer, and returns the blend of their contributions. Real-time: bounded by the objects
     /// that are near, no allocation.
     #[inline]
-    pub(super) fn step(&mut self, context: &StepContext<'_>, events: &mut Events) -> Contribution {
-        let share = self.current.step(context, events);
+    pub(super) fn step(&mut self, tick: &Tick, samples: &B::Samples<'_>, events: &mut B::Marks) -> B::Share {
+        let share = self.current.step(tick, samples, events);
         let Some(leaving) = &mut self.leaving else { return share };
-        let presence = self.presence.at(context.tick.time_ns);
-        let mut before = leaving.step(context, events);
+        let presence = self.presence.at(tick.time_ns);
+        let mut before = leaving.step(tick, samples, events);
         if let Some(rest) = self.rest {
             before = before.plus(rest);
         }
-        self.gap = Some((context.tick.index, before.plus(share.times(-1.0))));
+        self.gap = Some((tick.index, before.plus(share.times(-1.0))));
         share.times(presence).plus(before.times(1.0 - presence))
     }
 
@@ -127,18 +123,18 @@ impl Slot {
     }
 
     /// Changes a live parameter of the current layer. Real-time: bounded by its objects, no allocation.
-    pub(super) fn set_parameter(&mut self, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
+    pub(crate) fn set_parameter(&mut self, tick: &Tick, parameter: usize, value: f64) -> CallStatus {
         self.current.set_parameter(tick, parameter, value)
     }
 
     /// Iterates over the states of the current layer's instances before a tick; `None` for one whose state cannot be saved.
     pub(crate) fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>> {
-        self.current.states(tick)
+        self.current.body.states(tick)
     }
 
     /// Returns health and last message of the current layer. Not real-time.
     pub(crate) fn health(&mut self) -> (ModelHealth, String) {
-        (self.current.health(), self.current.last_message())
+        (self.current.health(), self.current.body.last_message())
     }
 
     /// Returns reports on all layers of the slot. Not real-time.
@@ -150,8 +146,21 @@ impl Slot {
     }
 
     /// Returns all layers of the slot, each with the model's number. Not real-time.
-    pub(crate) fn into_layers(self) -> impl Iterator<Item = (usize, Box<Layer>)> {
+    pub(crate) fn into_layers(self) -> impl Iterator<Item = (usize, Box<ModelLayer<B>>)> {
         let Self { number, current, leaving, .. } = self;
         leaving.into_iter().chain(std::iter::once(current)).map(move |layer| (number, layer))
+    }
+}
+
+impl Slot<Objects> {
+    /// Returns the bounding box, device frame, in which the objects can act; `None` for everywhere. Real-time: bounded by their
+    /// number, no allocation.
+    pub(super) fn bounds(&self) -> Option<Bounds> {
+        // The contribution of a removed layer fades wherever the handle is.
+        if self.rest.is_some() {
+            return None;
+        }
+        let current = self.current.body.bounds()?;
+        self.leaving.as_ref().map_or(Some(current), |leaving| Some(current.with(leaving.body.bounds()?)))
     }
 }

@@ -8,6 +8,7 @@ mod placement;
 mod reader;
 mod reference;
 mod setting;
+mod shared;
 
 pub use change::{Alternative, ChangeUse, ChangeWhat};
 pub use devices::DeviceUse;
@@ -15,7 +16,7 @@ pub use devices::{is_named, without_device};
 use flotor_core::asynchronous::{ContactLimits, FieldTiming, StiffnessCap};
 use flotor_core::coupling::{CouplingDescription, PassivityMode};
 use flotor_core::limits::{Boundary, Limits};
-use flotor_core::mapping::{Blend, MappingConfig};
+use flotor_core::mapping::{Blend, MappingConfig, PortConfig};
 use flotor_core::plausibility::is_rotation;
 pub use own::{OWN_SCENES, OwnScene};
 pub use reader::{Location, ParameterText, SceneError};
@@ -51,7 +52,7 @@ pub struct Scene {
     pub plugin_folders: Vec<PathBuf>,
     /// Devices, at least one.
     pub devices: Vec<DeviceUse>,
-    /// Force models, whose wrenches add up. A model on several devices has an entry for each.
+    /// Force models, whose wrenches add up. A model on several devices has an entry for each, unless the devices share it.
     pub models: Vec<ModelUse>,
     /// Virtual couplings between two devices, or with a device on another host.
     pub couplings: Vec<CouplingDescription>,
@@ -95,19 +96,21 @@ impl CalibrationUse {
     }
 }
 
-/// Force model of a scene on one device.
+/// Force model of a scene on one device, or shared by several.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelUse {
     /// Name in `--set NAME.KEY=VALUE` and reports; the plugin's id by default.
     pub name: String,
     /// Plugin of the model.
     pub plugin: PluginUse,
-    /// Number of the model's device, from 0 in the scene's order.
+    /// Number of the model's device, from 0 in the scene's order; of a shared model, of the first.
     pub device: u16,
     /// Mapping between device frame and model frame: rotation and scales.
     pub mapping: MappingConfig,
     /// Positions of the model's home in the device frame, m; one instance for each.
     pub places_m: Vec<[f64; 3]>,
+    /// Ports at the further devices of a shared model, whose one instance is at its only position; empty for other models.
+    pub shared_with: Vec<PortConfig>,
     /// Weight, priority and fade time of the model among the models of its device.
     pub blend: Blend,
     /// Isolation of the model from the host process.
@@ -146,6 +149,13 @@ impl Isolation {
 }
 
 impl ModelUse {
+    /// Returns the numbers of the model's devices: one, or those of the ports of a shared model.
+    #[must_use]
+    pub fn devices(&self) -> Vec<usize> {
+        let further = self.shared_with.iter().map(|port| port.device);
+        std::iter::once(self.device).chain(further).map(usize::from).collect()
+    }
+
     /// Returns a copy of the model with `plugin`, or with the same plugin for `None`. A given plugin starts from its own defaults,
     /// without the parameters of the scene; `settings`, as key and value, are added.
     #[must_use]
@@ -285,6 +295,7 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
     let plugin = plugin_use(&mut section)?;
     let name = section.read("name", devices::name)?;
     let on = devices::of_model(devices, section.take("device"), &plugin.location)?;
+    let sharing = shared::read(&mut section, &on, devices)?;
     let (mapping, places_m) = match section.section("mapping")? {
         Some(section) => mapping(section)?,
         None => (MappingConfig::default(), vec![[0.0; 3]]),
@@ -301,12 +312,16 @@ fn model(mut section: Section<'_>, devices: &[DeviceUse]) -> Result<Vec<ModelUse
         device: 0,
         mapping,
         places_m,
+        shared_with: Vec::new(),
         blend,
         isolation,
         field,
         budget_s: budget_us.map(|microseconds| microseconds * 1.0e-6),
         latency_s: 0.0,
     };
+    if let Some(sharing) = sharing {
+        return sharing.of(model, &on).map(|model| vec![model]);
+    }
     let only = on.len() == 1;
     let on_device = |number: u16| {
         let device = devices.get(usize::from(number)).filter(|_| !only);

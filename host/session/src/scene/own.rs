@@ -34,6 +34,7 @@ pub const OWN_SCENES: &[OwnScene] = own![
     "study",
     "teleoperation",
     "teleoperation-apart",
+    "two-hands",
     "wall"
 ];
 

@@ -34,7 +34,7 @@ pub(super) fn warnings(scene: &Scene, opened: &[Opened]) -> Vec<String> {
 /// no mismatch: a model declares that it can compute torque, not that it will.
 fn without_torque(scene: &Scene, number: u16, device: &Capabilities) -> Option<String> {
     let is_driven = device.actuated != Axes::NONE && !device.actuated.contains(Axes::ROTATION);
-    let is_felt = scene.models.iter().any(|model| model.device == number);
+    let is_felt = scene.models.iter().any(|model| model.devices().contains(&number.into()));
     let is_wanted = scene.limits.torque_nm.axes().iter().any(|most_nm| *most_nm > 0.0);
     (is_driven && is_felt && is_wanted).then(|| {
         let name = scene.devices.get(usize::from(number)).map_or("", |device| device.name.as_str());
@@ -74,7 +74,7 @@ fn pair(scene: &Scene, number: u16, device: &Capabilities, can_pace: bool) -> Ve
         );
     }
     mismatches.extend(boundless(&scene.boundary, device));
-    let is_felt = scene.models.iter().any(|model| model.device == number)
+    let is_felt = scene.models.iter().any(|model| model.devices().contains(&number.into()))
         || scene.couplings.iter().any(|coupling| coupling.ends.here().iter().any(|end| end.device == number));
     if is_felt {
         mismatches.extend(unfelt(&scene.limits.force_n.axes(), device));

@@ -222,7 +222,7 @@ fn deactivate(
 }
 
 /// Layers, each with its model number.
-type Layers = Vec<(usize, Box<Layer>)>;
+type Layers = Vec<(usize, Layer)>;
 
 /// Returns the layers, both of the loop and returned by it, and a report on each, with the last message of unhealthy models; returns
 /// nothing if a call hangs.

@@ -181,12 +181,14 @@ pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
         let number = usize::from(model.device);
         let device = opened.get(number);
         let damping_ns_per_m = scene.devices.get(number).map_or(0.0, |used| used.damping_ns_per_m);
-        let is_simulated = device.is_some_and(|device| device.embodiment == Embodiment::Simulated);
+        let devices = || model.devices().into_iter().filter_map(|number| opened.get(number));
+        let is_simulated = devices().all(|device| device.embodiment == Embodiment::Simulated);
+        let latency_s = devices().map(|device| device.capabilities.latency_s).fold(0.0, f64::max);
         if model.isolation == Isolation::ByOrigin && (clock == Clock::Virtual || is_simulated) {
             model.isolation = Isolation::None;
         }
         let Some(Opened { capabilities, .. }) = device else { continue };
-        model.latency_s = capabilities.latency_s;
+        model.latency_s = latency_s;
         if let Some(field) = &mut model.field {
             field.contacts = field.contacts.on(capabilities, damping_ns_per_m, &scene.limits, period_s);
         }
@@ -194,8 +196,8 @@ pub(super) fn settled(scene: &Scene, opened: &[Opened], clock: Clock) -> Scene {
     scene
 }
 
-/// Layers of a scene's models, each with its device number, and reports on their plugins.
-type Models = (Vec<(usize, Layer)>, Vec<PluginReport>);
+/// Layers of a scene's models, each with its device numbers, and reports on their plugins.
+type Models = (Vec<(Vec<usize>, Layer)>, Vec<PluginReport>);
 
 /// Loads the models of a scene and creates an instance at each position of each model. Not real-time.
 pub(super) fn prepare_models(
@@ -206,7 +208,7 @@ pub(super) fn prepare_models(
 ) -> Result<Models, RunError> {
     let prepare = |model: &ModelUse| {
         let (layer, report) = prepare_model(registry, model, config, clock)?;
-        Ok(((usize::from(model.device), layer), report))
+        Ok(((model.devices(), layer), report))
     };
     scene.models.iter().map(prepare).collect()
 }
@@ -229,6 +231,11 @@ fn isolation(model: &ModelUse, plugin: &Metadata, clock: Clock) -> Result<Isolat
                  start all of them, or `isolation = \"none\"` to run the model in the host process"
             );
             Err(complain(model, &problem))
+        }
+        Isolation::ByOrigin if is_outside && !model.shared_with.is_empty() => {
+            let problem = "the plugin is not part of the installation, so it would get a worker process, which devices cannot \
+                           share; set `isolation = \"none\"` to run it in the host process, or remove `shared`";
+            Err(complain(model, problem))
         }
         Isolation::ByOrigin if is_outside => Ok(Isolation::Process),
         Isolation::ByOrigin => Ok(Isolation::None),
@@ -256,14 +263,18 @@ impl ModelBuilder {
         let Self { plugin, model, config, clock, .. } = self;
         let budget_ns = budget_ns(model, *clock, config.period_ns);
         let mapping = Mapping::new(&model.mapping);
+        let further = model.shared_with.iter().map(|port| Mapping::new(&port.mapping).at(port.place_m));
+        let further: Vec<Mapping> = further.collect();
         let instance = |place_m: &[f64; 3]| {
             let mapping = mapping.at(*place_m);
             let mut engine = self.engine(&mapping, budget_ns, progress)?;
-            if pushes_at_home(&engine.workspace_bounds(), &mapping) {
+            let bounds = engine.workspace_bounds();
+            let mut mappings = std::iter::once(&mapping).chain(&further);
+            if let Some(excluded) = mappings.find(|mapping| pushes_at_home(&bounds, mapping)) {
                 let problem = format!(
                     "at {} mm the workspace limits of the model exclude the home of its device, and the wall at these \
                      limits would push there; move the model (`position_mm`) or choose parameters that extend its limits",
-                    DVec3::from(*place_m) * 1.0e3
+                    excluded.position_to_device(DVec3::ZERO) * 1.0e3
                 );
                 return Err(complain(model, &problem).into());
             }
@@ -285,7 +296,11 @@ impl ModelBuilder {
             (_, Some(_)) => TimeBudget::default(),
         };
         let sampled = SampledLoop { period_s: config.period_ns as f64 * 1.0e-9, latency_s: model.latency_s };
-        Ok((Layer::new(instances, &model.blend, budget, &sampled), values, estimates))
+        let layer = match instances.pop() {
+            Some(one) if !further.is_empty() => Layer::shared(one, further, &model.blend, budget, &sampled),
+            last => Layer::new(instances.into_iter().chain(last).collect(), &model.blend, budget, &sampled),
+        };
+        Ok((layer, values, estimates))
     }
 
     /// Creates and prepares one instance: in the loop, in a worker, or asynchronous.
@@ -316,6 +331,11 @@ impl ModelBuilder {
             }
             Isolation::ByOrigin | Isolation::None => Engine::Here(plugin.create_model(settings)?),
         };
+        if !model.shared_with.is_empty() && !engine.has_ports() {
+            let problem = "the plugin cannot be shared: it does not offer `flotor.world/1`; remove `shared` to give each device an \
+                           instance of its own";
+            return Err(complain(model, problem).into());
+        }
         let Some(timing) = &model.field else {
             progress.enter(&model.name, Call::Prepare);
             engine.prepare(config).map_err(no)?;

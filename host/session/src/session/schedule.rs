@@ -65,7 +65,7 @@ pub(super) fn schedule(
                     let (layer, report) = made.swap_remove(choice);
                     *others = made.into_iter().map(|(_, report)| report).collect();
                     let generation = plugins.add(number, report, chosen_by);
-                    let replacement = Replacement { model: number, generation, layer: Box::new(layer) };
+                    let replacement = Replacement { model: number, generation, layer };
                     scheduled.replacements.push((time_ns, replacement));
                 }
                 continue;

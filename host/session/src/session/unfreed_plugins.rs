@@ -11,7 +11,7 @@ use flotor_servo::{LastStop, Layer};
 #[derive(Default)]
 pub struct UnfreedPlugins {
     pub(super) devices: Vec<(String, OpenedDevice)>,
-    pub(super) models: Vec<(String, Box<Layer>)>,
+    pub(super) models: Vec<(String, Layer)>,
     /// Also owns the devices, and closes a device that has no other owner.
     pub(super) last_stop: Option<LastStop>,
     pub(super) calls: CallThread,

@@ -19,6 +19,8 @@ pub(crate) enum May {
     Stay,
     /// New lines, but none removed.
     Grow,
+    /// New lines while an instance exists, none of which is there after it.
+    GrowInLife,
 }
 
 /// Part of the state: name, permitted change, and descriptive lines.

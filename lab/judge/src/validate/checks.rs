@@ -4,7 +4,7 @@ use super::outcome::{Figures, Outcome};
 use super::rule::Check;
 use super::subject::Subject;
 use super::untouched::{Host, untouched};
-use super::{device, guarded, life, live_parameters, model, passive, restore};
+use super::{device, guarded, life, live_parameters, model, passive, ports, restore};
 use crate::platform::locked;
 use flotor_hal::conformance::Rule;
 use flotor_hal::{Parameter, ParameterKind};
@@ -57,6 +57,7 @@ pub fn check(path: &Path, settings: &[KeyValue], wanted: Check) -> Result<Option
             Rule::SurvivesFarPoses => of_model(model::far_poses)?,
             Rule::ResetRepeats => of_model(model::reset_repeats)?,
             Rule::RestoreRepeats => restore::restore_repeats(&subject)?,
+            Rule::Ports => ports::ports(&subject)?,
             Rule::TimeBudget => of_model(model::time_budget)?,
             Rule::Independent => model::independent(&subject)?,
             Rule::NoThreads => model::no_threads(subject.prepared_model()?, before.threads()?)?,

@@ -122,11 +122,17 @@ fn extensions(model: &mut Model, after: After<'_>) -> Result<(), String> {
             let mut set = Box::new(ContactSet::NONE);
             let answer = model.contact_set(&input, &mut set);
             works(model, "contact-set")?;
-            if answer != CallStatus::Ok || !set.bilateral().is_finite() {
+            let at = wording::pose(&input.pose);
+            if answer != CallStatus::Ok {
                 return Err(format!(
-                    "contact-set returned `{}`; its bilateral part: {}",
-                    wording::status(answer),
-                    wording::linear_field(&set.bilateral())
+                    "contact-set returned `{}` at {at}; return ok at every pose, or do not offer flotor.contact-set/1",
+                    answer.name()
+                ));
+            }
+            if !set.bilateral().is_finite() {
+                let field = wording::linear_field(&set.bilateral());
+                return Err(format!(
+                    "the bilateral part of contact-set is not finite at {at}: {field}; return finite numbers"
                 ));
             }
             // Any period: how long a set is valid does not make it right or wrong.

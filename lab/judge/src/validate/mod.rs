@@ -17,6 +17,7 @@ mod outcome;
 mod passive;
 pub(crate) mod path;
 pub(crate) mod patience;
+mod ports;
 mod restore;
 mod rule;
 mod subject;

@@ -3,7 +3,6 @@
 use super::outcome::Outcome;
 use super::path::{step, walk};
 use super::subject::Subject;
-use crate::wording;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Input, Output};
 use flotor_loader::{InstanceState, Model};
@@ -57,14 +56,14 @@ fn saved(state: &mut InstanceState<'_>) -> Result<Vec<u8>, String> {
     let mut bytes = vec![0; count.ok_or("snapshot does not return the number of bytes of the state")?];
     match state.save(&mut bytes) {
         CallStatus::Ok => Ok(bytes),
-        other => Err(format!("save returned `{}`", wording::status(other))),
+        other => Err(format!("save returned `{}`", other.name())),
     }
 }
 
 fn restored(state: &mut InstanceState<'_>, bytes: &[u8]) -> Result<(), String> {
     match state.restore(bytes) {
         CallStatus::Ok => Ok(()),
-        other => Err(format!("restore returned `{}`", wording::status(other))),
+        other => Err(format!("restore returned `{}`", other.name())),
     }
 }
 

@@ -12,6 +12,10 @@ use std::time::Duration;
 /// Waiting time at the end, in which a leftover timer or signal would fire.
 const REST: Duration = Duration::from_millis(300);
 
+/// Parts that may grow while an instance exists, and after it.
+const IN_LIFE: &[May] = &[May::Grow, May::GrowInLife];
+const AFTER: &[May] = &[May::Grow];
+
 /// State of this process and thread.
 pub(super) struct Host {
     parts: Vec<Part>,
@@ -22,16 +26,16 @@ pub(super) struct Host {
 
 /// Runs the life of an instance, and compares the state after each call.
 pub(super) fn untouched(subject: &Subject, before: &Host) -> Result<(), Outcome> {
-    before.compare("loading")?;
+    before.compare("loading", AFTER)?;
     live(subject, &mut |call, float_changes| match float_changes {
-        0 => before.compare(call),
+        0 => before.compare(call, IN_LIFE),
         _ => Err(format!(
             "{call} changed the floating-point mode (rounding, flush-to-zero or traps); restore the mode before the call \
              returns"
         )),
     })?;
     std::thread::sleep(REST);
-    before.compare("the plugin, after its last call,")?;
+    before.compare("the plugin, after its last call,", AFTER)?;
     before.known()
 }
 
@@ -69,17 +73,18 @@ impl Host {
         self.unknown.clone().map_or(Ok(()), Err)
     }
 
-    fn compare(&self, call: &str) -> Result<(), String> {
-        self.difference(&Self::now()).map_or(Ok(()), |difference| Err(format!("{call} changed {difference}")))
+    fn compare(&self, call: &str, growing: &[May]) -> Result<(), String> {
+        let difference = self.difference(&Self::now(), growing);
+        difference.map_or(Ok(()), |difference| Err(format!("{call} changed {difference}")))
     }
 
-    /// Returns the first part that has changed.
-    fn difference(&self, now: &Self) -> Option<String> {
+    /// Returns the first part that has changed, other than by growth of a part that may grow.
+    fn difference(&self, now: &Self, growing: &[May]) -> Option<String> {
         let missing = |from: &[String], of: &[String]| of.iter().find(|line| !from.contains(line)).cloned();
         let mut parts = self.parts.iter().zip(&now.parts);
         parts.find_map(|((what, may, before), (_, _, after))| {
             let (gone, new) = (missing(after, before), missing(before, after));
-            let has_changed = gone.is_some() || new.is_some() && *may == May::Stay;
+            let has_changed = gone.is_some() || new.is_some() && !growing.contains(may);
             let [gone, new] = [gone, new].map(|line| line.unwrap_or_else(|| "nothing".to_owned()));
             has_changed.then(|| format!("{what}: `{gone}` became `{new}`"))
         })
@@ -113,15 +118,26 @@ mod tests {
     #[test]
     fn what_changes_is_named_and_files_may_come() {
         let before = host("/here", &["3 -> /a"]);
-        assert_eq!(before.difference(&host("/here", &["3 -> /a", "4 -> /b"])), None);
-        let told = before.difference(&host("/there", &["3 -> /a"]));
+        assert_eq!(before.difference(&host("/here", &["3 -> /a", "4 -> /b"]), AFTER), None);
+        let told = before.difference(&host("/there", &["3 -> /a"]), AFTER);
         assert_eq!(told.as_deref(), Some("the folder: `/here` became `/there`"));
-        let told = before.difference(&host("/here", &["4 -> /b"]));
+        let told = before.difference(&host("/here", &["4 -> /b"]), AFTER);
         assert_eq!(told.as_deref(), Some("open files: `3 -> /a` became `4 -> /b`"));
         assert_eq!(
-            before.difference(&host("/here", &[])).as_deref(),
+            before.difference(&host("/here", &[]), AFTER).as_deref(),
             Some("open files: `3 -> /a` became `nothing`")
         );
+    }
+
+    #[test]
+    fn a_solver_in_a_process_of_its_own_may_run_until_its_instance_ends() {
+        let with = |processes: &[&str]| {
+            let lines = processes.iter().map(|line| (*line).to_owned()).collect();
+            Host { parts: vec![("child processes", May::GrowInLife, lines)], unknown: None, threads: Ok(1) }
+        };
+        assert_eq!(with(&[]).difference(&with(&["at least one"]), IN_LIFE), None);
+        let left = with(&[]).difference(&with(&["at least one"]), AFTER);
+        assert_eq!(left.as_deref(), Some("child processes: `nothing` became `at least one`"));
     }
 
     #[test]

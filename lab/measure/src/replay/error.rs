@@ -1,6 +1,6 @@
 //! Failure of a replay, of a saved state and of a change that does not fit.
 
-use flotor_core::snapshot::SnapshotError;
+use super::snapshot::SnapshotError;
 use flotor_record::ReadError;
 use flotor_session::RunError;
 

@@ -7,6 +7,7 @@ mod divergence;
 mod error;
 mod files;
 mod held;
+mod snapshot;
 mod state;
 
 pub use divergence::{Coverage, DivergenceCause};
@@ -135,7 +136,7 @@ impl<'r> Replay<'r> {
         let mut plugins = Vec::new();
         for model in &uses {
             let (layer, report) = prepare_model(registry, model, &config, Clock::Virtual)?;
-            layers.push((usize::from(model.device), layer));
+            layers.push((model.devices(), layer));
             plugins.push(report);
         }
         let devices = recording.run().devices().count();
@@ -351,7 +352,7 @@ impl<'r> Replay<'r> {
         *report = now;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // a count
         let generation = change.number as u16;
-        drop(self.forces.replace(Replacement { model, generation, layer: Box::new(layer) }, tick));
+        drop(self.forces.replace(Replacement { model, generation, layer }, tick));
         Ok(())
     }
 }
@@ -474,6 +475,7 @@ fn models_of(path: &Path, run: &RunDescription) -> Vec<ModelUse> {
             device: plugin.device,
             mapping,
             places_m: plugin.places_m.clone(),
+            shared_with: plugin.shared_with.clone(),
             blend: plugin.blend,
             isolation: Isolation::None, // no device, so no hand to protect
             field: plugin.field,

@@ -1,7 +1,7 @@
 //! State of all models of a replay before a tick, to start another replay there.
 
 use super::error::ReplayError;
-use flotor_core::snapshot::{Snapshot, SnapshotError, SnapshotOrigin};
+use super::snapshot::{Snapshot, SnapshotError, SnapshotOrigin};
 use flotor_hal::LoopConfig;
 use flotor_hal::abi::CallStatus;
 use flotor_loader::InstanceState;

@@ -74,7 +74,7 @@ impl Tree {
         }
         let mut lowest = vec![Boxes::EMPTY; below.div_ceil(WIDTH)];
         // Items under one box of the lowest level of boxes.
-        let share = WIDTH.pow(DISC_LEVELS as u32);
+        let share = [WIDTH; DISC_LEVELS].iter().product::<usize>();
         fill(&mut lowest, |node| {
             let mut boxes = Boxes::EMPTY;
             for item in WIDTH * share * node..count.min(WIDTH * share * (node + 1)) {

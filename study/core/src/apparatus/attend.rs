@@ -1,19 +1,20 @@
 //! Sitting of a person: shows screens, presents stimuli and logs each answer before the next trial begins.
 
 use super::real_time_rig::RealTimeRig;
+use super::real_time_run::RealTimeRun;
 use crate::conduct::{ApparatusOrFrontEndError, Ending};
-use crate::log::{Event, Incident, LogWriter, digest};
+use crate::log::{Event, Incident, LogWriter, LoggedEvent, digest};
 use crate::screen::{Input, May, Screen, ScreenStateMachine, Step, StimulusExploration};
 use crate::trial::Trial;
 use std::time::Instant;
 
 /// Result of polling a front end.
 #[derive(Clone, Debug, PartialEq)]
-pub enum PollResult {
+pub enum PollResult<I = Input> {
     /// No input yet.
     Nothing,
     /// Input of the person.
-    Input(Input),
+    Input(I),
     /// The window or standard input is closed: no further input is possible.
     Closed,
 }
@@ -33,7 +34,7 @@ impl MinimumExploration {
 
     /// Returns a hint for the person if a stimulus was not felt long or far enough; `None` if time and path length suffice. Without
     /// a path length, only the time counts.
-    fn is_missed(&self, time_s: f64, path_length_m: Option<f64>) -> Option<&'static str> {
+    pub(super) fn is_missed(&self, time_s: f64, path_length_m: Option<f64>) -> Option<&'static str> {
         if time_s < self.time_s {
             Some("feel the stimulus a little longer")
         } else if path_length_m.is_some_and(|path_length_m| path_length_m < self.path_length_m) {
@@ -44,20 +45,20 @@ impl MinimumExploration {
     }
 }
 
-/// User interface of a person's sitting: a terminal, a pipe to a window program, or a test.
-pub trait FrontEnd {
+/// User interface of a person's sitting, with screens `S` and inputs `I`: a terminal, a pipe to a window program, or a test.
+pub trait FrontEnd<S = Screen, I = Input> {
     /// Shows a screen.
     ///
     /// # Errors
     /// If the front end is gone.
-    fn show(&mut self, screen: &Screen) -> Result<(), ApparatusOrFrontEndError>;
+    fn show(&mut self, screen: &S) -> Result<(), ApparatusOrFrontEndError>;
 
     /// Returns the next input of the person; waits only briefly, so that the caller can check the handle and the run between
     /// calls.
     ///
     /// # Errors
     /// If the front end is gone.
-    fn poll(&mut self, screen: &Screen) -> Result<PollResult, ApparatusOrFrontEndError>;
+    fn poll(&mut self, screen: &S) -> Result<PollResult<I>, ApparatusOrFrontEndError>;
 
     /// Warns the person immediately, visibly and audibly, that the handle was pushed out of its range.
     ///
@@ -87,7 +88,7 @@ pub fn attend(
     let result = sit(attended, log, rig, front, least);
     if let Err(error) = &result {
         // Return the error of the sitting: a failure to log this error matters less.
-        let _ = log.write(&Event::Incident(rig.incident_of(error.as_ref())));
+        let _ = log.write(&Event::Incident(rig.run().incident_of(error.as_ref())));
     }
     result
 }
@@ -119,7 +120,9 @@ fn sit(
         front.show(&screen)?;
         let shown = Instant::now();
         let step = loop {
-            let input = match wait_for_input(rig, front, &screen, felt.as_ref(), log)? {
+            let out_of_range = |trial: &Trial| disturbance(trial, Incident::OutOfRange);
+            let out_of_range = felt.as_ref().map(out_of_range);
+            let input = match wait_for_input(rig.run(), front, &screen, out_of_range.as_ref(), log)? {
                 Ok(input) => input,
                 Err(incident) => {
                     log.write(&Event::Incident(incident))?;
@@ -132,13 +135,13 @@ fn sit(
             let felt_for_s = shown.elapsed().as_secs_f64();
             if may_withdraw(&screen)
                 && input == Input::Withdraw
-                && MinimumExploration::USUAL.is_missed(felt_for_s, rig.path_length_m()).is_none()
+                && MinimumExploration::USUAL.is_missed(felt_for_s, rig.run().path_length_m()).is_none()
             {
                 front.refuse("the next stimulus has been felt, so the previous answer is final")?;
                 continue;
             }
             if let Some(trial) = felt.filter(|_| input == Input::Continue) {
-                if let Some(why) = least.is_missed(felt_for_s, rig.path_length_m()) {
+                if let Some(why) = least.is_missed(felt_for_s, rig.run().path_length_m()) {
                     front.refuse(why)?;
                     continue;
                 }
@@ -205,35 +208,36 @@ fn disturbance(trial: &Trial, incident: Incident) -> Event {
 
 /// Closes the recording of a trial; logs a failure and continues the sitting.
 fn close_recording(rig: &mut RealTimeRig<'_>, log: &mut LogWriter) -> Result<(), ApparatusOrFrontEndError> {
-    if let Err(error) = rig.close_recording() {
+    if let Err(error) = rig.run().close_recording() {
         log.write(&Event::Incident(Incident::NotRecorded { reason: error.to_string() }))?;
     }
     Ok(())
 }
 
-/// Returns the next input, or the incident that stops the sitting. Warns and logs once each time the handle leaves its range.
-fn wait_for_input(
-    rig: &mut RealTimeRig<'_>,
-    front: &mut dyn FrontEnd,
-    screen: &Screen,
-    felt: Option<&Trial>,
+/// Returns the next input, or the incident that stops the sitting. While a stimulus is felt, warns and logs `out_of_range` once each time
+/// the handle leaves its range.
+pub(super) fn wait_for_input<S, I>(
+    run: &mut RealTimeRun,
+    front: &mut dyn FrontEnd<S, I>,
+    screen: &S,
+    out_of_range: Option<&impl LoggedEvent>,
     log: &mut LogWriter,
-) -> Result<Result<Input, Incident>, ApparatusOrFrontEndError> {
+) -> Result<Result<I, Incident>, ApparatusOrFrontEndError> {
     let mut warned = false;
     loop {
-        if let Some(incident) = rig.stopped_by() {
+        if let Some(incident) = run.stopped_by() {
             return Ok(Err(incident));
         }
         match front.poll(screen)? {
             PollResult::Nothing => {}
             PollResult::Input(input) => return Ok(Ok(input)),
             // An emergency stop closes the window, too: report the stop.
-            PollResult::Closed => return Ok(Err(rig.stopped_by().unwrap_or(Incident::WindowClosed))),
+            PollResult::Closed => return Ok(Err(run.stopped_by().unwrap_or(Incident::WindowClosed))),
         }
-        let out = felt.filter(|_| rig.is_out_of_range());
-        if let (Some(trial), false) = (out, warned) {
+        let out = out_of_range.filter(|_| run.is_out_of_range());
+        if let (Some(event), false) = (out, warned) {
             front.warn_out_of_range()?;
-            log.write(&disturbance(trial, Incident::OutOfRange))?;
+            log.write(event)?;
         }
         warned = out.is_some();
     }

@@ -32,7 +32,7 @@ pub struct RunEnded(pub RunEnd);
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "the model rejected {}.{} = {}; choose stimuli within the range of the model", .0.plugin, .0.parameter, .0.value)]
-pub struct StimulusRefused(pub Change);
+pub struct StimulusRefused(pub Box<Change>);
 
 /// Paths of the trial recordings, one file per trial.
 #[derive(Clone, Debug)]
@@ -55,10 +55,15 @@ impl TrialFiles {
     /// 1000 recordings of a trial, returns the path of the first recording.
     #[must_use]
     pub fn next_of(&self, trial: &Trial) -> PathBuf {
-        let first = self.of(trial);
-        let again = |run: u32| {
-            self.folder.join(format!("{}_trial-{:04}_run-{run}_motion.mcap", self.prefix, trial.number))
-        };
+        self.next_of_number(trial.number)
+    }
+
+    /// Returns an unused path for the trial of this number, as [`Self::next_of`] does.
+    #[must_use]
+    pub fn next_of_number(&self, number: u32) -> PathBuf {
+        let first = self.of_number(number);
+        let again =
+            |run: u32| self.folder.join(format!("{}_trial-{number:04}_run-{run}_motion.mcap", self.prefix));
         let mut paths = std::iter::once(first.clone()).chain((2..=1000).map(again));
         paths.find(|path| !path.exists()).unwrap_or(first)
     }
@@ -66,7 +71,11 @@ impl TrialFiles {
     /// Returns the path of a trial's first recording.
     #[must_use]
     pub fn of(&self, trial: &Trial) -> PathBuf {
-        self.folder.join(format!("{}_trial-{:04}_motion.mcap", self.prefix, trial.number))
+        self.of_number(trial.number)
+    }
+
+    fn of_number(&self, number: u32) -> PathBuf {
+        self.folder.join(format!("{}_trial-{number:04}_motion.mcap", self.prefix))
     }
 }
 
@@ -97,10 +106,10 @@ impl<'a> Rig<'a> {
         feel_s: f64,
         stop: &StopSwitch,
     ) -> Result<Self, RunError> {
-        let scene = apparatus.scene_with_hand(seed, subject);
+        let scene = apparatus.stage.scene_with_hand(seed, subject);
         // A different seed for each subject, so that the tremor differs, too.
         let seed = seed.wrapping_mul(u64::from(SubjectNumber::MOST) + 1).wrapping_add(subject.get().into());
-        let steps = Steps::prepare(&scene, &apparatus.registry, seed, stop)?;
+        let steps = Steps::prepare(&scene, &apparatus.stage.registry, seed, stop)?;
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // minutes at most
         let ticks = |seconds: f64| (seconds * scene.rate_hz).ceil() as u64;
         Ok(Self {
@@ -128,7 +137,7 @@ impl<'a> Rig<'a> {
         also: &mut dyn Observer,
     ) -> Result<Exploration, ApparatusOrFrontEndError> {
         if let (Kinematics::Full, Some(files)) = (self.kinematics, &self.files) {
-            let run = self.apparatus.describe(&self.scene, Clock::Virtual, self.seed);
+            let run = self.apparatus.stage.describe(&self.scene, Clock::Virtual, self.seed);
             self.watch.recording = RunRecording::new(Some(Recorder::create(&files.next_of(trial), &run)?));
         }
         let mut exploration = Exploration::default();
@@ -161,7 +170,7 @@ impl<'a> Rig<'a> {
         busy?;
         apparatus.show(self.steps.controls(), true)?;
         self.advance(self.fade_ticks, also)?;
-        self.watch.refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change).into()))
+        self.watch.refused.take().map_or(Ok(()), |change| Err(StimulusRefused(change.into()).into()))
     }
 
     fn advance(&mut self, ticks: u64, also: &mut dyn Observer) -> Result<(), ApparatusOrFrontEndError> {

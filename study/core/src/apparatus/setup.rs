@@ -1,21 +1,17 @@
 //! Apparatus of an experiment: a scene and the varied parameter of one of its models, both checked before the first trial.
 
+use super::stage::{DURATION_S, Stage, UnreadableFile, text};
 use crate::log::InputFile;
-use crate::observer::HandManner;
-use crate::protocol::{Protocol, ProtocolError, Stimulus, SubjectNumber};
+use crate::protocol::{Protocol, ProtocolError, Stimulus};
 use flotor_core::limits::CEILING;
 use flotor_hal::{Mutability, Parameter, ParameterKind};
-use flotor_record::{NamedFile, RunDescription};
 use flotor_servo::Clock;
 use flotor_session::registry::Registry;
-use flotor_session::run_description::{describe, named_files};
-use flotor_session::scene::{Location, ModelUse, ParameterText, Scene, nearest};
+use flotor_session::scene::{ModelUse, Scene, nearest};
 use flotor_session::{
-    ControlError, Controls, NewValue, PluginReport, RunError, RunOptions, Session, Strength, StrongDevice,
+    ControlError, Controls, NewValue, RunError, RunOptions, Session, Strength, StrongDevice,
 };
-use serde_json::{Value, json};
-use std::io;
-use std::path::{Path, PathBuf};
+use serde_json::Value;
 
 /// Movement data to store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -64,14 +60,8 @@ pub enum ApparatusError {
         numbers: Vec<String>,
     },
     /// A file of the scene or of a plugin has become unreadable.
-    #[error("{}: {cause}; the file was readable at the start: restore the file and start again", path.display())]
-    Unreadable {
-        /// Path of the file.
-        path: PathBuf,
-        /// Message of the system.
-        #[source]
-        cause: io::Error,
-    },
+    #[error(transparent)]
+    Unreadable(#[from] UnreadableFile),
     /// A stimulus outside the range of its parameter.
     #[error(transparent)]
     Range(#[from] ProtocolError),
@@ -114,34 +104,15 @@ fn listed(names: &[String]) -> String {
 
 /// Checked scene with its varied stimulus.
 pub struct Apparatus {
-    pub(super) scene: Scene,
-    pub(super) registry: Registry,
+    pub(super) stage: Stage,
     stimulus: Stimulus,
     /// Mutability of the varied parameter: a fixed parameter changes by replacement of its model (hot swap).
     mutability: Mutability,
     /// Blend weight of the model while it is felt, 0 to 1; below, its fade time, s.
     weight: f64,
     pub(super) fade_s: f64,
-    plugins: Vec<PluginReport>,
-    /// Permission for devices with limits above the host's force ceiling.
-    pub(super) strength: Strength,
     notices: Vec<String>,
 }
-
-/// Duration of the run, s: a year, longer than any experiment.
-const DURATION_S: f64 = 31_536_000.0;
-
-/// Parameter id of the device, and conversion of a hand's movement to the parameter's value.
-type HandParameter = (&'static str, fn(&HandManner) -> f64);
-
-/// Settings of the simulated hand, by parameter id of the device.
-const HAND: [HandParameter; 5] = [
-    ("hand_frequency_hz", |hand| hand.frequency_hz),
-    ("hand_centre_mm", |hand| hand.centre_m * 1.0e3),
-    ("hand_amplitude_mm", |hand| hand.amplitude_m * 1.0e3),
-    ("hand_stiffness_n_per_m", |hand| hand.stiffness_n_per_m),
-    ("hand_tremor_um", |hand| hand.tremor_m * 1.0e6),
-];
 
 impl Apparatus {
     /// Checks an experiment against a scene: model and parameter exist, the model accepts the smallest and largest stimulus,
@@ -180,8 +151,8 @@ impl Apparatus {
         protocol.check_range(parameter.min(), parameter.max())?;
         let mutability = parameter.mutability();
         let stimulus = Stimulus { model: name, ..stimulus };
-        let apparatus =
-            Self { scene, registry, stimulus, mutability, weight, fade_s, plugins, strength, notices };
+        let stage = Stage { scene, registry, plugins, strength };
+        let apparatus = Self { stage, stimulus, mutability, weight, fade_s, notices };
         for value in protocol.extremes() {
             let scene = apparatus.with_stimulus(value);
             let refused = |cause| ApparatusError::Refused {
@@ -189,7 +160,7 @@ impl Apparatus {
                 value,
                 cause: Box::new(cause),
             };
-            let prepared = Session::prepare(&scene, &apparatus.registry, &options);
+            let prepared = Session::prepare(&scene, &apparatus.stage.registry, &options);
             drop(prepared.map_err(refused)?);
         }
         Ok(apparatus)
@@ -206,30 +177,15 @@ impl Apparatus {
     /// # Errors
     /// [`ApparatusError::NoHand`].
     pub fn check_hand(&self) -> Result<(), ApparatusError> {
-        let schema = self.plugins.first().map_or(&[][..], |device| device.schema);
-        let lacks = |id: &&'static str| !schema.iter().any(|parameter| parameter.id() == *id);
-        let missing = HAND.iter().map(|(id, _)| *id).find(lacks);
-        missing.map_or(Ok(()), |missing| {
-            let device =
-                self.scene.devices.first().map_or_else(String::new, |device| device.plugin.plugin.clone());
-            Err(ApparatusError::NoHand { device, missing })
-        })
+        let missing = self.stage.missing_hand_parameter();
+        missing.map_or(Ok(()), |missing| Err(ApparatusError::NoHand { device: self.stage.device(), missing }))
     }
 
     /// Returns the configuration that determines the stimuli, for the log: scene, servo rate, and plugins with version and
     /// settings.
     #[must_use]
     pub fn description(&self) -> Value {
-        let plugin = |plugin: &PluginReport| {
-            json!({
-                "name": plugin.name, "id": plugin.metadata.id, "version": plugin.metadata.version,
-                "settings": plugin.settings,
-            })
-        };
-        json!({
-            "scene": self.scene.text, "rate_hz": self.scene.rate_hz,
-            "plugins": self.plugins.iter().map(plugin).collect::<Vec<_>>(),
-        })
+        self.stage.description()
     }
 
     /// Returns the files named by settings of the scene, with their hashes. Not real-time: reads the files.
@@ -237,10 +193,7 @@ impl Apparatus {
     /// # Errors
     /// If a file cannot be read.
     pub fn input_files(&self) -> Result<Vec<InputFile>, ApparatusError> {
-        let named = self.plugins.iter().flat_map(|plugin| {
-            named_files(plugin).map(move |(parameter, path)| (format!("{}.{parameter}", plugin.name), path))
-        });
-        named.map(|(used_as, path)| input(used_as, &path)).collect()
+        Ok(self.stage.input_files()?)
     }
 
     /// Returns the files of plugins in shared libraries, with their hashes: another build of the same version may present
@@ -249,14 +202,13 @@ impl Apparatus {
     /// # Errors
     /// If a file cannot be read.
     pub fn plugin_files(&self) -> Result<Vec<InputFile>, ApparatusError> {
-        let in_files = self.plugins.iter().filter(|plugin| !plugin.metadata.path.as_os_str().is_empty());
-        in_files.map(|plugin| input(plugin.name.clone(), &plugin.metadata.path)).collect()
+        Ok(self.stage.plugin_files()?)
     }
 
-    /// Estimates the disk space of a full recording, bytes per second (measured: 466 bytes per tick with one device).
+    /// Estimates the disk space of a full recording, bytes per second.
     #[must_use]
     pub fn recording_bytes_per_s(&self) -> f64 {
-        470.0 * self.scene.rate_hz * self.scene.devices.len() as f64
+        self.stage.recording_bytes_per_s()
     }
 
     /// Returns the varied parameter.
@@ -269,23 +221,6 @@ impl Apparatus {
     #[must_use]
     pub fn swaps_models(&self) -> bool {
         self.mutability == Mutability::Fixed
-    }
-
-    /// Returns the scene with the hand parameters of a simulated subject.
-    pub(super) fn scene_with_hand(&self, seed: u64, subject: SubjectNumber) -> Scene {
-        let hand = HandManner::of(seed, subject);
-        let mut scene = self.scene.clone();
-        // Insert at the front, so that settings of the scene or the command line take precedence.
-        let parameters = HAND.iter().map(|(id, value)| text(id, value(&hand)));
-        if let Some(device) = scene.devices.first_mut() {
-            device.plugin.parameters.splice(0..0, parameters);
-        }
-        scene
-    }
-
-    /// Returns the description of the run for a recording.
-    pub(super) fn describe(&self, scene: &Scene, clock: Clock, seed: u64) -> RunDescription {
-        describe(scene, &RunOptions { clock, seed }, &self.plugins)
     }
 
     /// Starts to fade the object in (`shown`) or out.
@@ -301,29 +236,17 @@ impl Apparatus {
             Mutability::Live => {
                 controls.set_parameters_at_once(&[NewValue { plugin: model, parameter, value: &value }])
             }
-            Mutability::Fixed => controls.swap(&self.registry, model, None, &[(parameter, &value)]),
+            Mutability::Fixed => controls.swap(&self.stage.registry, model, None, &[(parameter, &value)]),
         }
     }
 
     fn with_stimulus(&self, value: f64) -> Scene {
-        let mut scene = self.scene.clone();
+        let mut scene = self.stage.scene.clone();
         if let Some(model) = scene.models.iter_mut().find(|model| model.name == self.stimulus.model) {
             model.plugin.parameters.push(text(&self.stimulus.parameter, value));
         }
         scene
     }
-}
-
-fn input(used_as: String, path: &Path) -> Result<InputFile, ApparatusError> {
-    let unreadable = |cause| ApparatusError::Unreadable { path: path.to_path_buf(), cause };
-    let file = NamedFile::read(path).map_err(unreadable)?;
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(InputFile { used_as, name, hash: file.hash_text() })
-}
-
-fn text(key: &str, value: f64) -> ParameterText {
-    let location = Location { file: PathBuf::from("the study"), line: 0 };
-    ParameterText { key: key.to_owned(), value: value.to_string(), location }
 }
 
 /// Finds the model of the stimulus by its name in the scene, else by its plugin's id.

@@ -72,7 +72,7 @@ impl<'t> Table<'t> {
 ///
 /// # Errors
 /// [`Unmergeable`] if the earlier text is not a table with the key column first.
-pub(super) fn table(
+pub(crate) fn table(
     earlier: &str,
     generated: &str,
     key: &'static str,
@@ -104,7 +104,7 @@ pub(super) fn table(
 ///
 /// # Errors
 /// [`Unmergeable`] if the earlier text is not an object.
-pub(super) fn object(
+pub(crate) fn object(
     earlier: &str,
     generated: Map<String, Value>,
     owned: &[&str],

@@ -12,8 +12,8 @@
 //! and can be regenerated at any time. Lists of participants and scans, and descriptions, are merged with the existing files
 //! instead of replaced, because BIDS asks people to extend them (`kept`).
 
-mod kept;
-mod table;
+pub(crate) mod kept;
+pub(crate) mod table;
 
 pub use kept::Unmergeable;
 pub use table::trials_csv;
@@ -102,6 +102,14 @@ pub enum DatasetError {
         subject: SubjectNumber,
         /// Task of the log.
         task: &'static str,
+        /// Correct path of the log.
+        place: PathBuf,
+    },
+    /// The log of a designed study is at another path than its subject and session say.
+    #[error("{}: the log belongs at {}; move the log there, or remove the log if that file exists already", path.display(), place.display())]
+    OtherPlace {
+        /// Path of the log.
+        path: PathBuf,
         /// Correct path of the log.
         place: PathBuf,
     },
@@ -207,7 +215,7 @@ impl Dataset {
         Ok(self.log_paths()?.into_iter().map(read))
     }
 
-    fn log_paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
+    pub(crate) fn log_paths(&self) -> Result<Vec<PathBuf>, DatasetError> {
         let mut paths: Vec<PathBuf> = Vec::new();
         let source = self.root.join("sourcedata");
         let folders = std::fs::read_dir(&source).map_err(|cause| match cause.kind() {
@@ -312,7 +320,7 @@ impl Dataset {
 }
 
 /// Writes a generated file, merged with an existing file that people may have edited.
-fn complete(
+pub(crate) fn complete(
     path: &Path,
     generated: &str,
     merge: impl FnOnce(&str) -> Result<Option<String>, Unmergeable>,
@@ -323,7 +331,7 @@ fn complete(
     merged.map_or(Ok(()), |text| replace(path, &text))
 }
 
-fn complete_table(path: &Path, generated: &str, key: &'static str) -> Result<(), DatasetError> {
+pub(crate) fn complete_table(path: &Path, generated: &str, key: &'static str) -> Result<(), DatasetError> {
     complete(path, generated, |earlier| kept::table(earlier, generated, key))
 }
 
@@ -338,7 +346,7 @@ fn read_earlier(path: &Path) -> Result<Option<String>, DatasetError> {
 }
 
 /// Writes a file atomically.
-fn replace(path: &Path, text: &str) -> Result<(), DatasetError> {
+pub(crate) fn replace(path: &Path, text: &str) -> Result<(), DatasetError> {
     if let Some(folder) = path.parent() {
         make_folder(folder)?;
     }
@@ -354,7 +362,7 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), DatasetError> {
         .map_err(|cause| DatasetError::file(folder, "cannot make the folder", cause))
 }
 
-fn pretty(object: Map<String, Value>) -> String {
+pub(crate) fn pretty(object: Map<String, Value>) -> String {
     serde_json::to_string_pretty(&Value::Object(object)).unwrap_or_default() + "\n"
 }
 
@@ -374,7 +382,7 @@ fn same_study(begin: &Begin, log: &SittingLog) -> Result<(), DatasetError> {
 
 /// Returns true for the log of a sitting. Names with a leading dot are ignored: macOS adds a file `._NAME` for each file that
 /// it copies to a USB stick.
-fn is_log(path: &Path) -> bool {
+pub(crate) fn is_log(path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     name.ends_with("_log.jsonl") && !name.starts_with('.')
 }

@@ -3,14 +3,14 @@
 use crate::blinding::Codes;
 use crate::exclusion::Exclusion;
 use crate::kinematics::StimulusKinematics;
-use crate::log::{Begin, SittingLog, TrialRecord};
+use crate::log::{Begin, Person, SittingLog, TrialRecord};
 use crate::protocol::Protocol;
 use crate::sitting::Verdict;
 use crate::trial::{Judgement, Presented};
 use serde_json::{Map, Value, json};
 
 /// Text for a missing value in BIDS.
-pub(super) const MISSING: &str = "n/a";
+pub(crate) const MISSING: &str = "n/a";
 
 /// Name and description of each column.
 const COLUMNS: [(&str, &str); 30] = [
@@ -183,7 +183,7 @@ pub(super) fn description(begin: &Begin) -> (Map<String, Value>, &'static [&'sta
 }
 
 /// First column of the list of scans.
-pub(super) const SCAN: &str = "filename";
+pub(crate) const SCAN: &str = "filename";
 
 /// Returns the list of scans of a subject: the sitting's table with the start time; `None` if the time is unknown.
 pub(super) fn scans(log: &SittingLog) -> Option<String> {
@@ -193,7 +193,7 @@ pub(super) fn scans(log: &SittingLog) -> Option<String> {
 }
 
 /// First column of the list of participants.
-pub(super) const PARTICIPANT: &str = "participant_id";
+pub(crate) const PARTICIPANT: &str = "participant_id";
 
 /// Header of the list of participants.
 pub(super) const PARTICIPANTS_HEAD: &str = "participant_id\tobserver\tfirst_modality\tcomplete\tpresentations\tresumed\tincidents\tage\tsex\thandedness\n";
@@ -205,28 +205,39 @@ pub(super) fn participant(log: &SittingLog) -> String {
     let first = log.begin.protocol.first_modality().of(subject).word();
     let complete = u8::from(log.complete);
     let counts = [log.trials.len(), log.resumed as usize, log.incidents.len()].map(|count| count.to_string());
-    let person = log.begin.person.clone().unwrap_or_default();
-    let age = person.age.map(|age| age.to_string());
-    let person = [age, person.sex, person.handedness].map(|known| known.unwrap_or(MISSING.to_owned()));
-    format!("{subject}\t{observer}\t{first}\t{complete}\t{}\t{}\n", counts.join("\t"), person.join("\t"))
+    let person = person_cells(log.begin.person.as_ref()).join("\t");
+    format!("{subject}\t{observer}\t{first}\t{complete}\t{}\t{person}\n", counts.join("\t"))
+}
+
+/// Returns age, sex and handedness for the list of participants.
+pub(crate) fn person_cells(person: Option<&Person>) -> [String; 3] {
+    let Person { age, sex, handedness } = person.cloned().unwrap_or_default();
+    [age.map(|age| age.to_string()), sex, handedness].map(|known| known.unwrap_or(MISSING.to_owned()))
 }
 
 /// Returns the descriptions of the participant columns; the program overwrites none of them.
-pub(super) fn participant_columns() -> (Map<String, Value>, &'static [&'static str]) {
+pub(crate) fn participant_columns() -> (Map<String, Value>, &'static [&'static str]) {
     let columns = json!({
         "observer": { "Description": "human, or simulated: no person was tested" },
         "first_modality": { "Description": "Modality the subject started with: vh (vision and haptics) or h (haptics alone)" },
         "complete": { "Description": "1 if the sitting is complete" },
         "presentations": { "Description": "Presentations, practice and repeats included" },
         "resumed": { "Description": "Number of times the sitting was resumed" },
+        "incidents": { "Description": "Interruptions and disturbances in the event log" },
+    });
+    let columns = members(&columns).into_iter().chain(person_columns()).collect();
+    (columns, &[])
+}
+
+/// Returns the descriptions of the columns of [`person_cells`].
+pub(crate) fn person_columns() -> Map<String, Value> {
+    members(&json!({
         "age": { "Description": "Age, if it was given", "Units": "year" },
         "sex": { "Description": "Sex, if it was given" },
         "handedness": { "Description": "Preferred hand, if it was given" },
-        "incidents": { "Description": "Interruptions and disturbances in the event log" },
-    });
-    (members(&columns), &[])
+    }))
 }
 
-fn members(object: &Value) -> Map<String, Value> {
+pub(crate) fn members(object: &Value) -> Map<String, Value> {
     object.as_object().cloned().unwrap_or_default()
 }

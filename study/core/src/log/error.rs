@@ -75,6 +75,15 @@ pub enum LogProblem {
         /// Trial, from 1.
         number: u32,
     },
+    /// The course of a designed study has another step, or refuses the answer.
+    #[error(
+        "step {number} does not follow from design, seed and answers; another version of the program wrote the log: \
+         use that version"
+    )]
+    OtherStep {
+        /// Step, from 1.
+        number: u32,
+    },
     /// The answer does not fit the trial.
     #[error("trial {number}: {cause}")]
     Answer {

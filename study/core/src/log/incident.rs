@@ -46,7 +46,7 @@ pub enum Incident {
 
 impl Incident {
     /// Returns true for an interruption: the sitting ends until it is resumed.
-    pub(super) fn ends_the_sitting(&self) -> bool {
+    pub(crate) fn ends_the_sitting(&self) -> bool {
         match self {
             Self::EmergencyStop { .. }
             | Self::RunEnded { .. }

@@ -12,20 +12,21 @@
 
 mod error;
 mod incident;
+pub(crate) mod lines;
 mod reader;
 mod writer;
 
 pub use error::{LogError, LogProblem};
 pub use incident::Incident;
 pub use reader::{SittingLog, TrialRecord};
-pub use writer::LogWriter;
+pub use writer::{LogWriter, LoggedEvent};
 
 use crate::exclusion::ExclusionRules;
 use crate::protocol::{Protocol, SubjectNumber};
 use crate::sitting::Verdict;
 use crate::time_of_day::TimeOfDay;
 use crate::trial::{Exploration, Response, Trial};
-use crate::word::words;
+use flotor_study_design::words;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
@@ -212,7 +213,7 @@ pub struct Plan {
 impl Plan {
     /// Describes the difference of the current study file from the earlier one; `None` if they are equal. Only the texts count,
     /// not the file names. The number of subjects and the data folder may differ: neither affects a sitting.
-    fn differs(now: Option<&Self>, earlier: Option<&Self>) -> Option<String> {
+    pub(crate) fn differs(now: Option<&Self>, earlier: Option<&Self>) -> Option<String> {
         match (earlier, now) {
             (None, None) => None,
             (Some(earlier), None) => {
@@ -265,7 +266,7 @@ fn changed(before: &str, after: &str) -> String {
 }
 
 /// Describes a changed part of the configuration with its first difference; `None` if the part is equal.
-fn another<T: PartialEq + Serialize>(what: &str, earlier: &T, now: &T) -> Option<String> {
+pub(crate) fn another<T: PartialEq + Serialize>(what: &str, earlier: &T, now: &T) -> Option<String> {
     if earlier == now {
         return None;
     }

@@ -2,15 +2,12 @@
 //! and verdicts.
 
 use super::error::{LogError, LogProblem};
-use super::{Begin, CHAIN_START, Event, FORMAT, Incident, LogWriter, TrialEvent, chain, parts, unstamped};
+use super::lines::{LogEnd, read_lines};
+use super::{Begin, Event, FORMAT, Incident, LogWriter, TrialEvent};
 use crate::sitting::{Sitting, TrackResult};
 use crate::time_of_day::TimeOfDay;
 use crate::trial::{Response, Trial};
-use flotor_hal::read_file;
 use std::path::{Path, PathBuf};
-
-/// Maximum size of a log, bytes; enough for hundreds of hours.
-const MOST_BYTES: u64 = 256 << 20;
 
 /// Logged trial.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,9 +41,7 @@ pub struct SittingLog {
     has_reason_to_end: bool,
     sitting: Sitting,
     path: PathBuf,
-    complete_bytes: u64,
-    read_bytes: u64,
-    chain: String,
+    end: LogEnd,
 }
 
 impl SittingLog {
@@ -56,48 +51,21 @@ impl SittingLog {
     /// # Errors
     /// [`LogError`] with line and reason.
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let bytes = read_file(path, MOST_BYTES)
-            .map_err(|cause| LogError::file(path, "cannot read the log", cause))?;
         let at = |line: usize, problem: LogProblem| LogError { path: path.into(), line, problem };
-        let complete = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
-        let whole = bytes.get(..complete).unwrap_or_default();
         let mut log: Option<Self> = None;
-        let mut before = CHAIN_START.to_owned();
-        for (index, bytes) in whole.split_inclusive(|byte| *byte == b'\n').enumerate() {
-            let number = index + 1;
-            let not_text = || at(number, LogProblem::Text("the file is not UTF-8".to_owned()));
-            let text = std::str::from_utf8(bytes).map_err(|_| not_text())?;
-            let text = text.strip_suffix('\n').unwrap_or(text);
-            // Windows programs or git may have changed the line ends to CRLF.
-            let text = text.strip_suffix('\r').unwrap_or(text);
-            let (found, event) = parts(text).ok_or_else(|| {
-                at(number, LogProblem::Text("the line does not consist of `chain` and `event`".to_owned()))
-            })?;
-            before = chain(&before, event);
-            if found != before {
-                return Err(at(number, LogProblem::Chain));
-            }
-            let not_read = |error: &dyn std::fmt::Display| at(number, LogProblem::Unknown(error.to_string()));
-            let (event, time) = unstamped(event);
-            let time: Option<TimeOfDay> =
-                time.map(str::parse).transpose().map_err(|error| not_read(&error))?;
-            let event: Event = serde_json::from_str(event).map_err(|error| not_read(&error))?;
-            match (&mut log, event) {
-                (None, Event::Begin(begin)) => {
-                    if !(1..=FORMAT).contains(&begin.format) {
-                        return Err(at(number, LogProblem::Format { found: begin.format }));
-                    }
-                    log = Some(Self { began: time, ..Self::new(*begin, path) });
+        let end = read_lines(path, |event: Event, time| match (&mut log, event) {
+            (None, Event::Begin(begin)) => {
+                if !(1..=FORMAT).contains(&begin.format) {
+                    return Err(LogProblem::Format { found: begin.format });
                 }
-                (None, _) => {
-                    return Err(at(number, LogProblem::Order("the log does not start with `begin`")));
-                }
-                (Some(log), event) => log.take_in(event, time).map_err(|problem| at(number, problem))?,
+                log = Some(Self { began: time, ..Self::new(*begin, path) });
+                Ok(())
             }
-        }
+            (None, _) => Err(LogProblem::Order("the log does not start with `begin`")),
+            (Some(log), event) => log.take_in(event, time),
+        })?;
         let mut log = log.ok_or_else(|| at(0, LogProblem::Empty))?;
-        (log.complete_bytes, log.read_bytes) = (complete as u64, bytes.len() as u64);
-        log.chain = before;
+        log.end = end;
         Ok(log)
     }
 
@@ -115,9 +83,7 @@ impl SittingLog {
             has_reason_to_end: false,
             sitting,
             path: path.into(),
-            complete_bytes: 0,
-            read_bytes: 0,
-            chain: String::new(),
+            end: LogEnd::default(),
         }
     }
 
@@ -213,8 +179,7 @@ impl SittingLog {
 
     /// Opens the log for writing, with times of day for a person.
     fn writer(&self) -> Result<LogWriter, LogError> {
-        let writer =
-            LogWriter::append(&self.path, [self.complete_bytes, self.read_bytes], self.chain.clone())?;
+        let writer = LogWriter::append(&self.path, &self.end)?;
         Ok(if self.begin.is_of_a_person() { writer.stamped() } else { writer })
     }
 

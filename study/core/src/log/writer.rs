@@ -1,11 +1,25 @@
 //! Writer of a log, which appends lines and syncs each to disk.
 
+use super::lines::LogEnd;
 use super::{CHAIN_START, Event, Incident, LogError, LogProblem, chain, line, stamped};
 use crate::platform::open_alone;
 use crate::time_of_day::{SittingClock, TimeOfDay};
+use serde::Serialize;
 use std::fs::{File, OpenOptions};
 use std::io::{Error, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+
+/// Event of a log.
+pub trait LoggedEvent: Serialize {
+    /// Returns true for the first event of a log.
+    fn is_begin(&self) -> bool;
+}
+
+impl LoggedEvent for Event {
+    fn is_begin(&self) -> bool {
+        matches!(self, Self::Begin(_))
+    }
+}
 
 /// Log open for writing, with exclusive write access.
 pub struct LogWriter {
@@ -39,23 +53,18 @@ impl LogWriter {
         Ok(Self { file, path: path.into(), chain: CHAIN_START.to_owned(), clock: None })
     }
 
-    /// Opens a log of `read_bytes` to continue it after its complete lines, `complete_bytes` long, whose last `chain` is given.
-    /// Truncates an incomplete last line.
+    /// Opens a log to continue it after its last complete line. Truncates an incomplete last line.
     ///
     /// # Errors
     /// If the log is open in another process, has changed since it was read, or cannot be written.
-    pub(super) fn append(
-        path: &Path,
-        [complete_bytes, read_bytes]: [u64; 2],
-        chain: String,
-    ) -> Result<Self, LogError> {
+    pub(crate) fn append(path: &Path, end: &LogEnd) -> Result<Self, LogError> {
         let failed = |cause| LogError::file(path, "cannot continue the log", cause);
         let mut file = open(OpenOptions::new().write(true), path, "cannot continue the log")?;
-        if file.metadata().map_err(failed)?.len() != read_bytes {
+        if file.metadata().map_err(failed)?.len() != end.read_bytes {
             return Err(LogError::of_file(path, LogProblem::InUse));
         }
-        cut(&mut file, complete_bytes).map_err(failed)?;
-        Ok(Self { file, path: path.into(), chain, clock: None })
+        cut(&mut file, end.complete_bytes).map_err(failed)?;
+        Ok(Self { file, path: path.into(), chain: end.chain.clone(), clock: None })
     }
 
     /// Checks that no other process writes to a log.
@@ -83,15 +92,15 @@ impl LogWriter {
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn write(&mut self, event: &Event) -> Result<(), LogError> {
-        let clock = self.clock.as_mut().filter(|_| !matches!(event, Event::Begin(_)));
+    pub fn write(&mut self, event: &impl LoggedEvent) -> Result<(), LogError> {
+        let clock = self.clock.as_mut().filter(|_| !event.is_begin());
         if let Some(by_ms) = clock.and_then(SittingClock::take_jump_ms) {
             self.write_line(&Event::Incident(Incident::TimeOfDaySet { by_ms }))?;
         }
         self.write_line(event)
     }
 
-    fn write_line(&mut self, event: &Event) -> Result<(), LogError> {
+    fn write_line(&mut self, event: &impl Serialize) -> Result<(), LogError> {
         let text = serde_json::to_string(event)
             .map_err(|error| LogError::of_file(&self.path, LogProblem::Text(error.to_string())))?;
         let text = match self.now() {

@@ -1,7 +1,7 @@
 //! Movement of a simulated subject's hand, with the same parameters during the whole sitting.
 
 use crate::protocol::SubjectNumber;
-use crate::random::{Purpose, Stream};
+use flotor_study_design::random::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 
 /// Movement parameters of a simulated subject's hand, which explores along the vertical: intended movement up and down about a

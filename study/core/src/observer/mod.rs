@@ -4,14 +4,13 @@
 //! resumed after a crash gets the same answers.
 
 mod hand;
-mod ternary;
 
+pub use flotor_study_design::observer::TernaryObserver;
 pub use hand::HandManner;
-pub use ternary::TernaryObserver;
 
 use crate::protocol::{Stimulus, SubjectNumber};
-use crate::random::{Purpose, Stream};
 use crate::trial::{Modality, Phase, Position, Presented, Response, Trial};
+use flotor_study_design::random::{Purpose, Stream};
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -212,7 +211,11 @@ impl SimulatedSubject {
                     Position::First => -pair.delta,
                     Position::Second => pair.delta,
                 };
-                observer.respond(second_minus_first, &mut stream)
+                match observer.respond(second_minus_first, &mut stream) {
+                    Some(Position::First) => Response::First,
+                    Some(Position::Second) => Response::Second,
+                    None => Response::DontKnow,
+                }
             }
         }
     }

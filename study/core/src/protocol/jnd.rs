@@ -5,7 +5,7 @@ use super::{
     AtBoundary, Checks, FirstModality, ProtocolError, Stimulus, at_least_one, extremes,
     positive_and_different,
 };
-use crate::procedure::{InvalidRule, Procedure};
+use flotor_study_design::procedure::{InvalidRule, Procedure};
 use serde::{Deserialize, Serialize};
 
 /// Side of the base on which the comparison lies.

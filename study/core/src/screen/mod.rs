@@ -20,7 +20,7 @@ pub use line::{Warning, WindowMessage, WindowReply, WindowState};
 
 use crate::protocol::Quality;
 use crate::trial::{Phase, Position, Response};
-use crate::word::words;
+use flotor_study_design::words;
 use serde::{Deserialize, Serialize};
 
 /// Key of the emergency stop in a window; by default not the space bar, which a person tends to press to continue.

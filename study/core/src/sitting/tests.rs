@@ -1,6 +1,6 @@
 use super::*;
-use crate::procedure::{Procedure, WeightedUpDownRule};
 use crate::protocol::MagnitudeProtocol;
+use flotor_study_design::procedure::{Procedure, WeightedUpDownRule};
 
 fn subject(number: u16) -> SubjectNumber {
     SubjectNumber::new(number).unwrap()

@@ -16,7 +16,7 @@ use flotor_study::apparatus::rig::TrialFiles;
 use flotor_study::apparatus::{Apparatus, Kinematics};
 use flotor_study::conduct::{ApparatusOrFrontEndError, Ending};
 use flotor_study::dataset::{Dataset, DatasetError, Progress};
-use flotor_study::log::{Begin, Event, FORMAT, LogError, LogWriter, digest};
+use flotor_study::log::{Begin, Event, FORMAT, digest};
 use flotor_study::protocol::{Protocol, SubjectNumber};
 use flotor_study::screen::ScreenStateMachine;
 use serde_json::json;
@@ -61,8 +61,9 @@ pub(super) fn sit(common: &Common, protocol: &Protocol, apparatus: &Apparatus) -
         let files = TrialFiles::make(folder, format!("{subject}_task-{}", protocol.task()));
         rig.record_into(files.map_err(of_dataset)?);
     }
-    note_conditions(&mut log, common, noise.as_ref(), screen_texts.as_deref())
-        .map_err(|error| CommandError::Failed(error.to_string()))?;
+    let conditions = conditions(common, noise.as_ref(), screen_texts.as_deref()).into_iter();
+    let noted = conditions.map(|text| Event::Note { text }).try_for_each(|note| log.write(&note));
+    noted.map_err(|error| CommandError::Failed(error.to_string()))?;
     let mut attended = ScreenStateMachine::new(sitting, protocol, common.rest_every).after_reading(texts);
     if presented > 0 {
         attended = attended.with_practice_offered();
@@ -120,14 +121,14 @@ fn begin(
 
 /// Returns the texts that the person reads first: the consent text before the first trial only, instructions also when the
 /// sitting resumes.
-fn texts(common: &Common, presented: usize) -> Result<Vec<String>, CommandError> {
+pub(super) fn texts(common: &Common, presented: usize) -> Result<Vec<String>, CommandError> {
     let consent = common.consent.iter().filter(|_| presented == 0);
     let remedy = "write a title in its first line, and then the text";
     consent.chain(&common.instructions).map(|path| text_of(path, remedy)).collect()
 }
 
 /// Returns the content of the file with the texts of the window's screens; `None` without a file.
-fn screen_texts(common: &Common) -> Result<Option<String>, CommandError> {
+pub(super) fn screen_texts(common: &Common) -> Result<Option<String>, CommandError> {
     let remedy = "start from a copy of `viewer/texts/english.toml`, or omit --texts";
     let texts = common.texts.as_deref().map(|path| text_of(path, remedy)).transpose()?;
     if texts.is_some() && common.screen != ScreenOption::Viewer {
@@ -137,24 +138,23 @@ fn screen_texts(common: &Common) -> Result<Option<String>, CommandError> {
     Ok(texts)
 }
 
-fn least_exploration(common: &Common) -> MinimumExploration {
+pub(super) fn least_exploration(common: &Common) -> MinimumExploration {
     MinimumExploration { time_s: common.least_time, path_length_m: common.least_movement_mm * 1.0e-3 }
 }
 
-/// Writes the conditions of the sitting as notes to its log: noise, texts, minimum exploration, repetitions.
-fn note_conditions(
-    log: &mut LogWriter,
+/// Describes the conditions of the sitting for its log: noise, texts, minimum exploration, repetitions.
+pub(super) fn conditions(
     common: &Common,
     noise: Option<&WhiteNoise>,
     screen_texts: Option<&str>,
-) -> Result<(), LogError> {
+) -> Vec<String> {
     let notes = [
         Some(format!("white noise: {}", noise.map_or("none", |noise| noise.name))),
         screen_texts.map(|texts| format!("texts of the screens: SHA-256 {}", digest(texts))),
         Some(format!("least time {} s, least movement {} mm", common.least_time, common.least_movement_mm)),
         common.feel_again.map(|times| format!("at most {times} repetitions of a trial")),
     ];
-    notes.into_iter().flatten().try_for_each(|text| log.write(&Event::Note { text }))
+    notes.into_iter().flatten().collect()
 }
 
 /// Reads a text file; an empty one is an error with this remedy.
@@ -169,7 +169,7 @@ fn text_of(path: &Path, remedy: &str) -> Result<String, CommandError> {
 }
 
 /// Converts an apparatus error to a command error with the exit code of its cause.
-fn outside(cause: ApparatusOrFrontEndError) -> CommandError {
+pub(super) fn outside(cause: ApparatusOrFrontEndError) -> CommandError {
     let message = cause.to_string();
     super::outside(cause, message)
 }
@@ -228,7 +228,7 @@ fn subject(common: &Common, dataset: &Dataset, protocol: &Protocol) -> Result<Su
 
 /// Starts the noise unless `--noise off`. If this machine cannot play it, returns an error for `--noise on`, else prints a note
 /// and returns `None`.
-fn noise(common: &Common) -> Result<Option<WhiteNoise>, CommandError> {
+pub(super) fn noise(common: &Common) -> Result<Option<WhiteNoise>, CommandError> {
     if common.noise == NoiseOption::Off {
         return Ok(None);
     }

@@ -4,27 +4,20 @@
 //! analysis, which are fixed before data collection. Every log contains text and SHA-256 of the file, so that the version of
 //! the plan is documented.
 
-use super::{StudyArguments, Task};
+use super::design_file::DesignFile;
+use super::options_table::{option_words, parsed, plan, read_table};
+use super::{StudyArguments, Task, designed, shipped};
 use crate::analyse::choices::{Choices, PlannedTable};
-use clap::{Args, FromArgMatches};
+use clap::Args;
 use flotor_command::CommandError;
-use flotor_core::LARGEST_SEED;
 use flotor_hal::read_text;
-use flotor_loader::nearest;
-use flotor_session::scene::OwnScene;
 use flotor_study::exclusion::ExclusionRules;
-use flotor_study::log::{Plan, digest};
 use serde::Deserialize;
-use std::ffi::{OsStr, OsString};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 /// Suffix of a study file's name.
 const ENDING: &str = ".study.toml";
-/// Options whose values are paths, relative to the folder of the study file; the name of one of Flotor's own scenes is no path.
-const PATHS: [&str; 6] = ["out", "scene", "consent", "instructions", "texts", "plugin-path"];
-/// Options that are only valid on the command line of `study run`.
-const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
-
 #[derive(Args)]
 #[command(
     after_help = "A study file has the task, the planned analysis, and options of the task by name:\n  \
@@ -47,10 +40,13 @@ const OF_THE_COMMAND_LINE: [&str; 2] = ["resume", "subject"];
     least_movement_mm; an excluded trial of an adaptive track excludes the whole track, unless the estimator is \
     map.\n\n\
     Planned options of `flotor analyse`, which reports each deviation from the plan: estimator, type, ratings.\n\n\
+    A file may have a design of one's own instead of a task: factors, a question, a method, questionnaires \
+    (chapter \"Experiments\" of the book). People answer the questions of a design on the terminal.\n\n\
     Examples:\n  \
     flotor study run weber.study.toml\n  \
     flotor study run weber.study.toml --observer human --subject 3\n  \
     flotor study run --observer human weber.study.toml\n  \
+    flotor study run delay.study.toml --observer human --screen terminal\n  \
     flotor study run                              the only study file of this folder: begins or resumes"
 )]
 pub(super) struct RunArguments {
@@ -92,15 +88,7 @@ enum TaskName {
 
 impl StudyFile {
     fn read(file: &Path, text: &str) -> Result<Self, CommandError> {
-        toml::from_str(text).map_err(|error| {
-            let start = error.span().map_or(0, |span| span.start);
-            let line = 1 + text.bytes().take(start).filter(|byte| *byte == b'\n').count();
-            let mut message = error.message().replace('\n', " ");
-            if message.contains("too large") {
-                message += &format!("; write numbers below 2^63, and a seed up to {LARGEST_SEED}");
-            }
-            CommandError::Usage(format!("{}:{line}: {message}", file.display()))
-        })
+        read_table(file, text)
     }
 }
 
@@ -116,6 +104,11 @@ pub(crate) struct Planned {
 
 /// Parses the analysis plan from the text of a study file; `None` if this version cannot parse it.
 pub(crate) fn planned(text: &str) -> Option<Planned> {
+    if DesignFile::is_in(text) {
+        let study = DesignFile::read(Path::new(""), text).ok()?;
+        let subjects = study.option("subjects").and_then(|count| usize::try_from(count).ok());
+        return Some(Planned { analysis: study.analysis, choices: Choices::default(), subjects });
+    }
     let study = StudyFile::read(Path::new(""), text).ok()?;
     let choices = Choices::planned(&study.analyse).ok()?;
     let subjects = study.options.get("subjects").and_then(toml::Value::as_integer);
@@ -149,19 +142,26 @@ impl RunArguments {
 /// Runs the study of a study file: begins or resumes it, and skips complete subjects.
 pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let (file, further) = arguments.file_and_options();
-    let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
-    let text = read_text(&file, "the study file").map_err(|wrong| {
-        let advice = if wrong.line == 0 { "; name a study file" } else { "" };
-        CommandError::Usage(wrong.in_file(file.display()) + advice)
-    })?;
+    let (file, text) = file_and_text(file)?;
+    if DesignFile::is_in(&text) {
+        let study = DesignFile::read(&file, &text)?;
+        return match shipped::task_of(&study.design) {
+            Some((task, words)) => run_words(&file, text, study.words(&file, task, words, further)?),
+            None => designed::run(&file, text, study, further),
+        };
+    }
     let (words, exclusion) = words(&file, &text, further)?;
-    let command = clap::Command::new("study").no_binary_name(true);
-    let mut study = StudyArguments::augment_args(command)
-        .try_get_matches_from(words)
-        .and_then(|matches| StudyArguments::from_arg_matches(&matches))
-        .map_err(|error| CommandError::Usage(of_file(&file, &error.to_string())))?;
-    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let plan = Plan { file: name, sha256: digest(&text), text, exclusion };
+    run_words(&file, text, (words, exclusion))
+}
+
+/// Runs a task from command-line arguments of a study file.
+fn run_words(
+    file: &Path,
+    text: String,
+    (words, exclusion): (Vec<OsString>, ExclusionRules),
+) -> Result<(), CommandError> {
+    let mut study = parsed::<StudyArguments>(file, words)?;
+    let plan = plan(file, text, exclusion);
     match &mut study.task {
         Task::Jnd(task) => task.common.plan = Some(plan),
         Task::Magnitude(task) => task.common.plan = Some(plan),
@@ -171,8 +171,21 @@ pub(super) fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     super::run(&study)
 }
 
+/// Returns name and text of a study file: the named one, one of Flotor's own studies, or the only one of this folder.
+pub(super) fn file_and_text(file: Option<PathBuf>) -> Result<(PathBuf, String), CommandError> {
+    let file = file.map_or_else(|| only_one(Path::new(".")), Ok)?;
+    if let Some(text) = shipped::text_of(&file).filter(|_| !file.exists()) {
+        return Ok((file, text.to_owned()));
+    }
+    let text = read_text(&file, "the study file").map_err(|wrong| {
+        let advice = if wrong.line == 0 { "; name a study file" } else { "" };
+        CommandError::Usage(wrong.in_file(file.display()) + advice)
+    })?;
+    Ok((file, text))
+}
+
 /// Returns the only study file of a folder; an error if there is none, or more than one.
-fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
+pub(super) fn only_one(folder: &Path) -> Result<PathBuf, CommandError> {
     let entries = std::fs::read_dir(folder).map_err(|cause| {
         CommandError::Usage(format!(
             "{}: cannot read the folder: {cause}; name a study file",
@@ -217,123 +230,15 @@ fn words(
     let study_command = StudyArguments::augment_args(clap::Command::new("study"));
     let known: Vec<&clap::Arg> =
         study_command.find_subcommand(task).into_iter().flat_map(|task| task.get_arguments()).collect();
-    let folder = file.parent().unwrap_or(Path::new(""));
-    let said = Said(&further);
     let mut words: Vec<OsString> = vec![task.into()];
-    // Plugin folders of the file, which are searched after the plugin folders of the command line.
-    let mut last: Vec<OsString> = Vec::new();
-    for (key, value) in &study.options {
-        let name = key.replace('_', "-");
-        let refuse = |why: String| CommandError::Usage(format!("{}: options.{key}: {why}", file.display()));
-        if OF_THE_COMMAND_LINE.contains(&name.as_str()) {
-            return Err(refuse("write this option only on the command line".to_owned()));
-        }
-        let option = known.iter().find(|option| option.get_long() == Some(&name)).ok_or_else(|| {
-            let names = known.iter().filter_map(|option| option.get_long());
-            let near = nearest(&name, names).map_or_else(
-                || format!("; `flotor study {task} --help` lists the options"),
-                |near| format!("; did you mean `{near}`?"),
-            );
-            refuse(format!("`flotor study {task}` has no such option{near}"))
-        })?;
-        let value_of = |value: &toml::Value| match plain(value) {
-            Some(text) if PATHS.contains(&name.as_str()) => {
-                let path = folder.join(&text);
-                let is_own =
-                    name == "scene" && !path.is_file() && OwnScene::named(Path::new(&text)).is_some();
-                Ok(if is_own { text.into() } else { path.into_os_string() })
-            }
-            Some(text) => Ok(OsString::from(text)),
-            None => Err(refuse(format!(
-                "the option accepts no value of type {}; write a number or a text",
-                kind(value)
-            ))),
-        };
-        let values = match (value, option.get_action()) {
-            (toml::Value::Boolean(is_set), clap::ArgAction::SetTrue) => {
-                words.extend((*is_set && !said.has(&name)).then(|| format!("--{name}").into()));
-                continue;
-            }
-            (_, clap::ArgAction::SetTrue) => return Err(refuse("write true or false".to_owned())),
-            (toml::Value::Array(values), clap::ArgAction::Append)
-                if option.get_value_delimiter().is_none() =>
-            {
-                values.iter().map(value_of).collect::<Result<Vec<_>, _>>()?
-            }
-            (toml::Value::Array(values), _) if option.get_value_delimiter().is_some() => {
-                let values = values.iter().map(value_of).collect::<Result<Vec<_>, _>>()?;
-                vec![values.join(OsStr::new(","))]
-            }
-            (value, _) => vec![value_of(value)?],
-        };
-        for value in values {
-            let one = [OsString::from(format!("--{name}")), value];
-            match name.as_str() {
-                "plugin-path" => last.extend(one),
-                // A setting on the command line replaces the file's setting of the same parameter; the file's other settings
-                // are added.
-                "set" if said.sets(&one[1]) => {}
-                "set" => words.extend(one),
-                _ if said.has(&name) => {}
-                _ => words.extend(one),
-            }
-        }
-    }
-    words.extend(further.iter().cloned());
-    words.extend(last);
-    if !said.has("resume") {
-        words.push("--resume".into());
-    }
+    words.extend(option_words(file, task, &known, &study.options, further)?);
     Ok((words, study.exclusion))
-}
-
-/// Options on the command line, which override the options of the file.
-struct Said<'a>(&'a [OsString]);
-
-impl Said<'_> {
-    fn has(&self, name: &str) -> bool {
-        let (long, with_value) = (format!("--{name}"), format!("--{name}="));
-        self.0.iter().any(|word| *word == *long || word.to_string_lossy().starts_with(&with_value))
-    }
-
-    /// Returns true if the command line sets the parameter of `PLUGIN.KEY=VALUE`.
-    fn sets(&self, setting: &OsStr) -> bool {
-        let key = |text: &str| text.split('=').next().unwrap_or_default().to_owned();
-        let wanted = key(&setting.to_string_lossy());
-        self.0.iter().enumerate().any(|(place, word)| match word.to_string_lossy().strip_prefix("--set") {
-            Some("") => self.0.get(place + 1).is_some_and(|next| key(&next.to_string_lossy()) == wanted),
-            Some(rest) => rest.strip_prefix('=').is_some_and(|rest| key(rest) == wanted),
-            None => false,
-        })
-    }
-}
-
-fn kind(value: &toml::Value) -> &'static str {
-    match value {
-        toml::Value::Array(_) => "list",
-        other => other.type_str(),
-    }
-}
-
-/// Formats a string or number for the command line; `None` for a table, list, boolean or date.
-fn plain(value: &toml::Value) -> Option<String> {
-    match value {
-        toml::Value::String(text) => Some(text.clone()),
-        toml::Value::Integer(_) | toml::Value::Float(_) => Some(value.to_string()),
-        _ => None,
-    }
-}
-
-/// Formats an error of the command-line parser as one line, with the name of the study file.
-fn of_file(file: &Path, reason: &str) -> String {
-    let lines = reason.lines().map(str::trim).filter(|line| !line.is_empty() && !line.starts_with("Usage:"));
-    let reason = lines.take_while(|line| !line.starts_with("For more")).collect::<Vec<_>>().join(" ");
-    format!("{}: {}", file.display(), reason.trim_start_matches("error: "))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use clap::FromArgMatches;
 
     const FILE: &str = "task = \"jnd\"\n[options]\nout = \"data\"\nbases = [17, 26.5]\nno_demo = true\n\
                         set = [\"spring.wire=1\", \"device.hand=hold\"]\nsubjects = 4\n";

@@ -158,7 +158,7 @@ impl Controls {
         for (number, (layer, report)) in numbers.into_iter().zip(made) {
             swaps.warnings.extend(report.warning());
             let generation = plugins.add(number, report, ChosenBy::Name);
-            swaps.send(Replacement { model: number, generation, layer: Box::new(layer) })?;
+            swaps.send(Replacement { model: number, generation, layer })?;
         }
         Ok(())
     }
@@ -180,7 +180,7 @@ impl Controls {
     }
 
     /// Removes and returns the models that a finished loop has returned, each with its number. Not real-time.
-    pub(super) fn take_retired(&self) -> Vec<(usize, Box<Layer>)> {
+    pub(super) fn take_retired(&self) -> Vec<(usize, Layer)> {
         self.swaps().take_retired()
     }
 

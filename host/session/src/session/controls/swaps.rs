@@ -144,7 +144,7 @@ impl Swaps {
     }
 
     /// Removes and returns the models that a finished loop has returned, each with its number.
-    pub(super) fn take_retired(&mut self) -> Vec<(usize, Box<Layer>)> {
+    pub(super) fn take_retired(&mut self) -> Vec<(usize, Layer)> {
         std::iter::from_fn(|| self.queues.retired.pop().ok()).collect()
     }
 

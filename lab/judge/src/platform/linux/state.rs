@@ -3,7 +3,7 @@
 use crate::platform::process::{May, Part};
 use crate::validate::Outcome;
 use rustix::io::Errno;
-use rustix::process::{WaitOptions, waitpid};
+use rustix::process::{WaitId, WaitIdOptions, waitid};
 use std::fs;
 use std::path::Path;
 
@@ -34,7 +34,7 @@ pub(crate) fn of_the_system() -> Result<Vec<Part>, Outcome> {
         ("the scheduling of the thread", May::Stay, scheduling()),
         ("the limits of the process", May::Stay, limits.lines().map(str::to_owned).collect()),
         ("umask or tracer", May::Stay, named(&process, &["Umask:", "TracerPid:"])),
-        ("child processes", May::Stay, vec![children().to_owned()]),
+        ("child processes", May::GrowInLife, children().map(str::to_owned).into_iter().collect()),
         ("timers", May::Stay, named(&whole("/proc/self/timers"), &["ID:", "signal:"])),
         ("open files", May::Grow, files()),
     ])
@@ -63,12 +63,10 @@ pub(crate) fn is_loaded_first(library: &str) -> Result<(), Outcome> {
     }
 }
 
-/// Returns the presence of child processes as text: none, or at least one.
-fn children() -> &'static str {
-    match waitpid(None, WaitOptions::NOHANG) {
-        Err(Errno::CHILD) => "none",
-        _ => "at least one",
-    }
+/// Returns "at least one" if there are child processes. An ended child stays waitable, because the plugin may wait for it.
+fn children() -> Option<&'static str> {
+    let options = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+    (waitid(WaitId::All, options).err() != Some(Errno::CHILD)).then_some("at least one")
 }
 
 /// Formats a set of signals by their numbers, without 32 and 33: the C library uses those for its threads.

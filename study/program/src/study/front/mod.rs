@@ -1,5 +1,6 @@
 //! Front ends of a person's sitting: text on a terminal, the viewer's window, or lines of JSON for another window.
 
+mod designed_terminal;
 mod json;
 mod terminal;
 mod window;
@@ -33,10 +34,10 @@ pub(super) enum ScreenOption {
 
 /// Waits up to [`MOMENT`] for a line of input, and reads the line with `read`. Without a line the result is
 /// [`PollResult::Nothing`], or [`PollResult::Closed`] at the end of the input.
-fn next_input(
+fn next_input<I>(
     lines: &Receiver<String>,
-    read: impl FnOnce(&str) -> Result<PollResult, String>,
-) -> Result<PollResult, String> {
+    read: impl FnOnce(&str) -> Result<PollResult<I>, String>,
+) -> Result<PollResult<I>, String> {
     match lines.recv_timeout(MOMENT) {
         Ok(line) => read(&line),
         Err(RecvTimeoutError::Timeout) => Ok(PollResult::Nothing),

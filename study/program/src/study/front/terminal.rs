@@ -12,7 +12,7 @@ use std::sync::mpsc::Receiver;
 
 /// Front end on the terminal of this process.
 pub(in crate::study) struct Terminal {
-    lines: Receiver<String>,
+    pub(super) lines: Receiver<String>,
 }
 
 impl Terminal {
@@ -20,49 +20,63 @@ impl Terminal {
     pub(in crate::study) fn listen() -> Result<Self, CommandError> {
         Ok(Self { lines: lines_of(BufReader::new(std::io::stdin()))? })
     }
+
+    /// Discards input typed before a screen was shown. Piped input is kept: a script knows the sequence.
+    pub(super) fn discard_typed(&mut self) {
+        if std::io::stdin().is_terminal() {
+            while self.lines.try_recv().is_ok() {}
+        }
+    }
 }
 
 impl FrontEnd for Terminal {
     fn show(&mut self, screen: &Screen) -> Result<(), ApparatusOrFrontEndError> {
-        // Discard input typed before the screen was shown. Piped input is kept: a script knows the sequence.
-        if std::io::stdin().is_terminal() {
-            while self.lines.try_recv().is_ok() {}
-        }
+        self.discard_typed();
         say!("{}", words(screen));
         Ok(())
     }
 
     fn poll(&mut self, screen: &Screen) -> Result<PollResult, ApparatusOrFrontEndError> {
         let polled = next_input(&self.lines, |line| typed(line, screen).map(PollResult::Input));
-        polled.or_else(|why| self.refuse(&why).map(|()| PollResult::Nothing))
+        Ok(polled.unwrap_or_else(|why| {
+            hint(&why);
+            PollResult::Nothing
+        }))
     }
 
     fn warn_out_of_range(&mut self) -> Result<(), ApparatusOrFrontEndError> {
-        // The bell replaces the beep of the thesis.
-        ring_bell();
-        say!("  {} the handle is out of its range: move it back", style::warning("!"));
+        warn_of_range();
         Ok(())
     }
 
     fn refuse(&mut self, why: &str) -> Result<(), ApparatusOrFrontEndError> {
-        say!("  {why}");
+        hint(why);
         Ok(())
     }
 }
 
-/// Rings the bell of the terminal.
-fn ring_bell() {
+/// Warns visibly and audibly that the handle is out of its range. The bell of the terminal replaces the beep of the thesis.
+pub(super) fn warn_of_range() {
     let _ = std::io::stdout().write_all(b"\x07");
+    say!("  {} the handle is out of its range: move it back", style::warning("!"));
+}
+
+/// Prints the reason for the rejection of an input.
+pub(super) fn hint(why: &str) {
+    say!("  {why}");
+}
+
+/// Formats a text by the experimenter, with its keys.
+pub(super) fn text_to_read(text: &str) -> String {
+    let (title, rest) = text.split_once('\n').unwrap_or((text, ""));
+    let rest: String = rest.trim().lines().map(|line| format!("  {line}\n")).collect();
+    format!("\n{}\n{rest}  Enter continues, q stops", style::title(title))
 }
 
 /// Formats a screen, with its keys, as text.
 fn words(screen: &Screen) -> String {
     match screen {
-        Screen::Read { text } => {
-            let (title, rest) = text.split_once('\n').unwrap_or((text, ""));
-            let rest: String = rest.trim().lines().map(|line| format!("  {line}\n")).collect();
-            format!("\n{}\n{rest}  Enter continues, q stops", style::title(title))
-        }
+        Screen::Read { text } => text_to_read(text),
         Screen::Ready { reason, next } => {
             format!(
                 "\n{}\n{}\n  Enter continues, n TEXT adds a note, q stops{}",

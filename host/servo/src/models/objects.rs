@@ -1,0 +1,203 @@
+//! Instances of a model on one device, one for each of its positions.
+
+use super::body::Body;
+use super::contribution::{Contribution, Sample, Share, usable};
+use super::instance::Instance;
+use super::placement::Placement;
+use crate::engine::{Engine, Stepped};
+use flotor_contact::Shortcoming;
+use flotor_core::broad_phase::{Bounds, BroadPhase};
+use flotor_core::demand::TickDemand;
+use flotor_core::grip::GripRecord;
+use flotor_core::health::ModelHealth;
+use flotor_core::mapping::Mapping;
+use flotor_core::trace::Events;
+use flotor_hal::abi::CallStatus;
+use flotor_hal::{
+    DVec3, Demand, GripState, Input, Memory, Output, RegionShape, SampledLoop, StepStatus, Tick, Wrench,
+};
+use flotor_loader::InstanceState;
+
+/// One instance of a model with its mapping.
+struct Object {
+    instance: Instance,
+    placement: Placement,
+    /// Usable output and effort of the last tick, in the model frame, kept for an engine whose next output may be late.
+    last: Option<(Output, f64)>,
+}
+
+/// Instances of a model on one device.
+pub(crate) struct Objects {
+    objects: Box<[Object]>,
+    broad: BroadPhase,
+    serves: Demand,
+    memory: Memory,
+}
+
+impl Objects {
+    /// Creates the instances, each with its mapping; returns them with the outputs that they can compute. Not real-time.
+    pub(super) fn new(instances: Vec<(Engine, Mapping)>, sampled: &SampledLoop) -> (Self, Demand) {
+        let object = |(mut model, mapping): (Engine, Mapping)| {
+            let placement = Placement::new(&mut model, mapping, sampled);
+            Object { instance: Instance::new(model), placement, last: None }
+        };
+        let mut objects: Box<[Object]> = instances.into_iter().map(object).collect();
+        let bounds = objects.iter_mut().map(Object::bounds).collect();
+        let first =
+            objects.first().map(|object| (object.instance.model.serves(), object.instance.model.memory()));
+        let (serves, memory) = first.unwrap_or((Demand::ALL, Memory::Stateless));
+        (Self { objects, broad: BroadPhase::new(bounds), serves, memory }, serves)
+    }
+
+    /// Returns the bounding box, device frame, in which the objects can act; `None` for everywhere. Real-time: bounded by the
+    /// number of objects, no allocation.
+    pub(super) fn bounds(&self) -> Option<Bounds> {
+        self.broad.hull()
+    }
+}
+
+impl Body for Objects {
+    type Samples<'s> = Sample<'s>;
+    type Share = Contribution;
+    type Marks = Events;
+
+    /// Steps all objects that can act at the handle and returns the sum of their contributions; other objects are not called.
+    #[inline]
+    fn step(
+        &mut self,
+        tick: &Tick,
+        sample: &Sample<'_>,
+        health: &mut ModelHealth,
+        events: &mut Events,
+    ) -> Contribution {
+        let Sample { state, grip, demand } = *sample;
+        let Self { objects, broad, serves, memory } = self;
+        let mut share = Contribution::NONE;
+        broad.for_each_near(objects, state.pose.position(), |object| {
+            let input = object.placement.mapping.input(tick, state, demand.computed().limited_to(*serves));
+            let Some((output, effort)) = object.answer(&input, grip, demand, *memory, health, events) else {
+                events.insert(Events::MODEL_FAULT);
+                return;
+            };
+            object.placement.add_to(&mut share, (&output, effort), &input, sample, events);
+        });
+        share
+    }
+
+    fn set_parameter(
+        &mut self,
+        tick: &Tick,
+        parameter: usize,
+        value: f64,
+        health: &mut ModelHealth,
+    ) -> CallStatus {
+        let mut worst = CallStatus::Ok;
+        for (index, object) in self.objects.iter_mut().enumerate() {
+            let status = object.instance.set_parameter(tick, parameter, value, health);
+            if status != CallStatus::Ok {
+                worst = status;
+                continue;
+            }
+            object.placement.move_end(&mut object.instance.model);
+            if self.broad.bounds(index).is_some() {
+                let bounds = object.bounds();
+                if bounds != self.broad.bounds(index) {
+                    self.broad.watch_always(index, bounds);
+                }
+            }
+        }
+        worst
+    }
+
+    fn states(&mut self, tick: u64) -> impl Iterator<Item = Option<InstanceState<'_>>> {
+        let memory = self.memory;
+        self.objects.iter_mut().map(move |object| object.instance.state(tick, memory))
+    }
+
+    fn with_stiffness(&self, mut health: ModelHealth) -> ModelHealth {
+        for Object { instance, placement, .. } in &self.objects {
+            let (felt, scale) = (instance.model.felt_stiffness(), placement.mapping.stiffness_scale());
+            let contacts = &mut health.contacts;
+            contacts.undamped_n_per_m = contacts.undamped_n_per_m.max(felt.undamped_n_per_m * scale);
+            let at_hand = felt.reduced_n_per_m.map(|pair| pair.map(|stiffness| stiffness * scale));
+            contacts.reduced_n_per_m = contacts.reduced_n_per_m.or(at_hand);
+        }
+        health
+    }
+
+    fn last_message(&mut self) -> String {
+        let mut messages = self.objects.iter_mut().map(|object| object.instance.model.last_message());
+        messages.find(|message| !message.is_empty()).unwrap_or_default()
+    }
+}
+
+impl Object {
+    /// Returns the bounding box, device frame, in which the object can act; `None` for everywhere. Real-time: bounded, no allocation.
+    fn bounds(&mut self) -> Option<Bounds> {
+        let (region, mapping) = (self.instance.model.active_region(), &self.placement.mapping);
+        let half_sides_m = match region.shape() {
+            RegionShape::Everywhere => return None,
+            RegionShape::Sphere => DVec3::splat(mapping.length_to_device(region.half_sides().x)),
+            RegionShape::Box => mapping.half_sides_to_device(region.half_sides()),
+        };
+        Some(Bounds::about(mapping.position_to_device(region.center()), half_sides_m))
+    }
+
+    /// Steps the model. Returns output and effort, model frame, if they are usable; otherwise counts the problem in `health`.
+    #[inline(always)] // with the three of `Mapping` and `limit_wrench` 22 ns a tick
+    fn answer(
+        &mut self,
+        input: &Input,
+        grip: Option<&GripState>,
+        demand: TickDemand,
+        memory: Memory,
+        health: &mut ModelHealth,
+        events: &mut Events,
+    ) -> Option<(Output, f64)> {
+        let Self { instance, placement, last } = self;
+        if !instance.begin(input.tick, memory, health) {
+            return None;
+        }
+        let mut output = Output::new(Wrench::ZERO, 0.0, StepStatus::Ok);
+        let mut grip = grip.map(|state| GripRecord::at(placement.mapping.grip_to_model(state)));
+        let stepped = instance.model.step(input, &mut output, &mut grip);
+        if instance.has_changed_floats(input.tick, health) {
+            events.insert(Events::FLOAT_ENVIRONMENT);
+        }
+        match stepped {
+            Stepped::Answered => {}
+            Stepped::Short(Shortcoming::Aged) => health.contacts.aged.count(input.tick),
+            Stepped::Short(Shortcoming::Unsolved) => health.contacts.unsolved.count(input.tick),
+            Stepped::Refused => health.refused_sets.count(input.tick),
+            // The last output replaces one late output; a second late output in a row has no replacement.
+            Stepped::Late => {
+                events.insert(Events::MODEL_OVERRUN);
+                health.late_answers += 1;
+                return last.take();
+            }
+            Stepped::Silent => {
+                events.insert(Events::MODEL_OVERRUN);
+                health.late.count(input.tick);
+                return last.take();
+            }
+            Stepped::Broken => {
+                instance.fail(input.tick, health);
+                return None;
+            }
+            Stepped::Gone => {
+                instance.is_disabled = true;
+                health.lost_at.get_or_insert(input.tick);
+                return None;
+            }
+        }
+        let effort = grip.map_or(0.0, |grip| grip.model);
+        let usable = usable(demand, output).map(|output| (output, effort)).filter(|_| effort.is_finite());
+        if usable.is_none() {
+            *last = None;
+            health.rejected.count(input.tick);
+        } else if instance.model.may_be_late() {
+            *last = usable;
+        }
+        usable
+    }
+}
