@@ -166,6 +166,12 @@ impl Ball {
         }
     }
 
+    /// Returns the ball nearest to `goal_m` over its one contact; `None` if it has several or leaves this one.
+    pub(crate) fn over_its_contact(&self, surface: &Surface, goal_m: DVec3) -> Option<Self> {
+        let contact = self.contacts.first().filter(|_| self.contacts.count() == 1)?;
+        Some(self.over_one(surface, goal_m, contact)).filter(|ball| ball.contacts.count() == 1)
+    }
+
     fn over_one(&self, surface: &Surface, goal_m: DVec3, contact: Contact) -> Self {
         let place = surface.walk(goal_m, contact.place.patch);
         let side = self.side(surface, &place, contact.side);
@@ -185,7 +191,7 @@ impl Ball {
             let mut planes = [Plane::default(); MOST_CONTACTS];
             let (mut contacts, mut kept) = (Contacts::default(), 0);
             for contact in ball.contacts.iter() {
-                let place = surface.walk(ball.centre_m, contact.place.patch);
+                let place = surface.follow(ball.centre_m, &contact.place, 0.0);
                 let side = self.side(surface, &place, contact.side);
                 let over = ball.over(surface, &place, side, ball.centre_m);
                 if contacts.add(Contact { place, side }) {
@@ -300,7 +306,7 @@ impl Ball {
     fn drop_idle(&mut self, surface: &Surface) {
         let mut left = Contacts::default();
         for contact in self.contacts.iter() {
-            let place = surface.walk(self.centre_m, contact.place.patch);
+            let place = surface.follow(self.centre_m, &contact.place, 0.0);
             let over = self.over(surface, &place, contact.side, self.centre_m);
             if over.height_m - self.radius_m <= SKIN_M {
                 left.add(Contact { place, ..contact });
@@ -322,7 +328,7 @@ impl Ball {
         let Some(contact) = self.contacts.first().filter(|_| self.contacts.count() == 1) else {
             return self.target(surface, near_m);
         };
-        let place = surface.walk(near_m, contact.place.patch);
+        let place = surface.follow(near_m, &contact.place, (near_m - self.centre_m).length());
         let direction = self.over(surface, &place, contact.side, near_m).direction;
         let mut contacts = Contacts::default();
         contacts.add(Contact { place, ..contact });

@@ -49,6 +49,8 @@ pub struct Surface {
 
 /// Most patches that a walk crosses.
 const MOST_PATCHES: usize = 64;
+/// Travel, relative to an edge, up to which the last closest point is a better start than the one of the flat triangle.
+const NEAR: f64 = 0.05;
 /// Most patches about a corner.
 const MOST_FAN: usize = 4096;
 /// Decrease of a distance below which a neighbour is not nearer, relative.
@@ -174,10 +176,14 @@ impl Surface {
         let mut best: Option<Place> = None;
         let mut bound_m = bound_m;
         self.tree.nearest(c_m, bound_m, |number| {
+            if is_known(number) {
+                return bound_m;
+            }
             let patch = &self.patches[number];
             let (start, square) = closest_of_triangle(&patch.corners_m, c_m);
             // No point of the patch is farther from the triangle than its bulge.
-            if square.sqrt() - f64::from(patch.bulge_m) > bound_m || is_known(number) {
+            let reach_m = bound_m + f64::from(patch.bulge_m);
+            if square > reach_m * reach_m {
                 return bound_m;
             }
             let Some(foot) = patch.closest_within(c_m, start, bound_m) else { return bound_m };
@@ -200,12 +206,27 @@ impl Surface {
     #[must_use]
     pub fn walk(&self, c_m: DVec3, patch: usize) -> Place {
         let (patch, at) = self.flat_walk(c_m, patch);
+        self.descend(c_m, patch, at)
+    }
+
+    fn descend(&self, c_m: DVec3, patch: usize, at: Barycentric) -> Place {
         let mut place = Place { patch, foot: self.patches[patch].closest(c_m, at) };
         for _ in 0..MOST_PATCHES {
             let Some(next) = self.step_on(c_m, &place) else { break };
             place = next;
         }
         place
+    }
+
+    /// Follows the surface downhill to a local closest point to `c_m`, from the closest point of a place `travel_m` away. Real-time:
+    /// bounded, no allocation.
+    pub(crate) fn follow(&self, c_m: DVec3, from: &Place, travel_m: f64) -> Place {
+        let [p, q, _] = self.patches[from.patch].corners_m;
+        if travel_m < NEAR * p.distance(q) {
+            self.descend(c_m, from.patch, from.foot.at)
+        } else {
+            self.walk(c_m, from.patch)
+        }
     }
 
     /// Follows the flat triangles downhill, which takes a tenth of the time: the patch and the place from which a walk ends soon.

@@ -170,8 +170,8 @@ impl Touch {
     /// Moves the proxy for a tool at `goal_m`; returns true if the proxy is at rest.
     fn advance(&mut self, surface: &Surface, materials: &Materials, ball: &mut Ball, goal_m: DVec3) -> bool {
         let material = materials.of(surface, ball);
-        let normal = ball.normal(surface);
-        let Some(normal) = normal.filter(|_| material.static_friction > 0.0) else {
+        let has_friction = material.static_friction > 0.0;
+        let Some(normal) = has_friction.then(|| ball.normal(surface)).flatten() else {
             let settled = ball.settle(surface, goal_m);
             let has_friction = materials.of(surface, ball).static_friction > 0.0 && ball.contacts.count() > 0;
             self.friction = if has_friction { Friction::Sticks } else { Friction::Free };
@@ -186,6 +186,10 @@ impl Touch {
             return true;
         }
         let before = *ball;
+        if let Some(edge) = before.slid_on(surface, goal_m, material.sliding()) {
+            (*ball, self.friction) = (edge, Friction::Slides);
+            return true;
+        }
         let settled = ball.settle(surface, goal_m);
         if ball.contacts.count() == 0 {
             self.friction = Friction::Free;
@@ -211,11 +215,10 @@ impl Touch {
     ) -> Answer {
         let stretch_m = ball.centre_m - tool_m;
         let Some(contact) = ball.contacts.first() else { return Answer::NOTHING };
-        let Some(mut normal) = ball.normal(surface) else { return Answer::NOTHING };
-        if material.static_friction == 0.0 || ball.contacts.count() > 1 {
-            // Without friction the spring pulls along the normal of all contacts.
-            normal = stretch_m.try_normalize().unwrap_or(normal);
-        }
+        // Without friction the spring pulls along the normal of all contacts.
+        let is_along = material.static_friction == 0.0 || ball.contacts.count() > 1;
+        let along = is_along.then(|| stretch_m.try_normalize()).flatten();
+        let Some(normal) = along.or_else(|| ball.normal(surface)) else { return Answer::NOTHING };
         let Material { stiffness_n_per_m, damping_ns_per_m, viscous_ns_per_m, .. } = *material;
         let depth_m = stretch_m.dot(normal);
         let outwards_m_per_s = velocity_m_per_s.dot(normal);
@@ -255,32 +258,40 @@ fn excess_m(stretch_m: DVec3, normal: DVec3, coefficient: f64) -> f64 {
     (stretch_m - normal * depth_m).length() - coefficient * depth_m
 }
 
+impl Ball {
+    /// Returns this ball, slid over its one contact towards a tool at `goal_m` as far as friction permits; `None` if that is not all
+    /// that happens: another contact, the end of this one, or something on the way.
+    fn slid_on(&self, surface: &Surface, goal_m: DVec3, coefficient: f64) -> Option<Self> {
+        let free = self.over_its_contact(surface, goal_m)?;
+        let edge = at_cone(surface, self, &free, goal_m, coefficient)?;
+        self.can_move_to(surface, &edge).then_some(edge)
+    }
+}
+
 /// Returns the ball between a frictionless place and the place `before` at which the force along the surface is on the cone;
 /// `None` if even the frictionless place is.
 fn at_cone(surface: &Surface, before: &Ball, free: &Ball, goal_m: DVec3, coefficient: f64) -> Option<Ball> {
-    let at = |share: f64| {
-        let near_m = free.centre_m.lerp(before.centre_m, share);
-        let ball = free.placed_under(surface, near_m);
-        let normal = ball.normal(surface)?;
-        Some((ball, excess_m(ball.centre_m - goal_m, normal, coefficient)))
-    };
+    let excess = |ball: &Ball| Some(excess_m(ball.centre_m - goal_m, ball.normal(surface)?, coefficient));
     let (mut low, mut high) = (0.0, 1.0);
-    let (free, mut low_m) = at(low)?;
+    let mut low_m = excess(free)?;
     if coefficient == 0.0 || low_m > 0.0 {
         return None;
     }
     let way_m = (before.centre_m - free.centre_m).length();
-    let (ball, mut high_m) = at(high)?;
+    let is_alike = before.contacts.count() == free.contacts.count();
+    let mut ball = if is_alike { *before } else { free.placed_under(surface, before.centre_m) };
+    let mut high_m = excess(&ball)?;
     if high_m <= 0.0 {
         return Some(ball);
     }
     high_m = high_m.min(way_m);
     // Regula falsi; an end that stays twice counts half (Dowell and Jarratt 1971, BIT 11, 168-174).
-    let (mut best, mut last) = (free, 0);
+    let (mut best, mut last) = (*free, 0);
     for _ in 0..MOST_SECANTS {
         let share = (low * high_m - high * low_m) / (high_m - low_m);
         let share = if share > low && share < high { share } else { 0.5 * (low + high) };
-        let (ball, excess_m) = at(share)?;
+        ball = ball.placed_under(surface, free.centre_m.lerp(before.centre_m, share));
+        let excess_m = excess(&ball)?;
         let is_met = excess_m.abs() <= ON_CONE_M;
         if is_met || excess_m <= 0.0 {
             best = ball;

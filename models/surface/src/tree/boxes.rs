@@ -1,11 +1,11 @@
-//! Boxes along the axes, four at a time, in binary32, rounded outwards.
+//! Boxes along the axes, eight at a time, in binary32, rounded outwards.
 
 use super::{WIDTH, above, below};
 use flotor_hal::DVec3;
 
-/// Four boxes, by coordinate.
+/// Eight boxes, by coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C, align(32))]
+#[repr(C, align(64))]
 pub(super) struct Boxes {
     low: [[f32; WIDTH]; 3],
     high: [[f32; WIDTH]; 3],
@@ -28,7 +28,7 @@ impl Boxes {
         sum
     }
 
-    /// Returns true for each box that a segment may meet, widened by `wide`.
+    /// Returns true for each box that meets a box.
     #[inline]
     pub(super) fn meets(&self, low: [f32; 3], high: [f32; 3]) -> [bool; WIDTH] {
         let mut all = [true; WIDTH];
@@ -48,10 +48,10 @@ impl Boxes {
         }
     }
 
-    /// Returns the box about all four, m.
+    /// Returns the box about all eight, m.
     pub(super) fn all_m(&self) -> [DVec3; 2] {
         let end = |all: [[f32; WIDTH]; 3], of: fn(f32, f32) -> f32, start| {
-            DVec3::from_array(all.map(|four| f64::from(four.into_iter().fold(start, of))))
+            DVec3::from_array(all.map(|ends| f64::from(ends.into_iter().fold(start, of))))
         };
         [end(self.low, f32::min, f32::INFINITY), end(self.high, f32::max, f32::NEG_INFINITY)]
     }

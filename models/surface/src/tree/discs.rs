@@ -1,4 +1,4 @@
-//! Flat cylinders, four at a time: a ball that touches a smooth surface meets the boxes of many patches about the place, but few of
+//! Flat cylinders, eight at a time: a ball that touches a smooth surface meets the boxes of many patches about the place, but few of
 //! their discs. Stored in binary32, rounded so that a disc contains its item.
 
 use super::{ROUNDING, WIDTH, above, narrow};
@@ -46,7 +46,7 @@ fn wide(v: [f32; 3]) -> DVec3 {
     DVec3::from_array(v.map(f64::from))
 }
 
-/// Four discs, by coordinate. Two lines of a cache.
+/// Eight discs, by coordinate. Four lines of a cache.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Discs {

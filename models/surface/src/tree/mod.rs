@@ -1,6 +1,6 @@
-//! Tree over the patches: four children a node, packed bottom-up over patches sorted along Hilbert's curve.
+//! Tree over the patches: eight children a node, packed bottom-up over patches sorted along Hilbert's curve.
 //!
-//! No pointers: the children of node `i` of a level are nodes `4 i` to `4 i + 3` of the level below, and of the lowest level patches.
+//! No pointers: the children of node `i` of a level are nodes `8 i` to `8 i + 7` of the level below, and of the lowest level patches.
 //! The two lowest levels have discs, the others boxes, in binary32; distances are computed in binary32, with a margin.
 
 mod boxes;
@@ -15,11 +15,11 @@ use flotor_hal::DVec3;
 pub(crate) use hilbert::hilbert_order;
 
 /// Children of a node.
-const WIDTH: usize = 4;
+const WIDTH: usize = 8;
 /// Levels of discs.
 const DISC_LEVELS: usize = 2;
-/// Most levels: four to this power is more than the number of patches that is read.
-const MOST_LEVELS: usize = 14;
+/// Most levels: eight to this power is more than the number of patches that is read.
+const MOST_LEVELS: usize = 10;
 /// Size of the stack of a traversal.
 const STACK: usize = WIDTH * MOST_LEVELS;
 /// Rounding of a few operations in binary32, relative: eight units in the last place.
@@ -43,7 +43,7 @@ fn narrow(v: DVec3) -> [f32; 3] {
 /// Tree over numbered items.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Tree {
-    /// Discs of the items, and of four of these.
+    /// Discs of the items, and of eight of them.
     discs: [Vec<Discs>; DISC_LEVELS],
     /// Levels of boxes, from the lowest to the root; none for a few items.
     boxes: Vec<Vec<Boxes>>,
@@ -60,15 +60,19 @@ impl Tree {
         disc: impl Fn(usize) -> Disc + Sync,
         box_m: impl Fn(usize) -> [DVec3; 2] + Sync,
     ) -> Self {
-        let mut items = vec![Discs::EMPTY; count.div_ceil(WIDTH)];
-        fill(&mut items, |node| {
-            Discs::of(WIDTH * node..count.min(WIDTH * (node + 1)), |item| Some(disc(item)))
-        });
-        let mut groups = vec![Discs::EMPTY; items.len().div_ceil(WIDTH)];
-        fill(&mut groups, |node| {
-            Discs::of(WIDTH * node..items.len().min(WIDTH * (node + 1)), |item| items[item].disc())
-        });
-        let mut lowest = vec![Boxes::EMPTY; groups.len().div_ceil(WIDTH)];
+        let mut discs: [Vec<Discs>; DISC_LEVELS] = Default::default();
+        let mut below = count;
+        for level in 0..DISC_LEVELS {
+            let (lower, upper) = discs.split_at_mut(level);
+            let child = |i: usize| match lower.last() {
+                Some(lower) => lower[i].disc(),
+                None => Some(disc(i)),
+            };
+            upper[0] = vec![Discs::EMPTY; below.div_ceil(WIDTH)];
+            fill(&mut upper[0], |node| Discs::of(WIDTH * node..below.min(WIDTH * (node + 1)), child));
+            below = upper[0].len();
+        }
+        let mut lowest = vec![Boxes::EMPTY; below.div_ceil(WIDTH)];
         // Items under one box of the lowest level of boxes.
         let share = [WIDTH; DISC_LEVELS].iter().product::<usize>();
         fill(&mut lowest, |node| {
@@ -89,7 +93,7 @@ impl Tree {
         }
         let root = boxes.last().and_then(|root| root.first()).map(Boxes::all_m);
         let largest = root.map_or(0.0, |[low, high]| low.abs().max(high.abs()).max_element());
-        Self { discs: [items, groups], boxes, count, rounding_m: above(largest * 2.4e-7) }
+        Self { discs, boxes, count, rounding_m: above(largest * 2.4e-7) }
     }
 
     /// Returns the number of bytes.
@@ -137,33 +141,25 @@ impl Tree {
                 continue;
             }
             let squares = self.squares(level, index, c);
-            if squares.iter().all(|square| *square > most) {
-                continue;
-            }
-            let mut order = [0_u32, 1, 2, 3];
-            let mut sort = |i: usize, j: usize| {
-                if squares[order[i] as usize] < squares[order[j] as usize] {
-                    order.swap(i, j);
+            let base = used;
+            for child in 0..WIDTH {
+                if squares[child] > most {
+                    continue;
                 }
-            };
-            // Farthest first: the stack returns the nearest.
-            sort(0, 1);
-            sort(2, 3);
-            sort(0, 2);
-            sort(1, 3);
-            sort(1, 2);
-            if level == 0 {
-                for child in order.into_iter().rev() {
-                    let item = WIDTH * index as usize + child as usize;
-                    if squares[child as usize] <= most && item < self.count {
-                        most = most.min(limit(visit(item)));
+                #[allow(clippy::cast_possible_truncation)] // 0 to 7
+                let item = index * WIDTH as u32 + child as u32;
+                if level == 0 {
+                    if (item as usize) < self.count {
+                        most = most.min(limit(visit(item as usize)));
                     }
-                }
-                continue;
-            }
-            for child in order {
-                if squares[child as usize] <= most && used < STACK {
-                    stack[used] = (level - 1, index * 4 + child, squares[child as usize]);
+                } else if used < STACK {
+                    // Farthest first: the stack returns the nearest.
+                    let mut place = used;
+                    while place > base && stack[place - 1].2 < squares[child] {
+                        stack[place] = stack[place - 1];
+                        place -= 1;
+                    }
+                    stack[place] = (level - 1, item, squares[child]);
                     used += 1;
                 }
             }
@@ -187,8 +183,8 @@ impl Tree {
                 Some(discs) => discs[index as usize].meets(low, high),
                 None => self.boxes[level as usize - DISC_LEVELS][index as usize].meets(low, high),
             };
-            for child in (0..4_u32).filter(|child| meets[*child as usize]) {
-                let item = index * 4 + child;
+            for child in (0..WIDTH as u32).filter(|child| meets[*child as usize]) {
+                let item = index * WIDTH as u32 + child;
                 if level == 0 {
                     if (item as usize) < self.count {
                         visit(item as usize);
