@@ -24,10 +24,10 @@ pub fn crossings(surface: &Surface) -> Crossings {
         for t in range {
             let corners_m = surface.patches()[t].corners_m;
             let [p, q, r] = corners_m;
-            surface.near_box(p.min(q).min(r), p.max(q).max(r), |other| {
+            surface.near_box([p.min(q).min(r), p.max(q).max(r)], t + 1, |other| {
                 let theirs = surface.patches()[other].corners_m;
                 let is_neighbour = theirs.iter().any(|corner| corners_m.contains(corner));
-                if other <= t || is_neighbour {
+                if is_neighbour {
                     return;
                 }
                 if let Some(place_m) =

@@ -8,7 +8,7 @@ use crate::patch::{Barycentric, Jet, Patch};
 use flotor_hal::DVec3;
 
 /// Closest point of a patch.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Foot {
     /// Place in the patch.
     pub at: Barycentric,

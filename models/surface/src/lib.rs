@@ -20,7 +20,7 @@
 //! - [`patch`], [`closest`]: a curved triangle, and its closest point. [`tree`], [`surface`]: all of them, and the search.
 //! - `planes`, `proxy`, [`touch`]: the ball between ticks, with friction. [`material`]: its values by group.
 //! - [`object`], [`check`], `store`, `cache`: from a file to a surface that instances share.
-//! - `parameters`, `plugin`, `drawing`, `built_in`: the contract.
+//! - `parameters`, `plugin`, `saved`, `drawing`, `built_in`: the contract.
 #![allow(clippy::needless_range_loop)] // coordinates and corners have numbers, in several arrays at once
 
 mod built_in;
@@ -38,6 +38,7 @@ pub mod patch;
 mod planes;
 mod plugin;
 mod proxy;
+mod saved;
 pub mod soup;
 mod store;
 pub mod surface;

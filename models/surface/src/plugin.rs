@@ -36,9 +36,9 @@ const DETAILS: &[Detail] = &[
 
 /// Smooth surface of a mesh file, and the ball that touches it.
 pub struct Touched {
-    object: Arc<Object>,
+    pub(crate) object: Arc<Object>,
     materials: Materials,
-    touch: Touch,
+    pub(crate) touch: Touch,
     parameters: [f64; SCHEMA.len()],
     last: Option<Answer>,
     /// Ball of the drawing, which follows the drawn poses instead of the ticks.
@@ -187,4 +187,4 @@ impl SoftRangeModel for Touched {
     ];
 }
 
-flotor_hal::export_model!(Touched, details, shape, soft_range);
+flotor_hal::export_model!(Touched, details, shape, snapshot, soft_range);

@@ -29,9 +29,10 @@ const HIGH_M: f64 = 1.0e-6;
 const SKIN_M: f64 = 1.0e-7;
 
 /// Side of a surface on which the ball is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Side {
     /// Side of the normals.
+    #[default]
     Front,
     /// Other side, of an open surface only.
     Back,
@@ -50,26 +51,25 @@ impl Side {
 }
 
 /// Patch in contact with the ball.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Contact {
     pub(crate) place: Place,
     pub(crate) side: Side,
 }
 
-/// Contacts of a ball.
+/// Contacts of a ball, the first ones of the places in use.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Contacts {
-    all: [Option<Contact>; MOST_CONTACTS],
-    count: usize,
+    pub(crate) all: [Option<Contact>; MOST_CONTACTS],
 }
 
 impl Contacts {
     pub(crate) fn iter(&self) -> impl Iterator<Item = Contact> + '_ {
-        self.all[..self.count].iter().copied().flatten()
+        self.all.iter().copied().flatten()
     }
 
     pub(crate) fn count(&self) -> usize {
-        self.count
+        self.all.iter().flatten().count()
     }
 
     pub(crate) fn first(&self) -> Option<Contact> {
@@ -79,12 +79,13 @@ impl Contacts {
     /// Adds a contact; returns false if it is one already or there is no room.
     fn add(&mut self, contact: Contact) -> bool {
         let is_known = self.iter().any(|other| is_same(&other.place.foot, &contact.place.foot));
-        if is_known || self.count == MOST_CONTACTS {
-            return false;
+        match self.all.iter_mut().find(|place| place.is_none()) {
+            Some(place) if !is_known => {
+                *place = Some(contact);
+                true
+            }
+            _ => false,
         }
-        self.all[self.count] = Some(contact);
-        self.count += 1;
-        true
     }
 }
 
@@ -101,7 +102,7 @@ struct Over {
 }
 
 /// Ball and its contacts.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Ball {
     pub(crate) radius_m: f64,
     /// Centre, m.

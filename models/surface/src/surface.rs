@@ -10,7 +10,7 @@ use crate::weld::Mesh;
 use flotor_hal::DVec3;
 
 /// Place on the surface: a patch, and the closest point of it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
     /// Number of the patch.
     pub patch: usize,
@@ -197,9 +197,9 @@ impl Surface {
         best
     }
 
-    /// Visits the patches whose boxes overlap a box. Real-time: bounded, no allocation.
-    pub(crate) fn near_box(&self, low_m: DVec3, high_m: DVec3, visit: impl FnMut(usize)) {
-        self.tree.along(low_m, high_m, visit);
+    /// Visits the patches from number `first` on that may overlap a box.
+    pub(crate) fn near_box(&self, [low_m, high_m]: [DVec3; 2], first: usize, visit: impl FnMut(usize)) {
+        self.tree.along(low_m, high_m, first, visit);
     }
 
     /// Follows the surface downhill to a local closest point to `c_m`, from `patch`. Real-time: bounded, no allocation.
@@ -378,7 +378,7 @@ impl Surface {
     pub fn first_crossing(&self, from_m: DVec3, to_m: DVec3) -> Option<Crossing> {
         let mut first: Option<Crossing> = None;
         let way_m = to_m - from_m;
-        self.tree.along(from_m, to_m, |number| {
+        self.tree.along(from_m, to_m, 0, |number| {
             let Some((at, share)) = self.patches[number].crossing(from_m, way_m) else { return };
             let is_entry = !self.traits[number].is_closed || self.patches[number].normal(at).dot(way_m) < 0.0;
             if is_entry && first.is_none_or(|first| share < first.share) {

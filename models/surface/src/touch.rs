@@ -25,7 +25,7 @@ pub enum Friction {
 /// State of the touch.
 #[allow(clippy::large_enum_variant)] // one state an instance, in a tick without allocation
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum State {
+pub(crate) enum State {
     /// No step yet.
     Start,
     /// Overlapping since the start; distance to the surface in the last step, m.
@@ -83,8 +83,8 @@ const ON_CONE_M: f64 = 1.0e-14;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
     pub(crate) radius_m: f64,
-    state: State,
-    friction: Friction,
+    pub(crate) state: State,
+    pub(crate) friction: Friction,
 }
 
 /// Materials of a surface.

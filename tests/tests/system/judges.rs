@@ -198,6 +198,8 @@ fn shipped_models_pass() {
             (&["load"], &[]),
             (&["measured"], &[]),
             (&["membrane"], &["M2", "M5"]),
+            (&["surface"], &[]),
+            (&["surface", "--set", "file=torus"], &[]),
         ],
     };
     for (arguments, expected) in models {

@@ -166,8 +166,8 @@ impl Tree {
         }
     }
 
-    /// Visits the items that the box of a segment may meet. Real-time: bounded, no allocation.
-    pub(crate) fn along(&self, from_m: DVec3, to_m: DVec3, mut visit: impl FnMut(usize)) {
+    /// Visits the items from number `first` on that the box of a segment may meet. Real-time: bounded, no allocation.
+    pub(crate) fn along(&self, from_m: DVec3, to_m: DVec3, first: usize, mut visit: impl FnMut(usize)) {
         if self.count == 0 {
             return;
         }
@@ -183,8 +183,13 @@ impl Tree {
                 Some(discs) => discs[index as usize].meets(low, high),
                 None => self.boxes[level as usize - DISC_LEVELS][index as usize].meets(low, high),
             };
+            // Items below one child.
+            let share = WIDTH.pow(level);
             for child in (0..WIDTH as u32).filter(|child| meets[*child as usize]) {
                 let item = index * WIDTH as u32 + child;
+                if (item as usize + 1) * share <= first {
+                    continue;
+                }
                 if level == 0 {
                     if (item as usize) < self.count {
                         visit(item as usize);
