@@ -15,8 +15,8 @@
 //! If frames or scales differ, both ends use one shared frame, to which each device has a mapping, like the mapping of
 //! a model. Energies are given in the shared frame.
 //!
-//! The energy at the port of one device is in [`port_energy`]; [`passivity`] and [`slew`] are the stages of the envelope that keep
-//! accounts of it.
+//! The energy at the port of one device is in [`port_energy`]; [`passivity`] and [`slew`] are the stages of the envelope that limit
+//! it.
 //!
 //! [`Coupling`] has both ends in one loop with a delay of whole ticks. [`RemoteEnd`] is an end whose partner is on
 //! another host; other threads transport its messages over the [`Line`].

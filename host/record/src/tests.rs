@@ -455,7 +455,7 @@ fn other_files_are_refused_with_name_reason_and_remedy() {
         mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
     writer.write_to_known_channel(&header, &message.encode_to_vec()).unwrap();
     writer.finish().unwrap();
-    holds(&refusal(&newer.0), &["format 3", "9.8.7", "update flotor"]);
+    holds(&refusal(&newer.0), &[&format!("format {}", FORMAT + 1), "9.8.7", "update flotor"]);
 }
 
 #[test]
