@@ -39,6 +39,9 @@
 // Capacity of a stop message, bytes.
 #define FLOTOR_STOP_MESSAGE_BYTES 64
 
+// Largest number of ports of an object.
+#define FlotorMAX_PORTS 4
+
 // Status returned by a table function.
 enum FlotorCallStatus
 #if defined(__cplusplus) || __STDC_VERSION__ >= 202311L
@@ -1177,6 +1180,20 @@ typedef struct FlotorSnapshotTable {
     uint32_t (*restore)(FlotorInstance instance, const uint8_t *bytes, uint64_t count);
 } FlotorSnapshotTable;
 
+// Function table `flotor.world/1`: see [`WorldModel`].
+typedef struct FlotorWorldTable {
+    // Size of this table in the plugin's build, bytes.
+    uint32_t size;
+    // Reserved, 0.
+    uint32_t reserved;
+    // Steps the object once, with the inputs of `count` ports, and writes an output for each; `count` is at least 1 and at
+    // most `MAX_PORTS`, else the status is `OutOfRange`. Returns a [`CallStatus`] code. Real-time.
+    uint32_t (*step_ports)(FlotorInstance instance,
+                           uint32_t count,
+                           const struct FlotorInput *inputs,
+                           struct FlotorOutput *outputs);
+} FlotorWorldTable;
+
 /* Version of the contract, for the metadata. */
 #define FLOTOR_CONTRACT "1.0-rc"
 /* Names of interfaces and extensions. */
@@ -1198,6 +1215,7 @@ typedef struct FlotorSnapshotTable {
 #define FLOTOR_INTERFACE_SOFT_RANGE "flotor.soft-range/1"
 #define FLOTOR_INTERFACE_VARIANT "flotor.variant/1"
 #define FLOTOR_INTERFACE_WORKSPACE_BOUNDS "flotor.workspace-bounds/1"
+#define FLOTOR_INTERFACE_WORLD "flotor.world/1"
 
 #if defined(_WIN32)
 #define FLOTOR_VISIBLE __declspec(dllexport)
@@ -1547,6 +1565,10 @@ __attribute__((unused)) static const FlotorFieldLayout flotor_layouts[] = {
     FLOTOR_FIELD(WorkspaceBoundsTable, size),
     FLOTOR_FIELD(WorkspaceBoundsTable, reserved),
     FLOTOR_FIELD(WorkspaceBoundsTable, bounds),
+    FLOTOR_STRUCT(WorldTable),
+    FLOTOR_FIELD(WorldTable, size),
+    FLOTOR_FIELD(WorldTable, reserved),
+    FLOTOR_FIELD(WorldTable, step_ports),
     FLOTOR_STRUCT(VerticalCalibration),
     FLOTOR_FIELD(VerticalCalibration, range_m),
     FLOTOR_FIELD(VerticalCalibration, coefficients),
