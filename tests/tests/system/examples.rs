@@ -16,6 +16,9 @@ fn text(path: &str) -> String {
     std::fs::read_to_string(workspace_root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
 }
 
+/// Beginning of the line that names the command that failed.
+const FAILED: &str = "failed: ";
+
 /// The commands of the page, in order.
 fn commands() -> Vec<String> {
     text("examples/README.md").lines().filter_map(|line| line.strip_prefix("$ ").map(str::to_owned)).collect()
@@ -23,7 +26,10 @@ fn commands() -> Vec<String> {
 
 /// Runs the commands in one shell, as a reader does, and returns what they print. The programs are those of this build.
 fn run(commands: &[String]) -> String {
-    let commands: String = commands.iter().map(|command| format!("({command}) || exit 1\n")).collect();
+    let commands: String = commands
+        .iter()
+        .map(|command| format!("({command}) || {{ echo {FAILED}'{command}' >&2; exit 1; }}\n"))
+        .collect();
     let scratch = Scratch::default();
     // An earlier run of the page left it, and recordings are not overwritten.
     let _ = std::fs::remove_file(workspace_root().join("target/examples/run.mcap"));
@@ -35,6 +41,8 @@ fn run(commands: &[String]) -> String {
     let file = scratch.file("script", script);
     let ran =
         Flotor::with([&file]).through_shell("exec bash \"$2\" \"$1\"").env("CARGO_NET_OFFLINE", "true").run();
+    let failed = ran.stderr.lines().find_map(|line| line.strip_prefix(FAILED));
+    assert_eq!(failed, None, "{ran:#?}");
     assert_eq!(ran.code, Some(0), "{ran:#?}");
     ran.stdout
 }
