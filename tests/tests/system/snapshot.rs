@@ -44,7 +44,7 @@ const MODELS: &[(&Entry, Settings)] = &[
     (&flotor_solid::FLOTOR_ENTRY, &[("friction", "0.4"), ("body", "half-space")]),
     (&flotor_solid::FLOTOR_ENTRY, &[("friction", "0.4"), ("body", "half-space"), ("tool_count", "3")]),
     (&flotor_surface::FLOTOR_ENTRY, &[("static_friction", "0.5"), ("kinetic_friction", "0.4")]),
-    (&flotor_surface::FLOTOR_ENTRY, &[("file", "torus"), ("tool_radius_mm", "0")]),
+    (&flotor_surface::FLOTOR_ENTRY, &[("tool_radius_mm", "0")]),
 ];
 
 fn plugin(entry: &'static Entry) -> Plugin {
