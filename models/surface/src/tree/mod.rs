@@ -185,8 +185,9 @@ impl Tree {
             };
             // Items below one child.
             let share = WIDTH.pow(level);
-            for child in (0..WIDTH as u32).filter(|child| meets[*child as usize]) {
-                let item = index * WIDTH as u32 + child;
+            for child in (0..WIDTH).filter(|child| meets[*child]) {
+                #[allow(clippy::cast_possible_truncation)] // 0 to 7
+                let item = index * WIDTH as u32 + child as u32;
                 if (item as usize + 1) * share <= first {
                     continue;
                 }
