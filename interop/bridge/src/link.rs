@@ -150,7 +150,6 @@ impl Link {
     }
 
     /// Returns the member name of this program in its configuration; without keys, `anyone`.
-    #[must_use]
     pub fn member(&self) -> &Name {
         &self.member
     }

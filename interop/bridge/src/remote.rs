@@ -37,6 +37,7 @@ const LOOK_PERIOD: Duration = Duration::from_millis(300);
 
 /// Event of a remote run.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)] // nearly every event is a tick: a box would allocate for each
 pub enum RemoteEvent {
     /// Tick of the run.
     Tick(TickRecord),

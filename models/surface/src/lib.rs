@@ -17,7 +17,7 @@
 //! # Modules
 //!
 //! - [`files`], [`soup`]: triangles of a file. [`weld`], [`topology`], [`normals`]: an oriented mesh with real edges and normals.
-//! - [`patch`], [`closest`]: a curved triangle, and its closest point. [`tree`], [`surface`]: all of them, and the search.
+//! - [`patch`], [`closest`]: a curved triangle, and its closest point. `tree`, [`surface`]: all of them, and the search.
 //! - `planes`, `proxy`, [`touch`]: the ball between ticks, with friction. [`material`]: its values by group.
 //! - [`object`], [`check`], `store`, `cache`: from a file to a surface that instances share.
 //! - `parameters`, `plugin`, `saved`, `drawing`, `built_in`: the contract.

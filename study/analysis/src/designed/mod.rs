@@ -1,9 +1,9 @@
 //! Analysis of a designed study: what each subject did in each condition, and the effects of the factors.
 //!
-//! - [`record`]: answers of a subject, over all sessions.
-//! - [`measure`]: threshold, psychometric function, sensitivity or mean answer in a condition.
-//! - [`power`]: effects found in simulated studies.
-//! - [`effects`]: analysis of variance with factors between and within subjects, and tests by ranks.
+//! - `record`: answers of a subject, over all sessions.
+//! - `measure`: threshold, psychometric function, sensitivity or mean answer in a condition.
+//! - `power`: effects found in simulated studies.
+//! - `effects`: analysis of variance with factors between and within subjects, and tests by ranks.
 
 mod effects;
 mod measure;
