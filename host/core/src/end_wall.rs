@@ -49,7 +49,7 @@ impl EndWall {
 
     /// Returns the wall force on the handle, device frame; `None` within the bounds. `pose` is in the model frame, `twist` in the
     /// device frame. Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)] // in the middle of a tick
     #[must_use]
     pub fn push(&self, pose: &Pose, mapping: &Mapping, twist: &Twist) -> Option<Wrench> {
         let beyond_m = self.bounds.beyond(pose.position());

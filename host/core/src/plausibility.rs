@@ -220,7 +220,7 @@ impl PlausibilityCheck {
     /// The reason, if the sample is implausible.
     ///
     /// Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)] // in the middle of a tick
     pub fn check(&mut self, tick: &Tick, sample: &DeviceState) -> Result<(), Implausible> {
         self.check_both(tick, sample, Ok(()))
     }
@@ -231,7 +231,7 @@ impl PlausibilityCheck {
     /// The reason, if one of both is implausible.
     ///
     /// Real-time: bounded, no allocation.
-    #[inline]
+    #[inline(always)] // in the middle of a tick
     pub fn check_both(
         &mut self,
         tick: &Tick,

@@ -134,6 +134,7 @@ impl Envelope {
     }
 
     /// Passes the models' effort at a grip through its limits and stores the effort to command. Real-time: bounded, no allocation.
+    #[inline(never)] // few devices have one
     pub fn apply_grip(&mut self, grip: &mut GripRecord, gate: Gate, tick: &Tick, events: &mut Events) {
         let dt_s = self.slew_time_ns(tick) as f64 * 1.0e-9;
         grip.commanded =

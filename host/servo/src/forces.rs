@@ -204,13 +204,14 @@ impl Forces {
     /// Steps all couplings and models at the states of the ports, and stores the requested wrenches, energies and events in the
     /// ports; one port per device. `observed`: outputs that observers demand. Real-time: bounded by the models that are near, no
     /// allocation.
+    #[inline(always)] // in the middle of a tick
     pub fn step(&mut self, tick: &Tick, ports: &mut [Port], observed: Demand, heartbeat: &Heartbeat) {
         // Couplings first: the held wrench is still the last request of couplings and models.
         self.couplings.iter_mut().for_each(|coupled| coupled.step(tick, ports));
         for (stack, port) in self.stacks.iter_mut().zip(&mut *ports) {
             let demand = TickDemand::new(port.at_hand, observed.limited_to(stack.observable()));
-            let sampled = port.grip.map(|grip| grip.state);
-            let sample = Sample { state: &port.state, grip: sampled.as_ref(), demand };
+            let grip = port.grip.as_ref().map(|grip| &grip.state);
+            let sample = Sample { state: &port.state, grip, demand };
             let Contribution { wrench, energy_j, effort } =
                 stack.step(tick, &sample, heartbeat, &mut port.events);
             port.take(demand, wrench, energy_j);

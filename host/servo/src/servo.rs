@@ -88,6 +88,7 @@ impl Servo {
     }
 
     /// Passes a record of the tick for each device to `on_record`.
+    #[inline(always)] // in the middle of a tick
     fn emit_records(
         &self,
         due: &Due,

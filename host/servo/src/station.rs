@@ -85,6 +85,7 @@ impl Station {
     /// implausible sample does not change the port.
     ///
     /// Real-time: bounded by the device, no allocation.
+    #[inline(always)] // in the middle of a tick
     pub(super) fn read(&mut self, tick: &Tick, port: &mut Port) -> RunEvent {
         let last = port.state;
         match self.device.read(tick, &mut port.state) {
@@ -118,9 +119,19 @@ impl Station {
         }
     }
 
-    /// Checks the new sample, and reads and checks that of a grip; stores a plausible one in the port.
+    /// Checks the new sample, with that of a grip.
+    #[inline(always)] // in the middle of a tick
     fn check(&mut self, tick: &Tick, port: &mut Port) -> Result<(), Implausible> {
-        let Some(guard) = self.envelope.grip else { return self.plausibility.check(tick, &port.state) };
+        match self.envelope.grip {
+            None => self.plausibility.check(tick, &port.state),
+            Some(_) => self.check_with_grip(tick, port),
+        }
+    }
+
+    /// Checks the new sample, and reads and checks that of the grip; stores a plausible one in the port.
+    #[inline(never)] // few devices have one
+    fn check_with_grip(&mut self, tick: &Tick, port: &mut Port) -> Result<(), Implausible> {
+        let Some(guard) = &self.envelope.grip else { return self.plausibility.check(tick, &port.state) };
         let grip = guard.check(self.device.read_grip(guard.axis().kind()));
         self.plausibility.check_both(tick, &port.state, grip.map(drop))?;
         port.grip.iter_mut().zip(grip).for_each(|(record, state)| record.state = state);
@@ -145,6 +156,7 @@ impl Station {
     }
 
     /// Limits the port's request to the wrench that may be sent. Real-time: bounded, no allocation.
+    #[inline(always)] // in the middle of a tick
     pub(super) fn limit(&mut self, tick: &Tick, gate: Gate, port: &mut Port) {
         let Port { state, requested, commanded, grip, events, .. } = port;
         *commanded = self.envelope.apply(requested, gate, state, tick, events);
@@ -155,9 +167,10 @@ impl Station {
 
     /// Sends the command; returns a run event if the device faults or has not taken commands for too long. Real-time: bounded by
     /// the device, no allocation.
+    #[inline(always)] // in the middle of a tick
     pub(super) fn write(&mut self, tick: &Tick, port: &mut Port) -> Option<RunEvent> {
-        if let Some(grip) = port.grip
-            && !self.device.write_grip(grip.commanded)
+        if let Some(grip) = &port.grip
+            && !self.write_grip(grip.commanded)
         {
             return Some(self.failed(Fault::Broken, port));
         }
@@ -173,6 +186,12 @@ impl Station {
             }
             Cycle::Fault(fault) => Some(self.failed(fault, port)),
         }
+    }
+
+    /// Sends the effort to the grip; false if the device has violated the contract.
+    #[inline(never)] // few devices have one
+    fn write_grip(&mut self, effort: f64) -> bool {
+        self.device.write_grip(effort)
     }
 
     /// Returns a report on the device. Real-time: bounded, no allocation.

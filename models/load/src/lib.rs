@@ -130,6 +130,7 @@ impl Load {
     }
 
     /// Returns the output of a weight or a resistance, of which this hand carries a part.
+    #[inline(always)] // the output stays in place
     fn hold(&self, input: &Input, part: f64) -> Output {
         if !input.pose.is_finite() {
             return Output::new(Wrench::ZERO, 0.0, StepStatus::InvalidInput);
@@ -161,6 +162,7 @@ impl Load {
 }
 
 /// Returns the position of a finite input, limited to the workspace, with the status of the step.
+#[inline]
 fn reached(input: &Input) -> (DVec3, StepStatus) {
     let position_m = input.pose.position();
     let reached_m = position_m.clamp(DVec3::splat(-REACH_M), DVec3::splat(REACH_M));
@@ -246,9 +248,11 @@ impl ForceModel for Load {
     }
 
     fn step(&mut self, input: &Input) -> Output {
-        let mut output = [Output::default()];
-        self.step_ports(std::slice::from_ref(input), &mut output);
-        let [output] = output;
+        if self.kind != Kind::Free {
+            return self.hold(input, 1.0);
+        }
+        let mut output = Output::default();
+        self.push_body(std::slice::from_ref(input), std::slice::from_mut(&mut output));
         output
     }
 

@@ -40,6 +40,7 @@ macro_rules! each {
 impl Engine {
     /// Steps the model, also at a grip in its scale, where an asynchronous model has no effort; the results are only valid for
     /// [`Stepped::Answered`]. Real-time: bounded by the model or its timeout, no allocation.
+    #[inline(always)] // in the middle of a tick
     pub fn step(&mut self, input: &Input, output: &mut Output, grip: &mut Option<GripRecord>) -> Stepped {
         match self {
             Self::Here(model) => {

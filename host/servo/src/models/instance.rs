@@ -1,6 +1,7 @@
 //! One instance of a model in the loop: the ticks of its steps, and its end after a panic.
 
-use crate::engine::Engine;
+use crate::engine::{Engine, Stepped};
+use flotor_contact::Shortcoming;
 use flotor_core::health::ModelHealth;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Memory, Tick};
@@ -17,6 +18,16 @@ pub(super) struct Instance {
     pub(super) is_disabled: bool,
 }
 
+/// Output to use after a step.
+pub(super) enum Usable {
+    /// Output of the step.
+    Output,
+    /// Output of an earlier tick.
+    Last,
+    /// None: the model is disabled.
+    Nothing,
+}
+
 impl Instance {
     pub(super) const fn new(model: Engine) -> Self {
         Self { model, stepped_at: None, float_changes: 0, is_disabled: false }
@@ -27,7 +38,13 @@ impl Instance {
     #[inline(always)]
     fn forget_before(&mut self, tick: u64, memory: Memory) -> bool {
         let was_inactive = self.stepped_at.is_some_and(|last| last + 1 != tick);
-        !(was_inactive && memory == Memory::PathDependent) || self.model.reset() == CallStatus::Ok
+        !(was_inactive && memory == Memory::PathDependent) || self.forget()
+    }
+
+    /// Resets the model; false if this fails. Real-time: bounded by the model, no allocation.
+    #[inline(never)] // seldom called
+    fn forget(&mut self) -> bool {
+        self.model.reset() == CallStatus::Ok
     }
 
     /// Prepares a step in this tick; returns false if the model is disabled. Real-time: bounded by the model, no allocation.
@@ -55,7 +72,46 @@ impl Instance {
         has_changed
     }
 
+    /// Counts the result of a step without an output of this tick, or with an imperfect one, and returns the usable output.
+    /// Real-time: bounded, no allocation.
+    #[inline(never)] // seldom called
+    pub(super) fn count(&mut self, stepped: Stepped, tick: u64, health: &mut ModelHealth) -> Usable {
+        match stepped {
+            Stepped::Answered => Usable::Output,
+            Stepped::Short(Shortcoming::Aged) => {
+                health.contacts.aged.count(tick);
+                Usable::Output
+            }
+            Stepped::Short(Shortcoming::Unsolved) => {
+                health.contacts.unsolved.count(tick);
+                Usable::Output
+            }
+            Stepped::Refused => {
+                health.refused_sets.count(tick);
+                Usable::Output
+            }
+            Stepped::Late => {
+                health.late_answers += 1;
+                Usable::Last
+            }
+            Stepped::Silent => {
+                health.late.count(tick);
+                Usable::Last
+            }
+            Stepped::Broken => {
+                self.fail(tick, health);
+                Usable::Nothing
+            }
+            Stepped::Gone => {
+                self.is_disabled = true;
+                health.lost_at.get_or_insert(tick);
+                Usable::Nothing
+            }
+        }
+    }
+
     /// Disables the model after a panic or a violation of the contract. Real-time: bounded, no allocation.
+    #[inline(never)] // once in a run
     pub(super) fn fail(&mut self, tick: u64, health: &mut ModelHealth) {
         self.is_disabled = true;
         health.panicked_at.get_or_insert(tick);

@@ -2,10 +2,9 @@
 
 use super::body::Body;
 use super::contribution::{Contribution, Sample, Share, usable};
-use super::instance::Instance;
+use super::instance::{Instance, Usable};
 use super::placement::Placement;
 use crate::engine::{Engine, Stepped};
-use flotor_contact::Shortcoming;
 use flotor_core::broad_phase::{Bounds, BroadPhase};
 use flotor_core::demand::TickDemand;
 use flotor_core::grip::GripRecord;
@@ -164,40 +163,33 @@ impl Object {
         if instance.has_changed_floats(input.tick, health) {
             events.insert(Events::FLOAT_ENVIRONMENT);
         }
-        match stepped {
-            Stepped::Answered => {}
-            Stepped::Short(Shortcoming::Aged) => health.contacts.aged.count(input.tick),
-            Stepped::Short(Shortcoming::Unsolved) => health.contacts.unsolved.count(input.tick),
-            Stepped::Refused => health.refused_sets.count(input.tick),
-            // The last output replaces one late output; a second late output in a row has no replacement.
-            Stepped::Late => {
-                events.insert(Events::MODEL_OVERRUN);
-                health.late_answers += 1;
-                return last.take();
-            }
-            Stepped::Silent => {
-                events.insert(Events::MODEL_OVERRUN);
-                health.late.count(input.tick);
-                return last.take();
-            }
-            Stepped::Broken => {
-                instance.fail(input.tick, health);
-                return None;
-            }
-            Stepped::Gone => {
-                instance.is_disabled = true;
-                health.lost_at.get_or_insert(input.tick);
-                return None;
+        if stepped != Stepped::Answered {
+            match instance.count(stepped, input.tick, health) {
+                Usable::Output => {}
+                // The last output replaces one late output; a second late output in a row has no replacement.
+                Usable::Last => {
+                    events.insert(Events::MODEL_OVERRUN);
+                    return last.take();
+                }
+                Usable::Nothing => return None,
             }
         }
         let effort = grip.map_or(0.0, |grip| grip.model);
-        let usable = usable(demand, output).map(|output| (output, effort)).filter(|_| effort.is_finite());
-        if usable.is_none() {
-            *last = None;
-            health.rejected.count(input.tick);
-        } else if instance.model.may_be_late() {
-            *last = usable;
+        let usable = if effort.is_finite() { usable(demand, output) } else { None };
+        let Some(output) = usable else {
+            return self.reject(input.tick, health);
+        };
+        if instance.model.may_be_late() {
+            *last = Some((output, effort));
         }
-        usable
+        Some((output, effort))
+    }
+
+    /// Counts an output that cannot be used; no later one is replaced by it.
+    #[inline(never)] // seldom called
+    fn reject(&mut self, tick: u64, health: &mut ModelHealth) -> Option<(Output, f64)> {
+        self.last = None;
+        health.rejected.count(tick);
+        None
     }
 }
