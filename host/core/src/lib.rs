@@ -9,7 +9,7 @@
 //! - [`asynchronous`]: timing of an asynchronous model, and the limits of its contacts.
 //! - [`plausibility`]: checks of device samples; [`oscillation`]: detection of an unstable loop.
 //! - [`grip`], [`grip_guard`]: the grip of a device, its check and limits; [`feel`]: stiffness and settling time that the hand
-//!   felt.
+//!   felt; [`weight`]: the weight of a model that fades.
 //! - [`coupling`]: virtual coupling of two devices; [`peer`]: messages between the two ends of a coupling.
 //! - [`health`]: problems of a model, counted and as text.
 //! - [`guidance`]: the parameters that guide a simulated hand.
@@ -49,6 +49,7 @@ pub mod region;
 pub mod rendered_boundary;
 pub mod sent;
 pub mod trace;
+pub mod weight;
 pub mod words;
 
 pub use change::{Change, ChangeOutcome, ChangeSubject};

@@ -122,10 +122,10 @@ impl Station {
     /// Checks the new sample, with that of a grip.
     #[inline(always)] // in the middle of a tick
     fn check(&mut self, tick: &Tick, port: &mut Port) -> Result<(), Implausible> {
-        match self.envelope.grip {
-            None => self.plausibility.check(tick, &port.state),
-            Some(_) => self.check_with_grip(tick, port),
+        if self.envelope.grip.is_some() {
+            return self.check_with_grip(tick, port);
         }
+        self.plausibility.check(tick, &port.state)
     }
 
     /// Checks the new sample, and reads and checks that of the grip; stores a plausible one in the port.
@@ -170,7 +170,7 @@ impl Station {
     #[inline(always)] // in the middle of a tick
     pub(super) fn write(&mut self, tick: &Tick, port: &mut Port) -> Option<RunEvent> {
         if let Some(grip) = &port.grip
-            && !self.write_grip(grip.commanded)
+            && !self.device.write_grip(grip.commanded)
         {
             return Some(self.failed(Fault::Broken, port));
         }
@@ -186,12 +186,6 @@ impl Station {
             }
             Cycle::Fault(fault) => Some(self.failed(fault, port)),
         }
-    }
-
-    /// Sends the effort to the grip; false if the device has violated the contract.
-    #[inline(never)] // few devices have one
-    fn write_grip(&mut self, effort: f64) -> bool {
-        self.device.write_grip(effort)
     }
 
     /// Returns a report on the device. Real-time: bounded, no allocation.

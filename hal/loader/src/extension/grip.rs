@@ -34,6 +34,7 @@ impl ActiveDevice {
     /// Sets the effort that the next [`Self::write`] commands; false if the plugin failed. Real-time: bounded by the
     /// device, no allocation.
     #[must_use]
+    #[inline(never)] // few devices have one
     pub fn write_grip(&mut self, effort: f64) -> bool {
         let grip = self.extensions().and_then(|extensions| extensions.grip);
         let Some(write) = grip.and_then(|table| table.write) else { return false };

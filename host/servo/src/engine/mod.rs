@@ -99,6 +99,7 @@ impl Engine {
     }
 
     /// Clears the history of the model. Real-time: bounded by the model or its timeout, no allocation.
+    #[inline(never)] // seldom called
     pub fn reset(&mut self) -> CallStatus {
         each!(self, model => model.reset())
     }

@@ -38,13 +38,7 @@ impl Instance {
     #[inline(always)]
     fn forget_before(&mut self, tick: u64, memory: Memory) -> bool {
         let was_inactive = self.stepped_at.is_some_and(|last| last + 1 != tick);
-        !(was_inactive && memory == Memory::PathDependent) || self.forget()
-    }
-
-    /// Resets the model; false if this fails. Real-time: bounded by the model, no allocation.
-    #[inline(never)] // seldom called
-    fn forget(&mut self) -> bool {
-        self.model.reset() == CallStatus::Ok
+        !(was_inactive && memory == Memory::PathDependent) || self.model.reset() == CallStatus::Ok
     }
 
     /// Prepares a step in this tick; returns false if the model is disabled. Real-time: bounded by the model, no allocation.
@@ -77,37 +71,29 @@ impl Instance {
     #[inline(never)] // seldom called
     pub(super) fn count(&mut self, stepped: Stepped, tick: u64, health: &mut ModelHealth) -> Usable {
         match stepped {
-            Stepped::Answered => Usable::Output,
-            Stepped::Short(Shortcoming::Aged) => {
-                health.contacts.aged.count(tick);
-                Usable::Output
-            }
-            Stepped::Short(Shortcoming::Unsolved) => {
-                health.contacts.unsolved.count(tick);
-                Usable::Output
-            }
-            Stepped::Refused => {
-                health.refused_sets.count(tick);
-                Usable::Output
-            }
+            Stepped::Answered => {}
+            Stepped::Short(Shortcoming::Aged) => health.contacts.aged.count(tick),
+            Stepped::Short(Shortcoming::Unsolved) => health.contacts.unsolved.count(tick),
+            Stepped::Refused => health.refused_sets.count(tick),
             Stepped::Late => {
                 health.late_answers += 1;
-                Usable::Last
+                return Usable::Last;
             }
             Stepped::Silent => {
                 health.late.count(tick);
-                Usable::Last
+                return Usable::Last;
             }
             Stepped::Broken => {
                 self.fail(tick, health);
-                Usable::Nothing
+                return Usable::Nothing;
             }
             Stepped::Gone => {
                 self.is_disabled = true;
                 health.lost_at.get_or_insert(tick);
-                Usable::Nothing
+                return Usable::Nothing;
             }
         }
+        Usable::Output
     }
 
     /// Disables the model after a panic or a violation of the contract. Real-time: bounded, no allocation.

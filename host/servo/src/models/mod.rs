@@ -9,7 +9,6 @@
 
 mod body;
 mod contribution;
-mod fade;
 mod instance;
 mod layer;
 mod model_layer;

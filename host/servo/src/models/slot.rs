@@ -6,11 +6,11 @@
 
 use super::body::Body;
 use super::contribution::Share;
-use super::fade::Fade;
 use super::model_layer::{LayerReport, ModelLayer};
 use super::objects::Objects;
 use flotor_core::broad_phase::Bounds;
 use flotor_core::health::ModelHealth;
+use flotor_core::weight::Fade;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{Demand, Tick};
 use flotor_loader::InstanceState;

@@ -1,13 +1,13 @@
 //! Force models of one device, and the priorities of all models that act on it.
 
 use super::contribution::{Contribution, Sample, Share};
-use super::fade::Fade;
 use super::model_layer::ModelLayer;
 use super::objects::Objects;
 use super::slot::Slot;
 use crate::{Heartbeat, Place};
 use flotor_core::broad_phase::BroadPhase;
 use flotor_core::trace::Events;
+use flotor_core::weight::Fade;
 use flotor_hal::abi::CallStatus;
 use flotor_hal::{DVec3, Demand, Tick};
 

@@ -1,8 +1,10 @@
 //! Weight that moves to its target at a constant rate.
+#![deny(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros)] // see clippy.toml
+#![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 
 /// Weight from 0 to 1, a function of time alone: the weight needs no updates, and does not depend on the number of queries.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Fade {
+pub struct Fade {
     from: f64,
     target: f64,
     /// Start of the movement, ns.
@@ -13,14 +15,15 @@ pub(super) struct Fade {
 
 impl Fade {
     /// Creates a constant weight `at`, which takes `fade_s` seconds for a change from 0 to 1.
-    pub(super) fn new(at: f64, fade_s: f64) -> Self {
+    #[must_use]
+    pub fn new(at: f64, fade_s: f64) -> Self {
         let at = at.clamp(0.0, 1.0);
         Self { from: at, target: at, since_ns: 0, rate_per_ns: 1.0e-9 / fade_s }
     }
 
     /// Sets the target, 0 to 1 (clamped), to which the weight moves from its present value. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn set_target(&mut self, target: f64, now_ns: u64) {
+    pub fn set_target(&mut self, target: f64, now_ns: u64) {
         let target = target.clamp(0.0, 1.0);
         if target != self.target {
             *self = Self { from: self.at(now_ns), target, since_ns: now_ns, ..*self };
@@ -29,7 +32,8 @@ impl Fade {
 
     /// Returns the weight at the run time `now_ns`. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn at(&self, now_ns: u64) -> f64 {
+    #[must_use]
+    pub fn at(&self, now_ns: u64) -> f64 {
         if self.from == self.target {
             return self.target; // it never moved
         }
@@ -41,7 +45,8 @@ impl Fade {
 
     /// Returns true if the weight is 0 and has no other target. Real-time: bounded, no allocation.
     #[inline]
-    pub(super) fn is_silent(&self, now_ns: u64) -> bool {
+    #[must_use]
+    pub fn is_silent(&self, now_ns: u64) -> bool {
         self.target == 0.0 && self.at(now_ns) == 0.0
     }
 }
