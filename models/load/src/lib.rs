@@ -1,4 +1,4 @@
-//! Load: a weight in the hand, or a resistance to pushing down. Stimulus of a force-discrimination experiment.
+//! Load: a weight in the hand, a resistance to pushing down, or a free ball to push. Stimulus of a force-discrimination experiment.
 //!
 //! CMU-RI-TR-07-21 (section 7) asks why people discriminate weights so much better than springs, and whether it matters
 //! if a force is experienced or applied. The two kinds here differ in that alone:

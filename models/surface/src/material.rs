@@ -57,7 +57,7 @@ impl Material {
     }
 }
 
-/// Parses a file of materials: a table for each group. Returns the own values of each of `names`. Not real-time.
+/// Parses a file of materials, one table for each group, and returns the values of the groups `names`. Not real-time.
 ///
 /// # Errors
 /// A [`TextProblem`]: malformed TOML, an unknown group or key, a value out of range.

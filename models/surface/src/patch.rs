@@ -65,7 +65,7 @@ fn vector(v: Stored) -> DVec3 {
 
 /// Each coordinate with the two after it.
 const TURNS: [[usize; 3]; 3] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]];
-/// Sum of two coordinates below which a place is the third corner: the shares of its inner points have no limit there.
+/// Largest sum of two coordinates at the third corner, where the shares of the inner points have no limit.
 const AT_CORNER: f64 = 1.0e-12;
 
 /// Returns the shares of two coordinates in their sum; zero at the corner where both vanish.

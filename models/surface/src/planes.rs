@@ -43,7 +43,7 @@ fn equal(planes: &[Plane], subset: &[usize], to_m: DVec3) -> Option<(DVec3, [f64
     Some((y_m, multipliers))
 }
 
-/// Returns the displacement nearest to `to_m` that satisfies all conditions, and which conditions hold it; zero if there is none.
+/// Returns the displacement nearest to `to_m` that satisfies all conditions, and the active conditions; zero if none satisfies them.
 /// Real-time: bounded, no allocation.
 pub(crate) fn project(planes: &[Plane], to_m: DVec3) -> (DVec3, [bool; MOST_CONTACTS]) {
     let count = planes.len();

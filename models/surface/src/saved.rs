@@ -56,7 +56,7 @@ impl Restorable for Touched {
 }
 
 impl Touch {
-    /// Gives the ball of a state the radius of this one; begins anew with a state of another surface, or of no numbers.
+    /// Restores a state with the radius of this ball; resets the contact if the state is of another surface or not finite.
     fn begin_unless_on(&mut self, surface: &Surface) {
         let radius_m = self.radius_m;
         let is_on = match &mut self.state {
