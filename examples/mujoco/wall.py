@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 from flotor_model import Contact
 
-#: Stiffness and damping of what is touched; the scene may set another stiffness, `value_1`.
-STIFFNESS_N_PER_M, DAMPING_NS_PER_M = 2000.0, 2.0
+#: Stiffness and damping of what is touched; the scene may set others, `value_1` and `value_2`.
+STIFFNESS_N_PER_M, DAMPING_NS_PER_M = 2000.0, 4.0
 #: Farthest surface that the loop has to know of, m.
 FAR_M = 0.02
 
@@ -38,7 +38,7 @@ def contacts(handle):
     x, y, z, w = handle.orientation_xyzw
     data.mocap_quat[0] = w, x, y, z
     mujoco.mj_forward(model, data)
-    stiffness = handle.values[0] or STIFFNESS_N_PER_M
+    stiffness, damping = handle.values[0] or STIFFNESS_N_PER_M, handle.values[1] or DAMPING_NS_PER_M
     found, ends = [], np.zeros(6)
     for geom in others:
         gap_m = mujoco.mj_geomDistance(model, data, geom, tip, FAR_M, ends)
@@ -47,5 +47,5 @@ def contacts(handle):
         if length > 0:  # else they just touch, and the normal is that of the last answer
             normals[geom] = tuple(apart / length * np.sign(gap_m))
         if gap_m < FAR_M and geom in normals:
-            found.append(Contact(normals[geom], gap_m, stiffness, DAMPING_NS_PER_M))
+            found.append(Contact(normals[geom], gap_m, stiffness, damping))
     return found

@@ -1,6 +1,7 @@
 //! The interpreter answers, and what may happen to it: an exception, an answer that is none, a process that is killed or hangs.
 
 #[path = "../../../tests/src/tools.rs"]
+#[allow(dead_code, unreachable_pub)] // the other tests use the rest
 mod tools;
 
 use flotor_hal::{DVec3, Input, Pose, orientation_from_rotation_vector};
