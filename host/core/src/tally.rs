@@ -121,7 +121,7 @@ impl Tally {
     }
 
     /// Adds the record of a tick at one device: tick after tick, and within a tick device after device. Not real-time.
-    pub fn observe(&mut self, record: &TickRecord) {
+    pub fn add(&mut self, record: &TickRecord) {
         if record.device == 0 {
             // The previous tick is complete.
             self.event_ticks = self.event_ticks();

@@ -1,5 +1,6 @@
 //! Observers of a run: [`Observer`] receives every tick, [`Tap`] reads the newest.
 
+use flotor_core::tally::Tally;
 use flotor_core::trace::{Events, RECORD_WORDS, TickRecord};
 use flotor_core::{Change, ModelOutputs};
 use flotor_hal::{Demand, Pose, Twist, Wrench};
@@ -21,6 +22,12 @@ pub trait Observer {
     /// before the run and repeatedly during the run. Not real-time.
     fn demand(&self) -> Demand {
         Demand::FORCE
+    }
+}
+
+impl Observer for Tally {
+    fn observe(&mut self, record: &TickRecord) {
+        self.add(record);
     }
 }
 
