@@ -3,7 +3,8 @@
 //! - [`rows`]: the contract's structs as NumPy records, so that arrays are passed without copies.
 //! - [`model`]: a force model, in batches or at single poses as `flotor eval` does.
 //! - [`scene`]: scenes from Python; [`run`]: whole runs in virtual time; [`ending`]: the end of a run, as of the command line.
-//! - [`open_run`]: runs that a program is part of, live or in lockstep; [`state`]: the newest state of a device.
+//! - [`open_run`]: runs that a program is part of, live or in lockstep; [`state`]: the newest state of a device;
+//!   [`joined`]: runs of other programs.
 //! - [`environments`]: many runs in lockstep, stepped by one call.
 //! - [`recording`]: recordings as columns.
 //! - [`sweep`]: tasks of a sweep, for any executor.
@@ -11,6 +12,7 @@
 mod ending;
 mod environments;
 mod error;
+mod joined;
 mod model;
 mod open_run;
 mod recording;
@@ -29,6 +31,8 @@ mod _flotor {
     use crate::environments::Environments;
     #[pymodule_export]
     use crate::error::FlotorError;
+    #[pymodule_export]
+    use crate::joined::JoinedRun;
     #[pymodule_export]
     use crate::model::{Model, Parameter};
     #[pymodule_export]

@@ -6,9 +6,11 @@ use crate::run::Told;
 use crate::scene::GivenScene;
 use crate::state::State;
 use flotor_command::{CommandError, end_words};
+use flotor_hal::Wrench;
 use flotor_live::{Directory, EndKind};
 use flotor_servo::guest::{Signals, be_guest};
 use flotor_servo::{Clock, EmergencySource, RunEnd, StopSwitch};
+use flotor_session::program::{Connected, connect};
 use flotor_session::registry::Registry;
 use flotor_session::run_description::describe;
 use flotor_session::telemetry::{ObservedRun, publish};
@@ -62,7 +64,23 @@ pub(crate) struct OpenRun {
     stop: StopSwitch,
     taps: Vec<Tap>,
     devices: Vec<String>,
+    /// Ports of this program as a source of force, one for each device; none without one.
+    ports: Vec<Connected>,
     engine: Mutex<Engine>,
+}
+
+/// Options of a run that is open, from a dictionary of Python.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct GivenOptions {
+    /// Clock of the loop: `real` or `virtual`.
+    clock: String,
+    /// File of the recording.
+    recording: Option<PathBuf>,
+    /// True if other programs may watch the run.
+    watched: bool,
+    /// True if the program is a source of force on each device.
+    program: bool,
 }
 
 /// State of a run that was saved; fits the run that saved it.
@@ -71,29 +89,26 @@ pub(crate) struct SavedState(SavedRun);
 
 #[pymethods]
 impl OpenRun {
-    /// Prepares a run and starts its loop: on the real clock, where it waits for the first tick, or in lockstep. `is_watched`: other programs may watch the run.
+    /// Prepares a run and starts its loop: on the real clock, where it waits for the first tick, or in lockstep.
     #[new]
-    fn new(
-        py: Python<'_>,
-        given: GivenScene,
-        clock: &str,
-        recording: Option<PathBuf>,
-        is_watched: bool,
-    ) -> PyResult<Self> {
-        let clock = match clock {
+    fn new(py: Python<'_>, given: GivenScene, options: GivenOptions) -> PyResult<Self> {
+        let GivenOptions { clock, recording, watched, program } = options;
+        let clock = match &*clock {
             "real" => Clock::Real,
             "virtual" => Clock::Virtual,
             other => return Err(refuse(format!("clock = \"{other}\": must be \"real\" or \"virtual\""))),
         };
         py.detach(|| {
-            let (scene, registry, seed) = given.read()?;
+            let (mut scene, registry, seed) = given.read()?;
+            let ports = if program { connect(&mut scene) } else { Vec::new() };
+            ports.iter().for_each(|connected| connected.port.enable());
             let devices = scene.devices.iter().map(|device| device.name.clone()).collect();
             let prepared = Prepared::new(scene, &registry, (clock, seed), recording.as_deref());
             let (prepared, mut session, measured) = prepared.map_err(refuse_run)?;
             let taps = (0..prepared.scene.devices.len()).filter_map(|device| u16::try_from(device).ok());
             let taps: Vec<Tap> = taps.map(|device| session.tap(device)).collect();
             let (stop, controls) = (StopSwitch::default(), session.controls());
-            let publication = is_watched.then(|| {
+            let publication = watched.then(|| {
                 let description = describe(&prepared.scene, &prepared.options, &prepared.plugins);
                 publish(&Directory::of_this_user(), &prepared.scene, &description, &session, &stop).ok()
             });
@@ -109,8 +124,17 @@ impl OpenRun {
                 }
                 Clock::Virtual => Engine::Steps(Box::new(Steps::start(session, observed)?)),
             };
-            Ok(Self { prepared, registry, controls, stop, taps, devices, engine: Mutex::new(engine) })
+            Ok(Self { prepared, registry, controls, stop, taps, devices, ports, engine: Mutex::new(engine) })
         })
+    }
+
+    /// Commands the wrench of this program on a device, by its number: force (N) and torque (N m) in the frame of its model `program`.
+    fn push(&self, device: usize, force_n: [f64; 3], torque_nm: [f64; 3], effort: f64) -> PyResult<()> {
+        let none =
+            "open the run with program=True to push a device, and name one of its devices by its number";
+        let connected = self.ports.get(device).ok_or_else(|| refuse(none))?;
+        let wrench = Wrench { force_n, torque_nm };
+        connected.port.command_with_grip(&wrench, effort).map_err(refuse)
     }
 
     /// Returns the newest state of a device, by its number or its name; waits for nothing.

@@ -20,14 +20,19 @@ def episode(env, seed):
     return b"".join(np.asarray(row).tobytes() for row in rows)
 
 
-def test_gymnasium_s_own_checker_passes_without_a_warning():
+IDS = ["flotor/Spring-v0", "flotor/Palpation-v0"]
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_gymnasium_s_own_checker_passes_without_a_warning(id):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(gymnasium.make("flotor/Spring-v0").unwrapped, skip_render_check=True)
+        check_env(gymnasium.make(id).unwrapped, skip_render_check=True)
 
 
-def test_equal_seeds_and_actions_give_equal_bits_in_one_environment_and_in_another():
-    env, other = (gymnasium.make("flotor/Spring-v0") for _ in range(2))
+@pytest.mark.parametrize("id", IDS)
+def test_equal_seeds_and_actions_give_equal_bits_in_one_environment_and_in_another(id):
+    env, other = (gymnasium.make(id) for _ in range(2))
     first = episode(env, 3)
     assert episode(env, 3) == first == episode(other, 3)
     assert episode(env, 4) != first
@@ -66,6 +71,22 @@ def test_holding_the_force_is_rewarded():
         return sum(env.step(np.float32([0, 0, action]))[1] for _ in range(60))
 
     assert max(total(-action) for action in (0.2, 0.4, 0.6)) > total(0.0), "a hand at home holds nothing"
+
+
+def test_the_lump_is_felt_where_it_is_hidden():
+    env = flotor.environments.PalpationEnv()
+    env.reset(seed=2)
+    lump = -env._task.origins_m[0, :2] / flotor.environments.REACH_M
+
+    def press(x, y):
+        """Force and reward of a press at a place, after the way there above the surface."""
+        for aim in ((0, 0, 0.3), (x, y, 0.3), (x, y, -0.5)):
+            for _ in range(20):
+                observation, reward, *_ = env.step(np.float32([*aim]))
+        return observation[8], reward
+
+    (there_n, there), (elsewhere_n, elsewhere) = press(*lump), press(*(lump - np.sign(lump) * 0.8))
+    assert there_n > 1.5 * elsewhere_n > 0 and there > elsewhere
 
 
 def test_what_is_wrong_is_said():

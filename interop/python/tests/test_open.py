@@ -281,3 +281,20 @@ def test_the_command_of_the_wheel_is_the_whole_program(tmp_path):
     assert __import__("json").loads(out.read_text())["peak_force_n"] > 0
     listed = subprocess.run([command, "plugins"], check=True, env=bare, capture_output=True, text=True).stdout
     assert all(id in listed for id in ("spring", "solid", "simulated", "maglev"))
+
+
+def test_a_program_pushes_through_the_limits_and_its_force_fades_when_it_hangs():
+    scene = {"device": {"plugin": "simulated", "parameters": {"hand": "hold"}}, "limits": {"force_n": 2}}
+    with flotor.open(scene, clock="virtual", program=True) as run:
+        run.step(300)
+        for _ in range(40):
+            run.push((0, 0, 5))
+            state = run.step(10)
+        assert 1.9 < state.commanded_force_n[2] <= 2 and "force_limited" in state.events
+        force_n = [run.step().commanded_force_n[2] for _ in range(300)]
+        assert abs(force_n[-1]) < 1e-9 and max(abs(np.diff(force_n))) < 0.3, "it fades"
+        with pytest.raises(flotor.FlotorError, match="NaN|finite"):
+            run.push((0, 0, float("nan")))
+    with flotor.open(scene, clock="virtual") as run:
+        with pytest.raises(flotor.FlotorError, match="program=True"):
+            run.push((0, 0, 1))

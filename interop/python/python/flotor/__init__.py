@@ -21,7 +21,7 @@ import numpy as np
 
 from . import _command, _flotor, _scene
 from ._flotor import EVENTS, FlotorError, Parameter, SavedState, State, __version__
-from ._run import Run, RunFailed, open, told  # noqa: A004
+from ._run import JoinedRun, Run, RunFailed, join, open, told  # noqa: A004
 from ._scene import folders as _folders
 from ._scene import text as _text
 
@@ -36,6 +36,7 @@ __all__ = [
     "STATUS",
     "Evaluation",
     "FlotorError",
+    "JoinedRun",
     "Model",
     "Parameter",
     "PluginInfo",
@@ -45,6 +46,7 @@ __all__ = [
     "SavedState",
     "State",
     "__version__",
+    "join",
     "open",
     "plugins",
     "read_recording",

@@ -6,7 +6,7 @@ import atexit
 import json
 import os
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from . import _flotor, _scene
@@ -30,6 +30,17 @@ def told(summary: str | None, problem: tuple[str, int] | None) -> dict[str, obje
     if problem is not None:
         raise RunFailed(problem[0], summary, problem[1])
     return summary
+
+
+def _changes(values: Mapping[str, object] | None, parameters: Mapping[str, object]) -> list[tuple[str, str, str]]:
+    """Returns plugin, id and value of each change."""
+    changes = []
+    for key, value in _scene.by_plugin_and_id({**(values or {}), **parameters}):
+        plugin, dot, id = key.rpartition(".")
+        if not dot:
+            raise FlotorError(f"`{key}` names no parameter; write \"PLUGIN.{key}\", with the name of the device or model")
+        changes.append((plugin, id, _scene.text(value)))
+    return changes
 
 
 class Run:
@@ -75,13 +86,23 @@ class Run:
 
         Raises :class:`FlotorError`; then nothing changes.
         """
-        changes = []
-        for key, value in _scene.by_plugin_and_id({**(values or {}), **parameters}):
-            plugin, dot, id = key.rpartition(".")
-            if not dot:
-                raise FlotorError(f"`{key}` names no parameter; write \"PLUGIN.{key}\", with the name of the device or model")
-            changes.append((plugin, id, _scene.text(value)))
-        self._run.set(changes, not at_once)
+        self._run.set(_changes(values, parameters), not at_once)
+
+    def push(
+        self,
+        force_n: Sequence[float],
+        torque_nm: Sequence[float] = (0.0, 0.0, 0.0),
+        *,
+        device: int | str = 0,
+        effort: float = 0.0,
+    ) -> None:
+        """Commands a force (3,), N, and torque (3,), N m, on the hand, and an effort at its grip (N or N m), from the next tick on.
+
+        It passes the limits of the scene as the force of a model does, and fades after 50 ms without another one: a program that hangs
+        does not push on. The run is to be opened with ``program=True``.
+        """
+        number = self.devices.index(device) if isinstance(device, str) else device
+        self._run.push(number, tuple(map(float, force_n)), tuple(map(float, torque_nm)), float(effort))
 
     def set_weight(self, model: str, weight: float) -> None:
         """Sets the weight of a model, 0 to 1, to which the loop fades; a model with weight 0 is not stepped."""
@@ -196,13 +217,15 @@ def open(  # noqa: A001  (as `io.open`)
     settings: Mapping[str, object] | None = None,
     record: str | os.PathLike[str] | None = None,
     watched: bool | None = None,
+    program: bool = False,
 ) -> Run:
     """Opens a run that this program is part of: ``with flotor.open("scene.toml") as run:``.
 
     ``scene`` and ``settings`` are those of :func:`flotor.run`. The run lasts until it is closed, or ``duration_s``. With ``clock``
     "real" the loop keeps its rate in threads of its own, whatever Python does; with "virtual" it advances by :meth:`Run.step`, as
     fast as possible and with the same bits each time. ``record`` records every tick. Other programs (the viewer, ``flotor watch``)
-    can watch the run if ``watched``, by default on the real clock.
+    can watch the run if ``watched``, by default on the real clock. With ``program`` this program is a source of force beside the
+    models of the scene: :meth:`Run.push`.
 
     Raises :class:`FlotorError` for a scene, plugin or argument that is refused, with the sentence and ``exit_code`` of ``flotor run``.
     """
@@ -213,8 +236,98 @@ def open(  # noqa: A001  (as `io.open`)
         seed=seed,
         settings=settings,
     )
-    recording = None if record is None else Path(record)
-    run = Run(_flotor.OpenRun(given, clock, recording, clock == "real" if watched is None else watched), clock)
+    options = {
+        "clock": clock,
+        "recording": None if record is None else Path(record),
+        "watched": clock == "real" if watched is None else watched,
+        "program": program,
+    }
+    run = Run(_flotor.OpenRun(given, options), clock)
     if not run.running:
         run.close()  # raises the reason
     return run
+
+
+class JoinedRun:
+    """Run that another program has started; :func:`flotor.join` finds it. Leaving the ``with`` block leaves the run as it is."""
+
+    def __init__(self, run: _flotor.JoinedRun) -> None:
+        self._run = run
+        #: Title of the scene.
+        self.title: str = run.title
+        #: Process of the host.
+        self.process: int = run.process
+        #: Names of the devices, in the scene's order.
+        self.devices: list[str] = run.devices
+        #: Names of the models, in the scene's order.
+        self.models: list[str] = run.models
+
+    @property
+    def state(self) -> State:
+        """Newest state of the first device that has arrived; waits for the first."""
+        return self._run.state(0)
+
+    def state_of(self, device: int | str) -> State:
+        """Returns the newest state of a device, by its number or its name in the scene."""
+        if isinstance(device, str):
+            if device not in self.devices:
+                raise FlotorError(f"no device {device}; the devices are {', '.join(self.devices)}")
+            device = self.devices.index(device)
+        return self._run.state(device)
+
+    @property
+    def running(self) -> bool:
+        """False once the run has ended, or was left."""
+        return self._run.end(0.0) is None
+
+    def set(self, values: Mapping[str, object] | None = None, /, **parameters: object) -> None:
+        """Changes live parameters, all before the same tick, as :meth:`Run.set` does."""
+        self._run.set(_changes(values, parameters))
+
+    def set_weight(self, model: str, weight: float) -> None:
+        """Sets the weight of a model, 0 to 1, to which the loop fades."""
+        self._run.set_weight(model, weight)
+
+    def swap(self, model: str, plugin: str | os.PathLike[str] | None = None, **parameters: object) -> None:
+        """Replaces a model while the loop runs, as :meth:`Run.swap` does."""
+        settings = [(id, _scene.text(value)) for id, value in parameters.items()]
+        self._run.swap(model, None if plugin is None else os.fspath(plugin), settings)
+
+    def stop(self) -> None:
+        """Requests an end in order: the force fades out."""
+        self._run.stop()
+
+    def emergency_stop(self) -> None:
+        """Presses the emergency stop of the machine: no force, until ``flotor release``."""
+        self._run.emergency_stop()
+
+    def wait(self, timeout_s: float | None = None) -> str | None:
+        """Waits until the run ends; returns the sentence of its end, None after the timeout. Raises RunFailed if it failed."""
+        end = self._run.end(1e9 if timeout_s is None else timeout_s)
+        if end is None:
+            return None
+        words, is_in_order = end
+        if not is_in_order:
+            raise RunFailed(words, None)
+        return words
+
+    def leave(self) -> None:
+        """Closes the connection; the run continues."""
+        self._run.leave()
+
+    def __enter__(self) -> JoinedRun:
+        return self
+
+    def __exit__(self, kind, error, traceback) -> None:
+        self.leave()
+
+    def __repr__(self) -> str:
+        return f"JoinedRun({self.title!r}, process {self.process}, {'running' if self.running else 'ended'})"
+
+
+def join(process: int | None = None, *, every: int = 1) -> JoinedRun:
+    """Joins the newest run of this user, or the one of a process: reads its states, and changes it as the viewer can.
+
+    ``every``: only the ticks whose number is a multiple of it arrive. Raises :class:`FlotorError` if there is no such run.
+    """
+    return JoinedRun(_flotor.JoinedRun(process, every))
