@@ -69,7 +69,7 @@ def inside(file, seconds):
 
 
 def outside(file, seconds):
-    """The run alone, its Python asleep; the load in another process, whose changes go nowhere."""
+    """The run alone, its Python idle; the load in another process, whose changes go nowhere."""
     import flotor
 
     with flotor.open(SCENE, record=file):

@@ -30,7 +30,7 @@ pub(crate) struct JoinedRun {
 #[derive(Default)]
 struct Received {
     now: Mutex<Now>,
-    news: Condvar,
+    arrived: Condvar,
 }
 
 /// Newest of what the run has sent.
@@ -178,7 +178,7 @@ impl JoinedRun {
                 if now.end.is_some() || left.is_zero() {
                     return (None, true);
                 }
-                let waited = self.received.news.wait_timeout(now, LOOK.min(left));
+                let waited = self.received.arrived.wait_timeout(now, LOOK.min(left));
                 drop(waited);
                 (None, false)
             });
@@ -231,7 +231,7 @@ fn receive(mut client: Client, received: &Received) {
         }
         let is_over = now.end.is_some();
         drop(now);
-        received.news.notify_all();
+        received.arrived.notify_all();
         if is_over {
             return;
         }

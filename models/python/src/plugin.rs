@@ -41,7 +41,7 @@ impl ForceModel for PythonModel {
     const INFO: ModelInfo = ModelInfo::new(
         "python",
         "Python",
-        "Contacts and fields that a function in Python computes, beside the loop",
+        "Contacts and fields that a function in Python computes, in an interpreter of its own",
     )
     .with_memory(Memory::PathDependent);
     const PARAMETERS: &'static [Parameter] = &[
