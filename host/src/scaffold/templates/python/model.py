@@ -32,4 +32,4 @@ def contacts(handle):
     depth_m = min(max(-height_m, 0.0), DEEPEST_M)
     force_n, stiffness_n_per_m = solve(depth_m)
     gap_m = height_m + depth_m - force_n / stiffness_n_per_m
-    return Answer((Contact((0, 0, 1), gap_m, stiffness_n_per_m, damping_ns_per_m=1),), valid_m=VALID_M)
+    return Answer((Contact((0, 0, 1), gap_m, stiffness_n_per_m, damping_ns_per_m=3),), valid_m=VALID_M)
