@@ -12,6 +12,7 @@ use flotor_core::region::Region;
 use flotor_hal::{Capabilities, DVec3, Twist, Wrench};
 
 /// Slew limit of a wrench, with the energy balances of force and torque.
+#[derive(Clone)]
 pub struct SlewLimit {
     force: Side,
     torque: Side,
@@ -93,6 +94,7 @@ impl SlewLimit {
 }
 
 /// Slew limit of force or torque.
+#[derive(Clone)]
 struct Side {
     /// Maximum slew rate (norm of the change), N/s or N·m/s.
     most_per_s: f64,
@@ -139,6 +141,7 @@ impl Side {
 }
 
 /// Energy balance of a limit, reset when no generated energy is outstanding.
+#[derive(Clone)]
 struct Ledger {
     /// Energy that the requested force would have taken from the hand, J.
     requested_j: f64,

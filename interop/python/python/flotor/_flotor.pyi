@@ -7,7 +7,11 @@ import numpy as np
 __version__: str
 EVENTS: tuple[str, ...]
 
-class FlotorError(Exception): ...
+class FlotorError(Exception):
+    """Error of Flotor; the text has place, cause and remedy."""
+
+    exit_code: int
+    """Exit code of the command line for this error."""
 
 class Parameter:
     """Parameter of a plugin's schema."""
@@ -34,6 +38,56 @@ class Model:
         self, poses: np.ndarray, successive: bool
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]: ...
 
+class State:
+    """State of a device in a tick: SI units, device frame. Arrays are copies."""
+
+    tick: int
+    time_ns: int
+    time_s: float
+    position_m: np.ndarray
+    """(3,), m."""
+    orientation_xyzw: np.ndarray
+    """Quaternion, (4,)."""
+    linear_m_per_s: np.ndarray
+    angular_rad_per_s: np.ndarray
+    commanded_force_n: np.ndarray
+    """Force that was sent to the device, after all limits, (3,), N."""
+    commanded_torque_nm: np.ndarray
+    delivered_force_n: np.ndarray
+    delivered_torque_nm: np.ndarray
+    model_force_n: np.ndarray
+    """Sum of the models' forces, before all limits, (3,), N."""
+    model_torque_nm: np.ndarray | None
+    port_energy_j: float
+    buttons: int
+    grip_opening: float | None
+    events: tuple[str, ...]
+    """Names among `EVENTS`."""
+    lateness_ns: int
+
+class SavedState:
+    """State of a run that was saved; fits the run that saved it."""
+
+class OpenRun:
+    def __init__(self, given: dict[str, object], clock: str, recording: Path | None, is_watched: bool) -> None: ...
+    devices: list[str]
+    models: list[str]
+    period_s: float
+    def state(self, device: int | str) -> State: ...
+    def set(self, values: list[tuple[str, str, str]], is_gradual: bool) -> None: ...
+    def set_weight(self, model: str, weight: float) -> None: ...
+    def swap(self, model: str, plugin: str | None, settings: list[tuple[str, str]]) -> None: ...
+    def stop(self) -> None: ...
+    def emergency_stop(self) -> None: ...
+    def is_running(self) -> bool: ...
+    def can_go_on(self) -> bool: ...
+    def step(self, ticks: int) -> bool: ...
+    def save(self) -> SavedState: ...
+    def restore(self, saved: SavedState) -> None: ...
+    def reset(self) -> None: ...
+    def wait(self, timeout_s: float) -> tuple[str | None, tuple[str, int] | None] | None: ...
+    def close(self) -> None: ...
+
 class Sweep:
     def __init__(self, plan: Path, out: Path, folders: list[Path]) -> None: ...
     keys: list[str]
@@ -41,18 +95,9 @@ class Sweep:
     def do_task(self, number: int) -> None: ...
     def write_table(self) -> str: ...
 
+def enter_program(program: Path | None) -> None: ...
 def input_dtype() -> np.dtype[np.void]: ...
 def output_dtype() -> np.dtype[np.void]: ...
 def plugins(folders: list[Path]) -> list[tuple[str, str, str, str]]: ...
-def run_scene(
-    scene: Path | None,
-    *,
-    text: str | None,
-    folders: list[Path],
-    duration_s: float | None,
-    rate_hz: float | None,
-    seed: int,
-    settings: list[str],
-    recording: Path | None,
-) -> str: ...
+def run_scene(given: dict[str, object], recording: Path | None) -> tuple[str | None, tuple[str, int] | None]: ...
 def read_recording(path: Path) -> tuple[dict[str, np.ndarray], bool]: ...
