@@ -9,6 +9,8 @@ import os
 import signal
 import struct
 import sys
+import threading
+import time
 import traceback
 import types
 from typing import NamedTuple
@@ -120,7 +122,15 @@ def load(path, argument):
     return loaded
 
 
+def end_with_host(host):
+    """Ends this process when the host has ended: a function that hangs reads no end of the questions."""
+    while os.getppid() == host:
+        time.sleep(0.2)
+    os._exit(1)
+
+
 def main():
+    threading.Thread(target=end_with_host, args=(os.getppid(),), daemon=True).start()
     # Ctrl-C in a terminal is for the host, which ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # The pipes are for questions and answers only: what the file prints goes to the standard error, and it reads nothing.

@@ -163,3 +163,20 @@ def contacts(handle):
         assert!(!PathBuf::from(format!("/proc/{process}")).exists(), "the process is left behind");
     }
 }
+
+/// The shell is the interpreter's host, and is gone as soon as it has started it.
+#[test]
+fn an_interpreter_that_hangs_ends_with_its_host() {
+    let Some(path) = file("endless", "while True: pass\n") else { return };
+    let runner = include_str!("../src/runner.py");
+    let mut shell = std::process::Command::new("sh");
+    shell.args(["-c", "\"$@\" >/dev/null 2>&1 & echo $!; sleep 1", "sh", "python3", "-c", runner]);
+    let output = shell.arg(&path).arg("").output().expect("a shell");
+    let number = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+    let process = PathBuf::from("/proc").join(number).join("stat");
+    let since = Instant::now();
+    while process.exists() {
+        assert!(since.elapsed() < Duration::from_secs(20), "the interpreter runs without a host");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
