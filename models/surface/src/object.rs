@@ -1,4 +1,4 @@
-//! From a file to a surface: unit, healing, and refusal of what cannot be felt safely.
+//! Conversion of a mesh file to a surface: unit, repair, and rejection of unsuitable meshes.
 
 use crate::check::{Crossings, crossings};
 use crate::files::{self, Problem};
@@ -13,7 +13,7 @@ use std::fmt;
 /// Unit of the coordinates of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
-    /// Guess from format and size.
+    /// Guessed from format and size.
     Auto,
     /// Metres.
     Metre,
@@ -23,36 +23,36 @@ pub enum Unit {
     Inch,
 }
 
-/// Choices for the reading of a file.
+/// Import options of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
     /// Unit of the coordinates.
     pub unit: Unit,
-    /// Factor on the size.
+    /// Scale factor of the size.
     pub scale: f64,
-    /// Angle between two faces above which their edge stays an edge, rad.
+    /// Angle between two faces above which their common edge is sharp, rad.
     pub edge_angle_rad: f64,
 }
 
-/// Surface of a file, with what was changed.
+/// Surface of a file, with the remarks of the import.
 #[derive(Clone, Debug, Default)]
 pub struct Object {
     /// Smooth surface.
     pub surface: Surface,
     /// Names of the groups.
     pub names: Vec<String>,
-    /// What was guessed or changed, one sentence each.
+    /// Guesses and repairs of the import, one sentence each.
     pub remarks: Vec<String>,
 }
 
-/// Reason why an object cannot be touched.
+/// Reason why a mesh is rejected.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Unfit {
     /// The file cannot be read.
     File(Problem),
-    /// The surface has only one side; place of the edge, m.
+    /// The surface is not orientable; position of the edge, m.
     OneSided(DVec3),
-    /// Nothing is left of the mesh.
+    /// No triangle of the mesh has an area.
     Empty,
     /// The object is too large for the workspace; its diagonal, m.
     TooLarge(f64),
@@ -60,7 +60,7 @@ pub enum Unfit {
 
 /// Largest diagonal of an object, m: one metre of workspace to each side.
 const LARGEST_M: f64 = 4.0;
-/// Size of a file's box above which its unit is millimetres: no object in metres that a hand touches is larger.
+/// Extent of a mesh above which its unit is guessed as millimetres: no object touched by hand is larger than this in metres.
 const METRES_UP_TO: f64 = 3.0;
 
 impl fmt::Display for Unfit {
@@ -88,7 +88,7 @@ impl From<Problem> for Unfit {
     }
 }
 
-/// Reads an object from the bytes of a file named `name`. Not real-time.
+/// Builds an object from the bytes of a file named `name`. Not real-time.
 ///
 /// # Errors
 /// [`Unfit`] with the place and the remedy.
@@ -150,7 +150,7 @@ fn describe(welded: &Welded, remarks: &mut Vec<String>) {
     }
 }
 
-/// Returns the length of a unit of the file, m, and a sentence about a guess.
+/// Returns the length of a unit of the file, m, and a remark if it is a guess.
 fn metres(points: &[[f64; 3]], of_format: Option<f64>, unit: Unit) -> (f64, Option<String>) {
     match unit {
         Unit::Metre => (1.0, None),

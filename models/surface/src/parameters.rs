@@ -66,7 +66,7 @@ pub(crate) const SCHEMA: &[Parameter] = &[
     ),
 ];
 
-/// Returns the choices for reading the file.
+/// Returns the import options of the mesh file.
 pub(crate) fn reading(settings: &Settings<'_>) -> Reading {
     Reading {
         unit: settings.one_of("unit", [Unit::Auto, Unit::Metre, Unit::Millimetre, Unit::Inch]),

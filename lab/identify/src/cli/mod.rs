@@ -1,4 +1,5 @@
-//! `flotor identify`: the law of a real thing. Command line of the program `flotor-identify`, which `flotor` starts.
+//! `flotor identify`: identification of the force law of a real object. Command line of the program `flotor-identify`, which
+//! `flotor` starts.
 
 mod output;
 
@@ -15,13 +16,13 @@ use flotor_hal::read_text;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Identify real things; `flotor identify` starts this program.
+/// Identify the force law of a real object; `flotor identify` starts this program.
 #[derive(Subcommand)]
 enum Command {
     Identify(IdentifyArguments),
 }
 
-/// Function that returns the command-line parser of all commands. Not real-time.
+/// Function that returns the command-line parser of the program. Not real-time.
 pub const PARSER: fn() -> clap::Command = options::parser_of::<Command>;
 
 /// Runs the command of this process.
@@ -149,7 +150,7 @@ fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
     output::write(&measurement, &identified, out.as_deref(), json)
 }
 
-/// Reads a table, or a recording if the file is named so.
+/// Reads a recording if the file has the extension `mcap`, otherwise a table.
 fn measurement(file: &Path, axis: Axis) -> Result<Measurement, CommandError> {
     if file.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("mcap")) {
         return recording::read(file, axis).map_err(|error| match error {

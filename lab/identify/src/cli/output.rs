@@ -49,7 +49,7 @@ pub(super) fn write(
     let report = Report {
         law: identified.name(),
         closest: identified.closest.id(),
-        // Numbers of a law that does not hold would be taken for properties of the thing.
+        // Omit the parameters of a rejected law: readers would take them for properties of the object.
         parameters: identified.law.map_or(&[], |_| &identified.parameters),
         delay_s: identified.delay_s.as_ref(),
         rms_n: identified.rms_n,
@@ -114,7 +114,7 @@ fn to_text(identified: &Identification) -> String {
     lines.join("\n")
 }
 
-/// Returns the number of decimals that show the width of an interval with two digits.
+/// Returns the number of decimals that shows the width of an interval to two digits.
 fn digits(estimate: &Estimate) -> usize {
     let width = estimate.high - estimate.low;
     let shows = |digits: &u8| width * powi(10.0, i32::from(*digits)) >= 10.0;

@@ -99,7 +99,7 @@ pub(crate) enum Outcome {
     Settled(Reading),
     /// Moving to an equilibrium, with the present reading.
     Moving(Reading),
-    /// No finite number; the shape is as before.
+    /// The result is not finite; the shape is unchanged.
     Failed,
 }
 
@@ -259,8 +259,7 @@ impl<const K: usize, const N: usize, const Q: usize> Equilibrium<K, N, Q> {
         let mut outcome = self.search(plate, demand);
         if matches!(outcome, Outcome::Moving(_)) && (may_miss || distance(&self.shape, &before) > LONGEST_WAY)
         {
-            // The branch ends between the last tick and this one, or coils meet, and the prediction went across: search
-            // from the last shape.
+            // The prediction crossed the end of the branch, or a coil contact: search from the last shape.
             self.shape = before;
             let work = std::mem::take(&mut self.work);
             // If there is no time for this search, the next tick searches.

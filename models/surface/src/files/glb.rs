@@ -1,4 +1,4 @@
-//! Binary glTF 2.0: the triangles of all meshes, placed by the nodes of the scene; metres.
+//! Binary glTF 2.0: triangles of all meshes, transformed by the nodes of the scene, in metres.
 
 use super::bytes::{Cursor, Order, Scalar};
 use super::{At, NOT_FINITE, Problem, is_usable, next_index};
@@ -6,19 +6,19 @@ use crate::soup::Soup;
 use flotor_hal::glam::{DMat4, DQuat, DVec3};
 use serde_json::Value;
 
-/// Deepest nesting of nodes.
+/// Maximum depth of nested nodes.
 const DEEPEST: usize = 64;
-/// Most placements of meshes: each may repeat all triangles of the file.
+/// Maximum number of triangles of all mesh instances: a small file can repeat one mesh many times.
 const MOST_PLACED: usize = 20_000_000;
 
-/// Type of a JSON chunk and of a binary one.
+/// Types of the JSON chunk and of the binary chunk.
 const JSON: u32 = 0x4e4f_534a;
 const BINARY: u32 = 0x004e_4942;
 
 struct Glb<'a> {
     json: Value,
     binary: &'a [u8],
-    /// Place of the binary chunk in the file.
+    /// Offset of the binary chunk in the file.
     start: usize,
 }
 
@@ -62,7 +62,7 @@ fn numbers<const N: usize>(value: &Value, key: &str) -> Option<[f64; N]> {
     list.try_into().ok()
 }
 
-/// Returns the placement of a node in its parent.
+/// Returns the transform of a node to its parent.
 fn placement(node: &Value) -> DMat4 {
     if let Some(columns) = numbers::<16>(node, "matrix") {
         return DMat4::from_cols_array(&columns);

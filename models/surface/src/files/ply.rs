@@ -1,4 +1,4 @@
-//! PLY (Turk 1994): text, and binary with either order of bytes; vertices with `x`, `y`, `z`, faces with a list of vertices.
+//! PLY (Turk 1994): text, and binary with either byte order; vertices with `x`, `y`, `z`, faces with a list of vertices.
 
 use super::bytes::{Cursor, Order, Scalar};
 use super::{At, NOT_FINITE, Problem, is_usable, next_index, text};
@@ -7,12 +7,12 @@ use crate::soup::Soup;
 /// Property of an element.
 struct Property {
     name: String,
-    /// Type of the number before a list; `None` for a single number.
+    /// Type of the count before a list; `None` for a single number.
     count: Option<Scalar>,
     scalar: Scalar,
 }
 
-/// Kind of data, with the number of its rows.
+/// Element of the file with its number of rows.
 struct Element {
     name: String,
     rows: usize,
@@ -27,7 +27,7 @@ enum Encoding {
 struct Header {
     encoding: Encoding,
     elements: Vec<Element>,
-    /// First byte and first line of the data.
+    /// First byte of the data; below, its first line.
     data: usize,
     line: usize,
 }
@@ -46,7 +46,7 @@ fn scalar(word: &str) -> Option<Scalar> {
     })
 }
 
-/// Longest line of a header, bytes.
+/// Maximum length of a header line, bytes.
 const LONGEST: usize = 1024;
 
 fn header(bytes: &[u8]) -> Result<Header, Problem> {

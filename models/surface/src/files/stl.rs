@@ -1,12 +1,12 @@
-//! STL: loose triangles, as text or in binary32. A binary file may begin with `solid` too; its length decides.
+//! STL: triangle soup, as text or in binary32. A binary file may begin with `solid` as well, so its length decides.
 
 use super::bytes::{Cursor, Order, Scalar};
 use super::{NOT_FINITE, Problem, is_usable, next_index, text};
 use crate::soup::Soup;
 
-/// Bytes before the first triangle: a title and a count.
+/// Length of the header, bytes: a title and the number of triangles.
 const HEAD: usize = 84;
-/// Bytes of a triangle: a normal, three corners, two bytes of attributes.
+/// Size of a triangle, bytes: a normal, three corners, two bytes of attributes.
 const FACET: usize = 50;
 
 fn count(bytes: &[u8]) -> Option<usize> {
