@@ -238,7 +238,10 @@ impl fmt::Display for ContactSetError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooMany { count } => {
-                write!(f, "{count} contacts: a set has at most {MAX_CONTACTS}; send the deepest ones")
+                write!(
+                    f,
+                    "the set has {count} contacts, above the limit of {MAX_CONTACTS}; send the deepest ones"
+                )
             }
             Self::Anchor => {
                 write!(f, "the anchor is not a pose: send finite numbers and a unit quaternion")
@@ -258,8 +261,8 @@ impl fmt::Display for Fault {
             Self::NotUnit => "does not have length 1: normalize it",
             Self::TooSmall => "is too small: a stiffness is above 0, damping and friction are not below 0",
             Self::Inconsistent => {
-                "is not the distance from the point of the surface to that of the tool along the normal: \
-                 give all three for the pose of the anchor"
+                "is not the distance between the points of surface and tool along the normal: \
+                 compute all three at the pose of the anchor"
             }
         })
     }

@@ -28,7 +28,7 @@ pub enum MeasurementError {
     #[error("the time falls at sample {0}; sort the samples by time, or remove the column `time_s`")]
     TimeFalls(usize),
     /// Equal displacements of all samples.
-    #[error("the displacement is constant; press the thing, and measure again")]
+    #[error("the displacement is constant; press the object, and measure again")]
     Constant,
     /// Zero force in all samples.
     #[error("the force is zero everywhere; press until the force rises, and measure again")]

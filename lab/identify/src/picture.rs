@@ -15,7 +15,7 @@ const MEANS: usize = 400;
 pub fn to_svg(measurement: &Measurement, identification: &Identification) -> String {
     let x_mm: Vec<f64> = measurement.displacement_m().iter().map(|x| x * MM_PER_M).collect();
     let pairs = |values: &[f64]| x_mm.iter().copied().zip(values.iter().copied()).collect::<Vec<_>>();
-    let fit = Panel::new(Axis::of("Force on the thing", Quantity::Force))
+    let fit = Panel::new(Axis::of("Force on the object", Quantity::Force))
         .series(Series::line("measured", pairs(measurement.force_n())))
         .series(Series::line(identification.closest.id(), pairs(&identification.prediction_n)));
     let residuals = identification.residuals_n(measurement);
@@ -26,7 +26,7 @@ pub fn to_svg(measurement: &Measurement, identification: &Identification) -> Str
         Axis::of("Displacement", Quantity::Length),
     )
     .subtitle(format!(
-        "{} samples; residual {:.4} N, of which {:.4} N are no noise",
+        "{} samples; residual {:.4} N, of which {:.4} N is not noise",
         x_mm.len(),
         identification.rms_n,
         identification.structure_n

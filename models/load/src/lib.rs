@@ -206,7 +206,7 @@ impl ForceModel for Load {
             0.0,
             5000.0,
             0.0,
-            "Stiffness of the thing between the fingers, on a device with a linear grip",
+            "Stiffness of the object between the fingers, on a device with a linear grip",
         )
         .live(),
         Parameter::real(
@@ -215,7 +215,7 @@ impl ForceModel for Load {
             0.0,
             200.0,
             15.0,
-            "Width of the thing between the fingers: a wider grip feels nothing",
+            "Width of the object between the fingers; a wider grip has no contact",
         )
         .live(),
         Parameter::real("mass_g", "g", 10.0, 1.0e4, BODY[0] * 1.0e3, "Mass of the ball (kind free)"),

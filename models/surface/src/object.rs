@@ -69,14 +69,14 @@ impl fmt::Display for Unfit {
             Self::File(problem) => problem.fmt(f),
             Self::OneSided(at) => write!(
                 f,
-                "the surface has only one side, as a Moebius strip: its faces meet with opposite sides at ({:.6} {:.6} {:.6}) m; \
-                 cut the surface there, or remove the band",
+                "the surface is not orientable, like a Moebius strip: faces of opposite orientation meet at ({:.6} {:.6} {:.6}) m; \
+                 cut the surface there, or remove the strip",
                 at.x, at.y, at.z
             ),
             Self::Empty => f.write_str("no face of the mesh has an area; export the mesh again"),
             Self::TooLarge(size_m) => write!(
                 f,
-                "the object is {size_m:.3} m long, but at most {LARGEST_M} m can be touched; set `unit` or `scale`"
+                "the object is {size_m:.3} m large (diagonal), above the limit of {LARGEST_M} m; set `unit` or `scale`"
             ),
         }
     }
@@ -119,16 +119,16 @@ pub fn build(mut soup: Soup, reading: &Reading) -> Result<Object, Unfit> {
             remarks.push(format!("{number} {what}"));
         }
     };
-    count(topology.turned, "faces turned to the side of the others");
-    count(topology.crowded_edges, "edges of three or more faces, joined by the body between two");
+    count(topology.turned, "faces reversed to the orientation of their neighbours");
+    count(topology.crowded_edges, "edges with three or more faces, assigned to the bodies between the faces");
     let open = topology.components.iter().filter(|component| !component.is_closed).count();
-    count(open, "open parts, touched from both sides");
+    count(open, "open parts, which can be touched from both sides");
     let normals = Normals::new(&mesh, &topology, reading.edge_angle_rad);
     let surface = Surface::new(&mesh, &topology, &normals);
     let Crossings { count, first_m } = crossings(&surface);
     if let Some(at) = first_m {
         remarks.push(format!(
-            "{count} pairs of faces run through each other, the first at ({:.6} {:.6} {:.6}) m: a ball may be held on the \
+            "{count} pairs of faces intersect, the first at ({:.6} {:.6} {:.6}) m: a ball may be held on the \
              wrong face there; repair the mesh",
             at.x, at.y, at.z
         ));
@@ -138,11 +138,11 @@ pub fn build(mut soup: Soup, reading: &Reading) -> Result<Object, Unfit> {
 
 fn describe(welded: &Welded, remarks: &mut Vec<String>) {
     for (number, what) in [
-        (welded.collapsed, "faces removed because two corners are one point"),
-        (welded.doubled, "faces removed because they were there twice"),
+        (welded.collapsed, "faces removed because two of their corners coincide"),
+        (welded.doubled, "duplicate faces removed"),
         (welded.flipped, "faces without area removed"),
-        (welded.closed, "points of borders joined over gaps of rounding"),
-        (welded.unresolved, "points merged because binary32 does not resolve their edge"),
+        (welded.closed, "points of borders merged over gaps of rounding errors"),
+        (welded.unresolved, "points merged because their edge is too short for binary32"),
     ] {
         if number > 0 {
             remarks.push(format!("{number} {what}"));
@@ -170,7 +170,7 @@ fn metres(points: &[[f64; 3]], of_format: Option<f64>, unit: Unit) -> (f64, Opti
             let size = (0..3).map(|axis| ends[1][axis] - ends[0][axis]).fold(0.0, f64::max);
             let (metres, word) = if size > METRES_UP_TO { (1.0e-3, "mm") } else { (1.0, "m") };
             let remark = format!(
-                "the file has no unit and is {size:.6} long: taken as {word}; set `unit` if this is wrong"
+                "the file has no unit and is {size:.6} large: the unit is assumed to be {word}; set `unit` if this is wrong"
             );
             (metres, Some(remark))
         }

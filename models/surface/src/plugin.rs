@@ -24,7 +24,7 @@ const DEFAULT: &str = "bumpy-sphere";
 
 const DETAILS: &[Detail] = &[
     Detail::number("depth_m", "m", "Distance between the centres of tool and proxy"),
-    Detail::number("contacts", "1", "Number of places at which the ball touches the surface"),
+    Detail::number("contacts", "1", "Number of contacts between ball and surface"),
     Detail::word("friction", choices!["free", "sticks", "slides"], "State of the friction"),
     Detail::number("contact_x_m", "m", "Point of the first contact, x"),
     Detail::number("contact_y_m", "m", "Point of the first contact, y"),

@@ -21,14 +21,18 @@ fn each_error_names_its_key_and_the_remedy() {
         (
             "/study",
             json!("My study"),
-            "study: `My study` is no name for files; write 1 to 30 lower-case letters",
+            "study: `My study` is not a valid study name; write 1 to 30 lower-case letters",
         ),
-        ("/factor/0/name", json!("Delay"), "factor.name: `Delay` is no name of a column"),
-        ("/factor/0/name", json!("trial"), "factor.trial: the name is taken by another column; rename"),
-        ("/factor/0/values", json!([]), "factor.delay.values: no level; write at least one"),
-        ("/factor/0/values", json!([1, 1]), "factor.delay.values: 1: write each level once"),
-        ("/factor/0/values", json!([1, "on"]), "factor.delay.values: numbers and words are mixed"),
-        ("/factor/0/setting", json!("delay"), "`delay` is no setting; write PART.KEY of the scene"),
+        ("/factor/0/name", json!("Delay"), "factor.name: `Delay` is not a valid column name"),
+        ("/factor/0/name", json!("trial"), "factor.trial: another column has this name; rename"),
+        ("/factor/0/values", json!([]), "factor.delay.values: the factor has no level; write at least one"),
+        (
+            "/factor/0/values",
+            json!([1, 1]),
+            "factor.delay.values: level 1 is listed twice or not finite; write each",
+        ),
+        ("/factor/0/values", json!([1, "on"]), "factor.delay.values: the levels mix numbers and words"),
+        ("/factor/0/setting", json!("delay"), "`delay` is not a setting; write PART.KEY of the scene"),
         (
             "/factor/0/setting",
             json!("spring.gamma_n"),
@@ -37,7 +41,7 @@ fn each_error_names_its_key_and_the_remedy() {
         (
             "/factor/0/setting",
             json!("picture"),
-            "factor.delay.values: `0` is no state of the picture; write shown",
+            "factor.delay.values: `0` is not a state of the picture; write shown",
         ),
         ("/stimulus/standard", json!(26), "factor.base: the factor changes nothing; give it a `setting`"),
         ("/stimulus/standard", json!("bse"), "factor.base: the factor changes nothing"),
@@ -50,7 +54,7 @@ fn each_error_names_its_key_and_the_remedy() {
         (
             "/method/levels",
             json!([-1.5, 0.1]),
-            "method.levels: a value of 0 or on the other side of 0; write shares",
+            "method.levels: the value of a level is 0 or has the opposite sign; write shares",
         ),
         ("/method/repetitions", json!(0), "method.repetitions: 0 repetitions: write 1 or more"),
         (
@@ -70,7 +74,7 @@ fn each_error_names_its_key_and_the_remedy() {
         ),
         ("/method", json!({ "kind": "staircase", "tracks": 0 }), "method.tracks: 0 tracks: write 1 or more"),
         ("/blocks/by", json!(["dely"]), "blocks.by: there is no factor `dely`"),
-        ("/blocks/by", json!(["delay", "delay"]), "blocks.by: `delay` is there twice; remove one"),
+        ("/blocks/by", json!(["delay", "delay"]), "blocks.by: `delay` is listed twice; remove one"),
         ("/blocks/sessions", json!(0), "blocks.sessions: 0: write 1 to 99"),
         ("/questionnaire/0/texts", json!(["a"]), "questionnaire: 1 texts for the 6 scales of nasa-tlx"),
         ("/questionnaire/0/form", json!(null), "questionnaire: no items; write `form"),

@@ -81,7 +81,7 @@ fn write_folder(
 }
 
 fn to_text(identified: &Identification) -> String {
-    let mut lines = vec![style::title("law             error of prediction by cross-validation")];
+    let mut lines = vec![style::title("law             prediction error by cross-validation")];
     for rung in &identified.ladder {
         let mark = if rung.law == identified.closest { "  <- selected" } else { "" };
         lines.push(format!(
@@ -108,7 +108,7 @@ fn to_text(identified: &Identification) -> String {
         ));
     }
     lines.push(format!(
-        "residual {:.4} N, of which {:.4} N are no noise",
+        "residual {:.4} N, of which {:.4} N is not noise",
         identified.rms_n, identified.structure_n
     ));
     lines.join("\n")

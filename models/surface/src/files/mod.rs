@@ -111,7 +111,7 @@ pub fn read(name: &str, bytes: Vec<u8>) -> Result<Soup, Problem> {
     }
     if soup.triangles.len() > MOST_TRIANGLES {
         return Err(Problem::file(format!(
-            "{} triangles are too many, a surface may have {MOST_TRIANGLES}; reduce the mesh",
+            "the file has {} triangles, above the limit of {MOST_TRIANGLES}; reduce the mesh",
             soup.triangles.len()
         )));
     }
@@ -123,7 +123,7 @@ fn is_usable(x: f64) -> bool {
     x.abs() <= LARGEST // false for NaN
 }
 
-const NOT_FINITE: &str = "a coordinate is not finite or beyond 1e9; export the mesh again";
+const NOT_FINITE: &str = "a coordinate is not finite, or its magnitude is above 1e9; export the mesh again";
 
 /// Decodes a text file (UTF-8).
 fn text(bytes: Vec<u8>) -> Result<String, Problem> {

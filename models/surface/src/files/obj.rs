@@ -49,7 +49,7 @@ pub(super) fn read(bytes: Vec<u8>) -> Result<Soup, Problem> {
                         let word: String = word.chars().take(20).flat_map(char::escape_debug).collect();
                         Problem::line(
                             number,
-                            format!("a face names the vertex `{word}`, but {} are given so far; export the mesh again", soup.points.len()),
+                            format!("a face has the vertex `{word}`, but the file has {} vertices up to this line; export the mesh again", soup.points.len()),
                         )
                     })?);
                 }
