@@ -102,7 +102,7 @@ pub struct Validity {
 }
 
 impl Validity {
-    /// Any motion, any time.
+    /// Unlimited motion and time.
     pub const UNLIMITED: Self =
         Self { displacement_m: f64::INFINITY, rotation_rad: f64::INFINITY, duration_s: f64::INFINITY };
 }

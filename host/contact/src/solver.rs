@@ -27,7 +27,7 @@ pub enum Outcome {
 pub struct Solution {
     /// Wrench on the hand at the handle, scene frame, within the limits.
     pub wrench: Wrench,
-    /// How the solve ended.
+    /// Outcome of the solve.
     pub outcome: Outcome,
     /// Number of Newton steps.
     pub steps: u32,

@@ -72,7 +72,7 @@ pub struct ModelHealth {
 }
 
 impl ModelHealth {
-    /// Returns true without a problem to report; late replies and what a [notice](Self::notice) says are no problem.
+    /// Returns true without a problem to report; late replies and what a [notice](Self::notice) says are not problems.
     #[must_use]
     pub fn is_good(&self) -> bool {
         *self == Self { late_answers: self.late_answers, contacts: self.contacts, ..Self::default() }

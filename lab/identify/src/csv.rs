@@ -102,7 +102,7 @@ mod tests {
             ),
             (
                 rows("time_s,displacement_mm,force_n", |i| format!("{},{i},{i}", if i == 5 { 0 } else { i })),
-                "f:7: the time falls",
+                "f:7: the time decreases",
             ),
             (rows("displacement_mm,force_n", |i| format!("1,{i}")), "f:31: the displacement is constant"),
             (rows("displacement_mm,force_n", |i| format!("{i},0")), "f:31: the force is zero everywhere"),

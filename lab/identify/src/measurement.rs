@@ -25,7 +25,7 @@ pub enum MeasurementError {
     #[error("sample {0} is not finite; remove it")]
     NotFinite(usize),
     /// Index of a sample whose time is before that of its predecessor.
-    #[error("the time falls at sample {0}; sort the samples by time, or remove the column `time_s`")]
+    #[error("the time decreases at sample {0}; sort the samples by time, or remove the column `time_s`")]
     TimeFalls(usize),
     /// Equal displacements of all samples.
     #[error("the displacement is constant; press the object, and measure again")]
@@ -41,7 +41,7 @@ impl MeasurementError {
     pub fn without_sample(&self) -> String {
         match self {
             Self::TimeFalls(_) => {
-                "the time falls; sort the rows by time, or remove the column `time_s`".to_owned()
+                "the time decreases; sort the rows by time, or remove the column `time_s`".to_owned()
             }
             Self::NotFinite(_) => "a number is not finite; remove the row".to_owned(),
             other => other.to_string(),
@@ -53,7 +53,7 @@ impl Measurement {
     /// Creates a measurement from its columns; without `time_s` only laws without rate are identified. Not real-time.
     ///
     /// # Errors
-    /// A [`MeasurementError`] for too few samples, columns of different lengths, numbers that are not finite, a falling time, a
+    /// A [`MeasurementError`] for too few samples, columns of different lengths, numbers that are not finite, a decreasing time, a
     /// constant displacement, or a force that is zero everywhere.
     pub fn new(
         time_s: Option<Vec<f64>>,
