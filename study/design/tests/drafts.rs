@@ -50,7 +50,11 @@ fn each_error_names_its_key_and_the_remedy() {
         ("/task/absent_share", json!(0.5), "task: `unsure` belongs to a choice"),
         ("/task", json!({ "ask": "magnitude" }), ""),
         ("/method/levels", json!([]), "method.levels: no levels; write at least one"),
-        ("/method/levels", json!([0.1, 0.1]), "method.levels: 0.1: write finite levels, each once"),
+        (
+            "/method/levels",
+            json!([0.1, 0.1]),
+            "method.levels: level 0.1 is listed twice or not finite; write finite",
+        ),
         (
             "/method/levels",
             json!([-1.5, 0.1]),

@@ -36,7 +36,7 @@ pub fn main() -> ExitCode {
 #[derive(Args)]
 #[command(
     after_help = "A table has a header with `displacement_m` or `displacement_mm` (positive into the object), `force_n` (on the \
-    object positive), and `time_s` for laws that depend on the velocity; other columns are not read. A recording gives the \
+    object positive), and `time_s` for laws that depend on the velocity; other columns are ignored. A recording gives the \
     motion and the delivered force along one axis, or the force of its force sensor.\n\n\
     Laws, d the depth beyond `contact_m`, v its velocity:\n  \
     linear         F = k d\n  \
@@ -46,8 +46,8 @@ pub fn main() -> ExitCode {
     zener          F = k d + q,  dq/dt = E v - q / tau\n  \
     hysteresis     F = k d + z,  dz = kappa dd within |z| <= friction\n  \
     table          smooth curve through 17 points\n\n\
-    The command chooses the simplest law whose error of prediction is within one standard error of the best one. If the \
-    residuals still have structure that noise does not have, the answer is `none of these`.\n\n\
+    The command chooses the simplest law whose prediction error is within one standard error of the best one. If its \
+    residuals are not noise alone, the result is `none of these`.\n\n\
     Examples:\n  \
     flotor identify pressed.csv\n  \
     flotor identify pressed.csv --out ball --json ball.json\n  \
