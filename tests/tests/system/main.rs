@@ -62,6 +62,7 @@ mod replay;
 mod rod;
 mod rooms;
 mod safety;
+mod saved_run;
 mod scaffold;
 mod scene;
 mod scene_test;

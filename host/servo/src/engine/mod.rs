@@ -93,6 +93,12 @@ impl Engine {
         each!(self, model => model.parameter(index))
     }
 
+    /// Returns the present values of all parameters of a model in the loop; none of any other. Not real-time.
+    pub fn parameters(&mut self) -> Vec<f64> {
+        let Self::Here(model) = self else { return Vec::new() };
+        (0..model.parameters().len()).map(|index| model.parameter(index)).collect()
+    }
+
     /// Returns the outputs that the model can compute.
     pub fn serves(&self) -> Demand {
         each!(self, model => model.serves())
