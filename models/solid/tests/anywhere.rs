@@ -130,3 +130,12 @@ fn a_refined_mesh_fills_the_same_volume_and_has_no_hanging_nodes() {
             .all(|(edge, n)| *n == 2 || *n == 1 && edge.iter().all(|node| fine.fixed[*node as usize]))
     );
 }
+
+#[test]
+fn a_binary_mesh_that_is_cut_anywhere_is_an_error() {
+    let bytes = std::fs::read(format!("{}/tests/data/dome.msh", env!("CARGO_MANIFEST_DIR"))).expect("a file");
+    for end in [20, 60, 500, 5_000, bytes.len() / 2, bytes.len() - 20] {
+        let read = gmsh::to_text(&bytes[..end]).and_then(|text| gmsh::read(&text));
+        assert!(read.is_err(), "cut at {end}");
+    }
+}
