@@ -88,4 +88,5 @@ mod two_hosts;
 mod validate;
 #[cfg(feature = "drop-ins")]
 mod vendor_sdks;
+mod worlds;
 mod z_width;

@@ -1,5 +1,4 @@
-//! Plugin registry: finds plugins and resolves their ids. Reads the metadata of plugin files; executes the code of a plugin only when
-//! the plugin is loaded.
+//! Plugin registry: finds plugins and resolves their ids. Reads the metadata of plugin files; runs only the plugins that are loaded.
 
 #![allow(unsafe_code)] // `load_file`; listed in tests/tests/system/architecture.rs
 
@@ -278,9 +277,9 @@ impl Registry {
         let candidates = self.found().iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
         let unknown_program = || installation_is_unknown().map(str::to_owned);
         let broken = || self.findings.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
-        // Outside the default build: only meshes need its readers.
-        let command = "build it in Flotor's sources: `cargo build --release -p flotor-surface`";
-        let by_name = || (id == "surface").then(|| command.to_owned());
+        // Outside the default build: nobody else needs the readers of meshes, and the solver of bodies.
+        let command = || format!("build it in Flotor's sources: `cargo build --release -p flotor-{id}`");
+        let by_name = || matches!(id, "surface" | "world").then(command);
         LookupError::Unknown {
             id: id.to_owned(),
             kind,
@@ -318,8 +317,7 @@ impl Registry {
     }
 }
 
-/// Returns the reason why plugins beside this program are not found, if the system does not report the program's path; `None`
-/// otherwise.
+/// Returns why plugins beside this program are not found: the system does not report the program's path; `None` if it does.
 #[must_use]
 pub fn installation_is_unknown() -> Option<&'static str> {
     own_folders().is_empty().then_some(UNKNOWN_PROGRAM)
