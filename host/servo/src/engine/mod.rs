@@ -191,7 +191,7 @@ impl Engine {
         }
     }
 
-    /// Returns what the hand at a port has felt of the stiffness of contacts, in the model frame. Real-time: bounded, no allocation.
+    /// Returns the reductions of contact stiffness at a port, in the model frame. Real-time: bounded, no allocation.
     pub fn felt_stiffness(&self, port: usize) -> FeltStiffness {
         match self {
             Self::Asynchronous(model) => model.felt_stiffness(port),
