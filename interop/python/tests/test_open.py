@@ -153,6 +153,8 @@ def test_a_run_ends_with_its_duration_and_goes_on_after_a_reset():
             run.step()
         run.reset()
         assert run.step(10).tick == 9
+        with pytest.raises(flotor.FlotorError, match="virtual time"):
+            run.wait()
     with flotor.open(PRESS, duration_s=0.3) as run:
         assert run.wait(0.01) is None
         assert run.wait()["end"] == "finished"
@@ -173,7 +175,7 @@ def test_a_model_that_answers_nan_fails_the_run_with_the_sentence_of_the_command
     with pytest.raises(flotor.RunFailed, match=r"libhabit\.so: `jelly` .* not finite") as failed:
         with flotor.open(model_that(tmp_path, habit), clock=clock, duration_s=0.2) as run:
             run.step(200) if clock == "virtual" else run.wait()
-    assert failed.value.exit_code == 3
+    assert failed.value.exit_code == 3 and run.summary == failed.value.summary == run.close()
     assert failed.value.summary["plugins"][1]["health"] != "ok"
     assert failed.value.summary["end"] in ("finished", "stopped")
 

@@ -152,6 +152,8 @@ class Run:
 
         Raises :class:`RunFailed` if it did not end in order. Ctrl-C ends the waiting, and with it the ``with`` block.
         """
+        if self._clock == "virtual":
+            raise FlotorError("a run in virtual time ends by `step` and `close`; open it with clock=\"real\" to wait for its end")
         if self.summary is None:
             ended = self._run.wait(1e9 if timeout_s is None else timeout_s)
             if ended is None:
@@ -171,7 +173,11 @@ class Run:
 
     def _told(self, ended: tuple[str | None, tuple[str, int] | None]) -> None:
         _open_runs.discard(self)
-        self.summary = told(*ended)
+        try:
+            self.summary = told(*ended)
+        except RunFailed as failed:
+            self.summary = failed.summary
+            raise
 
     def _finish(self) -> None:
         """Raises RunFailed for a run in virtual time that a fault has ended; one whose duration is over can be reset."""
