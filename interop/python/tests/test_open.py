@@ -53,6 +53,15 @@ def test_a_live_loop_keeps_its_rate_while_python_is_busy():
     assert run.close() is run.summary, "a second close changes nothing"
 
 
+def test_the_times_of_a_run_are_those_of_the_clock():
+    with flotor.open(PRESS) as run:
+        offsets_ns = [run.clock_offset_ns() for _ in range(5)]
+        now_ns = time.monotonic_ns() - min(offsets_ns) - run.state.time_ns
+        print(f"offsets of the clock within {(max(offsets_ns) - min(offsets_ns)) * 1e-3:.0f} us")
+        assert -1_000_000 < now_ns < 200_000_000, "the newest tick is of now, on a machine that may be busy"
+        assert sorted(offsets_ns)[2] - min(offsets_ns) < 1_000_000, "most of them agree within a tick"
+
+
 def test_parameters_weights_and_models_change_while_the_loop_runs():
     with flotor.open(PRESS, clock="virtual") as run:
         before = run.step(500).commanded_force_n[2]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import json
 import os
+import time
 import weakref
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -72,6 +73,23 @@ class Run:
     def state_of(self, device: int | str) -> State:
         """Returns the newest state of a device, by its number or its name in the scene."""
         return self._run.state(device)
+
+    def clock_offset_ns(self, ticks: int = 50) -> int:
+        """Returns ``time.monotonic_ns()`` at time 0 of the run, to compare the times of its states with those of cameras and robots.
+
+        Observes the arrival of some ticks; the smallest difference counts, which is late by the time that a tick takes to compute and
+        Python to look: tens of microseconds. For a run on the real clock, while it runs.
+        """
+        if self._clock == "virtual":
+            raise FlotorError("a run in virtual time has no time of a clock")
+        least, tick = None, self.state.tick
+        for _ in range(ticks):
+            while (state := self.state).tick == tick and self.running:
+                pass
+            now_ns = time.monotonic_ns()
+            tick, difference = state.tick, now_ns - state.time_ns - state.lateness_ns
+            least = difference if least is None else min(least, difference)
+        return least
 
     @property
     def running(self) -> bool:
