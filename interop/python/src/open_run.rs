@@ -2,7 +2,7 @@
 
 use crate::ending::{Ended, Prepared};
 use crate::error::{refuse, refuse_run};
-use crate::run::Told;
+use crate::run::EndReport;
 use crate::scene::GivenScene;
 use crate::state::State;
 use flotor_command::{CommandError, end_words};
@@ -271,7 +271,7 @@ impl OpenRun {
     }
 
     /// Waits for the end of a run up to a time, s; returns summary and problem, `None` if the run has not ended.
-    fn wait(&self, py: Python<'_>, timeout_s: f64) -> PyResult<Option<Told>> {
+    fn wait(&self, py: Python<'_>, timeout_s: f64) -> PyResult<Option<EndReport>> {
         let since = Instant::now();
         loop {
             let told = py.detach(|| {
