@@ -101,6 +101,7 @@
 #![deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::indexing_slicing)]
 #![forbid(unsafe_code)]
 
+mod answer;
 mod cap;
 mod contact;
 mod coupling;
@@ -113,6 +114,7 @@ mod replacement;
 mod slot;
 mod solver;
 
+pub use answer::NewestAnswer;
 pub use contact::{Contact, ContactSet, ContactSetError, Fault, Validity};
 pub use coupling::{Coupling, Limits, NotPositive};
 pub use cross_fade::CrossFade;

@@ -215,6 +215,7 @@ messages! {
         device: u32 = 1 [uint32],
         mapping: Option<Mapping> = 2 [message, optional],
         place: Option<Vector3> = 3 [message, optional],
+        contacts: Option<ContactLimits> = 4 [message, optional],
     }
 
     FieldTiming: Copy {

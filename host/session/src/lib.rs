@@ -16,7 +16,6 @@
 
 pub mod calibration_file;
 mod calls;
-mod estimates;
 pub mod headless;
 mod long_call;
 mod measurements;
@@ -34,7 +33,6 @@ pub use calls::{
     Call, CallError, LIMIT_VARIABLE, Notice, STEP_LIMIT_VARIABLE, Unresponsive, is_abandoned, on_notice,
     stop_waits_with,
 };
-pub use estimates::estimates;
 pub use flotor_servo::THREAD_ADVICE;
 pub use long_call::{Exceeded, LongCall, step_limit};
 pub use measurements::{Measurements, RunRecording};

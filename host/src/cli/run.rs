@@ -221,6 +221,7 @@ fn report(
     let printed = print_result(arguments.json.file(), &summary, text);
     outcome.real_time.advice().into_iter().for_each(note);
     outcome.later_warnings().iter().for_each(note);
+    always_degraded(&summary).into_iter().for_each(note);
     latch.and_then(|latch| stop_note(outcome.end, latch)).into_iter().for_each(note);
     let verdict = verdict(&outcome, plugins, &summary);
     // Last, because plugin code may hang or end the process.
@@ -229,6 +230,16 @@ fn report(
     let freed = unresponsive.map_or(freed, Err).map_err(|hung| CommandError::PluginRefused(hung.to_string()));
     // Scripts need the outcome of the run first, a missing file second.
     first_error([verdict, freed, recorded, drawn, printed])
+}
+
+/// Returns advice if a model had no valid answer in any tick; `None` otherwise.
+fn always_degraded(summary: &RunSummary) -> Option<String> {
+    let degraded = summary.events.get("model_degraded").copied().unwrap_or(0);
+    (summary.ticks > 0 && degraded >= summary.ticks).then(|| {
+        "no tick had a valid answer of all models (`model_degraded`); move the handle or the model's origin into its domain, and give \
+         a model that computes asynchronously `[model.field]` with `rate_hz = 250` in the scene"
+            .to_owned()
+    })
 }
 
 /// Describes the effect of this run's emergency stop on other runs, or the source of the emergency stop of another run; `None`

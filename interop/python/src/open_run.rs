@@ -2,7 +2,7 @@
 
 use crate::ending::{Ended, Prepared};
 use crate::error::{refuse, refuse_run};
-use crate::run::Told;
+use crate::run::EndReport;
 use crate::scene::GivenScene;
 use crate::state::State;
 use flotor_command::{CommandError, end_words};
@@ -21,7 +21,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Ticks between two looks for signals of Python, such as Ctrl-C.
+/// Poll interval for Python's signals, such as Ctrl-C, in ticks.
 const TICKS_BETWEEN_SIGNALS: u64 = 2_000;
 /// Longest sleep while the program waits for the end of a run.
 const LOOK: Duration = Duration::from_millis(10);
@@ -271,7 +271,7 @@ impl OpenRun {
     }
 
     /// Waits for the end of a run up to a time, s; returns summary and problem, `None` if the run has not ended.
-    fn wait(&self, py: Python<'_>, timeout_s: f64) -> PyResult<Option<Told>> {
+    fn wait(&self, py: Python<'_>, timeout_s: f64) -> PyResult<Option<EndReport>> {
         let since = Instant::now();
         loop {
             let told = py.detach(|| {
@@ -321,7 +321,7 @@ impl OpenRun {
 }
 
 impl Drop for OpenRun {
-    /// Requests the end of a run that nobody closed; its thread ends it in order.
+    /// Requests the end of a run that was not closed; its thread ends the run in order.
     fn drop(&mut self) {
         self.stop.stop();
     }

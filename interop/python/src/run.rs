@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use std::path::PathBuf;
 
 /// Summary of a run as JSON text, and sentence and exit code if it did not end in order.
-pub(crate) type Told = (Option<String>, Option<(String, u8)>);
+pub(crate) type EndReport = (Option<String>, Option<(String, u8)>);
 
 /// Returns id, kind, version and file of every plugin found; opens none.
 #[pyfunction]
@@ -23,7 +23,11 @@ pub(crate) fn plugins(folders: Vec<PathBuf>) -> Vec<(String, &'static str, Strin
 
 /// Runs a scene in virtual time to its end, without the GIL.
 #[pyfunction]
-pub(crate) fn run_scene(py: Python<'_>, given: GivenScene, recording: Option<PathBuf>) -> PyResult<Told> {
+pub(crate) fn run_scene(
+    py: Python<'_>,
+    given: GivenScene,
+    recording: Option<PathBuf>,
+) -> PyResult<EndReport> {
     py.detach(|| {
         let (scene, registry, seed) = given.read()?;
         let prepared = Prepared::new(scene, &registry, (Clock::Virtual, seed), recording.as_deref());

@@ -63,7 +63,7 @@ def test_an_episode_that_is_over_starts_again():
     assert np.array_equal(observations[:, :9], start[:, :9]) and (rewards == 0).all() and not truncated.any()
 
 
-def test_holding_the_force_is_rewarded():
+def test_a_force_near_the_goal_is_rewarded():
     env = flotor.environments.SpringEnv()
 
     def total(action):

@@ -89,4 +89,5 @@ mod two_hosts;
 mod validate;
 #[cfg(feature = "drop-ins")]
 mod vendor_sdks;
+mod worlds;
 mod z_width;

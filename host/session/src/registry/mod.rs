@@ -278,9 +278,10 @@ impl Registry {
         let candidates = self.found().iter().filter(|known| kind.is_none_or(|kind| known.kind == kind));
         let unknown_program = || installation_is_unknown().map(str::to_owned);
         let broken = || self.findings.broken.iter().map(ToString::to_string).find(|text| text.contains(id));
-        // Outside the default build: only meshes need the readers of one, and only models in Python the other.
-        let package = [("surface", "flotor-surface"), ("python", "flotor-python-model")].into_iter();
-        let package = package.filter(|(plugin, _)| *plugin == id).map(|(_, package)| package).next();
+        // Outside the default build, for what they alone need: readers of meshes, the solver of bodies, Python.
+        let optional =
+            [("surface", "flotor-surface"), ("world", "flotor-world"), ("python", "flotor-python-model")];
+        let package = optional.into_iter().find(|(plugin, _)| *plugin == id).map(|(_, package)| package);
         let by_name =
             || package.map(|name| format!("build it in Flotor's sources: `cargo build --release -p {name}`"));
         LookupError::Unknown {
