@@ -7,6 +7,7 @@
 use crate::cells::{Geometry, Kind};
 use crate::dense::{self, NotPositive};
 use crate::grid::Lame;
+use crate::mesh::halves;
 use crate::refinement::{Refinement, distance_m2, narrow};
 use std::borrow::Cow;
 
@@ -107,19 +108,9 @@ fn join(parts: [&Border; 2], around: &[u32], is_kept: &[bool]) -> Result<Border,
     Ok(Border { nodes: border, matrix: schur })
 }
 
-/// Splits elements across the longest side of their box.
-fn halves<T>(mut elements: Vec<T>, at: impl Fn(&T) -> [f64; 3]) -> [Vec<T>; 2] {
-    let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
-    for element in &elements {
-        for (end, c) in ends.iter_mut().zip(at(element)) {
-            *end = [end[0].min(c), end[1].max(c)];
-        }
-    }
-    let side = |k: usize| ends[k][1] - ends[k][0];
-    let axis = (1..3).fold(0, |best, k| if side(k) > side(best) { k } else { best });
-    elements.sort_by(|a, b| at(a)[axis].total_cmp(&at(b)[axis]));
-    let upper = elements.split_off(elements.len() / 2);
-    [elements, upper]
+/// Returns the middle of an element, m.
+fn middle(refinement: &Refinement, nodes: &[u32; 10]) -> [f64; 3] {
+    [0, 1, 2].map(|k| nodes[..4].iter().map(|n| 0.25 * refinement.nodes_m[*n as usize][k]).sum())
 }
 
 /// Refined mesh on its way to a condensed stiffness.
@@ -155,10 +146,6 @@ impl Condensation {
         Ok(body)
     }
 
-    fn middle(&self, nodes: &[u32; 10]) -> [f64; 3] {
-        [0, 1, 2].map(|k| nodes[..4].iter().map(|n| self.base.nodes_m[*n as usize][k]).sum::<f64>())
-    }
-
     fn build(
         &mut self,
         elements: Vec<usize>,
@@ -172,7 +159,7 @@ impl Condensation {
             let lame = self.materials[self.regions[one]];
             (Below::Element(narrow(one)), element(&self.base, &nodes[one], lame))
         } else {
-            let [a, b] = halves(elements, |&e| self.middle(&nodes[e]));
+            let [a, b] = halves(elements, |&e| (middle(&self.base, &nodes[e]), e));
             let (a, b) = (self.build(a, nodes, around, is_kept)?, self.build(b, nodes, around, is_kept)?);
             (Below::Parts([a.0, b.0]), join([&a.1, &b.1], around, is_kept)?)
         };
@@ -196,10 +183,10 @@ impl Condensation {
         let at = |node: &u32| refined.nodes_m[*node as usize];
         let samples: Vec<[f64; 3]> = kept.iter().step_by(1 + kept.len() / SAMPLES).map(at).collect();
         for (leaf, nodes) in refined.leaves() {
-            let is_new = leaf.corners != self.base_corners(leaf.parent);
+            let is_new = leaf.corners != self.base.tetrahedra[leaf.parent as usize].corners;
             if is_new || nodes.iter().any(|n| kept.binary_search(n).is_ok()) {
-                let middle = [0, 1, 2].map(|k| 0.25 * nodes[..4].iter().map(|n| at(n)[k]).sum::<f64>());
-                let far = samples.iter().map(|s| distance_m2(*s, middle)).fold(f64::INFINITY, f64::min);
+                let middle_m = middle(refined, &nodes);
+                let far = samples.iter().map(|s| distance_m2(*s, middle_m)).fold(f64::INFINITY, f64::min);
                 pieces.push((nodes, leaf.parent, far));
                 let mut part = self.leaves[leaf.parent as usize];
                 while changed.get(part) == Some(&false) {
@@ -216,10 +203,6 @@ impl Condensation {
         let whole = place.inwards(pieces, outside)?;
         debug_assert!(whole.nodes.iter().map(|n| n.0).eq(kept.iter().copied()));
         Ok(whole.matrix)
-    }
-
-    fn base_corners(&self, element: u32) -> [u32; 4] {
-        self.base.tetrahedra[element as usize].corners
     }
 }
 
@@ -248,7 +231,7 @@ impl Place<'_> {
         Ok(match *below {
             Below::Element(_) if self.changed[part] => None,
             Below::Element(given) => {
-                let nodes = self.refined.nodes(self.body.base_corners(given));
+                let nodes = self.refined.nodes(self.body.base.tetrahedra[given as usize].corners);
                 Some(Cow::Owned(self.element(&nodes, given)))
             }
             Below::Parts([a, b]) => match (self.outside(a)?, self.outside(b)?) {
@@ -272,10 +255,7 @@ impl Place<'_> {
         if let [(nodes, given, _)] = &elements[..] {
             return self.join([&self.element(nodes, *given), &Border::default()]);
         }
-        let at = |piece: &Piece| {
-            [0, 1, 2].map(|k| piece.0[..4].iter().map(|n| self.refined.nodes_m[*n as usize][k]).sum::<f64>())
-        };
-        let [a, b] = halves(elements, at);
+        let [a, b] = halves(elements, |piece| (middle(self.refined, &piece.0), 0));
         self.join([&self.pieces(a)?, &self.pieces(b)?])
     }
 }

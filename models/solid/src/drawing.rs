@@ -115,6 +115,26 @@ impl Drawing {
         self.under(&[contact], focus, atlas.radius_m)
     }
 
+    /// Draws a mesh with its surface moved out of a sphere centred at `centre_m` (finite); the surface around is drawn undeformed.
+    pub fn ball(&mut self, radius_m: f64, centre_m: DVec3) -> &Shape {
+        let Shape { primitives, surface } = &mut self.shape;
+        if let Look::Sphere(Some(skin)) = &self.look {
+            surface.vertices.clear();
+            surface.vertices.extend(skin.places_m.iter().map(|place_m| {
+                let away_m = *place_m - centre_m;
+                let moved_m = centre_m + away_m.normalize_or_zero() * away_m.length().max(radius_m);
+                let value = moved_m.distance(*place_m) * 1.0e3;
+                SurfaceVertex { position_m: moved_m.to_array(), normal: [0.0; 3], value }
+            }));
+            surface.triangles.clone_from(&skin.triangles);
+            surface.field = DISPLACEMENT;
+            surface.set_normals();
+        }
+        primitives.clear();
+        primitives.push(Primitive::sphere(Part::Tool, Pose::new(centre_m, DQuat::IDENTITY), radius_m));
+        &self.shape
+    }
+
     /// Draws the solid under several spheres; the displacement of the surface is the sum of the displacements under each contact
     /// alone.
     pub fn spheres(&mut self, spheres: &Spheres, answer: &several::Answer, modulus_pa: f64) -> &Shape {

@@ -1,19 +1,24 @@
 //! Preparation of a law from a description: solving and caching.
 
+use crate::anywhere::Anywhere;
 use crate::atlas::Atlas;
 use crate::body;
 use crate::cache;
+use crate::condensation::Condensation;
 use crate::dense::NotPositive;
 use crate::description::{Body, Description, Tool};
 use crate::grid::Lame;
 use crate::half_space::HalfSpace;
+use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::prepare::{Prepared, beyond_half_space, sphere_on_block, sphere_on_half_space, sphere_on_mesh};
 use crate::punch::{Outline, extrapolated};
-use crate::remainder::{Face, Remainder};
+use crate::refinement::Refinement;
+use crate::remainder::{Face, Remainder, Resolution};
 use crate::rigid::{MODES, RigidPatch};
 use crate::several::{ExtraCompliance, Spheres};
 use crate::sphere::NotConverged;
+use crate::survey::survey;
 use crate::table::Table;
 use crate::tetrahedra;
 use flotor_hal::Refusal;
@@ -27,6 +32,8 @@ pub enum Law {
     Sphere(Box<Atlas>),
     /// Law of several spheres.
     Spheres(Box<Spheres>),
+    /// Law of one sphere anywhere on the surface of a mesh.
+    Anywhere(Box<Anywhere>),
 }
 
 /// Prepared law with the estimated error of its mesh, or the reason for the failure.
@@ -92,6 +99,40 @@ impl Description {
         };
         let spheres = Spheres::new(*atlas, self.poisson_ratio, count, spacing_m, beyond);
         Ok((Law::Spheres(Box::new(spheres)), mesh_error))
+    }
+
+    /// Loads the law of a sphere anywhere on a mesh from the cache, or surveys the body and caches it; also returns the mean
+    /// estimated error. `materials`: of each physical volume, for a Young's modulus of 1 Pa of this solid. Not real-time: minutes.
+    ///
+    /// # Errors
+    /// A [`Refusal`] if the tool is not one sphere, or an element not a tetrahedron, or a material not elastic.
+    pub fn prepare_anywhere(&self, mesh: &Mesh, materials: &[Material]) -> Result<(Law, f64), Refusal> {
+        let Tool::Sphere { radius_m } = self.tool else {
+            return Err(Refusal::unsupported(
+                "origin = \"body\" is for one sphere: set tool = \"sphere\" and omit `tool_count`, or set origin = \"home\"",
+            ));
+        };
+        let done = |law: Anywhere| {
+            let error = law.mean_error();
+            (Law::Anywhere(Box::new(law)), error)
+        };
+        let words = format!("anywhere {} {materials:?}", self.words());
+        if let Some(law) = cache::load(&words).and_then(|numbers| Anywhere::from_numbers(&numbers)) {
+            return Ok(done(law));
+        }
+        let base = Refinement::new(mesh).ok_or_else(|| {
+            Refusal::resource(
+                "the mesh has bricks, but origin = \"body\" needs tetrahedra of 10 nodes: mesh the body with tetrahedra, \
+                 or set origin = \"home\"",
+            )
+        })?;
+        let lames = materials.iter().map(|m| Lame::new(m.youngs_modulus_pa, m.poisson_ratio)).collect();
+        let regions = mesh.elements.iter().map(|element| element.region).collect();
+        let body = Condensation::new(base, lames, regions)?;
+        let hertz = 8.0 / 15.0 / (1.0 - self.poisson_ratio * self.poisson_ratio) * radius_m.sqrt();
+        let law = survey(mesh, &body, radius_m, hertz, effort(self.resolution))?;
+        cache::store(&words, &law.to_numbers());
+        Ok(done(law))
     }
 
     fn read(&self, numbers: &[f64]) -> Option<(Law, f64)> {
@@ -196,6 +237,15 @@ impl Description {
     }
 }
 
+/// Returns the number of places of a survey, and the size of elements over the distance from a place.
+fn effort(resolution: Resolution) -> (usize, f64) {
+    match resolution {
+        Resolution::QUICK => (72, 0.9),
+        Resolution::FINE => (480, 0.7),
+        _ => (192, 0.8),
+    }
+}
+
 /// Returns the refusal of `body = "file"` without a mesh.
 pub(crate) fn no_mesh() -> Refusal {
     Refusal::parameter("body = \"file\" needs a mesh: set `file` to the path of a Gmsh file (.msh)")
@@ -220,6 +270,7 @@ fn to_numbers(law: &Law, mesh_error: f64) -> Vec<f64> {
     match law {
         Law::Sphere(atlas) => Prepared { atlas: (**atlas).clone(), mesh_error }.to_numbers(),
         // Cached as the law of a single sphere.
+        Law::Anywhere(law) => law.to_numbers(),
         Law::Spheres(spheres) => Prepared { atlas: spheres.atlas.clone(), mesh_error }.to_numbers(),
         Law::Bonded(patch) => {
             let mut numbers = vec![mesh_error];
@@ -250,7 +301,6 @@ impl From<NotConverged> for Refusal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::remainder::Resolution;
 
     /// The remedies were those for a mesh file: a scaling factor of Gmsh, and the order of the nodes of an element.
     #[test]

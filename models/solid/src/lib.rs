@@ -7,9 +7,10 @@
 //!   factorisation with one order of sums.
 //! - [`half_space`]: field of forces on an elastic half-space, the singular part of every contact.
 //! - [`remainder`], [`table`]: difference between a block and a half-space, by finite elements.
-//! - [`gmsh`], [`cylinder`], [`mesh`], [`cells`], [`facet`]: bodies of any shape, their elements and surface; [`body`]:
+//! - [`gmsh`], [`material`], [`cylinder`], [`mesh`], [`cells`], [`facet`]: bodies of any shape, their elements and surface; [`body`]:
 //!   difference between such a body and a half-space; [`recovery`]: error estimate of a mesh.
-//! - [`refinement`], [`condensation`], [`touch`]: contact of a ball with any part of a body of tetrahedra, at one place.
+//! - [`refinement`], [`condensation`], [`touch`]: contact of a ball with any part of a body of tetrahedra; [`survey`], [`lattice`],
+//!   [`anywhere`]: its law, one function of the place of the centre.
 //! - [`sphere`]: contact solver of a sphere. [`punch`], [`plate`]: rigid patches bonded to a surface.
 //! - [`description`], [`prepare`], [`law`], [`cache`]: from a description to a law.
 //! - [`atlas`], [`several`], [`rigid`], [`friction`]: laws evaluated in a tick, with the numerics of [`jet`] and [`spline`].
@@ -20,6 +21,7 @@
 // Loop indices name components of vectors and tensors, in several arrays at once.
 #![allow(clippy::needless_range_loop)]
 
+pub mod anywhere;
 pub mod atlas;
 pub mod basis;
 pub mod body;
@@ -37,7 +39,9 @@ pub mod gmsh;
 pub mod grid;
 pub mod half_space;
 pub mod jet;
+pub mod lattice;
 pub mod law;
+pub mod material;
 pub mod mesh;
 mod parameters;
 pub mod plate;
@@ -52,6 +56,7 @@ pub mod several;
 pub mod skin;
 pub mod sphere;
 pub mod spline;
+pub mod survey;
 pub mod table;
 pub mod tetrahedra;
 pub mod touch;

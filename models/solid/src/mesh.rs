@@ -213,7 +213,7 @@ fn middle(nodes_m: &[[f64; 3]], of: &[usize]) -> [f64; 3] {
     [0, 1, 2].map(|k| of.iter().map(|&node| nodes_m[node][k]).sum::<f64>() / of.len() as f64)
 }
 
-fn sorted(corners: &[usize]) -> Vec<usize> {
+pub(crate) fn sorted(corners: &[usize]) -> Vec<usize> {
     let mut key = corners.to_vec();
     key.sort_unstable();
     key
@@ -409,6 +409,21 @@ fn check_held(elements: &[Element], fixed: &[bool]) -> Result<(), MeshError> {
         .map_or(Ok(()), |index| Err(MeshError::Loose { tag: elements[index].tag }))
 }
 
+/// Splits elements across the longest side of the box of their middles; `at`: middle and number of an element.
+pub(crate) fn halves<T>(mut elements: Vec<T>, at: impl Fn(&T) -> ([f64; 3], usize)) -> [Vec<T>; 2] {
+    let mut ends = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+    for element in &elements {
+        for (end, c) in ends.iter_mut().zip(at(element).0) {
+            *end = [end[0].min(c), end[1].max(c)];
+        }
+    }
+    let side = |k: usize| ends[k][1] - ends[k][0];
+    let axis = (1..3).fold(0, |best, k| if side(k) > side(best) { k } else { best });
+    elements.sort_by(|a, b| at(a).0[axis].total_cmp(&at(b).0[axis]).then(at(a).1.cmp(&at(b).1)));
+    let upper = elements.split_off(elements.len() / 2);
+    [elements, upper]
+}
+
 /// Stiffness of a mesh of one material, as an [`Assembly`].
 #[derive(Clone, Copy, Debug)]
 pub struct MeshStiffness<'a> {
@@ -438,18 +453,7 @@ impl Assembly for MeshStiffness<'_> {
     }
 
     /// Cuts across the longest side of the bounding box of the elements' middles.
-    fn halves(&self, mut elements: Vec<usize>) -> [Vec<usize>; 2] {
-        let at = |element: usize, axis: usize| {
-            middle(&self.mesh.nodes_m, &self.mesh.elements[element].nodes)[axis]
-        };
-        let side = |axis: usize| {
-            let all = || elements.iter().map(|&element| at(element, axis));
-            all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min)
-        };
-        let sides = [side(0), side(1), side(2)];
-        let longest = (0..3).fold(0, |best, axis| if sides[axis] > sides[best] { axis } else { best });
-        elements.sort_by(|&a, &b| at(a, longest).total_cmp(&at(b, longest)).then(a.cmp(&b)));
-        let upper = elements.split_off(elements.len() / 2);
-        [elements, upper]
+    fn halves(&self, elements: Vec<usize>) -> [Vec<usize>; 2] {
+        halves(elements, |&e| (middle(&self.mesh.nodes_m, &self.mesh.elements[e].nodes), e))
     }
 }

@@ -35,6 +35,11 @@ choice! {
     /// Unit of the coordinates of a mesh.
     Unit { Metre = "m", Millimetre = "mm" }
 }
+choice! {
+    /// What the pose is: the displacement from home, or the place of the sphere's centre in the frame of the mesh.
+    Origin { Home = "home", Body = "body" }
+}
+
 const BONDS: Choices = choices!["bonded", "frictionless"];
 
 /// Returns the bond of a punch.
@@ -121,8 +126,24 @@ pub(crate) const SCHEMA: &[Parameter] = &[
         "Mesh for `body = \"file\"`: Gmsh 4.1 (.msh), 10-node tetrahedra or 20-node hexahedra",
     ),
     Parameter::text("fixed_face", "Name of the fixed physical surface of the mesh (default: fixed)"),
-    Parameter::text("touched_face", "Name of the touched physical surface of the mesh (default: touched)"),
+    Parameter::text(
+        "touched_face",
+        "Name of the touched physical surface of the mesh (default: touched; with origin = \"body\" all that is not fixed)",
+    ),
     Parameter::choice("unit", Unit::WORDS, 0, "Unit of the coordinates of the mesh"),
+    Parameter::choice(
+        "origin",
+        Origin::WORDS,
+        0,
+        "home: the pose is the displacement from first touch at the middle of the touched face; body: the pose is the \
+         centre of the sphere in the frame of the mesh, and the sphere may touch all of the surface",
+    ),
+    Parameter::file(
+        "materials",
+        choices![],
+        "Materials of the physical volumes of the mesh, for origin = \"body\": a TOML file with a table for each volume \
+         (youngs_modulus_pa, poisson_ratio); the live youngs_modulus_pa scales all of them",
+    ),
 ];
 
 /// Returns the value of every parameter: from the settings, or the default. A beam has its own default sizes.

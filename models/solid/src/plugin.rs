@@ -4,14 +4,15 @@ use crate::description::{Description, Tool};
 use crate::drawing::Drawing;
 use crate::friction::Friction;
 use crate::law::{Law, no_mesh};
+use crate::material::{self, Material};
 use crate::mesh::Mesh;
-use crate::parameters::{BodyChoice, SCHEMA, Unit, YOUNGS_MODULUS, resolve};
+use crate::parameters::{BodyChoice, Origin, SCHEMA, Unit, YOUNGS_MODULUS, resolve};
 use crate::several::{self, MAX_SPHERES};
 use crate::{cache, gmsh};
 use flotor_hal::{
     DVec3, Demand, Detail, DetailsModel, ForceModel, Input, Memory, ModelInfo, Output, Parameter, Pose,
     Refusal, SetParameterError, Settings, Shape, ShapeModel, StepStatus, VariantInfo, VariantModel, Wrench,
-    read_file, restorable, text_from_bytes,
+    read_file, read_text, restorable, text_from_bytes,
 };
 use std::path::Path;
 
@@ -33,6 +34,8 @@ pub struct Solid {
     mesh_error: f64,
     /// Friction of each sphere.
     friction: [Friction; MAX_SPHERES],
+    /// True once the centre was outside a body that may be touched anywhere; before, nothing is felt.
+    was_outside: bool,
     depth_m: f64,
     contacts: f64,
     parameters: [f64; SCHEMA.len()],
@@ -43,23 +46,32 @@ pub struct Solid {
     nothing: Shape,
 }
 
-restorable!(Solid { friction, depth_m, contacts } without {
+restorable!(Solid { friction, was_outside, depth_m, contacts } without {
     law, mesh_error, parameters, description, mesh, drawing, nothing
 });
 
 /// Maximum size of a mesh file, bytes: beyond any body that can be solved for.
 const MOST_MESH_BYTES: u64 = 1 << 30;
 
-/// Reads the mesh of `body = "file"` with its hash; `None` for other bodies. Not real-time.
+/// Mesh of `body = "file"`, with the hash of all that was read, and the materials of its physical volumes.
+struct Read {
+    mesh: Mesh,
+    digest: u64,
+    materials: Vec<Material>,
+}
+
+/// Reads the mesh of `body = "file"`; `None` for other bodies. Not real-time.
 ///
 /// # Errors
 /// A [`Refusal`] that names the file, the place and the remedy.
-fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
+fn read_mesh(settings: &Settings<'_>, common: Material) -> Result<Option<Read>, Refusal> {
     let file = settings.text("file");
-    let faces = ["fixed_face", "touched_face"].map(|id| settings.text(id));
+    let texts = ["fixed_face", "touched_face", "materials"].map(|id| settings.text(id));
+    let origin = Origin::of(settings, "origin");
     if BodyChoice::of(settings, "body") != BodyChoice::File {
-        let stray = [file, faces[0], faces[1]].iter().any(Option::is_some);
-        let refusal = "`file`, `fixed_face` and `touched_face` are only for a mesh: set body = \"file\"";
+        let stray = file.is_some() || texts.iter().any(Option::is_some) || origin == Origin::Body;
+        let refusal = "`file`, `fixed_face`, `touched_face`, `materials` and origin = \"body\" are only for a mesh: \
+                       set body = \"file\"";
         return if stray { Err(Refusal::parameter(refusal)) } else { Ok(None) };
     }
     let path = file.ok_or_else(no_mesh)?;
@@ -67,12 +79,15 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     if let Some(id) = sizes.into_iter().find(|id| settings.number(id).is_some()) {
         return Err(Refusal::parameter(format!("`{id}`: a mesh has its own size; omit this parameter")));
     }
+    if origin == Origin::Home && texts[2].is_some() {
+        return Err(Refusal::unsupported("`materials` needs origin = \"body\": set it, or omit `materials`"));
+    }
     let bytes = read_file(Path::new(path), MOST_MESH_BYTES).map_err(|error| {
         Refusal::resource(format!(
             "{path}: cannot read the mesh: {error}; check the path and its permissions"
         ))
     })?;
-    let [fixed, touched] = [faces[0].unwrap_or("fixed"), faces[1].unwrap_or("touched")];
+    let fixed = texts[0].unwrap_or("fixed");
     let wrong = |problem: &dyn std::fmt::Display| Refusal::resource(format!("{path}: {problem}"));
     // Accept malformed text here: the reader reports it with its line.
     let text = text_from_bytes(bytes.clone()).or_else(|_| gmsh::to_text(&bytes)).map_err(|p| wrong(&p))?;
@@ -81,9 +96,21 @@ fn read_mesh(settings: &Settings<'_>) -> Result<Option<(Mesh, u64)>, Refusal> {
     if unit == Unit::Millimetre {
         parts.nodes_m.as_flattened_mut().iter_mut().for_each(|c| *c *= 1.0e-3);
     }
-    let mesh = Mesh::new(parts, fixed, touched).map_err(|problem| wrong(&problem))?;
-    let named = [&bytes[..], b"\0", fixed.as_bytes(), b"\0", touched.as_bytes()].concat();
-    Ok(Some((mesh, cache::digest(&named) ^ u64::from(unit == Unit::Millimetre))))
+    let mesh = match origin {
+        Origin::Home => Mesh::new(parts, fixed, texts[1].unwrap_or("touched")),
+        Origin::Body => Mesh::in_place(parts, fixed, texts[1]),
+    };
+    let mesh = mesh.map_err(|problem| wrong(&problem))?;
+    let materials = match texts[2] {
+        Some(file) => read_text(Path::new(file), "the materials")
+            .and_then(|text| material::parse(&text, &mesh.regions, common))
+            .map_err(|problem| Refusal::parameter(problem.in_file(file)))?,
+        None => vec![common; mesh.regions.len()],
+    };
+    let named =
+        [&bytes[..], b"\0", fixed.as_bytes(), b"\0", texts[1].unwrap_or_default().as_bytes()].concat();
+    let digest = cache::digest(&named) ^ u64::from(unit == Unit::Millimetre);
+    Ok(Some(Read { mesh, digest, materials }))
 }
 
 /// Returns the status of several spheres. `Clamped` (too deep) has priority over `NotConverged`, and this over `OutOfDomain`.
@@ -117,11 +144,22 @@ impl ForceModel for Solid {
 
     fn create(settings: &Settings<'_>) -> Result<Self, Refusal> {
         let parameters = resolve(settings);
-        let mesh = read_mesh(settings)?;
         let value = |id: &str| SCHEMA.iter().position(|p| p.id() == id).map_or(f64::NAN, |i| parameters[i]);
-        let description = Description::new(settings, value, mesh.as_ref().map_or(0, |(_, digest)| *digest))?;
-        let mesh = mesh.map(|(mesh, _)| mesh);
-        let (law, mesh_error) = description.prepare(mesh.as_ref())?;
+        let common =
+            Material { youngs_modulus_pa: parameters[YOUNGS_MODULUS], poisson_ratio: value("poisson_ratio") };
+        let read = read_mesh(settings, common)?;
+        let description = Description::new(settings, value, read.as_ref().map_or(0, |read| read.digest))?;
+        let (law, mesh_error) = match &read {
+            Some(Read { mesh, materials, .. }) if Origin::of(settings, "origin") == Origin::Body => {
+                let relative = |m: &Material| Material {
+                    youngs_modulus_pa: m.youngs_modulus_pa / common.youngs_modulus_pa,
+                    ..*m
+                };
+                description.prepare_anywhere(mesh, &materials.iter().map(relative).collect::<Vec<_>>())?
+            }
+            _ => description.prepare(read.as_ref().map(|read| &read.mesh))?,
+        };
+        let mesh = read.map(|read| read.mesh);
         let reach_m = match description.tool {
             Tool::Sphere { radius_m } | Tool::Spheres { radius_m, .. } => radius_m,
             _ => 0.0,
@@ -132,6 +170,7 @@ impl ForceModel for Solid {
             law,
             mesh_error,
             friction: [friction; MAX_SPHERES],
+            was_outside: false,
             depth_m: f64::NAN,
             contacts: f64::NAN,
             parameters,
@@ -172,6 +211,23 @@ impl ForceModel for Solid {
                 let rubbing = self.friction[0].follow(reached_m, normal_n, modulus);
                 (Wrench::from_force(normal_n + rubbing.0), answer.energy.value * modulus + rubbing.1)
             }
+            Law::Anywhere(law) => {
+                let answer = law.answer(reached_m.to_array());
+                self.depth_m = answer.depth_m;
+                self.contacts = f64::from(u8::from(answer.depth_m > 0.0));
+                self.mesh_error = answer.error;
+                self.was_outside |= answer.depth_m <= law.radius_m;
+                if !(self.was_outside && answer.is_in_domain(law.radius_m)) && status == StepStatus::Ok {
+                    status = StepStatus::OutOfDomain;
+                }
+                if self.was_outside {
+                    let normal_n = DVec3::from_array(answer.energy.slope) * -modulus;
+                    let rubbing = self.friction[0].follow(reached_m, normal_n, modulus);
+                    (Wrench::from_force(normal_n + rubbing.0), answer.energy.value * modulus + rubbing.1)
+                } else {
+                    (Wrench::ZERO, 0.0)
+                }
+            }
             Law::Spheres(spheres) => {
                 let answer = spheres.answer(reached_m, input.pose.orientation());
                 let depths_m = &answer.depths_m[..spheres.count()];
@@ -210,6 +266,7 @@ impl ForceModel for Solid {
 
     fn reset(&mut self) {
         self.friction.iter_mut().for_each(Friction::release);
+        self.was_outside = false;
         self.forget_details();
     }
 }
@@ -233,6 +290,7 @@ impl ShapeModel for Solid {
                 let answer = atlas.answer(centre_m.to_array());
                 drawing.sphere(atlas, centre_m, &answer, modulus)
             }
+            Law::Anywhere(law) => drawing.ball(law.radius_m, reached_m),
             Law::Spheres(spheres) => {
                 let answer = spheres.answer(reached_m, pose.orientation());
                 drawing.spheres(spheres, &answer, modulus)
@@ -242,9 +300,14 @@ impl ShapeModel for Solid {
 }
 
 impl VariantModel for Solid {
-    /// Returns path-dependent memory for a coefficient of friction above zero, else a stateless law.
+    /// Returns path-dependent memory for a coefficient of friction above zero and for a body that has an inside, else a stateless
+    /// law.
     fn variant_info(&self) -> VariantInfo {
-        let memory = if self.friction[0].is_smooth() { Memory::Stateless } else { Memory::PathDependent };
+        let memory = if self.friction[0].is_smooth() && !matches!(self.law, Law::Anywhere(_)) {
+            Memory::Stateless
+        } else {
+            Memory::PathDependent
+        };
         VariantInfo::new(Demand::ALL, memory)
     }
 }

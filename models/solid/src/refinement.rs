@@ -5,8 +5,8 @@
 //! has no hanging nodes, and a curved element keeps its map: the halves are quadratic and cover the same volume.
 
 use crate::cells::Kind;
-use crate::mesh::Mesh;
-use std::collections::{BTreeMap, HashMap};
+use crate::mesh::{Mesh, sorted};
+use std::collections::{BTreeSet, HashMap};
 
 /// Quadratic tetrahedron of a refined mesh.
 #[derive(Clone, Copy, Debug)]
@@ -61,12 +61,8 @@ impl Refinement {
     /// Prepares the refinement of a mesh; `None` if an element is not a tetrahedron.
     #[must_use]
     pub fn new(mesh: &Mesh) -> Option<Self> {
-        let mut touched: BTreeMap<Vec<usize>, bool> = BTreeMap::new();
-        for facet in &mesh.touched {
-            let mut corners = facet.nodes[..facet.corners].to_vec();
-            corners.sort_unstable();
-            touched.insert(corners, true);
-        }
+        let touched: BTreeSet<Vec<usize>> =
+            mesh.touched.iter().map(|facet| sorted(&facet.nodes[..facet.corners])).collect();
         let mut all = Self {
             nodes_m: mesh.nodes_m.clone(),
             fixed: mesh.fixed.clone(),
@@ -82,13 +78,8 @@ impl Refinement {
             for (k, [a, b]) in Kind::Tetrahedron.edges().iter().enumerate() {
                 all.middles.insert(edge(corners[*a], corners[*b]), narrow(element.nodes[4 + k]));
             }
-            let is_touched = |left_out: usize| {
-                let mut face: Vec<usize> =
-                    (0..4).filter(|k| *k != left_out).map(|k| element.nodes[k]).collect();
-                face.sort_unstable();
-                touched.contains_key(&face)
-            };
-            let touched = [0, 1, 2, 3].map(is_touched);
+            let touched = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]]
+                .map(|face| touched.contains(&sorted(&face.map(|k| element.nodes[k]))));
             all.add(Tetrahedron { corners, touched, parent: narrow(parent), is_leaf: true });
         }
         Some(all)

@@ -21,7 +21,7 @@ fn atlas() -> &'static Atlas {
         };
         match description.solve().expect("a solid").0 {
             Law::Sphere(atlas) => atlas,
-            Law::Bonded(_) | Law::Spheres(_) => panic!("a sphere"),
+            Law::Bonded(_) | Law::Spheres(_) | Law::Anywhere(_) => panic!("a sphere"),
         }
     })
 }

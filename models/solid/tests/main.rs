@@ -1,5 +1,6 @@
 //! The solid against tables made elsewhere, and against the laws no solid may break.
 
+mod anywhere;
 mod contact;
 mod finer;
 mod mesh;
@@ -36,4 +37,3 @@ fn leaves_out_long_tests() -> bool {
     }
     is_quick
 }
-mod anywhere;
