@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)] // text into memory
 
 mod contact;
+mod edges;
 mod files;
 mod shapes;
 mod smooth;
