@@ -4,6 +4,8 @@
 
 mod contact;
 mod edges;
+mod exhaustive;
 mod files;
+mod search;
 mod shapes;
 mod smooth;
